@@ -1,0 +1,379 @@
+//! What a source file says, before any name has a meaning.
+//!
+//! Everything is kept in a few flat lists that refer to each other by index: a file of a million lines is a handful of
+//! allocations, and a statement within a repetition is read again and again without being copied.
+
+use crate::expr::Operator;
+use crate::intern::NameId;
+use crate::source::Span;
+use std::collections::BTreeSet;
+
+/// A name as written: plain, or a template such as `l{i}` whose text depends on where it is expanded.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub struct NameRef(u32);
+
+impl NameRef {
+    const TEMPLATE: u32 = 1 << 31;
+
+    /// A plain name.
+    #[inline]
+    pub const fn plain(name: NameId) -> NameRef {
+        NameRef(name.0)
+    }
+
+    /// The template of this index in [`Ast::templates`].
+    pub const fn template(index: u32) -> NameRef {
+        NameRef(index | NameRef::TEMPLATE)
+    }
+
+    /// The plain name, or else the template's index.
+    #[inline]
+    pub const fn resolve(self) -> Result<NameId, usize> {
+        if self.0 & NameRef::TEMPLATE == 0 {
+            Ok(NameId(self.0))
+        } else {
+            Err((self.0 & !NameRef::TEMPLATE) as usize)
+        }
+    }
+}
+
+/// A name and its place.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Name {
+    /// The name.
+    pub name: NameRef,
+    /// Its place.
+    pub span: Span,
+}
+
+/// `head{e}middle{e}tail`: what precedes each braced expression, the expression, and the tail.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Template {
+    /// Text and expression, in turn.
+    pub parts: Vec<(NameId, Vec<Node>)>,
+    /// The text after the last expression.
+    pub tail: NameId,
+}
+
+/// A node of an expression's tree.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Node {
+    /// What it is.
+    pub kind: NodeKind,
+    /// The part of the source that it stands for.
+    pub span: Span,
+}
+
+/// What a node is. Operands precede their operator.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum NodeKind {
+    /// An integer literal.
+    Int(i64),
+    /// A real literal.
+    Real(f64),
+    /// A name.
+    Name(NameRef),
+    /// An operator before the one operand that precedes the node.
+    Prefix(Operator),
+    /// An operator between the two operands that precede the node.
+    Infix(Operator),
+    /// A function, by name, of as many arguments as precede the node.
+    Call(NameId, u32),
+}
+
+/// An expression: a range of nodes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct ExprId {
+    /// First node.
+    pub first: u32,
+    /// Number of nodes.
+    pub count: u32,
+}
+
+impl ExprId {
+    /// The nodes' indices.
+    #[inline]
+    pub fn range(self) -> std::ops::Range<usize> {
+        self.first as usize..(self.first + self.count) as usize
+    }
+}
+
+/// An expression and its place.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Expr {
+    /// The expression.
+    pub id: ExprId,
+    /// Its place.
+    pub span: Span,
+}
+
+/// An operand as written.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Operand {
+    /// What it is.
+    pub kind: OperandKind,
+    /// Its place.
+    pub span: Span,
+}
+
+/// What an operand looks like.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum OperandKind {
+    /// A name alone: a register, port, label, constant or parameter.
+    Name(NameRef),
+    /// Any other expression.
+    Expr(ExprId),
+    /// `@m12`: a register by its canonical name.
+    Place(NameRef),
+    /// `offset[register]`: an index into [`Ast::memories`].
+    Memory(u32),
+}
+
+/// `offset[register]`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Memory {
+    /// The offset; none is 0.
+    pub offset: Option<Expr>,
+    /// What stands in the brackets.
+    pub base: Operand,
+}
+
+/// An operation of a bundle, or the use of a macro.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Operation {
+    /// The mnemonic, the macro's name, or `.raw`.
+    pub mnemonic: Name,
+    /// Its first operand in [`Ast::operands`].
+    pub first: u32,
+    /// How many operands it has.
+    pub count: u32,
+    /// Line, from 1.
+    pub line: u32,
+    /// From the mnemonic to the last operand.
+    pub span: Span,
+}
+
+/// A line: an optional label, and what follows.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Statement {
+    /// The label.
+    pub label: Option<Name>,
+    /// What follows.
+    pub kind: StatementKind,
+    /// Line, from 1.
+    pub line: u32,
+}
+
+/// What a line does.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum StatementKind {
+    /// Nothing: a label alone, or a line that could not be read.
+    Empty,
+    /// Operations: their first in [`Ast::operations`] and their number.
+    Bundle(u32, u32),
+    /// A directive: its index in [`Ast::directives`].
+    Directive(u32),
+}
+
+/// What a declaration declares.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Declares {
+    /// Registers.
+    Register,
+    /// Registers whose value outlives the period.
+    State,
+    /// Input ports.
+    Input,
+    /// Output ports.
+    Output,
+}
+
+/// One name of a declaration.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Declaration {
+    /// The name.
+    pub name: Name,
+    /// What follows its colon.
+    pub ty: Option<Name>,
+    /// What follows its `@`.
+    pub place: Option<Name>,
+}
+
+/// A section of the program.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Hash, PartialOrd, Ord)]
+pub enum Section {
+    /// What runs once, after reset.
+    Once,
+    /// What runs every period.
+    Period,
+    /// Data memory.
+    Data,
+}
+
+impl Section {
+    /// Its name, without the point.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Section::Once => "once",
+            Section::Period => "period",
+            Section::Data => "data",
+        }
+    }
+}
+
+/// A directive and its operands.
+#[derive(Clone, PartialEq, Debug)]
+pub struct DirectiveLine {
+    /// The directive.
+    pub kind: DirectiveKind,
+    /// The directive's place and, where it has operands, theirs.
+    pub span: Span,
+}
+
+/// A directive and its operands. `end` and `next` are indices into [`Ast::statements`], known once the file is read.
+#[derive(Clone, PartialEq, Debug)]
+pub enum DirectiveKind {
+    /// `.reg`, `.state`, `.input`, `.output`.
+    Declare(Declares, Vec<Declaration>),
+    /// `.const`.
+    Const(Name, Expr),
+    /// `.preset`.
+    Preset {
+        /// The register, by its name or its place.
+        register: Name,
+        /// Whether `@` stands before it: then it is a place.
+        placed: bool,
+        /// What the loader writes there.
+        value: Expr,
+    },
+    /// `.once`, `.period`, `.data`.
+    Section(Section),
+    /// `.float`.
+    Float(Vec<Expr>),
+    /// `.word`.
+    Word(Vec<Expr>),
+    /// `.space`.
+    Space(Expr),
+    /// `.macro`, its parameters, and the statement of its `.endm`.
+    Macro {
+        /// The macro.
+        name: Name,
+        /// Its parameters.
+        parameters: Vec<Name>,
+        /// Where it ends.
+        end: u32,
+    },
+    /// `.rep` and the statement of its `.endr`.
+    Rep {
+        /// The name that counts.
+        variable: Name,
+        /// Its first value.
+        first: Expr,
+        /// Its last value.
+        last: Expr,
+        /// Where it ends.
+        end: u32,
+    },
+    /// `.if` and the statement of the next branch or its `.endif`.
+    If(Expr, u32),
+    /// `.elif`, the next branch, and the `.endif`.
+    Elif(Expr, u32, u32),
+    /// `.else` and the `.endif`.
+    Else(u32),
+    /// `.endm`, `.endr`, `.endif`.
+    End(Directive),
+    /// A `.macro`, `.rep` or `.if` that could not be read, and where it ends: what it encloses is passed over.
+    Broken(Directive, u32),
+    /// `.include`.
+    Include(String),
+    /// `.loc`: one place for all that follows, or one for each operation of each bundle that follows.
+    Loc(Vec<Loc>),
+    /// `.error`.
+    Error(String),
+    /// `.schedule` and `on` or `off`.
+    Schedule(Name),
+}
+
+/// One place of a `.loc`.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Loc {
+    /// `none`, or another name by mistake.
+    None(Name),
+    /// A file and a line.
+    At(String, Expr),
+}
+
+macro_rules! directives {
+    ($($variant:ident $name:literal $operands:literal;)*) => {
+        /// The directives, by name.
+        #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+        #[allow(missing_docs)]
+        pub enum Directive {
+            $($variant,)*
+        }
+
+        impl Directive {
+            /// Every directive.
+            pub const ALL: &[Directive] = &[$(Directive::$variant),*];
+
+            /// Its name, with the point.
+            pub const fn name(self) -> &'static str {
+                match self { $(Directive::$variant => $name,)* }
+            }
+
+            /// Its operands, as a message shows them.
+            pub const fn operands(self) -> &'static str {
+                match self { $(Directive::$variant => $operands,)* }
+            }
+        }
+    };
+}
+
+directives! {
+    Reg ".reg" "a, b:int, c @ m3";
+    State ".state" "a, b:int, c @ m3";
+    Input ".input" "a, b:int";
+    Output ".output" "a, b:int";
+    Const ".const" "NAME = expression";
+    Preset ".preset" "m12 = expression";
+    Once ".once" "";
+    Period ".period" "";
+    Data ".data" "";
+    Float ".float" "expression, …";
+    Word ".word" "expression, …";
+    Space ".space" "words";
+    Macro ".macro" "name p, q";
+    EndMacro ".endm" "";
+    Rep ".rep" "i, first, last";
+    EndRep ".endr" "";
+    If ".if" "expression";
+    Elif ".elif" "expression";
+    Else ".else" "";
+    EndIf ".endif" "";
+    Include ".include" "\"file\"";
+    Loc ".loc" "\"file\" line";
+    Error ".error" "\"text\"";
+    Schedule ".schedule" "on|off";
+    Raw ".raw" "slot 0x…";
+}
+
+/// A source file, read.
+#[derive(Clone, Default, Debug)]
+pub struct Ast {
+    /// Lines that say something, in order.
+    pub statements: Vec<Statement>,
+    /// Operations of the bundles.
+    pub operations: Vec<Operation>,
+    /// Operands of the operations.
+    pub operands: Vec<Operand>,
+    /// Nodes of the expressions.
+    pub nodes: Vec<Node>,
+    /// Memory operands.
+    pub memories: Vec<Memory>,
+    /// Name templates.
+    pub templates: Vec<Template>,
+    /// Directives.
+    pub directives: Vec<DirectiveLine>,
+    /// Names in lines that could not be read and may have declared them: that they are unknown is no further error.
+    pub doubtful: BTreeSet<NameId>,
+}

@@ -1,0 +1,152 @@
+//! The assembler: Takt source to [`Program`], and a program to an image and back.
+//!
+//! The stages, each a module:
+//!
+//! ```text
+//! text ─ lex ─ tokens ─ parse ─ ast ─ expand ─ flat list ─ resolve ─ ir ─ place ─ emit ─ Program ─ image
+//! ```
+//!
+//! `docs/language.md` is the contract of the language, `docs/image.md` that of the image. Nothing here prints, and nothing here
+//! touches the file system but [`load::FileLoader`]. No input makes the assembler panic; [`limits`] bounds what it takes.
+
+pub mod ast;
+mod blocks;
+mod check;
+mod context;
+mod declare;
+pub mod diag;
+pub mod disasm;
+mod emit;
+mod expand;
+pub mod expr;
+mod expression;
+mod files;
+mod grammar;
+pub mod image;
+pub mod intern;
+pub mod ir;
+mod lex;
+pub mod limits;
+pub mod listing;
+pub mod load;
+mod operand;
+pub mod parse;
+pub mod place;
+pub mod resolve;
+pub mod schedule;
+mod serialise;
+pub mod source;
+mod unknown;
+mod values;
+
+use diag::{Diagnostics, Severity};
+use source::Sources;
+use std::sync::Arc;
+use takt_isa::{Machine, Program, T3};
+
+pub use diag::Diagnostic;
+pub use expression::Expression;
+pub use load::{FileLoader, LoadError, Loader, MemoryLoader};
+
+/// What the assembler is to do.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// The machine to assemble for.
+    pub machine: &'static Machine,
+    /// Which bundles the scheduler packs.
+    pub schedule: Schedule,
+    /// How long it searches; 0 is one pass.
+    pub effort: u32,
+}
+
+/// Which bundles the scheduler packs.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Schedule {
+    /// Those that the source says (`.schedule on`).
+    #[default]
+    AsWritten,
+    /// All.
+    All,
+    /// None.
+    None,
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options { machine: &T3, schedule: Schedule::AsWritten, effort: schedule::DEFAULT_EFFORT }
+    }
+}
+
+/// An assembled program and what is known about it beyond its image.
+#[derive(Clone, Debug)]
+pub struct Assembled {
+    /// The program.
+    pub program: Program,
+    /// Warnings; there are no errors.
+    pub warnings: Diagnostics,
+    /// The sources.
+    pub sources: Arc<Sources>,
+    /// Named constants and their values, in the order of the source.
+    pub constants: Vec<(String, expr::Value)>,
+    /// What became of each block that the scheduler packed, in order.
+    pub blocks: Vec<schedule::BlockReport>,
+    /// Words that a macro or a repetition made: indices into the program's code, ascending.
+    pub expanded: Vec<u32>,
+}
+
+/// Assembles a program whose first source is at hand, as from standard input or an editor; what it includes is loaded.
+/// `name` is its path within the project.
+///
+/// # Errors
+/// Every error of the program, and its warnings.
+pub fn assemble_bytes(
+    name: &str,
+    bytes: Vec<u8>,
+    loader: &dyn Loader,
+    options: &Options,
+) -> Result<Assembled, Diagnostics> {
+    assemble(name, &load::First { name, bytes, rest: loader }, options)
+}
+
+/// Assembles the program that begins with the source at `path`.
+///
+/// # Errors
+/// Every error of the program, and its warnings.
+pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<Assembled, Diagnostics> {
+    let context = context::Context::new(options.machine);
+    let (mut context, flat) = expand::Expander::new(context, loader).expand(path);
+    let mut ir = resolve::resolve(&mut context, flat);
+    let packs = |scheduled| match options.schedule {
+        Schedule::AsWritten => scheduled,
+        Schedule::All => true,
+        Schedule::None => false,
+    };
+    ir.bundles.iter_mut().for_each(|bundle| bundle.scheduled = packs(bundle.scheduled));
+    values::split(&mut ir);
+    check::check(&mut context, &ir);
+    let context::Context { mut sink, sources, constants, .. } = context;
+    let sources = Arc::new(sources);
+    // What follows would only report what follows from the errors there are.
+    if sink.errors > 0 {
+        return Err(sink.finish(sources));
+    }
+    let blocks = schedule::schedule(&mut ir, options.effort);
+    let placement = place::place(&ir, &mut sink);
+    let emitted = emit::emit(&ir, &placement, &mut sink);
+    let errors = sink.errors;
+    let report = sink.finish(Arc::clone(&sources));
+    if errors > 0 {
+        return Err(report);
+    }
+    debug_assert!(report.list.iter().all(|diagnostic| diagnostic.severity == Severity::Warning));
+    let constants =
+        constants.into_iter().filter_map(|constant| Some((constant.name, constant.value?))).collect();
+    Ok(Assembled {
+        program: emitted.program,
+        warnings: report,
+        sources,
+        constants,
+        blocks,
+        expanded: emitted.expanded,
+    })
+}

@@ -1,0 +1,48 @@
+//! Every limit of the assembler, by name. They keep an unreasonable source from taking unreasonable time or memory:
+//! beyond each stands one clear error. None is near what a real program needs.
+
+/// Bytes of one source file.
+pub const FILE_BYTES: usize = 64 << 20;
+/// Bytes of all source files of a program together, each counted once.
+pub const SOURCE_BYTES: usize = 256 << 20;
+/// Bytes of one line, its continuations included.
+pub const LINE_BYTES: usize = 1 << 20;
+/// Nesting of parentheses, brackets, prefix operators and powers in one operand.
+pub const EXPRESSION_DEPTH: usize = 128;
+/// Macro arguments and name templates that depend on one another.
+pub const EVALUATION_DEPTH: usize = EXPRESSION_DEPTH + 32;
+/// Operands and operators of one expression.
+pub const EXPRESSION_NODES: usize = 1 << 16;
+/// `.include` within `.include`.
+pub const INCLUDE_DEPTH: usize = 32;
+/// `.include`s met during expansion.
+pub const INCLUDES: usize = 1 << 16;
+/// A macro's use within a macro's body.
+pub const MACRO_DEPTH: usize = 64;
+/// `.rep` and `.if` within one another, in one file.
+pub const BLOCK_DEPTH: usize = 64;
+/// Repetitions of one `.rep`.
+pub const REPETITIONS: i64 = 1 << 20;
+/// Statements met during expansion, each repetition and each macro use counted (fewer in the fuzz targets, where each
+/// takes a hundred times as long).
+pub const STATEMENTS: usize = 4 << 20;
+/// Operations of the expanded program, whatever the machine's program memory.
+pub const OPERATIONS: usize = 4 << 20;
+/// Operations of one bundle, on a machine that issues them one after another.
+pub const BUNDLE_OPERATIONS: usize = 64;
+/// Words of the expanded data memory, whatever the machine's.
+pub const DATA_WORDS: usize = 1 << 20;
+/// Characters of a name.
+pub const NAME_BYTES: usize = 255;
+/// Names that a program may use, those of macros' locals and of name templates included.
+pub const NAMES: usize = 1 << 24;
+/// Errors, and warnings, that are kept and shown; the rest are counted.
+pub const SHOWN: usize = 100;
+/// Bytes of a source line that a shown diagnostic quotes; of a longer line, the part around the error.
+pub const QUOTED_BYTES: usize = 160;
+/// Names that are compared with a misspelt one.
+pub const CANDIDATES: usize = 1 << 14;
+/// Bytes of an image.
+pub const IMAGE_BYTES: usize = 256 << 20;
+/// Characters of a misspelt name that is compared with others.
+pub const COMPARED_CHARACTERS: usize = 40;

@@ -1,0 +1,388 @@
+//! Operands to registers, labels and numbers: the part of [`resolve`](crate::resolve) that looks at one operand.
+
+use crate::ast::*;
+use crate::context::{Argument, At, Binding, Reported};
+use crate::declare::{address, register_at};
+use crate::diag::{Diagnostic, nearest};
+use crate::expr::{EvalError, Value};
+use crate::intern::NameId;
+use crate::ir::{Constant, LabelId, Operation, Register, RegisterId, RegisterKind};
+use crate::resolve::Resolver;
+use crate::source::Span;
+use crate::unknown::Wanted;
+use takt_isa::shape::Field;
+use takt_isa::{Operand as Place, ROWS, Row, Type};
+
+/// An operand and where it stands, parameters replaced by what was given for them; and what its name means, if it is one.
+type Meaning = (At, Operand, Option<(NameId, Binding)>);
+
+impl Resolver<'_> {
+    pub(crate) fn operand(
+        &mut self,
+        at: At,
+        row: &Row,
+        place: Place,
+        operand: Operand,
+        operation: &mut Operation,
+    ) -> Result<(), Reported> {
+        match place {
+            Place::Dest => operation.dest = Some(self.dest(at, operand)?),
+            Place::Source(index) => {
+                operation.sources[index] = self.source(at, operand, row.source_type(index))?
+            }
+            Place::Immediate => {
+                operation.constant = match self.code_label(at, operand)? {
+                    Some(label) => Constant::Code(label),
+                    None => Constant::Value(self.constant(at, operand, row.result_type())?),
+                }
+            }
+            Place::Target => operation.constant = self.target(at, operand)?,
+            Place::Memory => {
+                let (offset, base) = self.memory(at, operand, row)?;
+                operation.constant = Constant::Value(offset);
+                operation.sources[0] = base;
+            }
+        }
+        Ok(())
+    }
+
+    /// Follows parameters to the operand that was given for them, and what its name means if it is a name.
+    fn meaning(&mut self, mut at: At, mut operand: Operand) -> Result<Meaning, Reported> {
+        loop {
+            let OperandKind::Name(name) = operand.kind else { return Ok((at, operand, None)) };
+            let name = self.context.name(at, name, operand.span)?;
+            match self.context.lookup(at.scope, name) {
+                // Arguments that are parameters themselves were replaced when the macro was used.
+                Binding::Argument(argument) => {
+                    Argument { operand, at, .. } = self.context.arguments[argument as usize];
+                }
+                binding => return Ok((at, operand, Some((name, binding)))),
+            }
+        }
+    }
+
+    fn dest(&mut self, at: At, operand: Operand) -> Result<RegisterId, Reported> {
+        let (place, given, meaning) = self.meaning(at, operand)?;
+        let register = match (given.kind, meaning) {
+            (_, Some((_, Binding::Register(register)))) => register,
+            (_, Some((name, Binding::None))) => {
+                return Err(self.context.unknown(place.scope, name, given.span, Wanted::Dest));
+            }
+            (OperandKind::Place(name), _) => {
+                let address = address(self.context, place, Name { name, span: given.span })?;
+                register_at(self.context, address, given.span)
+            }
+            (_, Some((name, binding))) => {
+                let kind = self.context.kind_text(binding);
+                let message = format!("`{}` is {kind}: it cannot be written", self.context.names.text(name));
+                let mut error = Diagnostic::error("not-writable", given.span, message);
+                if let Some(declared) = self.context.declaration(binding) {
+                    error = error.also(declared, "declared here");
+                }
+                return Err(self
+                    .context
+                    .report(at.scope, error.help("the first operand is the register to write")));
+            }
+            _ => {
+                let error = Diagnostic::error("not-writable", given.span, "this cannot be written")
+                    .help("the first operand is the register to write");
+                return Err(self.context.report(at.scope, error));
+            }
+        };
+        let Register { kind, name, span, pinned, .. } = &self.context.registers[register.index()];
+        let machine = self.ir.machine;
+        let input = *kind == RegisterKind::Input || pinned.is_some_and(|address| machine.is_input(address));
+        let error = match kind {
+            RegisterKind::Zero => {
+                let error = Diagnostic::error(
+                    "not-writable",
+                    given.span,
+                    "`zero` always reads as zero: it cannot be written",
+                );
+                error.help("name a register for the result, even an unused one")
+            }
+            _ if input && name.is_empty() => {
+                Diagnostic::error("not-writable", given.span, "an input port is written from outside only")
+            }
+            _ if input => {
+                let message = format!("`{name}` is an input port: it is written from outside only");
+                Diagnostic::error("not-writable", given.span, message).also(*span, "declared here")
+            }
+            _ => return Ok(register),
+        };
+        Err(self.context.report(at.scope, error))
+    }
+
+    /// A register to read: a register as such, or the one that holds a constant.
+    fn source(&mut self, at: At, operand: Operand, ty: Type) -> Result<RegisterId, Reported> {
+        let (place, given, meaning) = self.meaning(at, operand)?;
+        match (given.kind, meaning) {
+            (_, Some((_, Binding::Register(register)))) => Ok(register),
+            (_, Some((name, Binding::None))) => {
+                Err(self.context.unknown(place.scope, name, given.span, Wanted::Source))
+            }
+            (OperandKind::Place(name), _) => {
+                let address = address(self.context, place, Name { name, span: given.span })?;
+                Ok(register_at(self.context, address, given.span))
+            }
+            (OperandKind::Memory(_), _) => {
+                let error =
+                    Diagnostic::error("operand", given.span, "a memory operand where a register is read")
+                        .help("load it into a register with `ld` first");
+                Err(self.context.report(at.scope, error))
+            }
+            _ => {
+                let bits = self.constant(place, given, ty)?;
+                Ok(self.pooled(bits, given.span))
+            }
+        }
+    }
+
+    /// The register that holds a constant.
+    fn pooled(&mut self, bits: u32, span: Span) -> RegisterId {
+        if bits == 0 {
+            return RegisterId::ZERO;
+        }
+        let registers = &mut self.context.registers;
+        *self.pool.entry(bits).or_insert_with(|| {
+            registers.push(Register {
+                name: String::new(),
+                kind: RegisterKind::Constant(bits),
+                ty: Type::B,
+                pinned: None,
+                preset: None,
+                span,
+            });
+            RegisterId::new(registers.len() - 1)
+        })
+    }
+
+    /// The bits of a constant operand.
+    fn constant(&mut self, at: At, operand: Operand, ty: Type) -> Result<u32, Reported> {
+        let value = self.operand_value(at, operand)?;
+        self.bits(at, value, ty, operand.span)
+    }
+
+    pub(crate) fn bits(&mut self, at: At, value: Value, ty: Type, span: Span) -> Result<u32, Reported> {
+        let bits = value.bits(ty).map_err(|fault| self.context.fault(at.scope, EvalError { span, fault }))?;
+        if let Value::Real(real) = value
+            && ty != Type::I
+            && bits << 1 == 0
+            && real != 0.0
+        {
+            let warning =
+                Diagnostic::warning("underflow", span, format!("{real:e} rounds to zero in binary32"));
+            self.context.report(at.scope, warning);
+        }
+        Ok(bits)
+    }
+
+    pub(crate) fn operand_value(&mut self, at: At, operand: Operand) -> Result<Value, Reported> {
+        let (place, given, meaning) = self.meaning(at, operand)?;
+        match (given.kind, meaning) {
+            (OperandKind::Expr(expr), _) => self.context.value(place, expr),
+            (_, Some((name, _))) => self.context.name_value(place.scope, name, given.span),
+            _ => {
+                let error = Diagnostic::error("operand", given.span, "a constant expression is needed here");
+                Err(self.context.report(at.scope, error))
+            }
+        }
+    }
+
+    /// The code label that an operand is, if it is one.
+    fn code_label(&mut self, at: At, operand: Operand) -> Result<Option<LabelId>, Reported> {
+        Ok(match self.meaning(at, operand)? {
+            (_, _, Some((_, Binding::Code(label)))) => Some(label),
+            _ => None,
+        })
+    }
+
+    fn target(&mut self, at: At, operand: Operand) -> Result<Constant, Reported> {
+        let (place, given, meaning) = self.meaning(at, operand)?;
+        match meaning {
+            Some((_, Binding::Code(label))) => return Ok(Constant::Code(label)),
+            Some((name, Binding::None)) => {
+                return Err(self.context.unknown(place.scope, name, given.span, Wanted::Target));
+            }
+            Some((name, binding @ (Binding::Register(_) | Binding::Data(_)))) => {
+                let kind = self.context.kind_text(binding);
+                let message = format!("`{}` is {kind}, not a code label", self.context.names.text(name));
+                let mut error = Diagnostic::error("operand", given.span, message);
+                if let Some(declared) = self.context.declaration(binding) {
+                    error = error.also(declared, "declared here");
+                }
+                return Err(self.context.report(at.scope, error));
+            }
+            _ => {}
+        }
+        let value = self.operand_value(place, given)?;
+        let target = value
+            .integer()
+            .map_err(|fault| self.context.fault(at.scope, EvalError { span: given.span, fault }))?;
+        self.field(at, target, Field::Target, given.span, "a bundle address")
+    }
+
+    /// A number for a field of the word.
+    fn field(
+        &mut self,
+        at: At,
+        value: i64,
+        field: Field,
+        span: Span,
+        what: &str,
+    ) -> Result<Constant, Reported> {
+        let most = field.bits().max();
+        match u32::try_from(value) {
+            Ok(value) if value <= most => Ok(Constant::Value(value)),
+            _ => {
+                let error = Diagnostic::error("range", span, format!("{what} is 0 to {most}, not {value}"));
+                Err(self.context.report(at.scope, error))
+            }
+        }
+    }
+
+    /// Offset and base of a memory operand.
+    fn memory(&mut self, at: At, operand: Operand, row: &Row) -> Result<(u32, RegisterId), Reported> {
+        let (place, given, meaning) = self.meaning(at, operand)?;
+        let (value, span, base) = match (given.kind, meaning) {
+            (OperandKind::Memory(memory), _) => {
+                let Memory { offset, base } = self.context.asts[place.ast as usize].memories[memory as usize];
+                let value = match offset {
+                    Some(offset) => self.context.integer(place, offset),
+                    None => Ok(0),
+                };
+                let base = self.source(place, base, row.source_type(0));
+                (value?, offset.map_or(given.span, |offset| offset.span), base?)
+            }
+            (_, Some((name, binding @ (Binding::Register(_) | Binding::Code(_))))) => {
+                let text = self.context.names.text(name).to_owned();
+                let kind = self.context.kind_text(binding);
+                let mut error = Diagnostic::error(
+                    "operand",
+                    given.span,
+                    format!("`{text}` is {kind}, not a place in memory"),
+                );
+                if matches!(binding, Binding::Register(_)) {
+                    error = error.help(format!("write `[{text}]` for the word that it points to"));
+                }
+                return Err(self.context.report(at.scope, error));
+            }
+            _ => {
+                let value = self.operand_value(place, given)?;
+                let value = value.integer().map_err(|fault| {
+                    let span = given.span;
+                    self.context.fault(at.scope, EvalError { span, fault })
+                })?;
+                (value, given.span, RegisterId::ZERO)
+            }
+        };
+        match self.field(at, value, Field::Offset, span, "an offset")? {
+            Constant::Value(offset) => Ok((offset, base)),
+            _ => Err(Reported),
+        }
+    }
+
+    pub(crate) fn wrong_count(
+        &mut self,
+        at: At,
+        row: &Row,
+        written: &crate::ast::Operation,
+        operands: &[Operand],
+    ) -> Reported {
+        let places = row.shape.operands();
+        let plural = |count: usize| if count == 1 { "" } else { "s" };
+        let message = format!(
+            "`{}` takes {} operand{}, not {}",
+            row.mnemonic,
+            places.len(),
+            plural(places.len()),
+            operands.len()
+        );
+        // At the first operand too many, or else behind the last.
+        let span = match operands.get(places.len()) {
+            Some(first) => first.span.to(written.span),
+            None => written.span,
+        };
+        let error = Diagnostic::error("operands", span, message);
+        let write = format!("{} {}", row.mnemonic, row.shape.syntax());
+        self.context.report(at.scope, error.help(format!("write `{}`", write.trim_end())))
+    }
+
+    pub(crate) fn unknown_mnemonic(
+        &mut self,
+        at: At,
+        name: NameId,
+        written: &crate::ast::Operation,
+        of: usize,
+    ) -> Reported {
+        let text = self.context.names.text(name).to_owned();
+        let span = written.mnemonic.span;
+        if let Some(definition) = self.context.macros.get(&name)
+            && of > 1
+        {
+            let defined = definition.span(&self.context.asts);
+            let error = Diagnostic::error("macro-in-bundle", span, format!("macro `{text}` within a bundle"))
+                .also(defined, "defined here")
+                .help("a macro's use stands alone on its line");
+            return self.context.report(at.scope, error);
+        }
+        if let Some(definition) = self.context.macros.get(&name) {
+            let defined = definition.span(&self.context.asts);
+            let error = Diagnostic::error(
+                "declared-later",
+                span,
+                format!("macro `{text}` is used before its definition"),
+            )
+            .also(defined, "defined only here")
+            .help("move the definition up");
+            return self.context.report(at.scope, error);
+        }
+        let directive = format!(".{text}");
+        let error = Diagnostic::error(
+            "unknown-instruction",
+            span,
+            format!("there is no instruction or macro `{text}`"),
+        );
+        let error = if Directive::ALL.iter().any(|known| known.name() == directive) {
+            error.did_you_mean(Some(directive))
+        } else {
+            let macros: Vec<&str> =
+                self.context.macros.keys().map(|name| self.context.names.text(*name)).collect();
+            let mut known: Vec<&str> = ROWS.iter().map(|row| row.mnemonic).chain(macros).collect();
+            known[ROWS.len()..].sort_unstable();
+            let lower = text.to_ascii_lowercase();
+            error.did_you_mean(alias(&lower).map(str::to_owned).or_else(|| nearest(&text, known)))
+        };
+        self.context.report(at.scope, error)
+    }
+}
+
+/// What users of other assemblers may write.
+fn alias(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "add" => "fadd",
+        "sub" => "fsub",
+        "mul" => "fmul",
+        "div" => "fdiv",
+        "sqrt" => "fsqrt",
+        "sin" => "fsin",
+        "abs" => "fabs",
+        "neg" => "fneg",
+        "min" => "fmin",
+        "max" => "fmax",
+        "and" => "iand",
+        "or" => "ior",
+        "xor" => "ixor",
+        "shl" | "sll" => "ishl",
+        "shr" | "srl" => "ishr",
+        "sar" | "sra" => "isar",
+        "load" | "lw" => "ld",
+        "store" | "sw" => "st",
+        "move" | "mv" => "mov",
+        "jump" | "br" | "b" | "j" => "jmp",
+        "beqz" | "brz" => "bz",
+        "bnez" | "brnz" => "bnz",
+        "return" => "ret",
+        _ => return None,
+    })
+}

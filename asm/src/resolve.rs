@@ -1,0 +1,324 @@
+//! Names to registers, labels and numbers: the expanded source as [`Ir`].
+
+use crate::ast::*;
+use crate::context::{At, Context, Reported};
+use crate::diag::{Diagnostic, nearest};
+use crate::expand::{Data, Flat, Item};
+use crate::ir::{Bundle, Constant, Ir, Operation, RegisterId};
+use crate::serialise;
+use smallvec::SmallVec;
+use std::collections::HashMap;
+use std::rc::Rc;
+use takt_isa::program::Location;
+use takt_isa::spec::instructions::Function;
+use takt_isa::{Op, ROWS};
+
+/// Resolves the expanded source. What has a mistake is left out; the report says whether there is any.
+pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
+    let machine = context.machine;
+    let slots = ROWS
+        .iter()
+        .map(|row| match row.function {
+            Function::Idle => Host::Any,
+            function => machine.host(function).map_or(Host::None, |(slot, _)| Host::Slot(slot as u8)),
+        })
+        .collect();
+    let ir = Ir {
+        machine,
+        registers: Vec::new(),
+        bundles: Vec::with_capacity(flat.once.len() + flat.period.len()),
+        period: 0,
+        labels: Vec::new(),
+        data: Vec::new(),
+        raw: Vec::new(),
+        files: Vec::new(),
+    };
+    let mut resolver =
+        Resolver { context, flat, ir, slots, pool: HashMap::new(), own_files: Vec::new(), label: 0 };
+    let once = std::mem::take(&mut resolver.flat.once);
+    resolver.section(Section::Once, &once);
+    resolver.ir.period = resolver.ir.bundles.len() as u32;
+    let period = std::mem::take(&mut resolver.flat.period);
+    resolver.section(Section::Period, &period);
+    resolver.data();
+    resolver.presets();
+    let Resolver { mut ir, flat, .. } = resolver;
+    context.report_unknown();
+    ir.registers = std::mem::take(&mut context.registers);
+    ir.labels = std::mem::take(&mut context.labels);
+    ir.files = flat.files;
+    ir
+}
+
+/// Which slot executes an instruction.
+#[derive(Clone, Copy)]
+enum Host {
+    Any,
+    Slot(u8),
+    None,
+}
+
+pub(crate) struct Resolver<'c> {
+    pub(crate) context: &'c mut Context,
+    flat: Flat,
+    pub(crate) ir: Ir,
+    slots: Vec<Host>,
+    /// Registers that hold constants, by bits.
+    pub(crate) pool: HashMap<u32, RegisterId>,
+    /// For each tree, the number of its file among those that code is attributed to.
+    own_files: Vec<Option<u32>>,
+    /// Labels before this one have their position.
+    label: usize,
+}
+
+impl Resolver<'_> {
+    /// Resolves the bundles of a section, and moves the section's labels from statements to bundles.
+    fn section(&mut self, section: Section, items: &[Item]) {
+        self.label = 0;
+        for (index, item) in items.iter().enumerate() {
+            self.place_labels(section, index as u32);
+            self.item(item);
+        }
+        self.place_labels(section, u32::MAX);
+    }
+
+    /// Sets the position of the section's labels that stand at or before a statement.
+    fn place_labels(&mut self, section: Section, statement: u32) {
+        while let Some(label) = self.context.labels.get_mut(self.label) {
+            if self.context.label_sections[self.label] == section {
+                if label.position > statement {
+                    return;
+                }
+                label.position = self.ir.bundles.len() as u32;
+            }
+            self.label += 1;
+        }
+    }
+
+    fn item(&mut self, item: &Item) {
+        let ast = Rc::clone(&self.context.asts[item.at.ast as usize]);
+        let StatementKind::Bundle(first, count) = ast.statements[item.statement as usize].kind else {
+            return;
+        };
+        let written = &ast.operations[first as usize..(first + count) as usize];
+        let mut operations: SmallVec<[Operation; 1]> = SmallVec::with_capacity(written.len());
+        for (index, (operation, number)) in written.iter().zip(first..).enumerate() {
+            let location = self.location(item, operation, index, written.len());
+            // What goes wrong is in the report; other operations may have mistakes of their own.
+            if let Ok(operation) = self.operation(item.at, &ast, number, written.len(), location) {
+                operations.push(operation);
+            }
+        }
+        if operations.len() < written.len() {
+            return;
+        }
+        let explicit = written.len() > 1;
+        if !explicit {
+            self.ir.bundles.push(Bundle { operations, explicit, scheduled: item.scheduled });
+        } else if self.ir.machine.slots.len() == 1 {
+            match serialise::order(&operations) {
+                Ok(order) => {
+                    for index in order {
+                        let operations = SmallVec::from_elem(operations[index], 1);
+                        self.ir.bundles.push(Bundle { operations, explicit, scheduled: item.scheduled });
+                    }
+                }
+                Err(diagnostic) => {
+                    let diagnostic = diagnostic(&self.context.registers, self.ir.machine);
+                    self.context.report(item.at.scope, diagnostic);
+                }
+            }
+        } else if self.check_slots(item.at, &operations).is_ok() {
+            self.ir.bundles.push(Bundle { operations, explicit, scheduled: item.scheduled });
+        }
+    }
+
+    /// Where an operation comes from: its own line, or what `.loc` says.
+    fn location(
+        &mut self,
+        item: &Item,
+        operation: &crate::ast::Operation,
+        index: usize,
+        count: usize,
+    ) -> Option<Location> {
+        if item.loc != 0 {
+            let places = &self.flat.locs[item.loc as usize];
+            if places.len() > 1 && places.len() != count {
+                let message = format!("a bundle of {count}, and `.loc` gives {} places", places.len());
+                self.context.error(item.at.scope, "loc", operation.span, message);
+                return None;
+            }
+            let place = places.get(if places.len() == 1 { 0 } else { index }).copied().flatten();
+            return place.map(|(file, line)| Location { file, line });
+        }
+        let ast = item.at.ast as usize;
+        if let Some(Some(file)) = self.own_files.get(ast) {
+            return Some(Location { file: *file, line: operation.line });
+        }
+        let file = self.context.sources.file_of(operation.span.start);
+        let name = std::sync::Arc::clone(&self.context.sources.files()[file].name);
+        let file = self.flat.file(&name);
+        self.own_files.resize(self.own_files.len().max(ast + 1), None);
+        self.own_files[ast] = Some(file);
+        Some(Location { file, line: operation.line })
+    }
+
+    /// Two operations of a bundle that need one slot are a mistake.
+    fn check_slots(&mut self, at: At, operations: &[Operation]) -> Result<(), Reported> {
+        let machine = self.ir.machine;
+        let mut result = Ok(());
+        for (index, operation) in operations.iter().enumerate() {
+            let Some(slot) = operation.slot else { continue };
+            let Some(first) = operations[..index].iter().find(|before| before.slot == Some(slot)) else {
+                continue;
+            };
+            let name = machine.slots[slot as usize].name;
+            let message = format!("two operations of the bundle need slot `{name}`");
+            let what = |operation: &Operation| match operation.constant {
+                Constant::Raw(_) => ".raw",
+                _ => operation.row().mnemonic,
+            };
+            let error = Diagnostic::error("slot-conflict", operation.span, message)
+                .here(format!("`{}` needs it", what(operation)))
+                .also(first.span, format!("so does `{}`", what(first)))
+                .help("write them as two bundles");
+            result = Err(self.context.report(at.scope, error));
+        }
+        if operations.len() > machine.slots.len() && result.is_ok() {
+            let message = format!(
+                "{} operations, and {} has {} slots",
+                operations.len(),
+                machine.name,
+                machine.slots.len()
+            );
+            let last = operations[operations.len() - 1].span;
+            result = Err(self.context.error(at.scope, "slot-conflict", last, message));
+        }
+        result
+    }
+
+    fn operation(
+        &mut self,
+        at: At,
+        ast: &Ast,
+        number: u32,
+        of: usize,
+        location: Option<Location>,
+    ) -> Result<Operation, Reported> {
+        let written = &ast.operations[number as usize];
+        let name = self.context.name(at, written.mnemonic.name, written.mnemonic.span)?;
+        let operands = &ast.operands[written.first as usize..(written.first + written.count) as usize];
+        let Some(op) = name.op() else {
+            if name.directive() == Some(Directive::Raw) {
+                return self.raw(at, number, written, operands, location);
+            }
+            return Err(self.unknown_mnemonic(at, name, written, of));
+        };
+        let row = op.row();
+        let slot = match self.slots[op as usize] {
+            Host::Any => None,
+            Host::Slot(slot) => Some(slot),
+            Host::None => {
+                let message = format!("{} has no unit for `{}`", self.ir.machine.name, row.mnemonic);
+                let having = takt_isa::MACHINES.iter().find(|machine| machine.host(row.function).is_some());
+                let mut error = Diagnostic::error("no-unit", written.mnemonic.span, message);
+                if let Some(machine) = having {
+                    error = error.note(format!("machine {} has one", machine.name));
+                }
+                return Err(self.context.report(at.scope, error));
+            }
+        };
+        let places = row.shape.operands();
+        if places.len() != operands.len() {
+            return Err(self.wrong_count(at, row, written, operands));
+        }
+        let mut operation = Operation {
+            op,
+            slot,
+            dest: None,
+            sources: [RegisterId::ZERO; 3],
+            constant: Constant::None,
+            location,
+            span: written.span,
+            expansion: at.scope.0,
+            written: (at.ast, number),
+        };
+        let mut failed = false;
+        for (place, operand) in places.iter().zip(operands) {
+            // All operands are looked at, whatever is wrong with one.
+            failed |= self.operand(at, row, *place, *operand, &mut operation).is_err();
+        }
+        if failed { Err(Reported) } else { Ok(operation) }
+    }
+
+    /// `.raw slot word`.
+    fn raw(
+        &mut self,
+        at: At,
+        number: u32,
+        written: &crate::ast::Operation,
+        operands: &[Operand],
+        location: Option<Location>,
+    ) -> Result<Operation, Reported> {
+        let [slot, word] = operands else { return Err(Reported) };
+        let slots = self.ir.machine.slots;
+        let name = self.context.sources.text(slot.span).to_owned();
+        let Some(index) = slots.iter().position(|slot| slot.name == name) else {
+            let names = slots.iter().map(|slot| slot.name);
+            let message = format!("{} has no slot `{name}`", self.ir.machine.name);
+            let meant = nearest(&name, names.clone());
+            let error = Diagnostic::error("operand", slot.span, message)
+                .note(format!("slots: {}", names.collect::<Vec<_>>().join(" ")))
+                .did_you_mean(meant);
+            return Err(self.context.report(at.scope, error));
+        };
+        let value = self.operand_value(at, *word)?;
+        let Some(bits) =
+            value.integer().ok().and_then(|value| u64::try_from(value).ok()).filter(|value| value >> 48 == 0)
+        else {
+            return Err(self.context.error(at.scope, "range", word.span, "a word has 48 bits"));
+        };
+        self.ir.raw.push(bits);
+        Ok(Operation {
+            op: Op::nop,
+            slot: Some(index as u8),
+            dest: None,
+            sources: [RegisterId::ZERO; 3],
+            constant: Constant::Raw(self.ir.raw.len() as u32 - 1),
+            location,
+            span: written.span,
+            expansion: at.scope.0,
+            written: (at.ast, number),
+        })
+    }
+
+    fn data(&mut self) {
+        for entry in std::mem::take(&mut self.flat.data) {
+            match entry {
+                Data::Space(count) => {
+                    let length = self.ir.data.len() + count as usize;
+                    self.ir.data.resize(length, 0);
+                }
+                Data::Value(at, value, ty) => {
+                    let word = self.context.value(at, value.id);
+                    let word = word.and_then(|word| self.bits(at, word, ty, value.span));
+                    // A word with a mistake keeps its place.
+                    self.ir.data.push(word.unwrap_or(0));
+                }
+            }
+        }
+    }
+
+    fn presets(&mut self) {
+        for preset in std::mem::take(&mut self.flat.presets) {
+            let Ok(value) = self.context.value(preset.at, preset.value.id) else { continue };
+            let Ok(bits) = self.bits(preset.at, value, preset.ty, preset.value.span) else { continue };
+            let register = &mut self.context.registers[preset.register.index()];
+            if register.preset.replace(bits).is_some() {
+                let error =
+                    Diagnostic::error("declared-twice", preset.span, "this register is preset already");
+                self.context.report(preset.at.scope, error);
+            }
+        }
+    }
+}

@@ -1,0 +1,230 @@
+//! The scheduler: packs operations into bundles and orders them for the machine, from the specification alone.
+//!
+//! It works on one block at a time: a straight run of bundles that control enters only at its first and leaves only after
+//! its last. What must keep its order is an edge between two operations (see [`Block`]); everything else may move.
+//! `docs/scheduling.md` says what that means for who writes a program.
+
+mod solve;
+
+pub use solve::Bound;
+
+use crate::ir::{Bundle, Constant, Ir, Operation, RegisterId, RegisterKind};
+use crate::values;
+use smallvec::SmallVec;
+use solve::{Edge, Part, Problem, Solution, Task};
+use std::collections::{BTreeMap, HashMap};
+use takt_isa::program::{Location, Space};
+use takt_isa::{Effect, Function, Machine, Operand};
+
+/// How long the scheduler searches unless told otherwise.
+pub const DEFAULT_EFFORT: u32 = 20;
+
+/// What became of a block.
+#[derive(Clone, Debug)]
+pub struct BlockReport {
+    /// Where the block's first operation stands in the source.
+    pub location: Option<Location>,
+    /// The label at the block's start, if there is one.
+    pub label: Option<String>,
+    /// Address of its first bundle.
+    pub address: u32,
+    /// Operations.
+    pub operations: u32,
+    /// Bundles that they are packed into.
+    pub bundles: u32,
+    /// Cycles from the issue of its first bundle to that of its last, both included, if nothing is pending at its start.
+    pub cycles: u32,
+    /// What no schedule can be shorter than.
+    pub bound: Bound,
+}
+
+/// Schedules every block of bundles that ask for it ([`Bundle::scheduled`]).
+pub fn schedule(ir: &mut Ir, effort: u32) -> Vec<BlockReport> {
+    if jumps_to_numbers(ir) {
+        return Vec::new();
+    }
+    let blocks = values::runs(ir);
+    let mut reports = Vec::new();
+    let mut bundles: Vec<Bundle> = Vec::with_capacity(ir.bundles.len());
+    // New address of each block's start, by its old one.
+    let mut moved = BTreeMap::new();
+    for block in &blocks {
+        let address = bundles.len() as u32;
+        moved.insert(block.start as u32, address);
+        let old = &ir.bundles[block.start..block.end];
+        if !block.scheduled || old.len() < 2 {
+            bundles.extend_from_slice(old);
+            continue;
+        }
+        let (problem, origins) = Block::new(ir, old).problem();
+        let solution = solve::solve(&problem, effort);
+        let packed = pack(old, &origins, &solution);
+        reports.push(BlockReport {
+            location: old.first().and_then(|bundle| bundle.operations.first()?.location),
+            label: label_at(ir, block.start as u32),
+            address,
+            operations: packed.iter().map(|bundle| bundle.operations.len() as u32).sum(),
+            bundles: packed.len() as u32,
+            cycles: solution.length,
+            bound: solution.bound,
+        });
+        bundles.extend(packed);
+    }
+    let end = bundles.len() as u32;
+    let relocate = |position: u32| moved.get(&position).copied().unwrap_or(end);
+    ir.period = relocate(ir.period);
+    for label in ir.labels.iter_mut().filter(|label| label.space == Space::Code) {
+        label.position = relocate(label.position);
+    }
+    ir.bundles = bundles;
+    reports
+}
+
+/// Whether a target is a number: then every bundle must stay at its address.
+fn jumps_to_numbers(ir: &Ir) -> bool {
+    ir.operations().any(|operation| {
+        operation.row().shape.operands().contains(&Operand::Target)
+            && matches!(operation.constant, Constant::Value(_))
+    })
+}
+
+fn label_at(ir: &Ir, position: u32) -> Option<String> {
+    ir.labels
+        .iter()
+        .find(|label| label.space == Space::Code && label.position == position)
+        .map(|label| label.name.clone())
+}
+
+/// Which unit of a machine an operation uses, by slot.
+fn part(machine: &Machine, operation: &Operation) -> Part {
+    let function = operation.row().function;
+    let slot = usize::from(operation.slot.unwrap_or(0)).min(machine.slots.len() - 1);
+    let before: usize = machine.slots[..slot].iter().map(|slot| slot.units.len()).sum();
+    match machine.slots[slot].unit_for(function).filter(|_| function != Function::Idle) {
+        Some(unit) => {
+            let row = &machine.slots[slot].units[unit];
+            let writes = operation.dest.map(|_| row.latency);
+            Part { slot, unit: Some(before + unit), interval: row.interval, writes }
+        }
+        None => Part { slot, unit: None, interval: 1, writes: None },
+    }
+}
+
+/// The order that a block's operations must keep.
+///
+/// - A value is computed before it is read: by the unit's latency.
+/// - A register is read before it is overwritten: in the same cycle at the latest, for a bundle reads before it writes.
+/// - Values for one register, ports included, are written in the source's order: the earlier is written back when the later issues.
+/// - Loads and stores keep their order among each other, except loads among loads.
+/// - A load or store may fault, and what was on the output ports before must be the same: outputs written before it in the
+///   source issue before it, outputs written after it not before it.
+/// - What redirects control comes last; what drains comes when all is written.
+struct Block<'a> {
+    machine: &'static Machine,
+    bundles: &'a [Bundle],
+    is_output: Box<dyn Fn(RegisterId) -> bool + 'a>,
+}
+
+impl<'a> Block<'a> {
+    fn new(ir: &'a Ir, bundles: &'a [Bundle]) -> Block<'a> {
+        let is_output = Box::new(move |id: RegisterId| ir.register(id).kind == RegisterKind::Output);
+        Block { machine: ir.machine, bundles, is_output }
+    }
+
+    /// The problem, and for each of its tasks the bundle that it is.
+    fn problem(&self) -> (Problem, Vec<usize>) {
+        let mut problem = Problem {
+            slots: self.machine.slots.len(),
+            units: self.machine.slots.iter().map(|slot| slot.units.len()).sum(),
+            ..Problem::default()
+        };
+        let mut origins = Vec::new();
+        // For each register: the task of its last value with that value's latency, and the tasks that read it since.
+        let mut values: HashMap<RegisterId, (usize, u32)> = HashMap::new();
+        let mut readers: HashMap<RegisterId, Vec<usize>> = HashMap::new();
+        let (mut store, mut loads): (Option<usize>, Vec<usize>) = (None, Vec::new());
+        let (mut access, mut outputs): (Option<usize>, Vec<usize>) = (None, Vec::new());
+        for (b, bundle) in self.bundles.iter().enumerate() {
+            let effects = || bundle.operations.iter().map(|operation| operation.row().effect);
+            if !bundle.explicit && effects().all(|effect| effect == Effect::Nothing) {
+                continue; // A filler has nothing to fill here.
+            }
+            let to = problem.tasks.len();
+            origins.push(b);
+            let parts: Vec<Part> =
+                bundle.operations.iter().map(|operation| part(self.machine, operation)).collect();
+            let mut after = |from: usize, distance: u32| {
+                if from != to {
+                    problem.edges.push(Edge { from, to, distance });
+                }
+            };
+            for register in bundle.operations.iter().flat_map(Operation::reads) {
+                if let Some(&(from, latency)) = values.get(register) {
+                    after(from, latency);
+                }
+                readers.entry(*register).or_default().push(to);
+            }
+            for (operation, part) in bundle.operations.iter().zip(&parts) {
+                let Some(dest) = operation.dest else { continue };
+                for from in readers.remove(&dest).unwrap_or_default() {
+                    after(from, 0);
+                }
+                if let Some((from, latency)) = values.insert(dest, (to, part.writes.unwrap_or(0))) {
+                    after(from, latency);
+                }
+                if (self.is_output)(dest) {
+                    if let Some(from) = access {
+                        after(from, 0);
+                    }
+                    outputs.push(to);
+                }
+            }
+            for effect in effects() {
+                match effect {
+                    Effect::Load => {
+                        if let Some(from) = store {
+                            after(from, 1);
+                        }
+                        loads.push(to);
+                    }
+                    Effect::Store => {
+                        for from in loads.drain(..).chain(store) {
+                            after(from, 1);
+                        }
+                        store = Some(to);
+                    }
+                    _ => continue,
+                }
+                for from in outputs.drain(..) {
+                    after(from, 1);
+                }
+                access = Some(to);
+            }
+            if effects().any(Effect::redirects) {
+                let drains = effects().any(Effect::drains);
+                for from in 0..to {
+                    let written = problem.tasks[from].parts.iter().filter_map(|part| part.writes).max();
+                    after(from, written.filter(|_| drains).unwrap_or(0));
+                }
+            }
+            problem.tasks.push(Task { parts });
+        }
+        (problem, origins)
+    }
+}
+
+/// The bundles of a solution: tasks that issue in one cycle become one bundle.
+fn pack(old: &[Bundle], origins: &[usize], solution: &Solution) -> Vec<Bundle> {
+    let mut by_cycle: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    for (task, &cycle) in solution.start.iter().enumerate() {
+        by_cycle.entry(cycle).or_default().push(origins[task]);
+    }
+    let bundle = |members: Vec<usize>| {
+        let mut operations: SmallVec<[Operation; 1]> =
+            members.iter().flat_map(|&b| old[b].operations.iter().copied()).collect();
+        operations.sort_by_key(|operation| operation.slot);
+        let explicit = members.iter().any(|&b| old[b].explicit);
+        Bundle { operations, explicit, scheduled: true }
+    };
+    by_cycle.into_values().map(bundle).collect()
+}

@@ -1,0 +1,83 @@
+//! What the tests share.
+#![allow(dead_code)]
+
+use std::path::PathBuf;
+use takt_asm::{Assembled, FileLoader, MemoryLoader, Options, diag::Diagnostics};
+use takt_isa::{Machine, T3};
+
+/// The sources of a folder of this crate's tests whose names begin so, in order of their names, with the machine that
+/// their first line asks for (`; machine t1`).
+pub(crate) fn sources(folder: &str, prefix: &str) -> Vec<(String, &'static Machine)> {
+    let mut names: Vec<String> = std::fs::read_dir(root(folder))
+        .expect("the folder is part of the crate")
+        .map(|entry| entry.expect("it can be read").file_name().into_string().expect("names are ASCII"))
+        .filter(|name| name.starts_with(prefix) && name.ends_with(".s"))
+        .collect();
+    names.sort();
+    let machine = |name: &String| {
+        let text = std::fs::read_to_string(root(folder).join(name)).expect("it can be read");
+        let asked = text.lines().next().and_then(|line| line.strip_prefix("; machine "));
+        asked.map_or(&T3, |name| Machine::from_name(name.trim()).expect("the machine exists"))
+    };
+    names.into_iter().map(|name| (name.clone(), machine(&name))).collect()
+}
+
+/// A folder of this crate's tests.
+pub(crate) fn root(folder: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests").join(folder)
+}
+
+pub(crate) fn options(machine: &'static Machine) -> Options {
+    Options { machine, ..Options::default() }
+}
+
+/// Assembles a file of a folder of this crate's tests.
+pub(crate) fn assemble_file(
+    folder: &str,
+    name: &str,
+    machine: &'static Machine,
+) -> Result<Assembled, Diagnostics> {
+    takt_asm::assemble(name, &FileLoader::new(root(folder)), &options(machine))
+}
+
+/// Assembles a text.
+pub(crate) fn assemble(text: &str, machine: &'static Machine) -> Result<Assembled, Diagnostics> {
+    takt_asm::assemble("test.s", &MemoryLoader::of("test.s", text), &options(machine))
+}
+
+/// Assembles a text without mistakes for the fast machine.
+#[track_caller]
+pub(crate) fn good(text: &str) -> Assembled {
+    match assemble(text, &T3) {
+        Ok(assembled) => assembled,
+        Err(report) => panic!("{}", report.render(false)),
+    }
+}
+
+/// The errors and warnings of a text that is not accepted.
+#[track_caller]
+pub(crate) fn bad(text: &str, machine: &'static Machine) -> Diagnostics {
+    match assemble(text, machine) {
+        Ok(_) => panic!("this is accepted:\n{text}"),
+        Err(report) => report,
+    }
+}
+
+/// The bundles of a program as text, with the names of the source.
+pub(crate) fn bundles(assembled: &Assembled) -> Vec<String> {
+    let program = &assembled.program;
+    let bundle = |address| {
+        let instructions = program.bundle(address).expect("it is in the program").expect("it is legal");
+        let texts: Vec<String> = instructions
+            .iter()
+            .enumerate()
+            .filter(|(_, instruction)| instruction.op != takt_isa::Op::nop)
+            .map(|(slot, instruction)| {
+                let register = |register| program.register_text(register);
+                instruction.text_with(program.machine, slot, register, |target| target.to_string())
+            })
+            .collect();
+        texts.join(" || ")
+    };
+    (0..program.bundles()).map(bundle).collect()
+}

@@ -1,0 +1,219 @@
+//! The image format: written deterministically, read with suspicion.
+
+mod common;
+
+use object::read::elf::{FileHeader as _, SectionHeader as _};
+use object::{LittleEndian as LE, elf};
+use proptest::prelude::*;
+use takt_asm::image::{self, ImageError};
+use takt_isa::Program;
+
+fn program() -> Program {
+    common::good(
+        ".input x, n:int\n.output F\n.reg a\n.data\nt: .word 1, 2\n.period\np: fadd a, x, 0.5 || ld @x3, t[n]\n fadd F, a, @x3\n wait p\n",
+    )
+    .program
+}
+
+/// File offset and size of a section.
+fn section(bytes: &[u8], name: &str) -> (usize, usize) {
+    let header = elf::FileHeader32::<LE>::parse(bytes).expect("it is an ELF file");
+    let sections = header.sections(LE, bytes).expect("it has sections");
+    let (_, section) = sections.section_by_name(LE, name.as_bytes()).expect("the section is there");
+    (section.sh_offset(LE) as usize, section.sh_size(LE) as usize)
+}
+
+/// File offset of a section's header.
+fn section_header(bytes: &[u8], name: &str) -> usize {
+    let header = elf::FileHeader32::<LE>::parse(bytes).expect("it is an ELF file");
+    let sections = header.sections(LE, bytes).expect("it has sections");
+    let (index, _) = sections.section_by_name(LE, name.as_bytes()).expect("the section is there");
+    header.e_shoff(LE) as usize + 40 * index.0
+}
+
+/// The image with its metadata changed; the new text must not be longer.
+fn with_meta(bytes: &[u8], change: impl Fn(&str) -> String) -> Vec<u8> {
+    let (offset, size) = section(bytes, ".takt.meta");
+    let old = std::str::from_utf8(&bytes[offset..offset + size]).expect("JSON is text");
+    let new = change(old);
+    assert_ne!(old, new, "the change changes something");
+    // Room for a longer text.
+    let new = new.replace("test.s", "t");
+    assert!(new.len() <= size, "{} > {size}", new.len());
+    let mut bytes = bytes.to_vec();
+    bytes[offset..offset + size].fill(b' ');
+    bytes[offset..offset + new.len()].copy_from_slice(new.as_bytes());
+    bytes
+}
+
+#[test]
+fn what_is_written_is_read() {
+    let program = program();
+    let bytes = image::write(&program);
+    assert!(image::is_image(&bytes));
+    assert!(!image::is_image(b".period"));
+    assert_eq!(image::read(&bytes).as_ref(), Ok(&program));
+    assert_eq!(bytes, image::write(&program), "equal programs give equal bytes");
+    // Wherever the bytes lie in memory.
+    let mut moved = vec![0];
+    moved.extend(&bytes);
+    assert_eq!(image::read(&moved[1..]).as_ref(), Ok(&program));
+}
+
+#[test]
+fn labels_are_symbols_that_other_tools_see() {
+    let bytes = image::write(&program());
+    let header = elf::FileHeader32::<LE>::parse(&bytes[..]).expect("it is an ELF file");
+    let sections = header.sections(LE, &bytes[..]).expect("it has sections");
+    let symbols = sections.symbols(LE, &bytes[..], elf::SHT_SYMTAB).expect("it has symbols");
+    let names: Vec<&[u8]> =
+        symbols.iter().map(|symbol| symbols.symbol_name(LE, symbol).expect("it has a name")).collect();
+    assert_eq!(names, [&b""[..], b"p", b"t"]);
+}
+
+#[test]
+fn an_empty_program() {
+    let program = common::good("").program;
+    assert_eq!(image::read(&image::write(&program)).as_ref(), Ok(&program));
+}
+
+#[test]
+fn every_truncation_is_an_error() {
+    let bytes = image::write(&program());
+    for length in 0..bytes.len() {
+        match image::read(&bytes[..length]) {
+            Err(ImageError::NotElf) => assert!(length < 4),
+            Err(_) => assert!(length >= 4),
+            Ok(_) => panic!("{length} of {} bytes are accepted", bytes.len()),
+        }
+    }
+}
+
+#[test]
+fn other_files_are_told_apart() {
+    let bytes = image::write(&program());
+    let changed = |at: usize, value: u8| {
+        let mut bytes = bytes.clone();
+        bytes[at] = value;
+        image::read(&bytes).expect_err("it is damaged")
+    };
+    assert_eq!(changed(0, b'x'), ImageError::NotElf);
+    assert_eq!(changed(4, 2), ImageError::NotTakt, "64 bits");
+    assert_eq!(changed(5, 2), ImageError::NotTakt, "big endian");
+    assert_eq!(changed(18, 243), ImageError::NotTakt, "RISC-V");
+    assert_eq!(changed(39, 0), ImageError::NotTakt, "flags");
+    assert_eq!(changed(36, 2), ImageError::Version { found: 2 }, "container of another version");
+    assert!(matches!(changed(32, 0xff), ImageError::Damaged(_)), "section headers elsewhere");
+}
+
+#[test]
+fn every_defect_has_its_error() {
+    let bytes = image::write(&program());
+    let meta = |from: &'static str, to: &'static str| {
+        let error = image::read(&with_meta(&bytes, |meta| meta.replacen(from, to, 1)));
+        error.expect_err("it is damaged")
+    };
+    assert_eq!(meta("\"version\":1", "\"version\":7"), ImageError::Version { found: 7 });
+    assert_eq!(meta("\"t3\"", "\"t9\""), ImageError::UnknownMachine("t9".into()));
+    assert!(matches!(meta("\"machine\"", "\"maschin\""), ImageError::Meta(_)));
+    assert!(matches!(meta("\"inputs\":[", "\"inputs\":{"), ImageError::Meta(_)));
+    assert!(matches!(meta("\"int\"", "\"jnt\""), ImageError::Meta(_)));
+    assert_eq!(meta("\"t3\"", "\"t1\""), ImageError::Sections { bundles: 9 });
+    assert!(matches!(meta("\"register\":769", "\"register\":3"), ImageError::Register { .. }));
+    assert!(matches!(meta("\"register\":769", "\"register\":768"), ImageError::Register { .. }));
+    assert!(matches!(meta("\"register\":769", "\"register\":-1"), ImageError::Meta(_)));
+    assert!(matches!(meta("\"register\":769", "\"register\":1023"), ImageError::Register { .. }));
+    assert_eq!(meta("\"x\"", "\"1\""), ImageError::Name("1".into()));
+    assert_eq!(meta("\"x\"", "\"\""), ImageError::Name(String::new()));
+    assert_eq!(meta("\"x\"", "\"n\""), ImageError::RepeatedName("n".into()));
+    assert_eq!(meta("\"x\"", "\"t\""), ImageError::RepeatedName("t".into()));
+    assert_eq!(meta("\"period\"", "\"other\""), ImageError::Sections { bundles: 3 });
+    assert_eq!(meta("\"end\":3", "\"end\":2"), ImageError::Sections { bundles: 3 });
+    assert_eq!(meta("\"start\":0", "\"start\":1"), ImageError::Sections { bundles: 3 });
+    assert!(matches!(meta("[0,7]", "[1,7]"), ImageError::Lines(_)));
+    assert!(matches!(meta("[0,7]", "[0,0]"), ImageError::Lines(_)));
+    assert!(matches!(meta("[0,7],", ""), ImageError::Lines(_)));
+
+    let word = |section_name: &str, index: usize, value: u32| {
+        let mut bytes = bytes.clone();
+        let (offset, _) = section(&bytes, section_name);
+        bytes[offset + 4 * index..offset + 4 * index + 4].copy_from_slice(&value.to_le_bytes());
+        image::read(&bytes)
+    };
+    assert!(matches!(word(".takt.code", 1, 1 << 16), Err(ImageError::WordBits { index: 0, .. })));
+    assert!(matches!(word(".takt.constants", 0, 1023), Err(ImageError::Register { .. })));
+    assert!(matches!(word(".takt.constants", 0, 70_000), Err(ImageError::Register { .. })));
+    // Any word of 48 bits may stand in the code: the machine faults on it.
+    assert!(word(".takt.code", 0, 0xffff_ffff).is_ok());
+    // A symbol's value.
+    assert!(matches!(word(".symtab", 5, 4), Err(ImageError::Label { .. })));
+    assert!(word(".symtab", 5, 3).is_ok(), "a label may stand at the end");
+
+    let size = |name: &str, size: u32| {
+        let mut bytes = bytes.clone();
+        let at = section_header(&bytes, name) + 20;
+        bytes[at..at + 4].copy_from_slice(&size.to_le_bytes());
+        image::read(&bytes).expect_err("it is damaged")
+    };
+    assert!(matches!(size(".takt.code", 71), ImageError::SectionSize { section: ".takt.code", .. }));
+    assert!(matches!(size(".takt.code", 64), ImageError::WordCount { words: 8, .. }));
+    assert!(matches!(size(".takt.data", 7), ImageError::SectionSize { section: ".takt.data", .. }));
+    assert!(matches!(size(".takt.constants", 4), ImageError::SectionSize { .. }));
+    assert!(matches!(size(".takt.code", 1 << 30), ImageError::Damaged(_)));
+    assert!(matches!(size(".takt.meta", 10), ImageError::Meta(_)));
+
+    let renamed = |from: &str, to: &str| {
+        let mut bytes = bytes.clone();
+        let at =
+            bytes.windows(from.len()).rposition(|window| window == from.as_bytes()).expect("it is there");
+        bytes[at..at + to.len()].copy_from_slice(to.as_bytes());
+        image::read(&bytes).expect_err("it is damaged")
+    };
+    assert_eq!(renamed(".takt.data", ".takt.dote"), ImageError::MissingSection(".takt.data"));
+    assert_eq!(renamed(".takt.code", ".takt.data"), ImageError::MissingSection(".takt.code"));
+}
+
+#[test]
+fn memories_that_overflow() {
+    let mut program = program();
+    let depth = program.machine.data_depth as usize;
+    program.data = vec![0; depth + 1];
+    assert!(matches!(image::read(&image::write(&program)), Err(ImageError::MemorySize { .. })));
+    program.data.pop();
+    assert!(image::read(&image::write(&program)).is_ok());
+    let words = program.machine.slots.len() * (program.machine.code_depth as usize + 1);
+    program.code = vec![0; words];
+    program.lines = vec![None; words];
+    assert!(matches!(image::read(&image::write(&program)), Err(ImageError::MemorySize { .. })));
+}
+
+#[test]
+fn a_name_with_a_zero_byte_does_not_break_the_writer() {
+    let mut program = program();
+    program.symbols[0].name = "a\0b".to_owned();
+    let read = image::read(&image::write(&program)).expect("the zero byte is dropped");
+    assert_eq!(read.symbols[0].name, "ab");
+}
+
+proptest! {
+    #[test]
+    fn no_bytes_make_the_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..2000)) {
+        let _ = image::read(&bytes);
+        let mut image = b"\x7fELF\x01\x01\x01".to_vec();
+        image.extend(bytes);
+        let _ = image::read(&image);
+    }
+
+    #[test]
+    fn no_damage_makes_the_reader_panic(changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6)) {
+        let mut bytes = image::write(&program());
+        for (index, value) in changes {
+            let at = index.index(bytes.len());
+            bytes[at] = value;
+        }
+        if let Ok(program) = image::read(&bytes) {
+            // What is accepted can be written and read again.
+            prop_assert_eq!(image::read(&image::write(&program)), Ok(program));
+        }
+    }
+}

@@ -1,0 +1,11 @@
+.const A = 1/0
+.const B = sqrt(-1)
+.const C = 2^63
+.const D = 9223372036854775807 + 1
+.const E = 1 << 64
+.const F = ~1.5
+.const G = exp(1000)
+.const H = 1 % 0
+.const I = atan2(1)
+.const J = 3 & 0.5
+.const K = 0^-1

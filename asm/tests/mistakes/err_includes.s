@@ -1,0 +1,6 @@
+.include "missing.s"
+.include "../outside.s"
+.include "/etc/passwd"
+.include "cycle.s"
+.include latin.s
+.include "latin1.s"

@@ -1,0 +1,6 @@
+; machine t1
+.reg a @ m3
+.reg b @ r3
+.period
+        fadd    b, @x3, 1
+        .raw    add 0

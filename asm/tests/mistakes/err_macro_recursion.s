@@ -1,0 +1,5 @@
+.macro forever
+        forever
+.endm
+.period
+        forever

@@ -1,0 +1,4 @@
+.rge a
+.fnord 3
+.period
+        .ones

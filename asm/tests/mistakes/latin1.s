@@ -1,0 +1,2 @@
+; first line
+.const X = 1 ; ä

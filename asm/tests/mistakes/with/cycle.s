@@ -1,0 +1,2 @@
+; Included by what it includes.
+.include "../cycle.s"

@@ -1,0 +1,92 @@
+//! Speed of the assembler over the length of the source, and of the scheduler over the length of a block.
+#![allow(missing_docs, clippy::print_stdout)]
+
+use criterion::Criterion;
+use std::fmt::Write as _;
+use takt_asm::{MemoryLoader, Options};
+use takt_benches::Measured;
+use takt_isa::{Machine, T3};
+
+/// t3 with room for a million bundles: the machine is data.
+static DEEP: Machine = Machine { name: "t3-deep", code_depth: 1 << 21, ..T3 };
+
+/// A source of this many lines, in the mix of a real one: comments, blank lines, labels, bundles, macros' uses, constants.
+fn source(lines: usize) -> String {
+    let mut text = String::from(
+        ".const k = 2*pi*80\n.input n:int, x, y\n.output F\n.reg a b c d t\n.macro scale to, by\n fmul to, to, by\n.endm\n\
+         .once\n wait period\n.period\nperiod:\n",
+    );
+    let mut line = text.lines().count();
+    let mut label = 0;
+    while line + 12 < lines {
+        let _ = write!(
+            text,
+            "; block {label}: a proportional controller\n\n\
+             step{label}:\n        fmul    a, x, k\n        fmul    b, y, 0.25e-6         ; m\n\
+             \x20       fadd    c, a, b || mov d, x\n        scale   a, 2*k + {label}\n        fsub    c, c, a\n\
+             \x20       sel     d, d, x, y\n        itof    t, n\n        fsqrt   a, x\n        fadd    F, c, t\n"
+        );
+        label += 1;
+        line += 12;
+    }
+    while line + 1 < lines {
+        text.push_str("; rest\n");
+        line += 1;
+    }
+    text.push_str("        wait period\n");
+    text
+}
+
+/// A block of this many operations in straight line, with chains of dependence as a controller has them.
+fn block(operations: usize) -> String {
+    let mut text = String::from(".input x, y\n.output F\n.schedule on\n.period\nperiod:\n");
+    let names = 48;
+    for r in 0..names {
+        let _ = writeln!(text, ".reg r{r}\n fmul r{r}, x, {r}");
+    }
+    for i in 0..operations.saturating_sub(names + 2) {
+        let (d, a, b) = (i * 7 % names, i * 13 % names, i * 29 % names);
+        let mnemonic = ["fmul", "fadd", "fsub", "fmax", "fadd", "fmul"][i % 6];
+        let _ = writeln!(text, " {mnemonic} r{d}, r{a}, r{b}");
+    }
+    text.push_str(" mov F, r1\n wait period\n");
+    text
+}
+
+fn main() {
+    let mut criterion = Criterion::default().configure_from_args();
+    let mut group = Measured::new(&mut criterion, "assembler");
+    let mut rows = Vec::new();
+    for lines in [10_000, 100_000, 1_000_000] {
+        let loader = MemoryLoader::of("source.s", source(lines));
+        let options = Options { machine: &DEEP, ..Options::default() };
+        let seconds = group.seconds(&format!("{lines} lines"), lines as u64, || {
+            takt_asm::assemble("source.s", &loader, &options).map(|assembled| assembled.program.bundles())
+        });
+        rows.push((lines, seconds));
+    }
+    let shortest = rows[0].1 / rows[0].0 as f64;
+    let mut blocks = Vec::new();
+    for operations in [300, 1_000, 10_000] {
+        let loader = MemoryLoader::of("block.s", block(operations));
+        let options = Options { machine: &DEEP, ..Options::default() };
+        let start = std::time::Instant::now();
+        let assembled = takt_asm::assemble("block.s", &loader, &options).expect("the block is well formed");
+        let seconds = start.elapsed().as_secs_f64();
+        let block =
+            assembled.blocks.into_iter().max_by_key(|block| block.operations).expect("there is a block");
+        blocks.push((block.operations, block.cycles, block.bound.cycles(), seconds));
+    }
+    println!("\n{:>12}{:>10}{:>10}{:>10}   scheduled, default effort", "operations", "cycles", "bound", "s");
+    for (operations, cycles, bound, seconds) in blocks {
+        println!("{operations:>12}{cycles:>10}{bound:>10}{seconds:>10.2}");
+    }
+    println!(
+        "\n{:>12}{:>16}{:>14}{:>30}",
+        "lines", "M lines/s", "ns per line", "per line, times 10,000 lines"
+    );
+    for (lines, seconds) in rows {
+        let per_line = seconds / lines as f64;
+        println!("{lines:>12}{:>16.2}{:>14.0}{:>30.2}", 1e-6 / per_line, per_line * 1e9, per_line / shortest);
+    }
+}

@@ -1,0 +1,116 @@
+//! Where the cycles of a run or a period went, as a table and as JSON.
+
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use takt_emu::Statistics;
+use takt_isa::timing::{Address, Cause};
+use takt_isa::{Program, ROWS};
+
+/// Counts over a run or a period. `cycles = bundles + Σ stalls`.
+#[derive(Clone, Debug)]
+pub(crate) struct Account {
+    pub(crate) cycles: u64,
+    pub(crate) bundles: u64,
+    /// By mnemonic, those that there are.
+    pub(crate) operations: BTreeMap<&'static str, u64>,
+    /// By kind of cause, all of them.
+    stalls: BTreeMap<&'static str, u64>,
+    causes: Vec<((Address, Cause), u64)>,
+}
+
+impl Account {
+    /// What was counted since reset.
+    pub(crate) fn of(statistics: &Statistics) -> Account {
+        Account::new(statistics, |count| count(statistics))
+    }
+
+    /// What was counted from `before` to `after`.
+    pub(crate) fn between(before: &Statistics, after: &Statistics) -> Account {
+        Account::new(after, |count| count(after) - count(before))
+    }
+
+    /// The keys of a statistics, and the difference of two for each.
+    fn new(after: &Statistics, difference: impl Fn(&dyn Fn(&Statistics) -> u64) -> u64) -> Account {
+        let operations = ROWS
+            .iter()
+            .map(|row| (row.mnemonic, difference(&|statistics| statistics.operation(row.op))))
+            .filter(|(_, count)| *count > 0)
+            .collect();
+        let caused = |key| difference(&|statistics| statistics.causes.get(key).copied().unwrap_or(0));
+        let causes: Vec<_> =
+            after.causes.keys().map(|key| (*key, caused(key))).filter(|(_, count)| *count > 0).collect();
+        let mut stalls: BTreeMap<_, _> = Cause::KINDS.into_iter().map(|kind| (kind, 0)).collect();
+        for ((_, cause), count) in &causes {
+            *stalls.entry(cause.name()).or_default() += count;
+        }
+        let (cycles, bundles) = (difference(&|s| s.cycles), difference(&|s| s.bundles));
+        Account { cycles, bundles, operations, stalls, causes }
+    }
+
+    /// Operations, all together.
+    pub(crate) fn total_operations(&self) -> u64 {
+        self.operations.values().sum()
+    }
+
+    /// Stalled cycles by kind of cause; names in one word, as programs like keys.
+    pub(crate) fn stalls_json(&self) -> Value {
+        self.stalls.iter().map(|(kind, count)| (kind.replace(' ', "_"), Value::from(*count))).collect()
+    }
+
+    /// The share of each kind, then the costliest stalls with their places; waiting for the tick is left out.
+    pub(crate) fn stall_table(&self, program: &Program, most: usize) -> String {
+        let mut out = String::new();
+        let waiting = self.stalls.get(Cause::Wait.name()).copied().unwrap_or(0);
+        let _ = writeln!(out, "  {:<14} {:>9}", "issue", self.bundles);
+        for (kind, count) in
+            self.stalls.iter().filter(|(kind, count)| **kind != Cause::Wait.name() && **count > 0)
+        {
+            let _ = writeln!(out, "  {kind:<14} {count:>9}");
+        }
+        let _ = writeln!(out, "  {:<14} {:>9}", "all", self.cycles - waiting);
+        let mut causes: Vec<_> = self.causes.iter().filter(|((_, cause), _)| *cause != Cause::Wait).collect();
+        causes.sort_by_key(|((address, _), count)| (std::cmp::Reverse(*count), *address));
+        if !causes.is_empty() && most > 0 {
+            out.push_str("  the longest stalls:\n");
+        }
+        for ((address, cause), count) in causes.iter().take(most) {
+            let _ =
+                writeln!(out, "  {count:>8}  {}: {}", place(program, *address), describe(program, *cause));
+        }
+        out
+    }
+}
+
+/// `bundle 12 (tracking.s:40)`.
+pub(crate) fn place(program: &Program, address: Address) -> String {
+    match program.location(address) {
+        Some(location) => format!("bundle {address} ({})", program.place_text(location)),
+        None => format!("bundle {address}"),
+    }
+}
+
+fn describe(program: &Program, cause: Cause) -> String {
+    match cause {
+        Cause::Branch { from } => format!("front end refills after {}", place(program, from)),
+        Cause::Operand { register, producer } => {
+            format!("awaits {} from {}", program.register_text(register), place(program, producer))
+        }
+        Cause::Destination { register, producer } => {
+            format!(
+                "{} is still to be written by {}",
+                program.register_text(register),
+                place(program, producer)
+            )
+        }
+        Cause::Unit { slot, unit } => {
+            let slot = &program.machine.slots[usize::from(slot)];
+            format!("unit {} is busy", slot.units[usize::from(unit)].name)
+        }
+        Cause::WritePort { slot } => {
+            format!("write port of bank {} is taken", program.machine.slots[usize::from(slot)].bank.name)
+        }
+        Cause::Drain => "earlier results must be written first".to_owned(),
+        Cause::Wait => "waits for the tick".to_owned(),
+    }
+}

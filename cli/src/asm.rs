@@ -1,0 +1,233 @@
+//! `takt asm`.
+
+use crate::files::{self, Given, Out};
+use crate::load::Load;
+use crate::output::{self, Failure};
+use crate::select::MachineArgument;
+use anyhow::{Context, Result};
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use takt_asm::diag::Diagnostics;
+use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT};
+use takt_asm::{Assembled, Schedule, image, listing};
+use takt_isa::Program;
+
+/// Assemble a source into an image.
+///
+/// Without any of the output options, the image goes to FILE with the ending `.takt`. What the scheduler made of each block
+/// is printed beside the bound that no schedule can beat.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Asm {
+    /// Source; `-` is standard input.
+    file: PathBuf,
+    #[command(flatten)]
+    machine: MachineArgument,
+    /// Write the image here; `-` is standard output.
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Write a listing: address, words, source; `-` is standard output.
+    #[arg(long, short, value_name = "FILE")]
+    listing: Option<PathBuf>,
+    /// Write the symbol map: labels, registers, ports, constants; `-` is standard output.
+    #[arg(long, short, value_name = "FILE")]
+    symbols: Option<PathBuf>,
+    /// Write `$readmemh` memories into this folder: code of each slot, constants of each bank, data.
+    #[arg(long, value_name = "FOLDER")]
+    readmemh: Option<PathBuf>,
+    /// Schedule everything: the same as --schedule on.
+    #[arg(short = 'O', conflicts_with = "schedule")]
+    optimise: bool,
+    /// Which operations the scheduler packs into bundles and orders.
+    #[arg(long, value_enum, value_name = "WHEN", default_value_t = When::Source)]
+    schedule: When,
+    /// How long the scheduler searches, up to 100000; 0 is the first passes only.
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_EFFORT, value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    effort: u32,
+    /// Check only; write no file.
+    #[arg(long, conflicts_with_all = ["output", "listing", "symbols", "readmemh"])]
+    check: bool,
+    /// Print the result, errors and warnings as JSON on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  takt asm prog.s                       prog.s into prog.takt
+  takt asm prog.s -m t1 -o small.takt   the same source for the small machine
+  takt asm prog.s --listing -           which bundle came from which lines
+  takt asm prog.s --check --json        errors and warnings for an editor";
+
+/// Which bundles to schedule.
+#[derive(Clone, Copy, ValueEnum)]
+enum When {
+    /// As the source says: `.schedule on`.
+    Source,
+    /// All, whatever the source says.
+    On,
+    /// None, whatever the source says.
+    Off,
+}
+
+impl From<When> for Schedule {
+    fn from(when: When) -> Schedule {
+        match when {
+            When::Source => Schedule::AsWritten,
+            When::On => Schedule::All,
+            When::Off => Schedule::None,
+        }
+    }
+}
+
+impl Asm {
+    /// Where the image goes, if anywhere.
+    fn image_path(&self) -> Result<Option<PathBuf>> {
+        let others = self.listing.is_some() || self.symbols.is_some() || self.readmemh.is_some();
+        match &self.output {
+            Some(path) => Ok(Some(path.clone())),
+            None if others || self.check => Ok(None),
+            None if files::is_dash(&self.file) => {
+                Err(Failure::Usage("say with --output where the image of standard input is to go".to_owned())
+                    .into())
+            }
+            None => Ok(Some(self.file.with_extension("takt"))),
+        }
+    }
+}
+
+pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
+    let image_path = arguments.image_path()?;
+    let source = Load::source(&arguments.file)?;
+    let mut writes: Vec<Given<'_>> =
+        [("the image", &image_path), ("--listing", &arguments.listing), ("--symbols", &arguments.symbols)]
+            .into_iter()
+            .filter_map(|(option, path)| Some((option, path.as_deref()?)))
+            .collect();
+    if arguments.json {
+        writes.push(("--json", Path::new("-")));
+    }
+    files::check(&[("FILE", &arguments.file)], &writes)?;
+
+    let schedule = if arguments.optimise { Schedule::All } else { arguments.schedule.into() };
+    let load = Load { schedule, effort: arguments.effort, ..Load::new(arguments.machine.machine, color) };
+    let result = load.assemble(&arguments.file, source);
+    let assembled = match result {
+        Err(errors) if arguments.json => {
+            output::json(&json!({ "messages": messages(&errors)? }), out)?;
+            return Err(Failure::Reported.into());
+        }
+        Ok(assembled) if arguments.json => assembled,
+        result => load.finish(result)?,
+    };
+
+    let program = &assembled.program;
+    if let Some(path) = &arguments.listing {
+        files::write(path, listing::listing(&assembled).as_bytes())?;
+    }
+    if let Some(path) = &arguments.symbols {
+        files::write(path, listing::symbol_map(&assembled).to_string().as_bytes())?;
+    }
+    if let Some(folder) = &arguments.readmemh {
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+        for (name, text) in listing::readmemh(program) {
+            files::write(&folder.join(name), text.as_bytes())?;
+        }
+    }
+    if let Some(path) = &image_path {
+        files::write(path, &image::write(program))?;
+    }
+    if arguments.json {
+        output::json(&result_json(&assembled, image_path.as_deref())?, out)?;
+    } else if !writes.iter().any(|(_, path)| files::is_dash(path)) {
+        let place = image_path.map_or_else(|| "assembled".to_owned(), |path| path.display().to_string());
+        writeln!(
+            out,
+            "{place}: {} bundles ({} words), {} constants, {} data words for {}",
+            program.bundles(),
+            program.code.len(),
+            program.constants.len(),
+            program.data.len(),
+            program.machine.name
+        )?;
+        write_blocks(&assembled, out)?;
+    }
+    Ok(())
+}
+
+/// What the scheduler made of each block, beside its bound.
+fn write_blocks(assembled: &Assembled, out: &mut Out) -> Result<()> {
+    let program = &assembled.program;
+    let names: Vec<String> = assembled.blocks.iter().map(|block| block_name(program, block)).collect();
+    let Some(longest) = names.iter().map(|name| name.chars().count()).max() else { return Ok(()) };
+    let width = longest.clamp(12, 40);
+    let title = format!("{:<1$}", "scheduled", width + 2);
+    writeln!(out, "{title} operations  bundles  cycles   bound   above it   bound set by")?;
+    for (block, name) in assembled.blocks.iter().zip(&names) {
+        let bound = block.bound.cycles();
+        let above = 100.0 * f64::from(block.cycles.saturating_sub(bound)) / f64::from(bound.max(1));
+        writeln!(
+            out,
+            "  {name:<width$}{:>11}{:>9}{:>8}{bound:>8}{above:>9.1} %   {}",
+            block.operations,
+            block.bundles,
+            block.cycles,
+            bound_text(block, program)
+        )?;
+    }
+    Ok(())
+}
+
+/// A block's label, or else the place of its first operation.
+fn block_name(program: &Program, block: &BlockReport) -> String {
+    let place = || block.location.map(|at| program.place_text(at));
+    block.label.clone().or_else(place).unwrap_or_else(|| format!("bundle {}", block.address))
+}
+
+/// What sets a bound.
+fn bound_text(block: &BlockReport, program: &Program) -> String {
+    let bound = block.bound.cycles();
+    let slots = program.machine.slots;
+    if block.bound.critical_path == bound {
+        return "the chain of dependent operations".to_owned();
+    }
+    if let Some((slot, _)) = slots.iter().zip(&block.bound.slots).find(|(_, cycles)| **cycles == bound) {
+        return format!("slot {}", slot.name);
+    }
+    let mut units = slots.iter().flat_map(|slot| slot.units).zip(&block.bound.units);
+    units
+        .find(|(_, cycles)| **cycles == bound)
+        .map_or(String::new(), |(unit, _)| format!("unit {}", unit.name))
+}
+
+fn messages(diagnostics: &Diagnostics) -> Result<Value> {
+    Ok(serde_json::to_value(diagnostics.messages())?)
+}
+
+fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
+    let program = &assembled.program;
+    let block = |block: &BlockReport| {
+        json!({
+            "name": block_name(program, block),
+            "address": block.address,
+            "operations": block.operations,
+            "bundles": block.bundles,
+            "cycles": block.cycles,
+            "bound": block.bound.cycles(),
+            "bound_set_by": bound_text(block, program),
+        })
+    };
+    Ok(json!({
+        "machine": program.machine.name,
+        "image": image.map(|path| path.display().to_string()),
+        "bundles": program.bundles(),
+        "words": program.code.len(),
+        "constants": program.constants.len(),
+        "data_words": program.data.len(),
+        "blocks": assembled.blocks.iter().map(block).collect::<Vec<_>>(),
+        "messages": messages(&assembled.warnings)?,
+    }))
+}

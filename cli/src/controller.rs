@@ -1,0 +1,166 @@
+//! A program on the emulator as the controller of the hybrid robot.
+
+use crate::fault::explain;
+use crate::run::PERIOD_LIMIT;
+use crate::select::suggest;
+use anyhow::{Result, anyhow, bail};
+use takt_emu::{Emulator, Event, PeriodError, PeriodReport, Statistics};
+use takt_isa::program::Port;
+use takt_isa::{Program, Type};
+use takt_programs::hybrid::Outputs;
+use takt_programs::hybrid::closed_loop::{Inputs, TrackingController};
+use takt_programs::hybrid::ports::{INPUTS, OUTPUTS, Port as RobotPort, PortType};
+
+/// Number of encoders, the first inputs, and of forces and torques, the first outputs.
+const AXES: usize = 5;
+
+/// Registers of a program for the ports of the tracking algorithm.
+#[derive(Clone)]
+struct Binding {
+    inputs: [u16; INPUTS.len()],
+    outputs: [u16; OUTPUTS.len()],
+}
+
+impl Binding {
+    fn new(program: &Program) -> Result<Binding> {
+        if let Some(port) = program.inputs.iter().find(|port| !is_among(&INPUTS, &port.name)) {
+            bail!("this is no tracking program: nothing gives its input port `{}` a value", port.name);
+        }
+        let mut binding = Binding { inputs: [0; INPUTS.len()], outputs: [0; OUTPUTS.len()] };
+        for (port, register) in INPUTS.iter().zip(&mut binding.inputs) {
+            *register = find("input", port, &program.inputs, &INPUTS)?;
+        }
+        for (port, register) in OUTPUTS.iter().zip(&mut binding.outputs) {
+            *register = find("output", port, &program.outputs, &OUTPUTS)?;
+        }
+        Ok(binding)
+    }
+}
+
+fn is_among(ports: &[RobotPort], name: &str) -> bool {
+    ports.iter().any(|port| port.name == name)
+}
+
+/// The register of one of the algorithm's ports in a program.
+fn find(kind: &str, wanted: &RobotPort, have: &[Port], all: &[RobotPort]) -> Result<u16> {
+    let name = wanted.name;
+    let port = have.iter().find(|port| port.name == name).ok_or_else(|| {
+        let others = have.iter().map(|port| port.name.as_str()).filter(|name| !is_among(all, name));
+        let near = suggest(name, others);
+        anyhow!("this is no tracking program: it has no {kind} port `{name}`{near}")
+    })?;
+    match port_type(wanted.kind) {
+        ty if ty == port.ty => Ok(port.register),
+        Type::I => bail!("{kind} port `{name}` must carry integers: declare it `{name}:int`"),
+        _ => bail!("{kind} port `{name}` must carry binary32: declare it `{name}:float`"),
+    }
+}
+
+/// The machine's type for a port's.
+pub(crate) fn port_type(kind: PortType) -> Type {
+    match kind {
+        PortType::I32 => Type::I,
+        PortType::F32 => Type::F,
+    }
+}
+
+/// Cycles from reading encoders to writing forces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub(crate) struct Latency {
+    /// From the first bundle that reads an encoder.
+    pub(crate) from_first_read: u64,
+    /// From the first read of the encoder that is read last.
+    pub(crate) from_last_encoder: u64,
+}
+
+/// What the last period showed in detail.
+#[derive(Clone)]
+pub(crate) struct Detail {
+    /// Counts before and after it.
+    pub(crate) before: Statistics,
+    pub(crate) after: Statistics,
+    /// `None` if it wrote no force.
+    pub(crate) latency: Option<Latency>,
+}
+
+/// The program on the emulator, one period at a time.
+pub(crate) struct OnEmulator {
+    emulator: Emulator,
+    binding: Binding,
+    /// Periods until the one that is looked at in detail, the last.
+    until_detail: u64,
+    /// The report of the last period.
+    pub(crate) report: Option<PeriodReport>,
+    pub(crate) detail: Option<Detail>,
+}
+
+impl OnEmulator {
+    /// A program that has the tracking algorithm's ports; period `detail`, from 0, is looked at in detail.
+    pub(crate) fn new(emulator: Emulator, detail: u64) -> Result<OnEmulator> {
+        let binding = Binding::new(emulator.program())?;
+        Ok(OnEmulator { emulator, binding, until_detail: detail, report: None, detail: None })
+    }
+
+    /// Runs a period under observation.
+    fn observed_period(&mut self) -> Result<PeriodReport, PeriodError> {
+        let before = self.emulator.statistics();
+        let program = self.emulator.program().clone();
+        let encoders = &self.binding.inputs[..AXES];
+        let forces = &self.binding.outputs[..AXES];
+        let mut first_read = [None; AXES];
+        let mut written = None;
+        let mut sink = |event: &Event| match event {
+            Event::Issue { cycle, address } => {
+                for instruction in program.bundle(*address).and_then(Result::ok).iter().flatten() {
+                    for (read, encoder) in first_read.iter_mut().zip(encoders) {
+                        if instruction.reads().contains(encoder) {
+                            read.get_or_insert(*cycle);
+                        }
+                    }
+                }
+            }
+            Event::PortWrite(write) if forces.contains(&write.register) => written = Some(write.cycle),
+            _ => {}
+        };
+        let report = self.emulator.observed(&mut sink).run_period(&[])?;
+        let reads = || first_read.iter().copied().flatten();
+        let latency = reads().min().zip(reads().max()).zip(written).map(|((first, last), written)| Latency {
+            from_first_read: written.saturating_sub(first),
+            from_last_encoder: written.saturating_sub(last),
+        });
+        self.detail = Some(Detail { before, after: self.emulator.statistics(), latency });
+        Ok(report)
+    }
+}
+
+/// Why the program cannot control the robot any further.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(crate) struct ControllerError(String);
+
+impl TrackingController for OnEmulator {
+    type Error = ControllerError;
+
+    fn step(&mut self, inputs: &Inputs) -> Result<Outputs<f64>, ControllerError> {
+        for (register, bits) in self.binding.inputs.iter().zip(inputs.to_words()) {
+            self.emulator
+                .set_input_bits(*register, bits)
+                .map_err(|error| ControllerError(error.to_string()))?;
+        }
+        self.emulator.set_cycle_limit(self.emulator.now() + PERIOD_LIMIT);
+        let is_last = self.until_detail == 0;
+        let report = if is_last { self.observed_period() } else { self.emulator.run_period(&[]) };
+        let report = report.map_err(|error| ControllerError(explain(self.emulator.program(), &error)))?;
+        self.until_detail = self.until_detail.wrapping_sub(1);
+        self.report = Some(report);
+        let mut values = [0.0; OUTPUTS.len()];
+        for ((value, register), port) in values.iter_mut().zip(&self.binding.outputs).zip(&OUTPUTS) {
+            let bits = self.emulator.register(*register);
+            let unwritten =
+                || ControllerError(format!("the program has not written output port `{}`", port.name));
+            let bits = bits.ok_or_else(unwritten)?;
+            *value = f64::from(f32::from_bits(bits));
+        }
+        Ok(Outputs::from_array(values))
+    }
+}

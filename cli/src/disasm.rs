@@ -1,0 +1,27 @@
+//! `takt disasm`.
+
+use crate::files;
+use crate::load::Load;
+use crate::select::OptionalMachine;
+use anyhow::Result;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Turn an image back into source, which assembles to the same image.
+#[derive(Args)]
+#[command(after_help = "Example:\n  takt disasm prog.takt -o prog.s")]
+pub(crate) struct Disasm {
+    /// Image, or a source, which is assembled first; `-` is standard input.
+    file: PathBuf,
+    #[command(flatten)]
+    machine: OptionalMachine,
+    /// Write the source here.
+    #[arg(long, short, value_name = "FILE", default_value = "-")]
+    output: PathBuf,
+}
+
+pub(crate) fn run(arguments: &Disasm, color: bool) -> Result<()> {
+    files::check(&[("FILE", &arguments.file)], &[("--output", &arguments.output)])?;
+    let program = Load::new(arguments.machine.machine, color).program(&arguments.file)?;
+    files::write(&arguments.output, takt_asm::disasm::disassemble(&program).as_bytes())
+}

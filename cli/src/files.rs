@@ -1,0 +1,188 @@
+//! Files that commands read and write. `-` is standard input or output.
+
+use crate::output::Failure;
+use anyhow::{Context, Result, bail};
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
+
+/// Whether a path means standard input or output.
+pub(crate) fn is_dash(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+/// A file to read, as messages name it.
+pub(crate) fn input_name(path: &Path) -> String {
+    if is_dash(path) { "standard input".to_owned() } else { path.display().to_string() }
+}
+
+/// Opens a file to read.
+pub(crate) fn open(path: &Path) -> Result<Box<dyn Read>> {
+    if is_dash(path) {
+        return Ok(Box::new(io::stdin().lock()));
+    }
+    let file = File::open(path).with_context(|| format!("cannot open {}", path.display()))?;
+    if file.metadata().is_ok_and(|about| about.is_dir()) {
+        bail!("{} is a folder, not a file", path.display());
+    }
+    Ok(Box::new(file))
+}
+
+/// Reads a file of at most `limit` bytes whole. An empty one is an error: nothing that is read here may be.
+pub(crate) fn read(path: &Path, limit: usize) -> Result<Vec<u8>> {
+    let name = input_name(path);
+    let mut bytes = Vec::new();
+    open(path)?
+        .take(limit as u64 + 1)
+        .read_to_end(&mut bytes)
+        .with_context(|| format!("cannot read {name}"))?;
+    if bytes.len() > limit {
+        bail!("{name} is larger than {} MiB", limit >> 20);
+    }
+    if bytes.is_empty() {
+        bail!("{name} is empty");
+    }
+    Ok(bytes)
+}
+
+/// Standard output, or a file that is being written, buffered.
+///
+/// A file grows beside its target under a temporary name and takes the target's place in [`Out::finish`]: until then, and
+/// after any failure, the target is what it was. What is no regular file (a device, a pipe) is written directly.
+pub(crate) struct Out {
+    writer: Box<dyn Write>,
+    name: String,
+    partial: Option<Partial>,
+}
+
+/// A file under its temporary name, which is removed when this is dropped.
+struct Partial {
+    temporary: PathBuf,
+    target: PathBuf,
+}
+
+impl Drop for Partial {
+    fn drop(&mut self) {
+        // Once it is in its place there is none to remove.
+        let _ = fs::remove_file(&self.temporary);
+    }
+}
+
+const BUFFER: usize = 1 << 16;
+
+impl Out {
+    /// Standard output.
+    pub(crate) fn stdout() -> Out {
+        let writer = BufWriter::with_capacity(BUFFER, io::stdout().lock());
+        Out { writer: Box::new(writer), name: "standard output".to_owned(), partial: None }
+    }
+
+    /// Begins a file. What can be known to be wrong with the path is found here, before the work.
+    pub(crate) fn create(path: &Path) -> Result<Out> {
+        if is_dash(path) {
+            return Ok(Out::stdout());
+        }
+        let name = path.display().to_string();
+        let (file, partial) = begin(path).with_context(|| format!("cannot write {name}"))?;
+        Ok(Out { writer: Box::new(BufWriter::with_capacity(BUFFER, file)), name, partial })
+    }
+
+    /// Ends the file, which is there from now on.
+    pub(crate) fn finish(mut self) -> Result<()> {
+        self.flush()?;
+        let Out { writer, name, partial } = self;
+        drop(writer);
+        partial.map_or(Ok(()), |Partial { ref temporary, ref target }| {
+            fs::rename(temporary, target).with_context(|| format!("cannot write {name}"))
+        })
+    }
+
+    fn named<T>(&self, result: io::Result<T>) -> io::Result<T> {
+        result.map_err(|error| io::Error::new(error.kind(), format!("cannot write {}: {error}", self.name)))
+    }
+}
+
+impl Write for Out {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let result = self.writer.write(bytes);
+        self.named(result)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let result = self.writer.flush();
+        self.named(result)
+    }
+}
+
+fn begin(path: &Path) -> Result<(File, Option<Partial>)> {
+    // Behind a symbolic link, the file that it leads to is written.
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let existing = fs::metadata(&target).ok();
+    match &existing {
+        Some(about) if about.is_dir() => bail!("it is a folder"),
+        Some(about) if !about.is_file() => return Ok((File::options().write(true).open(&target)?, None)),
+        Some(about) if about.permissions().readonly() => bail!("it is read-only"),
+        _ => {}
+    }
+    let Some(file_name) = target.file_name() else { bail!("it names no file") };
+    let mut temporary = OsString::from(".");
+    temporary.push(file_name);
+    temporary.push(format!(".{}.partial", std::process::id()));
+    let temporary = target.with_file_name(temporary);
+    let file = File::create_new(&temporary)?;
+    let partial = Partial { temporary, target };
+    if let Some(about) = existing {
+        file.set_permissions(about.permissions())?;
+    }
+    Ok((file, Some(partial)))
+}
+
+/// Writes a file whole.
+pub(crate) fn write(path: &Path, contents: &[u8]) -> Result<()> {
+    let mut out = Out::create(path)?;
+    out.write_all(contents)?;
+    out.finish()
+}
+
+/// A path and the option that it was given with.
+pub(crate) type Given<'a> = (&'static str, &'a Path);
+
+/// Refuses a command line that reads standard input twice, writes a file twice, or writes what it reads.
+pub(crate) fn check(reads: &[Given<'_>], writes: &[Given<'_>]) -> Result<()> {
+    let usage = |text: String| Err(Failure::Usage(text).into());
+    if let [(first, _), (second, _), ..] =
+        reads.iter().filter(|(_, path)| is_dash(path)).collect::<Vec<_>>()[..]
+    {
+        return usage(format!("standard input cannot be both {first} and {second}"));
+    }
+    for (i, &(option, path)) in writes.iter().enumerate() {
+        let Some(file) = identity(path) else { continue };
+        if let Some((other, _)) =
+            writes[..i].iter().find(|(_, other)| identity(other).as_ref() == Some(&file))
+        {
+            let what = if is_dash(path) { "standard output".to_owned() } else { path.display().to_string() };
+            return usage(format!("{other} and {option} would both write to {what}"));
+        }
+        let is_read = |(_, read): &&Given<'_>| !is_dash(read) && identity(read).as_ref() == Some(&file);
+        if let Some((read, _)) = reads.iter().find(is_read) {
+            return usage(format!("{option} would overwrite {}, which is {read}", path.display()));
+        }
+    }
+    Ok(())
+}
+
+/// What two paths of the same file have in common; `None` for what can well be written twice, as /dev/null.
+fn identity(path: &Path) -> Option<PathBuf> {
+    if is_dash(path) {
+        return Some(path.to_owned());
+    }
+    match fs::canonicalize(path) {
+        Ok(whole) => whole.is_file().then_some(whole),
+        Err(_) => {
+            let folder =
+                path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            Some(fs::canonicalize(folder).ok()?.join(path.file_name()?))
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! From a file, a name or standard input to a program.
+
+use crate::files;
+use crate::output::{Failure, message};
+use anyhow::{Context, Result, bail};
+use std::path::{Path, PathBuf};
+use takt_asm::diag::Diagnostics;
+use takt_asm::limits::IMAGE_BYTES;
+use takt_asm::{Assembled, FileLoader, MemoryLoader, Options, Schedule, image};
+use takt_isa::{MACHINES, Machine, Program};
+
+/// How diagnostics are shown, and for which machine sources are assembled.
+#[derive(Clone, Copy)]
+pub(crate) struct Load {
+    /// The machine that the user asked for.
+    pub(crate) machine: Option<&'static Machine>,
+    /// Colour on standard error.
+    pub(crate) color: bool,
+    /// Which bundles are scheduled.
+    pub(crate) schedule: Schedule,
+    /// How long the scheduler searches.
+    pub(crate) effort: u32,
+}
+
+impl Load {
+    /// With the scheduler as the source says.
+    pub(crate) fn new(machine: impl Into<Option<&'static Machine>>, color: bool) -> Load {
+        let Options { schedule, effort, .. } = Options::default();
+        Load { machine: machine.into(), color, schedule, effort }
+    }
+
+    fn options(&self) -> Options {
+        Options { machine: self.machine.unwrap_or(MACHINES[0]), schedule: self.schedule, effort: self.effort }
+    }
+
+    /// The text of a source.
+    pub(crate) fn source(path: &Path) -> Result<Vec<u8>> {
+        let bytes = files::read(path, IMAGE_BYTES)?;
+        if image::is_image(&bytes) {
+            bail!("{} is an image already; `takt disasm` turns it into source", files::input_name(path));
+        }
+        Ok(bytes)
+    }
+
+    /// The program in a file that is to run or be shown: an image, or a source, which is assembled.
+    pub(crate) fn program(&self, path: &Path) -> Result<Program> {
+        let bytes = files::read(path, IMAGE_BYTES)?;
+        let name = files::input_name(path);
+        let program = if image::is_image(&bytes) {
+            image::read(&bytes).with_context(|| format!("{name} is not an image that can run"))?
+        } else {
+            self.finish(self.assemble(path, bytes))?.program
+        };
+        if let Some(machine) = self.machine.filter(|machine| **machine != *program.machine) {
+            bail!("{name} is an image for {}, not for {}", program.machine.name, machine.name);
+        }
+        if program.bundles() == 0 {
+            bail!("{name} has no instruction");
+        }
+        Ok(program)
+    }
+
+    /// Assembles a source that was read from a file. What it includes is looked for beside it.
+    pub(crate) fn assemble(&self, path: &Path, bytes: Vec<u8>) -> Result<Assembled, Diagnostics> {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let loader = FileLoader::new(folder.map_or(PathBuf::from("."), Path::to_owned));
+        let name = match path.file_name() {
+            Some(name) if !files::is_dash(path) => name.to_string_lossy(),
+            _ => "<stdin>".into(),
+        };
+        takt_asm::assemble_bytes(&name, bytes, &loader, &self.options())
+    }
+
+    /// Assembles one of the programs that come with Takt.
+    pub(crate) fn builtin(&self, path: &str) -> Result<Program> {
+        let loader = MemoryLoader::new(takt_programs::SOURCES);
+        Ok(self.finish(takt_asm::assemble(path, &loader, &self.options()))?.program)
+    }
+
+    /// Shows warnings on standard error; errors are the error.
+    pub(crate) fn finish(&self, result: Result<Assembled, Diagnostics>) -> Result<Assembled> {
+        match result {
+            Ok(assembled) => {
+                message(&assembled.warnings.render(self.color));
+                Ok(assembled)
+            }
+            Err(diagnostics) => Err(Failure::Diagnostics(diagnostics.render(self.color)).into()),
+        }
+    }
+}

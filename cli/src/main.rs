@@ -1,0 +1,119 @@
+//! Takt: assemble, emulate and time controllers for robots. One command per module; this is the only crate that knows the
+//! terminal.
+
+mod account;
+mod asm;
+mod completions;
+mod controller;
+mod disasm;
+mod eval;
+mod fault;
+mod files;
+mod isa;
+mod load;
+mod machines;
+mod man;
+mod nan;
+mod output;
+mod plot;
+mod ports;
+mod report;
+mod run;
+mod select;
+mod track;
+
+use anyhow::Result;
+use clap::{Parser, Subcommand};
+use files::Out;
+use output::{Color, Failure};
+use std::io::Write;
+use std::process::ExitCode;
+
+/// Robot controllers on a floating-point processor whose every cycle is accounted for.
+#[derive(Parser)]
+#[command(name = "takt", version, max_term_width = 110, after_help = AFTER_HELP)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+    /// Colour of messages: auto (on a terminal, unless NO_COLOR is set), always or never.
+    #[arg(long, global = true, value_enum, default_value_t = Color::Auto, value_name = "WHEN", hide_possible_values = true)]
+    color: Color,
+}
+
+const AFTER_HELP: &str = "\
+Results go to standard output, messages to standard error. \
+Exit status: 0 success, 1 an error in a file or while running, 2 an error in the command line.
+
+Examples:
+  takt track                         the main job: cycles, accuracy, tracking error
+  takt asm prog.s                    assemble prog.s into prog.takt
+  takt run prog.s --inputs in.csv    run it, one period for each row
+  takt isa fdiv                      look an instruction up";
+
+#[derive(Subcommand)]
+enum Command {
+    Track(track::Track),
+    Asm(asm::Asm),
+    Disasm(disasm::Disasm),
+    Run(run::Run),
+    Eval(eval::Eval),
+    Isa(isa::Isa),
+    Machines(machines::Machines),
+    Completions(completions::Completions),
+    Man(man::Man),
+}
+
+fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
+    match &arguments.command {
+        Command::Track(track) => track::run(track, color, out),
+        Command::Asm(asm) => asm::run(asm, color, out),
+        Command::Disasm(disasm) => disasm::run(disasm, color),
+        Command::Run(run) => run::run(run, color, out),
+        Command::Eval(eval) => eval::run(eval, out),
+        Command::Isa(isa) => isa::run(isa, out),
+        Command::Machines(machines) => machines::run(machines, out),
+        Command::Completions(completions) => completions::run(completions, out),
+        Command::Man(man) => man::run(man, out),
+    }
+}
+
+/// What the command line asks for, or the status to end with where clap has already answered (help, version, a mistake).
+fn parse(out: &mut Out) -> Result<Arguments, ExitCode> {
+    Arguments::try_parse().map_err(|answer| {
+        if answer.use_stderr() {
+            let text = answer.render();
+            let color = Color::Auto.on_stderr();
+            output::message(&if color { text.ansi().to_string() } else { text.to_string() });
+            return ExitCode::from(2);
+        }
+        // Help goes where results go, so that a full disk or a closed pipe is treated alike.
+        end(write!(out, "{}", answer.render()).and_then(|()| out.flush()).map_err(Into::into), false)
+    })
+}
+
+/// Reports an error, if there is one, and gives the exit status. A closed pipe, as under `| head`, is none.
+fn end(result: Result<()>, color: bool) -> ExitCode {
+    let Err(error) = result else { return ExitCode::SUCCESS };
+    if output::is_closed_pipe(&error) {
+        return ExitCode::SUCCESS;
+    }
+    match error.downcast_ref::<Failure>() {
+        Some(Failure::Reported) => {}
+        Some(Failure::Diagnostics(text)) => output::message(text),
+        Some(Failure::Usage(_)) | None => output::error(&output::describe(&error), color),
+    }
+    ExitCode::from(if matches!(error.downcast_ref(), Some(Failure::Usage(_))) { 2 } else { 1 })
+}
+
+fn main() -> ExitCode {
+    let mut out = Out::stdout();
+    let arguments = match parse(&mut out) {
+        Ok(arguments) => arguments,
+        Err(status) => return status,
+    };
+    let color = arguments.color.on_stderr();
+    let result = run(&arguments, color, &mut out);
+    // What was written before an error still goes out; the first error is the one that counts.
+    let flushed = out.flush().map_err(anyhow::Error::from);
+    end(result.and(flushed), color)
+}

@@ -1,0 +1,98 @@
+//! Results as JSON, messages on standard error, and how failures are told.
+
+use crate::files::Out;
+use anyhow::Result;
+use std::io::{self, IsTerminal, Write};
+
+/// Writes a value as JSON, for people to read too.
+pub(crate) fn json(value: &impl serde::Serialize, out: &mut Out) -> Result<()> {
+    // Via a string: an error of writing stays an `io::Error`.
+    let text = serde_json::to_string_pretty(value)?;
+    Ok(writeln!(out, "{text}")?)
+}
+
+/// Shows a text on standard error. If nobody can read it, there is nobody to tell.
+pub(crate) fn message(text: &str) {
+    let text = text.trim_end();
+    if !text.is_empty() {
+        let _ = writeln!(io::stderr(), "{text}");
+    }
+}
+
+/// Shows an error.
+pub(crate) fn error(text: &str, color: bool) {
+    let (on, off) = if color { ("\x1b[1;31m", "\x1b[0m") } else { ("", "") };
+    message(&format!("{on}error{off}: {text}"));
+}
+
+/// Shows a warning.
+pub(crate) fn warning(text: &str, color: bool) {
+    let (on, off) = if color { ("\x1b[1;33m", "\x1b[0m") } else { ("", "") };
+    message(&format!("{on}warning{off}: {text}"));
+}
+
+/// An error and its causes in one line. Some errors repeat their cause in their own text; it is said once.
+pub(crate) fn describe(error: &anyhow::Error) -> String {
+    let mut text = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if !text.contains(&cause) {
+            let colon = if text.is_empty() { "" } else { ": " };
+            text.push_str(colon);
+            text.push_str(&cause);
+        }
+    }
+    text
+}
+
+/// Whether the error is that nobody reads standard output any more.
+pub(crate) fn is_closed_pipe(error: &anyhow::Error) -> bool {
+    let is_pipe = |cause: &io::Error| cause.kind() == io::ErrorKind::BrokenPipe;
+    error.chain().any(|cause| cause.downcast_ref().is_some_and(is_pipe))
+}
+
+/// Failures that are not told like the others.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// The assembler's diagnostics, rendered; they say themselves that they are errors.
+    Diagnostics(String),
+    /// Options that cannot be together: an error in the command line.
+    Usage(String),
+    /// The result has told already.
+    Reported,
+}
+
+impl std::fmt::Display for Failure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Failure::Diagnostics(text) | Failure::Usage(text) => f.write_str(text),
+            Failure::Reported => Ok(()),
+        }
+    }
+}
+
+impl std::error::Error for Failure {}
+
+/// When to colour.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Color {
+    /// On a terminal, unless NO_COLOR is set.
+    Auto,
+    /// Always.
+    Always,
+    /// Never.
+    Never,
+}
+
+impl Color {
+    /// Whether messages on standard error are coloured.
+    pub(crate) fn on_stderr(self) -> bool {
+        match self {
+            Color::Always => true,
+            Color::Never => false,
+            Color::Auto => {
+                let refused = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+                io::stderr().is_terminal() && !refused
+            }
+        }
+    }
+}

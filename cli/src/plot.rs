@@ -1,0 +1,228 @@
+//! The tool path and the tracking error over time, as SVG.
+
+use anyhow::{Result, anyhow};
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use std::ops::Range;
+use takt_programs::hybrid::closed_loop::Record;
+use takt_programs::hybrid::params::SAMPLE_TIME;
+
+/// Points of a curve at most: an SVG of all periods would have hundreds of thousands.
+const POINTS: u64 = 1000;
+/// The picture in pixels.
+const SIZE: u32 = 1000;
+/// Units of drawing in a pixel. plotters draws in whole units, and a slanted line in whole pixels is a zig-zag.
+const FINE: u32 = 8;
+const CUT: RGBColor = RGBColor(0x1f, 0x4e, 0x9c);
+const RAPID: RGBColor = RGBColor(0xa8, 0xa8, 0xa8);
+const LIMIT: RGBColor = RGBColor(0xc0, 0x30, 0x20);
+/// The paper's requirement on the tool, µm.
+const REQUIRED: f64 = 10.0;
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
+
+/// What is drawn, gathered as the loop runs.
+pub(crate) struct Plot {
+    /// Periods of a stretch of time, which is one point of a curve.
+    every: u64,
+    path: Vec<Run>,
+    /// Where the tool was in the last period.
+    last: Option<(usize, (f64, f64))>,
+    errors: Vec<Stretch>,
+}
+
+/// A run of moves of one kind; points in mm.
+struct Run {
+    cutting: bool,
+    points: Vec<(f64, f64)>,
+}
+
+/// Largest errors in a stretch of time, µm, of rapid and of cutting moves, if there were any.
+#[derive(Clone, Copy, Default)]
+struct Stretch {
+    errors: [Option<f64>; 2],
+}
+
+impl Plot {
+    pub(crate) fn new(periods: u64) -> Plot {
+        Plot { every: periods.div_ceil(POINTS).max(1), path: Vec::new(), last: None, errors: Vec::new() }
+    }
+
+    pub(crate) fn add(&mut self, record: &Record) {
+        let cutting = record.sample.cutting;
+        let point = (record.position[0] * 1e3, record.position[1] * 1e3);
+        // The end of each move is a point of the path, so that no corner is cut; and a run begins where the last one ends.
+        let corner = self.last.filter(|(index, _)| *index != record.sample.move_index).map(|(_, end)| end);
+        if let (Some(run), Some(corner)) = (self.path.last_mut(), corner) {
+            run.points.push(corner);
+        }
+        if self.path.last().is_none_or(|run| run.cutting != cutting) {
+            self.path.push(Run { cutting, points: corner.into_iter().collect() });
+        }
+        let begins = record.period.is_multiple_of(self.every);
+        if begins && let Some(run) = self.path.last_mut() {
+            run.points.push(point);
+        }
+        self.last = Some((record.sample.move_index, point));
+
+        if begins {
+            self.errors.push(Stretch::default());
+        }
+        if let Some(stretch) = self.errors.last_mut() {
+            let error = record.tool_error * 1e6;
+            let largest = &mut stretch.errors[usize::from(cutting)];
+            *largest = Some(largest.map_or(error, |largest| largest.max(error)));
+        }
+    }
+
+    /// The picture.
+    pub(crate) fn draw(&self, title: &str) -> Result<String> {
+        let mut svg = String::new();
+        self.draw_into(title, &mut svg).map_err(|error| anyhow!("cannot draw: {error}"))?;
+        let fine = format!("width=\"{0}\" height=\"{0}\"", SIZE * FINE);
+        Ok(svg.replacen(&fine, &format!("width=\"{SIZE}\" height=\"{SIZE}\""), 1))
+    }
+
+    fn draw_into(&self, title: &str, svg: &mut String) -> Outcome<()> {
+        let root = SVGBackend::with_string(svg, (SIZE * FINE, SIZE * FINE)).into_drawing_area();
+        root.fill(&WHITE)?;
+        let (upper, lower) = root.split_vertically(px(600));
+        self.draw_path(title, &upper)?;
+        self.draw_errors(&lower)?;
+        root.present()?;
+        Ok(())
+    }
+
+    fn draw_path(&self, title: &str, area: &Area<'_>) -> Outcome<()> {
+        let (rapid, cut) = (RAPID.stroke_width(px(1)), CUT.stroke_width(px(2)));
+        let lines = [("rapid moves", rapid), ("cutting moves", cut)];
+        let area = headed(area, &format!("Tool path of {title}, seen from above"), &lines)?;
+        let ends = self.last.iter().map(|(_, end)| end);
+        let points = || self.path.iter().flat_map(|run| &run.points).chain(ends.clone());
+        let range = |pick: fn(&(f64, f64)) -> f64| {
+            let (low, high) = points().map(pick).fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
+            let margin = 0.05 * (high - low) + 1.0;
+            low - margin..high + margin
+        };
+        // One scale for both axes: letters must not be stretched. What the axes leave for the plot, only a chart knows.
+        let (x, y) = (range(|p| p.0), range(|p| p.1));
+        let (width, height) =
+            chart(&area).build_cartesian_2d(0.0..1.0, 0.0..1.0)?.plotting_area().dim_in_pixel();
+        let scale = ((x.end - x.start) / f64::from(width)).max((y.end - y.start) / f64::from(height));
+        let widen = |range: Range<f64>, pixels: u32| {
+            let (centre, half) = ((range.start + range.end) / 2.0, scale * f64::from(pixels) / 2.0);
+            centre - half..centre + half
+        };
+        let mut chart = chart(&area).build_cartesian_2d(widen(x, width), widen(y, height))?;
+        mesh(&mut chart, "x, mm", "y, mm")?;
+        let last = self.path.len().saturating_sub(1);
+        for (cutting, style) in [(false, rapid), (true, cut)] {
+            for (i, run) in self.path.iter().enumerate().filter(|(_, run)| run.cutting == cutting) {
+                let end = ends.clone().filter(|_| i == last);
+                chart.draw_series(LineSeries::new(run.points.iter().chain(end).copied(), style))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn draw_errors(&self, area: &Area<'_>) -> Outcome<()> {
+        let (rapid, cut, limit) = (RAPID.filled(), CUT.filled(), LIMIT.stroke_width(px(1)));
+        let required = format!("required while cutting: {REQUIRED} µm");
+        let lines = [("rapid moves", rapid), ("cutting moves", cut), (required.as_str(), limit)];
+        let stretch = self.every as f64 * SAMPLE_TIME;
+        let title = format!("Tracking error of the tool, largest in each {:.1} ms", stretch * 1e3);
+        let area = headed(area, &title, &lines)?;
+        let end = self.errors.len() as f64 * stretch;
+        let worst = self.errors.iter().flat_map(|stretch| stretch.errors).flatten().fold(REQUIRED, f64::max);
+        let mut chart = chart(&area).build_cartesian_2d(0.0..end, 0.0..worst * 1.15)?;
+        mesh(&mut chart, "time, s", "error, µm")?;
+        for (kind, style) in [rapid, cut].into_iter().enumerate() {
+            chart.draw_series(
+                self.skylines(kind, stretch).into_iter().map(|points| Polygon::new(points, style)),
+            )?;
+        }
+        chart.draw_series(LineSeries::new([(0.0, REQUIRED), (end, REQUIRED)], limit))?;
+        Ok(())
+    }
+
+    /// The outlines of the errors of one kind, each over stretches that follow one another. (Bars side by side would show
+    /// seams.)
+    fn skylines(&self, kind: usize, stretch: f64) -> Vec<Vec<(f64, f64)>> {
+        let errors: Vec<Option<f64>> = self.errors.iter().map(|of| of.errors[kind]).collect();
+        let mut outlines = Vec::new();
+        let mut time = 0.0;
+        for run in errors.chunk_by(|a, b| a.is_some() == b.is_some()) {
+            let mut outline = vec![(time, 0.0)];
+            for error in run {
+                outline.extend(error.iter().flat_map(|&error| [(time, error), (time + stretch, error)]));
+                time += stretch;
+            }
+            outline.push((time, 0.0));
+            if run[0].is_some() {
+                outlines.push(outline);
+            }
+        }
+        outlines
+    }
+}
+
+/// Pixels in units of drawing.
+fn px(pixels: u32) -> u32 {
+    pixels * FINE
+}
+
+fn font(size: u32) -> (&'static str, u32) {
+    ("sans-serif", px(size))
+}
+
+/// Writes a title and, in a line under it, what is drawn in which style; gives the area below, which they cannot cover.
+fn headed<'a>(area: &Area<'a>, title: &str, styles: &[(&str, ShapeStyle)]) -> Outcome<Area<'a>> {
+    let area = area.margin(px(10), 0, 0, 0).titled(title, font(20))?;
+    let (head, rest) = area.split_vertically(px(24));
+    let mut x = px(72) as i32;
+    let (middle, swatch, gap) = (px(12) as i32, px(24) as i32, px(8) as i32);
+    for &(text, style) in styles {
+        let half = if style.filled { px(5) as i32 } else { 0 };
+        if style.filled {
+            head.draw(&Rectangle::new([(x, middle - half), (x + swatch, middle + half)], style))?;
+        } else {
+            head.draw(&PathElement::new([(x, middle), (x + swatch, middle)], style))?;
+        }
+        x += swatch + gap;
+        head.draw(&Text::new(text.to_owned(), (x, middle - px(6) as i32), font(14)))?;
+        x += (text.chars().count() as u32 * px(7)) as i32 + 3 * gap;
+    }
+    Ok(rest)
+}
+
+fn chart<'a, 'b>(area: &'a Area<'b>) -> ChartBuilder<'a, 'b, SVGBackend<'b>> {
+    let mut chart = ChartBuilder::on(area);
+    chart
+        .margin(px(12))
+        .margin_top(px(2))
+        .margin_right(px(24))
+        .x_label_area_size(px(44))
+        .y_label_area_size(px(60));
+    chart
+}
+
+type Axes = Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>;
+
+fn mesh(chart: &mut ChartContext<'_, SVGBackend<'_>, Axes>, x: &str, y: &str) -> Outcome<()> {
+    let label = |value: &f64| format!("{}", (value * 1e6).round() / 1e6);
+    chart
+        .configure_mesh()
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(BLACK.mix(0.15).stroke_width(px(1)))
+        .axis_style(BLACK.stroke_width(px(1)))
+        .set_all_tick_mark_size(px(5))
+        .label_style(font(12))
+        .axis_desc_style(font(14))
+        .x_label_formatter(&label)
+        .y_label_formatter(&label)
+        .x_desc(x)
+        .y_desc(y)
+        .draw()?;
+    Ok(())
+}

@@ -1,0 +1,175 @@
+//! Input ports from CSV, output ports to CSV and JSON.
+
+use crate::files;
+use crate::select::suggest;
+use anyhow::{Context, Result, anyhow, bail};
+use serde_json::Value;
+use std::io::{self, Read, Write};
+use std::path::Path;
+use takt_isa::Type;
+use takt_isa::program::Port;
+
+/// A value as CSV has it: the shortest decimal that reads back as the same bits, integers in decimal, bits in hexadecimal.
+pub(crate) fn format(ty: Type, bits: u32) -> String {
+    match ty {
+        Type::F => format!("{:?}", f32::from_bits(bits)),
+        Type::I => bits.cast_signed().to_string(),
+        Type::B => format!("0x{bits:08x}"),
+    }
+}
+
+/// A value as JSON has it: a number, or else what [`format`] makes of it.
+pub(crate) fn json(ty: Type, bits: u32) -> Value {
+    let text = format(ty, bits);
+    serde_json::from_str::<serde_json::Number>(&text).map_or_else(|_| Value::from(text), Value::from)
+}
+
+/// Writes a row of CSV. No field has a comma or a quote: they are names of ports, and numbers.
+pub(crate) fn write_row(out: &mut impl Write, fields: impl IntoIterator<Item = String>) -> io::Result<()> {
+    let mut row = String::new();
+    for (i, field) in fields.into_iter().enumerate() {
+        if i > 0 {
+            row.push(',');
+        }
+        row.push_str(&field);
+    }
+    row.push('\n');
+    out.write_all(row.as_bytes())
+}
+
+/// The bits of a CSV field.
+fn parse(ty: Type, text: &str) -> Result<u32, String> {
+    match ty {
+        Type::F => {
+            let value: f32 = text.parse().map_err(|_| format!("`{}` is no number", shown(text)))?;
+            if value.is_nan() {
+                return Err("NaN is no input for a controller".to_owned());
+            }
+            if value.is_infinite() {
+                let largest = f32::MAX;
+                return Err(format!("`{}` does not fit binary32, whose largest is {largest:e}", shown(text)));
+            }
+            Ok(value.to_bits())
+        }
+        Type::I => text
+            .parse()
+            .map(i32::cast_unsigned)
+            .map_err(|_| format!("`{}` is no integer between {} and {}", shown(text), i32::MIN, i32::MAX)),
+        Type::B => text
+            .strip_prefix("0x")
+            .and_then(|digits| u32::from_str_radix(digits, 16).ok())
+            .or_else(|| text.parse().ok())
+            .ok_or_else(|| format!("`{}` is no 32-bit number (0x… or decimal)", shown(text))),
+    }
+}
+
+/// The beginning of a field that may be long.
+fn shown(text: &str) -> String {
+    let mut start: String = text.chars().take(40).collect();
+    if start.len() < text.len() {
+        start.push('…');
+    }
+    start
+}
+
+/// Rows of input values from a CSV with one named column for each input port; further columns are left alone.
+pub(crate) struct Inputs {
+    name: String,
+    reader: csv::Reader<Rationed>,
+    record: csv::StringRecord,
+    /// Number of columns.
+    width: usize,
+    /// The ports, each with its column.
+    ports: Vec<(Port, usize)>,
+}
+
+/// Bytes of one row; more is an error, so that a file without line ends, or with an open quote, cannot fill the memory.
+const ROW_LIMIT: usize = 1 << 20;
+
+impl Inputs {
+    /// Opens a file, `-` being standard input, and reads the header.
+    pub(crate) fn open(path: &Path, ports: &[Port]) -> Result<Inputs> {
+        let name = files::input_name(path);
+        let source = Rationed { source: files::open(path)?, left: ROW_LIMIT };
+        // Rows of another length are found here, with a better message.
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(source);
+        let header = reader.headers().map_err(|error| explain(&name, error))?.clone();
+        if header.is_empty() {
+            bail!("{name} is empty: it wants a header with a column for each input port");
+        }
+        let columns = |port: &Port| -> Vec<usize> {
+            header.iter().enumerate().filter(|(_, title)| *title == port.name).map(|(i, _)| i).collect()
+        };
+        let mut found = Vec::new();
+        let mut missing = Vec::new();
+        for port in ports {
+            match columns(port)[..] {
+                [column] => found.push((port.clone(), column)),
+                [] => missing.push(port.name.as_str()),
+                _ => bail!("{name}: two columns are named `{}`", port.name),
+            }
+        }
+        if let [first, ..] = missing[..] {
+            // A column that is a port's is not another's misspelt.
+            let near =
+                suggest(first, header.iter().filter(|title| ports.iter().all(|port| port.name != **title)));
+            let ports = if missing.len() == 1 { "input port" } else { "input ports" };
+            bail!("{name}: no column for the {ports} {}{near}", missing.join(", "));
+        }
+        Ok(Inputs { name, reader, record: csv::StringRecord::new(), width: header.len(), ports: found })
+    }
+
+    /// Reads the next row into `values`, register and bits for each port; false at the end.
+    pub(crate) fn next(&mut self, values: &mut Vec<(u16, u32)>) -> Result<bool> {
+        self.reader.get_mut().left = ROW_LIMIT;
+        if !self.reader.read_record(&mut self.record).map_err(|error| explain(&self.name, error))? {
+            return Ok(false);
+        }
+        let place = || format!("{}:{}", self.name, self.record.position().map_or(0, csv::Position::line));
+        if self.record.len() != self.width {
+            bail!("{}: the row has {}, the header {}", place(), fields(self.record.len()), self.width);
+        }
+        values.clear();
+        for (port, column) in &self.ports {
+            let field = self.record.get(*column).context("a row without a field")?;
+            let bits = parse(port.ty, field)
+                .map_err(|reason| anyhow!("{}: column {}: {reason}", place(), port.name))?;
+            values.push((port.register, bits));
+        }
+        Ok(true)
+    }
+}
+
+fn fields(count: usize) -> String {
+    format!("{count} field{}", if count == 1 { "" } else { "s" })
+}
+
+/// An error of the CSV reader in the form of ours.
+fn explain(name: &str, error: csv::Error) -> anyhow::Error {
+    match error.kind() {
+        csv::ErrorKind::Utf8 { pos, err } => {
+            let line = pos.as_ref().map_or(0, csv::Position::line);
+            anyhow!("{name}:{line}: field {} is not UTF-8 text", err.field() + 1)
+        }
+        csv::ErrorKind::Io(error) => anyhow!("cannot read {name}: {error}"),
+        _ => anyhow::Error::from(error).context(format!("cannot read {name}")),
+    }
+}
+
+/// A reader that gives so many bytes and then an error, unless it is granted more.
+struct Rationed {
+    source: Box<dyn Read>,
+    left: usize,
+}
+
+impl Read for Rationed {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.left == 0 {
+            return Err(io::Error::other(format!("a row is longer than {} MiB", ROW_LIMIT >> 20)));
+        }
+        let allowed = buffer.len().min(self.left);
+        let count = self.source.read(&mut buffer[..allowed])?;
+        self.left -= count;
+        Ok(count)
+    }
+}

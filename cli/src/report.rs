@@ -1,0 +1,207 @@
+//! `takt track`'s tables: ours beside the founding paper's.
+
+use crate::account::Account;
+use crate::track::{PAPER_CLOCK, Tracking};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use takt_programs::accuracy::MaxError;
+
+/// Table 2 of the paper: platform, clock in MHz, time of one period in µs.
+const PLATFORMS: [(&str, f64, f64); 4] = [
+    ("FPGA1: Nios II, vendor's FPU", 100.0, 218.0),
+    ("FPGA2: Nios II, own float instructions", 100.0, 82.0),
+    ("DSP TMS320F28069", 80.0, 43.0),
+    ("FPGA3: own float ASIP", 125.0, 21.0),
+];
+
+/// Table 1 of the paper: operation, count, our mnemonics for it.
+const OPERATIONS: [(&str, u64, &[&str]); 7] = [
+    ("+ -", 186, &["fadd", "fsub"]),
+    ("×", 216, &["fmul"]),
+    ("/", 31, &["fdiv"]),
+    ("√", 13, &["fsqrt"]),
+    ("sin", 1, &["fsin"]),
+    ("float(int)", 5, &["itof"]),
+    ("saturation", 5, &["fsat"]),
+];
+
+/// Table 3 of the paper: output, unit, largest errors on PC, DSP and FPGA1,2,3. The paper gives one figure for both axes
+/// of the table.
+const ERRORS: [(&str, &str, [f64; 3]); 15] = [
+    ("l1", "m", [1.8651e-6, 1.8651e-6, 1.8651e-6]),
+    ("l2", "m", [1.1658e-6, 2.2893e-8, 2.2165e-8]),
+    ("l3", "m", [1.0510e-6, 1.0512e-7, 1.0510e-6]),
+    ("v1", "m/s", [5.9368e-7, 5.9377e-7, 5.9368e-7]),
+    ("v2", "m/s", [8.2634e-7, 8.2634e-7, 8.2634e-7]),
+    ("v3", "m/s", [7.5938e-7, 7.6683e-7, 7.6003e-7]),
+    ("a1", "m/s²", [1.8899e-6, 2.1942e-7, 2.2496e-7]),
+    ("a2", "m/s²", [2.7877e-6, 6.0238e-7, 5.8701e-7]),
+    ("a3", "m/s²", [2.6891e-6, 6.0238e-6, 2.9990e-6]),
+    ("th4", "rad", [4.4702e-8; 3]),
+    ("th5", "rad", [4.4702e-8; 3]),
+    ("om4", "rad/s", [1.0000e-7; 3]),
+    ("om5", "rad/s", [1.0000e-7; 3]),
+    ("ep4", "rad/s²", [3.2011e-7; 3]),
+    ("ep5", "rad/s²", [3.2011e-7; 3]),
+];
+
+/// The paper's requirement on the tool, m.
+const REQUIREMENT: f64 = 10e-6;
+
+/// Rows by kind: the paper's arm lengths are unknown, so the largest of three is compared with the largest of three.
+const KINDS: [(&str, std::ops::Range<usize>); 3] = [("l", 0..3), ("v", 3..6), ("a", 6..9)];
+
+/// The largest of some errors; a NaN is the largest of all.
+fn largest(errors: impl Iterator<Item = f64>) -> f64 {
+    errors.fold(0.0, |largest, error| if error > largest || error.is_nan() { error } else { largest })
+}
+
+/// A number with its thousands marked.
+fn digits(value: u64) -> String {
+    let digits = value.to_string();
+    let mut out = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(digit);
+    }
+    out
+}
+
+/// The result for people.
+pub(crate) fn text(tracking: &Tracking) -> String {
+    let mut out = String::new();
+    let Tracking { name, path, totals, program, .. } = tracking;
+    let periods = digits(totals.periods);
+    let s = if totals.periods == 1 { "" } else { "s" };
+    let _ = writeln!(
+        out,
+        "{name} on {}, closed loop along {path}: {periods} period{s} of 100 µs\n",
+        program.machine.name
+    );
+    time_table(tracking, &mut out);
+    operation_table(&tracking.account, &mut out);
+    error_table(&totals.accuracy.errors, &mut out);
+
+    let _ = writeln!(out, "\nLargest tracking error of the tool{:>11}", "µm");
+    for (name, error) in [("while cutting", totals.error.cutting), ("over everything", totals.error.overall)]
+    {
+        let _ = writeln!(out, "  {name:<32}{:>11.3}", error * 1e6);
+    }
+    let _ = writeln!(out, "  {:<32}{:>11.3}", "required while cutting", REQUIREMENT * 1e6);
+
+    let _ = writeln!(out, "\nCycles of one period (the last), by what they went to");
+    out.push_str(&tracking.account.stall_table(program, 5));
+    out
+}
+
+/// Table 2.
+fn time_table(tracking: &Tracking, out: &mut String) {
+    let (machine, clock, totals) = (tracking.program.machine.name, tracking.clock, &tracking.totals);
+    let _ = writeln!(out, "Time of one period{:>31}{:>10}{:>12}", "clock MHz", "cycles", "time µs");
+    for (platform, clock, time) in PLATFORMS {
+        let _ = writeln!(out, "  {platform:<40}{clock:>7}{:>10}{time:>12}", digits((clock * time) as u64));
+    }
+    for (which, cycles) in [("shortest", totals.shortest), ("longest", totals.longest)] {
+        let name = format!("Takt {machine}, {which} period");
+        let time = cycles as f64 / clock;
+        let _ = writeln!(out, "  {name:<40}{clock:>7}{:>10}{time:>12.3}", digits(cycles));
+    }
+    let (_, fpga3_clock, fpga3_time) = PLATFORMS[3];
+    let whose = if clock == PAPER_CLOCK { "The clock is the paper's" } else { "The clock is --clock's" };
+    let _ = writeln!(
+        out,
+        "  FPGA3 takes {:.1} times the cycles. {whose}; Takt's own circuit is not placed and routed yet.",
+        fpga3_clock * fpga3_time / totals.longest as f64
+    );
+    if let Some(latency) = tracking.latency {
+        let _ = writeln!(
+            out,
+            "  encoder to force: {} cycles from the first read of the encoder read last, {} from the first of all",
+            latency.from_last_encoder, latency.from_first_read
+        );
+    }
+    let _ = writeln!(out, "  deadlines missed: {}", totals.missed);
+}
+
+/// Table 1.
+fn operation_table(account: &Account, out: &mut String) {
+    let _ = writeln!(out, "\nOperations of one period{:>10}{:>10}", "paper", "Takt");
+    let operations = &account.operations;
+    let mut listed = 0;
+    for (name, paper, mnemonics) in OPERATIONS {
+        let ours: u64 = mnemonics.iter().filter_map(|name| operations.get(name)).sum();
+        listed += ours;
+        let _ = writeln!(out, "  {name:<22}{paper:>10}{ours:>10}");
+    }
+    let is_other = |name: &str| OPERATIONS.iter().all(|(_, _, listed)| !listed.contains(&name));
+    let others: Vec<String> = operations
+        .iter()
+        .filter(|(name, _)| is_other(name))
+        .map(|(name, count)| format!("{name} {count}"))
+        .collect();
+    let all = account.total_operations();
+    let others = if others.is_empty() { String::new() } else { format!("  ({})", others.join(", ")) };
+    let _ = writeln!(out, "  {:<22}{:>10}{:>10}{others}", "others", "-", all - listed);
+    let paper: u64 = OPERATIONS.iter().map(|(_, count, _)| count).sum();
+    let _ = writeln!(out, "  {:<22}{paper:>10}{all:>10}", "all");
+}
+
+/// Table 3.
+fn error_table(errors: &[MaxError], out: &mut String) {
+    let _ = writeln!(
+        out,
+        "\nLargest |binary32 - binary64|{:>12}{:>8}{:>12}{:>12}{:>12}",
+        "Takt", "ulp", "paper PC", "DSP", "FPGA"
+    );
+    let mut row = |name: &str, ours: f64, ulps: Option<f64>, paper: [f64; 3]| {
+        let ulps = ulps.map_or(String::new(), |ulps| format!("{ulps:.2}"));
+        let [pc, dsp, fpga] = paper;
+        let _ = writeln!(out, "  {name:<27}{ours:>12.4e}{ulps:>8}{pc:>12.4e}{dsp:>12.4e}{fpga:>12.4e}");
+    };
+    for ((name, unit, paper), error) in ERRORS.iter().zip(errors) {
+        row(&format!("{name}, {unit}"), error.absolute, Some(error.ulps_of_largest()), *paper);
+    }
+    for (kind, rows) in KINDS {
+        let paper = [0, 1, 2].map(|column| largest(ERRORS[rows.clone()].iter().map(|row| row.2[column])));
+        let ours = largest(errors[rows].iter().map(|error| error.absolute));
+        row(&format!("largest {kind}"), ours, None, paper);
+    }
+    out.push_str(
+        "  ulp: of the largest value that the output takes. The paper's arm lengths are unknown: compare the largest of a\n  \
+         kind. Angles are the reference as it comes in, rounded to binary32; the paper's are unknown (ours reach π).\n",
+    );
+}
+
+/// The result for programs.
+pub(crate) fn json(tracking: &Tracking) -> Value {
+    let by_name = |value: fn(&MaxError) -> f64| -> BTreeMap<&str, f64> {
+        ERRORS
+            .iter()
+            .zip(&tracking.totals.accuracy.errors)
+            .map(|((name, ..), error)| (*name, value(error)))
+            .collect()
+    };
+    let totals = &tracking.totals;
+    let time = |cycles: u64| cycles as f64 / tracking.clock;
+    json!({
+        "program": tracking.name,
+        "machine": tracking.program.machine.name,
+        "path": tracking.path,
+        "periods": totals.periods,
+        "cycles": {"min": totals.shortest, "max": totals.longest},
+        "clock_mhz": tracking.clock,
+        "time_us": {"min": time(totals.shortest), "max": time(totals.longest)},
+        "encoder_to_force_cycles": tracking.latency,
+        "deadlines_missed": totals.missed,
+        "operations": tracking.account.operations,
+        "bundles": tracking.account.bundles,
+        "max_error": by_name(|error| error.absolute),
+        "max_error_ulp": by_name(MaxError::ulps_of_largest),
+        "tracking_error_m": {"cutting": totals.error.cutting, "overall": totals.error.overall},
+        "stalls": tracking.account.stalls_json(),
+        "nan_writes": tracking.nan_writes,
+    })
+}

@@ -1,0 +1,47 @@
+//! Options that several commands share, and did-you-mean.
+
+use clap::Args;
+use takt_asm::diag::nearest;
+use takt_isa::{MACHINES, Machine, Op, ROWS, Row};
+
+/// `--machine`.
+#[derive(Args, Clone)]
+pub(crate) struct MachineArgument {
+    /// The machine, as `takt machines` lists them.
+    #[arg(long = "machine", short = 'm', value_name = "MACHINE", default_value = MACHINES[0].name, value_parser = machine)]
+    pub(crate) machine: &'static Machine,
+}
+
+/// `--machine`, where a file may decide.
+#[derive(Args, Clone)]
+pub(crate) struct OptionalMachine {
+    /// The machine, as `takt machines` lists them [default: the image's; t3 for a source].
+    #[arg(long = "machine", short = 'm', value_name = "MACHINE", value_parser = machine)]
+    pub(crate) machine: Option<&'static Machine>,
+}
+
+fn machine(name: &str) -> Result<&'static Machine, String> {
+    Machine::from_name(name).ok_or_else(|| {
+        let names: Vec<&str> = MACHINES.iter().map(|machine| machine.name).collect();
+        let near = suggest(name, names.iter().copied());
+        format!("there is no such machine{near} (machines: {})", names.join(", "))
+    })
+}
+
+/// The instruction of a mnemonic, for clap.
+pub(crate) fn instruction(mnemonic: &str) -> Result<&'static Row, String> {
+    Op::from_mnemonic(mnemonic).map(Op::row).ok_or_else(|| {
+        let near = suggest(mnemonic, ROWS.iter().map(|row| row.mnemonic));
+        format!("there is no such instruction{near} (`takt isa` lists them)")
+    })
+}
+
+/// A number of periods or cycles, for clap.
+pub(crate) fn count(text: &str) -> Result<u64, String> {
+    text.parse().ok().filter(|count| *count > 0).ok_or_else(|| "not a whole number of at least 1".to_owned())
+}
+
+/// `; did you mean …?` if one of the names is near.
+pub(crate) fn suggest<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+    nearest(name, names).map_or(String::new(), |near| format!("; did you mean `{near}`?"))
+}

@@ -1,0 +1,261 @@
+//! `takt track`: the main job. The tracking program, in closed loop with the robot, along a tool path.
+
+use crate::account::Account;
+use crate::controller::{Latency, OnEmulator, port_type};
+use crate::files::{self, Given, Out};
+use crate::load::Load;
+use crate::nan::NanWrites;
+use crate::plot::Plot;
+use crate::select::{self, OptionalMachine, suggest};
+use crate::{output, ports, report};
+use anyhow::{Context, Result, anyhow, bail};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::Write;
+use std::num::NonZeroU64;
+use std::path::{Path, PathBuf};
+use takt_emu::{Emulator, PeriodReport};
+use takt_isa::Program;
+use takt_programs::accuracy::Accuracy;
+use takt_programs::hybrid::closed_loop::{ClosedLoop, Record, TrackingError};
+use takt_programs::hybrid::kinematics;
+use takt_programs::hybrid::params::SAMPLE_TIME;
+use takt_programs::hybrid::ports::{INPUTS, OUTPUTS, REFERENCE_LEN};
+use takt_programs::trajectory::Trajectory;
+use takt_programs::{SOURCES, gcode};
+
+/// Drive the hybrid robot along a tool path in closed loop, and count.
+///
+/// Assembles the tracking program, runs it on the emulator once per sampling period (10 kHz) against a binary64 model of the
+/// robot, and prints its cycles, accuracy and tracking error beside the founding paper's.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Track {
+    /// `tracking`, `tracking_literal` (the equations as printed), or a source or image of your own.
+    #[arg(long, value_name = "NAME|FILE", default_value = "tracking")]
+    program: PathBuf,
+    #[command(flatten)]
+    machine: OptionalMachine,
+    /// Tool path in G-code [default: the letters AGH]; `-` is standard input.
+    #[arg(long, value_name = "FILE")]
+    gcode: Option<PathBuf>,
+    /// Stop after this many periods [default: the whole path].
+    #[arg(long, value_name = "N", value_parser = select::count, allow_negative_numbers = true)]
+    periods: Option<u64>,
+    /// Clock in MHz, for cycles to time and for the deadline; the paper's is 125.
+    #[arg(long, value_name = "MHZ", default_value_t = PAPER_CLOCK, value_parser = clock, allow_negative_numbers = true)]
+    clock: f64,
+    /// Write inputs, outputs, cycles and errors of every period as CSV, which `takt run --inputs` reads; `-` is standard
+    /// output.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Draw the tool path and the tracking error over time as SVG; `-` is standard output.
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+    /// Show no progress.
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  takt track                                     the letters AGH on t3, the fast machine
+  takt track --machine t1 --plot agh.svg         on the small machine; draw path and error
+  takt track --program mine.s --gcode part.ngc   your own controller, your own path
+  takt track --periods 1000 --csv path.csv       record inputs and outputs for `takt run`";
+
+/// The clock of the paper's FPGA3, MHz.
+pub(crate) const PAPER_CLOCK: f64 = 125.0;
+
+/// Bytes of G-code; beyond, the longest path that can be driven would be made of moves of a micrometre.
+const GCODE_LIMIT: usize = 16 << 20;
+
+fn clock(text: &str) -> Result<f64, String> {
+    let mhz: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if (0.01..=100_000.0).contains(&mhz) {
+        Ok(mhz)
+    } else {
+        Err("not between 0.01 and 100000 MHz".to_owned())
+    }
+}
+
+/// Cycles that the sampling period has at a clock in MHz.
+fn period_cycles(clock: f64) -> Option<NonZeroU64> {
+    NonZeroU64::new((clock * 1e6 * SAMPLE_TIME).round() as u64)
+}
+
+/// What a run along the path came to.
+pub(crate) struct Tracking {
+    /// The program's name.
+    pub(crate) name: String,
+    pub(crate) program: Program,
+    /// The tool path's name.
+    pub(crate) path: String,
+    /// Clock, MHz.
+    pub(crate) clock: f64,
+    pub(crate) totals: Totals,
+    pub(crate) nan_writes: u64,
+    /// Of the last period.
+    pub(crate) account: Account,
+    /// Of the last period; `None` if it read no encoder or wrote no force.
+    pub(crate) latency: Option<Latency>,
+}
+
+/// What is gathered over the periods.
+pub(crate) struct Totals {
+    pub(crate) periods: u64,
+    /// Shortest and longest period, cycles.
+    pub(crate) shortest: u64,
+    pub(crate) longest: u64,
+    /// Deadlines missed, and ticks lost.
+    pub(crate) missed: u64,
+    /// Of the joint reference: l, v, a of the arms, θ, ω, ε of the table.
+    pub(crate) accuracy: Accuracy<REFERENCE_LEN>,
+    pub(crate) error: TrackingError,
+}
+
+impl Totals {
+    fn new() -> Totals {
+        let (accuracy, error) = (Accuracy::default(), TrackingError::default());
+        Totals { periods: 0, shortest: u64::MAX, longest: 0, missed: 0, accuracy, error }
+    }
+
+    fn add(&mut self, record: &Record, report: &PeriodReport) {
+        self.periods += 1;
+        self.shortest = self.shortest.min(report.cycles);
+        self.longest = self.longest.max(report.cycles);
+        self.missed += u64::from(report.missed) + report.lost;
+        self.error.add(record);
+        let measured = record.outputs.joint.to_array().map(|value| value as f32);
+        self.accuracy.add(&measured, &kinematics::inverse(&record.sample.reference).to_array());
+    }
+}
+
+pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
+    let mut reads: Vec<Given<'_>> = vec![("--program", &arguments.program)];
+    reads.extend(arguments.gcode.as_deref().map(|path| ("--gcode", path)));
+    let outputs = [("--csv", arguments.csv.as_deref()), ("--plot", arguments.plot.as_deref())];
+    let mut writes: Vec<Given<'_>> =
+        outputs.into_iter().filter_map(|(name, path)| Some((name, path?))).collect();
+    if arguments.json {
+        writes.push(("--json", Path::new("-")));
+    }
+    files::check(&reads, &writes)?;
+
+    let (path, trajectory) = trajectory(arguments.gcode.as_deref())?;
+    let (name, program) = program(&arguments.program, Load::new(arguments.machine.machine, color))?;
+    let periods = arguments.periods.unwrap_or(u64::MAX).min(trajectory.periods());
+    let mut emulator = Emulator::new(&program)?;
+    emulator.set_tick_period(period_cycles(arguments.clock));
+    let mut closed_loop =
+        ClosedLoop::new(&trajectory, OnEmulator::new(emulator, periods - 1).with_context(|| name.clone())?);
+
+    // Opened before the work, so that a path that cannot be written is known at once.
+    let mut table = arguments.csv.as_deref().map(Table::create).transpose()?;
+    let mut drawing =
+        arguments.plot.as_deref().map(Out::create).transpose()?.map(|file| (file, Plot::new(periods)));
+    let progress = progress(periods, arguments.quiet);
+    let mut totals = Totals::new();
+    let mut nans = NanWrites::default();
+    while totals.periods < periods {
+        let record = closed_loop.next().context("the path ended early")?.with_context(|| path.clone())?;
+        let report = closed_loop.controller().report.as_ref().context("a period has no report")?;
+        totals.add(&record, report);
+        nans.add(&report.nan_writes);
+        if let Some(table) = &mut table {
+            table.add(&record, report.cycles)?;
+        }
+        if let Some((_, plot)) = &mut drawing {
+            plot.add(&record);
+        }
+        if record.period.is_multiple_of(4096) {
+            progress.set_position(record.period);
+        }
+    }
+    progress.finish_and_clear();
+    table.map_or(Ok(()), |Table(file)| file.finish())?;
+    if let Some((mut file, plot)) = drawing {
+        file.write_all(plot.draw(&path)?.as_bytes())?;
+        file.finish()?;
+    }
+
+    let detail = closed_loop.controller().detail.as_ref().context("the last period was not looked at")?;
+    let nan_writes = detail.after.nan_writes;
+    nans.warn(&program, nan_writes, color);
+    let account = Account::between(&detail.before, &detail.after);
+    let (clock, latency) = (arguments.clock, detail.latency);
+    let tracking = Tracking { name, program, path, clock, totals, nan_writes, account, latency };
+    if arguments.json {
+        output::json(&report::json(&tracking), out)?;
+    } else if !writes.iter().any(|(_, path)| files::is_dash(path)) {
+        out.write_all(report::text(&tracking).as_bytes())?;
+    }
+    Ok(())
+}
+
+/// Every period as a row of CSV.
+struct Table(Out);
+
+impl Table {
+    fn create(path: &Path) -> Result<Table> {
+        let mut file = Out::create(path)?;
+        let ports = INPUTS.iter().chain(&OUTPUTS).map(|port| port.name);
+        let titles = ["period", "time", "cutting"].into_iter().chain(ports).chain(["cycles", "tool_error"]);
+        ports::write_row(&mut file, titles.map(str::to_owned))?;
+        Ok(Table(file))
+    }
+
+    fn add(&mut self, record: &Record, cycles: u64) -> Result<()> {
+        let time = format!("{:.4}", record.period as f64 * SAMPLE_TIME);
+        let first = [record.period.to_string(), time, u8::from(record.sample.cutting).to_string()];
+        let inputs = record.inputs.to_words();
+        let outputs = record.outputs.to_array().map(|value| (value as f32).to_bits());
+        let ports = INPUTS.iter().zip(inputs).chain(OUTPUTS.iter().zip(outputs));
+        let ports = ports.map(|(port, bits)| ports::format(port_type(port.kind), bits));
+        let last = [cycles.to_string(), format!("{:e}", record.tool_error)];
+        Ok(ports::write_row(&mut self.0, first.into_iter().chain(ports).chain(last))?)
+    }
+}
+
+/// The name and the plan of a tool path; without a file, the letters AGH.
+fn trajectory(file: Option<&Path>) -> Result<(String, Trajectory)> {
+    let (name, source) = match file {
+        Some(file) => (files::input_name(file), files::read(file, GCODE_LIMIT)?),
+        None => ("agh.ngc".to_owned(), takt_programs::AGH.as_bytes().to_vec()),
+    };
+    let moves = gcode::read_bytes(&source)
+        .map_err(|error| anyhow!("{name}:{}:{}: {}", error.line, error.column, error.kind))?;
+    let trajectory = Trajectory::plan(&moves).map_err(|error| anyhow!("{name}: {error}"))?;
+    if trajectory.periods() == 0 {
+        bail!("{name}: the path has no move");
+    }
+    Ok((name, trajectory))
+}
+
+/// A program that comes with Takt, by name, or one in a file.
+fn program(path: &Path, load: Load) -> Result<(String, Program)> {
+    let name = files::input_name(path);
+    let builtin = format!("hybrid/{name}.s");
+    if SOURCES.iter().any(|(path, _)| *path == builtin) {
+        return Ok((format!("programs/{builtin}"), load.builtin(&builtin)?));
+    }
+    if !path.exists() && !files::is_dash(path) {
+        let names = ["tracking", "tracking_literal"];
+        let near = suggest(&name, names);
+        bail!("there is no program and no file `{name}`{near} (programs: {})", names.join(", "));
+    }
+    Ok((name, load.program(path)?))
+}
+
+fn progress(periods: u64, quiet: bool) -> ProgressBar {
+    if quiet {
+        return ProgressBar::hidden();
+    }
+    // On standard error, and only if that is a terminal.
+    let style = ProgressStyle::with_template("{bar:40} {human_pos}/{human_len} periods, {eta} to go")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(periods).with_style(style)
+}

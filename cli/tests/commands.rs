@@ -1,0 +1,491 @@
+//! The commands as users run them.
+
+mod common;
+
+use common::{Done, Folder, source};
+use std::collections::BTreeMap;
+use std::process::Stdio;
+
+/// The columns of a CSV by title.
+fn columns(csv: &str) -> BTreeMap<String, Vec<String>> {
+    let mut lines = csv.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+    let titles = lines.next().unwrap();
+    let rows: Vec<Vec<String>> = lines.collect();
+    assert!(rows.iter().all(|row| row.len() == titles.len()));
+    let column = |i: usize| rows.iter().map(|row| row[i].clone()).collect();
+    titles.into_iter().enumerate().map(|(i, title)| (title, column(i))).collect()
+}
+
+/// Floating-point numbers to three digits: the last ones are the host's sine's.
+fn round(value: &mut serde_json::Value) {
+    match value {
+        serde_json::Value::Object(map) => map.values_mut().for_each(round),
+        serde_json::Value::Array(list) => list.iter_mut().for_each(round),
+        serde_json::Value::Number(number) if number.is_f64() => {
+            let text = format!("{:.2e}", number.as_f64().unwrap());
+            *value = text.parse::<f64>().unwrap().into();
+        }
+        _ => {}
+    }
+}
+
+#[test]
+fn track() {
+    let folder = Folder::new();
+    let text = folder.line("track --periods 200").ok();
+    assert_eq!(folder.line("track --periods 200").ok(), text, "the same every time");
+    insta::assert_snapshot!("track", text);
+
+    let json = folder.line("track --periods 200 --json").ok();
+    let mut json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    round(&mut json);
+    insta::assert_json_snapshot!("track_json", json);
+    assert_eq!(folder.list(), [""; 0]);
+}
+
+/// The keys that issue 2 promises, on every program and machine.
+#[test]
+fn track_as_json() {
+    let folder = Folder::new();
+    for (program, machine) in [("tracking", "t1"), ("tracking_literal", "t3"), ("tracking_literal", "t1")] {
+        let line = format!("track --periods 20 --json --program {program} --machine {machine}");
+        let json: serde_json::Value = serde_json::from_str(&folder.line(&line).ok()).unwrap();
+        assert_eq!(json["program"], format!("programs/hybrid/{program}.s"));
+        assert_eq!(json["machine"], machine);
+        assert_eq!(json["periods"], 20);
+        let cycles = |key| json["cycles"][key].as_u64().unwrap();
+        assert!(cycles("min") > 100 && cycles("min") <= cycles("max"), "{json}");
+        assert_eq!(json["operations"]["fsat"], 5);
+        for key in "l1 l2 l3 th4 th5 v1 v2 v3 om4 om5 a1 a2 a3 ep4 ep5".split(' ') {
+            assert!(json["max_error"][key].is_f64(), "{key}");
+        }
+        assert_eq!(json["max_error"].as_object().unwrap().len(), 15);
+        assert!(json["tracking_error_m"]["cutting"].is_f64() && json["tracking_error_m"]["overall"].is_f64());
+        // Every cycle of the last period issued or is charged to a cause.
+        let stalls: u64 =
+            json["stalls"].as_object().unwrap().values().map(|count| count.as_u64().unwrap()).sum();
+        assert_eq!(json["bundles"].as_u64().unwrap() + stalls, 12_500, "125 MHz, 100 µs");
+    }
+}
+
+#[test]
+fn run_reproduces_track_from_recorded_inputs() {
+    let folder = Folder::new();
+    for (program, machine) in [("tracking", "t3"), ("tracking", "t1"), ("tracking_literal", "t3")] {
+        folder
+            .line(&format!("track --periods 300 --program {program} --machine {machine} --csv rec.csv"))
+            .ok();
+        let source = source(&format!("{program}.s"));
+        let line = format!("run {source} --machine {machine} --inputs rec.csv --outputs out.csv");
+        folder.line(&line).ok();
+        let (recorded, run) = (columns(&folder.read_text("rec.csv")), columns(&folder.read_text("out.csv")));
+        assert_eq!(run.len(), 21, "20 outputs and the cycles");
+        for (title, values) in &run {
+            assert_eq!(values.len(), 300);
+            assert_eq!(values, &recorded[title], "{program} on {machine}: {title}");
+        }
+        assert!(run["F1"].iter().any(|value| *value != run["F1"][0]), "the robot moves");
+    }
+}
+
+#[test]
+fn images_run_like_their_sources() {
+    let folder = Folder::new();
+    folder.line("track --periods 50 --csv rec.csv -q").ok();
+    for program in ["tracking", "tracking_literal"] {
+        for machine in ["t3", "t1"] {
+            let source = source(&format!("{program}.s"));
+            folder.line(&format!("asm {source} --machine {machine} -o image")).ok();
+            let table = folder.line(&format!("run {source} -m {machine} --inputs rec.csv --outputs -")).ok();
+            assert_eq!(folder.line("run image --inputs rec.csv --outputs -").ok(), table);
+            let mut stats = folder.line(&format!("run {source} -m {machine} --inputs rec.csv --stats")).ok();
+            assert_eq!(folder.line("run image --inputs rec.csv --stats").ok(), stats);
+            // From standard input too.
+            let image = folder.read("image");
+            stats = folder.fed("run - --inputs rec.csv --stats", &image).ok();
+            assert!(stats.starts_with("50 periods on "), "{stats}");
+
+            folder.line("disasm image -o again.s").ok();
+            folder.line(&format!("asm again.s -m {machine} -o again")).ok();
+            assert!(folder.read("again") == image, "{program} on {machine}");
+        }
+    }
+}
+
+/// A program with all that the tracking programs lack: data, branches, calls, integers, bits, several bundles by hand.
+#[test]
+fn a_program_that_halts() {
+    let folder = Folder::new();
+    let text = "\
+.output sum, count:int, pattern:bits, never
+.reg i:int n:int p:int x
+        li      n, 3
+        li      p, table
+        mov     i, zero
+        fadd    sum, zero, zero
+next:   call    add
+        iadd    i, i, 1
+        ilt     x, i, n
+        bnz     x, next
+        mov     count, i
+        mov     pattern, sum
+        halt
+add:    iadd    x, p, i
+        ld      x, 0[x]
+        fadd    sum, sum, x
+        ret
+        fadd    never, sum, sum
+.data
+table:  .float  0.5, 0.25, -1.75
+";
+    folder.write("sum.s", text);
+    insta::assert_snapshot!("halts", folder.line("run sum.s --stats").ok());
+    let json: serde_json::Value = serde_json::from_str(&folder.line("run sum.s --json").ok()).unwrap();
+    assert_eq!(
+        json["outputs"],
+        serde_json::json!({"sum": -1.0, "count": 3, "pattern": "0xbf800000", "never": null})
+    );
+    assert_eq!((&json["periods"], &json["cycles"]["min"]), (&0.into(), &serde_json::Value::Null));
+    for machine in ["t3", "t1"] {
+        folder.line(&format!("asm sum.s -m {machine}")).ok();
+        folder.line("disasm sum.takt -o again.s").ok();
+        folder.line(&format!("asm again.s -m {machine} -o again.takt")).ok();
+        assert!(folder.read("again.takt") == folder.read("sum.takt"), "{machine}");
+    }
+}
+
+#[test]
+fn eval_in_the_format_of_testfloat() {
+    let folder = Folder::new();
+    // Operands, result, flags; TestFloat's own columns follow, and are ignored.
+    let cases: [(&str, &[(&str, &str)]); 8] = [
+        (
+            "fadd",
+            &[
+                ("3F800000 40000000 40400000 00", "40400000 00"),
+                ("00000001 00000001", "00000002 00"),
+                ("7F7FFFFF 7F7FFFFF 7F800000 05", "7F800000 04"),
+                ("7F800000 FF800000", "7FC00000 10"),
+                ("7F800001 00000000", "7FC00000 10"),
+                ("FFC12345 00000000", "7FC00000 00"),
+                ("80000000 80000000", "80000000 00"),
+                ("  0x3f800000\tbf800000\r", "00000000 00"),
+            ],
+        ),
+        ("fmul", &[("00800000 3F000000", "00400000 00"), ("7F800000 00000000", "7FC00000 10")]),
+        (
+            "fdiv",
+            &[
+                ("3F800000 00000000", "7F800000 08"),
+                ("00000000 00000000", "7FC00000 10"),
+                ("1 1", "3F800000 00"),
+            ],
+        ),
+        (
+            "fsqrt",
+            &[
+                ("40800000 40000000 00", "40000000 00"),
+                ("BF800000", "7FC00000 10"),
+                ("80000000", "80000000 00"),
+            ],
+        ),
+        ("itof", &[("FFFFFFFF", "BF800000 00"), ("7FFFFFFF", "4F000000 00")]),
+        ("ftoi", &[("40200000", "00000002 00"), ("40600000", "00000004 00"), ("7F800000", "7FFFFFFF 10")]),
+        ("fsat", &[("40400000 BF800000", "3F800000 00"), ("C0400000 3F800000", "BF800000 00")]),
+        ("sel", &[("1 2 3", "00000002 00"), ("0 2 3", "00000003 00")]),
+    ];
+    for (operation, lines) in cases {
+        let input: String = lines.iter().flat_map(|(operands, _)| [operands, "\n"]).collect();
+        let output: String = lines.iter().flat_map(|(_, result)| [result, "\n"]).collect();
+        for options in ["", "--reference", "--machine t1"] {
+            let line = format!("eval {operation} {options}");
+            assert_eq!(folder.fed(&line, input.as_bytes()).ok(), output, "{line}");
+            assert_eq!(
+                folder.fed(&line, input.trim_end().as_bytes()).ok(),
+                output,
+                "without the last line end"
+            );
+        }
+    }
+    // Longer than any buffer, in pieces that end anywhere.
+    let many = "3F800000 40000000\n".repeat(100_000);
+    assert_eq!(folder.fed("eval fsub", many.as_bytes()).ok(), "BF800000 00\n".repeat(100_000));
+    // An answer comes before the end of the questions.
+    let mut command = folder.command(&["eval", "fneg"]);
+    let mut child = command.stdin(Stdio::piped()).spawn().unwrap();
+    let (mut stdin, stdout) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
+    std::io::Write::write_all(&mut stdin, b"00000000\n").unwrap();
+    let mut answer = String::new();
+    std::io::BufRead::read_line(&mut std::io::BufReader::new(stdout), &mut answer).unwrap();
+    assert_eq!(answer, "80000000 00\n");
+    drop(stdin);
+    assert!(child.wait().unwrap().success());
+}
+
+/// `in cycle 12` as `in cycle N`: which cycle depends on latencies, which are not the matter here.
+fn without_cycles(text: &str) -> String {
+    let mut pieces = text.split("in cycle ");
+    let mut out = pieces.next().unwrap().to_owned();
+    for piece in pieces {
+        out.push_str("in cycle N");
+        out.push_str(piece.trim_start_matches(|c: char| c.is_ascii_digit()));
+    }
+    out
+}
+
+#[test]
+fn nan_on_an_output_is_a_warning() {
+    let folder = Folder::new();
+    let text = ".input a\n.output F\n.once\n wait p\n.period\np: fdiv F, a, zero\n wait p\n";
+    folder.write("nan.s", text);
+    folder.write("in.csv", format!("a\n{}1\n", "0\n".repeat(7)));
+    let done = folder.line("run nan.s --inputs in.csv --outputs out.csv");
+    assert_eq!(done.status, Some(0));
+    insta::assert_snapshot!("nan", without_cycles(&done.stderr));
+    assert_eq!(columns(&folder.read_text("out.csv"))["F"], [["NaN"; 7].as_slice(), &["inf"]].concat());
+    let json = folder.line("run nan.s --inputs in.csv --json").stdout;
+    assert!(json.contains("\"nan_writes\": 7"), "{json}");
+    // Where there are no periods, too.
+    folder.write("once.s", ".output F\n fdiv F, zero, zero\n halt\n");
+    let done = folder.line("run once.s");
+    assert_eq!(without_cycles(&done.stderr), "warning: NaN written to F in cycle N by bundle 0 (once.s:2)\n");
+}
+
+/// What is limited is a row, not the table; and a table may come from anywhere, with any line ends.
+#[test]
+fn long_tables() {
+    let folder = Folder::new();
+    folder.write("sum.s", ".input n:int\n.state s:int\n.output k:int\n.once\n mov s, zero\n wait p\n.period\np: iadd s, s, n\n mov k, s\n wait p\n");
+    let rows = 300_000;
+    let table = format!("\u{feff}other, n\r\n{}", "ignored,1\r\n".repeat(rows));
+    let json = folder.fed("run sum.s --inputs - --json", table.as_bytes()).ok();
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((&json["periods"], &json["outputs"]["k"]), (&rows.into(), &rows.into()));
+    // Fewer, if fewer are asked for.
+    let text = folder.fed("run sum.s --inputs - --outputs - --periods 3", table.as_bytes()).ok();
+    assert_eq!(columns(&text)["k"], ["1", "2", "3"]);
+}
+
+#[test]
+fn a_missed_deadline_is_counted() {
+    let folder = Folder::new();
+    let json = |line: &str| -> serde_json::Value { serde_json::from_str(&folder.line(line).ok()).unwrap() };
+    assert_eq!(json("track --periods 20 --json")["deadlines_missed"], 0);
+    // 100 cycles in 100 µs.
+    assert!(json("track --periods 20 --json --clock 1")["deadlines_missed"].as_u64().unwrap() >= 19);
+}
+
+#[test]
+fn asm_tells_what_became_of_the_source() {
+    let folder = Folder::new();
+    let source = source("tracking.s");
+    let text = folder.line(&format!("asm {source} -o image")).ok();
+    let json = folder.line(&format!("asm {source} -o image --json")).ok();
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["messages"], serde_json::json!([]));
+    let blocks = json["blocks"].as_array().unwrap();
+    let period = blocks.iter().find(|block| block["name"] == "period").unwrap();
+    assert!(period["cycles"].as_u64() >= period["bound"].as_u64(), "{period}");
+    let row: Vec<&str> =
+        text.lines().find(|line| line.starts_with("  period ")).unwrap().split_whitespace().collect();
+    for (text, key) in row[1..5].iter().zip(["operations", "bundles", "cycles", "bound"]) {
+        assert_eq!(*text, period[key].to_string());
+    }
+
+    let listing = folder.line(&format!("asm {source} --listing -")).ok();
+    assert!(listing.starts_with("; ") && listing.contains("tracking.s:"), "{listing}");
+    assert_eq!(folder.list(), ["image"], "a listing asks for no image");
+    let symbols = folder.line(&format!("asm {source} --symbols -")).ok();
+    assert!(symbols.contains("period"), "{symbols}");
+    folder.line(&format!("asm {source} --check")).ok();
+    assert_eq!(folder.list(), ["image"]);
+    folder.line(&format!("asm {source} --readmemh memories")).ok();
+    let code = folder.read_text("memories/code_mul.hex");
+    assert_eq!(code.lines().count() as u64, json["bundles"].as_u64().unwrap());
+    // Unscheduled code is slower, and says nothing of blocks.
+    let unscheduled = folder.line(&format!("asm {source} -o image --schedule off")).ok();
+    assert_eq!(unscheduled.lines().count(), 1, "{unscheduled}");
+}
+
+#[test]
+fn the_plot_shows_the_path() {
+    let folder = Folder::new();
+    folder.write("square.ngc", "G0 X0 Y0 Z700\nG1 X10 F6000\nG1 Y10\nG1 X0\nG1 Y0\nG0 X5 Y5\n");
+    folder.line("track --gcode square.ngc --plot p.svg").ok();
+    let svg = folder.read_text("p.svg");
+    assert!(
+        svg.starts_with("<svg width=\"1000\" height=\"1000\" viewBox=\"0 0 8000 8000\""),
+        "{}",
+        &svg[..200]
+    );
+    assert!(svg.trim_end().ends_with("</svg>"));
+    for text in
+        ["Tool path of square.ngc", "x, mm", "y, mm", "time, s", "error, µm", "required while cutting: 10 µm"]
+    {
+        assert!(svg.contains(text), "{text}");
+    }
+    // The cutting moves are one line, as wide as it is high; the legend's is shorter.
+    let lines = svg.lines().filter(|line| line.starts_with("<polyline") && line.contains("1F4E9C"));
+    let line = lines.max_by_key(|line| line.len()).unwrap();
+    let points = line.split("points=\"").nth(1).unwrap().split('"').next().unwrap();
+    let points: Vec<(f64, f64)> = points
+        .split_whitespace()
+        .map(|point| point.split_once(',').unwrap())
+        .map(|(x, y)| (x.parse().unwrap(), y.parse().unwrap()))
+        .collect();
+    let extent = |pick: fn(&(f64, f64)) -> f64| {
+        points.iter().map(pick).fold(f64::MIN, f64::max) - points.iter().map(pick).fold(f64::MAX, f64::min)
+    };
+    assert!(extent(|p| p.0) > 1000.0, "{points:?}");
+    assert!(
+        (extent(|p| p.0) / extent(|p| p.1) - 1.0).abs() < 0.005,
+        "{} by {}",
+        extent(|p| p.0),
+        extent(|p| p.1)
+    );
+    assert_eq!(folder.line("track --gcode square.ngc --plot -").ok(), svg);
+}
+
+#[test]
+fn references() {
+    let folder = Folder::new();
+    let manual = folder.line("isa --format markdown").ok();
+    assert!(manual.starts_with("# Takt's instruction set\n") && manual.contains("### fadd\n"));
+    let isa: serde_json::Value = serde_json::from_str(&folder.line("isa --json").ok()).unwrap();
+    assert_eq!(
+        isa["instructions"].as_array().unwrap().iter().filter(|row| row["mnemonic"] == "fadd").count(),
+        1
+    );
+    assert!(folder.line("isa fadd").ok().contains("d = a + b"));
+    let one: serde_json::Value = serde_json::from_str(&folder.line("isa fadd --json").ok()).unwrap();
+    assert_eq!(one["mnemonic"], "fadd");
+    let machines: serde_json::Value = serde_json::from_str(&folder.line("machines --json").ok()).unwrap();
+    let names: Vec<&str> = machines.as_array().unwrap().iter().map(|m| m["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["t3", "t1"]);
+    let text = folder.line("machines").ok();
+    assert!(names.iter().all(|name| text.contains(*name)), "{text}");
+    assert!(folder.line("man").ok().contains(".TH takt 1"));
+    assert!(folder.line("man track").ok().contains("\\-\\-gcode"));
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        assert!(folder.line(&format!("completions {shell}")).ok().contains("track"), "{shell}");
+    }
+}
+
+/// Every option is explained, and nothing is wider than the terminal that is promised.
+#[test]
+fn help() {
+    let folder = Folder::new();
+    let mut all = folder.line("--help").ok();
+    assert_eq!(folder.line("help").ok(), all);
+    for command in ["track", "asm", "disasm", "run", "eval", "isa", "machines", "completions", "man"] {
+        let text = folder.line(&format!("{command} --help")).ok();
+        assert!(folder.line(&format!("{command} -h")).ok().lines().count() <= text.lines().count());
+        all.push_str(&format!("\n$ takt {command} --help\n{text}"));
+    }
+    for line in all.lines() {
+        assert!(line.chars().count() <= 100, "{line}");
+    }
+    insta::assert_snapshot!("help", all);
+    assert_eq!(folder.line("--version").ok(), format!("takt {}\n", env!("CARGO_PKG_VERSION")));
+}
+
+const WORDY: [&str; 9] = [
+    "isa",
+    "isa --json",
+    "machines --json",
+    "man",
+    "completions bash",
+    "--help",
+    "track --help",
+    "track --periods 2000 --csv -",
+    "track --periods 20 --json",
+];
+
+#[test]
+fn a_closed_pipe_is_no_error() {
+    let folder = Folder::new();
+    for line in WORDY {
+        let mut command = folder.command(&line.split(' ').collect::<Vec<_>>());
+        let mut child = command.spawn().unwrap();
+        drop(child.stdout.take());
+        let done = Done::from(child.wait_with_output().unwrap());
+        assert_eq!((done.status, done.stderr.as_str()), (Some(0), ""), "{line}");
+    }
+    // In the middle of the work.
+    let mut child = folder.command(&["eval", "fneg"]).stdin(Stdio::piped()).spawn().unwrap();
+    let mut stdin = child.stdin.take().unwrap();
+    drop(child.stdout.take());
+    let feed = || {
+        (0..1000)
+            .try_for_each(|_| std::io::Write::write_all(&mut stdin, "00000000\n".repeat(1000).as_bytes()))
+    };
+    assert!({ feed }().is_err(), "it has stopped reading");
+    let done = Done::from(child.wait_with_output().unwrap());
+    assert_eq!((done.status, done.stderr.as_str()), (Some(0), ""));
+}
+
+#[test]
+fn a_full_disk_is_an_error() {
+    let folder = Folder::new();
+    for line in WORDY {
+        let mut command = folder.command(&line.split(' ').collect::<Vec<_>>());
+        command.stdout(std::fs::File::options().write(true).open("/dev/full").unwrap());
+        let done = Done::of(command);
+        let text = "error: cannot write standard output: No space left on device (os error 28)\n";
+        assert_eq!((done.status, done.stderr.as_str()), (Some(1), text), "{line}");
+    }
+}
+
+#[test]
+fn colour_is_for_terminals() {
+    let folder = Folder::new();
+    folder.write("bad.s", " fad a, b, b\n");
+    for line in ["asm bad.s", "run nowhere"] {
+        assert!(!folder.line(line).stderr.contains('\x1b'), "{line}");
+        assert!(!folder.line(&format!("{line} --color never")).stderr.contains('\x1b'));
+        let coloured = folder.line(&format!("{line} --color always")).stderr;
+        assert!(coloured.contains("\x1b["), "{coloured}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn names_of_files_need_not_be_text() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let folder = Folder::new();
+    let program = OsStr::from_bytes(b"pro\xffgram.s");
+    let table = OsStr::from_bytes(b"\xfe.csv");
+    folder.write(program, ".input a\n.output F\n.once\n wait p\n.period\np: fadd F, a, a\n wait p\n");
+    folder.write(table, "a\n1\n");
+    let line =
+        [OsStr::new("run"), program, OsStr::new("--inputs"), table, OsStr::new("--outputs"), OsStr::new("-")];
+    assert_eq!(folder.takt(&line).ok(), "F,cycles\n2.0,6\n");
+    folder.takt(&[OsStr::new("asm"), program]).ok();
+    assert!(folder.path().join(OsStr::from_bytes(b"pro\xffgram.takt")).exists());
+    let done = folder.takt(&[OsStr::new("run"), OsStr::from_bytes(b"no\xff")]);
+    assert_eq!(done.stderr, "error: cannot open no\u{fffd}: No such file or directory (os error 2)\n");
+}
+
+/// Through a symbolic link the file behind it is written, and keeps its permissions; devices are written as they are.
+#[cfg(unix)]
+#[test]
+fn outputs_go_where_they_are_sent() {
+    use std::os::unix::fs::{PermissionsExt, symlink};
+    let folder = Folder::new();
+    folder.write("prog.s", " halt\n");
+    folder.write("real", "");
+    let real = folder.path().join("real");
+    std::fs::set_permissions(&real, std::fs::Permissions::from_mode(0o640)).unwrap();
+    symlink("real", folder.path().join("link")).unwrap();
+    folder.line("asm prog.s -o link").ok();
+    assert!(folder.path().join("link").is_symlink());
+    assert!(folder.read("real").starts_with(b"\x7fELF"));
+    assert_eq!(std::fs::metadata(&real).unwrap().permissions().mode() & 0o777, 0o640);
+    folder.line("asm prog.s -o /dev/null --listing /dev/null").ok();
+    assert!(!std::fs::metadata("/dev/null").unwrap().is_file());
+
+    std::fs::set_permissions(&real, std::fs::Permissions::from_mode(0o440)).unwrap();
+    let done = folder.line("asm prog.s -o real --schedule on");
+    assert_eq!((done.status, done.stderr.as_str()), (Some(1), "error: cannot write real: it is read-only\n"));
+}

@@ -1,0 +1,261 @@
+//! Blocks: straight lines of bundles, their timing found once.
+//!
+//! A machine without data-dependent timing takes the same cycles for the same bundles whenever it enters them in the same
+//! state. What of the state counts is the bundles issued of late, each with its distance in cycles ([`Cache`] finds blocks
+//! by entry address and that list, which is nearly always empty). [`compile`] puts a line of bundles through the
+//! scoreboard and keeps what came out: offsets, stalls, counts, and the operations as a flat list of [`crate::micro`]s.
+
+use crate::code::{Code, Decoded};
+use crate::machine::RegisterSet;
+use crate::micro::{Check, Emitter, Ending, Late, Micro};
+use crate::statistics::Tally;
+use std::collections::HashMap;
+use takt_isa::spec::units::MAX_LATENCY;
+use takt_isa::timing::{self, Address, Cause, Cycle, Scoreboard};
+use takt_isa::{Op, ROWS, ZERO};
+
+/// Bundles in a block at most: longer lines are cut.
+const MAX_BUNDLES: usize = 1024;
+/// Micros in all blocks together; when there are more, the cache starts anew. (16 bytes each.)
+const MAX_MICROS: usize = 1 << 20;
+/// Blocks at most, for the same reason.
+const MAX_BLOCKS: usize = 1 << 14;
+/// Successors that a block remembers; others it looks up every time.
+const MAX_EDGES: usize = 8;
+
+/// The block that follows when execution goes to `target`, delivered `distance` cycles after the last issue.
+#[derive(Clone, Copy, Debug)]
+struct Edge {
+    target: Address,
+    distance: u8,
+    id: u32,
+}
+
+/// Bundles issued of late, in order, each with the number of cycles since.
+pub(crate) type Ages = Box<[(Address, u8)]>;
+
+/// A straight line of bundles. Offsets are cycles from the entry, the first cycle in which the first bundle may issue.
+#[derive(Clone, Debug)]
+pub(crate) struct Block {
+    pub(crate) entry: Address,
+    /// Its bundles follow each other from `entry` on.
+    pub(crate) bundles: u32,
+    pub(crate) micros: Box<[Micro]>,
+    /// The first micro from which on there are late results.
+    pub(crate) split: usize,
+    /// Offset of the last bundle's issue.
+    pub(crate) last: u32,
+    pub(crate) ending: Ending,
+    /// Registers that must have been written before.
+    pub(crate) required: RegisterSet,
+    /// Registers that it writes, without those of late results.
+    pub(crate) writes: RegisterSet,
+    /// Whether it has run once: then all that it requires has been written, and all that it writes. No register is ever
+    /// unwritten again.
+    pub(crate) verified: bool,
+    /// If it can fault in the middle, the registers to be restored then.
+    pub(crate) restore: Option<Box<[u16]>>,
+    pub(crate) late: Box<[Late]>,
+    pub(crate) checks: Box<[Check]>,
+    /// The recent bundles, at the cycle of the last issue.
+    recent: Ages,
+    edges: Vec<Edge>,
+
+    /// How often it ran.
+    pub(crate) runs: u64,
+    /// What each run adds to the statistics.
+    stalls: Box<[(Address, Cause, u32)]>,
+    operations: Box<[(Op, u32)]>,
+    /// Cycles for which the front end kept it waiting, by the bundle that redirected.
+    entered: Vec<(Address, u64)>,
+}
+
+impl Block {
+    /// Charges cycles before its entry to the front end.
+    #[inline]
+    pub(crate) fn enter(&mut self, from: Address, cycles: u64) {
+        if cycles == 0 {
+            return;
+        }
+        match self.entered.iter_mut().find(|(address, _)| *address == from) {
+            Some((_, sum)) => *sum += cycles,
+            None => self.entered.push((from, cycles)),
+        }
+    }
+
+    fn count(&self, tally: &mut Tally) {
+        tally.bundles += self.runs * u64::from(self.bundles);
+        for address in self.entry..self.entry + self.bundles {
+            tally.visits[address as usize] += self.runs;
+        }
+        for &(address, cause, cycles) in &self.stalls {
+            tally.stall(address, cause, self.runs * u64::from(cycles));
+        }
+        for &(op, number) in &self.operations {
+            tally.operations[op as usize] += self.runs * u64::from(number);
+        }
+        for &(from, cycles) in &self.entered {
+            tally.stall(self.entry, Cause::Branch { from }, cycles);
+        }
+    }
+}
+
+/// The blocks compiled so far.
+#[derive(Clone, Default)]
+pub(crate) struct Cache {
+    pub(crate) blocks: Vec<Block>,
+    ids: HashMap<(Address, Ages), u32>,
+    micros: usize,
+}
+
+impl Cache {
+    /// The bundles that were recent when a block's last bundle issued.
+    pub(crate) fn recent(&self, id: u32) -> &[(Address, u8)] {
+        &self.blocks[id as usize].recent
+    }
+
+    /// Adds what the blocks did to a tally.
+    pub(crate) fn count(&self, tally: &mut Tally) {
+        self.blocks.iter().for_each(|block| block.count(tally));
+    }
+
+    /// Whether it is time to start anew.
+    pub(crate) fn is_full(&self) -> bool {
+        self.micros >= MAX_MICROS || self.blocks.len() >= MAX_BLOCKS
+    }
+
+    /// The block that follows block `id`, whose last bundle issued in cycle `last`.
+    #[inline]
+    pub(crate) fn successor(
+        &mut self,
+        code: &Code,
+        id: u32,
+        last: Cycle,
+        entry: Address,
+        at: Cycle,
+    ) -> Option<u32> {
+        // However much later, nothing is underway any more.
+        let distance = (at - last).min(Cycle::from(MAX_LATENCY)) as u8;
+        let edges = &self.blocks[id as usize].edges;
+        if let Some(edge) = edges.iter().find(|edge| edge.target == entry && edge.distance == distance) {
+            return Some(edge.id);
+        }
+        let recent = self.recent(id).iter().map(|&(address, age)| (address, age.saturating_add(distance)));
+        let next = self.find(code, entry, ages(code, recent))?;
+        let edges = &mut self.blocks[id as usize].edges;
+        if edges.len() < MAX_EDGES {
+            edges.push(Edge { target: entry, distance, id: next });
+        }
+        Some(next)
+    }
+
+    /// The block from `entry` on, to be entered in cycle `at` after these bundles.
+    pub(crate) fn after(
+        &mut self,
+        code: &Code,
+        recent: &[(Address, Cycle)],
+        entry: Address,
+        at: Cycle,
+    ) -> Option<u32> {
+        let recent = recent.iter().map(|&(address, cycle)| (address, (at - cycle).min(u8::MAX.into()) as u8));
+        self.find(code, entry, ages(code, recent))
+    }
+
+    fn find(&mut self, code: &Code, entry: Address, recent: Ages) -> Option<u32> {
+        let key = (entry, recent);
+        if let Some(&id) = self.ids.get(&key) {
+            return Some(id);
+        }
+        let block = compile(code, entry, &key.1)?;
+        let id = self.blocks.len() as u32;
+        self.micros += block.micros.len() + block.bundles as usize;
+        self.blocks.push(block);
+        self.ids.insert(key, id);
+        Some(id)
+    }
+}
+
+/// Keeps the bundles that can still hold up one that issues now.
+fn ages(code: &Code, recent: impl Iterator<Item = (Address, u8)>) -> Ages {
+    recent
+        .filter(|&(address, age)| code.legal(address).is_some_and(|decoded| decoded.reach > age.into()))
+        .collect()
+}
+
+/// One bundle of a block, with its offset.
+struct Placed<'a> {
+    address: Address,
+    offset: u32,
+    decoded: &'a Decoded,
+}
+
+/// The block from `entry` on, entered after the bundles `recent`; `None` if the first bundle cannot execute.
+fn compile(code: &Code, entry: Address, recent: &Ages) -> Option<Block> {
+    // Offset 0 is this cycle of the scoreboard's.
+    const BASE: Cycle = MAX_LATENCY as Cycle;
+    let mut scoreboard = Scoreboard::new(code.machine);
+    for &(address, age) in recent {
+        scoreboard.issue(&code.legal(address)?.timing, address, BASE.saturating_sub(age.into()));
+    }
+    let mut placed = Vec::new();
+    let mut stalls = Vec::new();
+    let mut earliest = BASE;
+    let mut address = entry;
+    while let Some(decoded) = code.legal(address).filter(|_| placed.len() < MAX_BUNDLES) {
+        let issue = scoreboard.issue(&decoded.timing, address, earliest);
+        stalls.extend(issue.stalls().iter().map(|&(cause, cycles)| (address, cause, cycles)));
+        placed.push(Placed { address, offset: (issue.cycle - BASE) as u32, decoded });
+        if decoded.redirect().is_some() {
+            break;
+        }
+        earliest = timing::after_sequential(issue.cycle);
+        address += 1;
+    }
+    let last = placed.last()?.offset;
+
+    let mut required = RegisterSet::default();
+    let mut defined = RegisterSet::default();
+    let mut counts = [0; ROWS.len()];
+    for Placed { decoded, .. } in &placed {
+        for operation in &decoded.operations {
+            operation.reads().iter().filter(|&&r| !defined.contains(r)).for_each(|&r| required.insert(r));
+            counts[operation.op as usize] += 1;
+        }
+        decoded.operations.iter().filter_map(|operation| operation.dest).for_each(|r| defined.insert(r));
+    }
+
+    let mut emitter = Emitter::new(last, code.machine.data_depth);
+    for Placed { address, offset, decoded } in &placed {
+        emitter.bundle(*address, *offset, &decoded.operations);
+    }
+    let ending = Emitter::ending(&placed.last()?.decoded.operations);
+    let Emitter { micros, late, checks, split, writes, can_fault, .. } = emitter;
+
+    let age = |offset: u32| u8::try_from(last - offset).unwrap_or(u8::MAX);
+    let inherited = recent.iter().map(|&(address, before)| (address, before.saturating_add(age(0))));
+    let own = placed.iter().map(|bundle| (bundle.address, age(bundle.offset)));
+    Some(Block {
+        entry,
+        bundles: placed.len() as u32,
+        split: split.unwrap_or(micros.len()),
+        last,
+        ending,
+        required,
+        restore: can_fault.then(|| (0..=ZERO).filter(|&r| writes.contains(r)).collect()),
+        writes,
+        verified: false,
+        late: late.into(),
+        checks: checks.into(),
+        micros: micros.into(),
+        recent: ages(code, inherited.chain(own)),
+        edges: Vec::new(),
+        runs: 0,
+        stalls: stalls.into(),
+        operations: ROWS
+            .iter()
+            .map(|row| (row.op, counts[row.op as usize]))
+            .filter(|&(_, number)| number > 0)
+            .collect(),
+        entered: Vec::new(),
+    })
+}

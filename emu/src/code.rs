@@ -1,0 +1,137 @@
+//! A program prepared for execution: every word decoded and checked once.
+
+use crate::fault::LoadError;
+use takt_isa::program::IllegalWord;
+use takt_isa::timing::{Address, Bundle};
+use takt_isa::{Effect, Machine, Op, Program, Type, ZERO};
+
+/// The most slots that the emulator handles; it bounds the registers that a block borrows for its own use.
+pub const MAX_SLOTS: usize = 8;
+
+/// An operation in its slot, with what its unit and its operands are.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Operation {
+    pub(crate) slot: u8,
+    pub(crate) op: Op,
+    pub(crate) effect: Effect,
+    pub(crate) sources: [u16; 3],
+    pub(crate) source_count: u8,
+    pub(crate) dest: Option<u16>,
+    pub(crate) latency: u32,
+    pub(crate) constant: u32,
+    /// Whether the destination is an output port.
+    pub(crate) output: bool,
+    /// Whether that port carries binary32, so that a NaN is to be reported.
+    pub(crate) float: bool,
+}
+
+impl Operation {
+    pub(crate) fn reads(&self) -> &[u16] {
+        &self.sources[..self.source_count.into()]
+    }
+}
+
+/// A bundle that can execute. Operations that do nothing are left out.
+#[derive(Clone, Debug)]
+pub(crate) struct Decoded {
+    pub(crate) operations: Box<[Operation]>,
+    pub(crate) timing: Bundle,
+    /// For how many cycles from its issue it can hold others up: its longest latency or interval.
+    pub(crate) reach: u32,
+}
+
+impl Decoded {
+    /// The operation that may continue elsewhere.
+    pub(crate) fn redirect(&self) -> Option<&Operation> {
+        self.operations.iter().find(|operation| operation.effect.redirects())
+    }
+}
+
+/// Every bundle of a program: executable, or the slot and the reason why not.
+pub(crate) struct Code {
+    pub(crate) machine: &'static Machine,
+    bundles: Vec<Result<Decoded, (u8, IllegalWord)>>,
+}
+
+impl Code {
+    pub(crate) fn new(program: &Program) -> Result<Code, LoadError> {
+        let machine = program.machine;
+        check(program)?;
+        let bundles = (0..program.bundles()).map_while(|address| program.bundle(address)).map(|bundle| {
+            let instructions = bundle.map_err(|(slot, reason)| (slot as u8, reason))?;
+            let mut reach = 0;
+            let mut operations = Vec::with_capacity(instructions.len());
+            for (s, (instruction, slot)) in instructions.iter().zip(machine.slots).enumerate() {
+                let row = instruction.op.row();
+                let Some(unit) = slot.unit_for(row.function) else { continue };
+                let (latency, interval) = (slot.units[unit].latency, slot.units[unit].interval);
+                let dest = instruction.writes(slot);
+                reach = reach.max(interval).max(if dest.is_some() { latency } else { 0 });
+                let output = dest.is_some_and(|register| machine.is_output(register));
+                let ty = program.outputs.iter().find(|port| Some(port.register) == dest).map(|port| port.ty);
+                operations.push(Operation {
+                    slot: s as u8,
+                    op: instruction.op,
+                    effect: row.effect,
+                    sources: instruction.sources,
+                    source_count: row.shape.sources() as u8,
+                    dest,
+                    latency,
+                    constant: instruction.constant,
+                    output,
+                    float: output && ty.unwrap_or(row.result_type()) == Type::F,
+                });
+            }
+            Ok(Decoded { operations: operations.into(), timing: Bundle::new(machine, &instructions), reach })
+        });
+        Ok(Code { machine, bundles: bundles.collect() })
+    }
+
+    /// Bundles in the program.
+    pub(crate) fn len(&self) -> usize {
+        self.bundles.len()
+    }
+
+    /// The bundle at an address; `None` past the end.
+    pub(crate) fn get(&self, address: Address) -> Option<&Result<Decoded, (u8, IllegalWord)>> {
+        self.bundles.get(address as usize)
+    }
+
+    /// The bundle at an address, if it can execute.
+    pub(crate) fn legal(&self, address: Address) -> Option<&Decoded> {
+        self.get(address)?.as_ref().ok()
+    }
+}
+
+/// Refuses what the machine's memories cannot hold. Words are not looked at: an illegal one is a fault if it is reached.
+fn check(program: &Program) -> Result<(), LoadError> {
+    let machine = program.machine;
+    let (name, slots) = (machine.name, machine.slots.len());
+    if slots == 0 || slots > MAX_SLOTS {
+        return Err(LoadError::Slots { machine: name, slots, most: MAX_SLOTS });
+    }
+    let words = program.code.len();
+    if !words.is_multiple_of(slots) {
+        return Err(LoadError::Bundle { words, slots });
+    }
+    if words / slots > machine.code_depth as usize {
+        return Err(LoadError::Code { bundles: words / slots, machine: name, depth: machine.code_depth });
+    }
+    if program.data.len() > machine.data_depth as usize {
+        return Err(LoadError::Data { words: program.data.len(), machine: name, depth: machine.data_depth });
+    }
+    for &(register, _) in &program.constants {
+        if register == ZERO || !machine.banks().any(|bank| bank.contains(register)) {
+            return Err(LoadError::Constant { register, machine: name });
+        }
+    }
+    let inputs = program.inputs.iter().map(|port| (port, "input", machine.is_input(port.register)));
+    let outputs = program.outputs.iter().map(|port| (port, "output", machine.is_output(port.register)));
+    for (port, kind, exists) in inputs.chain(outputs) {
+        if !exists {
+            let (name, register) = (port.name.clone(), port.register);
+            return Err(LoadError::Port { name, register, machine: machine.name, kind });
+        }
+    }
+    Ok(())
+}

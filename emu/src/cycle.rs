@@ -1,0 +1,178 @@
+//! The stepper: one cycle after another, by the rules of `takt_isa::timing`.
+//!
+//! In each cycle, in this order: the tick is seen; results are written back; the next bundle issues or is charged a stall.
+
+use crate::emulator::{Emulator, Recent, Sink, Status, Step, emit};
+use crate::event::Event;
+use crate::execute::{self, Flow};
+use crate::fault::{Fault, FaultKind};
+use takt_isa::spec::units::MAX_LATENCY;
+use takt_isa::timing::{self, Address, Cause, Cycle, Scoreboard};
+
+/// When the list of recent bundles is this long, those that are not recent any more are dropped.
+const RECENT: usize = 4 * MAX_LATENCY as usize;
+
+impl Emulator {
+    /// Lets one cycle pass.
+    pub(crate) fn cycle(&mut self, sink: &mut Sink<'_>) -> Result<Step, Fault> {
+        let now = self.now;
+        let waiting = match self.status {
+            Status::Halted { .. } => return Ok(Step::Halted),
+            Status::Faulted(ref fault) => return Err(fault.clone()),
+            Status::Waiting { address, .. } => Some(address),
+            Status::Running => None,
+        };
+        if now >= self.cycle_limit {
+            let address = waiting.unwrap_or(self.front.next);
+            return Err(self.fault(address, None, FaultKind::CycleLimit { limit: now }, sink));
+        }
+        while self.ticks.take(now) {
+            self.see_tick(now, sink);
+        }
+        self.write_back(now, sink);
+
+        if let Some(address) = waiting {
+            self.tally.wait(address, 1);
+            self.now += 1;
+            return Ok(Step::Stalled { cycle: now, address, cause: Cause::Wait });
+        }
+        let address = self.front.next;
+        if let Some(cause) = self.stall(address, sink)? {
+            self.tally.stall(address, cause, 1);
+            self.now += 1;
+            return Ok(Step::Stalled { cycle: now, address, cause });
+        }
+        self.issue(address, sink)?;
+        self.now += 1;
+        Ok(Step::Issued { cycle: now, address })
+    }
+
+    /// What keeps the next bundle from issuing in this cycle, if anything.
+    fn stall(&mut self, address: Address, sink: &mut Sink<'_>) -> Result<Option<Cause>, Fault> {
+        let (now, delivered) = (self.now, self.front.delivered);
+        if now < delivered {
+            return Ok(Some(Cause::Branch { from: self.front.from }));
+        }
+        if self.planned.is_none() {
+            let kind = match self.code.get(address) {
+                Some(Ok(_)) => None,
+                Some(Err((slot, reason))) => {
+                    Some((Some(*slot), FaultKind::IllegalWord(reason.clone().into())))
+                }
+                None => Some((None, FaultKind::ProgramCounter { bundles: self.code.len() as u32 })),
+            };
+            if let Some((slot, kind)) = kind {
+                return Err(self.fault(address, slot, kind, sink));
+            }
+            self.plan(address);
+        }
+        let Some(issue) = &self.planned else { return Ok(None) };
+        // Rules once met stay met, so that the causes come one after the other.
+        let mut end = delivered;
+        Ok(issue.stalls().iter().find_map(|&(cause, cycles)| {
+            end += Cycle::from(cycles);
+            (now < end).then_some(cause)
+        }))
+    }
+
+    /// Applies the rules to the next bundle.
+    fn plan(&mut self, address: Address) {
+        if self.scoreboard.is_none() {
+            self.list_recent();
+            let mut scoreboard = Box::new(Scoreboard::new(self.code.machine));
+            if let Recent::List(recent) = &self.recent {
+                // What was issued then, issues then: of what held it up nothing is left out that still counts.
+                for &(address, cycle) in recent {
+                    if let Some(decoded) = self.code.legal(address) {
+                        scoreboard.issue(&decoded.timing, address, cycle);
+                    }
+                }
+            }
+            self.scoreboard = Some(scoreboard);
+        }
+        if let (Some(scoreboard), Some(decoded)) = (&mut self.scoreboard, self.code.legal(address)) {
+            self.planned = Some(scoreboard.issue(&decoded.timing, address, self.front.delivered));
+        }
+    }
+
+    /// Issues the next bundle.
+    fn issue(&mut self, address: Address, sink: &mut Sink<'_>) -> Result<(), Fault> {
+        let (now, machine) = (self.now, self.code.machine);
+        let Some(decoded) = self.code.legal(address) else { return Ok(()) };
+        if let Some((slot, kind)) = execute::check(decoded, &self.state, machine, &self.program) {
+            return Err(self.fault(address, Some(slot), kind, sink));
+        }
+        emit(sink, || Event::Issue { cycle: now, address });
+        let flow = execute::issue(decoded, &mut self.state, address, now, |retire| {
+            emit(sink, || Event::Retire(retire));
+        });
+        self.tally.issue(address, decoded.operations.iter().map(|operation| operation.op));
+        self.planned = None;
+        self.push_recent(address, now);
+        match flow {
+            Flow::Sequential => self.continue_at(address + 1, timing::after_sequential(now), address),
+            Flow::NotTaken => self.continue_at(address + 1, timing::after_not_taken(machine, now), address),
+            Flow::Redirect(target) => {
+                self.continue_at(target, timing::after_redirect(machine, now), address);
+            }
+            Flow::Wait(target) => {
+                emit(sink, || Event::Wait { cycle: now, address });
+                self.wait_issued(now, address, target);
+            }
+            Flow::Halt => {
+                emit(sink, || Event::Halt { cycle: now, address });
+                self.halt_issued(now, address, sink);
+            }
+        }
+        Ok(())
+    }
+
+    pub(crate) fn continue_at(&mut self, next: Address, delivered: Cycle, from: Address) {
+        (self.front.next, self.front.delivered, self.front.from) = (next, delivered, from);
+    }
+
+    /// Stops the machine. What issued together with `halt` is still written back: nothing else can happen any more, so
+    /// it is done at once.
+    pub(crate) fn halt_issued(&mut self, cycle: Cycle, address: Address, sink: &mut Sink<'_>) {
+        self.status = Status::Halted { cycle, address };
+        self.front.next = address;
+        let last = self.state.pending.iter().map(|pending| pending.retire.cycle).max().unwrap_or(0);
+        for cycle in cycle + 1..=last {
+            self.write_back(cycle, sink);
+        }
+    }
+
+    /// Writes back the results of a cycle, in slot order.
+    fn write_back(&mut self, cycle: Cycle, sink: &mut Sink<'_>) {
+        loop {
+            let due =
+                self.state.pending.iter().enumerate().filter(|(_, pending)| pending.retire.cycle == cycle);
+            let Some((i, _)) = due.min_by_key(|(_, pending)| pending.retire.slot) else { return };
+            let pending = self.state.pending.remove(i);
+            emit(sink, || Event::Retire(pending.retire));
+            if let Some(write) = self.state.write_back(&pending) {
+                emit(sink, || Event::PortWrite(write));
+            }
+        }
+    }
+
+    fn push_recent(&mut self, address: Address, cycle: Cycle) {
+        self.list_recent();
+        if let Recent::List(recent) = &mut self.recent {
+            if recent.len() >= RECENT {
+                recent.retain(|&(_, issued)| issued + Cycle::from(MAX_LATENCY) > cycle);
+            }
+            recent.push((address, cycle));
+        }
+    }
+
+    /// Makes the recent bundles a list.
+    pub(crate) fn list_recent(&mut self) {
+        if let Recent::Block { id, cycle } = self.recent {
+            let recent = self.cache.recent(id);
+            self.recent = Recent::List(
+                recent.iter().map(|&(address, age)| (address, cycle - Cycle::from(age))).collect(),
+            );
+        }
+    }
+}

@@ -1,0 +1,479 @@
+//! The machine with a program in it: what the outside sees.
+
+use crate::block::Cache;
+use crate::code::Code;
+use crate::event::{Event, PortWrite, Retire};
+use crate::fast::{Fast, Journal};
+use crate::fault::{Fault, FaultKind, LoadError};
+use crate::machine::State;
+use crate::statistics::{Statistics, Tally};
+use crate::system::{Period, PeriodReport, Ticks};
+use std::sync::Arc;
+use takt_isa::fp::Flags;
+use takt_isa::timing::{self, Address, Cause, Cycle, Issue, Scoreboard};
+use takt_isa::{Machine, Program, ZERO};
+
+/// The cycle limit that always holds, so that cycle arithmetic cannot overflow: a thousand years at 125 MHz.
+pub const MAX_CYCLE: Cycle = 1 << 62;
+
+/// What the machine is doing.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// Executing.
+    Running,
+    /// Waiting for the tick.
+    Waiting {
+        /// The cycle in which `wait` issued.
+        since: Cycle,
+        /// Its bundle.
+        address: Address,
+    },
+    /// Stopped by `halt`.
+    Halted {
+        /// The cycle in which it issued.
+        cycle: Cycle,
+        /// Its bundle.
+        address: Address,
+    },
+    /// Stopped by a fault.
+    Faulted(Fault),
+}
+
+/// What one cycle brought.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// A bundle issued.
+    Issued {
+        /// In this cycle.
+        cycle: Cycle,
+        /// The bundle.
+        address: Address,
+    },
+    /// Nothing issued.
+    Stalled {
+        /// In this cycle.
+        cycle: Cycle,
+        /// The bundle that could not; for [`Cause::Wait`] the one that waits.
+        address: Address,
+        /// Why.
+        cause: Cause,
+    },
+    /// The machine has halted before; no cycle passed.
+    Halted,
+}
+
+/// Why a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stop {
+    /// A bundle issued ([`Emulator::step_bundle`]).
+    Issued {
+        /// In this cycle.
+        cycle: Cycle,
+        /// The bundle.
+        address: Address,
+    },
+    /// A `wait` issued ([`Emulator::run_to_wait`]).
+    Wait {
+        /// In this cycle.
+        cycle: Cycle,
+        /// Its bundle.
+        address: Address,
+    },
+    /// The program waits and no tick is going to come.
+    Idle,
+    /// The machine has halted.
+    Halted,
+    /// The cycle asked for is reached ([`Emulator::run_until`]).
+    Reached,
+}
+
+/// The instruction fetch.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Front {
+    /// The bundle that issues next.
+    pub(crate) next: Address,
+    /// The first cycle in which it may.
+    pub(crate) delivered: Cycle,
+    /// The bundle that redirected the fetch to it.
+    pub(crate) from: Address,
+}
+
+/// The bundles issued of late that may still hold others up.
+#[derive(Clone, Debug)]
+pub(crate) enum Recent {
+    /// These, each with its cycle of issue, in that order.
+    List(Vec<(Address, Cycle)>),
+    /// Those of a block, the last bundle of which issued in `cycle`.
+    Block { id: u32, cycle: Cycle },
+}
+
+/// A machine with a program in it.
+#[derive(Clone)]
+pub struct Emulator {
+    pub(crate) program: Arc<Program>,
+    pub(crate) code: Arc<Code>,
+    pub(crate) state: State,
+    pub(crate) status: Status,
+    /// The next cycle to pass; so many have.
+    pub(crate) now: Cycle,
+    pub(crate) front: Front,
+    pub(crate) recent: Recent,
+    /// The rules applied to everything issued; `None` when blocks have run since and it must be made anew.
+    pub(crate) scoreboard: Option<Box<Scoreboard>>,
+    /// How the next bundle issues. There only while it stalls for another reason than the front end.
+    pub(crate) planned: Option<Issue>,
+    pub(crate) ticks: Ticks,
+    pub(crate) period: Option<Period>,
+    /// Of the last period that ended and was not asked for.
+    pub(crate) report: Option<PeriodReport>,
+    pub(crate) tally: Tally,
+    pub(crate) cache: Cache,
+    pub(crate) journal: Journal,
+    pub(crate) cycle_limit: Cycle,
+    pub(crate) blocks_enabled: bool,
+}
+
+/// Where events go.
+pub(crate) type Sink<'a> = Option<&'a mut dyn FnMut(&Event)>;
+
+#[inline]
+pub(crate) fn emit(sink: &mut Sink<'_>, event: impl FnOnce() -> Event) {
+    if let Some(sink) = sink {
+        sink(&event());
+    }
+}
+
+/// When a run ends, apart from halts and faults.
+#[derive(Clone, Copy)]
+pub(crate) struct Goal {
+    /// Before this cycle.
+    pub(crate) until: Cycle,
+    /// Once a `wait` has issued.
+    pub(crate) wait: bool,
+    /// Once a bundle has issued.
+    pub(crate) bundle: bool,
+}
+
+impl Emulator {
+    /// Loads a program and resets the machine.
+    ///
+    /// # Errors
+    /// If the machine's memories cannot hold it. Words that are no instructions are no error but a fault, if execution
+    /// reaches them.
+    pub fn new(program: &Program) -> Result<Emulator, LoadError> {
+        let code = Code::new(program)?;
+        Ok(Emulator {
+            state: State::new(program),
+            status: Status::Running,
+            now: 0,
+            front: Front { next: 0, delivered: timing::after_reset(program.machine), from: 0 },
+            recent: Recent::List(Vec::new()),
+            scoreboard: None,
+            planned: None,
+            ticks: Ticks::default(),
+            period: None,
+            report: None,
+            tally: Tally::new(code.len()),
+            cache: Cache::default(),
+            journal: Journal::default(),
+            cycle_limit: MAX_CYCLE,
+            blocks_enabled: true,
+            program: Arc::new(program.clone()),
+            code: Arc::new(code),
+        })
+    }
+
+    /// Loads the program anew and resets the machine: everything is as [`Emulator::new`] made it, except the settings
+    /// (cycle limit, tick period).
+    pub fn reset(&mut self) {
+        self.state = State::new(&self.program);
+        self.status = Status::Running;
+        self.now = 0;
+        self.front = Front { next: 0, delivered: timing::after_reset(self.program.machine), from: 0 };
+        self.recent = Recent::List(Vec::new());
+        self.scoreboard = None;
+        self.planned = None;
+        self.ticks.reset();
+        self.period = None;
+        self.report = None;
+        self.tally = Tally::new(self.code.len());
+        self.cache = Cache::default();
+    }
+
+    /// Stops every run before cycle `limit` with [`FaultKind::CycleLimit`] (and never later than [`MAX_CYCLE`]). It is the
+    /// host that stops the machine here: with a higher limit it goes on.
+    pub fn set_cycle_limit(&mut self, limit: Cycle) {
+        self.cycle_limit = limit.min(MAX_CYCLE);
+    }
+
+    /// Whether straight lines of bundles may run as blocks (they do unless this turns it off). Only time tells: the tests
+    /// compare the two ways.
+    pub fn set_blocks(&mut self, enabled: bool) {
+        self.blocks_enabled = enabled;
+    }
+
+    // ---- Running.
+
+    /// Lets one cycle pass.
+    ///
+    /// # Errors
+    /// A fault; asked again, the same one.
+    pub fn step_cycle(&mut self) -> Result<Step, Fault> {
+        self.cycle(&mut None)
+    }
+
+    /// Runs until a bundle has issued.
+    ///
+    /// # Errors
+    /// A fault; asked again, the same one.
+    pub fn step_bundle(&mut self) -> Result<Stop, Fault> {
+        self.drive(Goal { until: Cycle::MAX, wait: false, bundle: true }, &mut None)
+    }
+
+    /// Runs until `cycle` cycles have passed since reset.
+    ///
+    /// # Errors
+    /// A fault; asked again, the same one.
+    pub fn run_until(&mut self, cycle: Cycle) -> Result<Stop, Fault> {
+        self.drive(Goal { until: cycle, wait: false, bundle: false }, &mut None)
+    }
+
+    /// Runs until a `wait` has issued.
+    ///
+    /// # Errors
+    /// A fault; asked again, the same one.
+    pub fn run_to_wait(&mut self) -> Result<Stop, Fault> {
+        self.drive(Goal { until: Cycle::MAX, wait: true, bundle: false }, &mut None)
+    }
+
+    /// Runs until the machine halts, or waits and no tick is going to come.
+    ///
+    /// # Errors
+    /// A fault; asked again, the same one.
+    pub fn run(&mut self) -> Result<Stop, Fault> {
+        self.drive(Goal { until: Cycle::MAX, wait: false, bundle: false }, &mut None)
+    }
+
+    /// The machine with an observer: the same ways of running it, and `sink` hears every [`Event`].
+    pub fn observed<'a>(&'a mut self, sink: &'a mut dyn FnMut(&Event)) -> Observed<'a> {
+        Observed { emulator: self, sink }
+    }
+
+    pub(crate) fn drive(&mut self, goal: Goal, sink: &mut Sink<'_>) -> Result<Stop, Fault> {
+        // Up to here only the stepper may go.
+        let mut step_until = 0;
+        let fast = self.blocks_enabled && sink.is_none() && !goal.bundle;
+        loop {
+            match self.status {
+                Status::Halted { .. } => return Ok(Stop::Halted),
+                Status::Faulted(ref fault) => return Err(fault.clone()),
+                _ if self.now >= goal.until => return Ok(Stop::Reached),
+                Status::Waiting { address, .. } => {
+                    let tick = self.ticks.next();
+                    if tick.is_none() && goal.until == Cycle::MAX {
+                        return Ok(Stop::Idle);
+                    }
+                    let end = tick.unwrap_or(Cycle::MAX).min(goal.until).min(self.cycle_limit);
+                    if end > self.now && self.state.pending.is_empty() {
+                        self.tally.wait(address, end - self.now);
+                        self.now = end;
+                        continue;
+                    }
+                }
+                Status::Running => {
+                    if fast && self.now >= step_until && self.now <= self.front.delivered {
+                        match self.run_blocks(goal.until.min(self.cycle_limit), goal.wait) {
+                            Fast::Step { until } => step_until = until,
+                            Fast::Wait { cycle, address } if goal.wait => {
+                                return Ok(Stop::Wait { cycle, address });
+                            }
+                            Fast::Wait { .. } | Fast::Halted => {}
+                        }
+                        continue;
+                    }
+                }
+            }
+            if let Step::Issued { cycle, address } = self.cycle(sink)? {
+                if goal.bundle {
+                    return Ok(Stop::Issued { cycle, address });
+                }
+                if goal.wait && self.ticks.waited == Some(cycle) {
+                    return Ok(Stop::Wait { cycle, address });
+                }
+            }
+        }
+    }
+
+    // ---- What there is to see.
+
+    /// The program.
+    pub fn program(&self) -> &Program {
+        &self.program
+    }
+
+    /// The machine that it is for.
+    pub fn machine(&self) -> &'static Machine {
+        self.program.machine
+    }
+
+    /// Cycles that have passed since reset; the next one has this number.
+    pub fn now(&self) -> Cycle {
+        self.now
+    }
+
+    /// What the machine is doing. (The cycle limit, which is the host's, does not change it.)
+    pub fn status(&self) -> &Status {
+        &self.status
+    }
+
+    /// The bundle that issues next; while the program waits, the one that issues after the tick. In a machine that has
+    /// stopped, the bundle that halted or faulted.
+    pub fn next_address(&self) -> Address {
+        self.front.next
+    }
+
+    /// A register's bits; `None` if it was never written. A result appears in the cycle of its writeback.
+    pub fn register(&self, register: u16) -> Option<u32> {
+        (register <= ZERO && self.state.written.contains(register)).then(|| self.state.get(register))
+    }
+
+    /// Sets a register (a debugger's way in; ports have their own). Results underway still arrive.
+    ///
+    /// Returns false, and does nothing, for `zero` and for an address where the machine has no register.
+    pub fn set_register(&mut self, register: u16, bits: u32) -> bool {
+        let exists = register != ZERO && self.machine().banks().any(|bank| bank.contains(register));
+        if exists {
+            self.state.set(register, bits);
+        }
+        exists
+    }
+
+    /// The data memory.
+    pub fn memory(&self) -> &[u32] {
+        &self.state.memory
+    }
+
+    /// The data memory, to be changed by a debugger.
+    pub fn memory_mut(&mut self) -> &mut [u32] {
+        &mut self.state.memory
+    }
+
+    /// The return stack, oldest entry first.
+    pub fn stack(&self) -> &[Address] {
+        &self.state.stack
+    }
+
+    /// The sticky exception flags.
+    pub fn flags(&self) -> Flags {
+        self.state.flags
+    }
+
+    /// Operations underway: issued, and to be written back in the cycle that each one names.
+    pub fn underway(&self) -> impl Iterator<Item = &Retire> {
+        self.state.pending.iter().map(|pending| &pending.retire)
+    }
+
+    /// The NaNs written to output ports since this was last asked, in order; at most [`crate::MAX_NAN_WRITES`] of them
+    /// are kept, [`Statistics::nan_writes`] counts all.
+    pub fn take_nan_writes(&mut self) -> Vec<PortWrite> {
+        let mut writes = std::mem::take(&mut self.state.nan_writes.kept);
+        writes.sort_unstable();
+        writes
+    }
+
+    /// Where the cycles went since reset.
+    pub fn statistics(&self) -> Statistics {
+        let mut tally = self.tally.clone();
+        self.cache.count(&mut tally);
+        Statistics {
+            cycles: self.now,
+            bundles: tally.bundles,
+            operations: tally.operations,
+            causes: tally.causes(),
+            visits: tally.visits,
+            ticks: self.ticks.seen,
+            missed: self.ticks.missed,
+            lost: self.ticks.lost,
+            nan_writes: self.state.nan_writes.count,
+        }
+    }
+
+    pub(crate) fn fault(
+        &mut self,
+        address: Address,
+        slot: Option<u8>,
+        kind: FaultKind,
+        sink: &mut Sink<'_>,
+    ) -> Fault {
+        let stops = !matches!(kind, FaultKind::CycleLimit { .. });
+        let fault = Fault::new(&self.program, self.now, address, slot, kind);
+        emit(sink, || Event::Fault(fault.clone()));
+        if stops {
+            self.status = Status::Faulted(fault.clone());
+        }
+        fault
+    }
+}
+
+/// A machine with an observer; see [`Emulator::observed`].
+pub struct Observed<'a> {
+    emulator: &'a mut Emulator,
+    sink: &'a mut dyn FnMut(&Event),
+}
+
+impl Observed<'_> {
+    /// As [`Emulator::step_cycle`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn step_cycle(&mut self) -> Result<Step, Fault> {
+        self.emulator.cycle(&mut Some(self.sink))
+    }
+
+    /// As [`Emulator::step_bundle`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn step_bundle(&mut self) -> Result<Stop, Fault> {
+        self.drive(Goal { until: Cycle::MAX, wait: false, bundle: true })
+    }
+
+    /// As [`Emulator::run_until`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn run_until(&mut self, cycle: Cycle) -> Result<Stop, Fault> {
+        self.drive(Goal { until: cycle, wait: false, bundle: false })
+    }
+
+    /// As [`Emulator::run_to_wait`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn run_to_wait(&mut self) -> Result<Stop, Fault> {
+        self.drive(Goal { until: Cycle::MAX, wait: true, bundle: false })
+    }
+
+    /// As [`Emulator::run`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn run(&mut self) -> Result<Stop, Fault> {
+        self.drive(Goal { until: Cycle::MAX, wait: false, bundle: false })
+    }
+
+    /// As [`Emulator::run_period`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn run_period(
+        &mut self,
+        inputs: &[(&str, crate::Number)],
+    ) -> Result<PeriodReport, crate::PeriodError> {
+        self.emulator.period(inputs, &mut Some(self.sink))
+    }
+
+    fn drive(&mut self, goal: Goal) -> Result<Stop, Fault> {
+        self.emulator.drive(goal, &mut Some(self.sink))
+    }
+}

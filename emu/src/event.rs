@@ -1,0 +1,96 @@
+//! What an observer hears: plain data, in the order in which it happens.
+//!
+//! Events come by cycle. Within a cycle: the tick and what it entails, then writebacks in slot order (each followed by its
+//! port's event), then the issue of a bundle with what it does at once (operations without a destination, in slot order).
+
+use crate::fault::Fault;
+use takt_isa::Op;
+use takt_isa::fp::Flags;
+use takt_isa::timing::{Address, Cycle};
+
+/// One event.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A bundle issued.
+    Issue {
+        /// In this cycle.
+        cycle: Cycle,
+        /// The bundle.
+        address: Address,
+    },
+    /// An operation completed.
+    Retire(Retire),
+    /// An output port took a value.
+    PortWrite(PortWrite),
+    /// The tick was seen.
+    Tick {
+        /// In this cycle.
+        cycle: Cycle,
+    },
+    /// The tick was seen before the program waited: it is remembered.
+    DeadlineMissed {
+        /// The tick's cycle.
+        cycle: Cycle,
+    },
+    /// The tick was seen while an earlier one was remembered: it is lost.
+    TickLost {
+        /// The tick's cycle.
+        cycle: Cycle,
+    },
+    /// The period's end was reached.
+    Wait {
+        /// The cycle in which `wait` issued.
+        cycle: Cycle,
+        /// Its bundle.
+        address: Address,
+    },
+    /// The machine stopped for good.
+    Halt {
+        /// The cycle in which `halt` issued.
+        cycle: Cycle,
+        /// Its bundle.
+        address: Address,
+    },
+    /// The machine stopped with a fault.
+    Fault(Fault),
+}
+
+/// A completed operation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Retire {
+    /// The cycle of its writeback; of its issue, for an operation that writes no register.
+    pub cycle: Cycle,
+    /// The cycle of its issue.
+    pub issued: Cycle,
+    /// Its bundle.
+    pub address: Address,
+    /// Its slot.
+    pub slot: u8,
+    /// The operation.
+    pub op: Op,
+    /// The register that it wrote.
+    pub register: Option<u16>,
+    /// What it wrote to the register, or to memory if it is a store; otherwise 0.
+    pub value: u32,
+    /// The flags that it raised.
+    pub flags: Flags,
+    /// The data word that it read or wrote.
+    pub memory: Option<u32>,
+}
+
+/// A value written to an output port.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct PortWrite {
+    /// The cycle of the writeback.
+    pub cycle: Cycle,
+    /// The slot whose bank the port belongs to.
+    pub slot: u8,
+    /// The bundle that computed the value.
+    pub address: Address,
+    /// The port's register.
+    pub register: u16,
+    /// The value's bits.
+    pub value: u32,
+    /// Whether the value is a number gone wrong: a NaN on a port that carries binary32.
+    pub nan: bool,
+}

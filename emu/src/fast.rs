@@ -1,0 +1,214 @@
+//! Running blocks. What is out of the ordinary is left to the stepper: before a block, if that can be seen; else the block
+//! is undone.
+
+use crate::block::{Block, Cache};
+use crate::emulator::{Emulator, Recent, Status};
+use crate::event::Retire;
+use crate::machine::{Pending, RegisterSet, State};
+use crate::micro::{self, Context, Ending, LATE, Late, Outside};
+use takt_isa::fp::Flags;
+use takt_isa::timing::{self, Address, Cycle};
+
+/// Why no further block runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Fast {
+    /// The stepper must take over, up to this cycle.
+    Step { until: Cycle },
+    /// A `wait` has issued.
+    Wait { cycle: Cycle, address: Address },
+    /// The machine has halted.
+    Halted,
+}
+
+/// What is kept to undo a block, and buffers.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Journal {
+    registers: Vec<(u16, u32)>,
+    pending: Vec<Pending>,
+    written: RegisterSet,
+    flags: Flags,
+    kept_nans: usize,
+    counted_nans: u64,
+    stored: Vec<(u32, u32)>,
+    nans: Vec<(u32, u32)>,
+    late: Vec<(Flags, Option<u32>)>,
+}
+
+impl Journal {
+    /// Keeps what `block`, whose last bundle issues in cycle `last`, may change before it faults.
+    fn begin(&mut self, state: &State, block: &Block, last: Cycle) {
+        self.stored.clear();
+        self.nans.clear();
+        self.late.clear();
+        self.late.resize(block.late.len(), (Flags::NONE, None));
+        let Some(restore) = &block.restore else { return };
+        self.pending.clone_from(&state.pending);
+        (self.written, self.flags) = (state.written, state.flags);
+        (self.kept_nans, self.counted_nans) = (state.nan_writes.kept.len(), state.nan_writes.count);
+        self.registers.clear();
+        let pending = state.pending.iter().filter(|pending| pending.retire.cycle <= last);
+        let registers = pending.map(|pending| pending.register).chain(restore.iter().copied());
+        self.registers.extend(registers.map(|register| (register, state.get(register))));
+    }
+
+    fn undo(&mut self, state: &mut State) {
+        for &(register, bits) in &self.registers {
+            state.set(register, bits);
+        }
+        for &(address, old) in self.stored.iter().rev() {
+            if let Some(word) = state.memory.get_mut(address as usize) {
+                *word = old;
+            }
+        }
+        std::mem::swap(&mut state.pending, &mut self.pending);
+        (state.written, state.flags) = (self.written, self.flags);
+        state.nan_writes.kept.truncate(self.kept_nans);
+        state.nan_writes.count = self.counted_nans;
+    }
+}
+
+impl Emulator {
+    /// Runs blocks as long as they end before cycle `bound`; until a `wait` issues, if `stop_at_wait`. The machine must
+    /// be running and the next bundle not have been charged a stall but the front end's.
+    pub(crate) fn run_blocks(&mut self, bound: Cycle, stop_at_wait: bool) -> Fast {
+        let mut journal = std::mem::take(&mut self.journal);
+        let why = self.chain(bound, stop_at_wait, &mut journal);
+        self.journal = journal;
+        why
+    }
+}
+
+impl Emulator {
+    fn chain(&mut self, bound: Cycle, stop_at_wait: bool, journal: &mut Journal) -> Fast {
+        loop {
+            if self.cache.is_full() {
+                self.list_recent();
+                self.cache.count(&mut self.tally);
+                self.cache = Cache::default();
+            }
+            let (entry, entered) = (self.front.next, self.front.delivered);
+            let id = match &self.recent {
+                Recent::Block { id, cycle } => self.cache.successor(&self.code, *id, *cycle, entry, entered),
+                Recent::List(recent) => self.cache.after(&self.code, recent, entry, entered),
+            };
+            let Some(id) = id else { return Fast::Step { until: entered + 1 } };
+            let block = &mut self.cache.blocks[id as usize];
+            let (state, ending) = (&mut self.state, block.ending);
+            let last = entered + Cycle::from(block.last);
+            if last >= bound {
+                return Fast::Step { until: bound.max(self.now + 1) };
+            }
+            let stack_fault = match ending {
+                Ending::Call(_) => state.stack.len() >= self.code.machine.stack_depth as usize,
+                Ending::Return => state.stack.is_empty(),
+                _ => false,
+            };
+            if stack_fault
+                || !(block.verified || has_required(state, block, last))
+                || !run(block, state, journal, entered)
+            {
+                return Fast::Step { until: last + 1 };
+            }
+            block.enter(self.front.from, entered - self.now);
+            block.runs += 1;
+            let address = entry + block.bundles - 1;
+            let taken = match ending {
+                Ending::Branch { register, zero, .. } => (state.get(register) == 0) == zero,
+                _ => true,
+            };
+
+            self.now = last + 1;
+            self.recent = Recent::Block { id, cycle: last };
+            self.scoreboard = None;
+            while let Some(tick) = self.ticks.next().filter(|&tick| tick <= last) {
+                self.ticks.take(tick);
+                self.see_tick(tick, &mut None);
+            }
+            let machine = self.code.machine;
+            match ending {
+                Ending::Sequential => self.continue_at(address + 1, timing::after_sequential(last), address),
+                Ending::Branch { .. } if !taken => {
+                    self.continue_at(address + 1, timing::after_not_taken(machine, last), address);
+                }
+                Ending::Jump(target) | Ending::Branch { target, .. } => {
+                    self.continue_at(target, timing::after_redirect(machine, last), address);
+                }
+                Ending::Call(target) => {
+                    self.state.stack.push(address + 1);
+                    self.continue_at(target, timing::after_redirect(machine, last), address);
+                }
+                Ending::Return => {
+                    let target = self.state.stack.pop().unwrap_or_default();
+                    self.continue_at(target, timing::after_redirect(machine, last), address);
+                }
+                Ending::Wait(target) => {
+                    self.wait_issued(last, address, target);
+                    if stop_at_wait || self.status != Status::Running {
+                        return Fast::Wait { cycle: last, address };
+                    }
+                }
+                Ending::Halt => {
+                    self.halt_issued(last, address, &mut None);
+                    return Fast::Halted;
+                }
+            }
+        }
+    }
+}
+
+/// Whether everything that a block requires has been written, counting what is written back by its last issue. (What is
+/// not, the block cannot read.)
+fn has_required(state: &State, block: &Block, last: Cycle) -> bool {
+    let mut written = state.written;
+    let pending = state.pending.iter().filter(|pending| pending.retire.cycle <= last);
+    pending.for_each(|pending| written.insert(pending.register));
+    written.contains_all(&block.required)
+}
+
+/// Runs a block entered in cycle `entered`. If it faults, nothing has happened, and the answer is false.
+fn run(block: &mut Block, state: &mut State, journal: &mut Journal, entered: Cycle) -> bool {
+    let last = entered + Cycle::from(block.last);
+    journal.begin(state, block, last);
+    state.write_back_until(last);
+    let mut context = Context {
+        registers: &mut state.registers,
+        memory: &mut state.memory,
+        flags: state.flags,
+        late: &mut journal.late,
+        stored: &mut journal.stored,
+        nans: &mut journal.nans,
+    };
+    let (head, tail) = block.micros.split_at(block.split);
+    let ran = micro::run::<false>(head, &mut context).and_then(|()| micro::run::<true>(tail, &mut context));
+    let flags = context.flags;
+    if let Err(Outside) = ran {
+        journal.undo(state);
+        return false;
+    }
+    state.flags = flags;
+    for (i, (late, &(flags, memory))) in block.late.iter().zip(&journal.late).enumerate() {
+        let Late { operation, register, address, offset } = *late;
+        let issued = entered + Cycle::from(offset);
+        let retire = Retire {
+            cycle: issued + Cycle::from(operation.latency),
+            issued,
+            address,
+            slot: operation.slot,
+            op: operation.op,
+            register: Some(register),
+            value: state.get(LATE + i as u16),
+            flags,
+            memory,
+        };
+        let (output, float) = (operation.output, operation.float);
+        state.pending.push(Pending { retire, register, output, float });
+    }
+    for &(check, bits) in &journal.nans {
+        state.nan_writes.record(block.checks[check as usize].write(entered, bits));
+    }
+    if !block.verified {
+        state.written.insert_all(&block.writes);
+        block.verified = true;
+    }
+    true
+}

@@ -1,0 +1,36 @@
+//! Takt's cycle-accurate emulator.
+//!
+//! [`Emulator`] holds a machine with a program in it and gives plain data: load it, step a cycle or a bundle, run it, run a
+//! period with named inputs, read any state, ask where the cycles went. To hear of every issue, writeback and tick, run it
+//! through [`Emulator::observed`]. Nothing here prints.
+//!
+//! There are two ways of execution and they agree in everything that can be seen. The *stepper* (`cycle`) goes cycle by
+//! cycle by the rules of [`takt_isa::timing`], which `docs/timing.md` says in prose. *Blocks* (`block`, `fast`) rest on
+//! what the machine promises: a straight line of bundles takes the same cycles every time. Each line's timing is found
+//! once, and from then on running it is arithmetic only. Whatever is out of the ordinary in a block (a fault, the cycle
+//! limit, somebody who observes) is left to the stepper. `tests/agreement.rs` holds the two against each other.
+//!
+//! Within both, instructions are known by their effects; none is named.
+
+mod block;
+mod code;
+mod cycle;
+mod emulator;
+mod event;
+mod execute;
+mod fast;
+mod fault;
+mod machine;
+mod micro;
+mod statistics;
+mod system;
+#[cfg(feature = "testing")]
+pub mod testing;
+
+pub use code::MAX_SLOTS;
+pub use emulator::{Emulator, MAX_CYCLE, Observed, Status, Step, Stop};
+pub use event::{Event, PortWrite, Retire};
+pub use fault::{Fault, FaultKind, LoadError};
+pub use machine::MAX_NAN_WRITES;
+pub use statistics::Statistics;
+pub use system::{Number, PeriodError, PeriodReport, PortError};

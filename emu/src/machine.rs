@@ -1,0 +1,142 @@
+//! The machine's architectural state, and the results on their way into it.
+
+use crate::event::{PortWrite, Retire};
+use takt_isa::fp::{Flags, is_nan};
+use takt_isa::spec::machines::REGISTER_SPACE;
+use takt_isa::timing::{Address, Cycle};
+use takt_isa::{Program, ZERO};
+
+/// Words of the register array: the register space, then the words that blocks use for themselves (`block`).
+pub(crate) const WORDS: usize = 2 * REGISTER_SPACE;
+/// NaNs on output ports that are kept until somebody takes them; more are only counted.
+pub const MAX_NAN_WRITES: usize = 256;
+
+/// A set of registers.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(crate) struct RegisterSet([u64; REGISTER_SPACE / 64]);
+
+impl RegisterSet {
+    pub(crate) fn insert(&mut self, register: u16) {
+        self.0[usize::from(register) / 64 % 16] |= 1 << (register % 64);
+    }
+
+    pub(crate) fn contains(&self, register: u16) -> bool {
+        self.0[usize::from(register) / 64 % 16] >> (register % 64) & 1 != 0
+    }
+
+    pub(crate) fn insert_all(&mut self, other: &RegisterSet) {
+        self.0.iter_mut().zip(other.0).for_each(|(word, other)| *word |= other);
+    }
+
+    pub(crate) fn contains_all(&self, other: &RegisterSet) -> bool {
+        self.0.iter().zip(other.0).all(|(word, other)| other & !word == 0)
+    }
+}
+
+/// A result between issue and writeback.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Pending {
+    /// The operation, complete; `register` is always there.
+    pub(crate) retire: Retire,
+    pub(crate) register: u16,
+    pub(crate) output: bool,
+    /// Whether a NaN is to be reported.
+    pub(crate) float: bool,
+}
+
+/// NaNs that went out.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct NanWrites {
+    pub(crate) kept: Vec<PortWrite>,
+    pub(crate) count: u64,
+}
+
+impl NanWrites {
+    pub(crate) fn record(&mut self, write: PortWrite) {
+        self.count += 1;
+        if self.kept.len() < MAX_NAN_WRITES {
+            self.kept.push(write);
+        }
+    }
+}
+
+/// Everything that operations read and write.
+#[derive(Clone, Debug)]
+pub(crate) struct State {
+    pub(crate) registers: Box<[u32; WORDS]>,
+    pub(crate) written: RegisterSet,
+    pub(crate) memory: Vec<u32>,
+    pub(crate) stack: Vec<Address>,
+    pub(crate) flags: Flags,
+    /// In the order of issue.
+    pub(crate) pending: Vec<Pending>,
+    pub(crate) nan_writes: NanWrites,
+}
+
+impl State {
+    /// The state after loading and reset.
+    pub(crate) fn new(program: &Program) -> State {
+        let mut memory = program.data.clone();
+        memory.resize(program.machine.data_depth as usize, 0);
+        let mut state = State {
+            registers: Box::new([0; WORDS]),
+            written: RegisterSet::default(),
+            memory,
+            stack: Vec::with_capacity(program.machine.stack_depth as usize),
+            flags: Flags::NONE,
+            pending: Vec::new(),
+            nan_writes: NanWrites::default(),
+        };
+        state.written.insert(ZERO);
+        for &(register, bits) in &program.constants {
+            state.set(register, bits);
+        }
+        state
+    }
+
+    #[inline]
+    pub(crate) fn get(&self, register: u16) -> u32 {
+        self.registers[usize::from(register) % WORDS]
+    }
+
+    /// Writes a register for all to see.
+    #[inline]
+    pub(crate) fn set(&mut self, register: u16, bits: u32) {
+        self.registers[usize::from(register) % WORDS] = bits;
+        self.written.insert(register);
+    }
+
+    /// The writeback of one result; what went to an output port, if it is one.
+    pub(crate) fn write_back(&mut self, pending: &Pending) -> Option<PortWrite> {
+        let Retire { cycle, slot, address, value, flags, .. } = pending.retire;
+        self.set(pending.register, value);
+        self.flags |= flags;
+        if !pending.output {
+            return None;
+        }
+        let nan = pending.float && is_nan(value);
+        let write = PortWrite { cycle, slot, address, register: pending.register, value, nan };
+        if nan {
+            self.nan_writes.record(write);
+        }
+        Some(write)
+    }
+
+    /// Writes back every result that is on its bus in cycle `last` or before. (The order does not matter to the state: no
+    /// two pending results go to one register.)
+    #[inline]
+    pub(crate) fn write_back_until(&mut self, last: Cycle) {
+        if self.pending.is_empty() {
+            return;
+        }
+        let mut i = 0;
+        while i < self.pending.len() {
+            if self.pending[i].retire.cycle <= last {
+                let pending = self.pending.remove(i);
+                self.write_back(&pending);
+            } else {
+                i += 1;
+            }
+        }
+    }
+}

@@ -1,0 +1,310 @@
+//! Micros: a block's operations as a flat list, one after the other, that does what its bundles do.
+//!
+//! Micros write registers at once, although the results are underway for some cycles yet. Nobody can tell, as the
+//! interlocks keep every operation from reading or overwriting a register with a result underway; except at the block's
+//! end, where somebody may look. So results that are still underway then (*late* ones) go to words of their own in the
+//! register array, from which they become [`crate::machine::Pending`].
+
+use crate::code::{MAX_SLOTS, Operation};
+use crate::event::PortWrite;
+use crate::execute::data_address;
+use crate::machine::{RegisterSet, WORDS};
+use takt_isa::fp::{Flags, Host, Value, is_nan};
+use takt_isa::spec::machines::REGISTER_SPACE;
+use takt_isa::spec::units::MAX_LATENCY;
+use takt_isa::timing::{Address, Cycle};
+use takt_isa::{Effect, Op, ZERO, compute};
+
+/// Scratch words, one for each slot, for bundles that exchange registers.
+const SCRATCH: u16 = REGISTER_SPACE as u16;
+/// The words of late results: each bank is written at most once a cycle, at most [`MAX_LATENCY`] cycles after issue.
+pub(crate) const LATE: u16 = SCRATCH + MAX_SLOTS as u16;
+const _: () = assert!(
+    LATE as usize + MAX_SLOTS * MAX_LATENCY as usize <= WORDS,
+    "late results overflow the register array"
+);
+
+/// What a micro does.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Kind {
+    /// `dest = compute(op, a, b, c)`
+    Compute,
+    /// `dest = constant`
+    Immediate,
+    /// `dest = a`
+    Move,
+    /// `dest = memory[constant + a]`
+    Load,
+    /// `memory[constant + a] = b`
+    Store,
+    /// `dest = flags`
+    ReadFlags,
+    /// `flags = 0`
+    ClearFlags,
+    /// Looks whether register `a` holds a NaN, for check number `constant`.
+    Check,
+}
+
+/// A pre-decoded operation.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Micro {
+    kind: Kind,
+    op: Op,
+    dest: u16,
+    a: u16,
+    b: u16,
+    c: u16,
+    constant: u32,
+}
+
+impl Micro {
+    fn new(kind: Kind, operation: &Operation, dest: u16) -> Micro {
+        let [a, b, c] = operation.sources;
+        Micro { kind, op: operation.op, dest, a, b, c, constant: operation.constant }
+    }
+}
+
+/// A result that is underway at the block's end.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Late {
+    pub(crate) operation: Operation,
+    pub(crate) register: u16,
+    pub(crate) address: Address,
+    /// Cycle of its issue, from the block's entry.
+    pub(crate) offset: u32,
+}
+
+/// A write to an output port that carries binary32.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Check {
+    slot: u8,
+    register: u16,
+    address: Address,
+    /// Cycle of its writeback, from the block's entry.
+    offset: u32,
+}
+
+impl Check {
+    /// The event, for a block entered in cycle `entered`.
+    pub(crate) fn write(&self, entered: Cycle, value: u32) -> PortWrite {
+        let Check { slot, register, address, offset } = *self;
+        PortWrite { cycle: entered + Cycle::from(offset), slot, address, register, value, nan: true }
+    }
+}
+
+/// How a block ends.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Ending {
+    /// The line was cut, or the next bundle cannot execute: at the next bundle.
+    Sequential,
+    /// At the target.
+    Jump(Address),
+    /// At the target if the register is zero, or is not zero; else at the next bundle. (What its own bundle computes is
+    /// late, so that the register still has its old value when the micros have run.)
+    Branch { register: u16, zero: bool, target: Address },
+    /// At the target, the next address pushed.
+    Call(Address),
+    /// At the address popped.
+    Return,
+    /// At the target, on the tick.
+    Wait(Address),
+    /// Nowhere.
+    Halt,
+}
+
+/// Makes micros of bundles.
+#[derive(Debug, Default)]
+pub(crate) struct Emitter {
+    /// Offset of the last bundle's issue.
+    last: u32,
+    /// Words of the data memory.
+    depth: u32,
+    pub(crate) micros: Vec<Micro>,
+    /// The first micro from which on there are late results.
+    pub(crate) split: Option<usize>,
+    pub(crate) late: Vec<Late>,
+    pub(crate) checks: Vec<Check>,
+    /// Registers that micros write.
+    pub(crate) writes: RegisterSet,
+    /// Whether a load or store may leave the memory.
+    pub(crate) can_fault: bool,
+}
+
+impl Emitter {
+    /// For a block whose last bundle issues at offset `last`, and a data memory of `depth` words.
+    pub(crate) fn new(last: u32, depth: u32) -> Emitter {
+        Emitter { last, depth, ..Emitter::default() }
+    }
+
+    fn is_late(&self, operation: &Operation, offset: u32) -> bool {
+        operation.dest.is_some() && offset + operation.latency > self.last
+    }
+
+    /// Appends the micros of a bundle.
+    pub(crate) fn bundle(&mut self, address: Address, offset: u32, operations: &[Operation]) {
+        let first_check = self.checks.len();
+        let start = self.micros.len();
+        let mut bundle = Vec::with_capacity(operations.len());
+        for operation in operations {
+            let late = self.is_late(operation, offset);
+            let dest = match operation.dest {
+                Some(register) if late => {
+                    self.split.get_or_insert(start);
+                    self.late.push(Late { operation: *operation, register, address, offset });
+                    LATE + (self.late.len() - 1) as u16
+                }
+                Some(register) => {
+                    self.writes.insert(register);
+                    if operation.float {
+                        let offset = offset + operation.latency;
+                        self.checks.push(Check { slot: operation.slot, register, address, offset });
+                    }
+                    register
+                }
+                None => ZERO,
+            };
+            let kind = match operation.effect {
+                Effect::Compute => Kind::Compute,
+                Effect::Immediate => Kind::Immediate,
+                Effect::Load => Kind::Load,
+                Effect::Store => Kind::Store,
+                Effect::ReadFlags => Kind::ReadFlags,
+                Effect::ClearFlags => Kind::ClearFlags,
+                // These are the block's ending.
+                Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => continue,
+                Effect::Call | Effect::Return | Effect::Wait | Effect::Halt | Effect::Nothing => continue,
+            };
+            if matches!(kind, Kind::Load | Kind::Store) {
+                let fixed = operation.sources[0] == ZERO && operation.constant < self.depth;
+                self.can_fault |= !fixed;
+            }
+            bundle.push((operation, Micro::new(kind, operation, dest)));
+        }
+        self.order(bundle);
+        for (i, check) in self.checks.iter().enumerate().skip(first_check) {
+            let (kind, a, constant) = (Kind::Check, check.register, i as u32);
+            self.micros.push(Micro { kind, op: Op::nop, dest: ZERO, a, b: 0, c: 0, constant });
+        }
+    }
+
+    /// Appends the micros of a bundle in an order in which none writes what a later one reads. Where there is no such
+    /// order, because the bundle exchanges registers, a scratch word makes one.
+    fn order(&mut self, mut bundle: Vec<(&Operation, Micro)>) {
+        let on_flags = |micro: &Micro| matches!(micro.kind, Kind::ReadFlags | Kind::ClearFlags);
+        let mut moves = Vec::new();
+        while !bundle.is_empty() {
+            // The flags that operations raise now come after what is done to those of before.
+            let flags_left = bundle.iter().any(|(_, micro)| on_flags(micro));
+            let candidates = || (0..bundle.len()).filter(|&i| !flags_left || on_flags(&bundle[i].1));
+            let is_read = |i: usize| {
+                let dest = bundle[i].1.dest;
+                let others = bundle.iter().enumerate().filter(|&(j, _)| j != i);
+                let writes = bundle[i].0.dest.is_some();
+                writes && others.into_iter().any(|(_, (operation, _))| operation.reads().contains(&dest))
+            };
+            if let Some(i) = candidates().find(|&i| !is_read(i)) {
+                self.micros.push(bundle.remove(i).1);
+            } else if let Some(i) = candidates().next() {
+                let (operation, mut micro) = bundle.remove(i);
+                let scratch = SCRATCH + u16::from(operation.slot);
+                moves.push(Micro { kind: Kind::Move, a: scratch, ..micro });
+                micro.dest = scratch;
+                self.micros.push(micro);
+            }
+        }
+        self.micros.append(&mut moves);
+    }
+
+    /// The ending of a block with these operations in its last bundle.
+    pub(crate) fn ending(operations: &[Operation]) -> Ending {
+        let Some(operation) = operations.iter().find(|operation| operation.effect.redirects()) else {
+            return Ending::Sequential;
+        };
+        let target = operation.constant;
+        match operation.effect {
+            Effect::Jump => Ending::Jump(target),
+            Effect::BranchZero | Effect::BranchNonzero => Ending::Branch {
+                register: operation.sources[0],
+                zero: operation.effect == Effect::BranchZero,
+                target,
+            },
+            Effect::Call => Ending::Call(target),
+            Effect::Return => Ending::Return,
+            Effect::Wait => Ending::Wait(target),
+            Effect::Halt => Ending::Halt,
+            Effect::Compute
+            | Effect::Nothing
+            | Effect::Immediate
+            | Effect::Load
+            | Effect::Store
+            | Effect::ReadFlags
+            | Effect::ClearFlags => Ending::Sequential,
+        }
+    }
+}
+
+/// What micros run on, and what they leave to the one who runs them.
+pub(crate) struct Context<'a> {
+    pub(crate) registers: &'a mut [u32; WORDS],
+    pub(crate) memory: &'a mut [u32],
+    pub(crate) flags: Flags,
+    /// Of each late result the flags, and the data word that it was loaded from.
+    pub(crate) late: &'a mut [(Flags, Option<u32>)],
+    /// Words of memory overwritten, with their old values.
+    pub(crate) stored: &'a mut Vec<(u32, u32)>,
+    /// Checks that found a NaN, with its bits.
+    pub(crate) nans: &'a mut Vec<(u32, u32)>,
+}
+
+/// A load or store left the memory: the block has not run, and what it changed is to be restored.
+pub(crate) struct Outside;
+
+/// Runs micros, one after the other. `TAIL`: there may be late results among them.
+#[inline]
+pub(crate) fn run<const TAIL: bool>(micros: &[Micro], context: &mut Context<'_>) -> Result<(), Outside> {
+    // In a local the flags stay in a machine register.
+    let mut flags = context.flags;
+    let registers = &mut *context.registers;
+    for micro in micros {
+        let [a, b, c] = [micro.a, micro.b, micro.c].map(|word| registers[usize::from(word) % WORDS]);
+        let value = match micro.kind {
+            Kind::Compute => compute::<Host>(micro.op, a, b, c),
+            Kind::Immediate => Value::exact(micro.constant),
+            Kind::Move => Value::exact(a),
+            Kind::Load => match context.memory.get(data_address(micro.constant, a)) {
+                Some(&word) => Value::exact(word),
+                None => return Err(Outside),
+            },
+            Kind::Store => {
+                let address = data_address(micro.constant, a);
+                match context.memory.get_mut(address) {
+                    Some(word) => context.stored.push((address as u32, std::mem::replace(word, b))),
+                    None => return Err(Outside),
+                }
+                continue;
+            }
+            Kind::ReadFlags => Value::exact(flags.bits().into()),
+            Kind::ClearFlags => {
+                flags = Flags::NONE;
+                continue;
+            }
+            Kind::Check => {
+                if is_nan(a) {
+                    context.nans.push((micro.constant, a));
+                }
+                continue;
+            }
+        };
+        registers[usize::from(micro.dest) % WORDS] = value.bits;
+        if TAIL && micro.dest >= LATE {
+            if let Some(late) = context.late.get_mut(usize::from(micro.dest - LATE)) {
+                let word = (micro.kind == Kind::Load).then(|| data_address(micro.constant, a) as u32);
+                *late = (value.flags, word);
+            }
+        } else {
+            flags |= value.flags;
+        }
+    }
+    context.flags = flags;
+    Ok(())
+}

@@ -1,0 +1,103 @@
+//! Where the cycles went.
+
+use std::collections::{BTreeMap, HashMap};
+use takt_isa::timing::{Address, Cause, Cycle};
+use takt_isa::{Op, ROWS};
+
+/// Everything counted since reset. `cycles = bundles + stalled()`, always.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Statistics {
+    /// Cycles that have passed.
+    pub cycles: Cycle,
+    /// Bundles issued.
+    pub bundles: u64,
+    /// Operations issued, by [`Op`] (`operations[op as usize]`); those that do nothing are not counted.
+    pub operations: [u64; ROWS.len()],
+    /// How often each bundle of the program issued, by address.
+    pub visits: Vec<u64>,
+    /// Stalled cycles, by the bundle that could not issue and the cause. For [`Cause::Wait`] that is the waiting bundle
+    /// itself.
+    pub causes: BTreeMap<(Address, Cause), u64>,
+    /// Ticks seen.
+    pub ticks: u64,
+    /// Of these, how many came before the program waited, and were remembered.
+    pub missed: u64,
+    /// Of these, how many came while another was remembered, and were lost.
+    pub lost: u64,
+    /// NaNs written to output ports that carry binary32.
+    pub nan_writes: u64,
+}
+
+impl Statistics {
+    /// Stalled cycles by kind of cause, in the order of [`Cause::KINDS`].
+    pub fn stalls(&self) -> [u64; Cause::KINDS.len()] {
+        let mut kinds = [0; Cause::KINDS.len()];
+        for ((_, cause), cycles) in &self.causes {
+            kinds[cause.kind()] += cycles;
+        }
+        kinds
+    }
+
+    /// Stalled cycles, waiting included.
+    pub fn stalled(&self) -> u64 {
+        self.causes.values().sum()
+    }
+
+    /// Operations issued, those that do nothing not counted.
+    pub fn total_operations(&self) -> u64 {
+        self.operations.iter().sum()
+    }
+
+    /// How often an operation issued.
+    pub fn operation(&self, op: Op) -> u64 {
+        self.operations[op as usize]
+    }
+}
+
+/// The counts that are kept as the machine runs; those of blocks are added when somebody asks.
+#[derive(Clone, Debug)]
+pub(crate) struct Tally {
+    pub(crate) bundles: u64,
+    pub(crate) operations: [u64; ROWS.len()],
+    pub(crate) visits: Vec<u64>,
+    pub(crate) causes: HashMap<(Address, Cause), u64>,
+    /// Cycles waited, by the address of the `wait`: apart because every period adds to one of them.
+    pub(crate) waits: Vec<u64>,
+}
+
+impl Tally {
+    pub(crate) fn new(bundles: usize) -> Tally {
+        Tally {
+            bundles: 0,
+            operations: [0; ROWS.len()],
+            visits: vec![0; bundles],
+            causes: HashMap::new(),
+            waits: vec![0; bundles],
+        }
+    }
+
+    pub(crate) fn stall(&mut self, address: Address, cause: Cause, cycles: u64) {
+        if cycles > 0 {
+            *self.causes.entry((address, cause)).or_default() += cycles;
+        }
+    }
+
+    pub(crate) fn wait(&mut self, address: Address, cycles: u64) {
+        self.waits[address as usize] += cycles;
+    }
+
+    pub(crate) fn issue(&mut self, address: Address, operations: impl Iterator<Item = Op>) {
+        self.bundles += 1;
+        self.visits[address as usize] += 1;
+        for op in operations {
+            self.operations[op as usize] += 1;
+        }
+    }
+
+    /// The causes as a sorted table, waiting included.
+    pub(crate) fn causes(&self) -> BTreeMap<(Address, Cause), u64> {
+        let waits = self.waits.iter().enumerate().filter(|&(_, &cycles)| cycles > 0);
+        let waits = waits.map(|(address, &cycles)| ((address as Address, Cause::Wait), cycles));
+        self.causes.iter().map(|(&key, &cycles)| (key, cycles)).chain(waits).collect()
+    }
+}

@@ -1,0 +1,408 @@
+//! Random programs from a seed, for tests: of the emulator here, and of the circuit against it.
+//!
+//! Programs use few registers, so that operations collide: nearly every bundle waits for something. Units are drawn before
+//! instructions, so that rare ones come up as often as common ones. Instructions are taken from the specification's table;
+//! only the loop counter's decrement is named.
+
+use takt_isa::program::{Port, Section};
+use takt_isa::spec::machines::REGISTER_SPACE;
+use takt_isa::{Effect, Function, Instruction, Machine, Op, Operand, Program, ROWS, Row, Type, ZERO};
+
+/// What a random program is like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// Bundles of the period, roughly.
+    pub bundles: u32,
+    /// Whether there are branches, loops, calls; otherwise the period is a straight line.
+    pub control: bool,
+    /// Whether anything may happen that a sane program does not do: illegal words, jumps and addresses into the blue,
+    /// unwritten registers, unbalanced calls. Such a program may fault, or never wait.
+    pub wild: bool,
+}
+
+impl Options {
+    /// A program that runs without fault: `.once` part, `wait`, a period, `wait`, subroutines.
+    pub const TAME: Options = Options { bundles: 40, control: true, wild: false };
+    /// A program that may do anything.
+    pub const WILD: Options = Options { bundles: 40, control: true, wild: true };
+}
+
+/// A small random number generator (SplitMix64).
+#[derive(Clone, Debug)]
+pub struct Random(u64);
+
+impl Random {
+    /// From a seed.
+    pub const fn new(seed: u64) -> Random {
+        Random(seed)
+    }
+
+    /// 64 random bits.
+    pub const fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// A number below `end`, which is not 0.
+    pub const fn below(&mut self, end: u32) -> u32 {
+        (((self.bits() >> 32) * end as u64) >> 32) as u32
+    }
+
+    /// True once in `n` times.
+    pub const fn once_in(&mut self, n: u32) -> bool {
+        self.below(n) == 0
+    }
+
+    fn pick<'a, T>(&mut self, from: &'a [T]) -> &'a T {
+        &from[self.below(from.len() as u32) as usize]
+    }
+
+    /// A word that makes arithmetic interesting: special binary32 values, small integers, anything.
+    pub fn word(&mut self) -> u32 {
+        const SPECIAL: [u32; 16] = [
+            0x0000_0000, // zeros
+            0x8000_0000,
+            0x3f80_0000, // one, minus one, two, half
+            0xbf80_0000,
+            0x4000_0000,
+            0x3f00_0000,
+            0x7f80_0000, // infinities
+            0xff80_0000,
+            0x7fc0_0000, // NaNs, the last signaling
+            0x7f80_0001,
+            0x0000_0001, // subnormals
+            0x807f_ffff,
+            0x7f7f_ffff, // largest
+            0x4f00_0000, // 2^31
+            0x4049_0fdb, // pi
+            0x43c9_0fda, // the sine's last argument
+        ];
+        match self.below(8) {
+            0 | 1 => *self.pick(&SPECIAL),
+            2 => self.below(64),
+            3 => self.bits() as u32,
+            // Of moderate size, so that sums and products stay numbers for a while.
+            _ => (self.bits() as u32) & 0x807f_ffff | (120 + self.below(14)) << 23,
+        }
+    }
+}
+
+/// Registers that random operations read and write, of each bank; and how many of its output ports.
+const POOL: u32 = 8;
+const OUTPUTS: u16 = 2;
+/// Input ports that are read, and to be set: `in0`, ….
+pub const INPUTS: u16 = 4;
+/// Registers at the start of the first slot's bank that hold word addresses and are never written.
+const BASES: u16 = 4;
+
+/// The random program of a seed: the same for the same arguments. The host is to set its inputs before it runs.
+pub fn random_program(seed: u64, machine: &'static Machine, options: Options) -> Program {
+    Generator::new(seed, machine, options).program()
+}
+
+struct Generator {
+    random: Random,
+    machine: &'static Machine,
+    options: Options,
+    /// Readable registers.
+    sources: Vec<u16>,
+    /// Registers of each slot that operations may write.
+    dests: Vec<Vec<u16>>,
+    bases: Vec<(u16, u32)>,
+    constants: Vec<(u16, u32)>,
+    bundles: Vec<Vec<u64>>,
+    /// Instructions that await the address of a subroutine: bundle, slot, which.
+    calls: Vec<(usize, usize)>,
+}
+
+impl Generator {
+    fn new(seed: u64, machine: &'static Machine, options: Options) -> Generator {
+        let mut random = Random::new(seed);
+        let mut sources: Vec<u16> = (0..INPUTS).map(|i| machine.inputs.base + i).chain([ZERO]).collect();
+        let mut constants = Vec::new();
+        let mut dests = Vec::new();
+        let pool = 1 + random.below(POOL) as u16;
+        for slot in machine.slots {
+            // The first registers are spared for bases and counters.
+            let ordinary = (0..pool).map(|i| slot.bank.base + 2 * BASES + i);
+            let outputs =
+                (0..OUTPUTS).map(|i| slot.bank.base + slot.bank.depth - machine.outputs_per_bank + i);
+            let all: Vec<u16> = ordinary.chain(outputs).collect();
+            constants.extend(all.iter().map(|&register| (register, random.word())));
+            sources.extend(&all);
+            dests.push(all);
+        }
+        let base = machine.slots[0].bank.base;
+        let words = machine.data_depth.min(500);
+        let bases: Vec<(u16, u32)> =
+            (0..BASES).map(|i| (base + i, random.below(words + 50).wrapping_sub(50))).collect();
+        constants.extend(&bases);
+        Generator {
+            random,
+            machine,
+            options,
+            sources,
+            dests,
+            bases,
+            constants,
+            bundles: Vec::new(),
+            calls: Vec::new(),
+        }
+    }
+
+    fn program(mut self) -> Program {
+        let machine = self.machine;
+        for _ in 0..self.random.below(4) {
+            self.plain();
+        }
+        let first_wait = self.bundles.len();
+        self.plain();
+        let period = self.bundles.len() as u32;
+        self.control(first_wait, Effect::Wait, period, None);
+        self.body(self.options.bundles);
+        let last = self.bundles.len();
+        self.plain();
+        let ending = if self.random.once_in(16) { Effect::Halt } else { Effect::Wait };
+        self.control(last, ending, period, None);
+        let end = self.bundles.len() as u32;
+        // Subroutines call only what comes after them.
+        let mut depth = 0;
+        while !self.calls.is_empty() && depth < 3 {
+            depth += 1;
+            let callers = std::mem::take(&mut self.calls);
+            let address = self.bundles.len() as u32;
+            for (bundle, slot) in callers {
+                self.retarget(bundle, slot, address);
+            }
+            self.body(4);
+            let last = self.bundles.len();
+            self.plain();
+            self.control(last, Effect::Return, 0, None);
+        }
+        for (bundle, slot) in std::mem::take(&mut self.calls) {
+            self.bundles[bundle][slot] = filler();
+        }
+        if self.options.wild {
+            self.derange();
+        }
+        let port = |name: String, register, ty| Port { name, register, ty };
+        let inputs = (0..INPUTS).map(|i| port(format!("in{i}"), machine.inputs.base + i, Type::B)).collect();
+        // The second port of a bank is an integer's: no NaN there.
+        let outputs = self.dests.iter().flat_map(|bank| {
+            let ports = &bank[bank.len() - usize::from(OUTPUTS)..];
+            ports
+                .iter()
+                .zip([Type::F, Type::I])
+                .map(|(&register, ty)| port(format!("out{register}"), register, ty))
+        });
+        let section = |name: &str, start, end| Section { name: name.to_owned(), start, end };
+        self.constants.sort_unstable();
+        Program {
+            machine,
+            lines: vec![None; self.bundles.len() * machine.slots.len()],
+            data: (0..machine.data_depth).map(|_| self.random.word()).collect(),
+            inputs,
+            outputs: outputs.collect(),
+            constants: self.constants,
+            registers: Vec::new(),
+            symbols: Vec::new(),
+            sections: vec![section("once", 0, period), section("period", period, end)],
+            files: Vec::new(),
+            code: self.bundles.into_iter().flatten().collect(),
+        }
+    }
+
+    /// A stretch of bundles that is entered at its start and left at its end.
+    fn body(&mut self, bundles: u32) {
+        let end = self.bundles.len() + bundles as usize;
+        while self.bundles.len() < end {
+            match self.random.below(if self.options.control { 12 } else { 8 }) {
+                0..8 => self.plain(),
+                8 | 9 => self.skip(),
+                10 => self.repeat(),
+                _ => {
+                    let at = self.bundles.len();
+                    self.plain();
+                    if let Some(slot) = self.control(at, Effect::Call, 0, None) {
+                        self.calls.push((at, slot));
+                    }
+                }
+            }
+        }
+    }
+
+    /// A forward branch or jump over a few bundles.
+    fn skip(&mut self) {
+        let at = self.bundles.len();
+        self.plain();
+        let over = self.random.below(4);
+        for _ in 0..over {
+            self.plain();
+        }
+        let effect = *self.random.pick(&[Effect::BranchZero, Effect::BranchNonzero, Effect::Jump]);
+        let source = *self.random.pick(&self.sources);
+        self.control(at, effect, at as u32 + 1 + over, Some(source));
+    }
+
+    /// A loop of a few rounds.
+    fn repeat(&mut self) {
+        let Some((slot, _)) = self.machine.host(Op::isub.row().function) else { return };
+        let counter = self.machine.slots[slot].bank.base + BASES;
+        let (rounds, one) = (1 + self.random.below(5), counter + 1);
+        let set =
+            |dest, constant| Instruction { dest, constant, ..Instruction::bare(op_with(Effect::Immediate)) };
+        for (index, value) in [(BASES, rounds), (BASES + 1, 1)] {
+            let mut bundle = self.nops();
+            bundle[slot] = word(&set(index, value));
+            self.bundles.push(bundle);
+        }
+        let start = self.bundles.len() as u32;
+        for _ in 0..1 + self.random.below(4) {
+            self.plain();
+        }
+        let mut bundle = self.nops();
+        bundle[slot] =
+            word(&Instruction { dest: BASES, sources: [counter, one, 0], ..Instruction::bare(Op::isub) });
+        self.bundles.push(bundle);
+        let at = self.bundles.len();
+        self.plain();
+        self.control(at, Effect::BranchNonzero, start, Some(counter));
+    }
+
+    fn nops(&self) -> Vec<u64> {
+        vec![filler(); self.machine.slots.len()]
+    }
+
+    /// A bundle without control.
+    fn plain(&mut self) {
+        let mut bundle = self.nops();
+        let fill = 1 + self.random.below(4);
+        for (slot, place) in bundle.iter_mut().enumerate() {
+            if self.random.below(4) < fill {
+                *place = self.operation(slot);
+            }
+        }
+        self.bundles.push(bundle);
+    }
+
+    /// An operation for a slot.
+    fn operation(&mut self, slot: usize) -> u64 {
+        let rows = |function: Function| {
+            ROWS.iter().filter(move |row| row.function == function && !row.effect.redirects())
+        };
+        let functions: Vec<Function> =
+            self.machine.slots[slot].units.iter().flat_map(|unit| unit.functions.iter().copied()).collect();
+        let function = *self.random.pick(&functions);
+        let rows: Vec<&Row> = rows(function).collect();
+        if rows.is_empty() {
+            return filler();
+        }
+        // What drains hides other stalls, so it is rarer.
+        let mut row = *self.random.pick(&rows);
+        if row.effect.drains() && !self.random.once_in(4) {
+            row = *self.random.pick(&rows);
+        }
+        let mut instruction = Instruction::bare(row.op);
+        for operand in row.shape.operands() {
+            match *operand {
+                Operand::Dest => {
+                    let bank = &self.machine.slots[slot].bank;
+                    instruction.dest = *self.random.pick(&self.dests[slot]) - bank.base;
+                }
+                Operand::Source(n) => instruction.sources[n] = *self.random.pick(&self.sources),
+                Operand::Immediate => instruction.constant = self.random.word(),
+                Operand::Target => {}
+                Operand::Memory => {
+                    let (base, value) = *self.random.pick(&self.bases);
+                    // Few words, so that loads meet stores.
+                    let word = 60 + self.random.below(8);
+                    let offset = word.wrapping_sub(value);
+                    let near = offset < 4096;
+                    instruction.sources[0] = if near { base } else { ZERO };
+                    instruction.constant = if near { offset } else { word };
+                }
+            }
+        }
+        word(&instruction)
+    }
+
+    /// Puts an operation with this effect into a bundle; the slot that it went to.
+    fn control(&mut self, bundle: usize, effect: Effect, target: u32, source: Option<u16>) -> Option<usize> {
+        let op = op_with(effect);
+        let (slot, _) = self.machine.host(op.row().function)?;
+        let mut instruction = Instruction::bare(op);
+        if op.row().shape.fields().contains(&takt_isa::Field::Target) {
+            instruction.constant = target;
+        }
+        if op.row().shape.sources() > 0 {
+            instruction.sources[0] = source.unwrap_or(ZERO);
+        }
+        self.bundles[bundle][slot] = word(&instruction);
+        Some(slot)
+    }
+
+    fn retarget(&mut self, bundle: usize, slot: usize, target: u32) {
+        if let Ok(mut instruction) = Instruction::decode(self.bundles[bundle][slot]) {
+            instruction.constant = target;
+            self.bundles[bundle][slot] = word(&instruction);
+        }
+    }
+
+    /// Breaks a few words.
+    fn derange(&mut self) {
+        let (bundles, slots) = (self.bundles.len() as u32, self.machine.slots.len() as u32);
+        for _ in 0..1 + self.random.below(3) {
+            let (bundle, slot) = (self.random.below(bundles) as usize, self.random.below(slots) as usize);
+            let (target, register) =
+                (self.random.below(bundles + 2), self.random.below(REGISTER_SPACE as u32) as u16);
+            match self.random.below(12) {
+                0 => self.bundles[bundle][slot] = 0,
+                1 => self.bundles[bundle][slot] = self.random.bits() >> 16,
+                2 => self.bundles[bundle][slot] = self.random.bits() >> 8,
+                3 => _ = self.control(bundle, Effect::Return, 0, None),
+                4 | 5 => _ = self.control(bundle, Effect::Call, target, None),
+                6 => _ = self.control(bundle, Effect::Jump, target, None),
+                7 => _ = self.control(bundle, Effect::Halt, 0, None),
+                8 => _ = self.control(bundle, Effect::Wait, target, None),
+                9 => {
+                    let source = *self.random.pick(&self.sources);
+                    self.control(bundle, Effect::BranchNonzero, target, Some(source));
+                }
+                _ => {
+                    // Another source, or base: unwritten, or any value at all.
+                    let source =
+                        if self.random.once_in(2) { register } else { *self.random.pick(&self.sources) };
+                    let words = self.bundles.iter_mut().flatten();
+                    let with_source = |word: &&mut u64| {
+                        Instruction::decode(**word).is_ok_and(|instruction| !instruction.reads().is_empty())
+                    };
+                    let mut candidates: Vec<&mut u64> = words.filter(with_source).collect();
+                    if !candidates.is_empty() {
+                        let which = self.random.below(candidates.len() as u32) as usize;
+                        if let Ok(mut instruction) = Instruction::decode(*candidates[which]) {
+                            instruction.sources[0] = source;
+                            *candidates[which] = word(&instruction);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn filler() -> u64 {
+    word(&Instruction::NOP)
+}
+
+/// An instruction's word. Those made here fit; one that did not would be unwritten memory, and fault.
+fn word(instruction: &Instruction) -> u64 {
+    instruction.encode().unwrap_or(0)
+}
+
+/// The instruction with an effect that only one has.
+fn op_with(effect: Effect) -> Op {
+    ROWS.iter().find(|row| row.effect == effect).map_or(Op::nop, |row| row.op)
+}

@@ -1,0 +1,290 @@
+//! Blocks and stepper do the same: random programs, run both ways in the same chunks, agree in all that can be seen.
+
+use std::num::NonZeroU64;
+use takt_emu::testing::{INPUTS, Options, Random, random_program};
+use takt_emu::{Emulator, Event, Fault, PeriodError, PeriodReport, Status, Stop};
+use takt_isa::timing::Cause;
+use takt_isa::{Effect, MACHINES, Program, ROWS};
+
+/// Programs of each kind and machine.
+const PROGRAMS: u64 = 1500;
+
+/// Everything that can be seen from outside must be equal.
+fn assert_same(seed: u64, fast: &mut Emulator, step: &mut Emulator) {
+    let now = step.now();
+    let context = |what: &str| format!("seed {seed}: {what} in cycle {now}");
+    assert_eq!(fast.now(), step.now(), "{}", context("now"));
+    assert_eq!(fast.status(), step.status(), "{}", context("status"));
+    assert_eq!(fast.next_address(), step.next_address(), "{}", context("next"));
+    for register in 0..1024 {
+        assert_eq!(
+            fast.register(register),
+            step.register(register),
+            "{}",
+            context(&format!("register {register}"))
+        );
+    }
+    assert_eq!(fast.memory(), step.memory(), "{}", context("memory"));
+    assert_eq!(fast.stack(), step.stack(), "{}", context("stack"));
+    assert_eq!(fast.flags(), step.flags(), "{}", context("flags"));
+    let underway = |emulator: &Emulator| {
+        let mut all: Vec<_> = emulator.underway().copied().collect();
+        all.sort_by_key(|retire| (retire.cycle, retire.slot));
+        all
+    };
+    assert_eq!(underway(fast), underway(step), "{}", context("underway"));
+    let statistics = fast.statistics();
+    assert_eq!(statistics, step.statistics(), "{}", context("statistics"));
+    assert_eq!(statistics.cycles, statistics.bundles + statistics.stalled(), "{}", context("accounting"));
+    assert_eq!(statistics.stalls().iter().sum::<u64>(), statistics.stalled());
+    assert_eq!(statistics.visits.iter().sum::<u64>(), statistics.bundles);
+    assert_eq!(fast.deadline_missed(), step.deadline_missed(), "{}", context("missed"));
+    let writes = fast.take_nan_writes();
+    assert_eq!(writes, step.take_nan_writes(), "{}", context("NaN writes"));
+}
+
+/// The two emulators of a program, with random inputs. One input in some programs stays unset.
+fn pair(program: &Program, random: &mut Random, wild: bool) -> [Emulator; 2] {
+    let mut fast = Emulator::new(program).unwrap();
+    for i in 0..INPUTS {
+        if !(wild && random.once_in(20)) {
+            fast.set_input_bits(program.machine.inputs.base + i, random.word()).unwrap();
+        }
+    }
+    let mut step = fast.clone();
+    step.set_blocks(false);
+    [fast, step]
+}
+
+/// Runs both in random chunks, with ticks at random times.
+fn compare_runs(seed: u64, program: &Program, wild: bool) -> Result<Stop, Fault> {
+    let mut random = Random::new(!seed);
+    let [mut fast, mut step] = pair(program, &mut random, wild);
+    if random.once_in(2) {
+        let period = NonZeroU64::new(u64::from(1 + random.below(900)));
+        for emulator in [&mut fast, &mut step] {
+            emulator.set_tick_period(period);
+        }
+    }
+    let limit = u64::from(1000 + random.below(3000));
+    for emulator in [&mut fast, &mut step] {
+        emulator.set_cycle_limit(limit);
+    }
+    loop {
+        if random.once_in(4) {
+            let (port, bits) =
+                (program.machine.inputs.base + random.below(INPUTS.into()) as u16, random.word());
+            for emulator in [&mut fast, &mut step] {
+                emulator.set_input_bits(port, bits).unwrap();
+            }
+        }
+        for _ in 0..random.below(3) {
+            let tick = fast.now() + u64::from(random.below(300));
+            assert!(fast.tick_at(tick) && step.tick_at(tick));
+        }
+        let until = fast.now() + u64::from(random.below(400));
+        let results = match random.below(4) {
+            0 => [&mut fast, &mut step].map(|emulator| emulator.step_bundle()),
+            1 => [&mut fast, &mut step].map(|emulator| emulator.run_to_wait()),
+            _ => [&mut fast, &mut step].map(|emulator| emulator.run_until(until)),
+        };
+        assert_eq!(results[0], results[1], "seed {seed}");
+        assert_same(seed, &mut fast, &mut step);
+        if let [result @ (Err(_) | Ok(Stop::Halted)), _] = results {
+            return result;
+        }
+    }
+}
+
+#[test]
+fn tame_programs_agree() {
+    for machine in MACHINES {
+        for seed in 0..PROGRAMS {
+            let program = random_program(seed, machine, Options::TAME);
+            match compare_runs(seed, &program, false) {
+                Err(fault) => {
+                    assert!(
+                        matches!(fault.kind, takt_emu::FaultKind::CycleLimit { .. }),
+                        "seed {seed}: {fault}"
+                    );
+                }
+                Ok(stop) => assert_eq!(stop, Stop::Halted),
+            }
+        }
+    }
+}
+
+#[test]
+fn wild_programs_agree() {
+    let mut kinds = std::collections::BTreeMap::new();
+    for machine in MACHINES {
+        for seed in 0..PROGRAMS {
+            let program = random_program(seed, machine, Options::WILD);
+            let outcome = match compare_runs(seed, &program, true) {
+                Ok(_) => "halt".to_owned(),
+                Err(fault) => format!("{:?}", fault.kind).split([' ', '(']).next().unwrap().to_owned(),
+            };
+            *kinds.entry(outcome).or_insert(0) += 1;
+        }
+    }
+    // Every kind of fault must have come up, and not once only.
+    for kind in [
+        "halt",
+        "IllegalWord",
+        "ProgramCounter",
+        "DataAddress",
+        "UnwrittenRegister",
+        "StackOverflow",
+        "StackUnderflow",
+        "CycleLimit",
+    ] {
+        assert!(kinds.get(kind).is_some_and(|&count| count >= 5), "{kind} is rare: {kinds:?}");
+    }
+}
+
+/// Programs of any words at all: mostly instructions with any fields, in any slot.
+#[test]
+fn any_words_agree() {
+    for machine in MACHINES {
+        for seed in 0..PROGRAMS {
+            let mut program = random_program(seed, machine, Options::TAME);
+            let mut random = Random::new(seed);
+            let registers = (0..1023).filter(|&register| machine.banks().any(|bank| bank.contains(register)));
+            program.constants = registers.map(|register| (register, random.word())).collect();
+            program.data.truncate(random.below(machine.data_depth) as usize);
+            for word in &mut program.code {
+                let row = &ROWS[random.below(ROWS.len() as u32) as usize];
+                // Targets and destinations that exist, now and then.
+                let bits = random.bits()
+                    & if random.once_in(2) { !0 } else { !0xffc0 }
+                    & if random.once_in(4) { !0 } else { !(0x100 << 32) };
+                match random.below(60) {
+                    0 => *word = bits,
+                    1..6 => {}
+                    _ => *word = bits & row.shape.mask() & !(0x7f << 41) | u64::from(row.opcode) << 41,
+                }
+            }
+            // They fault soon; that they do not panic, and fault alike, is the point.
+            let _ = compare_runs(seed, &program, true);
+        }
+    }
+}
+
+/// Period after period, with inputs that change and deadlines that are missed.
+#[test]
+fn periods_agree() {
+    for machine in MACHINES {
+        for seed in 0..PROGRAMS / 3 {
+            let options = Options { bundles: 25, ..Options::TAME };
+            let program = random_program(seed, machine, options);
+            let mut random = Random::new(!seed);
+            let [mut fast, mut step] = pair(&program, &mut random, false);
+            let period = NonZeroU64::new(u64::from(random.below(1000)));
+            for emulator in [&mut fast, &mut step] {
+                emulator.set_tick_period(period);
+            }
+            for _ in 0..8 {
+                let inputs = [("in0", random.word().into()), ("in3", random.word().into())];
+                let reports = [&mut fast, &mut step].map(|emulator| emulator.run_period(&inputs));
+                assert_eq!(reports[0], reports[1], "seed {seed}");
+                assert_same(seed, &mut fast, &mut step);
+                match &reports[0] {
+                    Ok(PeriodReport { tick, start, wait, cycles, .. }) => {
+                        assert!(tick <= start && start + cycles == *wait);
+                    }
+                    Err(PeriodError::Halted) => break,
+                    Err(error) => panic!("seed {seed}: {error}"),
+                }
+            }
+        }
+    }
+}
+
+/// With an observer nothing changes, and what it hears adds up.
+#[test]
+fn observed_runs_agree() {
+    for machine in MACHINES {
+        for seed in 0..PROGRAMS / 3 {
+            let program = random_program(seed, machine, Options::WILD);
+            let mut random = Random::new(!seed);
+            let [mut fast, mut heard] = pair(&program, &mut random, true);
+            for emulator in [&mut fast, &mut heard] {
+                emulator.set_tick_period(NonZeroU64::new(500));
+            }
+            for emulator in [&mut fast, &mut heard] {
+                emulator.set_cycle_limit(3000);
+            }
+            let mut events = Vec::new();
+            let end = heard.observed(&mut |event| events.push(event.clone())).run();
+            assert_eq!(fast.run(), end, "seed {seed}");
+            assert_same(seed, &mut fast, &mut heard);
+
+            let statistics = heard.statistics();
+            let count = |which: fn(&Event) -> bool| events.iter().filter(|event| which(event)).count() as u64;
+            assert_eq!(count(|event| matches!(event, Event::Issue { .. })), statistics.bundles);
+            assert_eq!(count(|event| matches!(event, Event::Tick { .. })), statistics.ticks);
+            assert_eq!(count(|event| matches!(event, Event::DeadlineMissed { .. })), statistics.missed);
+            assert_eq!(count(|event| matches!(event, Event::TickLost { .. })), statistics.lost);
+            let underway = heard.underway().count() as u64;
+            assert_eq!(
+                count(|event| matches!(event, Event::Retire(_))) + underway,
+                statistics.total_operations(),
+                "seed {seed}"
+            );
+            assert!(matches!(
+                events.last(),
+                Some(Event::Fault(_) | Event::Halt { .. } | Event::Retire(_) | Event::PortWrite(_))
+            ));
+            let written: Vec<_> = events
+                .iter()
+                .filter_map(|event| match event {
+                    Event::Retire(retire) if retire.register.is_some() => Some((retire.cycle, retire.slot)),
+                    _ => None,
+                })
+                .collect();
+            assert!(written.is_sorted_by(|a, b| a < b), "seed {seed}: a bank has one write port");
+            let cycles: Vec<u64> = events.iter().map(cycle).collect();
+            let halted = matches!(heard.status(), Status::Halted { .. });
+            assert!(halted || cycles.is_sorted(), "seed {seed}: events out of order");
+        }
+    }
+}
+
+fn cycle(event: &Event) -> u64 {
+    match event {
+        Event::Issue { cycle, .. }
+        | Event::Tick { cycle }
+        | Event::DeadlineMissed { cycle }
+        | Event::TickLost { cycle }
+        | Event::Wait { cycle, .. }
+        | Event::Halt { cycle, .. } => *cycle,
+        Event::Retire(retire) => retire.cycle,
+        Event::PortWrite(write) => write.cycle,
+        Event::Fault(fault) => fault.cycle,
+    }
+}
+
+/// The generator is worth its name: every instruction runs, and every cause of a stall comes up on every machine that can
+/// have it.
+#[test]
+fn random_programs_cover_the_machine() {
+    for machine in MACHINES {
+        let mut operations = [0; ROWS.len()];
+        let mut stalls = [0; Cause::KINDS.len()];
+        for seed in 0..200 {
+            let program = random_program(seed, machine, Options::TAME);
+            let mut emulator = pair(&program, &mut Random::new(seed), false)[0].clone();
+            emulator.set_tick_period(NonZeroU64::new(2000));
+            emulator.run_until(10_000).unwrap();
+            let statistics = emulator.statistics();
+            operations.iter_mut().zip(statistics.operations).for_each(|(sum, count)| *sum += count);
+            stalls.iter_mut().zip(statistics.stalls()).for_each(|(sum, cycles)| *sum += cycles);
+        }
+        for row in ROWS.iter().filter(|row| row.effect != Effect::Nothing) {
+            assert!(operations[row.op as usize] > 0, "{}: no {}", machine.name, row.mnemonic);
+        }
+        for (kind, cycles) in Cause::KINDS.iter().zip(stalls) {
+            assert!(cycles > 0, "{}: no stall of kind {kind}", machine.name);
+        }
+    }
+}

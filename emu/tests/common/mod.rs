@@ -1,0 +1,121 @@
+//! A few lines of assembler, so that these tests stand on the specification alone.
+//!
+//! A line is a label, a bundle (`op d, a, b || op …`, canonical register names, labels as targets), or a directive:
+//! `.preset register value`, `.input name register`, `.output name register type`.
+
+#![allow(dead_code, reason = "each test file uses a part")]
+
+use std::collections::HashMap;
+use takt_isa::program::{Location, Port};
+use takt_isa::{Function, Instruction, Machine, Operand, Program, ROWS, Type};
+
+pub(crate) fn program(machine: &'static Machine, source: &str) -> Program {
+    let mut program = Program {
+        machine,
+        code: Vec::new(),
+        data: Vec::new(),
+        constants: Vec::new(),
+        inputs: Vec::new(),
+        outputs: Vec::new(),
+        registers: Vec::new(),
+        symbols: Vec::new(),
+        sections: Vec::new(),
+        files: vec!["test.s".to_owned()],
+        lines: Vec::new(),
+    };
+    let mut labels = HashMap::new();
+    let mut bundles = Vec::new();
+    for (number, line) in source.lines().enumerate() {
+        let mut line = line.split(';').next().unwrap().trim();
+        if let Some((label, rest)) = line.split_once(':') {
+            labels.insert(label.trim(), bundles.len() as u32);
+            line = rest.trim();
+        }
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let register =
+            |name: &str| machine.register_address(name).unwrap_or_else(|| panic!("no register {name}"));
+        let port = |ty: Option<&&str>| Port {
+            name: words[1].to_owned(),
+            register: register(words[2]),
+            ty: match ty {
+                Some(&"int") => Type::I,
+                Some(&"bits") => Type::B,
+                _ => Type::F,
+            },
+        };
+        match words.first() {
+            None => {}
+            Some(&".preset") => program.constants.push((register(words[1]), value(words[2]))),
+            Some(&".input") => program.inputs.push(port(words.get(3))),
+            Some(&".output") => program.outputs.push(port(words.get(3))),
+            Some(_) => bundles.push((number as u32 + 1, line)),
+        }
+    }
+    for (line, bundle) in bundles {
+        let mut words = vec![Instruction::NOP.encode().unwrap(); machine.slots.len()];
+        let mut lines = vec![None; machine.slots.len()];
+        for operation in bundle.split("||") {
+            let (slot, instruction) = parse(machine, operation.trim(), &labels);
+            words[slot] = instruction.encode().unwrap();
+            lines[slot] = Some(Location { file: 0, line });
+        }
+        program.code.extend(words);
+        program.lines.extend(lines);
+    }
+    program.constants.sort_unstable();
+    program
+}
+
+/// Latency and interval of a machine's unit.
+pub(crate) fn unit(machine: &Machine, function: Function) -> (u64, u64) {
+    let (slot, unit) = machine.host(function).unwrap();
+    let unit = &machine.slots[slot].units[unit];
+    (unit.latency.into(), unit.interval.into())
+}
+
+/// Latency of a machine's unit.
+pub(crate) fn latency(machine: &Machine, function: Function) -> u64 {
+    unit(machine, function).0
+}
+
+fn parse(machine: &Machine, text: &str, labels: &HashMap<&str, u32>) -> (usize, Instruction) {
+    let (mnemonic, operands) = text.split_once(' ').unwrap_or((text, ""));
+    let row = ROWS.iter().find(|row| row.mnemonic == mnemonic).unwrap_or_else(|| panic!("no {mnemonic}"));
+    let slot = machine.host(row.function).map_or(0, |(slot, _)| slot);
+    let register = |name: &str| {
+        machine.register_address(name.trim()).unwrap_or_else(|| panic!("no register {name} in {text}"))
+    };
+    let mut instruction = Instruction::bare(row.op);
+    let operands: Vec<&str> = operands.split(',').map(str::trim).filter(|o| !o.is_empty()).collect();
+    assert_eq!(operands.len(), row.shape.operands().len(), "{text}");
+    for (operand, text) in row.shape.operands().iter().zip(operands) {
+        match *operand {
+            Operand::Dest => instruction.dest = register(text) - machine.slots[slot].bank.base,
+            Operand::Source(n) => instruction.sources[n] = register(text),
+            Operand::Immediate => instruction.constant = value(text),
+            Operand::Target => {
+                instruction.constant = labels
+                    .get(text)
+                    .copied()
+                    .unwrap_or_else(|| text.parse().unwrap_or_else(|_| panic!("{text}")));
+            }
+            Operand::Memory => {
+                let (offset, base) = text.trim_end_matches(']').split_once('[').unwrap();
+                instruction.constant = offset.parse().unwrap();
+                instruction.sources[0] = register(base);
+            }
+        }
+    }
+    (slot, instruction)
+}
+
+/// A float if it has a point, else an integer.
+fn value(text: &str) -> u32 {
+    if text == "nan" {
+        0x7fc0_0000
+    } else if text.contains('.') {
+        text.parse::<f32>().unwrap().to_bits()
+    } else {
+        text.parse::<i32>().unwrap() as u32
+    }
+}

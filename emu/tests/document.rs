@@ -1,0 +1,178 @@
+//! The examples in `docs/timing.md` are what the emulator does. `TAKT_BLESS=1 cargo test -p takt-emu --test document`
+//! writes them anew.
+
+mod common;
+
+use common::program;
+use std::fmt::Write as _;
+use std::path::Path;
+use takt_emu::{Emulator, Event, Step};
+use takt_isa::timing::{Cause, Cycle};
+use takt_isa::{Machine, Program, T1, T3};
+
+struct Example {
+    name: &'static str,
+    machine: &'static Machine,
+    source: &'static str,
+    ticks: &'static [Cycle],
+    cycles: Cycle,
+}
+
+const EXAMPLES: &[Example] = &[
+    Example {
+        name: "rules",
+        machine: &T3,
+        source: "
+            fdiv m1, i0, i1 || fadd a1, i0, i1
+            fmul m2, i0, i1
+            fadd a2, m2, i0
+            mov x1, i0
+            nop
+            fmul m3, i0, i1
+            flt x2, a2, i0
+            bz x2, again
+            nop
+    again:  nop",
+        ticks: &[],
+        cycles: 27,
+    },
+    Example {
+        name: "iterative",
+        machine: &T1,
+        source: "
+            fdiv r1, i0, i1
+            fadd r2, i0, i1
+            fdiv r3, i0, r2
+            fadd r3, i0, i1
+            rdflags r4
+            nop",
+        ticks: &[],
+        cycles: 48,
+    },
+    Example {
+        name: "wait",
+        machine: &T3,
+        source: "
+            fadd a1, i0, i1
+            wait period
+    period: mov x224, i0
+            wait period",
+        ticks: &[14, 24],
+        cycles: 28,
+    },
+    Example {
+        name: "missed",
+        machine: &T3,
+        source: "
+            wait period
+    period: fadd a224, i0, i1
+            nop
+            wait period",
+        ticks: &[8, 16],
+        cycles: 30,
+    },
+];
+
+fn describe(program: &Program, cause: Cause) -> String {
+    match cause {
+        Cause::Branch { from } => format!("front end, after bundle {from}"),
+        Cause::Operand { register, producer } => {
+            format!("operand {} of bundle {producer}", program.register_text(register))
+        }
+        Cause::Destination { register, producer } => {
+            format!("destination {} of bundle {producer}", program.register_text(register))
+        }
+        Cause::Unit { slot, unit } => {
+            format!("unit {}", program.machine.slots[usize::from(slot)].units[usize::from(unit)].name)
+        }
+        Cause::WritePort { slot } => {
+            format!("write port of slot {}", program.machine.slots[usize::from(slot)].name)
+        }
+        Cause::Drain => "drain".to_owned(),
+        Cause::Wait => "wait".to_owned(),
+    }
+}
+
+fn bundle_text(program: &Program, address: u32) -> String {
+    let instructions = program.bundle(address).unwrap().unwrap();
+    let texts =
+        instructions.iter().enumerate().map(|(slot, instruction)| instruction.text(program.machine, slot));
+    let texts: Vec<String> = texts.filter(|text| text != "nop").collect();
+    if texts.is_empty() { "nop".to_owned() } else { texts.join(" || ") }
+}
+
+/// The example's program, then its cycles, as the document shows them.
+fn render(example: &Example) -> String {
+    let program = program(example.machine, example.source);
+    let mut emulator = Emulator::new(&program).unwrap();
+    for i in 0..2 {
+        emulator.set_input_bits(example.machine.inputs.base + i, 1.0f32.to_bits()).unwrap();
+    }
+    for &tick in example.ticks {
+        emulator.tick_at(tick);
+    }
+    let mut text = format!("```text\n{}, bundle by bundle:\n", example.machine.name);
+    for address in 0..program.bundles() {
+        writeln!(text, "  {address:2}  {}", bundle_text(&program, address)).unwrap();
+    }
+    text.push_str("\ncycle\n");
+    while emulator.now() < example.cycles {
+        let mut notes = Vec::new();
+        let result = emulator
+            .observed(&mut |event| match event {
+                Event::Tick { .. } => notes.push("tick".to_owned()),
+                Event::DeadlineMissed { .. } => notes.push("deadline missed".to_owned()),
+                Event::Retire(retire) => {
+                    notes.extend(
+                        retire
+                            .register
+                            .map(|register| format!("{} written", program.register_text(register))),
+                    );
+                }
+                _ => {}
+            })
+            .step_cycle();
+        // The end of the example's program.
+        let Ok(step) = result else { break };
+        let (cycle, what) = match step {
+            Step::Issued { cycle, address } => {
+                (cycle, format!("{address}  {}", bundle_text(&program, address)))
+            }
+            Step::Stalled { cycle, cause, .. } => (cycle, format!("   [{}]", describe(&program, cause))),
+            Step::Halted => break,
+        };
+        let line = format!("{cycle:5}  {what:38}  {}", notes.join(", "));
+        writeln!(text, "{}", line.trim_end()).unwrap();
+    }
+    text.push_str("```\n");
+    text
+}
+
+#[test]
+fn examples_are_what_happens() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/timing.md");
+    let document = std::fs::read_to_string(&path).unwrap();
+    let mut expected = String::new();
+    let mut rest = document.as_str();
+    for example in EXAMPLES {
+        let marker = format!("<!-- example: {} -->\n", example.name);
+        let (before, after) = rest.split_once(&marker).unwrap_or_else(|| panic!("no {marker}"));
+        expected.push_str(before);
+        expected.push_str(&marker);
+        expected.push_str(&render(example));
+        // The old table, if there is one, ends with the fence.
+        rest = match after.strip_prefix("```text\n").and_then(|table| table.split_once("```\n")) {
+            Some((_, rest)) => rest,
+            None => after,
+        };
+    }
+    expected.push_str(rest);
+    if std::env::var_os("TAKT_BLESS").is_some() {
+        std::fs::write(&path, &expected).unwrap();
+    } else {
+        assert!(
+            document == expected,
+            "docs/timing.md is stale: TAKT_BLESS=1 cargo test -p takt-emu --test document"
+        );
+    }
+}

@@ -1,0 +1,454 @@
+//! The rules of `docs/timing.md`, each on a program of a few bundles, with the cycles worked out by hand. Latencies,
+//! intervals and refills are the table's, by unit; all other numbers are the rules'.
+//!
+//! Every program is run both ways, as blocks and by the stepper.
+
+mod common;
+
+use common::{latency, program, unit};
+use std::collections::BTreeMap;
+use takt_emu::{Emulator, Event, Status, Step};
+use takt_isa::timing::{Address, Cause};
+use takt_isa::{Function, Instruction, MACHINES, Machine, Op, Program, ROWS, T1, T3};
+
+/// Stalled cycles by the bundle that could not issue, and why.
+type Stalls = BTreeMap<(Address, Cause), u64>;
+
+/// Runs a program to its end; returns cycles of issue, counted from the first bundle's, by bundle in the order of issue, and
+/// the stalls without those before it.
+fn run(program: &Program) -> (Vec<(Address, u64)>, Stalls) {
+    let reset = u64::from(program.machine.refill);
+    let mut stepper = Emulator::new(program).unwrap();
+    let mut blocks = stepper.clone();
+    let mut issues = Vec::new();
+    let end = stepper
+        .observed(&mut |event| {
+            if let Event::Issue { cycle, address } = event {
+                issues.push((*address, cycle - reset));
+            }
+        })
+        .run();
+    assert_eq!(blocks.run(), end);
+    assert_eq!(blocks.statistics(), stepper.statistics());
+    let statistics = stepper.statistics();
+    assert_eq!(statistics.cycles, statistics.bundles + statistics.stalled());
+    let mut causes = statistics.causes;
+    assert_eq!(causes.remove(&(0, Cause::Branch { from: 0 })), Some(reset), "the refill after reset");
+    (issues, causes)
+}
+
+/// Checks the cycles of issue (from the first bundle's) of the bundles in order, and all stalls.
+#[track_caller]
+fn check(machine: &'static Machine, source: &str, cycles: &[u64], stalls: &[((Address, Cause), u64)]) {
+    let (issues, causes) = run(&program(machine, source));
+    assert_eq!(issues.iter().map(|issue| issue.1).collect::<Vec<_>>(), cycles, "{source}");
+    assert_eq!(causes, stalls.iter().copied().collect(), "{source}");
+}
+
+fn register(machine: &Machine, name: &str) -> u16 {
+    machine.register_address(name).unwrap()
+}
+
+/// Rule 2: for every instruction of every machine, the distance to a reader is its unit's latency.
+#[test]
+fn operand_distance_is_the_latency_of_every_unit() {
+    for machine in MACHINES {
+        let mut units = 0;
+        for row in ROWS.iter().filter(|row| row.shape.has_dest()) {
+            let (slot, unit) = machine.host(row.function).unwrap();
+            let latency = u64::from(machine.slots[slot].units[unit].latency);
+            let (reader, _) = machine.host(Op::mov.row().function).unwrap();
+            let dest = machine.slots[slot].bank.base;
+            let mut code = vec![Instruction::NOP; 3 * machine.slots.len()];
+            let zero = [takt_isa::ZERO; 3];
+            let sources = [0, 1, 2].map(|i| if i < row.shape.sources() { zero[i] } else { 0 });
+            code[slot] = Instruction { sources, ..Instruction::bare(row.op) };
+            let slots = machine.slots.len();
+            code[slots + reader] =
+                Instruction { dest: 1, sources: [dest, 0, 0], ..Instruction::bare(Op::mov) };
+            code[2 * slots + reader] = Instruction::bare(Op::halt);
+            let mut program = program(machine, "");
+            program.lines = vec![None; code.len()];
+            program.code = code.iter().map(|instruction| instruction.encode().unwrap()).collect();
+
+            let (issues, causes) = run(&program);
+            assert_eq!(issues[1], (1, latency), "{} {}", machine.name, row.mnemonic);
+            let cause = Cause::Operand { register: dest, producer: 0 };
+            assert_eq!(causes.get(&(1, cause)), Some(&(latency - 1)), "{} {}", machine.name, row.mnemonic);
+            units += 1;
+        }
+        assert_eq!(units, ROWS.iter().filter(|row| row.shape.has_dest()).count());
+    }
+}
+
+/// Without a reason to wait, one bundle issues each cycle.
+#[test]
+fn independent_bundles_issue_back_to_back() {
+    check(
+        &T3,
+        ".preset m0 1.0
+         fmul m1, m0, m0 || fadd a1, m0, m0 || mov x1, m0
+         fmul m2, m0, m0 || fadd a2, m0, m0 || mov x2, m0
+         nop
+         fmul m3, m0, m0 || fadd a3, m0, m0 || halt",
+        &[0, 1, 2, 2 + latency(&T3, Function::Multiply).max(latency(&T3, Function::Add)) - 1],
+        &[((3, Cause::Drain), latency(&T3, Function::Multiply).max(latency(&T3, Function::Add)) - 2)],
+    );
+}
+
+/// Rule 2: the charge goes to the producer whose result comes last; results on different banks alike.
+#[test]
+fn the_last_operand_is_charged() {
+    let (multiply, add) = (latency(&T3, Function::Multiply), latency(&T3, Function::Add));
+    // The product is on its bus in cycle `multiply`, the sum in 1 + add.
+    let last = multiply.max(1 + add);
+    let from = if 1 + add > multiply { ("a1", 1) } else { ("m1", 0) };
+    let cause = Cause::Operand { register: register(&T3, from.0), producer: from.1 };
+    check(
+        &T3,
+        ".preset m0 1.0
+         fmul m1, m0, m0
+         fadd a1, m0, m0
+         flt x1, m1, a1
+         jmp 4
+         nop",
+        &[0, 1, last, last + 1, last + 2 + u64::from(T3.refill)],
+        &[((2, cause), last - 2), ((4, Cause::Branch { from: 3 }), T3.refill.into())],
+    );
+}
+
+/// Where two come last, the first operand of the first slot is charged.
+#[test]
+fn ties_are_charged_in_operand_order() {
+    let (multiply, add) = (latency(&T3, Function::Multiply), latency(&T3, Function::Add));
+    let (first, second) = if multiply < add { (0, add - multiply) } else { (multiply - add, 0) };
+    for (operands, name, producer) in [("m1, a1", "m1", second), ("a1, m1", "a1", first)] {
+        // Issued so far apart that both come in the same cycle.
+        let mut bundles = vec!["nop".to_owned(); 1 + first.max(second) as usize];
+        let place = |bundles: &mut Vec<String>, at: u64, text: &str| {
+            let bundle = &mut bundles[at as usize];
+            *bundle = if bundle == "nop" { text.to_owned() } else { format!("{bundle} || {text}") };
+        };
+        place(&mut bundles, second, "fmul m1, m0, m0");
+        place(&mut bundles, first, "fadd a1, m0, m0");
+        let reader = bundles.len() as Address;
+        let source = format!(".preset m0 1.0\n{}\nflt x1, {operands}", bundles.join("\n"));
+        let (_, causes) = run(&program(&T3, &source));
+        let cause = Cause::Operand { register: register(&T3, name), producer: producer as Address };
+        assert!(causes.contains_key(&(reader, cause)), "{source}: {causes:?}");
+    }
+}
+
+/// A bundle issues as a whole, and those after it wait with it.
+#[test]
+fn issue_is_in_order_and_whole() {
+    let multiply = latency(&T3, Function::Multiply);
+    let cause = Cause::Operand { register: register(&T3, "m1"), producer: 0 };
+    check(
+        &T3,
+        ".preset m0 1.0
+         fmul m1, m0, m0
+         mov x0, m0 || fadd a1, m1, m0
+         mov x1, m0
+         nop",
+        &[0, multiply, multiply + 1, multiply + 2],
+        &[((1, cause), multiply - 1)],
+    );
+}
+
+/// Rule 3: a register is not written again before the earlier result is there.
+#[test]
+fn destination_waits_for_the_earlier_result() {
+    for (machine, source, register_name) in [
+        (&T3, ".preset m1 2.0\nfdiv m0, m1, m1\nfmul m0, m1, m1\nnop", "m0"),
+        (&T1, ".preset r1 2.0\nfdiv r0, r1, r1\nmov r0, r1\nnop", "r0"),
+    ] {
+        let divide = latency(machine, Function::Divide);
+        let cause = Cause::Destination { register: register(machine, register_name), producer: 0 };
+        check(machine, source, &[0, divide, divide + 1], &[((1, cause), divide - 1)]);
+    }
+}
+
+/// Rule 4: an iterative unit accepts an operation every interval; another unit of the slot does not mind.
+#[test]
+fn unit_accepts_one_operation_every_interval() {
+    let (_, interval) = unit(&T1, Function::Divide);
+    assert!(interval > 1, "t1's divider is iterative");
+    let (slot, divider) = T1.host(Function::Divide).unwrap();
+    let cause = Cause::Unit { slot: slot as u8, unit: divider as u8 };
+    check(
+        &T1,
+        ".preset r0 2.0
+         fdiv r1, r0, r0
+         fsqrt r2, r0
+         fdiv r3, r0, r0
+         nop",
+        // The root's writeback, one cycle after the quotient's, is not in the way of the second quotient's.
+        &[0, 1, interval, interval + 1],
+        &[((2, cause), interval - 2)],
+    );
+    // Fully pipelined on t3.
+    check(&T3, ".preset m0 2.0\nfdiv m1, m0, m0\nfdiv m2, m0, m0\nnop", &[0, 1, 2], &[]);
+}
+
+/// Rule 6: two results of a bank never reach its write port in one cycle; the later bundle tries cycle by cycle.
+#[test]
+fn write_port_takes_one_result_a_cycle() {
+    let (add, divide) = (latency(&T1, Function::Add), latency(&T1, Function::Divide));
+    assert_eq!(divide, latency(&T1, Function::Root), "quotient and root come in successive cycles");
+    // The sum, issued in `at`, would come with the quotient; one later with the root; one later it comes alone.
+    let at = divide - add;
+    let nops = "nop\n".repeat(at as usize - 2);
+    let source = format!(".preset r0 2.0\nfdiv r1, r0, r0\nfsqrt r2, r0\n{nops}fadd r3, r0, r0\nnop");
+    let cycles: Vec<u64> = (0..at).chain([at + 2, at + 3]).collect();
+    check(&T1, &source, &cycles, &[((at as Address, Cause::WritePort { slot: 0 }), 2)]);
+    // Banks have a port each.
+    let at = latency(&T3, Function::Divide) - latency(&T3, Function::Add);
+    let nops = "nop\n".repeat(at as usize - 1);
+    let source = format!(".preset m0 2.0\nfdiv m1, m0, m0\n{nops}fadd a1, m0, m0\nnop");
+    check(&T3, &source, &(0..at + 2).collect::<Vec<_>>(), &[]);
+}
+
+/// The order of the rules: a cycle is charged to the first that is not met.
+#[test]
+fn cycles_are_charged_in_the_order_of_the_rules() {
+    let (add, (divide, interval)) = (latency(&T1, Function::Add), unit(&T1, Function::Divide));
+    let (slot, divider) = T1.host(Function::Divide).unwrap();
+    let operand = Cause::Operand { register: register(&T1, "r2"), producer: 1 };
+    let busy = Cause::Unit { slot: slot as u8, unit: divider as u8 };
+    check(
+        &T1,
+        ".preset r0 2.0
+         fdiv r1, r0, r0
+         fadd r2, r0, r0
+         fdiv r3, r0, r2
+         nop",
+        &[0, 1, interval, interval + 1],
+        &[((2, operand), add - 1), ((2, busy), interval - (1 + add))],
+    );
+    // Destination before unit: the sum's register is free in 1 + add, the divider in `interval`.
+    let destination = Cause::Destination { register: register(&T1, "r2"), producer: 1 };
+    check(
+        &T1,
+        ".preset r0 2.0
+         fdiv r1, r0, r0
+         fadd r2, r0, r0
+         fdiv r2, r0, r0
+         nop",
+        &[0, 1, interval, interval + 1],
+        &[((2, destination), add - 1), ((2, busy), interval - (1 + add))],
+    );
+    // Operand before destination; the operand's wait covers that for the same register.
+    let operand = Cause::Operand { register: register(&T1, "r1"), producer: 0 };
+    check(
+        &T1,
+        ".preset r0 2.0
+         fdiv r1, r0, r0
+         fadd r1, r1, r0
+         nop",
+        &[0, divide, divide + 1],
+        &[((1, operand), divide - 1)],
+    );
+}
+
+/// Rule 5: what drains waits for the last result; no write port is in its way then.
+#[test]
+fn drain_waits_for_every_result() {
+    let (divide, alu) = (latency(&T1, Function::Divide), latency(&T1, Function::Alu));
+    // Were it not for the drain, the flags would meet the quotient at the write port.
+    let at = divide - alu;
+    let nops = "nop\n".repeat(at as usize - 1);
+    let source = format!(".preset r0 2.0\nfdiv r1, r0, r0\n{nops}rdflags r2\nnop");
+    let cycles: Vec<u64> = (0..at).chain([divide, divide + 1]).collect();
+    check(&T1, &source, &cycles, &[((at as Address, Cause::Drain), alu)]);
+    let divide = latency(&T3, Function::Divide);
+    for (op, next) in [("clrflags", Some(divide + 1)), ("wait 0", None), ("halt", None)] {
+        let source = format!(".preset m0 2.0\nfdiv m1, m0, m0 || mov x0, m0\n{op}\nnop");
+        let cycles: Vec<u64> = [0, divide].into_iter().chain(next).collect();
+        check(&T3, &source, &cycles, &[((1, Cause::Drain), divide - 1)]);
+    }
+    // What issues together with it is not waited for.
+    check(&T3, ".preset m0 2.0\nfdiv m1, m0, m0 || halt", &[0], &[]);
+}
+
+/// A jump costs the refill.
+#[test]
+fn a_jump_refills() {
+    for machine in MACHINES {
+        let taken = u64::from(machine.refill);
+        check(
+            machine,
+            "    jmp on
+                 halt
+             on: nop
+                 halt",
+            &[0, 1 + taken, 2 + taken],
+            &[((2, Cause::Branch { from: 0 }), taken)],
+        );
+    }
+}
+
+fn with_input(machine: &'static Machine, source: &str, input: u32) -> (Vec<(Address, u64)>, Emulator) {
+    let mut emulator = Emulator::new(&program(machine, source)).unwrap();
+    emulator.set_input_bits(machine.inputs.base, input).unwrap();
+    let mut blocks = emulator.clone();
+    let mut issues = Vec::new();
+    let end = emulator
+        .observed(&mut |event| {
+            if let Event::Issue { cycle, address } = event {
+                issues.push((*address, cycle - u64::from(machine.refill)));
+            }
+        })
+        .run();
+    assert_eq!(blocks.run(), end);
+    assert_eq!(blocks.statistics(), emulator.statistics());
+    (issues, emulator)
+}
+
+#[test]
+fn branches_are_taken_by_all_32_bits() {
+    for machine in MACHINES {
+        let (refill, resolve) = (u64::from(machine.refill), u64::from(machine.resolve));
+        for (op, input, taken) in [
+            ("bz", 0, true),
+            ("bz", 0x8000_0000, false),
+            ("bz", 1, false),
+            ("bnz", 0, false),
+            ("bnz", 0x8000_0000, true),
+            ("bnz", 0x100, true),
+        ] {
+            let (issues, emulator) = with_input(machine, &format!("{op} i0, on\nnop\non: halt"), input);
+            let expected = if taken {
+                vec![(0, 0), (2, 1 + refill)]
+            } else {
+                vec![(0, 0), (1, 1 + resolve), (2, 2 + resolve)]
+            };
+            assert_eq!(issues, expected, "{} {op} {input:#x}", machine.name);
+            let stalls = emulator.statistics().stalls()[Cause::Branch { from: 0 }.kind()];
+            assert_eq!(stalls, refill + if taken { refill } else { resolve });
+        }
+    }
+}
+
+/// A branch to the very next bundle is taken or not like any other.
+#[test]
+fn a_branch_to_the_next_bundle_refills() {
+    for (input, cost) in [(0, T3.refill), (1, T3.resolve)] {
+        let (issues, _) = with_input(&T3, "bz i0, 1\nhalt", input);
+        assert_eq!(issues, [(0, 0), (1, 1 + u64::from(cost))]);
+    }
+}
+
+#[test]
+fn calls_return_behind_themselves() {
+    let refill = u64::from(T3.refill);
+    let (issues, emulator) = with_input(
+        &T3,
+        "      call outer
+               halt
+         outer: call inner
+               ret
+         inner: ret",
+        0,
+    );
+    let step = 1 + refill;
+    assert_eq!(issues, [(0, 0), (2, step), (4, 2 * step), (3, 3 * step), (1, 4 * step)]);
+    assert!(emulator.stack().is_empty());
+}
+
+/// Operations of a bundle read before any of them writes: two banks exchange a value.
+#[test]
+fn a_bundle_reads_before_it_writes() {
+    let source = ".preset m0 3.0
+                  .preset a0 5.0
+                  .preset x0 1.0
+                  fadd a0, m0, zero || fmul m0, a0, x0
+                  fmul m0, zero, zero || bnz m0, on
+                  halt
+                  on: halt";
+    let mut stepper = Emulator::new(&program(&T3, source)).unwrap();
+    let mut blocks = stepper.clone();
+    stepper.set_blocks(false);
+    for emulator in [&mut stepper, &mut blocks] {
+        emulator.run().unwrap();
+        let value = |name| f32::from_bits(emulator.register(register(&T3, name)).unwrap());
+        assert_eq!((value("a0"), value("m0")), (3.0, 0.0));
+        // The branch saw the product that its own bundle overwrote.
+        assert!(matches!(emulator.status(), Status::Halted { address: 3, .. }));
+    }
+}
+
+/// A result shows, and its flags join, in the cycle of its writeback and not before.
+#[test]
+fn results_show_at_writeback() {
+    let source = ".preset m0 1.0\nfdiv m1, m0, zero\nfmul m2, m0, m0\nhalt";
+    let (first, divide, multiply) =
+        (u64::from(T3.refill), latency(&T3, Function::Divide), latency(&T3, Function::Multiply));
+    for blocks in [false, true] {
+        let mut emulator = Emulator::new(&program(&T3, source)).unwrap();
+        emulator.set_blocks(blocks);
+        for (cycle, register_name) in [(first + 1 + multiply, "m2"), (first + divide, "m1")] {
+            emulator.run_until(cycle).unwrap();
+            assert_eq!(emulator.register(register(&T3, register_name)), None, "{register_name}");
+            assert!(emulator.flags().is_empty());
+            emulator.run_until(cycle + 1).unwrap();
+            assert!(emulator.register(register(&T3, register_name)).is_some(), "{register_name}");
+        }
+        assert_eq!(emulator.flags(), takt_isa::fp::Flags::DIVIDE_BY_ZERO);
+    }
+}
+
+/// Loads and stores go to memory in order, at issue: a load sees the store just before it.
+#[test]
+fn memory_is_in_order() {
+    for machine in MACHINES {
+        let bank = machine.slots[machine.host(Function::Memory).unwrap().0].bank.name;
+        let source =
+            format!(".preset {bank}0 42\nst 7[zero], {bank}0\nld {bank}1, 7[zero]\nst 7[zero], zero\nhalt");
+        let (issues, emulator) = with_input(machine, &source, 0);
+        let load = latency(machine, Function::Memory);
+        assert_eq!(issues.iter().map(|issue| issue.1).collect::<Vec<_>>(), [0, 1, 2, 1 + load]);
+        assert_eq!(emulator.register(register(machine, &format!("{bank}1"))), Some(42));
+        assert_eq!(emulator.memory()[7], 0);
+    }
+}
+
+/// An input shows to bundles that issue after it was set.
+#[test]
+fn inputs_show_to_later_bundles() {
+    let mut emulator = Emulator::new(&program(&T3, "mov x0, i0\nmov x1, i0\nhalt")).unwrap();
+    emulator.set_input_bits(register(&T3, "i0"), 1).unwrap();
+    while !matches!(emulator.step_cycle().unwrap(), Step::Issued { .. }) {}
+    emulator.set_input_bits(register(&T3, "i0"), 2).unwrap();
+    emulator.run().unwrap();
+    assert_eq!([0, 1].map(|i| emulator.register(register(&T3, "x0") + i)), [Some(1), Some(2)]);
+}
+
+/// When the bundle after a `wait` issues, by the cycle of the tick; and what the cycles between are charged to.
+#[test]
+fn a_wait_ends_with_the_tick() {
+    let source = "wait 1\nnop\nhalt";
+    for machine in MACHINES {
+        let (waited, refill) = (u64::from(machine.refill), u64::from(machine.refill));
+        let missed = |tick: u64| tick <= waited;
+        // In the cycle of the `wait` or before it, the tick came too early. After it, it counts from the next cycle on.
+        for tick in (0..waited + 3 * refill).chain([waited + 1000]) {
+            let mut emulator = Emulator::new(&program(machine, source)).unwrap();
+            assert!(emulator.tick_at(tick));
+            let mut blocks = emulator.clone();
+            emulator.set_blocks(false);
+            assert_eq!(emulator.run(), blocks.run());
+            assert_eq!(emulator.statistics(), blocks.statistics(), "tick {tick}");
+
+            let issue = if missed(tick) { waited + 1 + refill } else { (waited + 1 + refill).max(tick + 1) };
+            assert_eq!(*emulator.status(), Status::Halted { cycle: issue + 1, address: 2 }, "tick {tick}");
+            assert_eq!(emulator.deadline_missed(), missed(tick), "tick {tick}");
+            let statistics = emulator.statistics();
+            let waiting = if missed(tick) { 0 } else { tick - waited };
+            assert_eq!(statistics.causes.get(&(0, Cause::Wait)).copied().unwrap_or(0), waiting);
+            let refilling = issue - waited - 1 - waiting;
+            let branch = statistics.causes.get(&(1, Cause::Branch { from: 0 })).copied().unwrap_or(0);
+            assert_eq!(branch, refilling, "tick {tick}");
+        }
+    }
+}

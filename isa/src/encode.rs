@@ -1,0 +1,263 @@
+//! Between words and instructions. Both directions follow the table and the shapes; neither names an instruction.
+
+use crate::shape::{Field, OPCODE, Operand, WORD_BITS};
+use crate::spec::instructions::{Effect, Function, Op, Type};
+use crate::spec::machines::{Machine, Slot};
+use std::fmt::Write as _;
+
+/// The mask of a word's bits.
+pub const WORD_MASK: u64 = (1 << WORD_BITS) - 1;
+
+/// A decoded instruction. Fields that its shape lacks are zero.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub struct Instruction {
+    /// The operation.
+    pub op: Op,
+    /// Destination: index into the bank of the slot that holds the instruction.
+    pub dest: u16,
+    /// Source registers: addresses in the register space.
+    pub sources: [u16; 3],
+    /// Immediate, bundle address or word offset, as the shape has it.
+    pub constant: u32,
+}
+
+/// Why an instruction does not fit its word.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("{} of {value} does not fit its {} bits (at most {})", field.name(), field.bits().width, field.bits().max())]
+pub struct EncodeError {
+    /// The field that overflows.
+    pub field: Field,
+    /// The value that was to go there.
+    pub value: u32,
+}
+
+/// Why a word is no instruction.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum DecodeError {
+    /// All bits are zero: memory that was never written.
+    #[error("word 0 is unwritten memory, not an instruction")]
+    Unwritten,
+    /// No row has this opcode.
+    #[error("opcode 0x{opcode:02x} is no instruction")]
+    UnknownOpcode {
+        /// Bits 47..41.
+        opcode: u8,
+    },
+    /// A bit is set that the instruction's shape does not use.
+    #[error("{} with stray bits 0x{stray:012x}", op.row().mnemonic)]
+    StrayBits {
+        /// The instruction that the opcode names.
+        op: Op,
+        /// The bits that must be zero.
+        stray: u64,
+    },
+    /// More than 48 bits.
+    #[error("0x{word:x} is longer than a word of 48 bits")]
+    TooLong {
+        /// The value.
+        word: u64,
+    },
+}
+
+/// Why an instruction cannot stand in a slot of a machine.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum PlacementError {
+    /// The slot hosts no unit for it.
+    #[error("slot {slot} of {machine} has no unit for {mnemonic}{}", match .host { Some(host) => format!(" (slot {host} has)"), None => String::new() })]
+    NoUnit {
+        /// The machine.
+        machine: &'static str,
+        /// The slot.
+        slot: &'static str,
+        /// The instruction.
+        mnemonic: &'static str,
+        /// A slot that does host one.
+        host: Option<&'static str>,
+    },
+    /// The destination lies past the end of the slot's bank.
+    #[error("destination {index} is out of reach: slot {slot} of {machine} writes {bank}0 to {bank}{}", depth - 1)]
+    DestOutOfReach {
+        /// The machine.
+        machine: &'static str,
+        /// The slot.
+        slot: &'static str,
+        /// The slot's bank.
+        bank: &'static str,
+        /// Its depth.
+        depth: u16,
+        /// The destination.
+        index: u16,
+    },
+    /// A source address lies in no bank.
+    #[error("source {} at address {address} is in no bank of {machine}", field.name())]
+    NoRegister {
+        /// The machine.
+        machine: &'static str,
+        /// The operand.
+        field: Field,
+        /// The register address.
+        address: u16,
+    },
+}
+
+impl Instruction {
+    /// An instruction without operands.
+    pub const fn bare(op: Op) -> Instruction {
+        Instruction { op, dest: 0, sources: [0; 3], constant: 0 }
+    }
+
+    /// The filler of an empty slot.
+    pub const NOP: Instruction = Instruction::bare(Op::nop);
+
+    /// The value of a field.
+    #[inline]
+    pub fn field(&self, field: Field) -> u32 {
+        match field {
+            Field::Dest => self.dest.into(),
+            Field::A => self.sources[0].into(),
+            Field::B => self.sources[1].into(),
+            Field::C => self.sources[2].into(),
+            Field::Immediate | Field::Target | Field::Offset => self.constant,
+        }
+    }
+
+    /// Sets a field; bits that do not fit the field's type are lost, so check with [`Instruction::encode`].
+    #[inline]
+    fn set_field(&mut self, field: Field, value: u32) {
+        match field {
+            Field::Dest => self.dest = value as u16,
+            Field::A => self.sources[0] = value as u16,
+            Field::B => self.sources[1] = value as u16,
+            Field::C => self.sources[2] = value as u16,
+            Field::Immediate | Field::Target | Field::Offset => self.constant = value,
+        }
+    }
+
+    /// The instruction's word.
+    ///
+    /// # Errors
+    /// If a field's value does not fit its bits.
+    pub fn encode(&self) -> Result<u64, EncodeError> {
+        let row = self.op.row();
+        let mut word = OPCODE.put(row.opcode.into());
+        for &field in row.shape.fields() {
+            let value = self.field(field);
+            if value > field.bits().max() {
+                return Err(EncodeError { field, value });
+            }
+            word |= field.bits().put(value);
+        }
+        Ok(word)
+    }
+
+    /// The instruction of a word.
+    ///
+    /// # Errors
+    /// If the word is none: see [`DecodeError`]. A word that decodes encodes to itself.
+    pub fn decode(word: u64) -> Result<Instruction, DecodeError> {
+        if word > WORD_MASK {
+            return Err(DecodeError::TooLong { word });
+        }
+        if word == 0 {
+            return Err(DecodeError::Unwritten);
+        }
+        let opcode = OPCODE.get(word) as u8;
+        let op = Op::from_opcode(opcode).ok_or(DecodeError::UnknownOpcode { opcode })?;
+        let shape = op.row().shape;
+        let stray = word & !shape.mask();
+        if stray != 0 {
+            return Err(DecodeError::StrayBits { op, stray });
+        }
+        let mut instruction = Instruction::bare(op);
+        for &field in shape.fields() {
+            instruction.set_field(field, field.bits().get(word));
+        }
+        Ok(instruction)
+    }
+
+    /// The source registers that it reads.
+    #[inline]
+    pub fn reads(&self) -> &[u16] {
+        &self.sources[..self.op.row().shape.sources()]
+    }
+
+    /// The address of the register that it writes when it issues from `slot`.
+    #[inline]
+    pub fn writes(&self, slot: &Slot) -> Option<u16> {
+        self.op.row().shape.has_dest().then(|| slot.bank.base + self.dest)
+    }
+
+    /// Checks that the instruction may stand in slot `slot` of `machine`: a unit is there, and every register exists.
+    ///
+    /// # Errors
+    /// If it may not: see [`PlacementError`].
+    pub fn place(&self, machine: &'static Machine, slot: usize) -> Result<(), PlacementError> {
+        let (row, host) = (self.op.row(), &machine.slots[slot]);
+        if row.function != Function::Idle && host.unit_for(row.function).is_none() {
+            return Err(PlacementError::NoUnit {
+                machine: machine.name,
+                slot: host.name,
+                mnemonic: row.mnemonic,
+                host: machine.host(row.function).map(|(s, _)| machine.slots[s].name),
+            });
+        }
+        if row.shape.has_dest() && self.dest >= host.bank.depth {
+            return Err(PlacementError::DestOutOfReach {
+                machine: machine.name,
+                slot: host.name,
+                bank: host.bank.name,
+                depth: host.bank.depth,
+                index: self.dest,
+            });
+        }
+        let fields = [Field::A, Field::B, Field::C];
+        for (&address, field) in self.reads().iter().zip(fields) {
+            if !machine.banks().any(|bank| bank.contains(address)) {
+                return Err(PlacementError::NoRegister { machine: machine.name, field, address });
+            }
+        }
+        Ok(())
+    }
+
+    /// The instruction as source text with canonical register names, for slot `slot` of `machine`.
+    /// Bundle addresses and offsets are numbers; registers that the machine lacks are written `?address`.
+    pub fn text(&self, machine: &Machine, slot: usize) -> String {
+        let name = |address: u16| machine.register_name(address).unwrap_or_else(|| format!("?{address}"));
+        self.text_with(machine, slot, name, |target| target.to_string())
+    }
+
+    /// As [`Instruction::text`], with the caller's names for registers and for bundle addresses.
+    pub fn text_with(
+        &self,
+        machine: &Machine,
+        slot: usize,
+        register: impl Fn(u16) -> String,
+        target: impl Fn(u32) -> String,
+    ) -> String {
+        let row = self.op.row();
+        let mut text = row.mnemonic.to_owned();
+        for (i, operand) in row.shape.operands().iter().enumerate() {
+            text.push_str(if i == 0 { " " } else { ", " });
+            match *operand {
+                Operand::Dest => text.push_str(&register(machine.slots[slot].bank.base + self.dest)),
+                Operand::Source(n) => text.push_str(&register(self.sources[n])),
+                Operand::Immediate => write!(text, "0x{:08x}", self.constant).expect("a String takes all"),
+                Operand::Target => text.push_str(&target(self.constant)),
+                Operand::Memory => write!(text, "{}[{}]", self.constant, register(self.sources[0]))
+                    .expect("a String takes all"),
+            }
+        }
+        text
+    }
+
+    /// The operand types, destination first: what a literal in that place becomes.
+    pub fn types(&self) -> &'static [Type] {
+        self.op.row().types
+    }
+
+    /// What the instruction does beyond its arithmetic.
+    #[inline]
+    pub fn effect(&self) -> Effect {
+        self.op.row().effect
+    }
+}

@@ -1,0 +1,211 @@
+//! The processor's arithmetic: IEEE 754 binary32, bits in and bits out.
+//!
+//! Every function takes and returns bit patterns, so that a result can be compared with the circuit's, and with any
+//! other implementation's, bit for bit. What holds throughout:
+//!
+//! * **Rounding** is to nearest, ties to even. Subnormals are ordinary operands and results.
+//! * **One NaN comes out** of every arithmetic operation, the canonical quiet NaN [`CANONICAL_NAN`], whatever NaN went
+//!   in. Only [`abs`] and [`neg`], which are bit operations (IEEE 754, 5.5.1), let a payload through.
+//! * **Three flags** are kept: [`Flags::INVALID`], [`Flags::DIVIDE_BY_ZERO`] and [`Flags::OVERFLOW`]. A control loop can
+//!   act on these; underflow and inexact, raised by nearly every operation, are deliberately not kept.
+//!
+//! There are two implementations of the IEEE operations, [`Arithmetic`]:
+//!
+//! | | what it is | role |
+//! |---|---|---|
+//! | `SoftFloat` | Berkeley SoftFloat 3 (feature `softfloat`) | the definition, named [`Reference`] |
+//! | [`Host`] | the host's binary32, NaN made canonical, flags derived from the operands | what the emulator runs |
+//!
+//! `isa/tests/fp_host.rs` shows that the two agree. The remaining functions ([`minimum`], [`maximum`], [`saturate`],
+//! [`sign`], [`abs`], [`neg`], [`sin`](sin())) are integer kernels without a floating-point operation in them. They are their
+//! own definition, shared by the reference and the emulator, and the circuit computes the same bits.
+
+use std::fmt;
+use std::ops::{BitOr, BitOrAssign};
+
+mod host;
+mod kernels;
+pub mod sin;
+mod sin_table;
+#[cfg(feature = "softfloat")]
+mod softfloat;
+
+pub use host::Host;
+pub use kernels::{abs, maximum, minimum, neg, saturate, sign};
+pub use sin::{SIN_CORRECTLY_ROUNDED, SIN_IDENTITY, SIN_LIMIT, SIN_MAX_ULP, SIN_WORST_INPUT, sin};
+#[cfg(feature = "softfloat")]
+pub use softfloat::SoftFloat;
+
+/// The implementation of [`Arithmetic`] that defines the machine: Berkeley SoftFloat.
+#[cfg(feature = "softfloat")]
+pub type Reference = SoftFloat;
+/// The implementation of [`Arithmetic`] that stands in for Berkeley SoftFloat, which this build leaves out.
+#[cfg(not(feature = "softfloat"))]
+pub type Reference = Host;
+
+/// The one NaN that arithmetic produces: quiet, positive, no payload.
+pub const CANONICAL_NAN: u32 = 0x7fc0_0000;
+
+/// Sign bit of a binary32.
+pub(crate) const SIGN: u32 = 0x8000_0000;
+/// Exponent field of a binary32; as a value, +∞.
+pub(crate) const INFINITY: u32 = 0x7f80_0000;
+/// The bit that makes a NaN quiet.
+const QUIET: u32 = 0x0040_0000;
+
+/// A set of exception flags. The bit positions are those of Berkeley SoftFloat and TestFloat.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+pub struct Flags(u8);
+
+impl Flags {
+    /// No flag.
+    pub const NONE: Flags = Flags(0);
+    /// A finite result was too large for the format and became infinite.
+    pub const OVERFLOW: Flags = Flags(0x04);
+    /// A finite nonzero number was divided by zero.
+    pub const DIVIDE_BY_ZERO: Flags = Flags(0x08);
+    /// The operation has no useful result: a signaling NaN, 0·∞, ∞−∞, √−1, a number outside the function's range, …
+    pub const INVALID: Flags = Flags(0x10);
+    /// Every flag.
+    pub const ALL: Flags = Flags(0x1c);
+
+    /// Each flag with the name under which it is displayed.
+    pub const NAMES: [(Flags, &'static str); 3] = [
+        (Flags::INVALID, "invalid"),
+        (Flags::DIVIDE_BY_ZERO, "divide-by-zero"),
+        (Flags::OVERFLOW, "overflow"),
+    ];
+
+    /// The flags as bits.
+    #[inline(always)]
+    #[must_use]
+    pub const fn bits(self) -> u8 {
+        self.0
+    }
+
+    /// The flags among `bits`; bits that are no flag of this machine (underflow, inexact) are dropped.
+    #[inline(always)]
+    #[must_use]
+    pub const fn from_bits(bits: u8) -> Flags {
+        Flags(bits & Flags::ALL.0)
+    }
+
+    /// The flags that are in either set.
+    #[inline(always)]
+    #[must_use]
+    pub const fn union(self, other: Flags) -> Flags {
+        Flags(self.0 | other.0)
+    }
+
+    /// Whether every flag of `other` is in this set.
+    #[inline(always)]
+    #[must_use]
+    pub const fn contains(self, other: Flags) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// Whether no flag is set.
+    #[inline(always)]
+    #[must_use]
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+}
+
+impl BitOr for Flags {
+    type Output = Flags;
+
+    #[inline(always)]
+    fn bitor(self, other: Flags) -> Flags {
+        self.union(other)
+    }
+}
+
+impl BitOrAssign for Flags {
+    #[inline(always)]
+    fn bitor_assign(&mut self, other: Flags) {
+        *self = self.union(other);
+    }
+}
+
+impl fmt::Display for Flags {
+    /// Names joined by `|`, as in `invalid|overflow`; `none` for the empty set.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.is_empty() {
+            return f.pad("none");
+        }
+        let set = Flags::NAMES.iter().filter(|(flag, _)| self.contains(*flag));
+        f.pad(&set.map(|(_, name)| *name).collect::<Vec<_>>().join("|"))
+    }
+}
+
+/// What an operation yields: a bit pattern and the flags it raised.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub struct Value {
+    /// The result: a binary32, or an integer from [`Arithmetic::ftoi`] and the comparisons.
+    pub bits: u32,
+    /// The flags that this one operation raised. They are sticky in the machine, not here.
+    pub flags: Flags,
+}
+
+impl Value {
+    /// A result that raised nothing.
+    #[inline(always)]
+    #[must_use]
+    pub const fn exact(bits: u32) -> Value {
+        Value { bits, flags: Flags::NONE }
+    }
+
+    /// A result with flags.
+    #[inline(always)]
+    #[must_use]
+    pub const fn new(bits: u32, flags: Flags) -> Value {
+        Value { bits, flags }
+    }
+}
+
+/// The operations that IEEE 754 defines, on binary32 bit patterns.
+pub trait Arithmetic {
+    /// `a + b`.
+    fn add(a: u32, b: u32) -> Value;
+    /// `a − b`.
+    fn sub(a: u32, b: u32) -> Value;
+    /// `a · b`.
+    fn mul(a: u32, b: u32) -> Value;
+    /// `a / b`.
+    fn div(a: u32, b: u32) -> Value;
+    /// `√a`; `√−0 = −0`, invalid below.
+    fn sqrt(a: u32) -> Value;
+    /// The two's-complement integer `a`, rounded to binary32.
+    fn itof(a: u32) -> Value;
+    /// The binary32 `a`, rounded to a two's-complement integer, ties to even. What does not fit saturates and is
+    /// invalid; a NaN gives the largest integer and is invalid (RISC-V's `fcvt.w.s`).
+    fn ftoi(a: u32) -> Value;
+    /// 1 if `a = b`, otherwise 0. Quiet: only a signaling NaN is invalid.
+    fn eq(a: u32, b: u32) -> Value;
+    /// 1 if `a < b`, otherwise 0. Signaling: any NaN is invalid.
+    fn lt(a: u32, b: u32) -> Value;
+    /// 1 if `a ≤ b`, otherwise 0. Signaling: any NaN is invalid.
+    fn le(a: u32, b: u32) -> Value;
+}
+
+/// Whether `a` is a NaN, of either kind.
+#[inline(always)]
+#[must_use]
+pub const fn is_nan(a: u32) -> bool {
+    a & !SIGN > INFINITY
+}
+
+/// Whether `a` is a signaling NaN.
+#[inline(always)]
+#[must_use]
+pub const fn is_signaling(a: u32) -> bool {
+    is_nan(a) && a & QUIET == 0
+}
+
+/// The canonical NaN that answers operands of which at least one is a NaN: invalid if one of them is signaling.
+#[inline(always)]
+pub(crate) const fn propagate_nan(a: u32, b: u32) -> Value {
+    let flags = if is_signaling(a) || is_signaling(b) { Flags::INVALID } else { Flags::NONE };
+    Value::new(CANONICAL_NAN, flags)
+}

@@ -1,0 +1,287 @@
+//! The manual: the tables as a reader wants them. Text for the terminal, Markdown for `docs/isa.md`, plain data for JSON.
+
+use crate::shape::{Field, OPCODE, Shape, WORD_BITS};
+use crate::spec::instructions::{Function, ROWS, Row, Type};
+use crate::spec::machines::{MACHINES, Machine};
+use crate::spec::units::{UNITS, Unit};
+use serde::Serialize;
+use std::fmt::Write as _;
+
+/// The whole manual as plain data.
+#[derive(Debug, Serialize)]
+pub struct Manual {
+    /// Bits in a word.
+    pub word_bits: u32,
+    /// One entry for each instruction.
+    pub instructions: Vec<Entry>,
+    /// The units.
+    pub units: &'static [Unit],
+    /// The machines.
+    pub machines: &'static [&'static Machine],
+}
+
+/// An instruction's entry.
+#[derive(Debug, Serialize)]
+pub struct Entry {
+    /// Mnemonic.
+    pub mnemonic: &'static str,
+    /// Operands as they are written.
+    pub syntax: &'static str,
+    /// Opcode.
+    pub opcode: u8,
+    /// What the unit must offer.
+    pub function: Function,
+    /// Type of the result, if any, then of the sources.
+    pub types: &'static [Type],
+    /// Meaning in symbols.
+    pub summary: &'static str,
+    /// Special cases, flags, error bound.
+    pub text: &'static str,
+    /// Bit fields: name, least significant bit, width.
+    pub fields: Vec<(&'static str, u32, u32)>,
+    /// Where it issues and what it costs, one entry for each machine that has a unit for it.
+    pub timing: Vec<Timing>,
+}
+
+/// Where an instruction issues on a machine, and its latency and interval in cycles.
+#[derive(Debug, Serialize)]
+pub struct Timing {
+    /// The machine.
+    pub machine: &'static str,
+    /// The slot; `any` for idle operations.
+    pub slot: &'static str,
+    /// The unit; empty for idle operations.
+    pub unit: &'static str,
+    /// Cycles to the earliest issue of a dependent operation; 0 where no register is written.
+    pub latency: u32,
+    /// Cycles between two issues to the unit.
+    pub interval: u32,
+}
+
+fn timing(row: &Row, machine: &'static Machine) -> Option<Timing> {
+    if row.function == Function::Idle {
+        return Some(Timing { machine: machine.name, slot: "any", unit: "", latency: 0, interval: 1 });
+    }
+    let (s, u) = machine.host(row.function)?;
+    let (slot, unit) = (&machine.slots[s], &machine.slots[s].units[u]);
+    let latency = if row.shape.has_dest() { unit.latency } else { 0 };
+    Some(Timing { machine: machine.name, slot: slot.name, unit: unit.name, latency, interval: unit.interval })
+}
+
+/// The manual.
+pub fn manual() -> Manual {
+    let entry = |row: &Row| Entry {
+        mnemonic: row.mnemonic,
+        syntax: row.shape.syntax(),
+        opcode: row.opcode,
+        function: row.function,
+        types: row.types,
+        summary: row.summary,
+        text: row.text,
+        fields: row
+            .shape
+            .fields()
+            .iter()
+            .map(|field| (field.name(), field.bits().low, field.bits().width))
+            .collect(),
+        timing: MACHINES.iter().filter_map(|machine| timing(row, machine)).collect(),
+    };
+    Manual {
+        word_bits: WORD_BITS,
+        instructions: ROWS.iter().map(entry).collect(),
+        units: UNITS,
+        machines: MACHINES,
+    }
+}
+
+impl Entry {
+    fn assembly(&self) -> String {
+        format!("{} {}", self.mnemonic, self.syntax).trim_end().to_owned()
+    }
+
+    /// `slot 5/1` for a machine, `-` where no unit is there.
+    fn cost(&self, machine: &str) -> String {
+        self.timing.iter().find(|timing| timing.machine == machine).map_or("-".to_owned(), |timing| {
+            match timing.latency {
+                0 => format!("{} -/{}", timing.slot, timing.interval),
+                latency => format!("{} {latency}/{}", timing.slot, timing.interval),
+            }
+        })
+    }
+}
+
+/// The entry of one instruction as text, a few lines.
+pub fn entry_text(entry: &Entry) -> String {
+    let mut out = format!("{}\n    {}\n", entry.assembly(), entry.summary);
+    if !entry.text.is_empty() {
+        let _ = writeln!(out, "    {}", entry.text);
+    }
+    let _ = write!(out, "    opcode 0x{:02x}", entry.opcode);
+    for (name, low, width) in &entry.fields {
+        let _ = write!(out, ", {name} [{}:{low}]", low + width - 1);
+    }
+    out.push('\n');
+    for timing in &entry.timing {
+        let unit = if timing.unit.is_empty() { String::new() } else { format!(", unit {}", timing.unit) };
+        let latency = match timing.latency {
+            0 => "writes no register".to_owned(),
+            latency => format!("latency {latency}"),
+        };
+        let _ = writeln!(
+            out,
+            "    {}: slot {}{unit}, {latency}, interval {} (cycles)",
+            timing.machine, timing.slot, timing.interval
+        );
+    }
+    out
+}
+
+/// The manual as text: one line for each instruction.
+pub fn text() -> String {
+    let manual = manual();
+    let mut out = String::new();
+    let _ = write!(out, "{:<10} {:<14} {:<6}", "mnemonic", "operands", "opcode");
+    for machine in manual.machines {
+        let _ = write!(out, " {:<10}", machine.name);
+    }
+    out.push_str(" meaning\n");
+    for entry in &manual.instructions {
+        let _ = write!(out, "{:<10} {:<14} 0x{:02x}  ", entry.mnemonic, entry.syntax, entry.opcode);
+        for machine in manual.machines {
+            let _ = write!(out, " {:<10}", entry.cost(machine.name));
+        }
+        let _ = writeln!(out, " {}", entry.summary);
+    }
+    out.push_str(
+        "\nColumns t3, t1: issue slot, latency/interval in cycles. `takt isa MNEMONIC` tells more.\n",
+    );
+    out
+}
+
+/// The machines as text.
+pub fn machines_text() -> String {
+    let mut out = String::new();
+    for (i, machine) in MACHINES.iter().enumerate() {
+        let default = if i == 0 { " (default)" } else { "" };
+        let _ = writeln!(out, "{}{default}: {}", machine.name, machine.text);
+        for slot in machine.slots {
+            let (bank, last) = (slot.bank.name, slot.bank.depth - 1);
+            let units: Vec<String> = slot
+                .units
+                .iter()
+                .map(|unit| format!("{} {}/{}", unit.name, unit.latency, unit.interval))
+                .collect();
+            let _ =
+                writeln!(out, "  slot {:<4} writes {bank}0..{bank}{last}; {}", slot.name, units.join(", "));
+        }
+        let _ = writeln!(
+            out,
+            "  inputs {0}0..{0}{1}; {2} outputs at the end of each bank; {3} bundles, {4} data words, return stack {5}",
+            machine.inputs.name,
+            machine.inputs.depth - 2,
+            machine.outputs_per_bank,
+            machine.code_depth,
+            machine.data_depth,
+            machine.stack_depth
+        );
+        let _ = writeln!(
+            out,
+            "  {} cycles without issue after a redirection, {} after a conditional branch not taken",
+            machine.refill, machine.resolve
+        );
+    }
+    out
+}
+
+/// The manual as Markdown: `docs/isa.md`.
+pub fn markdown() -> String {
+    let manual = manual();
+    let mut out = String::from(
+        "# Takt's instruction set\n\n\
+         Generated from the specification (`isa/src/spec/`) by `cargo xtask docs`; do not edit.\n\n",
+    );
+    let _ = writeln!(
+        out,
+        "A word has {WORD_BITS} bits; a bundle holds one word for each slot of the machine. Arithmetic is IEEE 754 binary32, rounded to nearest even,\n\
+         subnormals included, with one canonical NaN (0x7fc00000). Three exceptions are kept, sticky: invalid, divide by zero, overflow.\n\
+         Underflow and inexact are deliberately not kept.\n"
+    );
+
+    out.push_str("## Instructions\n\n| instruction | meaning | opcode | types |");
+    for machine in manual.machines {
+        let _ = write!(out, " {} |", machine.name);
+    }
+    out.push_str("\n|---|---|---|---|");
+    out.push_str(&"---|".repeat(manual.machines.len()));
+    out.push('\n');
+    for entry in &manual.instructions {
+        let types: Vec<&str> = entry.types.iter().map(|ty| type_name(*ty)).collect();
+        let _ = write!(
+            out,
+            "| [`{}`](#{}) | {} | `0x{:02x}` | {} |",
+            entry.assembly(),
+            entry.mnemonic,
+            entry.summary.replace('|', "\\|"),
+            entry.opcode,
+            types.join(" ")
+        );
+        for machine in manual.machines {
+            let _ = write!(out, " {} |", entry.cost(machine.name));
+        }
+        out.push('\n');
+    }
+    out.push_str(
+        "\nTypes: of the result, if any, then of the sources. Columns of machines: issue slot, latency/interval in cycles; an operation that issues in\n\
+         cycle `c` delivers to operations that issue in cycle `c + latency` or later (docs/timing.md).\n\n",
+    );
+
+    out.push_str("## Words\n\n| operands | bits |\n|---|---|\n");
+    for shape in Shape::ALL {
+        let mut fields = vec![format!("opcode [{}:{}]", WORD_BITS - 1, OPCODE.low)];
+        fields.extend(shape.fields().iter().map(|field| field_text(*field)));
+        let syntax = if shape.syntax().is_empty() { "(none)" } else { shape.syntax() };
+        let _ = writeln!(out, "| `{syntax}` | {} |", fields.join(", "));
+    }
+    out.push_str(
+        "\nAll other bits are zero; a word in which they are not, or whose opcode is in no row, is refused by name. `d` is an index into the bank of the slot\n\
+         that holds the word; `a`, `b`, `c` are addresses in the register space.\n\n",
+    );
+
+    out.push_str("## Machines\n\n```text\n");
+    out.push_str(&machines_text());
+    out.push_str("```\n\n## Units\n\n| unit | executes | latency | interval | pipeline registers after the operands | RTL module | |\n|---|---|---|---|---|---|---|\n");
+    for unit in manual.units {
+        let functions: Vec<String> =
+            unit.functions.iter().map(|function| format!("{function:?}").to_lowercase()).collect();
+        let latency = if unit.latency == 0 { "-".to_owned() } else { unit.latency.to_string() };
+        let _ = writeln!(
+            out,
+            "| {} | {} | {latency} | {} | {} | `{}` | {} |",
+            unit.name,
+            functions.join(", "),
+            unit.interval,
+            unit.cuts.join("; "),
+            unit.rtl,
+            unit.text
+        );
+    }
+
+    out.push_str("\n## Entries\n");
+    for entry in &manual.instructions {
+        let _ = writeln!(out, "\n### {}\n\n```text\n{}```", entry.mnemonic, entry_text(entry));
+    }
+    out
+}
+
+fn field_text(field: Field) -> String {
+    let bits = field.bits();
+    format!("{} [{}:{}]", field.name(), bits.low + bits.width - 1, bits.low)
+}
+
+const fn type_name(ty: Type) -> &'static str {
+    match ty {
+        Type::F => "float",
+        Type::I => "integer",
+        Type::B => "bits",
+    }
+}

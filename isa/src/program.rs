@@ -1,0 +1,155 @@
+//! A program ready to run: what the assembler makes, an image carries, and emulator and circuit load. Plain data.
+
+use crate::encode::{DecodeError, Instruction, PlacementError};
+use crate::spec::instructions::Type;
+use crate::spec::machines::Machine;
+use crate::timing::Address;
+
+/// A program for one machine.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Program {
+    /// The machine that it is for.
+    pub machine: &'static Machine,
+    /// Program memory: for each bundle, one word for each slot, in slot order.
+    pub code: Vec<u64>,
+    /// Data memory, from word 0; the rest of the memory is zero.
+    pub data: Vec<u32>,
+    /// Registers that the loader sets, by address, ascending: constants. All others are unwritten at the start.
+    pub constants: Vec<(u16, u32)>,
+    /// Input ports, in the order of their declaration.
+    pub inputs: Vec<Port>,
+    /// Output ports, in the order of their declaration.
+    pub outputs: Vec<Port>,
+    /// Registers that the source names.
+    pub registers: Vec<Port>,
+    /// Labels, by address.
+    pub symbols: Vec<Symbol>,
+    /// What runs once and what runs every period.
+    pub sections: Vec<Section>,
+    /// Source files, as the source names them.
+    pub files: Vec<String>,
+    /// Where each operation comes from, parallel to `code`; `None` for filler.
+    pub lines: Vec<Option<Location>>,
+}
+
+/// A named register: a port or a register of the source.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Port {
+    /// Its name in the source.
+    pub name: String,
+    /// Its address.
+    pub register: u16,
+    /// How its bits are read and shown.
+    pub ty: Type,
+}
+
+/// A label.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Symbol {
+    /// Its name.
+    pub name: String,
+    /// Which memory it points into.
+    pub space: Space,
+    /// Bundle or data-word address.
+    pub address: u32,
+}
+
+/// Which memory an address is in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Space {
+    /// Program memory, by bundle.
+    Code,
+    /// Data memory, by word.
+    Data,
+}
+
+/// A run of bundles with a name: `once` or `period`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Section {
+    /// Its name.
+    pub name: String,
+    /// First bundle.
+    pub start: Address,
+    /// Bundle after the last.
+    pub end: Address,
+}
+
+/// A place in a source.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Location {
+    /// Index into [`Program::files`].
+    pub file: u32,
+    /// Line, from 1.
+    pub line: u32,
+}
+
+/// Why a word of a program cannot run.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum IllegalWord {
+    /// It is no instruction.
+    #[error(transparent)]
+    Decode(#[from] DecodeError),
+    /// The machine cannot execute it in that slot.
+    #[error(transparent)]
+    Placement(#[from] PlacementError),
+}
+
+impl Program {
+    /// Bundles in the program.
+    pub fn bundles(&self) -> u32 {
+        (self.code.len() / self.machine.slots.len()) as u32
+    }
+
+    /// The words of a bundle, in slot order; `None` past the end.
+    pub fn words(&self, address: Address) -> Option<&[u64]> {
+        self.code.chunks_exact(self.machine.slots.len()).nth(address as usize)
+    }
+
+    /// The instructions of a bundle; `None` past the end, the slot and the reason where a word cannot run.
+    #[allow(clippy::type_complexity)]
+    pub fn bundle(&self, address: Address) -> Option<Result<Vec<Instruction>, (usize, IllegalWord)>> {
+        let decode = |(slot, &word): (usize, &u64)| {
+            let checked = Instruction::decode(word).map_err(IllegalWord::from).and_then(|instruction| {
+                instruction.place(self.machine, slot)?;
+                Ok(instruction)
+            });
+            checked.map_err(|reason| (slot, reason))
+        };
+        Some(self.words(address)?.iter().enumerate().map(decode).collect())
+    }
+
+    /// The source place of a bundle: that of its first operation that has one.
+    pub fn location(&self, address: Address) -> Option<Location> {
+        let slots = self.machine.slots.len();
+        let start = address as usize * slots;
+        self.lines.get(start..start + slots)?.iter().copied().flatten().next()
+    }
+
+    /// `file:line` of a location.
+    pub fn place_text(&self, location: Location) -> String {
+        let file = self.files.get(location.file as usize).map_or("?", String::as_str);
+        format!("{file}:{}", location.line)
+    }
+
+    /// The source's name for a register: port, named register, or else the canonical name.
+    pub fn register_text(&self, register: u16) -> String {
+        self.outputs
+            .iter()
+            .chain(&self.inputs)
+            .chain(&self.registers)
+            .find(|port| port.register == register)
+            .map(|port| port.name.clone())
+            .or_else(|| self.machine.register_name(register))
+            .unwrap_or_else(|| format!("?{register}"))
+    }
+
+    /// The label at, or last before, a bundle, and the distance from it.
+    pub fn nearest_label(&self, address: Address) -> Option<(&str, u32)> {
+        self.symbols
+            .iter()
+            .filter(|symbol| symbol.space == Space::Code && symbol.address <= address)
+            .max_by_key(|symbol| symbol.address)
+            .map(|symbol| (symbol.name.as_str(), address - symbol.address))
+    }
+}

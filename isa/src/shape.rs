@@ -1,0 +1,255 @@
+//! Operand shapes: which operands an instruction has, how they are written, and which bits of the word they occupy.
+//!
+//! A word has 48 bits. The opcode and the destination stand in the same place in every word; the payload below them holds
+//! either up to three source registers, or a source and an offset or a target, or 32 bits of immediate:
+//!
+//! ```text
+//!  47      41 40        32 31         22 21         12 11          2 1 0
+//! +----------+------------+-------------+-------------+-------------+----+
+//! |  opcode  |    dest    |      a      |      b      |      c      | 00 |
+//! |          |            |      a      |      b      |    offset      |
+//! |          |            |      a      | 0 0 0 0 0 0 |    target (16) |
+//! |          |            |                immediate                   |
+//! +----------+------------+--------------------------------------------+
+//! ```
+//!
+//! A source is an address in the machine's register space of 1,024; a destination is an index into the bank of the slot
+//! that holds the word. Bits that a shape does not use are zero; a word in which they are not is refused.
+
+/// A contiguous bit field of a word.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
+pub struct Bits {
+    /// Position of the least significant bit.
+    pub low: u32,
+    /// Number of bits.
+    pub width: u32,
+}
+
+impl Bits {
+    const fn new(high: u32, low: u32) -> Bits {
+        Bits { low, width: high - low + 1 }
+    }
+
+    /// The largest value that fits.
+    pub const fn max(self) -> u32 {
+        if self.width >= 32 { u32::MAX } else { (1 << self.width) - 1 }
+    }
+
+    /// The field's ones, in place.
+    pub const fn mask(self) -> u64 {
+        (self.max() as u64) << self.low
+    }
+
+    /// Reads the field.
+    #[inline]
+    pub const fn get(self, word: u64) -> u32 {
+        ((word >> self.low) as u32) & self.max()
+    }
+
+    /// The value in the field's place; the caller has checked that it fits.
+    #[inline]
+    pub const fn put(self, value: u32) -> u64 {
+        ((value & self.max()) as u64) << self.low
+    }
+}
+
+/// Bits in a word.
+pub const WORD_BITS: u32 = 48;
+/// The opcode, in every word.
+pub const OPCODE: Bits = Bits::new(47, 41);
+
+/// A field of an instruction other than its opcode.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Hash, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Field {
+    /// Destination: index into the slot's bank.
+    Dest,
+    /// First source: register address.
+    A,
+    /// Second source: register address.
+    B,
+    /// Third source: register address.
+    C,
+    /// 32 bits of immediate.
+    Immediate,
+    /// Bundle address.
+    Target,
+    /// Unsigned word offset of a load or store.
+    Offset,
+}
+
+impl Field {
+    /// Where the field stands in a word.
+    pub const fn bits(self) -> Bits {
+        match self {
+            Field::Dest => Bits::new(40, 32),
+            Field::A => Bits::new(31, 22),
+            Field::B => Bits::new(21, 12),
+            Field::C => Bits::new(11, 2),
+            Field::Immediate => Bits::new(31, 0),
+            Field::Target => Bits::new(15, 0),
+            Field::Offset => Bits::new(11, 0),
+        }
+    }
+
+    /// Its name in the manual.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Field::Dest => "d",
+            Field::A => "a",
+            Field::B => "b",
+            Field::C => "c",
+            Field::Immediate => "immediate",
+            Field::Target => "target",
+            Field::Offset => "offset",
+        }
+    }
+}
+
+/// One operand as it is written in the source, from left to right.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Operand {
+    /// A register that the instruction writes.
+    Dest,
+    /// A register that it reads: 0 = a, 1 = b, 2 = c.
+    Source(usize),
+    /// A 32-bit constant.
+    Immediate,
+    /// The address of a bundle.
+    Target,
+    /// `offset[a]`: a word of the data memory.
+    Memory,
+}
+
+/// The operands of an instruction.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Hash, serde::Serialize)]
+pub enum Shape {
+    /// No operand.
+    None,
+    /// `op d`
+    D,
+    /// `op d, a`
+    Da,
+    /// `op d, a, b`
+    Dab,
+    /// `op d, a, b, c`
+    Dabc,
+    /// `op d, immediate`
+    Dimm,
+    /// `op target`
+    T,
+    /// `op a, target`
+    At,
+    /// `op d, offset[a]`
+    Load,
+    /// `op offset[a], b`
+    Store,
+}
+
+impl Shape {
+    /// Every shape.
+    pub const ALL: [Shape; 10] = [
+        Shape::None,
+        Shape::D,
+        Shape::Da,
+        Shape::Dab,
+        Shape::Dabc,
+        Shape::Dimm,
+        Shape::T,
+        Shape::At,
+        Shape::Load,
+        Shape::Store,
+    ];
+
+    /// The operands in source order.
+    pub const fn operands(self) -> &'static [Operand] {
+        use Operand::*;
+        match self {
+            Shape::None => &[],
+            Shape::D => &[Dest],
+            Shape::Da => &[Dest, Source(0)],
+            Shape::Dab => &[Dest, Source(0), Source(1)],
+            Shape::Dabc => &[Dest, Source(0), Source(1), Source(2)],
+            Shape::Dimm => &[Dest, Immediate],
+            Shape::T => &[Target],
+            Shape::At => &[Source(0), Target],
+            Shape::Load => &[Dest, Memory],
+            Shape::Store => &[Memory, Source(1)],
+        }
+    }
+
+    /// The fields that the shape uses.
+    pub const fn fields(self) -> &'static [Field] {
+        use Field::*;
+        match self {
+            Shape::None => &[],
+            Shape::D => &[Dest],
+            Shape::Da => &[Dest, A],
+            Shape::Dab => &[Dest, A, B],
+            Shape::Dabc => &[Dest, A, B, C],
+            Shape::Dimm => &[Dest, Immediate],
+            Shape::T => &[Target],
+            Shape::At => &[A, Target],
+            Shape::Load => &[Dest, A, Offset],
+            Shape::Store => &[A, B, Offset],
+        }
+    }
+
+    /// Every bit that a word of this shape may set.
+    pub const fn mask(self) -> u64 {
+        let (mut mask, mut i) = (OPCODE.mask(), 0);
+        let fields = self.fields();
+        while i < fields.len() {
+            mask |= fields[i].bits().mask();
+            i += 1;
+        }
+        mask
+    }
+
+    /// Whether an instruction of this shape writes a register.
+    pub const fn has_dest(self) -> bool {
+        matches!(self, Shape::D | Shape::Da | Shape::Dab | Shape::Dabc | Shape::Dimm | Shape::Load)
+    }
+
+    /// How many source registers it reads (a, then b, then c).
+    pub const fn sources(self) -> usize {
+        match self {
+            Shape::None | Shape::D | Shape::Dimm | Shape::T => 0,
+            Shape::Da | Shape::At | Shape::Load => 1,
+            Shape::Dab | Shape::Store => 2,
+            Shape::Dabc => 3,
+        }
+    }
+
+    /// The operands as the manual writes them.
+    pub const fn syntax(self) -> &'static str {
+        match self {
+            Shape::None => "",
+            Shape::D => "d",
+            Shape::Da => "d, a",
+            Shape::Dab => "d, a, b",
+            Shape::Dabc => "d, a, b, c",
+            Shape::Dimm => "d, immediate",
+            Shape::T => "target",
+            Shape::At => "a, target",
+            Shape::Load => "d, offset[a]",
+            Shape::Store => "offset[a], b",
+        }
+    }
+}
+
+// No two fields of a shape overlap: the sum of the fields' masks equals their union.
+const _: () = {
+    let mut s = 0;
+    while s < Shape::ALL.len() {
+        let fields = Shape::ALL[s].fields();
+        let (mut sum, mut i) = (OPCODE.mask(), 0);
+        while i < fields.len() {
+            sum += fields[i].bits().mask();
+            i += 1;
+        }
+        assert!(sum == Shape::ALL[s].mask(), "two fields of a shape overlap");
+        assert!(sum >> WORD_BITS == 0, "a field leaves the word");
+        s += 1;
+    }
+};

@@ -1,0 +1,312 @@
+//! The table of instructions.
+//!
+//! A row reads, from left to right: mnemonic; opcode; the [`Function`] that a unit must offer to execute it; the operand
+//! [`Shape`]; the types of result and sources (`F` binary32, `I` 32-bit integer, `B` any 32 bits); the meaning; the manual's text.
+//!
+//! The meaning is either `= expression`, a value computed from the source operands `a`, `b`, `c` (the arithmetic `A` is
+//! Berkeley SoftFloat as the reference, or the host's binary32, which the tests prove identical), or `do Effect`, what
+//! it does to the machine beyond writing its destination. A row without a meaning does not compile.
+
+use crate::fp::{self, Arithmetic, Flags, Value};
+use crate::shape::Shape;
+
+/// What an instruction asks of the unit that executes it. A machine can execute an instruction if one of its slots hosts a unit with the function.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Function {
+    /// Nothing: every slot of every machine offers it.
+    Idle,
+    /// Sequencing: branches, calls, the period's end.
+    Control,
+    /// The data memory's port.
+    Memory,
+    /// Integer, logic, comparison and selection: what one carry chain does.
+    Alu,
+    /// binary32 addition.
+    Add,
+    /// Conversion between integer and binary32.
+    Convert,
+    /// binary32 multiplication.
+    Multiply,
+    /// binary32 division.
+    Divide,
+    /// binary32 square root.
+    Root,
+    /// Sine.
+    Sine,
+}
+
+/// The type of an operand: how a literal becomes bits and how bits are shown.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
+pub enum Type {
+    /// IEEE 754 binary32.
+    #[serde(rename = "float")]
+    F,
+    /// 32-bit two's-complement integer.
+    #[serde(rename = "integer")]
+    I,
+    /// Any 32 bits.
+    #[serde(rename = "bits")]
+    B,
+}
+
+/// What an instruction does beyond its arithmetic.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Effect {
+    /// Writes `compute(a, b, c)` to its destination and nothing else.
+    Compute,
+    /// Nothing at all.
+    Nothing,
+    /// Writes its immediate to its destination.
+    Immediate,
+    /// Writes the data word at `offset + a` to its destination.
+    Load,
+    /// Writes `b` to the data word at `offset + a`.
+    Store,
+    /// Continues at the target.
+    Jump,
+    /// Continues at the target if `a` is zero (all 32 bits).
+    BranchZero,
+    /// Continues at the target if `a` is not zero.
+    BranchNonzero,
+    /// Pushes the next bundle's address on the return stack and continues at the target.
+    Call,
+    /// Pops an address from the return stack and continues there.
+    Return,
+    /// Ends the period: all earlier results are written; continues at the target on the next tick.
+    Wait,
+    /// Stops the machine for good.
+    Halt,
+    /// Writes the sticky exception flags of all earlier operations to its destination.
+    ReadFlags,
+    /// Clears the sticky exception flags, those of all earlier operations included.
+    ClearFlags,
+}
+
+impl Effect {
+    /// Whether execution may continue elsewhere than at the next bundle.
+    pub const fn redirects(self) -> bool {
+        matches!(
+            self,
+            Effect::Jump
+                | Effect::BranchZero
+                | Effect::BranchNonzero
+                | Effect::Call
+                | Effect::Return
+                | Effect::Wait
+                | Effect::Halt
+        )
+    }
+
+    /// Whether execution may continue at the next bundle.
+    pub const fn falls_through(self) -> bool {
+        !self.redirects() || self.is_conditional()
+    }
+
+    /// Whether the redirection depends on an operand.
+    pub const fn is_conditional(self) -> bool {
+        matches!(self, Effect::BranchZero | Effect::BranchNonzero)
+    }
+
+    /// Whether issue must wait until every earlier result is written (see `timing`).
+    pub const fn drains(self) -> bool {
+        matches!(self, Effect::Wait | Effect::Halt | Effect::ReadFlags | Effect::ClearFlags)
+    }
+}
+
+/// One row of the table.
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    /// The instruction.
+    pub op: Op,
+    /// Its name in the source.
+    pub mnemonic: &'static str,
+    /// Bits 47..41 of its word.
+    pub opcode: u8,
+    /// What the executing unit must offer.
+    pub function: Function,
+    /// Operands and their bit fields.
+    pub shape: Shape,
+    /// Type of the result, if any, then of the sources.
+    pub types: &'static [Type],
+    /// What it does beyond arithmetic.
+    pub effect: Effect,
+    /// One line in symbols.
+    pub summary: &'static str,
+    /// The manual's text: special cases, flags, error bound.
+    pub text: &'static str,
+}
+
+impl Row {
+    /// The type of the destination; `B` where there is none.
+    pub fn result_type(&self) -> Type {
+        if self.shape.has_dest() { self.types[0] } else { Type::B }
+    }
+
+    /// The type of source `index` (0 = a, 1 = b, 2 = c).
+    pub fn source_type(&self, index: usize) -> Type {
+        let skip = usize::from(self.shape.has_dest());
+        self.types.get(skip + index).copied().unwrap_or(Type::B)
+    }
+}
+
+const fn flag(condition: bool) -> Value {
+    Value { bits: condition as u32, flags: Flags::NONE }
+}
+
+const fn bits(bits: u32) -> Value {
+    Value { bits, flags: Flags::NONE }
+}
+
+macro_rules! effect {
+    (= $e:expr) => {
+        Effect::Compute
+    };
+    (do $effect:ident) => {
+        Effect::$effect
+    };
+}
+
+macro_rules! value {
+    (= $e:expr) => {
+        $e
+    };
+    (do $effect:ident) => {
+        Value { bits: 0, flags: Flags::NONE }
+    };
+}
+
+macro_rules! instructions {
+    ([$a:ident $b:ident $c:ident]
+     $($mnemonic:ident $opcode:literal $function:ident $shape:ident [$($ty:ident)*] { $($meaning:tt)* } $summary:literal $text:literal;)*) => {
+        /// An instruction. Variants are named by their mnemonics.
+        #[allow(non_camel_case_types)]
+        #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
+        #[repr(u8)]
+        pub enum Op {
+            $(#[doc = $summary] $mnemonic,)*
+        }
+
+        /// Every instruction, in the order of the table; `ROWS[op as usize]` is `op`'s row.
+        pub const ROWS: &[Row] = &[
+            $(Row {
+                op: Op::$mnemonic,
+                mnemonic: stringify!($mnemonic),
+                opcode: $opcode,
+                function: Function::$function,
+                shape: Shape::$shape,
+                types: &[$(Type::$ty),*],
+                effect: effect!($($meaning)*),
+                summary: $summary,
+                text: $text,
+            },)*
+        ];
+
+        /// The value that `op` computes from its sources, with arithmetic `A`. Sources an instruction lacks are ignored;
+        /// the value is zero for an instruction whose effect is not [`Effect::Compute`].
+        #[inline(always)]
+        #[allow(unused_variables)]
+        pub fn compute<A: Arithmetic>(op: Op, $a: u32, $b: u32, $c: u32) -> Value {
+            match op {
+                $(Op::$mnemonic => value!($($meaning)*),)*
+            }
+        }
+    };
+}
+
+#[rustfmt::skip]
+instructions! { [a b c]
+    // mnemonic opcode function shape types meaning summary text
+
+    // ---- 0x0_ idle and sequencing. Opcode 0 stays illegal: execution that strays into unwritten memory must stop.
+    nop      0x01 Idle     None  []        { do Nothing }       "no operation"                            "Fills a slot.";
+    jmp      0x02 Control  T     []        { do Jump }          "continue at target"                      "";
+    bz       0x03 Control  At    [B]       { do BranchZero }    "if a = 0, continue at target"            "Tests all 32 bits as an integer; a comparison's result is 0 or 1. (-0.0 is not zero here.)";
+    bnz      0x04 Control  At    [B]       { do BranchNonzero } "if a ≠ 0, continue at target"            "Tests all 32 bits as an integer.";
+    call     0x05 Control  T     []        { do Call }          "push return address, continue at target" "The return stack is hardware, of the depth the machine states; a full stack is a fault.";
+    ret      0x06 Control  None  []        { do Return }        "pop return address, continue there"      "An empty stack is a fault.";
+    wait     0x07 Control  T     []        { do Wait }          "end of period; at the tick, continue at target" "Issues when every earlier result is written, so that all outputs of the period stand. If the next tick has come already, the deadline was missed: the event is recorded and execution goes on at once.";
+    halt     0x08 Control  None  []        { do Halt }          "stop"                                    "Issues when every earlier result is written. Only a reset restarts the machine.";
+
+    // ---- 0x1_ data memory: words of 32 bits, addressed by word.
+    ld       0x10 Memory   Load  [B I]     { do Load }          "d = memory[offset + a]"                  "The address is the sum of the 12-bit unsigned offset and the signed integer a. An address outside the data memory is a fault.";
+    st       0x11 Memory   Store [I B]     { do Store }         "memory[offset + a] = b"                  "In order with every other load and store.";
+
+    // ---- 0x2_ 32-bit integers and logic.
+    mov      0x20 Alu      Da    [B B]     { = bits(a) }        "d = a"                                   "";
+    li       0x21 Alu      Dimm  [B]       { do Immediate }     "d = immediate"                           "32 bits; in the source an integer, a float or a label.";
+    iadd     0x22 Alu      Dab   [I I I]   { = bits(a.wrapping_add(b)) }                         "d = a + b"  "Modulo 2^32.";
+    isub     0x23 Alu      Dab   [I I I]   { = bits(a.wrapping_sub(b)) }                         "d = a - b"  "Modulo 2^32.";
+    iand     0x24 Alu      Dab   [B B B]   { = bits(a & b) }                                     "d = a ∧ b"  "Bit by bit.";
+    ior      0x25 Alu      Dab   [B B B]   { = bits(a | b) }                                     "d = a ∨ b"  "Bit by bit.";
+    ixor     0x26 Alu      Dab   [B B B]   { = bits(a ^ b) }                                     "d = a ⊕ b"  "Bit by bit.";
+    ishl     0x27 Alu      Dab   [B B I]   { = bits(a << (b & 31)) }                             "d = a << b" "By the low five bits of b.";
+    ishr     0x28 Alu      Dab   [B B I]   { = bits(a >> (b & 31)) }                             "d = a >> b, zeros shifted in" "By the low five bits of b.";
+    isar     0x29 Alu      Dab   [I I I]   { = bits(((a as i32) >> (b & 31)) as u32) }           "d = a >> b, sign shifted in"  "By the low five bits of b.";
+    ieq      0x2a Alu      Dab   [I I I]   { = flag(a == b) }                                    "d = (a = b)" "1 or 0.";
+    ilt      0x2b Alu      Dab   [I I I]   { = flag((a as i32) < (b as i32)) }                   "d = (a < b), signed"   "1 or 0.";
+    iltu     0x2c Alu      Dab   [I I I]   { = flag(a < b) }                                     "d = (a < b), unsigned" "1 or 0.";
+
+    // ---- 0x3_ selection and the status register.
+    sel      0x30 Alu      Dabc  [B B B B] { = bits(if a != 0 { b } else { c }) }                "d = a ≠ 0 ? b : c" "Tests all 32 bits of a as an integer.";
+    rdflags  0x31 Alu      D     [I]       { do ReadFlags }     "d = sticky exception flags"              "Invalid 16, divide by zero 8, overflow 4 (SoftFloat's positions). Issues when every earlier result is written, so that no flag of an earlier operation is missed.";
+    clrflags 0x32 Alu      None  []        { do ClearFlags }    "clear the sticky exception flags"        "Issues when every earlier result is written.";
+
+    // ---- 0x4_ binary32 without rounding.
+    fabs     0x40 Alu      Da    [F F]     { = fp::abs(a) }                                      "d = |a|"     "Clears the sign bit, of a NaN too. No flags.";
+    fneg     0x41 Alu      Da    [F F]     { = fp::neg(a) }                                      "d = -a"      "Flips the sign bit, of a NaN too. No flags.";
+    fsign    0x42 Alu      Da    [F F]     { = fp::sign(a) }                                     "d = sign(a)" "-1.0, +0.0 or 1.0; zero of either sign gives +0.0; NaN gives NaN. Invalid on a signaling NaN.";
+    fmin     0x43 Alu      Dab   [F F F]   { = fp::minimum(a, b) }                               "d = min(a, b)" "IEEE 754-2019 minimum: a NaN operand gives NaN, so that it is not hidden from the controller; -0.0 < +0.0. Invalid on a signaling NaN.";
+    fmax     0x44 Alu      Dab   [F F F]   { = fp::maximum(a, b) }                               "d = max(a, b)" "IEEE 754-2019 maximum, as fmin.";
+    fsat     0x45 Alu      Dab   [F F F]   { = fp::saturate(a, b) }                              "d = a, kept within ±|b|" "a itself where |a| ≤ |b|, else |b| with the sign of a. A NaN operand gives NaN. Invalid on a signaling NaN.";
+    feq      0x46 Alu      Dab   [I F F]   { = A::eq(a, b) }                                     "d = (a = b)" "1 or 0; 0 if either is NaN. Invalid on a signaling NaN.";
+    flt      0x47 Alu      Dab   [I F F]   { = A::lt(a, b) }                                     "d = (a < b)" "1 or 0; 0 if either is NaN. Invalid on any NaN.";
+    fle      0x48 Alu      Dab   [I F F]   { = A::le(a, b) }                                     "d = (a ≤ b)" "1 or 0; 0 if either is NaN. Invalid on any NaN.";
+
+    // ---- 0x5_ binary32 addition and conversion, rounded to nearest even.
+    fadd     0x50 Add      Dab   [F F F]   { = A::add(a, b) }                                    "d = a + b"   "Invalid on ∞ - ∞ and on a signaling NaN; overflow.";
+    fsub     0x51 Add      Dab   [F F F]   { = A::sub(a, b) }                                    "d = a - b"   "As fadd.";
+    itof     0x52 Convert  Da    [F I]     { = A::itof(a) }                                      "d = float(a)" "From a signed integer, rounded to nearest even. No flags.";
+    ftoi     0x53 Convert  Da    [I F]     { = A::ftoi(a) }                                      "d = integer(a)" "Rounded to nearest even, saturating at -2^31 and 2^31 - 1; NaN gives 2^31 - 1. Invalid where the value does not fit.";
+
+    // ---- 0x6_ binary32 multiplication, division, root, rounded to nearest even.
+    fmul     0x60 Multiply Dab   [F F F]   { = A::mul(a, b) }                                    "d = a · b"   "Invalid on 0 · ∞ and on a signaling NaN; overflow.";
+    fdiv     0x61 Divide   Dab   [F F F]   { = A::div(a, b) }                                    "d = a / b"   "Invalid on 0/0, ∞/∞ and a signaling NaN; divide by zero on finite/0; overflow.";
+    fsqrt    0x62 Root     Da    [F F]     { = A::sqrt(a) }                                      "d = √a"      "√-0.0 = -0.0. Invalid on a negative operand and on a signaling NaN.";
+
+    // ---- 0x7_ functions. 0x71 fcos, 0x72 fatan2, 0x73 facos are kept free for issue 5's units.
+    fsin     0x70 Sine     Da    [F F]     { = fp::sin(a) }                                      "d = sin(a)"  "a in radians. At most 0.51659 ulp for |a| ≤ 2π·64 (0x43c90fda), measured over every such operand (99.82 % are correctly rounded). Beyond, and on ∞: NaN and invalid. Invalid on a signaling NaN. Cost: fifteen 18x18 products, a table of 256 × 72 bits.";
+}
+
+impl Op {
+    /// The instruction's row.
+    #[inline(always)]
+    pub fn row(self) -> &'static Row {
+        &ROWS[self as usize]
+    }
+
+    /// The instruction with this opcode.
+    #[inline]
+    pub fn from_opcode(opcode: u8) -> Option<Op> {
+        OPCODES.get(opcode as usize).copied().flatten()
+    }
+
+    /// The instruction of this name.
+    pub fn from_mnemonic(mnemonic: &str) -> Option<Op> {
+        ROWS.iter().find(|row| row.mnemonic == mnemonic).map(|row| row.op)
+    }
+}
+
+/// Opcode to instruction. Building it refuses two rows with one opcode and opcodes of more than seven bits, at compile time.
+static OPCODES: [Option<Op>; 128] = {
+    let mut table = [None; 128];
+    let mut i = 0;
+    while i < ROWS.len() {
+        let Row { opcode, op, .. } = ROWS[i];
+        assert!(opcode != 0 && opcode < 128, "an opcode is 1..=127");
+        assert!(table[opcode as usize].is_none(), "two instructions share an opcode");
+        table[opcode as usize] = Some(op);
+        i += 1;
+    }
+    table
+};

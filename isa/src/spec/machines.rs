@@ -1,0 +1,180 @@
+//! The table of machines: a named list of issue slots, each hosting units and owning a register bank.
+//!
+//! Every slot writes its own bank and every slot reads every bank, the inputs included. A bank is a window of the register
+//! space of 1,024 addresses. The last [`Machine::outputs_per_bank`] registers of each bank are its output ports; the bank
+//! after the slots' is the input ports', written from outside, and its last register, `zero`, is never written.
+
+use super::instructions::Function;
+use super::units::*;
+
+/// Register addresses, over all banks.
+pub const REGISTER_SPACE: usize = 1024;
+/// The address of the register that always reads as zero.
+pub const ZERO: u16 = (REGISTER_SPACE - 1) as u16;
+
+/// A window of the register space.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
+pub struct Bank {
+    /// Prefix of its registers' names: `m` has `m0`, `m1`, ….
+    pub name: &'static str,
+    /// Address of its first register.
+    pub base: u16,
+    /// Number of registers.
+    pub depth: u16,
+}
+
+impl Bank {
+    /// Whether `address` lies in the window.
+    #[inline]
+    pub const fn contains(&self, address: u16) -> bool {
+        address >= self.base && address - self.base < self.depth
+    }
+}
+
+/// An issue slot: one operation of a bundle.
+#[derive(Clone, Copy, Debug, serde::Serialize)]
+pub struct Slot {
+    /// Its name.
+    pub name: &'static str,
+    /// The bank that it writes.
+    pub bank: Bank,
+    /// The units that it hosts.
+    pub units: &'static [Unit],
+}
+
+impl Slot {
+    /// The index of the hosted unit that offers `function`.
+    pub fn unit_for(&self, function: Function) -> Option<usize> {
+        self.units.iter().position(|unit| unit.functions.contains(&function))
+    }
+}
+
+/// One row of the table.
+#[derive(Clone, Copy, Debug, serde::Serialize)]
+pub struct Machine {
+    /// Its name.
+    pub name: &'static str,
+    /// What it is for.
+    pub text: &'static str,
+    /// The slots, in the order of a bundle's words.
+    pub slots: &'static [Slot],
+    /// The input ports.
+    pub inputs: Bank,
+    /// How many registers at the end of each slot's bank are output ports.
+    pub outputs_per_bank: u16,
+    /// Depth of the program memory, in bundles.
+    pub code_depth: u32,
+    /// Depth of the data memory, in words of 32 bits.
+    pub data_depth: u32,
+    /// Depth of the return stack.
+    pub stack_depth: u32,
+    /// Cycles in which nothing issues after a taken branch, a call, a return, `wait` or reset, while the front end refills.
+    pub refill: u32,
+    /// Cycles in which nothing issues after a conditional branch that is not taken.
+    pub resolve: u32,
+}
+
+const fn bank(name: &'static str, base: u16, depth: u16) -> Bank {
+    Bank { name, base, depth }
+}
+
+/// The fast machine: three slots.
+pub static T3: Machine = Machine {
+    name: "t3",
+    text: "The fast machine: three operations a cycle, everything pipelined.",
+    slots: &[
+        Slot { name: "mul", bank: bank("m", 0, 256), units: &[MULTIPLY, DIVROOT, SINE] },
+        Slot { name: "add", bank: bank("a", 256, 256), units: &[ADD, CONVERT] },
+        Slot { name: "aux", bank: bank("x", 512, 256), units: &[ALU, MEMORY, SEQUENCER] },
+    ],
+    inputs: bank("i", 768, 256),
+    outputs_per_bank: 32,
+    code_depth: 1024,
+    data_depth: 1024,
+    stack_depth: 16,
+    refill: 5,
+    resolve: 1,
+};
+
+/// The small machine: one slot.
+pub static T1: Machine = Machine {
+    name: "t1",
+    text: "The small machine: one operation a cycle, one register file, iterative division and square root.",
+    slots: &[Slot {
+        name: "one",
+        bank: bank("r", 0, 512),
+        units: &[ADD, CONVERT, MULTIPLY, DIVIDE, ROOT, SINE, ALU_LATE, MEMORY, SEQUENCER],
+    }],
+    inputs: bank("i", 768, 256),
+    outputs_per_bank: 32,
+    code_depth: 2048,
+    data_depth: 1024,
+    stack_depth: 16,
+    refill: 5,
+    resolve: 1,
+};
+
+/// Every machine; the first is the default.
+pub static MACHINES: &[&Machine] = &[&T3, &T1];
+
+impl Machine {
+    /// The machine of this name.
+    pub fn from_name(name: &str) -> Option<&'static Machine> {
+        MACHINES.iter().copied().find(|machine| machine.name == name)
+    }
+
+    /// The first slot that hosts a unit for `function`, and that unit's index in the slot. Idle operations have none: every slot takes them.
+    pub fn host(&self, function: Function) -> Option<(usize, usize)> {
+        self.slots.iter().enumerate().find_map(|(s, slot)| slot.unit_for(function).map(|u| (s, u)))
+    }
+
+    /// The banks: one for each slot, in slot order, then the inputs.
+    pub fn banks(&self) -> impl Iterator<Item = &Bank> {
+        self.slots.iter().map(|slot| &slot.bank).chain([&self.inputs])
+    }
+
+    /// The canonical name of a register, `zero` included; `None` if the address is in no bank.
+    pub fn register_name(&self, address: u16) -> Option<String> {
+        if address == ZERO {
+            return Some("zero".to_owned());
+        }
+        let bank = self.banks().find(|bank| bank.contains(address))?;
+        Some(format!("{}{}", bank.name, address - bank.base))
+    }
+
+    /// The address of a register by its canonical name.
+    pub fn register_address(&self, name: &str) -> Option<u16> {
+        if name == "zero" {
+            return Some(ZERO);
+        }
+        let split = name.find(|c: char| c.is_ascii_digit())?;
+        let (prefix, digits) = name.split_at(split);
+        if digits.len() > 1 && digits.starts_with('0') {
+            return None;
+        }
+        let index: u16 = digits.parse().ok()?;
+        let bank = self.banks().find(|bank| bank.name == prefix)?;
+        (index < bank.depth).then(|| bank.base + index)
+    }
+
+    /// Whether the address is an output port.
+    pub fn is_output(&self, address: u16) -> bool {
+        self.slots.iter().any(|slot| {
+            slot.bank.contains(address) && address - slot.bank.base >= slot.bank.depth - self.outputs_per_bank
+        })
+    }
+
+    /// Whether the address is an input port (`zero` is not).
+    pub fn is_input(&self, address: u16) -> bool {
+        self.inputs.contains(address) && address != ZERO
+    }
+}
+
+/// Machines are equal by name: each has one row.
+impl PartialEq for Machine {
+    fn eq(&self, other: &Machine) -> bool {
+        self.name == other.name
+    }
+}
+
+impl Eq for Machine {}

@@ -1,0 +1,11 @@
+//! The specification: three tables, from which everything else is derived.
+//!
+//! - [`instructions`]: one row per instruction: mnemonic, opcode, function, operand shape, types, meaning, documentation;
+//! - [`units`]: one row per circuit: what it computes, latency, initiation interval, pipeline cuts, RTL module;
+//! - [`machines`]: one row per machine: its issue slots, the units each slot hosts, its register banks and memories.
+//!
+//! Encoder, decoder, disassembler, manual, timing model, assembler and emulator name no instruction.
+
+pub mod instructions;
+pub mod machines;
+pub mod units;

@@ -1,0 +1,63 @@
+//! The table of units: the circuits that a slot can host.
+//!
+//! **Latency** is the distance in cycles from the issue of an operation to the earliest issue of one that uses its result,
+//! forwarding included: an operation issued in cycle `c` has its result on the slot's result bus in cycle `c + latency`.
+//! **Interval** is the distance between two issues to the same unit. **Cuts** names what each pipeline register after the
+//! operand register holds; a fully pipelined unit has `latency - 1` of them.
+
+use super::instructions::Function;
+
+/// One row of the table.
+#[derive(Clone, Copy, Debug, serde::Serialize)]
+pub struct Unit {
+    /// Its name.
+    pub name: &'static str,
+    /// What it can execute.
+    pub functions: &'static [Function],
+    /// Cycles from issue to the earliest issue of a dependent operation; 0 for a unit that writes no register.
+    pub latency: u32,
+    /// Cycles between two issues to this unit.
+    pub interval: u32,
+    /// What stands in its pipeline registers, in the order of the data.
+    pub cuts: &'static [&'static str],
+    /// The Verilog module.
+    pub rtl: &'static str,
+    /// What it is.
+    pub text: &'static str,
+}
+
+/// Latencies stay below this: the write-port bookings of a bank fit a 64-cycle window.
+pub const MAX_LATENCY: u32 = 64;
+
+macro_rules! units {
+    ($($constant:ident $name:ident [$($function:ident)*] $latency:literal / $interval:literal [$($cut:literal)*] $text:literal;)*) => {
+        $(#[doc = $text] pub const $constant: Unit = Unit {
+            name: stringify!($name),
+            functions: &[$(Function::$function),*],
+            latency: $latency,
+            interval: $interval,
+            cuts: &[$($cut),*],
+            rtl: concat!("takt_", stringify!($name)),
+            text: $text,
+        };)*
+
+        /// Every unit.
+        pub const UNITS: &[Unit] = &[$($constant),*];
+    };
+}
+
+#[rustfmt::skip]
+units! {
+    // constant name functions latency/interval cuts text
+    SEQUENCER sequencer [Control]     0/1  [] "Branches, calls, the period's end; writes no register.";
+    ALU       alu       [Alu]         2/1  ["result"] "Integer, logic, comparison, selection, minimum, maximum, saturation.";
+    ALU_LATE  alu_late  [Alu]         5/1  ["result" "result" "result" "result"] "The ALU with its result as late as the adder's, so that one write port serves both without conflict.";
+    MEMORY    memory    [Memory]      4/1  ["address" "memory output" "output register"] "The data memory's one port.";
+    ADD       add       [Add]         5/1  ["swapped operands" "aligned operands" "sum, leading zeros" "normalised, rounded"] "binary32 adder.";
+    CONVERT   convert   [Convert]     5/1  ["operand" "magnitude, leading zeros" "shifted" "rounded"] "Integer to binary32 and back.";
+    MULTIPLY  multiply  [Multiply]    5/1  ["partial products" "product, shift count" "normalised" "rounded"] "binary32 multiplier: three 18x18 products, and 6x6 bits in logic.";
+    DIVROOT   divroot   [Divide Root] 10/1 ["classified" "normalised" "reciprocal" "first digit" "first product" "first residual" "second digit" "second product" "rounded"] "Division and square root, very high radix: a reciprocal table, two quotient digits of 14 and 10 bits, rounding by the sign of the last residual.";
+    DIVIDE    divide    [Divide]      18/14 [] "Iterative radix-4 divider.";
+    ROOT      root      [Root]        16/13 [] "Iterative square root, two bits a cycle.";
+    SINE      sine      [Sine]        18/14 [] "Fixed-point range reduction by 2/π and a piecewise quadratic table (one block RAM): fifteen 18x18 products on two multipliers, in nine passes.";
+}

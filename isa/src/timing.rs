@@ -1,0 +1,298 @@
+//! The rules of issue and writeback, once. `docs/timing.md` says them in prose for who builds the circuit.
+//!
+//! A bundle issues as a whole, in order, in the first cycle that meets every rule; each cycle that it waits is charged to
+//! the first rule, in this order, that is not met:
+//!
+//! 1. **front end**: not before the fetch has delivered it (after a taken branch, a wait, a reset);
+//! 2. **operand**: every source's pending result is on its result bus; charged to the producer whose result comes last;
+//! 3. **destination**: no earlier result for a register that the bundle writes is pending;
+//! 4. **unit**: every unit that it uses accepts an operation;
+//! 5. **drain**: for operations that ask for it, no result at all is pending;
+//! 6. **write port**: no earlier operation writes the same bank in the cycle in which one of this bundle's will.
+//!
+//! Because rules 1 to 5 once met stay met while the bundle waits, and rule 6 is tried cycle by cycle after them, the charge of
+//! each cycle is well defined and can be computed without stepping through the cycles. (After a drain nothing is booked, so
+//! that a bundle is never charged to both.)
+
+use crate::encode::Instruction;
+use crate::spec::instructions::Function;
+use crate::spec::machines::{Machine, REGISTER_SPACE};
+use crate::spec::units::MAX_LATENCY;
+
+/// A cycle's number; cycle 0 is the first after reset.
+pub type Cycle = u64;
+/// A bundle's address in the program memory.
+pub type Address = u32;
+
+/// Why a cycle issued nothing.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
+pub enum Cause {
+    /// The front end refills after a redirection or decides a conditional branch.
+    Branch {
+        /// The bundle that redirected (after reset: 0).
+        from: Address,
+    },
+    /// A source is not ready.
+    Operand {
+        /// The register.
+        register: u16,
+        /// The bundle that computes it.
+        producer: Address,
+    },
+    /// A destination still awaits an earlier result.
+    Destination {
+        /// The register.
+        register: u16,
+        /// The bundle that computes the earlier result.
+        producer: Address,
+    },
+    /// A unit accepts no operation yet.
+    Unit {
+        /// Slot of the machine.
+        slot: u8,
+        /// Unit of the slot.
+        unit: u8,
+    },
+    /// Earlier results must be written first.
+    Drain,
+    /// The bank's write port is taken in the cycle of this operation's writeback.
+    WritePort {
+        /// The slot whose bank it is.
+        slot: u8,
+    },
+    /// The program waits for the tick.
+    Wait,
+}
+
+impl Cause {
+    /// Names of the kinds, in the order of the rules; indices are [`Cause::kind`].
+    pub const KINDS: [&'static str; 7] =
+        ["branch", "operand", "destination", "unit", "drain", "write port", "wait"];
+
+    /// The cause's kind, as an index into [`Cause::KINDS`].
+    #[inline]
+    pub const fn kind(self) -> usize {
+        match self {
+            Cause::Branch { .. } => 0,
+            Cause::Operand { .. } => 1,
+            Cause::Destination { .. } => 2,
+            Cause::Unit { .. } => 3,
+            Cause::Drain => 4,
+            Cause::WritePort { .. } => 5,
+            Cause::Wait => 6,
+        }
+    }
+
+    /// The kind's name.
+    pub const fn name(self) -> &'static str {
+        Cause::KINDS[self.kind()]
+    }
+}
+
+/// One operation of a bundle, as the rules see it.
+#[derive(Clone, Copy, Debug)]
+struct Operation {
+    slot: u8,
+    unit: u8,
+    latency: u32,
+    interval: u32,
+    /// Registers that it reads.
+    sources: [u16; 3],
+    source_count: u8,
+    /// The register that it writes.
+    dest: Option<u16>,
+}
+
+/// A bundle, as the rules see it: made once for each address of a program.
+#[derive(Clone, Debug, Default)]
+pub struct Bundle {
+    operations: Vec<Operation>,
+    drains: bool,
+}
+
+impl Bundle {
+    /// What the rules need to know of a bundle: one instruction for each slot of `machine`, each of which
+    /// [`Instruction::place`] accepts.
+    pub fn new(machine: &Machine, instructions: &[Instruction]) -> Bundle {
+        let mut bundle = Bundle::default();
+        for (s, instruction) in instructions.iter().enumerate() {
+            let row = instruction.op.row();
+            let slot = &machine.slots[s];
+            let Some(u) = slot.unit_for(row.function).filter(|_| row.function != Function::Idle) else {
+                continue;
+            };
+            bundle.operations.push(Operation {
+                slot: s as u8,
+                unit: u as u8,
+                latency: slot.units[u].latency,
+                interval: slot.units[u].interval,
+                sources: instruction.sources,
+                source_count: row.shape.sources() as u8,
+                dest: instruction.writes(slot),
+            });
+            bundle.drains |= row.effect.drains();
+        }
+        bundle
+    }
+
+    /// The destinations, each with the cycles from issue to its writeback.
+    pub fn writebacks(&self) -> impl Iterator<Item = (u16, u32)> + '_ {
+        self.operations.iter().filter_map(|operation| Some((operation.dest?, operation.latency)))
+    }
+}
+
+/// How a bundle issued: the cycle, and what the cycles before it were charged to. The charges add up to `cycle - earliest`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Issue {
+    /// The cycle of issue.
+    pub cycle: Cycle,
+    stalls: [(Cause, u32); 5],
+    count: u8,
+}
+
+impl Issue {
+    /// Causes and numbers of stalled cycles, in time order.
+    #[inline]
+    pub fn stalls(&self) -> &[(Cause, u32)] {
+        &self.stalls[..self.count.into()]
+    }
+
+    #[inline]
+    fn advance(&mut self, to: Cycle, cause: Cause) {
+        if to > self.cycle {
+            self.stalls[usize::from(self.count)] = (cause, (to - self.cycle) as u32);
+            self.count += 1;
+            self.cycle = to;
+        }
+    }
+}
+
+const PORT_WINDOW: usize = MAX_LATENCY as usize;
+
+/// The scoreboard: what is pending, busy and booked.
+#[derive(Clone, Debug)]
+pub struct Scoreboard {
+    /// For each register, the cycle in which its pending result is on the bus, and who computes it.
+    ready: Box<[(Cycle, Address); REGISTER_SPACE]>,
+    /// For each slot and unit, the first cycle in which the unit accepts an operation.
+    free: Vec<Vec<Cycle>>,
+    /// For each slot, the cycles in which its bank is written: `booked[slot][cycle % PORT_WINDOW] == cycle`.
+    booked: Vec<[Cycle; PORT_WINDOW]>,
+    /// The last writeback.
+    drained: Cycle,
+}
+
+impl Scoreboard {
+    /// Nothing pending.
+    pub fn new(machine: &Machine) -> Scoreboard {
+        Scoreboard {
+            ready: vec![(0, 0); REGISTER_SPACE].try_into().expect("the vector has that length"),
+            free: machine.slots.iter().map(|slot| vec![0; slot.units.len()]).collect(),
+            booked: vec![[0; PORT_WINDOW]; machine.slots.len()],
+            drained: 0,
+        }
+    }
+
+    /// Issues a bundle from address `at` in the first cycle from `earliest` on that meets every rule.
+    pub fn issue(&mut self, bundle: &Bundle, at: Address, earliest: Cycle) -> Issue {
+        let mut issue = Issue { cycle: earliest, stalls: [(Cause::Drain, 0); 5], count: 0 };
+
+        let last = |registers: &mut dyn Iterator<Item = u16>, ready: &[(Cycle, Address); REGISTER_SPACE]| {
+            registers.fold((0, 0, 0), |last: (Cycle, u16, Address), register| {
+                let (cycle, producer) = ready[usize::from(register) % REGISTER_SPACE];
+                if cycle > last.0 { (cycle, register, producer) } else { last }
+            })
+        };
+        let mut sources = bundle
+            .operations
+            .iter()
+            .flat_map(|operation| &operation.sources[..operation.source_count.into()])
+            .copied();
+        let (cycle, register, producer) = last(&mut sources, &self.ready);
+        issue.advance(cycle, Cause::Operand { register, producer });
+
+        let mut dests = bundle.operations.iter().filter_map(|operation| operation.dest);
+        let (cycle, register, producer) = last(&mut dests, &self.ready);
+        issue.advance(cycle, Cause::Destination { register, producer });
+
+        let busiest = bundle
+            .operations
+            .iter()
+            .map(|operation| (self.free[usize::from(operation.slot)][usize::from(operation.unit)], operation))
+            .reduce(|last, next| if next.0 > last.0 { next } else { last });
+        if let Some((cycle, &Operation { slot, unit, .. })) = busiest {
+            issue.advance(cycle, Cause::Unit { slot, unit });
+        }
+
+        if bundle.drains {
+            issue.advance(self.drained, Cause::Drain);
+        }
+
+        // A later cycle can only be free: bookings end MAX_LATENCY cycles after the last issue.
+        let mut cycle = issue.cycle;
+        let taken = |cycle: Cycle| {
+            bundle.operations.iter().find(|operation| {
+                let writeback = cycle + Cycle::from(operation.latency);
+                operation.dest.is_some()
+                    && self.booked[usize::from(operation.slot)][writeback as usize % PORT_WINDOW] == writeback
+            })
+        };
+        let mut slot = 0;
+        while let Some(operation) = taken(cycle) {
+            (slot, cycle) = (operation.slot, cycle + 1);
+        }
+        issue.advance(cycle, Cause::WritePort { slot });
+
+        for operation in &bundle.operations {
+            let (slot, unit) = (usize::from(operation.slot), usize::from(operation.unit));
+            self.free[slot][unit] = issue.cycle + Cycle::from(operation.interval);
+            if let Some(dest) = operation.dest {
+                let writeback = issue.cycle + Cycle::from(operation.latency);
+                self.ready[usize::from(dest) % REGISTER_SPACE] = (writeback, at);
+                self.booked[slot][writeback as usize % PORT_WINDOW] = writeback;
+                self.drained = self.drained.max(writeback);
+            }
+        }
+        issue
+    }
+
+    /// The cycle in which the last pending result is on its bus.
+    pub fn drained(&self) -> Cycle {
+        self.drained
+    }
+
+    /// The cycle in which a register's last result is (or was) on its bus, and the bundle that computed it.
+    pub fn ready(&self, register: u16) -> (Cycle, Address) {
+        self.ready[usize::from(register) % REGISTER_SPACE]
+    }
+}
+
+/// The first cycle in which the bundle after one issued in `cycle` may issue, if nothing redirects.
+#[inline]
+pub fn after_sequential(cycle: Cycle) -> Cycle {
+    cycle + 1
+}
+
+/// As [`after_sequential`], after a conditional branch that is not taken.
+#[inline]
+pub fn after_not_taken(machine: &Machine, cycle: Cycle) -> Cycle {
+    cycle + 1 + Cycle::from(machine.resolve)
+}
+
+/// The first cycle in which the target of a bundle that issued in `cycle` and redirects may issue.
+#[inline]
+pub fn after_redirect(machine: &Machine, cycle: Cycle) -> Cycle {
+    cycle + 1 + Cycle::from(machine.refill)
+}
+
+/// The first cycle in which bundle 0 may issue after reset.
+#[inline]
+pub fn after_reset(machine: &Machine) -> Cycle {
+    Cycle::from(machine.refill)
+}
+
+/// The first cycle in which the target of a `wait` issued in `waited` may issue, when the tick is seen in cycle `tick`.
+#[inline]
+pub fn after_tick(machine: &Machine, waited: Cycle, tick: Cycle) -> Cycle {
+    after_redirect(machine, waited).max(tick + 1)
+}

@@ -1,0 +1,137 @@
+//! Encoder and decoder: exhaustive over opcodes, property-tested over words; the tables are consistent.
+
+use proptest::prelude::*;
+use std::collections::HashSet;
+use takt_isa::shape::{OPCODE, WORD_BITS};
+use takt_isa::{DecodeError, Function, Instruction, MACHINES, Op, ROWS, UNITS};
+
+/// For every opcode of the space, over payloads of zeros, ones and single bits: a row's word decodes to that row, and every
+/// word that belongs to no row is refused by name.
+#[test]
+fn every_opcode_is_one_row_or_refused() {
+    let payload_bits = OPCODE.low;
+    let payloads = (0..payload_bits).map(|bit| 1u64 << bit).chain([0, (1 << payload_bits) - 1]);
+    let mut decoded = HashSet::new();
+    for payload in payloads {
+        for opcode in 0..=OPCODE.max() {
+            let word = OPCODE.put(opcode) | payload;
+            let row = ROWS.iter().find(|row| u32::from(row.opcode) == opcode);
+            match (Instruction::decode(word), row) {
+                (Ok(instruction), Some(row)) => {
+                    assert_eq!(instruction.op, row.op);
+                    assert_eq!(word & !row.shape.mask(), 0);
+                    assert_eq!(instruction.encode(), Ok(word));
+                    decoded.insert(row.mnemonic);
+                }
+                (Err(DecodeError::StrayBits { op, stray }), Some(row)) => {
+                    assert_eq!(op, row.op);
+                    assert_eq!(stray, word & !row.shape.mask());
+                    assert_ne!(stray, 0);
+                }
+                (Err(DecodeError::UnknownOpcode { opcode: named }), None) => {
+                    assert_eq!(u32::from(named), opcode)
+                }
+                (Err(DecodeError::Unwritten), None) => assert_eq!(word, 0),
+                (outcome, row) => {
+                    panic!("word {word:012x}: {outcome:?}, row {:?}", row.map(|row| row.mnemonic))
+                }
+            }
+        }
+    }
+    assert_eq!(decoded.len(), ROWS.len(), "every row decodes");
+}
+
+#[test]
+fn rows_are_where_their_operation_says() {
+    for row in ROWS {
+        assert_eq!(row.op.row().mnemonic, row.mnemonic);
+        assert_eq!(Op::from_mnemonic(row.mnemonic), Some(row.op));
+        assert_eq!(Op::from_opcode(row.opcode), Some(row.op));
+        let operands = usize::from(row.shape.has_dest()) + row.shape.sources();
+        assert_eq!(row.types.len(), operands, "{}: a type for each register operand", row.mnemonic);
+        assert!(row.mnemonic.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit()));
+    }
+}
+
+#[test]
+fn machines_host_every_function_that_a_row_asks_for() {
+    for machine in MACHINES {
+        for row in ROWS.iter().filter(|row| row.function != Function::Idle) {
+            let hosts = machine.slots.iter().filter(|slot| slot.unit_for(row.function).is_some()).count();
+            assert_eq!(hosts, 1, "{} on {}: one slot", row.mnemonic, machine.name);
+        }
+    }
+}
+
+#[test]
+fn pipelined_units_name_each_of_their_registers() {
+    for unit in UNITS {
+        if !unit.cuts.is_empty() {
+            assert_eq!(unit.cuts.len() as u32, unit.latency - 1, "{}", unit.name);
+        }
+        assert!(unit.latency < takt_isa::spec::units::MAX_LATENCY);
+        assert!(unit.interval >= 1);
+    }
+}
+
+#[test]
+fn banks_do_not_overlap_and_names_lead_back() {
+    for machine in MACHINES {
+        let mut seen = HashSet::new();
+        for bank in machine.banks() {
+            for index in 0..bank.depth {
+                let address = bank.base + index;
+                assert!(seen.insert(address), "{}: address {address} in two banks", machine.name);
+                let name = machine.register_name(address).expect("it is in a bank");
+                assert_eq!(machine.register_address(&name), Some(address));
+            }
+        }
+        for strange in ["", "m", "m01", "q3", "m99999", "3", "zero1", "m-1"] {
+            assert_eq!(machine.register_address(strange), None, "{strange}");
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200_000))]
+
+    /// A word that decodes encodes to itself; no word panics.
+    #[test]
+    fn encode_inverts_decode(word in 0u64..1 << WORD_BITS) {
+        if let Ok(instruction) = Instruction::decode(word) {
+            prop_assert_eq!(instruction.encode(), Ok(word));
+        }
+    }
+
+    /// As above with legal opcodes, which random words rarely have.
+    #[test]
+    fn encode_inverts_decode_of_rows(row in 0..ROWS.len(), payload: u64) {
+        let word = OPCODE.put(ROWS[row].opcode.into()) | (payload & ROWS[row].shape.mask() & !OPCODE.mask());
+        let instruction = Instruction::decode(word).expect("only the row's own bits are set");
+        prop_assert_eq!(instruction.op, ROWS[row].op);
+        prop_assert_eq!(instruction.encode(), Ok(word));
+    }
+
+    /// decode(encode(x)) = x, and values that do not fit are refused.
+    #[test]
+    fn decode_inverts_encode(row in 0..ROWS.len(), dest: u16, sources: [u16; 3], constant: u32) {
+        let op = ROWS[row].op;
+        let mut instruction = Instruction { op, dest, sources, constant };
+        let fits = op.row().shape.fields().iter().all(|&field| instruction.field(field) <= field.bits().max());
+        match instruction.encode() {
+            Ok(word) => {
+                prop_assert!(fits);
+                let decoded = Instruction::decode(word).expect("an encoded word decodes");
+                for &field in op.row().shape.fields() {
+                    prop_assert_eq!(decoded.field(field), instruction.field(field));
+                }
+                instruction = decoded;
+                prop_assert_eq!(instruction.encode(), Ok(word));
+            }
+            Err(error) => {
+                prop_assert!(!fits);
+                prop_assert!(error.value > error.field.bits().max());
+            }
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! The five-axis hybrid robot: its parameters, its tracking algorithm, and a plant to close the loop with.
+//!
+//! Numbers in parentheses are the equations of the founding paper (Przegląd Elektrotechniczny 98, 7/2022). The
+//! algorithm is generic over [`Real`](crate::real::Real): in `f64` it is the golden model that judges the assembly
+//! program, in `f32` the same algorithm native.
+
+pub mod closed_loop;
+pub mod controller;
+pub mod dynamics;
+pub mod integrator;
+pub mod kinematics;
+pub mod params;
+pub mod plant;
+pub mod ports;
+pub mod workspace;
+
+pub use closed_loop::{ClosedLoop, Inputs, LoopError, Record, TrackingController, TrackingError};
+pub use controller::{Controller, Outputs};
+pub use kinematics::{JointReference, Reference};
+pub use plant::Plant;

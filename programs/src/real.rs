@@ -1,0 +1,90 @@
+//! The arithmetic that the control algorithm needs, for binary32 and binary64 alike.
+//!
+//! The tracking algorithm is written once, over [`Real`]. Instantiated with `f64` it is the golden model;
+//! with `f32` it is "the same algorithm as native binary32", which the benchmarks race the emulator against.
+
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
+
+/// A binary floating-point type that the algorithm can be instantiated with.
+pub trait Real:
+    Copy
+    + PartialOrd
+    + std::fmt::Debug
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + Send
+    + Sync
+    + 'static
+{
+    /// Zero.
+    const ZERO: Self;
+    /// One.
+    const ONE: Self;
+    /// The nearest value to a binary64 constant.
+    fn from_f64(value: f64) -> Self;
+    /// The nearest value to an integer (one conversion, as the processor does it).
+    fn from_i32(value: i32) -> Self;
+    /// The same value in binary64; exact for both types.
+    fn to_f64(self) -> f64;
+    /// Square root, correctly rounded.
+    #[must_use]
+    fn sqrt(self) -> Self;
+    /// Sine of an angle in radians, as the host's library computes it.
+    #[must_use]
+    fn sin(self) -> Self;
+    /// Absolute value.
+    #[must_use]
+    fn abs(self) -> Self;
+}
+
+macro_rules! real {
+    ($float:ty) => {
+        impl Real for $float {
+            const ZERO: Self = 0.0;
+            const ONE: Self = 1.0;
+
+            #[inline]
+            fn from_f64(value: f64) -> Self {
+                value as Self
+            }
+
+            #[inline]
+            fn from_i32(value: i32) -> Self {
+                value as Self
+            }
+
+            #[inline]
+            fn to_f64(self) -> f64 {
+                self.into()
+            }
+
+            #[inline]
+            fn sqrt(self) -> Self {
+                self.sqrt()
+            }
+
+            #[inline]
+            fn sin(self) -> Self {
+                self.sin()
+            }
+
+            #[inline]
+            fn abs(self) -> Self {
+                self.abs()
+            }
+        }
+    };
+}
+
+real!(f32);
+real!(f64);
+
+/// An array with every element converted to another [`Real`], rounding to nearest where it must.
+#[must_use]
+pub fn convert<A: Real, B: Real, const N: usize>(values: [A; N]) -> [B; N] {
+    values.map(|value| B::from_f64(value.to_f64()))
+}

@@ -1,0 +1,56 @@
+//! Both machines, scheduled or not, compute the same: values, state and flags, bit for bit.
+
+use crate::inputs::{CIRCLE, Random, moves, pair, recorded, words};
+use crate::integrator::{Off, scenario};
+use crate::processor::{LITERAL, PROGRAMS, Processor, assemble};
+use takt_asm::Schedule;
+use takt_isa::{MACHINES, Machine};
+use takt_programs::hybrid::Inputs;
+use takt_programs::hybrid::ports::INPUTS;
+
+/// The names of what a program keeps between periods.
+fn state(path: &str) -> Vec<String> {
+    let kept = if path == LITERAL { ["pp", "s", "tc", "sg"] } else { ["np", "s", "boost", "sg"] };
+    kept.iter().flat_map(|name| (1..=5).map(move |i| format!("{name}{i}"))).collect()
+}
+
+/// Some thousand periods: the path, the workspace, the integrator's scenarios, and at last words without sense (after
+/// which the state has none either).
+fn stimuli() -> Vec<[u32; INPUTS.len()]> {
+    let mut random = Random(3);
+    let mut inputs: Vec<Inputs> = recorded(&moves(..), 2000);
+    inputs.extend(recorded(&moves(CIRCLE..), 2000));
+    inputs.extend((0..500).flat_map(|_| pair(&mut random)));
+    inputs.extend(scenario(Off::Mixed, 5));
+    let sensible = inputs.iter().map(Inputs::to_words).collect::<Vec<_>>();
+    let senseless = (0..1000).map(|_| words(&mut random));
+    sensible.into_iter().chain(senseless).collect()
+}
+
+#[test]
+fn machines_and_schedules_agree_bit_for_bit() {
+    let stimuli = stimuli();
+    for path in PROGRAMS {
+        let names = state(path);
+        let variants: Vec<(&'static Machine, Schedule)> = MACHINES
+            .iter()
+            .flat_map(|&machine| {
+                [Schedule::AsWritten, Schedule::None, Schedule::All].map(|schedule| (machine, schedule))
+            })
+            .collect();
+        let mut processors: Vec<Processor> = variants
+            .iter()
+            .map(|&(machine, schedule)| Processor::new(&assemble(path, machine, schedule).program))
+            .collect();
+        for (period, inputs) in stimuli.iter().enumerate() {
+            let mut first = None;
+            for (processor, (machine, schedule)) in processors.iter_mut().zip(&variants) {
+                let outputs = processor.period(inputs).expect("no input makes the program fault");
+                let state: Vec<u32> = names.iter().map(|name| processor.state(name)).collect();
+                let all = (outputs, state, processor.emulator().flags());
+                let first = first.get_or_insert_with(|| all.clone());
+                assert_eq!(*first, all, "{path} on {}, {schedule:?}, period {period}", machine.name);
+            }
+        }
+    }
+}

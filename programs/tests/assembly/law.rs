@@ -1,0 +1,115 @@
+//! The control law in binary64 from intermediate values: what remains to be judged when the rounding of lengths and
+//! positions, which the gains magnify, is taken as given.
+
+use crate::measure::ulp;
+use takt_programs::hybrid::dynamics::{gravity, reduced_masses, table_gravity};
+use takt_programs::hybrid::integrator::Integrator;
+use takt_programs::hybrid::kinematics::{JointReference, forward};
+use takt_programs::hybrid::params;
+
+/// Where a program has its measured velocity from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Velocity {
+    /// From differences of counts, which are exact.
+    Counts,
+    /// From differences of positions in binary32.
+    Positions,
+}
+
+/// What the five axes are measured to be.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Measured {
+    /// Positions, m and rad.
+    pub(crate) position: [f64; 5],
+    /// Velocities, m/s and rad/s.
+    pub(crate) velocity: [f64; 5],
+}
+
+impl Measured {
+    /// Positions and velocities without any rounding but that of binary64.
+    pub(crate) fn exact(previous: [i32; 5], counts: [i32; 5]) -> Measured {
+        let moved = |i: usize| f64::from(counts[i].wrapping_sub(previous[i]));
+        Measured {
+            position: std::array::from_fn(|i| f64::from(counts[i]) * params::RESOLUTION[i]),
+            velocity: std::array::from_fn(|i| moved(i) * (params::RESOLUTION[i] / params::SAMPLE_TIME)),
+        }
+    }
+
+    /// Positions and velocities as they come out in binary32 where every one is a conversion and one operation: `l_i
+    /// = n_i · 0.25e-6`, and `v = Δn · (0.25e-6/Ts)` or `v = Δl/Ts`.
+    pub(crate) fn rounded(previous: [i32; 5], counts: [i32; 5], from: Velocity) -> Measured {
+        let scaled = |count: i32, by: f64| count as f32 * by as f32;
+        let position = |i: usize| scaled(counts[i], params::RESOLUTION[i]);
+        let velocity = |i: usize| match from {
+            Velocity::Counts => {
+                scaled(counts[i].wrapping_sub(previous[i]), params::RESOLUTION[i] / params::SAMPLE_TIME)
+            }
+            Velocity::Positions => {
+                (position(i) - scaled(previous[i], params::RESOLUTION[i])) / params::SAMPLE_TIME as f32
+            }
+        };
+        Measured {
+            position: std::array::from_fn(|i| f64::from(position(i))),
+            velocity: std::array::from_fn(|i| f64::from(velocity(i))),
+        }
+    }
+}
+
+/// The force or torque of one axis.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Effort {
+    /// Its value, N or N·m.
+    pub(crate) value: f64,
+    /// The largest of the terms that it is the sum of: `M·a_d`, `M·KP·e`, `M·KV·e_v`, `M·KI·s`, and of gravity the
+    /// largest over the arms, since an arm that carries little has its share from a difference of thirds.
+    pub(crate) largest: f64,
+    /// What one unit of acceleration costs: the mass, kg or kg·m².
+    pub(crate) mass: f64,
+}
+
+/// Steps 3 to 8 of the specification, with the state that they keep.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Law {
+    integrators: [Integrator<f64>; 5],
+    /// The integrators' values `s`.
+    pub(crate) sums: [f64; 5],
+    /// Ulps of each, one for every period, added up.
+    pub(crate) ulps: [f64; 5],
+}
+
+impl Law {
+    /// One period.
+    pub(crate) fn step(&mut self, measured: &Measured, joint: &JointReference<f64>) -> [Effort; 5] {
+        let [l1, l2, l3, tilt, _] = measured.position;
+        let [m1, m2, m3] = reduced_masses([l1, l2, l3]);
+        let [g1, g2, g3] = gravity([l1, l2, l3], forward([l1, l2, l3]));
+        let [g4, g5] = table_gravity(tilt);
+        let mass = [m1, m2, m3, params::TILT_INERTIA, params::ROTATION_INERTIA];
+        let load = [g1, g2, g3, g4, g5];
+        let heaviest = g1.abs().max(g2.abs()).max(g3.abs());
+
+        let wanted = joint.to_array();
+        let axis =
+            |row: usize, i: usize| if i < 3 { wanted[3 * row + i] } else { wanted[9 + 2 * row + i - 3] };
+        std::array::from_fn(|i| {
+            let (q, v, a) = (axis(0, i), axis(1, i), axis(2, i));
+            let e = q - measured.position[i];
+            let before = self.sums[i];
+            self.sums[i] = self.integrators[i].step(i, e, v);
+            self.ulps[i] += ulp(before.abs().max(self.sums[i].abs()));
+            let terms = [
+                mass[i] * a,
+                mass[i] * params::KP * e,
+                mass[i] * params::KV * (v - measured.velocity[i]),
+                mass[i] * params::KI * self.sums[i],
+                load[i],
+            ];
+            let share = if i < 3 { heaviest } else { 0.0 };
+            Effort {
+                value: terms.iter().sum(),
+                largest: terms.iter().fold(share, |largest, term| largest.max(term.abs())),
+                mass: mass[i],
+            }
+        })
+    }
+}

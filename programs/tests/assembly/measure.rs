@@ -1,0 +1,220 @@
+//! Errors of the outputs, in the units in which a bound means something, and the bounds.
+
+use crate::law::{Effort, Law, Measured, Velocity};
+use crate::processor::{LITERAL, floats};
+use std::fmt::Write as _;
+use takt_programs::accuracy;
+use takt_programs::hybrid::kinematics::inverse;
+use takt_programs::hybrid::ports::{INPUTS, OUTPUTS};
+use takt_programs::hybrid::{Controller, Inputs, JointReference, Outputs, params};
+
+/// Weight of the last place of the binary32 value nearest to a number.
+pub(crate) fn ulp(value: f64) -> f64 {
+    f64::from(accuracy::ulp(value as f32))
+}
+
+/// A largest value and where it was; NaN is the largest of all.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Largest {
+    pub(crate) value: f64,
+    pub(crate) period: u64,
+    pub(crate) output: &'static str,
+}
+
+impl Largest {
+    fn add(&mut self, value: f64, period: u64, output: &'static str) {
+        let value = if value.is_nan() { f64::INFINITY } else { value };
+        if value > self.value {
+            *self = Largest { value, period, output };
+        }
+    }
+}
+
+/// What limits an error, one bound for each field of [`Figures`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Bounds {
+    pub(crate) length: f64,
+    pub(crate) velocity: f64,
+    pub(crate) acceleration: f64,
+    pub(crate) ideal: f64,
+    pub(crate) law: f64,
+    pub(crate) sums: f64,
+}
+
+/// The bounds of a program, a third above what 100,000 random points and the scenarios show.
+pub(crate) fn bounds(path: &str) -> Bounds {
+    let length = if path == LITERAL { 2.0 } else { 1.5 };
+    Bounds { length, velocity: 4.6, acceleration: 5.5, ideal: 2.2, law: 12.0, sums: 1.2 }
+}
+
+/// Largest errors of a run against binary64, given the same binary32 inputs.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Figures {
+    /// `l_d` in ulps of itself.
+    pub(crate) length: Largest,
+    /// `v_d` in ulps of the tool's speed, of which it is a projection and may be any small part.
+    pub(crate) velocity: Largest,
+    /// `a_d` in ulps of the tool's acceleration, or of the centripetal part `|v|²/l` where that is larger.
+    pub(crate) acceleration: Largest,
+    /// `F` and `τ` against the golden controller, in units of what an ulp of the axis's position does to them.
+    ///
+    /// `l_d` and `l` are each rounded to a multiple of an ulp (6·10⁻⁸ m at 0.8 m) before they are subtracted, and the
+    /// difference is multiplied by `KP = 2.5·10⁵` and the mass: 0.6 N, a thousand times what any rounding after it
+    /// does. No program in binary32 is much better, and no bound in ulps of `F` itself could hold. Velocities magnify
+    /// less, except where they are differences of positions: through `KV/Ts`, 28 times as much as through `KP`. The
+    /// farther an axis is off, the more an ulp of the largest term counts. The unit is the sum of these, and of what
+    /// an ulp of position has integrated to so far.
+    pub(crate) ideal: Largest,
+    /// `F` and `τ` against [`Law`], given `l_d`, `v_d`, `a_d` as the program has them and the measured values as
+    /// binary32 has them, in ulps of the largest term and of the integrator's sums. Nothing is magnified here, so
+    /// this sees an error of a millionth in masses, gravity, gains and integrator. A dozen roundings lead to a force.
+    pub(crate) law: Largest,
+    /// The integrators against those of [`Law`], in ulps of the sum, one for each period: adding costs half of one,
+    /// the step another half while it is as large as the sum.
+    pub(crate) sums: Largest,
+    /// Outputs that should be an input bit for bit and are not.
+    pub(crate) altered: u64,
+    /// Periods compared.
+    pub(crate) periods: u64,
+}
+
+impl Figures {
+    /// Whether everything is within bounds; if not, all that is not.
+    pub(crate) fn within(&self, bounds: &Bounds) -> Result<(), String> {
+        let mut wrong = String::new();
+        let pairs = [
+            ("l_d", self.length, bounds.length),
+            ("v_d", self.velocity, bounds.velocity),
+            ("a_d", self.acceleration, bounds.acceleration),
+            ("effort against the golden controller", self.ideal, bounds.ideal),
+            ("effort against the law", self.law, bounds.law),
+            ("integrator", self.sums, bounds.sums),
+        ];
+        for (name, Largest { value, period, output }, bound) in pairs {
+            if value > bound {
+                let _ = writeln!(wrong, "{name}: {value:.3} > {bound} (period {period}, {output})");
+            }
+        }
+        if self.altered > 0 {
+            let _ = writeln!(wrong, "{} references of the table are not passed through", self.altered);
+        }
+        if wrong.is_empty() { Ok(()) } else { Err(wrong) }
+    }
+}
+
+/// The models that a program is compared with, period by period, and the errors so far.
+#[derive(Clone)]
+pub(crate) struct Comparison {
+    pub(crate) figures: Figures,
+    from: Velocity,
+    controller: Controller<f64>,
+    law: Law,
+    previous: Option<[i32; 5]>,
+    /// What an ulp of position in every period so far has integrated to, by axis, as acceleration.
+    drift: [f64; 5],
+}
+
+impl Comparison {
+    /// Before the first period.
+    pub(crate) fn new(path: &str) -> Comparison {
+        Comparison {
+            figures: Figures::default(),
+            from: if path == LITERAL { Velocity::Positions } else { Velocity::Counts },
+            controller: Controller::new(),
+            law: Law::default(),
+            previous: None,
+            drift: [0.0; 5],
+        }
+    }
+
+    /// The models as at power-on; the errors stay.
+    pub(crate) fn restart(&mut self) {
+        self.controller = Controller::new();
+        self.law = Law::default();
+        self.previous = None;
+        self.drift = [0.0; 5];
+    }
+
+    /// Compares what a program gave out in a period, and the integrators' values that it kept if they are at hand.
+    pub(crate) fn add(&mut self, inputs: &Inputs, words: [u32; OUTPUTS.len()], sums: Option<[f64; 5]>) {
+        let period = self.figures.periods;
+        let reference = inputs.reference.convert::<f64>();
+        let golden = self.controller.step(inputs.counts, &reference);
+        let outputs = floats(words).map(f64::from);
+        let given = Outputs::from_array(outputs);
+        let joint: JointReference<f64> = given.joint;
+
+        debug_assert_eq!(golden.joint, inverse(&reference));
+        let norm = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
+        let speed = norm(reference.velocity);
+        for i in 0..3 {
+            let truth = golden.joint;
+            let figures = &mut self.figures;
+            let length = (joint.length[i] - truth.length[i]).abs() / ulp(truth.length[i]);
+            figures.length.add(length, period, OUTPUTS[5 + i].name);
+            let velocity = (joint.velocity[i] - truth.velocity[i]).abs() / ulp(speed);
+            figures.velocity.add(velocity, period, OUTPUTS[8 + i].name);
+            let scale = norm(reference.acceleration).max(speed * speed / truth.length[i]);
+            let acceleration = (joint.acceleration[i] - truth.acceleration[i]).abs() / ulp(scale);
+            figures.acceleration.add(acceleration, period, OUTPUTS[11 + i].name);
+        }
+        // th4d th5d om4d om5d ep4d ep5d are the inputs alpha … eps_gamma, which come last on either side.
+        let sent = inputs.to_words();
+        let passed = words[OUTPUTS.len() - 6..].iter().zip(&sent[INPUTS.len() - 6..]);
+        self.figures.altered += passed.filter(|(out, into)| out != into).count() as u64;
+
+        let previous = self.previous.replace(inputs.counts).unwrap_or(inputs.counts);
+        let measured = Measured::rounded(previous, inputs.counts, self.from);
+        let efforts: [Effort; 5] = self.law.step(&measured, &joint);
+        let golden = golden.to_array();
+        let JointReference { length: l, velocity: v, angle, angular_velocity: omega, .. } = joint;
+        let wanted = [(l[0], v[0]), (l[1], v[1]), (l[2], v[2]), (angle[0], omega[0]), (angle[1], omega[1])];
+        for (i, effort) in efforts.iter().enumerate() {
+            let name = OUTPUTS[i].name;
+            let figures = &mut self.figures;
+            let integrated = effort.mass * params::KI * self.law.ulps[i];
+            let unit = ulp(effort.largest) + integrated;
+            figures.law.add((outputs[i] - effort.value).abs() / unit, period, name);
+
+            let place = ulp(wanted[i].0.abs().max(measured.position[i].abs()));
+            let rate = ulp(wanted[i].1.abs().max(measured.velocity[i].abs()));
+            self.drift[i] += params::BOOST * params::KI * params::SAMPLE_TIME * place;
+            let through_velocity = match self.from {
+                Velocity::Counts => rate,
+                Velocity::Positions => rate.max(place / params::SAMPLE_TIME),
+            };
+            let acceleration = params::KP * place + params::KV * through_velocity + self.drift[i];
+            let unit = effort.mass * acceleration + ulp(effort.largest) + integrated;
+            figures.ideal.add((outputs[i] - golden[i]).abs() / unit, period, name);
+
+            if let Some(sums) = sums {
+                let error = (sums[i] - self.law.sums[i]).abs();
+                figures.sums.add(error / self.law.ulps[i].max(f64::MIN_POSITIVE), period, name);
+            }
+        }
+        self.figures.periods += 1;
+    }
+}
+
+/// The law, given positions without rounding and the golden joint reference, is the golden controller: what is
+/// compared with [`Law`] is compared with the specification.
+#[test]
+fn the_law_is_that_of_the_golden_controller() {
+    let mut random = crate::inputs::Random(1);
+    for _ in 0..1000 {
+        let (mut controller, mut law) = (Controller::<f64>::new(), Law::default());
+        let pair = crate::inputs::pair(&mut random);
+        let mut previous = pair[0].counts;
+        for inputs in pair {
+            let golden = controller.step(inputs.counts, &inputs.reference.convert());
+            let efforts = law.step(&Measured::exact(previous, inputs.counts), &golden.joint);
+            for (effort, golden) in efforts.iter().zip(golden.to_array()) {
+                assert!(
+                    (effort.value - golden).abs() <= 1e-13 * effort.largest,
+                    "{effort:?} against {golden}"
+                );
+            }
+            previous = inputs.counts;
+        }
+    }
+}

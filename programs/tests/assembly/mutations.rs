@@ -1,0 +1,192 @@
+//! Single mistakes in `tracking.s`, every one of which must be noticed: a test that cannot fail says nothing.
+//!
+//! Mistakes are made in the source's text: in every line with an instruction another operation, operands exchanged, a
+//! constant off by a ten-thousandth; in every named constant of the robot the same; and some by hand. Exchanged
+//! operands of sums and products are no mistake, and must not be taken for one.
+
+use crate::integrator::{self, Off};
+use crate::measure::bounds;
+use crate::points;
+use crate::processor::{Processor, TRACKING, source};
+use takt_asm::{MemoryLoader, Options, Schedule};
+use takt_isa::{Program, T1};
+use takt_programs::SOURCES;
+
+const ROBOT: &str = "hybrid/robot.s";
+
+/// A source with one line changed.
+struct Mutation {
+    file: &'static str,
+    /// Line, from 0.
+    line: usize,
+    to: String,
+}
+
+/// The program with mistakes. On the machine with one slot, where any operation may write any register.
+fn assemble(mutations: &[Mutation]) -> Program {
+    let mut loader = MemoryLoader::new(SOURCES);
+    for file in [TRACKING, ROBOT] {
+        let line = |(i, line): (usize, &'static str)| {
+            let change = mutations.iter().find(|mutation| mutation.file == file && mutation.line == i);
+            change.map_or_else(|| line.to_owned(), |mutation| mutation.to.clone())
+        };
+        let lines: Vec<String> = source(file).lines().enumerate().map(line).collect();
+        loader.add(file, lines.join("\n"));
+    }
+    let options = Options { machine: &T1, schedule: Schedule::None, effort: 0 };
+    let assembled = takt_asm::assemble(TRACKING, &loader, &options);
+    assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false))).program
+}
+
+/// What is wrong with a program in the eyes of the tests, in short.
+fn judge(program: &Program) -> Result<(), String> {
+    let processor = Processor::new(program);
+    let limits = bounds(TRACKING);
+    points::measure(TRACKING, &processor, 250, 5).within(&limits)?;
+    for off in Off::ALL {
+        let figures =
+            integrator::measure(TRACKING, processor.clone(), off).map_err(|error| error.to_string())?;
+        figures.within(&limits)?;
+    }
+    Ok(())
+}
+
+/// An instruction of a line: mnemonic and operands.
+fn instruction(line: &str) -> Option<(&str, Vec<&str>)> {
+    let code = line.split(';').next().unwrap_or_default().trim();
+    let (mnemonic, operands) = code.split_once(' ')?;
+    let known = takt_isa::ROWS.iter().any(|row| row.mnemonic == mnemonic) && mnemonic != "wait";
+    known.then(|| (mnemonic, operands.split(',').map(str::trim).collect()))
+}
+
+/// Another operation that takes the same operands, and gives another result.
+fn other(mnemonic: &str) -> &'static str {
+    match mnemonic {
+        "fadd" => "fsub",
+        "fsub" | "fmul" => "fadd",
+        "fdiv" => "fmul",
+        "fsqrt" | "fsin" | "fsign" => "fabs",
+        "fabs" | "itof" => "mov",
+        "isub" => "iadd",
+        "fmax" | "fsat" => "fmin",
+        "feq" => "flt",
+        "fle" => "feq",
+        _ => panic!("say what else there is for {mnemonic}"),
+    }
+}
+
+/// Whether an operand is a constant expression other than a name.
+fn is_expression(operand: &str) -> bool {
+    operand.contains(['*', '/', '^', '(']) || operand.starts_with(|c: char| c.is_ascii_digit())
+}
+
+/// What a constant is multiplied by: as little as must be noticed.
+///
+/// - `ec` is a threshold between errors that are whole counts.
+/// - `fall` and what it follows from change only the second half of a boost; by a ten-thousandth, that is less than rounding.
+/// - The threshold for `tc ≤ Tc/2` is half a step off on purpose, and a step is 0.3 % of it.
+fn factor(name: &str) -> &'static str {
+    match name {
+        "ec{i}" => "2.2",
+        "fall" | "Tc" => "1.001",
+        "xc*gain - fall/2" => "1.01",
+        _ => "1.0001",
+    }
+}
+
+/// Lines that say the same in other words: `wu` is only squared.
+const EQUIVALENT: [&str; 1] = ["fsub wu, u, w"];
+
+/// Every mistake that is made by rule.
+fn by_rule() -> Vec<Mutation> {
+    let mut mutations = Vec::new();
+    for file in [TRACKING, ROBOT] {
+        for (line, text) in source(file).lines().enumerate() {
+            let mut add = |to: String| mutations.push(Mutation { file, line, to });
+            if let Some((name, value)) = text.strip_prefix(".const").and_then(|rest| rest.split_once('=')) {
+                let value = value.split(';').next().unwrap_or_default().trim();
+                add(format!(".const {name} = ({value})*{}", factor(name.trim())));
+            }
+            let Some((mnemonic, operands)) = instruction(text) else { continue };
+            let with = |operands: &[&str]| format!("{mnemonic} {}", operands.join(", "));
+            if mnemonic == "mov" {
+                add(with(&[operands[0], "1e6"]));
+                continue;
+            }
+            if mnemonic != "sel" {
+                add(format!("{} {}", other(mnemonic), operands.join(", ")));
+            }
+            if matches!(mnemonic, "fsub" | "fdiv" | "isub" | "fle" | "fsat" | "sel") {
+                let mut exchanged = operands.clone();
+                let last = exchanged.len() - 1;
+                exchanged.swap(last - 1, last);
+                add(with(&exchanged));
+            }
+            for (i, operand) in operands.iter().enumerate().filter(|(_, operand)| is_expression(operand)) {
+                let scaled = format!("({operand})*{}", factor(operand));
+                let mut operands = operands.clone();
+                operands[i] = &scaled;
+                add(with(&operands));
+            }
+        }
+    }
+    mutations.retain(|mutation| !EQUIVALENT.contains(&mutation.to.as_str()));
+    mutations
+}
+
+/// Mistakes of the kind that is made when formulas are copied: what to replace, and by what, in a line of its own.
+const BY_HAND: [(&str, &str); 12] = [
+    ("fmul    xv, x, vx", "fmul    xv, x, vy"),
+    ("fmul    za, z, az", "fmul    za, z, vz"),
+    ("fsub    {s}2, both, px2", "fsub    {s}2, sum, px2"),
+    ("fmul    w{i}, v{i}d, v{i}d", "fmul    w{i}, v{i}d, v1d"),
+    ("arms    dv, 1, vx, vy, dv", "arms    dv, 2, vx, vy, dv"),
+    ("mov     om5d, omega_gamma", "mov     om5d, omega_alpha"),
+    ("fsub    w, q1, q3", "fsub    w, q2, q3"),
+    ("mass    1, 2, s12, 3, s13", "mass    1, 3, s12, 2, s13"),
+    ("mass    3, 1, s13, 2, s23", "mass    3, 1, s13, 2, s12"),
+    ("fadd    la3, la1, w", "fadd    la3, la1, u"),
+    ("control 5, gamma, omega_gamma, eps_gamma", "control 5, gamma, omega_alpha, eps_gamma"),
+    ("sel     ramp, same, ramp, gain", "sel     ramp, early, ramp, gain"),
+];
+
+fn by_hand() -> impl Iterator<Item = Mutation> {
+    BY_HAND.iter().map(|(from, to)| {
+        let mut lines = source(TRACKING).lines().enumerate().filter(|(_, line)| line.contains(from));
+        let (line, text) = lines.next().unwrap_or_else(|| panic!("there is no `{from}`"));
+        assert_eq!(lines.next(), None, "`{from}` is there more than once");
+        Mutation { file: TRACKING, line, to: text.replace(from, to) }
+    })
+}
+
+#[test]
+fn every_mistake_is_noticed() {
+    let mut unnoticed = Vec::new();
+    let mut mistakes = 0;
+    for mutation in by_rule().into_iter().chain(by_hand()) {
+        let Mutation { file, line, ref to } = mutation;
+        let place = format!("{file}:{}: {to}", line + 1);
+        mistakes += 1;
+        if judge(&assemble(&[mutation])).is_ok() {
+            unnoticed.push(place);
+        }
+    }
+    assert!(unnoticed.is_empty(), "of {mistakes} mistakes these go unnoticed:\n{}", unnoticed.join("\n"));
+    assert!(mistakes > 200, "only {mistakes}");
+}
+
+#[test]
+fn what_is_no_mistake_is_not_taken_for_one() {
+    assert_eq!(judge(&assemble(&[])), Ok(()));
+    let lines = source(TRACKING).lines().enumerate();
+    let exchanged: Vec<Mutation> = lines
+        .filter_map(|(line, text)| {
+            let (mnemonic, operands) = instruction(text)?;
+            let [d, a, b] = operands[..] else { return None };
+            let to = format!("{mnemonic} {d}, {b}, {a}");
+            matches!(mnemonic, "fadd" | "fmul").then_some(Mutation { file: TRACKING, line, to })
+        })
+        .collect();
+    assert!(exchanged.len() > 50, "only {}", exchanged.len());
+    assert_eq!(judge(&assemble(&exchanged)), Ok(()));
+}

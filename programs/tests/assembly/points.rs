@@ -1,0 +1,37 @@
+//! Random points of the workspace, all twenty outputs against binary64.
+
+use crate::inputs::{Random, pair};
+use crate::measure::{Comparison, Figures, bounds};
+use crate::processor::{PROGRAMS, Processor, full};
+use takt_isa::{MACHINES, T3};
+
+/// The errors of a program, fresh from reset for every point: a first period that gives it previous counts, then a
+/// second.
+pub(crate) fn measure(path: &str, processor: &Processor, points: u64, seed: u64) -> Figures {
+    let mut random = Random(seed);
+    let mut comparison = Comparison::new(path);
+    for _ in 0..points {
+        let mut processor = processor.clone();
+        comparison.restart();
+        for inputs in pair(&mut random) {
+            let words = processor.period(&inputs.to_words()).expect("no input makes the program fault");
+            comparison.add(&inputs, words, None);
+        }
+    }
+    comparison.figures
+}
+
+#[test]
+fn outputs_are_right_anywhere_in_the_workspace() {
+    for path in PROGRAMS {
+        for &machine in MACHINES {
+            // Both machines compute the same bits (`agreement`), so one of them may take fewer.
+            let many = if full() { 100_000 } else { 5_000 };
+            let points = if *machine == T3 { many } else { many / 10 };
+            let figures = measure(path, &Processor::shipped(path, machine), points, 2026);
+            if let Err(wrong) = figures.within(&bounds(path)) {
+                panic!("{path} on {}, point = period / 2:\n{wrong}", machine.name);
+            }
+        }
+    }
+}

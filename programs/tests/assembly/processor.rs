@@ -1,0 +1,127 @@
+//! The programs under test, and a program on the emulator as the controller of the hybrid robot.
+
+use std::sync::{Arc, Mutex};
+use takt_asm::{Assembled, MemoryLoader, Options, Schedule};
+use takt_emu::{Emulator, PeriodError, PeriodReport};
+use takt_isa::{Machine, Program, Type};
+use takt_programs::SOURCES;
+use takt_programs::hybrid::ports::{INPUTS, OUTPUTS, PortType};
+use takt_programs::hybrid::{Inputs, Outputs, TrackingController};
+
+/// `tracking.s`, shared work done once.
+pub(crate) const TRACKING: &str = "hybrid/tracking.s";
+/// `tracking_literal.s`, every equation as printed.
+pub(crate) const LITERAL: &str = "hybrid/tracking_literal.s";
+/// Both.
+pub(crate) const PROGRAMS: [&str; 2] = [TRACKING, LITERAL];
+
+/// Whether to take the time for everything: in release builds, and where `TAKT_FULL=1` asks for it.
+pub(crate) fn full() -> bool {
+    !cfg!(debug_assertions) || std::env::var_os("TAKT_FULL").is_some_and(|value| value == "1")
+}
+
+/// The text of a shipped source.
+pub(crate) fn source(path: &str) -> &'static str {
+    SOURCES.iter().find(|(name, _)| *name == path).map(|(_, text)| *text).expect("it is shipped")
+}
+
+/// A shipped program, assembled as `takt track` does; once, however many tests ask for it.
+pub(crate) fn assemble(path: &'static str, machine: &'static Machine, schedule: Schedule) -> Arc<Assembled> {
+    type Done = Vec<(&'static str, &'static Machine, Schedule, Arc<Assembled>)>;
+    static DONE: Mutex<Done> = Mutex::new(Vec::new());
+    let mut done = DONE.lock().expect("every shipped program is sound");
+    if let Some((.., assembled)) = done.iter().find(|(p, m, s, _)| (*p, *m, *s) == (path, machine, schedule))
+    {
+        return Arc::clone(assembled);
+    }
+    let options = Options { machine, schedule, ..Options::default() };
+    let assembled = takt_asm::assemble(path, &MemoryLoader::new(SOURCES), &options);
+    let assembled =
+        assembled.unwrap_or_else(|errors| panic!("{path} on {}: {}", machine.name, errors.render(false)));
+    let assembled = Arc::new(assembled);
+    done.push((path, machine, schedule, Arc::clone(&assembled)));
+    assembled
+}
+
+/// The binary32 values of words.
+pub(crate) fn floats<const N: usize>(words: [u32; N]) -> [f32; N] {
+    words.map(f32::from_bits)
+}
+
+/// A program that has the tracking algorithm's ports, on the emulator.
+#[derive(Clone)]
+pub(crate) struct Processor {
+    emulator: Emulator,
+    inputs: [u16; INPUTS.len()],
+    outputs: [u16; OUTPUTS.len()],
+    /// The report of the last period.
+    pub(crate) report: Option<PeriodReport>,
+    /// NaNs written to output ports since reset.
+    pub(crate) nan_writes: usize,
+}
+
+impl Processor {
+    /// The program loaded and reset. Panics if a port is missing or of another type.
+    pub(crate) fn new(program: &Program) -> Processor {
+        let find = |have: &[takt_isa::program::Port], name: &str, kind: PortType| {
+            let port = have.iter().find(|port| port.name == name);
+            let port = port.unwrap_or_else(|| panic!("there is no port {name}"));
+            let ty = if kind == PortType::I32 { Type::I } else { Type::F };
+            assert_eq!(port.ty, ty, "type of port {name}");
+            port.register
+        };
+        Processor {
+            emulator: Emulator::new(program).expect("the program fits its machine"),
+            inputs: INPUTS.map(|port| find(&program.inputs, port.name, port.kind)),
+            outputs: OUTPUTS.map(|port| find(&program.outputs, port.name, port.kind)),
+            report: None,
+            nan_writes: 0,
+        }
+    }
+
+    /// A shipped program on a machine, as written.
+    pub(crate) fn shipped(path: &'static str, machine: &'static Machine) -> Processor {
+        Processor::new(&assemble(path, machine, Schedule::AsWritten).program)
+    }
+
+    /// Runs a period; the outputs' words in the order of [`OUTPUTS`].
+    pub(crate) fn period(
+        &mut self,
+        inputs: &[u32; INPUTS.len()],
+    ) -> Result<[u32; OUTPUTS.len()], PeriodError> {
+        for (register, &bits) in self.inputs.iter().zip(inputs) {
+            self.emulator.set_input_bits(*register, bits)?;
+        }
+        let report = self.emulator.run_period(&[])?;
+        self.nan_writes += report.nan_writes.len();
+        self.report = Some(report);
+        // A port that was never written is as wrong as a NaN.
+        Ok(self.outputs.map(|register| self.emulator.register(register).unwrap_or(f32::NAN.to_bits())))
+    }
+
+    /// Cycles of the last period.
+    pub(crate) fn cycles(&self) -> u64 {
+        self.report.as_ref().expect("a period has run").cycles
+    }
+
+    /// The machine.
+    pub(crate) fn emulator(&self) -> &Emulator {
+        &self.emulator
+    }
+
+    /// The word of a register by its name in the source.
+    pub(crate) fn state(&self, name: &str) -> u32 {
+        let registers = &self.emulator.program().registers;
+        let port = registers.iter().find(|port| port.name == name);
+        let port = port.unwrap_or_else(|| panic!("there is no register {name}"));
+        self.emulator.register(port.register).unwrap_or_else(|| panic!("{name} was never written"))
+    }
+}
+
+impl TrackingController for Processor {
+    type Error = PeriodError;
+
+    fn step(&mut self, inputs: &Inputs) -> Result<Outputs<f64>, PeriodError> {
+        Ok(Outputs::from_array(floats(self.period(&inputs.to_words())?).map(f64::from)))
+    }
+}

@@ -1,0 +1,235 @@
+//! A unit's circuit: what the generator and the tests must know to instantiate `rtl/units/<unit>.v`.
+//!
+//! A unit selects among its operations by a code of its own, as short as suits it. The header of its Verilog file states
+//! the code of each instruction, and that is the only place where it stands:
+//!
+//! ```text
+//! //@ op 1'b0 fadd
+//! //@ op 1'b1 fsub
+//! ```
+//!
+//! Several instructions may share a code. A unit with a single operation has no `op` port and writes `-` for the code. A
+//! unit around another one's module has that one's codes: `//@ as alu`. The remaining ports follow from the unit's row:
+//! operands `a`, `b`, `c` as many as its instructions have sources.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::{fs, io};
+use takt_isa::{Effect, Op, ROWS, Row, Unit};
+use thiserror::Error;
+
+/// An instruction that a circuit executes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Operation {
+    /// The instruction.
+    pub op: Op,
+    /// The value of the circuit's `op` port.
+    pub code: u32,
+}
+
+/// The circuit of a unit.
+#[derive(Clone, Debug)]
+pub struct Circuit {
+    /// The row that it implements.
+    pub unit: Unit,
+    /// Width of the `op` port; 0 if it has none.
+    pub op_bits: u32,
+    /// Number of operand ports.
+    pub operands: usize,
+    /// What it executes, in the order of the table of instructions.
+    pub operations: Vec<Operation>,
+    /// Whether the module has a parameter INTERVAL beside LATENCY.
+    pub has_interval: bool,
+    /// The files that it needs, in the library, its own last.
+    pub files: Vec<String>,
+}
+
+/// The Verilog files by their names in `rtl/units/`: `add.v`, `common/takt_product.v`.
+#[derive(Clone, Debug, Default)]
+pub struct Library {
+    files: BTreeMap<String, String>,
+}
+
+/// Why a header does not describe a circuit for its unit.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum CircuitError {
+    /// The unit has no file, or names one that is not there.
+    #[error("there is no circuit `{0}`")]
+    NoFile(String),
+    /// A line that begins with `//@` cannot be read.
+    #[error(
+        "`{0}`: expected `//@ op <width>'b<bits> <mnemonic> …`, `//@ op - <mnemonic> …` or `//@ as <unit>`"
+    )]
+    Syntax(String),
+    /// Codes of different widths.
+    #[error("`{0}`: the code is not as wide as the ones before it")]
+    Width(String),
+    /// A name that is no instruction of this unit.
+    #[error("`{0}` is no instruction that the unit `{1}` offers")]
+    Foreign(String, &'static str),
+    /// An instruction in two lines.
+    #[error("`{0}` has two codes")]
+    Twice(&'static str),
+    /// Instructions that the unit's row promises and the circuit lacks.
+    #[error("no circuit for {0}: the unit offers the function, but its Verilog file names no code")]
+    Missing(String),
+}
+
+/// Whether the unit has something to compute for an instruction: all that write a register pass through their unit.
+fn computes(unit: &Unit, row: &Row) -> bool {
+    unit.functions.contains(&row.function) && row.shape.has_dest() && row.effect != Effect::Load
+}
+
+impl Library {
+    /// The files of a folder and of its folder `common`.
+    ///
+    /// # Errors
+    /// If a file cannot be read.
+    pub fn load(folder: &Path) -> io::Result<Library> {
+        let mut library = Library::default();
+        for part in ["", "common/"] {
+            for entry in fs::read_dir(folder.join(part))? {
+                let path = entry?.path();
+                if let Some(name) =
+                    path.file_name().and_then(|name| name.to_str()).filter(|name| name.ends_with(".v"))
+                {
+                    library.put(&format!("{part}{name}"), fs::read_to_string(&path)?);
+                }
+            }
+        }
+        Ok(library)
+    }
+
+    /// Adds a file or replaces it.
+    pub fn put(&mut self, name: &str, text: String) {
+        self.files.insert(name.to_owned(), text);
+    }
+
+    /// The text of a file.
+    pub fn text(&self, name: &str) -> Option<&str> {
+        self.files.get(name).map(String::as_str)
+    }
+
+    /// The circuit of a unit.
+    ///
+    /// # Errors
+    /// If its file is not there, its header cannot be read or does not give exactly the unit's instructions.
+    pub fn circuit(&self, unit: &Unit) -> Result<Circuit, CircuitError> {
+        let file = |unit: &str| {
+            let name = format!("{unit}.v");
+            let text = self.text(&name).ok_or_else(|| CircuitError::NoFile(name.clone()))?;
+            Ok::<_, CircuitError>((name, text))
+        };
+        let (own, text) = file(unit.name)?;
+        let mut files: Vec<_> =
+            self.files.keys().filter(|name| name.starts_with("common/")).cloned().collect();
+        let inner = text.lines().find_map(|line| line.strip_prefix("//@ as "));
+        let (op_bits, operations) = match inner {
+            None => codes(unit, text)?,
+            Some(inner) => {
+                let (name, text) = file(inner.trim())?;
+                files.push(name);
+                codes(unit, text)?
+            }
+        };
+        files.push(own);
+        let operands =
+            operations.iter().map(|operation| operand_ports(operation.op.row())).max().unwrap_or(0);
+        let has_interval = text.contains("parameter INTERVAL");
+        Ok(Circuit { unit: *unit, op_bits, operands, operations, has_interval, files })
+    }
+}
+
+impl Circuit {
+    /// The rows that a unit must execute.
+    pub fn rows(unit: &Unit) -> impl Iterator<Item = &'static Row> {
+        ROWS.iter().filter(move |row| computes(unit, row))
+    }
+
+    /// The parameters with which the row asks for the module.
+    pub fn parameters(&self) -> impl Iterator<Item = (&'static str, u32)> {
+        let interval = self.has_interval.then_some(("INTERVAL", self.unit.interval));
+        [("LATENCY", self.unit.latency)].into_iter().chain(interval)
+    }
+}
+
+/// The width of the `op` port and the codes that a header states.
+fn codes(unit: &Unit, text: &str) -> Result<(u32, Vec<Operation>), CircuitError> {
+    let mut operations: Vec<Operation> = Vec::new();
+    let mut width = None;
+    for line in text.lines().filter(|line| line.starts_with("//@")) {
+        let syntax = || CircuitError::Syntax(line.to_owned());
+        let mut words = line.strip_prefix("//@ op ").ok_or_else(syntax)?.split_whitespace();
+        let (bits, code) = words.next().and_then(code).ok_or_else(syntax)?;
+        if *width.get_or_insert(bits) != bits {
+            return Err(CircuitError::Width(line.to_owned()));
+        }
+        for name in words {
+            let op = Op::from_mnemonic(name)
+                .filter(|op| computes(unit, op.row()))
+                .ok_or_else(|| CircuitError::Foreign(name.to_owned(), unit.name))?;
+            if operations.iter().any(|operation| operation.op == op) {
+                return Err(CircuitError::Twice(op.row().mnemonic));
+            }
+            operations.push(Operation { op, code });
+        }
+    }
+    let missing: Vec<_> = Circuit::rows(unit)
+        .filter(|row| operations.iter().all(|operation| operation.op != row.op))
+        .map(|row| row.mnemonic)
+        .collect();
+    if !missing.is_empty() {
+        return Err(CircuitError::Missing(missing.join(", ")));
+    }
+    operations.sort_by_key(|operation| operation.op);
+    Ok((width.unwrap_or(0), operations))
+}
+
+/// Operand ports that an instruction uses: its sources, or `a` for what the core puts there in a source's place (an
+/// immediate, the status register).
+fn operand_ports(row: &Row) -> usize {
+    row.shape.sources().max(1)
+}
+
+/// `3'b010` → (3, 2); `-` → (0, 0).
+fn code(word: &str) -> Option<(u32, u32)> {
+    if word == "-" {
+        return Some((0, 0));
+    }
+    let (width, digits) = word.split_once("'b")?;
+    let width = width.parse().ok().filter(|&width| width as usize == digits.len() && width <= 16)?;
+    Some((width, u32::from_str_radix(digits, 2).ok()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use takt_isa::spec::units::{ADD, MULTIPLY};
+
+    fn parse(unit: &Unit, source: &str) -> Result<Vec<(&'static str, u32)>, String> {
+        let mut library = Library::default();
+        library.put(&format!("{}.v", unit.name), source.to_owned());
+        library
+            .circuit(unit)
+            .map(|circuit| circuit.operations.iter().map(|o| (o.op.row().mnemonic, o.code)).collect())
+            .map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn header() {
+        assert_eq!(parse(&ADD, "//@ op 1'b1 fsub\n//@ op 1'b0 fadd"), Ok(vec![("fadd", 0), ("fsub", 1)]));
+        assert_eq!(parse(&MULTIPLY, "//@ op - fmul"), Ok(vec![("fmul", 0)]));
+    }
+
+    #[test]
+    fn refused() {
+        let message = |unit, source| parse(unit, source).unwrap_err();
+        assert!(message(&ADD, "//@ op 1'b0 fadd").contains("no circuit for fsub"));
+        assert!(message(&ADD, "//@ op 1'b0 fadd\n//@ op 2'b01 fsub").contains("not as wide"));
+        assert!(message(&ADD, "//@ op 1'b0 fadd fsub fadd").contains("two codes"));
+        assert!(message(&ADD, "//@ op 1'b0 fmul").contains("no instruction that the unit `add`"));
+        assert!(message(&ADD, "//@ op 1'd0 fadd").contains("expected"));
+        assert!(message(&MULTIPLY, "").contains("no circuit for fmul"));
+        assert!(message(&MULTIPLY, "//@ as fused").contains("no circuit `fused.v`"));
+    }
+}

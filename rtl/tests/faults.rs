@@ -1,0 +1,156 @@
+//! Faults planted in the circuits, each of which the units' test must find: an edit of one place in a unit's file.
+//!
+//! By default the first of each unit, with `TAKT_FULL=1` all.
+
+#[allow(dead_code, reason = "each test uses a part of it")]
+mod harness;
+
+use harness::{Simulation, circuit, full, library};
+use takt_isa::UNITS;
+
+/// A unit, what is replaced (it occurs once), and by what.
+type Fault = (&'static str, &'static str, &'static str);
+
+#[rustfmt::skip]
+const FAULTS: &[Fault] = &[
+    // The sum's sticky bit, tie to even, subnormals, infinities, flags.
+    ("add", "shift5[0] | lost}", "shift5[0]}"),
+    ("add", "sum[3] & ((|sum[2:0]) | sum[4])", "sum[3] & ((|sum[2:0]) | 1'b1)"),
+    ("add", "(distance1[2] & (|shift2[3:0]))", "(distance1[2] & (|shift2[3:1]))"),
+    ("add", "(a_small ^ b_small) ?", "1'b0 ?"),
+    ("add", "count2         <= difference | stop", "count2         <= difference"),
+    ("add", "((i == 0) & (exponent1 == 8'd0))", "1'b0"),
+    ("add", "sign2 & ~(near_taken2 & ~|near2)", "sign2"),
+    ("add", "close & ~difference[24]", "close"),
+    ("add", "(top & top_overflows2);", "1'b0;"),
+    ("add", "up3 & (far_exponent3 == 8'd253) & (&far3)", "1'b0"),
+    ("add", "(opposed & ~a_nan & ~b_nan)", "opposed"),
+    ("add", "valid3    <= valid2", "valid3    <= valid1"),
+    ("add", "sign1      <= b_larger ? b_sign : a[31]", "sign1      <= b_larger ? b[31] : a[31]"),
+    // Rounding in either place, the shift's ends, the exponent's limits, a partial product.
+    ("multiply", "(shift2[5] & (|shift0[53:22]))", "(shift2[5] & (|shift0[53:24]))"),
+    ("multiply", "shifted3[22] & (lost3 | shifted3[23])", "shifted3[22]"),
+    ("multiply", "|deep[9:6] ? 6'd63 : deep[5:0]", "deep[5:0]"),
+    ("multiply", "5'd23 - zeros1", "5'd23"),
+    ("multiply", "a[23] | a_small}", "a[23]}"),
+    ("multiply", "infinite2 | (field2 >= 9'd254)", "infinite2"),
+    ("multiply", "up & (&kept) & (top ? field_252 : field_253 & shifted3[46])", "1'b0"),
+    ("multiply", "{1'd0, x & {5{y[4]}}, 4'd0}", "{1'd0, x & {5{y[4]}}, 4'd1}"),
+    ("multiply", "~a_small & ~b_small, y", "1'b1, y"),
+    ("multiply", "(a_special & b_zero) | (a_zero & b_special)", "a_special & b_zero"),
+    ("multiply", "zero2     <= zero1", "zero2     <= 1'b0"),
+    ("multiply", "~top & shifted3[46]", "~top"),
+    // Ties, -2^31, values below one half, the direction of saturation.
+    ("convert", "half2 & (lost2 | (addend2[0] ^ sign2))", "half2 & (lost2 | addend2[0])"),
+    ("convert", "(shift1[0] & by2[0])", "1'b0"),
+    ("convert", "& (x != 32'hcf000000)", ""),
+    ("convert", "exponent < 8'd126", "exponent < 8'd125"),
+    ("convert", "x[31] & ~nan", "x[31]"),
+    ("convert", "none & ~x[31]", "1'b0"),
+    ("convert", "up ^ sign2}", "up}"),
+    ("convert", "op0    <= op[0]", "op0    <= to_integer ^ op[0]"),
+    // Order of zeros, shifts, NaN, the last step of a shift, comparison of negative numbers.
+    ("alu", "unlike ? b[31] : ~a[31]", "unlike ? a[31] : ~a[31]"),
+    ("alu", "is_shift & op[1] & a[31]", "is_shift & op[1]"),
+    ("alu", "b[4] ^ (left & (|b[3:0]))", "b[4] ^ (left & (|b[3:1]))"),
+    ("alu", "b[4:0] <= 31 - i", "b[4:0] < 31 - i"),
+    ("alu", "is_sel & a[31]", "1'b0"),
+    ("alu", "(is_float & a_zero)", "1'b0"),
+    ("alu", "is_float & a[31];", "1'b0;"),
+    ("alu", "(ordered & any_nan)", "(ordered & any_snan)"),
+    ("alu", "(b_nan & ~is_sign)", "b_nan"),
+    ("alu", "~(is_float & any_nan)", "1'b1"),
+    ("alu", "a[31] ^ b[31] ^ less", "a[31] ^ b[31]"),
+    ("alu", "op[1] ? b[31] : a[31], b[30:0]}", "b[31], b[30:0]}"),
+    ("alu_late", "localparam WAIT = LATENCY - 2", "localparam WAIT = LATENCY - 3"),
+    // Ties of subnormal quotients, bits that the alignment shifts low, digits, the table, operations that mix, flags.
+    ("divroot", "subnormal_8 & ~s_8[1]", "1'b0"),
+    ("divroot", "{residual_6[16:0], x_6}", "{residual_6[16:0], 10'd0}"),
+    ("divroot", "{root_part, 11'h7ff}", "{root_part, 11'h000}"),
+    ("divroot", "{1'b1, coarse_2} - {10'b0, fine_2}", "{1'b1, coarse_2}"),
+    ("divroot", "less & ~subnormal", "less"),
+    ("divroot", "(subnormal & |right_2[8:5])", "1'b0"),
+    ("divroot", "(~root[1] & b_signaling)", "b_signaling"),
+    ("divroot", "& ~a_infinite & ~a_nan;", "& ~a_nan;"),
+    ("divroot", "(exponent[8] | &exponent[7:0])", "exponent[8]"),
+    ("divroot", "root[7] ? {14'b0, q2_7, 1'b0}", "root[8] ? {14'b0, q2_7, 1'b0}"),
+    ("divroot", "b_zeros & {5{~root[1]}}", "b_zeros"),
+    ("divroot", "s_8[0] ? upper : s_8[24:1]", "s_8[24:1]"),
+    ("divroot", "~(odd_1 ^ a_zeros[0])", "~odd_1"),
+    ("divroot", "a_sign_1 & ~a_zero & ~a_nan", "a_sign_1 & ~a_nan"),
+    ("divroot", "subnormal_8 & lower[23]", "1'b0"),
+    ("divroot", "{residual_6[16:0], x_6}", "{residual_6[16:0], x_6 & 10'h3fe}"),
+    ("divroot", "out_valid <= valid[8]", "out_valid <= valid[7]"),
+    // Stickiness, the alignment of subnormal quotients, flags, the least interval.
+    ("divide", "(quotient[1] | |rest[25:2])", "1'b1"),
+    ("divide", "(quotient[1] | |rest[25:2])", "(quotient[1] | |rest[25:3])"),
+    ("divide", "subnormal ? right_2[0] : less", "less"),
+    ("divide", "|waits[9:5] ? 4'd15 : waits[4:1]", "waits[4:1]"),
+    ("divide", "high ? ~less_3[26] : ~less_1[26]", "~less_1[26]"),
+    ("divide", "{8'd0, ~is_less}", "9'd0"),
+    ("divide", "is_subnormal & significand[23]", "1'b0"),
+    ("divide", "(~is_subnormal & (exponent[8] | &exponent[7:0]))", "(~is_subnormal & exponent[8])"),
+    ("divide", "b_signaling | undefined", "b_signaling"),
+    ("divide", "if (at[2]) begin", "if (at[2] | at[15]) begin"),
+    // Parity, digits, signs, flags.
+    ("root", "= twice[0];", "= ~twice[0];"),
+    ("root", "doubled & ~significand[22]", "doubled"),
+    ("root", "high ? second_1[28] : second_0[28]", "second_0[28]"),
+    ("root", "{22'd0, q[0]}", "23'd0"),
+    ("root", "sign_1 & is_zero", "sign_1"),
+    ("root", "signaling | undefined", "undefined"),
+    ("root", "- {4'd0, zeros}", "- {4'd0, zeros[4:1], 1'b0}"),
+    ("root", "if (at[1]) begin", "if (at[1] | at[13]) begin"),
+    // The constant, its alignment, quadrants, cancellation, limits, what waits for the next operation.
+    ("sine", "72'ha2f9836e4e441529fc", "72'ha2f9836e4000000000"),
+    ("sine", "{a[27] ^ a[26], a[26], ~a[25:23]}", "{a[27], a[26], ~a[25:23]}"),
+    ("sine", "{60{odd}}", "{60{1'b0}}"),
+    ("sine", "18'h3ffff", "18'h00000"),
+    ("sine", "zeros[4] <= ~|u[59:44]", "zeros[4] <= 1'b0"),
+    ("sine", "x_8[31] ^ negative", "x_8[31]"),
+    ("sine", "31'h43c90fda", "31'h43c90fdb"),
+    ("sine", "8'd115", "8'd116"),
+    ("sine", "r[50] ? r[26] : r[25]", "r[25]"),
+    ("sine", "{~quiet, 2'b00}", "3'b100"),
+    ("sine", "{3'd0, p[32:18]}", "{3'd0, p[32:19], 1'b0}"),
+    ("sine", "{sum[17:0], y_low[26:18]}", "{18'd0, y_low[26:18]}"),
+];
+
+/// Whether the units' test, at its usual size, passes.
+fn passes(unit: &str, text: String) -> Result<(), String> {
+    let unit = UNITS.iter().find(|row| row.name == unit).expect("a unit of the table");
+    let mut library = library();
+    library.put(&format!("{}.v", unit.name), text);
+    let mut simulation = Simulation::new(&library, &circuit(&library, unit)?)?;
+    let outcome = simulation.check_special_values().and_then(|_| simulation.check_random(100_000, 1));
+    simulation.remove();
+    outcome.map(|_| ())
+}
+
+#[test]
+fn planted_faults_are_found() {
+    let mut survivors = Vec::new();
+    let mut last = "";
+    for &(unit, from, to) in FAULTS {
+        if !full() && unit == last {
+            continue;
+        }
+        last = unit;
+        let library = library();
+        let text = library.text(&format!("{unit}.v")).unwrap_or_else(|| panic!("no file of `{unit}`"));
+        assert_eq!(text.matches(from).count(), 1, "`{from}` must occur once in {unit}.v");
+        let error = match passes(unit, text.replace(from, to)) {
+            Ok(()) => {
+                survivors.push(format!("{unit}: `{from}` -> `{to}`"));
+                continue;
+            }
+            Err(error) => error,
+        };
+        // It must be the operation that fails, not the build.
+        assert!(
+            error.contains("the specification") || error.contains("out_valid"),
+            "{unit}: `{from}` -> `{to}` is no circuit: {error}"
+        );
+    }
+    assert!(survivors.is_empty(), "faults that no test finds:\n{}", survivors.join("\n"));
+}

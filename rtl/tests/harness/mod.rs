@@ -1,0 +1,494 @@
+//! Units in simulation: builds a unit's Verilog with Verilator into a small program and passes operations through it.
+//! `rtl/tests/README.md` says how to use it.
+
+use std::collections::hash_map::DefaultHasher;
+use std::fs;
+use std::hash::{Hash, Hasher};
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use takt_isa::fp::{Flags, Reference, SIN_IDENTITY, SIN_LIMIT, SIN_WORST_INPUT, Value};
+use takt_isa::{Effect, Op, Unit, compute};
+use takt_rtl::{Circuit, Library};
+
+#[path = "../../../isa/tests/fp_common/mod.rs"]
+#[allow(dead_code, reason = "of the arithmetic tests' operands this needs a part")]
+mod fp_common;
+
+pub(crate) use fp_common::full;
+use fp_common::{Pairs, Random, special_values};
+
+/// The other half of [`Simulation`].
+const DRIVER: &str = include_str!("driver.cpp");
+
+/// Operations that go through the circuit in one batch.
+const BATCH: usize = 1 << 15;
+
+/// The Verilog files of the project.
+pub(crate) fn library() -> Library {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("units");
+    Library::load(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()))
+}
+
+/// A unit's circuit.
+pub(crate) fn circuit(library: &Library, unit: &Unit) -> Result<Circuit, String> {
+    library.circuit(unit).map_err(|error| format!("unit `{}`: {error}", unit.name))
+}
+
+/// Runs a tool and returns what it wrote; `Err` if it failed.
+fn run(command: &mut Command) -> Result<String, String> {
+    let program = command.get_program().to_string_lossy().into_owned();
+    let output = match command.output() {
+        Ok(output) => output,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            panic!("{program} is not installed: `cargo xtask test` installs what the tests need")
+        }
+        Err(error) => panic!("{program} cannot be started: {error}"),
+    };
+    let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    if output.status.success() { Ok(text.into_owned()) } else { Err(text.into_owned()) }
+}
+
+/// Waivers of `verilator -Wall`, each with its reason.
+const WAIVERS: &[&str] = &[
+    // A unit's file has the name of its row, `add.v`; modules have a prefix, `takt_add`, for the namespace is global.
+    "-Wno-DECLFILENAME",
+];
+
+/// Verilator's lint of a circuit. This is also how elaboration is tried.
+pub(crate) fn lint(library: &Library, circuit: &Circuit) -> Result<String, String> {
+    let folder = Folder::new(circuit, "lint");
+    run(Command::new("verilator")
+        .args(["--lint-only", "-Wall"])
+        .args(WAIVERS)
+        .args(["--top-module", circuit.unit.rtl])
+        .args(circuit.parameters().map(|(name, value)| format!("-G{name}={value}")))
+        .args(folder.write(library, circuit)))
+}
+
+/// Elaboration by Icarus Verilog, which knows nothing of what Verilator accepts beyond Verilog-2005.
+pub(crate) fn elaborate(library: &Library, circuit: &Circuit) -> Result<String, String> {
+    let folder = Folder::new(circuit, "elaborate");
+    let top = circuit.unit.rtl;
+    run(Command::new("iverilog")
+        .args(["-g2005", "-Wall", "-Wno-timescale", "-t", "null", "-s", top])
+        .args(circuit.parameters().map(|(name, value)| format!("-P{top}.{name}={value}")))
+        .args(folder.write(library, circuit)))
+}
+
+/// A folder of its own for every use, removed with everything in it.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(circuit: &Circuit, purpose: &str) -> Folder {
+        static COUNT: AtomicUsize = AtomicUsize::new(0);
+        let (process, count) = (std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+        let name = format!("{}-{purpose}-{process}-{count}", circuit.unit.name);
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+        fs::create_dir_all(&folder).expect("the target folder can be written");
+        Folder(folder)
+    }
+
+    /// Writes the files that the circuit needs and returns their paths.
+    fn write(&self, library: &Library, circuit: &Circuit) -> Vec<PathBuf> {
+        let write = |name: &String| {
+            let path = self.0.join(name.replace('/', "-"));
+            let text = library.text(name).expect("the circuit's files are those of the library");
+            fs::write(&path, text).expect("the target folder can be written");
+            path
+        };
+        circuit.files.iter().map(write).collect()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// Verilator's run-time library, compiled once for all units.
+fn runtime() -> Result<PathBuf, String> {
+    static RUNTIME: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    let build = || {
+        let root = run(Command::new("verilator").args(["--getenv", "VERILATOR_ROOT"]))?;
+        let include = Path::new(root.trim()).join("include");
+        let version = run(Command::new("verilator").arg("--version"))?;
+        let mut hasher = DefaultHasher::new();
+        version.hash(&mut hasher);
+        let folder =
+            Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("verilated-{:016x}", hasher.finish()));
+        let done = folder.join("include");
+        if done.exists() {
+            return Ok(folder);
+        }
+        fs::create_dir_all(&folder).expect("the target folder can be written");
+        for part in ["verilated", "verilated_threads"] {
+            // Under a name of its own first, for other tests do the same at the same time.
+            let object = folder.join(format!("{part}.{}.o", std::process::id()));
+            run(Command::new("g++")
+                .args(COMPILE)
+                .arg("-c")
+                .arg(include.join(format!("{part}.cpp")))
+                .arg("-o")
+                .arg(&object)
+                .args(includes(&include)))?;
+            fs::rename(object, folder.join(format!("{part}.o"))).expect("both are in one folder");
+        }
+        fs::write(&done, include.to_string_lossy().as_bytes()).expect("the target folder can be written");
+        Ok(folder)
+    };
+    RUNTIME.get_or_init(build).clone()
+}
+
+/// Flags with which everything of a simulation is compiled.
+const COMPILE: &[&str] =
+    &["-std=gnu++17", "-O2", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TRACE=0", "-faligned-new", "-pthread"];
+
+fn includes(include: &Path) -> [String; 2] {
+    [format!("-I{}", include.display()), format!("-I{}", include.join("vltstd").display())]
+}
+
+/// A unit that runs in a process of its own.
+pub(crate) struct Simulation {
+    pub(crate) circuit: Circuit,
+    program: PathBuf,
+    process: Child,
+    stdin: Option<ChildStdin>,
+    stdout: ChildStdout,
+}
+
+/// An operation for the circuit.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Request {
+    pub(crate) op: Op,
+    pub(crate) code: u32,
+    pub(crate) sources: [u32; 3],
+    /// Cycles without an operation before it, on top of the unit's interval.
+    pub(crate) idle: u32,
+}
+
+impl Simulation {
+    /// Builds a circuit and starts it. The program stays in the target folder until something of it changes.
+    pub(crate) fn new(library: &Library, circuit: &Circuit) -> Result<Simulation, String> {
+        let texts: Vec<_> = circuit.files.iter().map(|name| library.text(name)).collect();
+        let mut hasher = DefaultHasher::new();
+        (texts, DRIVER, COMPILE, circuit.unit.latency, circuit.unit.interval).hash(&mut hasher);
+        let program = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!(
+            "{}-{:016x}",
+            circuit.unit.name,
+            hasher.finish()
+        ));
+        if !program.exists() {
+            compile(library, circuit, &program)?;
+        }
+        let mut process = Command::new(&program)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(|error| format!("{}: {error}", program.display()))?;
+        let (stdin, stdout) = (process.stdin.take(), process.stdout.take());
+        Ok(Simulation { circuit: circuit.clone(), program, stdin, stdout: stdout.expect("piped"), process })
+    }
+
+    /// Removes the program, of a circuit that nobody will ask for again.
+    pub(crate) fn remove(self) {
+        let _ = fs::remove_file(&self.program);
+    }
+
+    /// Passes operations through the circuit, in order, as densely as their `idle` allows.
+    pub(crate) fn run(&mut self, requests: &[Request]) -> Result<Vec<Value>, String> {
+        let mut bytes = Vec::with_capacity(4 + 20 * requests.len());
+        bytes.extend((requests.len() as u32).to_le_bytes());
+        for request in requests {
+            let [a, b, c] = request.sources;
+            for word in [request.code, a, b, c, request.idle] {
+                bytes.extend(word.to_le_bytes());
+            }
+        }
+        // The driver reads a whole batch before it answers, so that neither side waits for the other.
+        let mut answer = vec![0; 8 * requests.len()];
+        let exchanged = self
+            .stdin
+            .as_mut()
+            .expect("open until dropped")
+            .write_all(&bytes)
+            .and_then(|()| self.stdout.read_exact(&mut answer));
+        if exchanged.is_err() {
+            self.stdin = None;
+            let mut message = String::new();
+            let stderr = self.process.stderr.as_mut().expect("piped");
+            stderr.read_to_string(&mut message).map_err(|error| error.to_string())?;
+            return Err(format!("the simulation ended: {message}"));
+        }
+        let word = |bytes: &[u8]| u32::from_le_bytes(bytes.try_into().expect("four bytes"));
+        Ok(answer
+            .chunks_exact(8)
+            .map(|bytes| {
+                // {invalid, divide_by_zero, overflow} are bits 4..2 of the status register.
+                Value::new(word(&bytes[..4]), Flags::from_bits((word(&bytes[4..]) << 2) as u8))
+            })
+            .collect())
+    }
+
+    /// Passes operations through the circuit and compares each result with the meaning of its row.
+    pub(crate) fn check(&mut self, requests: &[Request]) -> Result<(), String> {
+        for batch in requests.chunks(BATCH) {
+            for (request, got) in batch.iter().zip(self.run(batch)?) {
+                let expected = meaning(request);
+                if got != expected {
+                    return Err(mismatch(request, expected, got));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// All pairs of special values, for every operation; the third operand takes a few.
+    pub(crate) fn check_special_values(&mut self) -> Result<u64, String> {
+        let values = self.special_values();
+        let mut count = 0;
+        for operation in self.circuit.operations.clone() {
+            let sources = operation.op.row().shape.sources();
+            let mut requests = Vec::new();
+            for (i, &a) in values.iter().enumerate() {
+                for (j, &b) in values.iter().enumerate() {
+                    if sources < 2 && j > 0 {
+                        break;
+                    }
+                    let c = values[(i + 7 * j) % values.len()];
+                    requests.push(Request {
+                        op: operation.op,
+                        code: operation.code,
+                        sources: [a, b, c],
+                        idle: 0,
+                    });
+                }
+            }
+            count += requests.len() as u64;
+            self.check(&requests)?;
+        }
+        Ok(count)
+    }
+
+    fn special_values(&self) -> Vec<u32> {
+        let mut values = special_values();
+        // As integers: bounds, powers of two and their neighbours, shift counts.
+        values.extend((0..=33).chain([0x8000_0000, 0x8000_0001, 0xffff_ffff, 0xffff_ffe0, 0xffff_fffe]));
+        values.extend((6..31).flat_map(|k| [(1 << k) - 1, 1 << k, (1 << k) + 1, 1u32.wrapping_neg() << k]));
+        // The sine's limits, its largest error, and the numbers closest to a multiple of π and of π/2 (3π, 80.5π).
+        for edge in [SIN_LIMIT, SIN_IDENTITY, SIN_WORST_INPUT, 0x4116_cbe4, 0x437c_e5f1] {
+            values.extend((edge - 2..=edge + 2).flat_map(|magnitude| [magnitude, magnitude | 0x8000_0000]));
+        }
+        values.sort_unstable();
+        values.dedup();
+        values
+    }
+
+    /// `count` random operands for each operation; operations of the unit alternate at random. Half of the batches run
+    /// back to back, the others with random gaps.
+    pub(crate) fn check_random(&mut self, count: u64, seed: u64) -> Result<u64, String> {
+        let operations = self.circuit.operations.clone();
+        let mut operands = Operands::new(seed);
+        let total = count * operations.len() as u64;
+        let (mut done, mut requests) = (0, Vec::with_capacity(BATCH));
+        while done < total {
+            requests.clear();
+            let gaps = (done / BATCH as u64) % 2 == 1;
+            while requests.len() < BATCH && done < total {
+                // Each operation once in every round, in an order of the round's own.
+                let n = operations.len() as u64;
+                let (round, turn) = (done / n, done % n);
+                let operation = operations[((turn + round * 7 + round / n) % n) as usize];
+                requests.push(Request {
+                    op: operation.op,
+                    code: operation.code,
+                    sources: operands.next(operation.op),
+                    idle: if gaps { operands.gap() } else { 0 },
+                });
+                done += 1;
+            }
+            self.check(&requests)?;
+        }
+        Ok(total)
+    }
+}
+
+impl Drop for Simulation {
+    fn drop(&mut self) {
+        self.stdin = None;
+        let _ = self.process.wait();
+    }
+}
+
+/// What the specification says of an operation. What the core puts in place of a source (an immediate, the status
+/// register) passes through.
+fn meaning(request: &Request) -> Value {
+    let [a, b, c] = request.sources;
+    match request.op.row().effect {
+        Effect::Compute => compute::<Reference>(request.op, a, b, c),
+        _ => Value::exact(a),
+    }
+}
+
+fn mismatch(request: &Request, expected: Value, got: Value) -> String {
+    let Request { op, sources: [a, b, c], .. } = request;
+    let operands = match op.row().shape.sources() {
+        0 | 1 => format!("{a:#010x}"),
+        2 => format!("{a:#010x}, {b:#010x}"),
+        _ => format!("{a:#010x}, {b:#010x}, {c:#010x}"),
+    };
+    format!(
+        "{}({operands}): the circuit gives {:#010x} [{}], the specification {:#010x} [{}]",
+        op.row().mnemonic,
+        got.bits,
+        got.flags,
+        expected.bits,
+        expected.flags
+    )
+}
+
+fn compile(library: &Library, circuit: &Circuit, program: &Path) -> Result<(), String> {
+    let runtime = runtime()?;
+    let include = fs::read_to_string(runtime.join("include")).expect("written with the run-time library");
+    let folder = Folder::new(circuit, "build");
+    let (work, unit) = (&folder.0, &circuit.unit);
+    fs::write(work.join("driver.cpp"), DRIVER).expect("the target folder can be written");
+    // X becomes random: what a circuit does not initialise must not matter.
+    run(Command::new("verilator")
+        .args([
+            "--cc",
+            "-Wno-fatal",
+            "-O3",
+            "--x-assign",
+            "unique",
+            "--x-initial",
+            "unique",
+            "--prefix",
+            "Vdut",
+        ])
+        .args(WAIVERS)
+        .args(["--top-module", unit.rtl])
+        .args(circuit.parameters().map(|(name, value)| format!("-G{name}={value}")))
+        .arg("--Mdir")
+        .arg(work)
+        .args(folder.write(library, circuit)))?;
+    let written =
+        fs::read_dir(work).expect("Verilator has written it").map(|entry| entry.expect("readable").path());
+    let sources = written.filter(|path| path.extension().is_some_and(|extension| extension == "cpp"));
+    let built = work.join("simulation");
+    let mut command = Command::new("g++");
+    command.args(COMPILE).args(includes(Path::new(&include))).arg(format!("-I{}", work.display()));
+    command.args([
+        format!("-DLATENCY={}", unit.latency),
+        format!("-DINTERVAL={}", unit.interval),
+        format!("-DOPERANDS={}", circuit.operands),
+    ]);
+    if circuit.op_bits > 0 {
+        command.arg(format!("-DOP={}", circuit.op_bits));
+    }
+    command.args(sources).arg(runtime.join("verilated.o")).arg(runtime.join("verilated_threads.o"));
+    run(command.arg("-o").arg(&built))?;
+    // Others may have built the same in the meantime.
+    fs::rename(&built, program).expect("both are in the target folder");
+    Ok(())
+}
+
+/// Operands for an instruction, by the types of its sources.
+struct Operands {
+    pairs: Pairs,
+    random: Random,
+}
+
+impl Operands {
+    fn new(seed: u64) -> Operands {
+        Operands { pairs: Pairs::new(seed), random: Random::new(!seed) }
+    }
+
+    /// A number of idle cycles: mostly few, sometimes enough to empty the unit.
+    fn gap(&mut self) -> u32 {
+        match self.random.bits() >> 29 {
+            0..=3 => 0,
+            4..=6 => self.random.bits() & 3,
+            _ => self.random.bits() & 31,
+        }
+    }
+
+    /// An integer as programs have them: of any magnitude, near a power of two, with trailing zeros or ones.
+    fn integer(&mut self) -> u32 {
+        let (bits, width) = (self.random.bits(), self.random.bits() & 31);
+        let magnitude = match self.random.bits() >> 29 {
+            0 | 1 => bits,
+            2 | 3 => bits >> width,
+            4 => bits >> width << (width / 2),
+            5 => (1u32 << width).wrapping_add_signed(self.random.between(-2, 2)),
+            // Halfway between two binary32 numbers, and near it.
+            6 => (bits | 0x0100_0000) << 7 >> width & !0x7f | 0x40 | bits & 1,
+            _ => (u32::MAX << width) ^ (bits & 3),
+        };
+        if self.random.bits() & 1 == 0 { magnitude } else { magnitude.wrapping_neg() }
+    }
+
+    /// A binary32 about the range of integers, often halfway between two.
+    fn near_integer(&mut self) -> u32 {
+        let exponent = self.random.between(-3, 34);
+        let kept = 22u32.saturating_sub(exponent.max(0) as u32).min(23);
+        let fraction = match self.random.bits() >> 30 {
+            0 => self.random.bits(),
+            1 => self.random.bits() >> kept << kept,
+            2 => (self.random.bits() >> kept << kept).wrapping_sub(1),
+            _ => self.random.bits() >> kept << kept | 1,
+        };
+        self.random.bits() & 0x8000_0000 | ((127 + exponent) as u32) << 23 | fraction & 0x007f_ffff
+    }
+
+    /// Two numbers of whose product nothing lies below rounding's place but the lowest bit of all: significands with
+    /// a·b = 1 modulo 2^place, for a result that is rounded at that place, subnormal if need be.
+    fn lone_bit(&mut self) -> (u32, u32) {
+        let place = 22 + self.random.bits() % 10;
+        let (a, b) = loop {
+            let a = self.random.bits() >> 8 | 0x0080_0001;
+            // Newton's iteration doubles the correct bits; an odd number is its own inverse modulo 8.
+            let inverse = (0..4).fold(a, |x, _| x.wrapping_mul(2u32.wrapping_sub(a.wrapping_mul(x))));
+            let above = if place < 24 { self.random.bits() >> 8 >> place << place } else { 0 };
+            let b = inverse & ((1 << place) - 1) | above;
+            if b >> 23 == 1 {
+                break (a, b);
+            }
+        };
+        let sum = if place < 24 { self.random.between(128, 380) } else { 150 - place as i32 };
+        let exponent = self.random.between((sum - 254).max(1), (sum - 1).min(254));
+        let number = |significand, exponent| (exponent as u32) << 23 | significand & 0x007f_ffff;
+        let sign = self.random.bits() & 0x8000_0000;
+        (sign | number(a, exponent), number(b, sum - exponent))
+    }
+
+    fn next(&mut self, op: Op) -> [u32; 3] {
+        use takt_isa::Type::{B, F, I};
+        let row = op.row();
+        let (mut a, mut b) = self.pairs.next();
+        let mut c = self.random.bits();
+        let integers = (0..row.shape.sources()).any(|index| matches!(row.source_type(index), I | B));
+        if integers && self.random.bits() & 3 != 0 {
+            (a, b, c) = (self.integer(), self.integer(), self.integer());
+            match self.random.bits() >> 29 {
+                0 => b = a,
+                1 => b = a.wrapping_add_signed(self.random.between(-2, 2)),
+                2 => b = a ^ 1 << (self.random.bits() & 31),
+                3 => a = 0,
+                4 => a = 1 << (self.random.bits() & 31),
+                _ => (),
+            }
+        }
+        if row.shape.sources() == 2 && !integers && self.random.bits() >> 27 == 0 {
+            (a, b) = self.lone_bit();
+        }
+        if row.shape.sources() == 1 && row.source_type(0) == F && self.random.bits() & 1 == 0 {
+            a = self.near_integer();
+        }
+        [a, b, c]
+    }
+}

@@ -1,0 +1,166 @@
+// takt_alu: integer, logic, comparison, selection, and what binary32 needs without rounding.
+//
+// Contract
+//   An operation whose operands and op stand on the inputs in one cycle, with in_valid, has its result and flags on the
+//   outputs, with out_valid, LATENCY - 1 cycles later. One operation a cycle. No reset: after LATENCY cycles without
+//   in_valid nothing is left of what was before.
+//   flags = {invalid, divide by zero, overflow}. The one NaN that comes out is 7fc00000, but mov, fabs and fneg are bit
+//   operations. What an operation lacks of a, b and c is ignored. mov's code passes a for the core too: an immediate (li),
+//   the status register (rdflags).
+//
+//@ op 5'b00000 mov li rdflags
+//@ op 5'b00001 fabs
+//@ op 5'b00010 fneg
+//@ op 5'b00011 fsign
+//@ op 5'b00100 iand
+//@ op 5'b00101 ior
+//@ op 5'b00110 ixor
+//@ op 5'b01000 iadd
+//@ op 5'b01001 isub
+//@ op 5'b01100 ishr
+//@ op 5'b01101 ishl
+//@ op 5'b01110 isar
+//@ op 5'b10000 ieq
+//@ op 5'b10001 ilt
+//@ op 5'b10010 iltu
+//@ op 5'b10100 feq
+//@ op 5'b10101 flt
+//@ op 5'b10110 fle
+//@ op 5'b11000 fmin
+//@ op 5'b11001 fmax
+//@ op 5'b11010 fsat
+//@ op 5'b11011 sel
+//
+// Pipeline: one register, the result. Everything before it is one level of alternatives: the longest paths are a carry
+// chain followed by a choice, and the shifter.
+
+module takt_alu #(
+    parameter LATENCY = 2
+) (
+    input  wire        clk,
+    input  wire        in_valid,
+    input  wire [4:0]  op,
+    input  wire [31:0] a,
+    input  wire [31:0] b,
+    input  wire [31:0] c,
+    output reg         out_valid,
+    output reg  [31:0] result,
+    output reg  [2:0]  flags
+);
+
+    generate
+        if (LATENCY != 2) begin : g_latency
+            takt_alu_has_latency_2 unsupported ();
+        end
+    endgenerate
+
+    // ---- groups of operations: op[4:2] names the group, op[1:0] the member
+
+    wire is_pass    = op[4:2] == 3'b000;
+    wire is_logic   = op[4:2] == 3'b001;
+    wire is_sum     = op[4:2] == 3'b010;
+    wire is_shift   = op[4:2] == 3'b011;
+    wire is_integer = op[4:2] == 3'b100;  // comparison of integers
+    wire is_float   = op[4:2] == 3'b101;  // comparison of binary32
+    wire is_choice  = op[4:2] == 3'b110;
+
+    wire is_sign    = is_pass & (op[1:0] == 2'b11);
+    wire is_sel     = is_choice & (op[1:0] == 2'b11);
+
+    // ---- sum and difference. The difference of the low 31 bits also compares: magnitudes of binary32 numbers, and integers,
+    //      since in two's complement of like sign the low bits decide.
+
+    wire [31:0] sum = a + b;
+    wire [31:0] low_difference = {1'b0, a[30:0]} - {1'b0, b[30:0]};
+    wire        less       = low_difference[31];
+    wire [31:0] difference = {a[31] ^ b[31] ^ less, low_difference[30:0]};
+    wire [31:0] arithmetic = ({32{is_sum & ~op[0]}} & sum) | ({32{is_sum & op[0]}} & difference);
+
+    // ---- shift: a rotation to the right, for a left shift by the negative of the count, and a mask for what came round. The
+    //      steps begin with the count's low bit: each bit of the negative takes a little longer.
+
+    wire        left = op[0];
+    wire [4:0]  turn = {
+        b[4] ^ (left & (|b[3:0])), b[3] ^ (left & (|b[2:0])), b[2] ^ (left & (|b[1:0])), b[1] ^ (left & b[0]), b[0]
+    };
+    wire [31:0] turn1  = turn[0] ? {a[0], a[31:1]} : a;
+    wire [31:0] turn2  = turn[1] ? {turn1[1:0], turn1[31:2]} : turn1;
+    wire [31:0] turn4  = turn[2] ? {turn2[3:0], turn2[31:4]} : turn2;
+    wire [31:0] turn8  = turn[3] ? {turn4[7:0], turn4[31:8]} : turn4;
+    wire [31:0] turn16 = turn[4] ? {turn8[15:0], turn8[31:16]} : turn8;
+
+    wire [31:0] keep;
+    genvar i;
+    generate
+        for (i = 0; i < 32; i = i + 1) begin : g_keep
+            assign keep[i] = left ? b[4:0] <= i : b[4:0] <= 31 - i;
+        end
+    endgenerate
+    wire [31:0] shifted_in = {32{is_shift & op[1] & a[31]}} & ~keep;
+    wire [31:0] shifted    = ({32{is_shift}} & keep & turn16) | shifted_in;
+
+    // ---- comparison. `less` comes last, out of a carry chain: what holds if it is 1 and what if it is 0 stands ready.
+
+    wire equal    = a[30:0] == b[30:0];
+    wire a_zero   = a[30:0] == 31'd0;
+    wire unlike   = a[31] ^ b[31];
+    wire same     = equal & (~unlike | (is_float & a_zero));  // +0 and -0 are one number
+
+    wire a_nan    = (&a[30:23]) & (|a[22:0]);
+    wire b_nan    = (&b[30:23]) & (|b[22:0]);
+    wire any_nan  = a_nan | b_nan;
+    wire any_snan = (a_nan & ~a[22]) | (b_nan & ~b[22]);
+
+    // If the signs differ, a < b is a's sign, but b's for unsigned integers; of negative binary32 numbers the one of larger
+    // magnitude is less.
+    wire unsigned_order = is_integer & op[1];
+    wire reversed       = is_float & a[31];
+    wire before_if_less = unlike ? (unsigned_order ? b[31] : a[31]) : ~reversed;
+    wire before_if_not  = unlike ? (unsigned_order ? b[31] : a[31]) : reversed;
+    // ieq, feq: 00; ilt 01, iltu 10, flt 01: order; fle 10: both.
+    wire wants_same  = is_integer ? op[1:0] == 2'b00 : is_float & ~op[0];
+    wire wants_order = (is_integer | is_float) & (op[1:0] != 2'b00);
+    wire possible    = ~(is_float & any_nan);
+    wire holds       = possible & (same ? wants_same : wants_order & (less ? before_if_less : before_if_not));
+
+    // ---- choice between x and y, the former also for everything that does not depend on a condition
+
+    // fmin takes b if it comes before a in the order in which -0 precedes +0 (if they are equal it does not matter), fmax if
+    // it does not; fsat takes the bound if it is less; sel b and fsign ±1 if a is not zero.
+    wire       b_first_if_less = unlike ? b[31] : a[31];
+    wire       b_first_if_not  = unlike ? b[31] : ~a[31];
+    wire       y_if_less    = is_choice & (op[1] ? is_sel & a[31] : b_first_if_less ^ op[0]);
+    wire       y_if_not     = is_choice & (op[1] ? ~is_sel | a[31] : b_first_if_not ^ op[0]);
+    wire       y_if_nonzero = is_sel | is_sign;
+    wire       take_y       = (less ? y_if_less : y_if_not) | (y_if_nonzero & ~a_zero);
+
+    wire [31:0] x =
+        is_sel ? c :
+        is_logic ? (op[1] ? a ^ b : op[0] ? a | b : a & b) :
+        is_choice | (is_pass & ~is_sign) ? {(a[31] & ~(is_pass & op[0])) ^ (is_pass & op[1]), a[30:0]} :
+        32'd0;
+    wire [31:0] y =
+        is_sign ? {a[31], 31'h3f800000} :
+        {is_sel | ~op[1] ? b[31] : a[31], b[30:0]};  // fsat: the bound with the sign of a
+    wire [31:0] chosen = take_y ? y : x;
+
+    // ---- NaN and flags: equality is quiet, order is not
+
+    wire makes_nan = is_sign | (is_choice & ~is_sel);
+    wire nan       = makes_nan & (a_nan | (b_nan & ~is_sign));
+    wire quiet     = (is_choice & ~is_sel) | (is_float & (op[1:0] == 2'b00));
+    wire ordered   = is_float & (op[1:0] != 2'b00);
+    wire invalid   = (quiet & any_snan) | (ordered & any_nan) | (is_sign & a_nan & ~a[22]);
+
+    always @(posedge clk) begin
+        out_valid <= in_valid;
+        flags     <= {invalid, 2'b00};
+        // Not a case of `chosen`: so it becomes the register's synchronous set and reset.
+        if (nan) begin
+            result <= 32'h7fc00000;
+        end else begin
+            result <= chosen | arithmetic | shifted | {31'd0, holds};
+        end
+    end
+
+endmodule

@@ -1,0 +1,282 @@
+// takt_divroot: quotient and square root of binary32 numbers, correctly rounded, one operation a cycle.
+//
+// Contract
+//   An operation whose operands and op stand on the inputs in one cycle, with in_valid, has its result and flags on the
+//   outputs, with out_valid, LATENCY - 1 cycles later. One operation a cycle. No reset: after LATENCY cycles without
+//   in_valid nothing is left of what was before.
+//   flags = {invalid, divide by zero, overflow}. IEEE 754, to nearest even, with subnormals; the one NaN that comes out is
+//   7fc00000. The root is that of a; b is ignored.
+//
+//@ op 1'b0 fdiv
+//@ op 1'b1 fsqrt
+//
+// Method: very high radix. A table gives Y, less than the reciprocal of the divisor b (of the root of the radicand) by at
+// most 2^-13. With the operand x the first digit is q1 = x Y, 14 bits after the point; the residual x - q1 b (x - q1^2) is
+// exact; the second digit is q2 = residual Y (residual Y / 2), to 24 bits after the point. The result lies above s = q1 + q2
+// and by less than 2^-23, two units of s's last place, that is one unit of the significand. So s, the significand and one
+// bit more, shows how to round unless that bit is 0; then the residual of s + 2^-24 decides by its sign. The tests prove
+// this, and the widths below (rtl/tests/tables.rs).
+//
+// Range: the dividend is doubled if it is less than the divisor, so that the quotient is in [1, 2). If the quotient is
+// subnormal the dividend is instead shifted right, with all its bits, and the quotient comes out with its point where the
+// format has it. Only then can a quotient lie in the middle between two numbers: the last residual is zero.
+//
+// Pipeline, by the number that ends the names of its registers:
+//   1 classified        operands' kinds; leading zeros in groups of four shifted out
+//   2 normalised        and the table read
+//   3 reciprocal        Y; the dividend aligned
+//   4 first digit
+//   5 first product     q1 b or q1^2
+//   6 first residual
+//   7 second digit
+//   8 second product    q2 b or q2 (2 q1 + q2); s
+//   9 rounded           the outputs
+
+module takt_divroot #(
+    parameter LATENCY = 10
+) (
+    input  wire        clk,
+    input  wire        in_valid,
+    input  wire        op,
+    input  wire [31:0] a,
+    input  wire [31:0] b,
+    output reg         out_valid,
+    output reg  [31:0] result,
+    output reg  [2:0]  flags
+);
+
+    generate
+        if (LATENCY != 10) begin : g_latency
+            takt_divroot_has_latency_10 unsupported ();
+        end
+    endgenerate
+
+    // What accompanies an operation: bit k - 1 stands in stage k.
+    reg [8:1] valid, root;
+    always @(posedge clk) begin
+        valid     <= {valid[7:1], in_valid};
+        root      <= {root[7:1], op};
+        out_valid <= valid[8];
+    end
+
+    // ---- 1: kinds, and subnormals partly shifted
+
+    wire [7:0]  a_exponent, b_exponent;
+    wire [23:0] a_shifted, b_shifted;
+    wire [4:0]  a_zeros, b_zeros;
+    wire        a_zero, a_infinite, a_nan, a_signaling;
+    wire        b_zero, b_infinite, b_nan, b_signaling;
+    takt_unpack unpack_a (
+        .clk(clk), .x(a[30:0]), .exponent(a_exponent), .significand(a_shifted), .zeros(a_zeros),
+        .zero(a_zero), .infinite(a_infinite), .nan(a_nan), .signaling(a_signaling)
+    );
+    takt_unpack unpack_b (
+        .clk(clk), .x(b[30:0]), .exponent(b_exponent), .significand(b_shifted), .zeros(b_zeros),
+        .zero(b_zero), .infinite(b_infinite), .nan(b_nan), .signaling(b_signaling)
+    );
+
+    reg       a_sign_1, b_sign_1;
+    reg       odd_1;            // a's exponent field
+    reg [9:0] right_1;          // 1 less the exponent field of a quotient in [1, 2), or 1 less twice a root's
+    always @(posedge clk) begin
+        a_sign_1 <= a[31];
+        b_sign_1 <= b[31];
+        odd_1    <= a_exponent[0];
+        right_1  <= {2'b0, b_exponent & {8{~op}}} - {2'b0, a_exponent} - 10'd126;
+    end
+
+    // ---- 2: the rest of the shift; what the result is if it is no number; the table's rows
+
+    // An even exponent field is an odd exponent: then the radicand is in [2, 4).
+    wire       doubled = ~(odd_1 ^ a_zeros[0]);
+    wire [5:0] zeros_difference = {1'b0, b_zeros & {5{~root[1]}}} - {1'b0, a_zeros};
+    wire       any_nan = a_nan | (~root[1] & b_nan);
+    wire       undefined = root[1] ? a_sign_1 & ~a_zero & ~a_nan : (a_zero & b_zero) | (a_infinite & b_infinite);
+
+    reg [23:0] a_2, b_2;
+    reg        sign_2, nan_2, infinite_2, zero_2, invalid_2, by_zero_2;
+    reg [9:0]  right_2;
+    always @(posedge clk) begin
+        a_2        <= a_shifted;
+        b_2        <= b_shifted;
+        sign_2     <= (a_sign_1 ^ (b_sign_1 & ~root[1])) & ~any_nan & ~undefined;
+        nan_2      <= any_nan | undefined;
+        infinite_2 <= a_infinite | (~root[1] & b_zero);
+        zero_2     <= a_zero | (~root[1] & b_infinite);
+        invalid_2  <= a_signaling | (~root[1] & b_signaling) | undefined;
+        by_zero_2  <= ~root[1] & b_zero & ~a_zero & ~a_infinite & ~a_nan;
+        right_2    <= right_1 - {{4{zeros_difference[5]}}, zeros_difference};
+    end
+
+    wire [14:0] coarse_2;
+    wire [5:0]  fine_2;
+    takt_reciprocal_table table_of_reciprocals (
+        .clk(clk),
+        .coarse_row(root[1] ? {1'b1, doubled, a_shifted[22:14]} : {1'b0, b_shifted[22:13]}),
+        .fine_row(root[1] ? {1'b1, doubled, a_shifted[22:19], a_shifted[13:9]} : {1'b0, b_shifted[22:18], b_shifted[12:8]}),
+        .coarse(coarse_2),
+        .fine(fine_2)
+    );
+
+    // ---- 3: Y; x, the dividend or radicand, with 47 bits after the point
+
+    wire        subnormal = ~root[2] & ~right_2[9];     // also the least exponent of normal quotients
+    wire        less = a_2 < b_2;
+    wire        left = root[2] ? ~right_2[0] : less & ~subnormal;
+    wire [4:0]  right = right_2[4:0] & {5{subnormal}};
+    wire [48:0] aligned_by_8 = {1'b0, a_2, 24'b0} >> {right[4:3], 3'b0};
+    wire [48:0] aligned_by_2 = aligned_by_8 >> {right[2:1], 1'b0};
+
+    reg [15:0] y_3;
+    reg [48:0] x_3;
+    reg [23:0] b_3;
+    reg        sign_3, nan_3, infinite_3, zero_3, invalid_3, by_zero_3;
+    reg        subnormal_3, left_3;
+    reg [9:0]  exponent_3;      // of a quotient in [1, 2), or twice a root's
+    always @(posedge clk) begin
+        y_3         <= {1'b1, coarse_2} - {10'b0, fine_2};
+        x_3         <= left ? aligned_by_2 << 1 : right[0] ? aligned_by_2 >> 1 : aligned_by_2;
+        b_3         <= b_2;
+        sign_3      <= sign_2;
+        nan_3       <= nan_2;
+        infinite_3  <= infinite_2;
+        // From a shift of 25 on nothing could be rounded up; from 32 on it is not made.
+        zero_3      <= zero_2 | (subnormal & |right_2[8:5]);
+        invalid_3   <= invalid_2;
+        by_zero_3   <= by_zero_2;
+        subnormal_3 <= subnormal;
+        left_3      <= left;
+        exponent_3  <= 10'd1 - right_2;
+    end
+
+    // ---- 4: the first digit; exponent and flags, for good
+
+    wire [35:0] first_product;
+    takt_product first_digit (.clk(clk), .a(x_3[48:31]), .b({2'b0, y_3}), .p(first_product));
+    wire [14:0] q1_4 = first_product[32:18];
+
+    wire [9:0]  exponent = root[3] ? {1'b0, exponent_3[9:1]} : exponent_3 - {9'b0, left_3};
+    wire        number = ~nan_3 & ~infinite_3 & ~zero_3;
+    wire        too_large = number & ~subnormal_3 & (exponent[8] | &exponent[7:0]);
+    wire        ones = nan_3 | infinite_3 | too_large;
+
+    // Of these only the first three and the last matter to the datapath, which is right for numbers whose exponent fits.
+    reg        fixed_4;         // not a number, infinite or zero: the fraction is nan_4's
+    reg        nan_4;
+    reg        subnormal_4;     // only if the result is not fixed
+    reg [7:0]  exponent_4;      // 0 if subnormal_4: then the significand's leading bit is the exponent
+    reg [2:0]  flags_4;
+    reg        sign_4;
+    reg [36:0] x_4;             // the residual is small: its upper bits are known
+    reg [15:0] y_4;
+    reg [23:0] b_4;
+    always @(posedge clk) begin
+        fixed_4     <= ~number | too_large;
+        nan_4       <= nan_3;
+        subnormal_4 <= subnormal_3 & number;
+        exponent_4  <= {8{ones}} | (exponent[7:0] & {8{number & ~subnormal_3}});
+        flags_4     <= {invalid_3, by_zero_3, too_large};
+        sign_4      <= sign_3;
+        x_4         <= x_3[36:0];
+        y_4         <= y_3;
+        b_4         <= b_3;
+    end
+
+    // ---- 5: q1 b, or q1^2 as the upper product alone
+
+    wire [35:0] low_5, high_5;
+    takt_product first_low  (.clk(clk), .a({3'b0, q1_4}), .b({9'b0, b_4[8:0] & {9{~root[4]}}}), .p(low_5));
+    takt_product first_high (.clk(clk), .a({3'b0, q1_4}), .b({3'b0, root[4] ? q1_4 : b_4[23:9]}), .p(high_5));
+
+    reg [14:0] q1_5;
+    reg [36:0] x_5;
+    reg [15:0] y_5;
+    reg [23:0] b_5;
+    reg [14:0] beside_5;
+    always @(posedge clk) begin
+        q1_5     <= q1_4;
+        x_5      <= x_4;
+        y_5      <= y_4;
+        b_5      <= b_4;
+        beside_5 <= {sign_4, fixed_4, nan_4, subnormal_4, exponent_4, flags_4};
+    end
+
+    // ---- 6: the residual, 37 bits after the point, in [0, 2^-10)
+
+    reg [26:0] residual_6;
+    reg [9:0]  x_6;
+    reg [14:0] q1_6;
+    reg [15:0] y_6;
+    reg [23:0] b_6;
+    reg [14:0] beside_6;
+    always @(posedge clk) begin
+        residual_6 <= x_5[36:10] - low_5[26:0] - {high_5[17:0], 9'b0};
+        x_6        <= x_5[9:0];
+        q1_6       <= q1_5;
+        y_6        <= y_5;
+        b_6        <= b_5;
+        beside_6   <= beside_5;
+    end
+
+    // ---- 7: the second digit; the last residual, modulo 2^27, begins: 47 bits after the point for a quotient, 48 for a root
+
+    wire [35:0] second_product;
+    takt_product second_digit (.clk(clk), .a(residual_6[26:9]), .b({2'b0, y_6}), .p(second_product));
+    wire [11:0] q2_7 = root[7] ? second_product[32:21] : second_product[31:20];
+
+    // For a root also less the parts of 2 (s + 2^-25) that are known.
+    wire [15:0] root_part = residual_6[15:0] + ~{1'b0, q1_6};
+    reg [26:0] last_7;
+    reg [14:0] q1_7;
+    reg [23:0] b_7;
+    reg [14:0] beside_7;
+    always @(posedge clk) begin
+        last_7   <= root[6] ? {root_part, 11'h7ff} : {residual_6[16:0], x_6};
+        q1_7     <= q1_6;
+        b_7      <= b_6;
+        beside_7 <= beside_6;
+    end
+
+    // ---- 8: q2 b or q2 (2 q1 + q2), in two parts; s, the significand and a bit
+
+    wire [35:0] low_8, high_8;
+    takt_product second_low  (.clk(clk), .a({6'b0, q2_7}), .b(root[7] ? {6'b0, q2_7} : {7'b0, b_7[10:0]}), .p(low_8));
+    takt_product second_high (.clk(clk), .a({6'b0, q2_7}), .b(root[7] ? {3'b0, q1_7} : {5'b0, b_7[23:11]}), .p(high_8));
+
+    reg [26:0] last_8;
+    reg [24:0] s_8;
+    reg        sign_8, fixed_8, nan_8, subnormal_8;
+    reg [7:0]  exponent_8;
+    reg [2:0]  flags_8;
+    always @(posedge clk) begin
+        last_8 <= last_7 - (root[7] ? {14'b0, q2_7, 1'b0} : {3'b0, b_7});
+        s_8    <= {q1_7, 10'b0} + {13'b0, q2_7};
+        {sign_8, fixed_8, nan_8, subnormal_8, exponent_8, flags_8} <= beside_7;
+    end
+
+    // ---- 9: the last residual's sign, and the choice
+
+    // In the middle, rounding to even goes down if the significand is even: then the residual must exceed zero.
+    wire        tie_down = subnormal_8 & ~s_8[1];
+    wire [26:0] last = last_8 - low_8[26:0] - {high_8[15:0], 10'b0, tie_down};
+    wire [23:0] upper = s_8[24:1] + 24'd1;
+    wire [23:0] lower = s_8[0] ? upper : s_8[24:1];
+
+    // The sign comes last. What else there is to say of bits 23 and 22 is said before.
+    wire [1:0]  upper_top = {exponent_8[0] | (subnormal_8 & upper[23]), fixed_8 ? nan_8 : upper[22]};
+    wire [1:0]  lower_top = {exponent_8[0] | (subnormal_8 & lower[23]), fixed_8 ? nan_8 : lower[22]};
+
+    always @(posedge clk) begin
+        result[31:24] <= {sign_8, exponent_8[7:1]};
+        result[23:22] <= last[26] ? lower_top : upper_top;
+        result[21:0]  <= last[26] ? lower[21:0] : upper[21:0];
+        if (fixed_8) begin
+            result[21:0] <= 22'd0;
+        end
+        flags <= flags_8;
+    end
+
+    wire unused = &{1'b0, root[8], exponent_3[9], exponent[9:8], first_product[35:33], first_product[17:0], low_5[35:27],
+                    high_5[35:18], second_product[35:33], second_product[19:0], low_8[35:27], high_8[35:16], last[25:0]};
+
+endmodule

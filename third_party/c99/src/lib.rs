@@ -1,0 +1,18 @@
+//! The five C99 `<stdint.h>` "fast" types that `softfloat-sys` names, as they
+//! are on x86-64 Linux (glibc: 8 bits stay 8, wider ones become 64).
+//!
+//! The published `c99` crate finds them by running CMake. These machines have
+//! none, and a build of Takt must need only Rust and a C compiler.
+#![no_std]
+#![allow(non_camel_case_types)]
+
+/// `int_fast32_t`.
+pub type int_fast32_t = i64;
+/// `int_fast64_t`.
+pub type int_fast64_t = i64;
+/// `uint_fast8_t`.
+pub type uint_fast8_t = u8;
+/// `uint_fast32_t`.
+pub type uint_fast32_t = u64;
+/// `uint_fast64_t`.
+pub type uint_fast64_t = u64;

@@ -1,0 +1,31 @@
+//! The generated documents.
+
+use anyhow::{Context, Result, bail};
+use std::path::Path;
+
+/// Generated files: path from the project's folder, and contents.
+fn generated() -> Vec<(&'static str, String)> {
+    vec![("docs/isa.md", takt_isa::manual::markdown())]
+}
+
+/// Writes every generated file, or checks that it is as it would be written.
+pub(crate) fn run(root: &Path, check: bool) -> Result<()> {
+    let mut stale = Vec::new();
+    for (path, contents) in generated() {
+        let file = root.join(path);
+        let is_fresh = std::fs::read_to_string(&file).is_ok_and(|old| old == contents);
+        if is_fresh {
+            continue;
+        }
+        if check {
+            stale.push(path);
+        } else {
+            std::fs::write(&file, contents).with_context(|| format!("cannot write {path}"))?;
+            println!("wrote {path}");
+        }
+    }
+    if !stale.is_empty() {
+        bail!("stale: {}; `cargo xtask docs` writes it anew", stale.join(", "));
+    }
+    Ok(())
+}

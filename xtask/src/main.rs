@@ -1,0 +1,172 @@
+//! Project automation. `cargo xtask --help` lists what there is.
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
+mod docs;
+
+use anyhow::{Context, Result, bail};
+use clap::{Parser, Subcommand};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Project automation for Takt.
+#[derive(Parser)]
+#[command(name = "cargo xtask")]
+struct Arguments {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Install what the tests need and is not there, then run every test, optimised.
+    Test {
+        /// Exhaustive: all 2³² operands of every operation of one operand (about ten minutes on two cores).
+        #[arg(long)]
+        full: bool,
+        /// Passed on to `cargo test`.
+        #[arg(last = true)]
+        rest: Vec<String>,
+    },
+    /// Write the generated documents, or with --check fail if one is stale.
+    Docs {
+        /// Change nothing; fail if a generated file differs from the specification.
+        #[arg(long)]
+        check: bool,
+    },
+    /// Format, lints, generated files: what CI checks before the tests.
+    Lint,
+    /// Fuzz the assembler and the image loader, one after the other (installs cargo-fuzz if it is not there).
+    Fuzz {
+        /// Minutes for each target.
+        #[arg(long, default_value_t = 10)]
+        minutes: u32,
+    },
+}
+
+fn main() -> Result<()> {
+    match Arguments::parse().task {
+        Task::Test { full, rest } => test(full, &rest),
+        Task::Docs { check } => docs::run(&root(), check),
+        Task::Lint => lint(),
+        Task::Fuzz { minutes } => fuzz(minutes),
+    }
+}
+
+/// The project's folder.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("xtask lies in the project").to_owned()
+}
+
+fn run(command: &mut Command) -> Result<()> {
+    let text = format!("{command:?}").replace('"', "");
+    eprintln!("$ {text}");
+    let status = command.status().with_context(|| format!("cannot start `{text}`"))?;
+    if !status.success() {
+        bail!("`{text}` failed ({status})");
+    }
+    Ok(())
+}
+
+fn cargo() -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.current_dir(root());
+    command
+}
+
+fn works(program: &str, argument: &str) -> bool {
+    Command::new(program).arg(argument).output().is_ok_and(|output| output.status.success())
+}
+
+/// What the tests call, how to ask whether it works, and the Debian package that has it.
+const TOOLS: [(&str, &str, &str); 1] = [
+    // Berkeley SoftFloat, the reference arithmetic, is C.
+    ("cc", "--version", "gcc"),
+];
+
+/// Installs with apt-get what the tests call and is not there.
+fn install() -> Result<()> {
+    let missing = TOOLS.iter().filter(|(tool, ask, _)| !works(tool, ask));
+    let packages: Vec<&str> = missing.map(|(_, _, package)| *package).collect();
+    if packages.is_empty() {
+        return Ok(());
+    }
+    eprintln!("installing {} with apt-get: the tests call them", packages.join(" "));
+    run(Command::new("apt-get").args(["update", "-qq"]))?;
+    let mut install = Command::new("apt-get");
+    install.args(["install", "-y", "-qq", "--no-install-recommends", "libc6-dev"]).args(packages);
+    run(install.env("DEBIAN_FRONTEND", "noninteractive"))
+}
+
+fn test(full: bool, rest: &[String]) -> Result<()> {
+    install()?;
+    let mut tests = cargo();
+    tests.args(["test", "--workspace", "--release"]).args(rest);
+    if full {
+        tests.env("TAKT_FULL", "1");
+    }
+    run(&mut tests)
+}
+
+fn lint() -> Result<()> {
+    run(cargo().args(["fmt", "--all", "--check"]))?;
+    run(cargo().args(["clippy", "--workspace", "--all-targets", "--release", "--", "-D", "warnings"]))?;
+    // isa, asm and emu stand without C: SoftFloat is a feature.
+    run(cargo().args([
+        "check",
+        "--release",
+        "--no-default-features",
+        "-p",
+        "takt-isa",
+        "-p",
+        "takt-asm",
+        "-p",
+        "takt-emu",
+    ]))?;
+    docs::run(&root(), true)
+}
+
+fn fuzz(minutes: u32) -> Result<()> {
+    if !works("cargo-fuzz", "--version") {
+        eprintln!("cargo-fuzz is missing: installing it");
+        run(cargo().args(["install", "cargo-fuzz", "--locked"]))?;
+    }
+    seed()?;
+    for target in ["assemble", "image"] {
+        // cargo-fuzz wants unstable compiler flags; the variable admits them on the stable compiler. Leaks are not looked for:
+        // chumsky's recursive parsers keep each other alive, two kilobytes for each source.
+        run(cargo()
+            .env("RUSTC_BOOTSTRAP", "1")
+            .env("ASAN_OPTIONS", "detect_leaks=0")
+            .args(["fuzz", "run", target, "--"])
+            .args([
+                format!("-max_total_time={}", 60 * minutes),
+                "-max_len=65536".to_owned(),
+                "-rss_limit_mb=4096".to_owned(),
+                "-timeout=60".to_owned(),
+            ]))?;
+    }
+    Ok(())
+}
+
+/// What fuzzing starts from: the sources there are, and images of the programs.
+fn seed() -> Result<()> {
+    let (sources, images) = (root().join("fuzz/corpus/assemble"), root().join("fuzz/corpus/image"));
+    std::fs::create_dir_all(&sources)?;
+    std::fs::create_dir_all(&images)?;
+    for folder in ["programs/hybrid", "asm/tests/accepted", "asm/tests/mistakes"] {
+        for entry in
+            std::fs::read_dir(root().join(folder)).with_context(|| format!("cannot read {folder}"))?
+        {
+            let path = entry?.path();
+            if let Some(name) = path.file_name().filter(|_| path.is_file()) {
+                std::fs::copy(&path, sources.join(name))?;
+            }
+        }
+    }
+    for machine in ["t3", "t1"] {
+        let image = images.join(format!("{machine}.takt"));
+        let source = "programs/hybrid/tracking.s";
+        run(cargo().args(["run", "--release", "-q", "--", "asm", source, "-m", machine, "-o"]).arg(image))?;
+    }
+    Ok(())
+}
