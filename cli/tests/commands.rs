@@ -4,7 +4,7 @@ mod common;
 
 use common::{Done, Folder, source};
 use std::collections::BTreeMap;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 
 /// The columns of a CSV by title.
 fn columns(csv: &str) -> BTreeMap<String, Vec<String>> {
@@ -482,8 +482,16 @@ fn outputs_go_where_they_are_sent() {
     assert!(folder.path().join("link").is_symlink());
     assert!(folder.read("real").starts_with(b"\x7fELF"));
     assert_eq!(std::fs::metadata(&real).unwrap().permissions().mode() & 0o777, 0o640);
-    folder.line("asm prog.s -o /dev/null --listing /dev/null").ok();
-    assert!(!std::fs::metadata("/dev/null").unwrap().is_file());
+    // What is no regular file is written, never replaced. A pipe stands for /dev/null, which a mistake here would destroy.
+    let pipe = folder.path().join("pipe");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let reader = std::thread::spawn({
+        let pipe = pipe.clone();
+        move || std::fs::read(pipe).unwrap()
+    });
+    folder.line("asm prog.s -o pipe").ok();
+    assert!(!std::fs::metadata(&pipe).unwrap().is_file());
+    assert!(reader.join().unwrap().starts_with(b"\x7fELF"));
 
     std::fs::set_permissions(&real, std::fs::Permissions::from_mode(0o440)).unwrap();
     let done = folder.line("asm prog.s -o real --schedule on");

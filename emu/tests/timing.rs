@@ -194,12 +194,18 @@ fn unit_accepts_one_operation_every_interval() {
 /// Rule 6: two results of a bank never reach its write port in one cycle; the later bundle tries cycle by cycle.
 #[test]
 fn write_port_takes_one_result_a_cycle() {
-    let (add, divide) = (latency(&T1, Function::Add), latency(&T1, Function::Divide));
-    assert_eq!(divide, latency(&T1, Function::Root), "quotient and root come in successive cycles");
+    let [add, divide, root] =
+        [Function::Add, Function::Divide, Function::Root].map(|function| latency(&T1, function));
+    // The root comes one cycle after the quotient.
+    let root_at = divide + 1 - root;
     // The sum, issued in `at`, would come with the quotient; one later with the root; one later it comes alone.
     let at = divide - add;
-    let nops = "nop\n".repeat(at as usize - 2);
-    let source = format!(".preset r0 2.0\nfdiv r1, r0, r0\nfsqrt r2, r0\n{nops}fadd r3, r0, r0\nnop");
+    let nops = |count: u64| "nop\n".repeat(count as usize);
+    let source = format!(
+        ".preset r0 2.0\nfdiv r1, r0, r0\n{}fsqrt r2, r0\n{}fadd r3, r0, r0\nnop",
+        nops(root_at - 1),
+        nops(at - root_at - 1)
+    );
     let cycles: Vec<u64> = (0..at).chain([at + 2, at + 3]).collect();
     check(&T1, &source, &cycles, &[((at as Address, Cause::WritePort { slot: 0 }), 2)]);
     // Banks have a port each.

@@ -78,9 +78,14 @@ fn works(program: &str, argument: &str) -> bool {
 }
 
 /// What the tests call, how to ask whether it works, and the Debian package that has it.
-const TOOLS: [(&str, &str, &str); 1] = [
+const TOOLS: [(&str, &str, &str); 5] = [
     // Berkeley SoftFloat, the reference arithmetic, is C.
     ("cc", "--version", "gcc"),
+    // The circuit runs in Verilator, which builds with make and a C++ compiler, and in Icarus Verilog.
+    ("c++", "--version", "g++"),
+    ("make", "--version", "make"),
+    ("verilator", "--version", "verilator"),
+    ("iverilog", "-V", "iverilog"),
 ];
 
 /// Installs with apt-get what the tests call and is not there.
