@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use takt_isa::MACHINES;
+use takt_rtl::export::synthesis_top;
 use takt_rtl::{Design, Library, export};
 
 fn write(design: &Design) -> Vec<String> {
@@ -31,12 +32,12 @@ fn lint() {
         let paths = write(&design);
         silent(
             Command::new("verilator")
-                .args(["--lint-only", "-Wall", "--top-module", &design.top])
+                .args(["--lint-only", "-Wall", "--top-module", &synthesis_top(machine)])
                 .args(&paths),
         );
         silent(
             Command::new("iverilog")
-                .args(["-g2005", "-Wall", "-Wno-timescale", "-t", "null", "-s", &design.top])
+                .args(["-g2005", "-Wall", "-Wno-timescale", "-t", "null", "-s", &synthesis_top(machine)])
                 .args(&paths),
         );
     }
