@@ -148,18 +148,13 @@ fn fuzz(minutes: u32) -> Result<()> {
     }
     seed()?;
     for target in ["assemble", "image"] {
-        // cargo-fuzz wants unstable compiler flags; the variable admits them on the stable compiler. Leaks are not looked for:
-        // chumsky's recursive parsers keep each other alive, two kilobytes for each source.
-        run(cargo()
-            .env("RUSTC_BOOTSTRAP", "1")
-            .env("ASAN_OPTIONS", "detect_leaks=0")
-            .args(["fuzz", "run", target, "--"])
-            .args([
-                format!("-max_total_time={}", 60 * minutes),
-                "-max_len=65536".to_owned(),
-                "-rss_limit_mb=4096".to_owned(),
-                "-timeout=60".to_owned(),
-            ]))?;
+        // cargo-fuzz wants unstable compiler flags; the variable admits them on the stable compiler.
+        run(cargo().env("RUSTC_BOOTSTRAP", "1").args(["fuzz", "run", target, "--"]).args([
+            format!("-max_total_time={}", 60 * minutes),
+            "-max_len=65536".to_owned(),
+            "-rss_limit_mb=4096".to_owned(),
+            "-timeout=60".to_owned(),
+        ]))?;
     }
     Ok(())
 }
