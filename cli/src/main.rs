@@ -20,6 +20,7 @@ mod ports;
 mod report;
 mod run;
 mod select;
+mod trace;
 mod track;
 
 use anyhow::Result;
