@@ -21,6 +21,7 @@ mod report;
 mod run;
 mod select;
 mod synthesis;
+mod trace;
 mod track;
 
 use anyhow::Result;
