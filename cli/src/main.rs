@@ -22,6 +22,8 @@ mod report;
 mod rtl;
 mod run;
 mod select;
+mod synthesis;
+mod trace;
 mod track;
 
 use anyhow::Result;

@@ -10,6 +10,7 @@ pub mod circuit;
 mod decode;
 pub mod export;
 mod files;
+pub mod synthesis;
 pub mod tables;
 
 pub use circuit::{Circuit, CircuitError, Library, Operation};
