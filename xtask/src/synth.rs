@@ -5,7 +5,7 @@
 
 use crate::venv::{NEXTPNR, Venv, YOSYS};
 use crate::{docs, root};
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::Value;
 use std::collections::BTreeMap;
