@@ -173,7 +173,7 @@ fn core(machine: &'static Machine, library: &Library, ecp5: bool) -> Result<Desi
         .context("the core has no file")?;
     let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
     for line in top.text.lines().take_while(|line| !line.starts_with(");")) {
-        let mut words = line.trim_start().split_whitespace();
+        let mut words = line.split_whitespace();
         let ports = match words.next() {
             Some("input") => &mut inputs,
             Some("output") => &mut outputs,
