@@ -6,20 +6,31 @@
 .include "robot.s"
 .schedule on
 
-.const  gain = Ts*KI                    ; of the integrator, without boost
+; What is measured is in counts of the encoder; mu is the inertia by which an axis' acceleration is multiplied at once, where
+; it is constant.
+.const  J    = J0 + ms*c^2              ; kg·m², an arm about its pivot, with its slider
+.const  Rc   = R/lcount                 ; counts
+.const  mu1 = 1
+.const  mu2 = 1
+.const  mu3 = 1
+.const  mu4  = J44
+.const  mu5  = J55
+.rep i, 1, 5
+.const  gain{i} = mu{i}*KI*Ts*count{i}  ; of the integrator, without boost
+.endr
 
 ; ---- State, kept between periods ----------------------------------------------------------------------------------
 .rep i, 1, 5
 .state  np{i}:int                       ; counts one period ago
-.state  s{i}                            ; integrator, times KI
-.state  boost{i}                        ; (φ_t + 1)·Ts·KI as tc alone gives it, for the second half of the boost
+.state  s{i}                            ; integrator, times KI·mu{i}
+.state  boost{i}                        ; (φ_t + 1)·gain{i} as tc alone gives it, for the second half of the boost
 .state  sg{i}                           ; sign of the reference velocity one period ago
 .endr
 
 .once
         .rep i, 1, 5
         mov     s{i}, zero
-        mov     boost{i}, gain          ; the specification starts tc at 1 s, beyond Tc: no boost at power-on
+        mov     boost{i}, gain{i}       ; the specification starts tc at 1 s, beyond Tc: no boost at power-on
         mov     sg{i}, zero
         .endr
         wait    first
@@ -30,6 +41,7 @@ first:                                  ; before the first period: previous posi
 
 .period
 period:
+        .late   n1, n2, n3, n4, n5 = 5  ; what needs no measurement goes before the sample, for up to 5 cycles
 
 ; ---- 1. Inverse kinematics with derivatives, (7)-(11) --------------------------------------------------------------
 ; With |p_i| = R: l² = |d|² = x² + y² + z² + R² - 2·(x·xp + y·yp), and likewise d·v = x·vx + y·vy + z·vz - (xp·vx + yp·vy).
@@ -37,16 +49,17 @@ period:
 ; addition rounds at the size of the sum.
 .const  xp = sqrt(3)/2*R                ; xp_2 = -xp_3; yp_1 = R, yp_2 = yp_3 = -R/2
 .macro  arms    s, f, px, py, sum       ; s_i = sum - f·(px·xp_i + py·yp_i), i = 1, 2, 3
-.reg    px2 py2 both py1
+.reg    px2 py2 e2 e3 py1
         fmul    px2, px, f*xp
         fmul    py2, py, f*R/2
-        fadd    both, sum, py2
-        fsub    {s}2, both, px2
-        fadd    {s}3, both, px2
-        fmul    py1, py, f*R
+        fsub    e2, py2, px2
+        fadd    e3, py2, px2
+        fadd    {s}2, sum, e2
+        fadd    {s}3, sum, e3
+        fadd    py1, py2, py2           ; yp_1 = -2·yp_2
         fsub    {s}1, sum, py1
 .endm
-.reg    xx yy zz xy  ll1 ll2 ll3  r1 r2 r3
+.reg    xx yy zz xy  ll1 ll2 ll3
         fmul    xx, x, x
         fmul    yy, y, y
         fmul    zz, z, z
@@ -57,7 +70,6 @@ period:
         .rep i, 1, 3
         fadd    ll{i}, ll{i}, R^2 + 0.5
         fsqrt   l{i}d, ll{i}            ; l = |d|
-        fdiv    r{i}, 1.0, l{i}d
         .endr
 
 ; v = (d·(vx,vy,vz)) / l
@@ -69,7 +81,7 @@ period:
         fadd    dv, dv, zv
         arms    dv, 1, vx, vy, dv
         .rep i, 1, 3
-        fmul    v{i}d, dv{i}, r{i}
+        fdiv    v{i}d, dv{i}, l{i}d
         .endr
 
 ; a = (vx² + vy² + vz² + d·(ax,ay,az) - v²) / l
@@ -89,7 +101,7 @@ period:
         .rep i, 1, 3
         fmul    w{i}, v{i}d, v{i}d
         fsub    da{i}, da{i}, w{i}
-        fmul    a{i}d, da{i}, r{i}
+        fdiv    a{i}d, da{i}, l{i}d
         .endr
 
 ; Table, (18)-(20).
@@ -100,62 +112,58 @@ period:
         mov     ep4d, eps_alpha
         mov     ep5d, eps_gamma
 
-; ---- 2. Encoders to positions and velocities; the difference of counts is exact -------------------------------------
+; ---- 2. Encoders: counts as they are, and counts per period; both exact ------------------------------------------------
 .rep i, 1, 5
-.reg    p{i} dn{i}:int vel{i}
+.reg    p{i} dn{i}:int dp{i}
         itof    p{i}, n{i}
-        fmul    p{i}, p{i}, count{i}
         isub    dn{i}, n{i}, np{i}
         mov     np{i}, n{i}
-        itof    vel{i}, dn{i}
-        fmul    vel{i}, vel{i}, count{i}/Ts
+        itof    dp{i}, dn{i}
 .endr
 
 ; ---- 3. Forward kinematics, (14)-(15) --------------------------------------------------------------------------------
-; With u = (l1² - l2²)/(3R²), w = (l1² - l3²)/(3R²): y = -R/2·(u + w), x = -√3R/2·(w - u).
+; With u = l1² - l2², w = l1² - l3²: y = -(u + w)/(6R), x = -(w - u)/(2√3R).
 .reg    q1 q2 q3  u w uw  wu fx fxx fy fyy fzz fz
         .rep i, 1, 3
         fmul    q{i}, p{i}, p{i}
         .endr
         fsub    u, q1, q2
         fsub    w, q1, q3
-        fmul    u, u, 1/(3*R^2)
-        fmul    w, w, 1/(3*R^2)
         fadd    uw, u, w
         fsub    wu, w, u
-        fmul    fx, wu, sqrt(3)/2*R     ; -x
+        fmul    fx, wu, 1/(2*sqrt(3)*Rc) ; -x
         fmul    fxx, fx, fx
-        fmul    fy, uw, R/2
-        fadd    fy, fy, R               ; R - y
+        fmul    fy, uw, 1/(6*Rc)
+        fadd    fy, fy, Rc              ; R - y
         fmul    fyy, fy, fy
         fsub    fzz, q1, fxx
         fsub    fzz, fzz, fyy
         fsqrt   fz, fzz                 ; z = √(l1² - x² - (y - R)²)
 
 ; ---- 4. Reduced masses, (23) ------------------------------------------------------------------------------------------
-; With b_i = √½/l_i: c_ij = (l_i² + l_j² - 3R²)·b_i·b_j, and
+; With b_i = kb/l_i: 2·kb²·c_ij = (l_i² + l_j² - 3R²)·b_i·b_j, and
 ; M_ii = m_s + m_p + Σ_j [m_s·c_ij² + κ_j·(1 - c_ij²)] = 3·m_s + m_p - Σ_j (m_s - κ_j)·(1 - c_ij²),
-; m_s - κ_j = b_j·(2√2·m_s·c - 2·(J0 + m_s·c²)·b_j).
+; m_s - κ_j = 2·m_s·c/l_j - J/l_j² = J/kb²·b_j·(2·kb·m_s·c/J - b_j). kb is such that the factors before, J/kb² and 1/(2·kb²)², are
+; together 1; it has the unit of l, which is counts.
+.const  kb = (J/(4*lcount^2))^(1/6)
 .reg    b1 b2 b3  t12 t13 t23 qm  s12 s13 s23  k1 k2 k3  M1 M2 M3
         .rep i, 1, 3
-        fdiv    b{i}, sqrt(0.5), p{i}
+        fdiv    b{i}, kb, p{i}
         .endr
-        fsub    qm, q1, 3*R^2
+        fsub    qm, q1, 3*Rc^2
         fadd    t12, qm, q2
         fadd    t13, qm, q3
-        fsub    qm, q2, 3*R^2
-        fadd    t23, qm, q3
+        fsub    t23, t12, w
         .rep i, 1, 3
-        fmul    k{i}, b{i}, 2*(J0 + ms*c^2)
-        fsub    k{i}, 2*sqrt(2)*ms*c, k{i}
+        fsub    k{i}, 2*kb*ms*c/J*lcount, b{i}
         fmul    k{i}, k{i}, b{i}
         .endr
-.macro  sine2   i, j                    ; s_ij = 1 - c_ij²
+.macro  sine2   i, j                    ; s_ij = (2·kb²)²·(1 - c_ij²)
 .reg    bb
         fmul    bb, b{i}, b{j}
         fmul    bb, bb, t{i}{j}
         fmul    bb, bb, bb
-        fsub    s{i}{j}, 1.0, bb
+        fsub    s{i}{j}, 4*kb^4, bb
 .endm
         sine2   1, 2
         sine2   1, 3
@@ -172,16 +180,16 @@ period:
         mass    3, 1, s13, 2, s23
 
 ; ---- 5. Gravity, (24)-(25), in closed form ----------------------------------------------------------------------------
-; G_i = l_i·λ_i·m_z·g/z; λ1 = 1/3 - (u + w)/3, λ2 = λ1 + u, λ3 = λ1 + w; m_z = m_p + 3·m_s + q·Σ 1/l_i.
+; G_i = l_i·λ_i·m_z·g/z; 3R²·λ1 = R² - (u + w)/3, 3R²·λ2 = 3R²·λ1 + u, 3R²·λ3 = 3R²·λ1 + w; m_z = m_p + 3·m_s + q·Σ 1/l_i.
 .reg    la1 la2 la3 third sb mg  G1 G2 G3
         fmul    third, uw, 1/3
-        fsub    la1, 1/3, third
+        fsub    la1, Rc^2, third
         fadd    la2, la1, u
         fadd    la3, la1, w
         fadd    sb, b1, b2
         fadd    sb, sb, b3
-        fmul    mg, sb, q*sqrt(2)*g
-        fadd    mg, mg, (mp + 3*ms)*g
+        fmul    mg, sb, q/(kb*lcount)*g/(3*Rc^2)
+        fadd    mg, mg, (mp + 3*ms)*g/(3*Rc^2)
         fdiv    mg, mg, fz
         .rep i, 1, 3
         fmul    G{i}, p{i}, la{i}
@@ -190,53 +198,56 @@ period:
 
 ; ---- 6. Table dynamics, (27) --------------------------------------------------------------------------------------------
 .reg    G4
-        fsin    G4, p4
+        fmul    G4, p4, count4
+        fsin    G4, G4
         fmul    G4, G4, rm4*g
 
 ; ---- 7, 8. Control law, (28), (36), with the nonlinear integrator, (29)-(35), (37) -----------------------------------------
-; The integrator is kept times KI, so its gain is (φ_t + 1)·Ts·KI. In place of tc the gain itself is kept: it starts at 2ξc - 1 times
-; Ts·KI when the sign changes (tc = 0), and falls by the same amount every period, to ξc times at tc = Tc/2 and to 1 at tc = Tc. It is
+; The integrator is kept times KI·mu, so its gain is (φ_t + 1)·gain. In place of tc the gain itself is kept: it starts at 2ξc - 1 times
+; `gain` when the sign changes (tc = 0), and falls by the same amount every period, to ξc times at tc = Tc/2 and to 1 at tc = Tc. It is
 ; compared half a step off, where rounding does not matter.
-.const  fall = 2*(xc - 1)*Ts/Tc*gain
-.macro  integrator i, vd, e             ; s_i = sat(s_i + (φ_t + 1)·Ts·KI·e)
+.const  fall = 2*(xc - 1)*Ts/Tc         ; in a period, of `gain`
+.macro  integrator i, vd, e             ; s_i = sat(s_i + (φ_t + 1)·gain·e)
 .reg    sg same:int later ramp eabs large:int early:int step
         fsign   sg, vd
         feq     same, sg, sg{i}
         mov     sg{i}, sg
-        fsub    later, boost{i}, fall
-        fmax    later, later, gain
-        sel     boost{i}, same, later, (2*xc - 1)*gain
+        fsub    later, boost{i}, fall*gain{i}
+        fmax    later, later, gain{i}
+        sel     boost{i}, same, later, (2*xc - 1)*gain{i}
         fabs    eabs, e
-        fle     large, ec{i}, eabs      ; φ_e
-        sel     ramp, large, boost{i}, gain
-        fle     early, xc*gain - fall/2, boost{i} ; tc ≤ Tc/2
-        sel     ramp, early, xc*gain, ramp
-        sel     ramp, same, ramp, gain  ; tc ≤ 0: no boost in the period of the reversal itself
+        fle     large, ec{i}/count{i}, eabs ; φ_e
+        sel     ramp, large, boost{i}, gain{i}
+        fle     early, (xc - fall/2)*gain{i}, boost{i} ; tc ≤ Tc/2
+        sel     ramp, early, xc*gain{i}, ramp
+        sel     ramp, same, ramp, gain{i} ; tc ≤ 0: no boost in the period of the reversal itself
         fmul    step, ramp, e
         fadd    step, s{i}, step
-        fsat    s{i}, step, smax{i}*KI
+        fsat    s{i}, step, smax{i}*KI*mu{i}
 .endm
-.macro  control i, qd, vd, ad           ; acc_i = a_d + KP·e + KV·(v_d - v) + KI·s
-.reg    e ev
-        fsub    e, qd, p{i}
-        fsub    ev, vd, vel{i}
+.macro  control i, qd, vd, ad, to       ; to = mu·[(a_d + KV·v_d) - KV·v + KP·e + KI·s]
+.reg    qc ff e
+        fmul    qc, qd, 1/count{i}
+        fmul    ff, vd, mu{i}*KV
+        fadd    ff, ad, ff              ; up to here no measurement
+        fsub    e, qc, p{i}
         integrator i, vd, e
-        fmul    e, e, KP
-        fmul    ev, ev, KV
-        fadd    e, e, ev
+        fmul    dp{i}, dp{i}, mu{i}*KV*count{i}/Ts
+        fsub    ff, ff, dp{i}
+        fmul    e, e, mu{i}*KP*count{i}
         fadd    e, e, s{i}
-        fadd    acc{i}, ad, e
+        fadd    to, ff, e
 .endm
-.reg    acc1 acc2 acc3 acc4 acc5
+.reg    acc1 acc2 acc3 acc4  am4 am5
         .rep i, 1, 3
-        control i, l{i}d, v{i}d, a{i}d
+        control i, l{i}d, v{i}d, a{i}d, acc{i}
         fmul    acc{i}, acc{i}, M{i}
         fadd    F{i}, acc{i}, G{i}
         .endr
-        control 4, alpha, omega_alpha, eps_alpha
-        fmul    acc4, acc4, J44
+        fmul    am4, eps_alpha, mu4
+        control 4, alpha, omega_alpha, am4, acc4
         fadd    tau4, acc4, G4
-        control 5, gamma, omega_gamma, eps_gamma
-        fmul    tau5, acc5, J55
+        fmul    am5, eps_gamma, mu5
+        control 5, gamma, omega_gamma, am5, tau5
 
         wait    period
