@@ -6,31 +6,22 @@
 .include "robot.s"
 .schedule on
 
-; What is measured is in counts of the encoder; mu is the inertia by which an axis' acceleration is multiplied at once, where
-; it is constant.
+.const  gain = Ts*KI                    ; of the integrator, without boost
 .const  J    = J0 + ms*c^2              ; kg·m², an arm about its pivot, with its slider
-.const  Rc   = R/lcount                 ; counts
-.const  mu1 = 1
-.const  mu2 = 1
-.const  mu3 = 1
-.const  mu4  = J44
-.const  mu5  = J55
-.rep i, 1, 5
-.const  gain{i} = mu{i}*KI*Ts*count{i}  ; of the integrator, without boost
-.endr
+.const  Rc   = R/lcount                 ; R in counts
 
 ; ---- State, kept between periods ----------------------------------------------------------------------------------
 .rep i, 1, 5
 .state  np{i}:int                       ; counts one period ago
-.state  s{i}                            ; integrator, times KI·mu{i}
-.state  boost{i}                        ; (φ_t + 1)·gain{i} as tc alone gives it, for the second half of the boost
+.state  s{i}                            ; integrator, times KI
+.state  boost{i}                        ; (φ_t + 1)·Ts·KI as tc alone gives it, for the second half of the boost
 .state  sg{i}                           ; sign of the reference velocity one period ago
 .endr
 
 .once
         .rep i, 1, 5
         mov     s{i}, zero
-        mov     boost{i}, gain{i}       ; the specification starts tc at 1 s, beyond Tc: no boost at power-on
+        mov     boost{i}, gain          ; the specification starts tc at 1 s, beyond Tc: no boost at power-on
         mov     sg{i}, zero
         .endr
         wait    first
@@ -41,7 +32,7 @@ first:                                  ; before the first period: previous posi
 
 .period
 period:
-        .late   n1, n2, n3, n4, n5 = 5  ; what needs no measurement goes before the sample, for up to 5 cycles
+        .late   n1, n2, n3, n4, n5 = 2  ; what needs no measurement goes before the sample, for up to 2 cycles
 
 ; ---- 1. Inverse kinematics with derivatives, (7)-(11) --------------------------------------------------------------
 ; With |p_i| = R: l² = |d|² = x² + y² + z² + R² - 2·(x·xp + y·yp), and likewise d·v = x·vx + y·vy + z·vz - (xp·vx + yp·vy).
@@ -112,20 +103,23 @@ period:
         mov     ep4d, eps_alpha
         mov     ep5d, eps_gamma
 
-; ---- 2. Encoders: counts as they are, and counts per period; both exact ------------------------------------------------
+; ---- 2. Encoders to positions and velocities; the difference of counts is exact -------------------------------------
+; Of the velocity only KV·v is wanted, and lengths are wanted in counts, too: exact up to 2^24, 4 m.
 .rep i, 1, 5
-.reg    p{i} dn{i}:int dp{i}
-        itof    p{i}, n{i}
+.reg    p{i} c{i} dn{i}:int vel{i}
+        itof    c{i}, n{i}
+        fmul    p{i}, c{i}, count{i}
         isub    dn{i}, n{i}, np{i}
         mov     np{i}, n{i}
-        itof    dp{i}, dn{i}
+        itof    vel{i}, dn{i}
+        fmul    vel{i}, vel{i}, KV*count{i}/Ts
 .endr
 
-; ---- 3. Forward kinematics, (14)-(15) --------------------------------------------------------------------------------
+; ---- 3. Forward kinematics, (14)-(15), in counts ---------------------------------------------------------------------
 ; With u = l1² - l2², w = l1² - l3²: y = -(u + w)/(6R), x = -(w - u)/(2√3R).
 .reg    q1 q2 q3  u w uw  wu fx fxx fy fyy fzz fz
         .rep i, 1, 3
-        fmul    q{i}, p{i}, p{i}
+        fmul    q{i}, c{i}, c{i}
         .endr
         fsub    u, q1, q2
         fsub    w, q1, q3
@@ -140,15 +134,14 @@ period:
         fsub    fzz, fzz, fyy
         fsqrt   fz, fzz                 ; z = √(l1² - x² - (y - R)²)
 
-; ---- 4. Reduced masses, (23) ------------------------------------------------------------------------------------------
+; ---- 4. Reduced masses, (23), in kg ------------------------------------------------------------------------------------
 ; With b_i = kb/l_i: 2·kb²·c_ij = (l_i² + l_j² - 3R²)·b_i·b_j, and
 ; M_ii = m_s + m_p + Σ_j [m_s·c_ij² + κ_j·(1 - c_ij²)] = 3·m_s + m_p - Σ_j (m_s - κ_j)·(1 - c_ij²),
-; m_s - κ_j = 2·m_s·c/l_j - J/l_j² = J/kb²·b_j·(2·kb·m_s·c/J - b_j). kb is such that the factors before, J/kb² and 1/(2·kb²)², are
-; together 1; it has the unit of l, which is counts.
-.const  kb = (J/(4*lcount^2))^(1/6)
+; m_s - κ_j = 2·m_s·c/l_j - J/l_j² = J/kb²·b_j·(2·kb·m_s·c/J - b_j). kb is such that the factors J/kb² and 1/(2·kb²)² cancel.
+.const  kb = (J/4/lcount^2)^(1/6)       ; counts; in the formula m
 .reg    b1 b2 b3  t12 t13 t23 qm  s12 s13 s23  k1 k2 k3  M1 M2 M3
         .rep i, 1, 3
-        fdiv    b{i}, kb, p{i}
+        fdiv    b{i}, kb, c{i}
         .endr
         fsub    qm, q1, 3*Rc^2
         fadd    t12, qm, q2
@@ -192,62 +185,59 @@ period:
         fadd    mg, mg, (mp + 3*ms)*g/(3*Rc^2)
         fdiv    mg, mg, fz
         .rep i, 1, 3
-        fmul    G{i}, p{i}, la{i}
+        fmul    G{i}, c{i}, la{i}
         fmul    G{i}, G{i}, mg
         .endr
 
 ; ---- 6. Table dynamics, (27) --------------------------------------------------------------------------------------------
 .reg    G4
-        fmul    G4, p4, count4
-        fsin    G4, G4
+        fsin    G4, p4
         fmul    G4, G4, rm4*g
 
 ; ---- 7, 8. Control law, (28), (36), with the nonlinear integrator, (29)-(35), (37) -----------------------------------------
-; The integrator is kept times KI·mu, so its gain is (φ_t + 1)·gain. In place of tc the gain itself is kept: it starts at 2ξc - 1 times
-; `gain` when the sign changes (tc = 0), and falls by the same amount every period, to ξc times at tc = Tc/2 and to 1 at tc = Tc. It is
+; The integrator is kept times KI, so its gain is (φ_t + 1)·Ts·KI. In place of tc the gain itself is kept: it starts at 2ξc - 1 times
+; Ts·KI when the sign changes (tc = 0), and falls by the same amount every period, to ξc times at tc = Tc/2 and to 1 at tc = Tc. It is
 ; compared half a step off, where rounding does not matter.
-.const  fall = 2*(xc - 1)*Ts/Tc         ; in a period, of `gain`
-.macro  integrator i, vd, e             ; s_i = sat(s_i + (φ_t + 1)·gain·e)
+.const  fall = 2*(xc - 1)*Ts/Tc*gain
+.macro  integrator i, vd, e             ; s_i = sat(s_i + (φ_t + 1)·Ts·KI·e)
 .reg    sg same:int later ramp eabs large:int early:int step
         fsign   sg, vd
         feq     same, sg, sg{i}
         mov     sg{i}, sg
-        fsub    later, boost{i}, fall*gain{i}
-        fmax    later, later, gain{i}
-        sel     boost{i}, same, later, (2*xc - 1)*gain{i}
+        fsub    later, boost{i}, fall
+        fmax    later, later, gain
+        sel     boost{i}, same, later, (2*xc - 1)*gain
         fabs    eabs, e
-        fle     large, ec{i}/count{i}, eabs ; φ_e
-        sel     ramp, large, boost{i}, gain{i}
-        fle     early, (xc - fall/2)*gain{i}, boost{i} ; tc ≤ Tc/2
-        sel     ramp, early, xc*gain{i}, ramp
-        sel     ramp, same, ramp, gain{i} ; tc ≤ 0: no boost in the period of the reversal itself
+        fle     large, ec{i}, eabs      ; φ_e
+        sel     ramp, large, boost{i}, gain
+        fle     early, xc*gain - fall/2, boost{i} ; tc ≤ Tc/2
+        sel     ramp, early, xc*gain, ramp
+        sel     ramp, same, ramp, gain  ; tc ≤ 0: no boost in the period of the reversal itself
         fmul    step, ramp, e
         fadd    step, s{i}, step
-        fsat    s{i}, step, smax{i}*KI*mu{i}
+        fsat    s{i}, step, smax{i}*KI
 .endm
-.macro  control i, qd, vd, ad, to       ; to = mu·[(a_d + KV·v_d) - KV·v + KP·e + KI·s]
-.reg    qc ff e
-        fmul    qc, qd, 1/count{i}
-        fmul    ff, vd, mu{i}*KV
+.macro  control i, qd, vd, ad           ; acc_i = (a_d + KV·v_d) - KV·v + KP·e + KI·s
+.reg    ff e
+        fmul    ff, vd, KV
         fadd    ff, ad, ff              ; up to here no measurement
-        fsub    e, qc, p{i}
+        fsub    e, qd, p{i}
         integrator i, vd, e
-        fmul    dp{i}, dp{i}, mu{i}*KV*count{i}/Ts
-        fsub    ff, ff, dp{i}
-        fmul    e, e, mu{i}*KP*count{i}
+        fsub    ff, ff, vel{i}
+        fmul    e, e, KP
         fadd    e, e, s{i}
-        fadd    to, ff, e
+        fadd    acc{i}, ff, e
 .endm
-.reg    acc1 acc2 acc3 acc4  am4 am5
+.reg    acc1 acc2 acc3 acc4 acc5
         .rep i, 1, 3
-        control i, l{i}d, v{i}d, a{i}d, acc{i}
+        control i, l{i}d, v{i}d, a{i}d
         fmul    acc{i}, acc{i}, M{i}
         fadd    F{i}, acc{i}, G{i}
         .endr
-        fmul    am4, eps_alpha, mu4
-        control 4, alpha, omega_alpha, am4, acc4
+        control 4, alpha, omega_alpha, eps_alpha
+        fmul    acc4, acc4, J44
         fadd    tau4, acc4, G4
-        fmul    am5, eps_gamma, mu5
-        control 5, gamma, omega_gamma, am5, tau5
+        control 5, gamma, omega_gamma, eps_gamma
+        fmul    tau5, acc5, J55
 
         wait    period
