@@ -9,6 +9,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use takt_isa::Program;
 use takt_isa::timing::Cycle;
 use takt_rtl::Design;
+use takt_rtl::bench::{LoadRecord, Space, load_records};
 use takt_rtl::export::RESET_CYCLES;
 use thiserror::Error;
 
@@ -241,27 +242,6 @@ pub struct Simulation {
     stdout: Option<ChildStdout>,
 }
 
-/// What the loader writes: space (0 program, 1 data, 2 registers, 3 input ports), slot, address, value.
-pub fn load_records(program: &Program) -> Vec<[u64; 4]> {
-    let machine = program.machine;
-    let slots = machine.slots.len();
-    let mut records = Vec::new();
-    // The rest of the program memory must be illegal words, the rest of the data memory zero.
-    for i in 0..machine.code_depth as usize * slots {
-        let word = program.code.get(i).copied().unwrap_or(0);
-        records.push([0, (i % slots) as u64, (i / slots) as u64, word]);
-    }
-    for i in 0..machine.data_depth as usize {
-        records.push([1, 0, i as u64, program.data.get(i).copied().unwrap_or(0).into()]);
-    }
-    for &(register, bits) in &program.constants {
-        let input = machine.inputs.contains(register);
-        let address = if input { register - machine.inputs.base } else { register };
-        records.push([if input { 3 } else { 2 }, 0, address.into(), bits.into()]);
-    }
-    records
-}
-
 impl Simulation {
     fn send(&mut self, words: &[u32]) -> Result<(), ModelError> {
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
@@ -288,13 +268,17 @@ impl Simulation {
     /// # Errors
     /// If the process has ended.
     pub fn load(&mut self, program: &Program, inputs: &[(u16, u32)]) -> Result<(), ModelError> {
-        let mut records = load_records(program);
         let base = program.machine.inputs.base;
-        records
-            .extend(inputs.iter().map(|&(register, bits)| [3, 0, u64::from(register - base), bits.into()]));
+        let first = inputs.iter().map(|&(register, bits)| LoadRecord {
+            space: Space::Input,
+            slot: 0,
+            address: register.saturating_sub(base),
+            value: bits.into(),
+        });
+        let records: Vec<LoadRecord> = load_records(program).into_iter().chain(first).collect();
         let mut words = vec![1, records.len() as u32];
-        for [space, slot, address, value] in records {
-            words.extend([space as u32, slot as u32, address as u32, value as u32, (value >> 32) as u32]);
+        for LoadRecord { space, slot, address, value } in records {
+            words.extend([space as u32, slot.into(), address.into(), value as u32, (value >> 32) as u32]);
         }
         self.send(&words)
     }
@@ -350,8 +334,8 @@ impl Simulation {
 
 impl Drop for Simulation {
     fn drop(&mut self) {
-        self.stdin = None;
-        let _ = self.process.kill();
+        // It ends when nobody speaks or listens to it.
+        (self.stdin, self.stdout) = (None, None);
         let _ = self.process.wait();
     }
 }

@@ -49,6 +49,8 @@ pub struct Design {
     pub top: String,
     /// Verilog files, each with the one module of its name.
     pub files: Vec<DesignFile>,
+    /// The core on a few pins, for a synthesis without a board.
+    pub synthesis: String,
     /// Modules that take the place of those of the same name on Lattice ECP5.
     pub ecp5: Vec<DesignFile>,
 }
@@ -147,7 +149,6 @@ pub fn export(machine: &'static Machine, library: &Library) -> Result<Design, Ex
         }
     };
     put(format!("{top}.v"), plan.core(&top));
-    put(format!("{}.v", synthesis_top(machine)), plan.synthesis(&top));
     for slot in &plan.slots {
         let name = format!("{top}_decode_{}", slot.slot.name);
         put(format!("{name}.v"), slot.module(machine, &name, plan.index));
@@ -165,7 +166,7 @@ pub fn export(machine: &'static Machine, library: &Library) -> Result<Design, Ex
     }
     let ecp5 =
         ECP5.iter().map(|&(name, text)| DesignFile { name: format!("ecp5/{name}"), text: text.to_owned() });
-    Ok(Design { machine, top, files, ecp5: ecp5.collect() })
+    Ok(Design { machine, synthesis: plan.synthesis(&top), top, files, ecp5: ecp5.collect() })
 }
 
 macro_rules! line {

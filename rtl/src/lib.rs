@@ -5,6 +5,7 @@
 //! ([`circuit`]), the tables of `takt-isa` say how many operands they have and how long they take, and [`export()`] writes the
 //! complete core of a machine.
 
+pub mod bench;
 pub mod circuit;
 mod decode;
 pub mod export;
