@@ -98,7 +98,7 @@ fn one(arguments: &Cosim, file: &Path, color: bool, out: &mut Out) -> Result<()>
         }
     };
     let (design, model) = model(program.machine)?;
-    let ran = run_rows(&program, &rows, model.start(None)?);
+    let ran = run_rows(&program, &rows, model.start(&[])?);
     let result = match ran {
         Ok(result) => result,
         Err(error) => {
@@ -168,7 +168,7 @@ fn many(arguments: &Cosim, out: &mut Out) -> Result<()> {
     let count = arguments.programs.unwrap_or(1);
     let Some(end) = first.checked_add(count) else { bail!("seeds end at {}", u64::MAX) };
     let (design, model) = model(machine)?;
-    let mut simulation = model.start(None)?;
+    let mut simulation = model.start(&[])?;
     let mut coverage = random::Coverage::default();
     for seed in first..end {
         simulation = match random::run(seed, machine, simulation, &mut coverage) {
@@ -259,7 +259,7 @@ fn waveform(
     again: impl FnOnce(Simulation) -> Result<(), LockstepError>,
 ) -> Result<bool> {
     let model = Model::build(design, &cache_folder(), true)?;
-    let mut simulation = model.start(Some(&arguments.waveform))?;
+    let mut simulation = model.start(&[arguments.waveform.as_os_str()])?;
     simulation.trace(difference.cycle.saturating_sub(SHOWN.0), difference.cycle + SHOWN.1)?;
     Ok(matches!(again(simulation), Err(LockstepError::Difference(_))))
 }

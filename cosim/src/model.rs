@@ -1,6 +1,7 @@
 //! A core in Verilator: built once for each design and kept, run as a process.
 
 use std::collections::hash_map::DefaultHasher;
+use std::ffi::OsStr;
 use std::fs;
 use std::hash::{Hash, Hasher};
 use std::io::{ErrorKind, Read, Write};
@@ -124,13 +125,13 @@ impl Model {
         compiled.map(|()| Model { program })
     }
 
-    /// Starts a simulation. `waveform` is where a model that can trace writes its waveform.
+    /// Starts a simulation. A model that can trace writes its waveform to the first argument; others are Verilog's plusargs.
     ///
     /// # Errors
     /// If the process cannot be started.
-    pub fn start(&self, waveform: Option<&Path>) -> Result<Simulation, ModelError> {
+    pub fn start(&self, arguments: &[&OsStr]) -> Result<Simulation, ModelError> {
         let mut process = Command::new(&self.program)
-            .args(waveform)
+            .args(arguments)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
