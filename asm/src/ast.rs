@@ -292,6 +292,8 @@ pub enum DirectiveKind {
     Error(String),
     /// `.schedule` and `on` or `off`.
     Schedule(Name),
+    /// `.loop_bound`.
+    LoopBound(Expr),
 }
 
 /// One place of a `.loc`.
@@ -354,6 +356,7 @@ directives! {
     Loc ".loc" "\"file\" line";
     Error ".error" "\"text\"";
     Schedule ".schedule" "on|off";
+    LoopBound ".loop_bound" "turns";
     Raw ".raw" "slot 0x…";
 }
 

@@ -538,6 +538,7 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
     let schedule = is(Directive::Schedule)
         .ignore_then(name.clone().labelled("`on` or `off`"))
         .map(DirectiveKind::Schedule);
+    let loop_bound = is(Directive::LoopBound).ignore_then(expr.clone()).map(DirectiveKind::LoopBound);
     let error = is(Directive::Error).ignore_then(text()).map(DirectiveKind::Error);
     let at = text()
         .then(expr.clone().labelled("a line number"))
@@ -548,7 +549,7 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
         .map(DirectiveKind::Loc);
     choice((
         bare, declare, float, word, constant, preset, space, branch, elif, rep, macro_, include, error, loc,
-        schedule,
+        schedule, loop_bound,
     ))
     .map_with(|kind, e| Body::Directive(kind, e.span()))
 }

@@ -3,6 +3,7 @@
 
 mod account;
 mod asm;
+mod bound;
 mod completions;
 mod controller;
 mod disasm;
@@ -56,6 +57,7 @@ enum Command {
     Asm(asm::Asm),
     Disasm(disasm::Disasm),
     Run(run::Run),
+    Bound(bound::Bound),
     Eval(eval::Eval),
     Isa(isa::Isa),
     Machines(machines::Machines),
@@ -69,6 +71,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Asm(asm) => asm::run(asm, color, out),
         Command::Disasm(disasm) => disasm::run(disasm, color),
         Command::Run(run) => run::run(run, color, out),
+        Command::Bound(bound) => bound::run(bound, color, out),
         Command::Eval(eval) => eval::run(eval, out),
         Command::Isa(isa) => isa::run(isa, out),
         Command::Machines(machines) => machines::run(machines, out),
