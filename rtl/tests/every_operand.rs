@@ -56,8 +56,8 @@ fn sine() {
 
 #[test]
 #[ignore = "takes hours"]
-fn root() {
-    every_operand("root", Op::fsqrt);
+fn divroot_serial() {
+    every_operand("divroot_serial", Op::fsqrt);
 }
 
 #[test]

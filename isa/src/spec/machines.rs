@@ -103,7 +103,7 @@ pub static T1: Machine = Machine {
     slots: &[Slot {
         name: "one",
         bank: bank("r", 0, 512),
-        units: &[ADD, CONVERT, MULTIPLY, DIVIDE, ROOT, SINE, ALU_LATE, MEMORY, SEQUENCER],
+        units: &[ADD, CONVERT, MULTIPLY, DIVROOT_SERIAL, SINE, ALU_LATE, MEMORY, SEQUENCER],
     }],
     inputs: bank("i", 768, 256),
     outputs_per_bank: 32,
