@@ -2,6 +2,7 @@
 //!
 //! A fault replaces one expression. All of a machine's stand in one simulation, which chooses one by `+fault=`; without it,
 //! the circuit is as it was.
+#![allow(clippy::print_stdout)]
 
 mod common;
 

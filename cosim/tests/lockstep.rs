@@ -1,4 +1,5 @@
 //! The circuit of every machine against the emulator.
+#![allow(clippy::print_stdout)]
 
 mod common;
 

@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 use std::{fs, thread};
 use takt_isa::spec::machines::MACHINES;
 use takt_isa::{Machine, UNITS, Unit};
-use takt_rtl::export::synthesis_top;
+use takt_rtl::export::{export, synthesis_top};
 use takt_rtl::synthesis::{self, Resources, Synthesis};
 use takt_rtl::{Circuit, Library};
 
@@ -30,6 +30,13 @@ const SEEDS: u32 = 5;
 const TARGET_MHZ: u32 = 200;
 /// Options of `synth_lattice`. Without the slices' wide multiplexers the logic is a third less and not slower.
 const OPTIONS: &str = "-nowidelut";
+
+/// Where the pins of a machine's top level are (those of the ULX3S board). Without a fixed place the placer takes ten times as long.
+const PINS: &str = "LOCATE COMP \"clk\" SITE \"G2\";
+LOCATE COMP \"rst\" SITE \"D6\";
+LOCATE COMP \"serial_in\" SITE \"R18\";
+LOCATE COMP \"serial_out\" SITE \"U1\";
+";
 
 /// What is measured, and how.
 #[derive(clap::Args)]
@@ -81,6 +88,7 @@ struct Design {
     name: String,
     files: BTreeMap<String, String>,
     top: String,
+    pins: &'static str,
     wrapper: Resources,
 }
 
@@ -131,7 +139,8 @@ fn place(design: &str) -> usize {
 
 fn designs(arguments: &Arguments) -> Result<Vec<Design>> {
     let mut library = Library::load(&root().join("rtl/units")).context("cannot read rtl/units")?;
-    if arguments.device != Device::CycloneV {
+    let ecp5 = arguments.device != Device::CycloneV;
+    if ecp5 {
         let product = fs::read_to_string(root().join("rtl/ecp5/takt_product.v"))?;
         library.put("common/takt_product.v", product);
     }
@@ -140,7 +149,7 @@ fn designs(arguments: &Arguments) -> Result<Vec<Design>> {
             let names: Vec<_> = MACHINES.iter().map(|machine| machine.name).collect();
             format!("there is no machine `{}`; there are {}", arguments.machine, names.join(", "))
         })?;
-        return Ok(vec![core(machine, &library)?]);
+        return Ok(vec![core(machine, &library, ecp5)?]);
     }
     let all = |unit: &&Unit| library.text(&format!("{}.v", unit.name)).is_some();
     let offered: Vec<&Unit> = UNITS.iter().filter(all).collect();
@@ -157,15 +166,17 @@ fn designs(arguments: &Arguments) -> Result<Vec<Design>> {
     Ok(designs)
 }
 
-/// A machine.
-fn core(machine: &'static Machine, library: &Library) -> Result<Design> {
-    let design = takt_rtl::export(machine, library)?;
-    let top = synthesis_top(machine);
-    let flat = |name: &str| name.replace('/', "_");
-    let mut files: BTreeMap<_, _> =
-        design.files.into_iter().map(|file| (flat(&file.name), file.text)).collect();
-    files.insert(format!("{top}.v"), design.synthesis);
-    Ok(Design { name: machine.name.to_owned(), files, top, wrapper: Resources::default() })
+/// A machine with its memories, as `takt rtl` writes it: on a few pins, what serves verification only left out.
+fn core(machine: &'static Machine, library: &Library, ecp5: bool) -> Result<Design> {
+    let core = export(machine, library)?;
+    let mut files = BTreeMap::new();
+    for file in core.files.iter().chain(core.ecp5.iter().filter(|_| ecp5)) {
+        let name = file.name.rsplit('/').next().unwrap_or(&file.name);
+        files.insert(name.to_owned(), file.text.clone());
+    }
+    files.insert("synthesis.v".to_owned(), core.synthesis);
+    let wrapper = Resources::default();
+    Ok(Design { name: machine.name.to_owned(), files, top: synthesis_top(machine), pins: PINS, wrapper })
 }
 
 /// A unit between registers, on few pins: the operands come out of a shift register and a second register, the results go
@@ -213,7 +224,7 @@ endmodule
     );
     // 9 LUT4 for the groups of four, 3 for the rest. A constant output has no register: the count of flip-flops may be low by two.
     let wrapper = Resources { luts: 12, flip_flops: u64::from(2 * bits) + 46, ..Resources::default() };
-    Ok(Design { name: circuit.unit.name.to_owned(), files, top: "wrapper".to_owned(), wrapper })
+    Ok(Design { name: circuit.unit.name.to_owned(), files, top: "wrapper".to_owned(), pins: "", wrapper })
 }
 
 // ---- The tools
@@ -226,6 +237,7 @@ fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Result<Synthes
     for (name, text) in &design.files {
         fs::write(folder.join(name), text)?;
     }
+    fs::write(folder.join("pins.lpf"), design.pins)?;
     let sources: Vec<_> =
         design.files.keys().filter(|name| name.ends_with(".v")).map(String::as_str).collect();
 
@@ -278,6 +290,8 @@ fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Result<Synthes
             "--seed",
             &number,
             "--timing-allow-fail",
+            "--lpf",
+            "pins.lpf",
             "--lpf-allow-unconstrained",
             "--report",
             &report,
@@ -487,7 +501,7 @@ RAMs of 18 kbit.\n",
     let (machines, units): (Vec<_>, Vec<_>) = rows.iter().partition(is_machine);
     let placed = |rows: &[&Synthesis]| rows.iter().any(|row| row.grade.is_some());
     if placed(&machines) {
-        text += "\n## Machines\n\nWith their memories. `cargo xtask synth --machine t3 --device 85k --grade 8`, and so on.\n";
+        text += "\n## Machines\n\nWith their memories, and with the shift register and the parity that stand for pins (about 230 flip-flops, 30 LUT4). `cargo xtask synth --machine t3 --device 85k --grade 8`, and so on.\n";
         text += &table(&machines);
         let (clock, [luts, flip_flops, memory, multipliers]) = PAPER;
         let _ = writeln!(
