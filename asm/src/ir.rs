@@ -9,7 +9,7 @@
 //! * every register that is written is written from one slot only;
 //! * bundles of `once` precede those of `period`; a label stands before the bundle at its position, or at the end.
 //!
-//! Whoever moves bundles must move [`Label::position`]s and [`Ir::period`] along, and leave alone, as fences, bundles that
+//! Whoever moves bundles must move [`Label::position`]s, [`LoopBound::position`]s and [`Ir::period`] along, and leave alone, as fences, bundles that
 //! hold a raw word ([`Bundle::is_opaque`]). Targets that the source wrote as numbers stay as they are.
 
 use crate::source::Span;
@@ -181,6 +181,15 @@ pub struct Label {
     pub span: Span,
 }
 
+/// How often a loop may turn.
+#[derive(Clone, Copy, Debug)]
+pub struct LoopBound {
+    /// Index of the bundle that heads the loop.
+    pub position: u32,
+    /// Turns at most.
+    pub most: u32,
+}
+
 /// What the source demands of the time at which ports are read or written.
 #[derive(Clone, Debug)]
 pub struct Demand {
@@ -218,6 +227,8 @@ pub struct Ir {
     pub period: u32,
     /// The labels, in the order of the source.
     pub labels: Vec<Label>,
+    /// Bounds of loops, by ascending position.
+    pub loop_bounds: Vec<LoopBound>,
     /// What is demanded of ports, in the order of the source.
     pub demands: Vec<Demand>,
     /// Data memory.

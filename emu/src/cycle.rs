@@ -2,10 +2,11 @@
 //!
 //! In each cycle, in this order: the tick is seen; results are written back; the next bundle issues or is charged a stall.
 
-use crate::emulator::{Emulator, Recent, Sink, Status, Step, emit};
+use crate::emulator::{Emulator, Recent, Sink, Status, Step, Upcoming, emit};
 use crate::event::Event;
 use crate::execute::{self, Flow};
 use crate::fault::{Fault, FaultKind};
+use std::sync::Arc;
 use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::{self, Address, Cause, Cycle, Scoreboard};
 
@@ -66,18 +67,22 @@ impl Emulator {
             }
             self.plan(address);
         }
-        let Some(issue) = &self.planned else { return Ok(None) };
-        // Rules once met stay met, so that the causes come one after the other.
-        let mut end = delivered;
-        Ok(issue.stalls().iter().find_map(|&(cause, cycles)| {
-            end += Cycle::from(cycles);
-            (now < end).then_some(cause)
-        }))
+        let Some(issue) = self.planned else { return Ok(None) };
+        Ok(Upcoming { address, delivered, from: self.front.from, issue }.cause(now))
     }
 
     /// Applies the rules to the next bundle.
     fn plan(&mut self, address: Address) {
-        if self.scoreboard.is_none() {
+        let code = Arc::clone(&self.code);
+        if let Some(decoded) = code.legal(address) {
+            let delivered = self.front.delivered;
+            self.planned = Some(self.scoreboard().issue(&decoded.timing, address, delivered));
+        }
+    }
+
+    /// The rules applied to everything issued, made anew where blocks have run since.
+    pub(crate) fn scoreboard(&mut self) -> &mut Scoreboard {
+        let scoreboard = self.scoreboard.take().unwrap_or_else(|| {
             self.list_recent();
             let mut scoreboard = Box::new(Scoreboard::new(self.code.machine));
             if let Recent::List(recent) = &self.recent {
@@ -88,17 +93,18 @@ impl Emulator {
                     }
                 }
             }
-            self.scoreboard = Some(scoreboard);
-        }
-        if let (Some(scoreboard), Some(decoded)) = (&mut self.scoreboard, self.code.legal(address)) {
-            self.planned = Some(scoreboard.issue(&decoded.timing, address, self.front.delivered));
-        }
+            scoreboard
+        });
+        self.scoreboard.insert(scoreboard)
     }
 
     /// Issues the next bundle.
     fn issue(&mut self, address: Address, sink: &mut Sink<'_>) -> Result<(), Fault> {
         let (now, machine) = (self.now, self.code.machine);
         let Some(decoded) = self.code.legal(address) else { return Ok(()) };
+        if let Some(most) = self.beyond_bound() {
+            return Err(self.fault(address, None, FaultKind::LoopBound { most }, sink));
+        }
         if let Some((slot, kind)) = execute::check(decoded, &self.state, machine, &self.program) {
             return Err(self.fault(address, Some(slot), kind, sink));
         }
@@ -112,6 +118,7 @@ impl Emulator {
         match flow {
             Flow::Sequential => self.continue_at(address + 1, timing::after_sequential(now), address),
             Flow::NotTaken => self.continue_at(address + 1, timing::after_not_taken(machine, now), address),
+            Flow::Jump(target) => self.jump_to(target, timing::after_redirect(machine, now), address),
             Flow::Redirect(target) => {
                 self.continue_at(target, timing::after_redirect(machine, now), address);
             }
@@ -127,8 +134,28 @@ impl Emulator {
         Ok(())
     }
 
+    /// Where execution goes on, other than by a jump: the first turn of a loop, if it is the head of one.
     pub(crate) fn continue_at(&mut self, next: Address, delivered: Cycle, from: Address) {
         (self.front.next, self.front.delivered, self.front.from) = (next, delivered, from);
+        if let Some(head) = self.code.head(next) {
+            self.turns[head] = 1;
+        }
+    }
+
+    /// Where a jump or a taken branch leads: a further turn of a loop, if it leads back to the head of one.
+    pub(crate) fn jump_to(&mut self, target: Address, delivered: Cycle, from: Address) {
+        let turns = self.code.head(target).map_or(0, |head| self.turns[head]);
+        self.continue_at(target, delivered, from);
+        if let Some(head) = self.code.head(target).filter(|_| target <= from) {
+            self.turns[head] = turns.saturating_add(1);
+        }
+    }
+
+    /// The bound of the loop that the next bundle heads, if its turn would be one too many.
+    pub(crate) fn beyond_bound(&self) -> Option<u32> {
+        let head = self.code.head(self.front.next)?;
+        let most = self.code.loops[head].most;
+        (self.turns[head] > most).then_some(most)
     }
 
     /// Stops the machine. What issued together with `halt` is still written back: nothing else can happen any more, so

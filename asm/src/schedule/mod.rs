@@ -104,6 +104,9 @@ pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
     for label in ir.labels.iter_mut().filter(|label| label.space == Space::Code) {
         label.position = relocate(label.position);
     }
+    for bound in &mut ir.loop_bounds {
+        bound.position = relocate(bound.position);
+    }
     ir.bundles = bundles;
     report
 }
