@@ -25,8 +25,9 @@ fn reciprocal_file() {
 }
 
 #[test]
-fn sine_file() {
-    check_file("takt_sine_table.v", &sine::verilog());
+fn sine_files() {
+    check_file("takt_quarter_table.v", &sine::multiples());
+    check_file("takt_wave_table.v", &sine::polynomials());
 }
 
 /// What `units/divroot.v` says of widths and of the last residual.
