@@ -21,6 +21,8 @@ mod ports;
 mod report;
 mod run;
 mod select;
+mod synthesis;
+mod trace;
 mod track;
 
 use anyhow::Result;

@@ -8,6 +8,7 @@ use crate::nan::NanWrites;
 use crate::output::{self, Failure};
 use crate::ports::{self, Inputs};
 use crate::select::{self, OptionalMachine};
+use crate::trace::{Trace, TraceArguments};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use serde_json::{Value, json};
@@ -43,6 +44,8 @@ pub(crate) struct Run {
     /// The tick comes every so many cycles, up to 100000000 [default: when the program is ready].
     #[arg(long, value_name = "CYCLES", value_parser = tick, allow_negative_numbers = true)]
     tick: Option<NonZeroU64>,
+    #[command(flatten)]
+    trace: TraceArguments,
     /// Print where the cycles went.
     #[arg(long)]
     stats: bool,
@@ -56,6 +59,7 @@ Examples:
   takt run prog.s                                 until it halts
   takt run prog.s --inputs in.csv --stats         a period for each row; where did the cycles go?
   takt run prog.takt --inputs in.csv --outputs -  outputs and cycles of every period
+  takt run prog.s --periods 3 --trace out.vcd     waveforms for GTKWave or Surfer
 
 `takt track --csv in.csv` records inputs of the tracking programs.";
 
@@ -84,6 +88,7 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
     reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
     let mut writes = Vec::new();
     writes.extend(arguments.outputs.as_deref().map(|path| ("--outputs", path)));
+    writes.extend(arguments.trace.given());
     if arguments.json || arguments.stats {
         writes.push((if arguments.json { "--json" } else { "--stats" }, Path::new("-")));
     }
@@ -100,13 +105,19 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
     let mut emulator = Emulator::new(&program)?;
     emulator.set_tick_period(arguments.tick);
     let mut nans = NanWrites::default();
-    let periods = if has_periods {
-        Some(run_periods(arguments, &program, &mut emulator, &mut nans)?)
+    let mut trace_file = arguments.trace.create()?;
+    let mut trace = trace_file.as_mut().map(|file| arguments.trace.begin(&emulator, file)).transpose()?;
+    let result = if has_periods {
+        run_periods(arguments, &program, &mut emulator, trace.as_mut(), &mut nans).map(Some)
     } else {
-        run_to_halt(arguments, &program, &mut emulator)?;
+        let result = run_to_halt(arguments, &program, &mut emulator, trace.as_mut());
         nans.add(&emulator.take_nan_writes());
-        None
+        result.map(|()| None)
     };
+    // What led to a fault is what a trace is for: it is kept.
+    trace.map_or(Ok(()), |trace| trace.finish(&emulator, color))?;
+    trace_file.map_or(Ok(()), Out::finish)?;
+    let periods = result?;
     let statistics = emulator.statistics();
     nans.warn(&program, statistics.nan_writes, color);
 
@@ -119,9 +130,18 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
-fn run_to_halt(arguments: &Run, program: &Program, emulator: &mut Emulator) -> Result<()> {
+fn run_to_halt(
+    arguments: &Run,
+    program: &Program,
+    emulator: &mut Emulator,
+    trace: Option<&mut Trace<'_>>,
+) -> Result<()> {
     emulator.set_cycle_limit(arguments.max_cycles.unwrap_or(PERIOD_LIMIT));
-    match emulator.run().map_err(|fault| anyhow!(explain(program, &fault.into())))? {
+    let stop = match trace {
+        Some(trace) => trace.run(emulator),
+        None => emulator.run().map_err(Into::into),
+    };
+    match stop.map_err(|error| anyhow!(explain(program, &error)))? {
         Stop::Idle => bail!("the program waits for the tick: give it periods with --inputs or --periods"),
         _ => Ok(()),
     }
@@ -131,6 +151,7 @@ fn run_periods(
     arguments: &Run,
     program: &Program,
     emulator: &mut Emulator,
+    mut trace: Option<&mut Trace<'_>>,
     nans: &mut NanWrites,
 ) -> Result<Periods> {
     let mut inputs = arguments.inputs.as_ref().map(|path| Inputs::open(path, &program.inputs)).transpose()?;
@@ -151,9 +172,15 @@ fn run_periods(
             }
         }
         emulator.set_cycle_limit(arguments.max_cycles.unwrap_or(emulator.now() + PERIOD_LIMIT));
-        let report = emulator
-            .run_period(&[])
-            .map_err(|error| anyhow!("period {}: {}", periods.count, explain(program, &error)))?;
+        let report = match &mut trace {
+            Some(trace) => trace.run_period(emulator),
+            None => emulator.run_period(&[]),
+        };
+        let report =
+            report.map_err(|error| anyhow!("period {}: {}", periods.count, explain(program, &error)))?;
+        if trace.as_ref().is_some_and(|trace| trace.has_failed()) {
+            break;
+        }
         periods.count += 1;
         periods.shortest = periods.shortest.min(report.cycles);
         periods.longest = periods.longest.max(report.cycles);

@@ -34,11 +34,17 @@ fn track() {
     let folder = Folder::new();
     let text = folder.line("track --periods 200").ok();
     assert_eq!(folder.line("track --periods 200").ok(), text, "the same every time");
-    insta::assert_snapshot!("track", text);
+    // Place and route has its own record, docs/synthesis.json.
+    let steady: String = text
+        .split_inclusive('\n')
+        .filter(|line| !line.to_lowercase().contains("placed and routed"))
+        .collect();
+    insta::assert_snapshot!("track", steady);
 
     let json = folder.line("track --periods 200 --json").ok();
     let mut json: serde_json::Value = serde_json::from_str(&json).unwrap();
     round(&mut json);
+    json.as_object_mut().unwrap().remove("placed");
     insta::assert_json_snapshot!("track_json", json);
     assert_eq!(folder.list(), [""; 0]);
 }

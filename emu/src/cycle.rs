@@ -2,10 +2,11 @@
 //!
 //! In each cycle, in this order: the tick is seen; results are written back; the next bundle issues or is charged a stall.
 
-use crate::emulator::{Emulator, Recent, Sink, Status, Step, emit};
+use crate::emulator::{Emulator, Recent, Sink, Status, Step, Upcoming, emit};
 use crate::event::Event;
 use crate::execute::{self, Flow};
 use crate::fault::{Fault, FaultKind};
+use std::sync::Arc;
 use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::{self, Address, Cause, Cycle, Scoreboard};
 
@@ -66,18 +67,22 @@ impl Emulator {
             }
             self.plan(address);
         }
-        let Some(issue) = &self.planned else { return Ok(None) };
-        // Rules once met stay met, so that the causes come one after the other.
-        let mut end = delivered;
-        Ok(issue.stalls().iter().find_map(|&(cause, cycles)| {
-            end += Cycle::from(cycles);
-            (now < end).then_some(cause)
-        }))
+        let Some(issue) = self.planned else { return Ok(None) };
+        Ok(Upcoming { address, delivered, from: self.front.from, issue }.cause(now))
     }
 
     /// Applies the rules to the next bundle.
     fn plan(&mut self, address: Address) {
-        if self.scoreboard.is_none() {
+        let code = Arc::clone(&self.code);
+        if let Some(decoded) = code.legal(address) {
+            let delivered = self.front.delivered;
+            self.planned = Some(self.scoreboard().issue(&decoded.timing, address, delivered));
+        }
+    }
+
+    /// The rules applied to everything issued, made anew where blocks have run since.
+    pub(crate) fn scoreboard(&mut self) -> &mut Scoreboard {
+        let scoreboard = self.scoreboard.take().unwrap_or_else(|| {
             self.list_recent();
             let mut scoreboard = Box::new(Scoreboard::new(self.code.machine));
             if let Recent::List(recent) = &self.recent {
@@ -88,11 +93,9 @@ impl Emulator {
                     }
                 }
             }
-            self.scoreboard = Some(scoreboard);
-        }
-        if let (Some(scoreboard), Some(decoded)) = (&mut self.scoreboard, self.code.legal(address)) {
-            self.planned = Some(scoreboard.issue(&decoded.timing, address, self.front.delivered));
-        }
+            scoreboard
+        });
+        self.scoreboard.insert(scoreboard)
     }
 
     /// Issues the next bundle.

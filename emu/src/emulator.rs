@@ -87,6 +87,34 @@ pub enum Stop {
     Reached,
 }
 
+/// How the next bundle is going to issue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Upcoming {
+    /// The bundle.
+    pub address: Address,
+    /// The first cycle in which the front end has it ready.
+    pub delivered: Cycle,
+    /// The bundle that redirected the fetch to it, which the cycles before `delivered` are charged to.
+    pub from: Address,
+    /// Its issue, and what the cycles from `delivered` on are charged to.
+    pub issue: Issue,
+}
+
+impl Upcoming {
+    /// What `cycle` is charged to; `None` from the cycle of issue on.
+    pub fn cause(&self, cycle: Cycle) -> Option<Cause> {
+        if cycle < self.delivered {
+            return Some(Cause::Branch { from: self.from });
+        }
+        // Rules once met stay met, so that the causes come one after the other.
+        let mut end = self.delivered;
+        self.issue.stalls().iter().find_map(|&(cause, cycles)| {
+            end += Cycle::from(cycles);
+            (cycle < end).then_some(cause)
+        })
+    }
+}
+
 /// The instruction fetch.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Front {
@@ -332,18 +360,40 @@ impl Emulator {
         self.front.next
     }
 
+    /// How the next bundle is going to issue; `None` if the machine does not run, or has no bundle there that can execute.
+    /// (Whether it faults when it issues, it shows then.)
+    pub fn upcoming(&mut self) -> Option<Upcoming> {
+        let Front { next: address, delivered, from } = self.front;
+        if self.status != Status::Running {
+            return None;
+        }
+        let issue = match self.planned {
+            Some(issue) => issue,
+            None => {
+                let code = Arc::clone(&self.code);
+                self.scoreboard().plan(&code.legal(address)?.timing, delivered)
+            }
+        };
+        Some(Upcoming { address, delivered, from, issue })
+    }
+
     /// A register's bits; `None` if it was never written. A result appears in the cycle of its writeback.
     pub fn register(&self, register: u16) -> Option<u32> {
         (register <= ZERO && self.state.written.contains(register)).then(|| self.state.get(register))
     }
 
-    /// Sets a register (a debugger's way in; ports have their own). Results underway still arrive.
+    /// Sets a register (a debugger's way in; ports have their own): what issues in the next cycle reads `bits`. A result whose
+    /// writeback is in that very cycle gives way, those underway for longer still arrive.
     ///
     /// Returns false, and does nothing, for `zero` and for an address where the machine has no register.
     pub fn set_register(&mut self, register: u16, bits: u32) -> bool {
         let exists = register != ZERO && self.machine().banks().any(|bank| bank.contains(register));
         if exists {
             self.state.set(register, bits);
+            let mut due = self.state.pending.iter_mut().filter(|pending| pending.retire.cycle == self.now);
+            if let Some(due) = due.find(|pending| pending.register == register) {
+                due.retire.value = bits;
+            }
         }
         exists
     }
@@ -470,7 +520,20 @@ impl Observed<'_> {
         &mut self,
         inputs: &[(&str, crate::Number)],
     ) -> Result<PeriodReport, crate::PeriodError> {
-        self.emulator.period(inputs, &mut Some(self.sink))
+        self.emulator.set_inputs(inputs)?;
+        loop {
+            if let Some(report) = self.run_period_until(Cycle::MAX)? {
+                return Ok(report);
+            }
+        }
+    }
+
+    /// As [`Emulator::run_period_until`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn run_period_until(&mut self, cycle: Cycle) -> Result<Option<PeriodReport>, crate::PeriodError> {
+        self.emulator.period(cycle, &mut Some(self.sink))
     }
 
     fn drive(&mut self, goal: Goal) -> Result<Stop, Fault> {

@@ -28,7 +28,7 @@ mod system;
 pub mod testing;
 
 pub use code::MAX_SLOTS;
-pub use emulator::{Emulator, MAX_CYCLE, Observed, Status, Step, Stop};
+pub use emulator::{Emulator, MAX_CYCLE, Observed, Status, Step, Stop, Upcoming};
 pub use event::{Event, PortWrite, Retire};
 pub use fault::{Fault, FaultKind, LoadError};
 pub use machine::MAX_NAN_WRITES;

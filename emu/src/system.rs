@@ -264,6 +264,11 @@ impl Emulator {
         to_come
     }
 
+    /// The cycle of the next tick, if one is to come.
+    pub fn next_tick(&self) -> Option<Cycle> {
+        self.ticks.next()
+    }
+
     /// Whether a deadline was missed since reset: a tick came before the program waited.
     pub fn deadline_missed(&self) -> bool {
         self.ticks.missed > 0
@@ -330,21 +335,40 @@ impl Emulator {
     /// # Errors
     /// A fault, or an input that cannot be set, or a machine that has halted.
     pub fn run_period(&mut self, inputs: &[(&str, Number)]) -> Result<PeriodReport, PeriodError> {
-        self.period(inputs, &mut None)
+        self.set_inputs(inputs)?;
+        // Without a bound it ends with a report.
+        loop {
+            if let Some(report) = self.period(Cycle::MAX, &mut None)? {
+                return Ok(report);
+            }
+        }
     }
 
-    pub(crate) fn period(
-        &mut self,
-        inputs: &[(&str, Number)],
-        sink: &mut Sink<'_>,
-    ) -> Result<PeriodReport, PeriodError> {
+    /// As [`Emulator::run_period`] with the inputs as they are, but no further than until `cycle` cycles have passed since
+    /// reset: then there is no report yet, and the next call goes on with the period.
+    ///
+    /// # Errors
+    /// A fault, or a machine that has halted.
+    pub fn run_period_until(&mut self, cycle: Cycle) -> Result<Option<PeriodReport>, PeriodError> {
+        self.period(cycle, &mut None)
+    }
+
+    pub(crate) fn set_inputs(&mut self, inputs: &[(&str, Number)]) -> Result<(), PortError> {
         for &(name, value) in inputs {
             self.input_for(name, value)?;
         }
         for &(name, value) in inputs {
             self.set_input(name, value)?;
         }
-        let goal = Goal { until: Cycle::MAX, wait: true, bundle: false };
+        Ok(())
+    }
+
+    pub(crate) fn period(
+        &mut self,
+        until: Cycle,
+        sink: &mut Sink<'_>,
+    ) -> Result<Option<PeriodReport>, PeriodError> {
+        let goal = Goal { until, wait: true, bundle: false };
         self.report = None;
         loop {
             if let Status::Waiting { since, .. } = self.status
@@ -354,11 +378,12 @@ impl Emulator {
             }
             match self.drive(goal, sink)? {
                 Stop::Halted => return Err(PeriodError::Halted),
+                Stop::Reached => return Ok(None),
                 // Without a report it was the wait before the first period.
                 _ => {
                     if let Some(mut report) = self.report.take() {
                         report.nan_writes = self.take_nan_writes();
-                        return Ok(report);
+                        return Ok(Some(report));
                     }
                 }
             }

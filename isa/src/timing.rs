@@ -195,6 +195,22 @@ impl Scoreboard {
 
     /// Issues a bundle from address `at` in the first cycle from `earliest` on that meets every rule.
     pub fn issue(&mut self, bundle: &Bundle, at: Address, earliest: Cycle) -> Issue {
+        let issue = self.plan(bundle, earliest);
+        for operation in &bundle.operations {
+            let (slot, unit) = (usize::from(operation.slot), usize::from(operation.unit));
+            self.free[slot][unit] = issue.cycle + Cycle::from(operation.interval);
+            if let Some(dest) = operation.dest {
+                let writeback = issue.cycle + Cycle::from(operation.latency);
+                self.ready[usize::from(dest) % REGISTER_SPACE] = (writeback, at);
+                self.booked[slot][writeback as usize % PORT_WINDOW] = writeback;
+                self.drained = self.drained.max(writeback);
+            }
+        }
+        issue
+    }
+
+    /// How a bundle would issue, from `earliest` on; nothing changes.
+    pub fn plan(&self, bundle: &Bundle, earliest: Cycle) -> Issue {
         let mut issue = Issue { cycle: earliest, stalls: [(Cause::Drain, 0); 5], count: 0 };
 
         let last = |registers: &mut dyn Iterator<Item = u16>, ready: &[(Cycle, Address); REGISTER_SPACE]| {
@@ -242,17 +258,6 @@ impl Scoreboard {
             (slot, cycle) = (operation.slot, cycle + 1);
         }
         issue.advance(cycle, Cause::WritePort { slot });
-
-        for operation in &bundle.operations {
-            let (slot, unit) = (usize::from(operation.slot), usize::from(operation.unit));
-            self.free[slot][unit] = issue.cycle + Cycle::from(operation.interval);
-            if let Some(dest) = operation.dest {
-                let writeback = issue.cycle + Cycle::from(operation.latency);
-                self.ready[usize::from(dest) % REGISTER_SPACE] = (writeback, at);
-                self.booked[slot][writeback as usize % PORT_WINDOW] = writeback;
-                self.drained = self.drained.max(writeback);
-            }
-        }
         issue
     }
 

@@ -5,6 +5,7 @@
 //! many operands they have and how long they take.
 
 pub mod circuit;
+pub mod synthesis;
 pub mod tables;
 
 pub use circuit::{Circuit, CircuitError, Library, Operation};

@@ -1,0 +1,110 @@
+//! `takt run --trace`: what a run did, cycle by cycle, in a file for other tools.
+
+use crate::files::{Given, Out};
+use crate::output::{self, Failure};
+use crate::select;
+use anyhow::{Result, anyhow};
+use clap::Args;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use takt_debug::trace::{Format, Options, Tracer};
+use takt_emu::{Emulator, PeriodError, PeriodReport, Stop};
+
+#[derive(Args)]
+pub(crate) struct TraceArguments {
+    /// Write what happens in each cycle: waveforms as .vcd or .fst, the pipeline for the viewer Konata as .kanata, completed
+    /// operations as .jsonl.
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+    /// Trace these cycles only; the last is left out, and either may be missing.
+    #[arg(long, value_name = "A..B", value_parser = cycles, requires = "trace")]
+    trace_cycles: Option<Range<u64>>,
+    /// Trace these signals only: names of ports and registers and of the signals in docs/traces.md; `*` stands for any
+    /// characters.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "trace")]
+    trace_signals: Vec<String>,
+    /// End the trace when it has so many MiB.
+    #[arg(long, value_name = "MIB", default_value_t = 256, value_parser = select::count, requires = "trace", allow_negative_numbers = true)]
+    trace_limit: u64,
+}
+
+fn cycles(text: &str) -> Result<Range<u64>, String> {
+    let wanted = "wants two numbers of cycles as in 1000..2000";
+    let (start, end) = text.split_once("..").ok_or(wanted)?;
+    let number = |text: &str, missing| if text.is_empty() { Some(missing) } else { text.parse().ok() };
+    let range = number(start, 0).ok_or(wanted)?..number(end, u64::MAX).ok_or(wanted)?;
+    if range.is_empty() { Err("has no cycle between its ends".to_owned()) } else { Ok(range) }
+}
+
+/// A trace underway.
+pub(crate) struct Trace<'o> {
+    tracer: Tracer<'o>,
+    name: String,
+    limit: u64,
+}
+
+impl TraceArguments {
+    /// What is written, and with which option it was given.
+    pub(crate) fn given(&self) -> Option<Given<'_>> {
+        Some(("--trace", self.trace.as_deref()?))
+    }
+
+    /// The format, by the file's extension.
+    fn format(path: &Path) -> Result<Format> {
+        let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+        Format::of_extension(extension).ok_or_else(|| {
+            let all: Vec<String> = Format::ALL.iter().map(|(known, _)| format!(".{known}")).collect();
+            let text = format!("--trace {}: the name must end in one of {}", path.display(), all.join(" "));
+            Failure::Usage(text).into()
+        })
+    }
+
+    /// Begins the file, so that one that cannot be written is known before the work.
+    pub(crate) fn create(&self) -> Result<Option<Out>> {
+        let Some(path) = self.trace.as_deref() else { return Ok(None) };
+        Self::format(path)?;
+        Out::create(path).map(Some)
+    }
+
+    pub(crate) fn begin<'o>(&self, emulator: &Emulator, file: &'o mut Out) -> Result<Trace<'o>> {
+        let path = self.trace.clone().unwrap_or_default();
+        let options = Options {
+            format: Self::format(&path)?,
+            cycles: self.trace_cycles.clone().unwrap_or(0..u64::MAX),
+            signals: self.trace_signals.clone(),
+            limit: self.trace_limit.saturating_mul(1 << 20),
+        };
+        let tracer = Tracer::new(emulator, Box::new(file), options)
+            .map_err(|error| Failure::Usage(format!("--trace-signals: {error}")))?;
+        Ok(Trace { tracer, name: path.display().to_string(), limit: self.trace_limit })
+    }
+}
+
+impl Trace<'_> {
+    pub(crate) fn run_period(&mut self, emulator: &mut Emulator) -> Result<PeriodReport, PeriodError> {
+        self.tracer.run_period(emulator)
+    }
+
+    pub(crate) fn run(&mut self, emulator: &mut Emulator) -> Result<Stop, PeriodError> {
+        self.tracer.run(emulator)
+    }
+
+    pub(crate) fn has_failed(&self) -> bool {
+        self.tracer.has_failed()
+    }
+
+    pub(crate) fn finish(self, emulator: &Emulator, color: bool) -> Result<()> {
+        // `Out` names the file in its errors.
+        let summary = self.tracer.finish(emulator).map_err(|error| anyhow!(error))?;
+        let name = self.name;
+        if summary.cut {
+            let (end, limit) = (summary.cycles.end, self.limit);
+            let text = format!("{name} ends before cycle {end}: --trace-limit is {limit} MiB");
+            output::warning(&text, color);
+        } else if summary.cycles.is_empty() {
+            let passed = emulator.now();
+            output::warning(&format!("{name} is empty: the run has {passed} cycles"), color);
+        }
+        Ok(())
+    }
+}

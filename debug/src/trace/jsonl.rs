@@ -1,0 +1,133 @@
+//! The retire log: a JSON object a line for each completed operation and each event of the period.
+
+use super::signal::{Signal, Source};
+use super::{Record, Writer, number};
+use serde::Serialize;
+use serde_json::Value;
+use std::io::{self, Write};
+use takt_emu::{Emulator, Event, Retire};
+use takt_isa::timing::{Address, Cycle};
+use takt_isa::{Program, Type};
+
+pub(super) struct JsonLines<'w> {
+    target: Box<dyn Write + 'w>,
+    /// Registers that are of interest.
+    registers: Vec<u16>,
+    /// Whether what writes no register is of interest.
+    rest: bool,
+}
+
+impl<'w> JsonLines<'w> {
+    pub(super) fn new(program: &Program, signals: Vec<Signal>, target: Box<dyn Write + 'w>) -> JsonLines<'w> {
+        let named: Vec<u16> = signals
+            .iter()
+            .filter_map(|signal| match signal.source {
+                Source::Register(register) => Some(register),
+                _ => None,
+            })
+            .collect();
+        let ports = program.inputs.len() + program.outputs.len() + program.registers.len();
+        // All of the program's: then registers without a name, too.
+        let rest = named.len() == ports;
+        JsonLines { target, registers: if rest { Vec::new() } else { named }, rest }
+    }
+
+    fn retire(&self, program: &Program, retire: &Retire) -> Option<Line> {
+        let wanted = retire.register.is_some_and(|register| self.registers.contains(&register));
+        if !self.rest && !wanted {
+            return None;
+        }
+        let row = retire.op.row();
+        let machine = program.machine;
+        let index = retire.address as usize * machine.slots.len() + usize::from(retire.slot);
+        let location = program.lines.get(index).copied().flatten();
+        Some(Line {
+            issued: Some(retire.issued),
+            bundle: Some(retire.address),
+            slot: Some(machine.slots[usize::from(retire.slot)].name),
+            op: Some(row.mnemonic),
+            source: location.map(|location| program.place_text(location)),
+            register: retire.register.map(|register| program.register_text(register)),
+            bits: (retire.register.is_some() || retire.memory.is_some())
+                .then(|| format!("0x{:08x}", retire.value)),
+            value: retire.register.and_then(|_| match row.result_type() {
+                Type::F => Some(number(f32::from_bits(retire.value))),
+                Type::I => Some(retire.value.cast_signed().into()),
+                Type::B => None,
+            }),
+            memory: retire.memory,
+            flags: (!retire.flags.is_empty()).then(|| retire.flags.to_string()),
+            ..Line::of(retire.cycle, "retire")
+        })
+    }
+}
+
+/// A line of the log, in the order of its keys; what does not apply is left out.
+#[derive(Default, Serialize)]
+struct Line {
+    cycle: Cycle,
+    event: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    issued: Option<Cycle>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bundle: Option<Address>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    slot: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    op: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    source: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    register: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bits: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    value: Option<Value>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    memory: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    flags: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    text: Option<String>,
+}
+
+impl Line {
+    fn of(cycle: Cycle, event: &'static str) -> Line {
+        Line { cycle, event, ..Line::default() }
+    }
+}
+
+impl Writer for JsonLines<'_> {
+    fn cycle(&mut self, record: &Record, emulator: &Emulator) -> io::Result<()> {
+        let program = emulator.program();
+        for event in &record.events {
+            let line = match event {
+                Event::Retire(retire) => self.retire(program, retire),
+                Event::Issue { .. } | Event::PortWrite(_) => None,
+                Event::Tick { cycle } => Some(Line::of(*cycle, "tick")),
+                Event::DeadlineMissed { cycle } => Some(Line::of(*cycle, "missed")),
+                Event::TickLost { cycle } => Some(Line::of(*cycle, "lost")),
+                Event::Wait { cycle, address } => {
+                    Some(Line { bundle: Some(*address), ..Line::of(*cycle, "wait") })
+                }
+                Event::Halt { cycle, address } => {
+                    Some(Line { bundle: Some(*address), ..Line::of(*cycle, "halt") })
+                }
+                Event::Fault(fault) => Some(Line {
+                    bundle: Some(fault.address),
+                    text: Some(fault.to_string()),
+                    ..Line::of(fault.cycle, "fault")
+                }),
+            };
+            if let Some(line) = line {
+                serde_json::to_writer(&mut self.target, &line)?;
+                self.target.write_all(b"\n")?;
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(mut self: Box<Self>, _: Cycle) -> io::Result<()> {
+        self.target.flush()
+    }
+}

@@ -1,0 +1,209 @@
+//! Kanata 0004, which the pipeline viewer Konata opens. An operation is a row; its stages:
+//!
+//! | stage | cycles |
+//! |---|---|
+//! | `Fr` `Op` `De` `Un` `Dr` `Wp` | its bundle waits: front end, operand, destination, unit, drain, write port |
+//! | `Is` | of its issue |
+//! | `Ex` | between issue and writeback |
+//! | `Wb` | of its writeback |
+//!
+//! Arrows lead from an operation to those that wait for its result or take it as it arrives.
+
+use super::{Record, Writer};
+use std::collections::{BTreeMap, HashMap};
+use std::fmt::Write as _;
+use std::io::{self, Write};
+use takt_emu::{Emulator, Event};
+use takt_isa::timing::{Address, Cause, Cycle};
+use takt_isa::{Function, Instruction, Program};
+
+/// Stages of waiting, in the order of [`Cause::KINDS`] (a bundle that waits for the tick is issued already).
+const WAITING: [&str; 7] = ["Fr", "Op", "De", "Un", "Dr", "Wp", "Ti"];
+
+pub(super) struct Kanata<'w> {
+    target: Box<dyn Write + 'w>,
+    /// The cycle that the file has come to.
+    at: Cycle,
+    /// Lines for cycles to come.
+    ahead: BTreeMap<Cycle, String>,
+    next_id: u64,
+    retired: u64,
+    /// The bundle that waits to issue: its rows, each with its slot, the stage that they are in, and since when.
+    front: Option<Front>,
+    /// For each register, the row that writes it last, and when.
+    writers: HashMap<u16, (u64, Cycle)>,
+}
+
+struct Front {
+    address: Address,
+    rows: Vec<(u64, usize, Option<Instruction>)>,
+    stage: &'static str,
+    since: Cycle,
+}
+
+impl<'w> Kanata<'w> {
+    pub(super) fn new(emulator: &Emulator, mut target: Box<dyn Write + 'w>) -> io::Result<Kanata<'w>> {
+        let at = emulator.now();
+        writeln!(target, "Kanata\t0004\nC=\t{at}")?;
+        Ok(Kanata {
+            target,
+            at,
+            ahead: BTreeMap::new(),
+            next_id: 0,
+            retired: 0,
+            front: None,
+            writers: HashMap::new(),
+        })
+    }
+
+    /// Adds a line to a cycle.
+    fn line(&mut self, cycle: Cycle, line: std::fmt::Arguments<'_>) {
+        // A String takes all.
+        let _ = writeln!(self.ahead.entry(cycle).or_default(), "{line}");
+    }
+
+    /// Writes all cycles before `cycle`.
+    fn flush_before(&mut self, cycle: Cycle) -> io::Result<()> {
+        while let Some(entry) = self.ahead.first_entry().filter(|entry| *entry.key() < cycle) {
+            let (next, lines) = entry.remove_entry();
+            if next > self.at {
+                writeln!(self.target, "C\t{}", next - self.at)?;
+                self.at = next;
+            }
+            self.target.write_all(lines.as_bytes())?;
+        }
+        Ok(())
+    }
+
+    /// The rows of a bundle, which waits to issue from `cycle` on.
+    fn enter(&mut self, program: &Program, address: Address, cycle: Cycle, stage: &'static str) -> Front {
+        let machine = program.machine;
+        let instructions = match program.bundle(address) {
+            Some(Ok(instructions)) => instructions,
+            _ => Vec::new(),
+        };
+        let mut operations: Vec<(usize, Option<Instruction>)> = instructions
+            .into_iter()
+            .enumerate()
+            .filter(|(_, instruction)| instruction.op.row().function != Function::Idle)
+            .map(|(slot, instruction)| (slot, Some(instruction)))
+            .collect();
+        if operations.is_empty() {
+            operations.push((0, None));
+        }
+        let label = match program.nearest_label(address) {
+            Some((label, 0)) => format!("{label}: "),
+            _ => String::new(),
+        };
+        let mut rows = Vec::new();
+        for (slot, instruction) in operations {
+            let id = self.next_id;
+            self.next_id += 1;
+            let text = instruction.as_ref().map_or("nop".to_owned(), |instruction| {
+                let target = |target: u32| match program.nearest_label(target) {
+                    Some((label, 0)) => label.to_owned(),
+                    _ => target.to_string(),
+                };
+                instruction.text_with(machine, slot, |register| program.register_text(register), target)
+            });
+            self.line(cycle, format_args!("I\t{id}\t{id}\t0"));
+            self.line(
+                cycle,
+                format_args!("L\t{id}\t0\t{address} {}: {label}{text}", machine.slots[slot].name),
+            );
+            let place = program.lines.get(address as usize * machine.slots.len() + slot);
+            if let Some(&Some(location)) = place {
+                self.line(cycle, format_args!("L\t{id}\t1\t{}", program.place_text(location)));
+            }
+            self.line(cycle, format_args!("S\t{id}\t0\t{stage}"));
+            rows.push((id, slot, instruction));
+        }
+        Front { address, rows, stage, since: cycle }
+    }
+
+    fn issue(&mut self, program: &Program, front: Front, cycle: Cycle) {
+        for (id, slot, instruction) in &front.rows {
+            let slot = &program.machine.slots[*slot];
+            let reads = instruction.as_ref().map_or(&[][..], Instruction::reads);
+            for register in reads {
+                if let Some(&(producer, ready)) = self.writers.get(register)
+                    && ready >= front.since
+                {
+                    self.line(cycle, format_args!("W\t{id}\t{producer}\t0"));
+                }
+            }
+            let unit =
+                instruction.as_ref().and_then(|instruction| slot.unit_for(instruction.op.row().function));
+            let dest = instruction.as_ref().and_then(|instruction| instruction.writes(slot));
+            let latency = unit.filter(|_| dest.is_some()).map_or(0, |unit| slot.units[unit].latency);
+            let writeback = cycle + Cycle::from(latency);
+            let mut stage = "Is";
+            if latency > 1 {
+                self.line(cycle + 1, format_args!("E\t{id}\t0\t{stage}\nS\t{id}\t0\tEx"));
+                stage = "Ex";
+            }
+            if latency > 0 {
+                self.line(writeback, format_args!("E\t{id}\t0\t{stage}\nS\t{id}\t0\tWb"));
+                stage = "Wb";
+            }
+            let retired = self.retired;
+            self.retired += 1;
+            self.line(writeback + 1, format_args!("E\t{id}\t0\t{stage}\nR\t{id}\t{retired}\t0"));
+        }
+        for (id, slot, instruction) in front.rows {
+            let slot = &program.machine.slots[slot];
+            let Some(instruction) = instruction else { continue };
+            if let (Some(dest), Some(unit)) =
+                (instruction.writes(slot), slot.unit_for(instruction.op.row().function))
+            {
+                self.writers.insert(dest, (id, cycle + Cycle::from(slot.units[unit].latency)));
+            }
+        }
+    }
+}
+
+impl Writer for Kanata<'_> {
+    fn cycle(&mut self, record: &Record, emulator: &Emulator) -> io::Result<()> {
+        let (program, cycle) = (emulator.program(), record.cycle);
+        let stage = match (record.issued, record.stall) {
+            (Some(address), _) => Some((address, "Is")),
+            (None, Some((address, cause))) if cause != Cause::Wait => Some((address, WAITING[cause.kind()])),
+            _ => None,
+        };
+        if let Some((address, stage)) = stage {
+            let front = match self.front.take() {
+                Some(mut front) if front.address == address => {
+                    if front.stage != stage {
+                        for (id, ..) in &front.rows {
+                            let ended = front.stage;
+                            self.line(cycle, format_args!("E\t{id}\t0\t{ended}\nS\t{id}\t0\t{stage}"));
+                        }
+                        front.stage = stage;
+                    }
+                    front
+                }
+                _ => self.enter(program, address, cycle, stage),
+            };
+            if record.issued.is_some() {
+                self.issue(program, front, cycle);
+            } else {
+                self.front = Some(front);
+            }
+        }
+        // What never issues is flushed.
+        if record.events.iter().any(|event| matches!(event, Event::Fault(_)))
+            && let Some(front) = self.front.take()
+        {
+            for (id, ..) in front.rows {
+                let stage = front.stage;
+                self.line(cycle, format_args!("E\t{id}\t0\t{stage}\nR\t{id}\t0\t1"));
+            }
+        }
+        self.flush_before(cycle)
+    }
+
+    fn finish(mut self: Box<Self>, _: Cycle) -> io::Result<()> {
+        self.flush_before(Cycle::MAX)?;
+        self.target.flush()
+    }
+}

@@ -1,0 +1,269 @@
+//! Traces: what a run did, cycle by cycle, as a file for other tools. `docs/traces.md` says what stands in each.
+//!
+//! [`Tracer`] runs an emulator in the place of its own `run` and `run_period`. Outside of the window of cycles the machine
+//! runs at full speed; within it each cycle is looked at. A trace that reaches its limit of bytes ends there, complete.
+
+mod jsonl;
+mod kanata;
+mod signal;
+mod wave;
+
+use std::cell::Cell;
+use std::io::{self, Write};
+use std::ops::Range;
+use std::rc::Rc;
+use takt_emu::{Emulator, Event, PeriodError, PeriodReport, Status};
+use takt_isa::timing::{Address, Cause, Cycle};
+
+pub use signal::SignalError;
+
+/// What a trace is written as.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Format {
+    /// Value change dump, IEEE 1364.
+    Vcd,
+    /// GTKWave's fast signal trace.
+    Fst,
+    /// Kanata 0004, the pipeline log of the viewer Konata.
+    Kanata,
+    /// A JSON object a line for each completed operation.
+    JsonLines,
+}
+
+impl Format {
+    /// Every format, by the extension of its files.
+    pub const ALL: [(&'static str, Format); 4] = [
+        ("vcd", Format::Vcd),
+        ("fst", Format::Fst),
+        ("kanata", Format::Kanata),
+        ("jsonl", Format::JsonLines),
+    ];
+
+    /// The format that a file's extension asks for.
+    pub fn of_extension(extension: &str) -> Option<Format> {
+        Format::ALL.iter().find(|(known, _)| *known == extension).map(|(_, format)| *format)
+    }
+}
+
+/// What to trace.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The format.
+    pub format: Format,
+    /// The cycles that are traced.
+    pub cycles: Range<Cycle>,
+    /// Names of signals, `*` standing for any characters; empty for all.
+    pub signals: Vec<String>,
+    /// Bytes, roughly: the cycle in which a trace has more is its last.
+    pub limit: u64,
+}
+
+/// One cycle, as formats see it.
+struct Record {
+    cycle: Cycle,
+    /// The bundle that issued.
+    issued: Option<Address>,
+    /// Otherwise the bundle that could not, and why; for [`Cause::Wait`] the one that waits.
+    stall: Option<(Address, Cause)>,
+    events: Vec<Event>,
+}
+
+/// A format's writer. `emulator` is the machine after the cycle of the record.
+trait Writer {
+    fn cycle(&mut self, record: &Record, emulator: &Emulator) -> io::Result<()>;
+    /// The trace ends before `cycle`.
+    fn finish(self: Box<Self>, cycle: Cycle) -> io::Result<()>;
+    /// Bytes that are kept and not yet written.
+    fn kept(&self) -> u64 {
+        0
+    }
+}
+
+/// Counts the bytes that pass.
+struct Counted<'w> {
+    inner: Box<dyn Write + 'w>,
+    bytes: Rc<Cell<u64>>,
+}
+
+impl Write for Counted<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let count = self.inner.write(bytes)?;
+        self.bytes.set(self.bytes.get() + count as u64);
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.inner.flush()
+    }
+}
+
+/// What became of a trace.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Summary {
+    /// The cycles that it covers; empty if the run did not reach the window.
+    pub cycles: Range<Cycle>,
+    /// Whether it ended because of its size.
+    pub cut: bool,
+}
+
+/// Runs an emulator and writes what it does.
+pub struct Tracer<'w> {
+    options: Options,
+    bytes: Rc<Cell<u64>>,
+    /// Until the window's first cycle, where it goes.
+    target: Option<Box<dyn Write + 'w>>,
+    writer: Option<Box<dyn Writer + 'w>>,
+    summary: Summary,
+    /// The first error of writing; nothing is written after it.
+    error: Option<io::Error>,
+}
+
+impl<'w> Tracer<'w> {
+    /// A trace of the program in `emulator`, to be written to `target`.
+    ///
+    /// # Errors
+    /// If a name of a signal matches none.
+    pub fn new(
+        emulator: &Emulator,
+        target: Box<dyn Write + 'w>,
+        options: Options,
+    ) -> Result<Tracer<'w>, SignalError> {
+        // Known wrong now rather than at the window.
+        signal::select(emulator.program(), options.format, &options.signals)?;
+        let bytes = Rc::new(Cell::new(0));
+        let target: Box<dyn Write + 'w> = Box::new(Counted { inner: target, bytes: Rc::clone(&bytes) });
+        let start = options.cycles.start;
+        let summary = Summary { cycles: start..start, cut: false };
+        Ok(Tracer { options, bytes, target: Some(target), writer: None, summary, error: None })
+    }
+
+    /// As [`Emulator::run_period`] with the inputs as they are.
+    ///
+    /// # Errors
+    /// As there. Errors of writing are told by [`Tracer::finish`].
+    pub fn run_period(&mut self, emulator: &mut Emulator) -> Result<PeriodReport, PeriodError> {
+        loop {
+            if let Some(report) = self.advance(emulator, |emulator, until, sink| match sink {
+                Some(sink) => emulator.observed(sink).run_period_until(until),
+                None => emulator.run_period_until(until),
+            })? {
+                return Ok(report);
+            }
+        }
+    }
+
+    /// As [`Emulator::run`].
+    ///
+    /// # Errors
+    /// As there. Errors of writing are told by [`Tracer::finish`].
+    pub fn run(&mut self, emulator: &mut Emulator) -> Result<takt_emu::Stop, PeriodError> {
+        use takt_emu::Stop;
+        loop {
+            let stop = self.advance(emulator, |emulator, until, sink| {
+                let stop = match sink {
+                    Some(sink) => emulator.observed(sink).run_until(until)?,
+                    None => emulator.run_until(until)?,
+                };
+                // A program that waits without a tick to come would let cycles pass for ever.
+                let idle =
+                    matches!(emulator.status(), Status::Waiting { .. }) && emulator.next_tick().is_none();
+                let reached = stop == Stop::Reached;
+                Ok(if reached && idle { Some(Stop::Idle) } else { Some(stop).filter(|_| !reached) })
+            })?;
+            if let Some(stop) = stop {
+                return Ok(stop);
+            }
+        }
+    }
+
+    /// Runs to the window, or for a cycle within it, or beyond it.
+    fn advance<T>(
+        &mut self,
+        emulator: &mut Emulator,
+        run: impl FnOnce(&mut Emulator, Cycle, Option<&mut dyn FnMut(&Event)>) -> Result<Option<T>, PeriodError>,
+    ) -> Result<Option<T>, PeriodError> {
+        let now = emulator.now();
+        let Range { start, end } = self.options.cycles;
+        if now < start {
+            return run(emulator, start, None);
+        }
+        let over = now >= end || self.summary.cut || self.error.is_some();
+        if over {
+            return run(emulator, Cycle::MAX, None);
+        }
+        if let Some(target) = self.target.take() {
+            self.writer = self.begin(emulator, target);
+        }
+        let (stall, upcoming) = match *emulator.status() {
+            Status::Waiting { address, .. } => (Some((address, Cause::Wait)), None),
+            _ => {
+                let upcoming = emulator.upcoming();
+                (upcoming.and_then(|upcoming| Some((upcoming.address, upcoming.cause(now)?))), upcoming)
+            }
+        };
+        let mut events = Vec::new();
+        let result = run(emulator, now + 1, Some(&mut |event| events.push(event.clone())));
+        let passed = emulator.now() > now;
+        let issued = upcoming.map(|upcoming| upcoming.address).filter(|_| passed && stall.is_none());
+        let record = Record { cycle: now, issued, stall, events };
+        self.record(&record, emulator, passed);
+        result
+    }
+
+    fn begin(&mut self, emulator: &Emulator, target: Box<dyn Write + 'w>) -> Option<Box<dyn Writer + 'w>> {
+        let (program, start) = (emulator.program(), emulator.now());
+        self.summary.cycles = start..start;
+        let begun = signal::select(program, self.options.format, &self.options.signals)
+            .map_err(|error| io::Error::other(error.to_string()))
+            .and_then(|signals| -> io::Result<Box<dyn Writer + 'w>> {
+                Ok(match self.options.format {
+                    Format::Vcd => wave::vcd(emulator, signals, target)?,
+                    Format::Fst => wave::fst(emulator, signals, target)?,
+                    Format::Kanata => Box::new(kanata::Kanata::new(emulator, target)?),
+                    Format::JsonLines => Box::new(jsonl::JsonLines::new(program, signals, target)),
+                })
+            });
+        begun.map_err(|error| self.error = Some(error)).ok()
+    }
+
+    fn record(&mut self, record: &Record, emulator: &Emulator, passed: bool) {
+        let Some(writer) = &mut self.writer else { return };
+        if let Err(error) = writer.cycle(record, emulator) {
+            self.error = Some(error);
+        }
+        if passed {
+            self.summary.cycles.end = record.cycle + 1;
+        }
+        self.summary.cut = self.bytes.get() + writer.kept() > self.options.limit;
+    }
+
+    /// Whether writing has failed, so that nothing more is written.
+    pub fn has_failed(&self) -> bool {
+        self.error.is_some()
+    }
+
+    /// Completes the trace.
+    ///
+    /// # Errors
+    /// The first error of writing.
+    pub fn finish(mut self, emulator: &Emulator) -> io::Result<Summary> {
+        if let Some(target) = self.target.take() {
+            // A window that was never reached makes an empty trace.
+            self.writer = self.begin(emulator, target);
+            self.summary.cycles = emulator.now()..emulator.now();
+        }
+        if let Some(error) = self.error {
+            return Err(error);
+        }
+        if let Some(writer) = self.writer {
+            writer.finish(self.summary.cycles.end)?;
+        }
+        Ok(self.summary)
+    }
+}
+
+/// A NaN or an infinity has no number in JSON.
+fn number(value: f32) -> serde_json::Value {
+    serde_json::from_str::<serde_json::Number>(&format!("{value:?}"))
+        .map_or_else(|_| format!("{value:?}").into(), serde_json::Value::from)
+}

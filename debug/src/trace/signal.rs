@@ -1,0 +1,169 @@
+//! Signals: what a waveform shows.
+
+use super::Format;
+use takt_asm::diag::nearest;
+use takt_emu::Emulator;
+use takt_isa::timing::Cause;
+use takt_isa::{Program, Type};
+
+/// Where a signal's value comes from.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Source {
+    /// Whether a bundle issued.
+    Issue,
+    /// The bundle that issued or waits to.
+    Bundle,
+    /// Whether the tick was seen.
+    Tick,
+    /// Whether a deadline was missed, or the tick lost.
+    Missed,
+    /// Whether the cycle is charged to this kind of cause.
+    Stall(usize),
+    /// A register.
+    Register(u16),
+}
+
+/// A signal.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(super) struct Signal {
+    /// The group that it stands in; none at the top.
+    pub(super) scope: Option<&'static str>,
+    pub(super) name: String,
+    pub(super) source: Source,
+    pub(super) ty: SignalType,
+}
+
+/// How a signal's value is written.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum SignalType {
+    Real,
+    Bits(u32),
+}
+
+impl Signal {
+    /// Its value after a cycle: `None` while unknown.
+    pub(super) fn value(&self, record: &super::Record, emulator: &Emulator) -> Option<u32> {
+        use takt_emu::Event;
+        let heard = |is: fn(&Event) -> bool| Some(record.events.iter().any(is).into());
+        match self.source {
+            Source::Issue => Some(record.issued.is_some().into()),
+            Source::Bundle => record.issued.or(record.stall.map(|(address, _)| address)),
+            Source::Tick => heard(|event| matches!(event, Event::Tick { .. })),
+            Source::Missed => {
+                heard(|event| matches!(event, Event::DeadlineMissed { .. } | Event::TickLost { .. }))
+            }
+            Source::Stall(kind) => Some(record.stall.is_some_and(|(_, cause)| cause.kind() == kind).into()),
+            Source::Register(register) => emulator.register(register),
+        }
+    }
+}
+
+/// Why signals cannot be selected.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SignalError {
+    /// A name that matches nothing.
+    #[error("no signal is named `{name}`{}", near.as_ref().map_or(String::new(), |near| format!("; did you mean `{near}`?")))]
+    Unknown {
+        /// The name.
+        name: String,
+        /// What may be meant.
+        near: Option<String>,
+    },
+    /// A format without signals.
+    #[error("a Kanata trace shows operations; it has no signals to select")]
+    None,
+}
+
+/// Every signal of a program.
+fn all(program: &Program) -> Vec<Signal> {
+    let address_bits = u32::BITS - program.bundles().leading_zeros();
+    let wire = |scope, name: &str, source, width| Signal {
+        scope,
+        name: name.to_owned(),
+        source,
+        ty: SignalType::Bits(width),
+    };
+    let mut signals = vec![
+        wire(None, "issue", Source::Issue, 1),
+        wire(None, "bundle", Source::Bundle, address_bits.max(1)),
+        wire(None, "tick", Source::Tick, 1),
+        wire(None, "missed", Source::Missed, 1),
+    ];
+    for (kind, name) in Cause::KINDS.iter().enumerate() {
+        signals.push(wire(Some("stall"), &name.replace(' ', "_"), Source::Stall(kind), 1));
+    }
+    for (scope, ports) in
+        [("inputs", &program.inputs), ("outputs", &program.outputs), ("registers", &program.registers)]
+    {
+        signals.extend(ports.iter().map(|port| Signal {
+            scope: Some(scope),
+            name: port.name.clone(),
+            source: Source::Register(port.register),
+            ty: if port.ty == Type::F { SignalType::Real } else { SignalType::Bits(32) },
+        }));
+    }
+    signals
+}
+
+/// The signals that match the patterns, all if there is none.
+pub(super) fn select(
+    program: &Program,
+    format: Format,
+    patterns: &[String],
+) -> Result<Vec<Signal>, SignalError> {
+    let signals = all(program);
+    if patterns.is_empty() {
+        return Ok(signals);
+    }
+    if format == Format::Kanata {
+        return Err(SignalError::None);
+    }
+    for pattern in patterns {
+        if !signals.iter().any(|signal| matches(pattern, &signal.name)) {
+            let near = nearest(pattern, signals.iter().map(|signal| signal.name.as_str()));
+            return Err(SignalError::Unknown { name: pattern.clone(), near });
+        }
+    }
+    let wanted = |signal: &Signal| patterns.iter().any(|pattern| matches(pattern, &signal.name));
+    Ok(signals.into_iter().filter(wanted).collect())
+}
+
+/// Whether a name matches a pattern, in which `*` stands for any characters.
+pub(super) fn matches(pattern: &str, name: &str) -> bool {
+    let Some((head, rest)) = pattern.split_once('*') else { return pattern == name };
+    let Some(mut name) = name.strip_prefix(head) else { return false };
+    // Each part where it first fits leaves most for those behind it; the last must fit the end.
+    let mut parts = rest.split('*').peekable();
+    while let Some(part) = parts.next() {
+        if parts.peek().is_none() {
+            return name.ends_with(part);
+        }
+        let Some(at) = name.find(part) else { return false };
+        name = &name[at + part.len()..];
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::matches;
+
+    #[test]
+    fn patterns() {
+        for (pattern, name, expected) in [
+            ("a", "a", true),
+            ("a", "ab", false),
+            ("*", "", true),
+            ("a*", "abc", true),
+            ("*c", "abc", true),
+            ("a*c", "abc", true),
+            ("a*c", "ac", true),
+            ("a*b*c", "axxbyyc", true),
+            ("a*b*c", "acb", false),
+            ("ab*ba", "aba", false),
+            ("*ab*", "xaab", true),
+        ] {
+            assert_eq!(matches(pattern, name), expected, "{pattern} {name}");
+        }
+    }
+}

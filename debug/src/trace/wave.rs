@@ -1,0 +1,247 @@
+//! Waveforms: VCD and FST, from the same samples. A time unit is a cycle.
+
+use super::signal::{Signal, SignalType};
+use super::{Record, Writer};
+use fst_writer::{
+    FstBodyWriter, FstFileType, FstHeaderWriter, FstInfo, FstScopeType, FstSignalId, FstSignalType,
+    FstVarDirection, FstVarType, FstWriteError,
+};
+use std::fmt::Write as _;
+use std::io::{self, Cursor, Write};
+use takt_emu::Emulator;
+use takt_isa::timing::Cycle;
+
+/// A file that takes changes of values.
+trait File {
+    fn time(&mut self, cycle: Cycle) -> io::Result<()>;
+    fn real(&mut self, signal: usize, value: f64) -> io::Result<()>;
+    /// `digits` are 0, 1 and x, as many as the signal is wide.
+    fn bits(&mut self, signal: usize, digits: &str) -> io::Result<()>;
+    fn finish(self: Box<Self>) -> io::Result<()>;
+    fn kept(&self) -> u64;
+}
+
+/// Samples signals and writes those that changed.
+struct Wave<'w> {
+    file: Box<dyn File + 'w>,
+    signals: Vec<Signal>,
+    /// What was last written for each.
+    last: Vec<Option<Option<u32>>>,
+    digits: String,
+}
+
+impl Writer for Wave<'_> {
+    fn cycle(&mut self, record: &Record, emulator: &Emulator) -> io::Result<()> {
+        let mut timed = false;
+        for (i, signal) in self.signals.iter().enumerate() {
+            let value = signal.value(record, emulator);
+            if self.last[i].replace(value) == Some(value) {
+                continue;
+            }
+            if !timed {
+                self.file.time(record.cycle)?;
+                timed = true;
+            }
+            match signal.ty {
+                SignalType::Real => {
+                    // A real has no unknown value; NaN is as near as it gets.
+                    self.file.real(i, value.map_or(f64::NAN, |bits| f32::from_bits(bits).into()))?;
+                }
+                SignalType::Bits(width) => {
+                    self.digits.clear();
+                    match value {
+                        Some(value) => write!(self.digits, "{value:0width$b}", width = width as usize),
+                        None => write!(self.digits, "{:x>width$}", "", width = width as usize),
+                    }
+                    .map_err(io::Error::other)?;
+                    self.file.bits(i, &self.digits)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(mut self: Box<Self>, cycle: Cycle) -> io::Result<()> {
+        self.file.time(cycle)?;
+        self.file.finish()
+    }
+
+    fn kept(&self) -> u64 {
+        self.file.kept()
+    }
+}
+
+fn wave<'w>(file: Box<dyn File + 'w>, signals: Vec<Signal>) -> Box<dyn Writer + 'w> {
+    Box::new(Wave { file, last: vec![None; signals.len()], signals, digits: String::new() })
+}
+
+/// Calls `signal` for each signal and `scope` where a group begins (with its name) and ends.
+fn hierarchy<E>(signals: &[Signal], mut visit: impl FnMut(Part<'_>) -> Result<(), E>) -> Result<(), E> {
+    let mut inside = None;
+    visit(Part::Begin("takt"))?;
+    for (i, signal) in signals.iter().enumerate() {
+        if signal.scope != inside {
+            if inside.is_some() {
+                visit(Part::End)?;
+            }
+            inside = signal.scope;
+            inside.map_or(Ok(()), |name| visit(Part::Begin(name)))?;
+        }
+        visit(Part::Signal(i, signal))?;
+    }
+    if inside.is_some() {
+        visit(Part::End)?;
+    }
+    visit(Part::End)
+}
+
+enum Part<'s> {
+    Begin(&'static str),
+    End,
+    Signal(usize, &'s Signal),
+}
+
+/// A VCD's short name of a signal: its number in the printable characters.
+fn identifier(mut signal: usize) -> String {
+    let mut text = String::new();
+    loop {
+        text.push(char::from(b'!' + (signal % 94) as u8));
+        signal /= 94;
+        if signal == 0 {
+            return text;
+        }
+        signal -= 1;
+    }
+}
+
+struct Vcd<'w> {
+    target: Box<dyn Write + 'w>,
+    identifiers: Vec<String>,
+}
+
+/// A VCD of these signals.
+pub(super) fn vcd<'w>(
+    emulator: &Emulator,
+    signals: Vec<Signal>,
+    mut target: Box<dyn Write + 'w>,
+) -> io::Result<Box<dyn Writer + 'w>> {
+    let machine = emulator.machine().name;
+    writeln!(target, "$comment machine {machine}; one time unit is one cycle $end")?;
+    writeln!(target, "$version takt {} $end\n$timescale 1 ns $end", env!("CARGO_PKG_VERSION"))?;
+    let identifiers: Vec<String> = (0..signals.len()).map(identifier).collect();
+    hierarchy(&signals, |part| match part {
+        Part::Begin(name) => writeln!(target, "$scope module {name} $end"),
+        Part::End => writeln!(target, "$upscope $end"),
+        Part::Signal(i, Signal { name, ty, .. }) => match ty {
+            SignalType::Real => writeln!(target, "$var real 64 {} {name} $end", identifiers[i]),
+            SignalType::Bits(width) => writeln!(target, "$var wire {width} {} {name} $end", identifiers[i]),
+        },
+    })?;
+    writeln!(target, "$enddefinitions $end")?;
+    Ok(wave(Box::new(Vcd { target, identifiers }), signals))
+}
+
+impl File for Vcd<'_> {
+    fn time(&mut self, cycle: Cycle) -> io::Result<()> {
+        writeln!(self.target, "#{cycle}")
+    }
+
+    fn real(&mut self, signal: usize, value: f64) -> io::Result<()> {
+        // As C's printf writes them, which is how the standard has them.
+        let text = if value.is_nan() { "nan".to_owned() } else { format!("{value:e}") };
+        writeln!(self.target, "r{text} {}", self.identifiers[signal])
+    }
+
+    fn bits(&mut self, signal: usize, digits: &str) -> io::Result<()> {
+        let (mark, gap) = if digits.len() == 1 { ("", "") } else { ("b", " ") };
+        writeln!(self.target, "{mark}{digits}{gap}{}", self.identifiers[signal])
+    }
+
+    fn finish(mut self: Box<Self>) -> io::Result<()> {
+        self.target.flush()
+    }
+
+    fn kept(&self) -> u64 {
+        0
+    }
+}
+
+struct Fst<'w> {
+    body: FstBodyWriter<Cursor<Vec<u8>>>,
+    ids: Vec<FstSignalId>,
+    target: Box<dyn Write + 'w>,
+}
+
+/// An FST of these signals. It is made in memory, since its format wants to go back in its file and targets may be pipes.
+pub(super) fn fst<'w>(
+    emulator: &Emulator,
+    signals: Vec<Signal>,
+    target: Box<dyn Write + 'w>,
+) -> io::Result<Box<dyn Writer + 'w>> {
+    let info = FstInfo {
+        // The writer's own start; before the window, values are unknown.
+        start_time: 0,
+        timescale_exponent: -9,
+        version: format!("takt {}", env!("CARGO_PKG_VERSION")),
+        // Equal runs give equal files.
+        date: String::new(),
+        file_type: FstFileType::Verilog,
+    };
+    let mut header = FstHeaderWriter::write_to_mem(&info).map_err(told)?;
+    let mut ids = Vec::new();
+    hierarchy(&signals, |part| match part {
+        Part::Begin(name) => header.scope(name, "", FstScopeType::Module),
+        Part::End => header.up_scope(),
+        Part::Signal(_, Signal { name, ty, .. }) => {
+            let (ty, kind) = match *ty {
+                SignalType::Real => (FstSignalType::real(), FstVarType::Real),
+                SignalType::Bits(width) => (FstSignalType::bit_vec(width), FstVarType::Wire),
+            };
+            header.var(name, ty, kind, FstVarDirection::Implicit, None).map(|id| ids.push(id))
+        }
+    })
+    .map_err(told)?;
+    let body = header.finish().map_err(told)?;
+    let mut file = Fst { body, ids, target };
+    if emulator.now() > 0 {
+        for (i, signal) in signals.iter().enumerate() {
+            match signal.ty {
+                SignalType::Real => file.real(i, f64::NAN)?,
+                SignalType::Bits(width) => file.bits(i, &"x".repeat(width as usize))?,
+            }
+        }
+    }
+    Ok(wave(Box::new(file), signals))
+}
+
+fn told(error: FstWriteError) -> io::Error {
+    match error {
+        FstWriteError::Io(error) => error,
+        other => io::Error::other(other.to_string()),
+    }
+}
+
+impl File for Fst<'_> {
+    fn time(&mut self, cycle: Cycle) -> io::Result<()> {
+        self.body.time_change(cycle).map_err(told)
+    }
+
+    fn real(&mut self, signal: usize, value: f64) -> io::Result<()> {
+        self.body.signal_change(self.ids[signal], &value.to_le_bytes()).map_err(told)
+    }
+
+    fn bits(&mut self, signal: usize, digits: &str) -> io::Result<()> {
+        self.body.signal_change(self.ids[signal], digits.as_bytes()).map_err(told)
+    }
+
+    fn finish(self: Box<Self>) -> io::Result<()> {
+        let Fst { body, mut target, .. } = *self;
+        let bytes = body.finish().map_err(told)?.into_inner();
+        target.write_all(&bytes)?;
+        target.flush()
+    }
+
+    fn kept(&self) -> u64 {
+        self.body.size() as u64
+    }
+}

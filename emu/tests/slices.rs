@@ -1,0 +1,102 @@
+//! What debuggers and traces rest on: a run cut into slices at any cycle is the same run, and `upcoming` tells the truth.
+
+use takt_emu::testing::{INPUTS, Options, Random, random_program};
+use takt_emu::{Emulator, PeriodError, Step};
+use takt_isa::{MACHINES, Program};
+
+fn loaded(program: &Program, seed: u64) -> Emulator {
+    let mut emulator = Emulator::new(program).unwrap();
+    let mut random = Random::new(seed);
+    for i in 0..INPUTS {
+        emulator.set_input_bits(program.machine.inputs.base + i, random.word()).unwrap();
+    }
+    emulator
+}
+
+#[test]
+fn periods_in_slices() {
+    for seed in 0..40 {
+        for machine in MACHINES {
+            let program = random_program(seed, machine, Options::TAME);
+            let (mut whole, mut sliced) = (loaded(&program, seed), loaded(&program, seed));
+            let mut random = Random::new(seed);
+            for _ in 0..4 {
+                // Some halt; they do so together.
+                let Ok(report) = whole.run_period(&[]) else {
+                    assert_eq!(sliced.run_period_until(u64::MAX), Err(PeriodError::Halted));
+                    break;
+                };
+                let again = loop {
+                    // Looking must not change what happens.
+                    if random.once_in(3) {
+                        sliced.upcoming();
+                    }
+                    let until = sliced.now() + u64::from(random.below(60));
+                    if let Some(report) = sliced.run_period_until(until).unwrap() {
+                        break report;
+                    }
+                    assert_eq!(sliced.now(), until);
+                };
+                assert_eq!(report, again, "seed {seed} on {}", machine.name);
+                assert_eq!(whole.now(), sliced.now());
+                assert_eq!(whole.statistics(), sliced.statistics());
+                assert!((0..1024).all(|register| whole.register(register) == sliced.register(register)));
+            }
+        }
+    }
+}
+
+#[test]
+fn upcoming_is_what_comes() {
+    let (mut issued, mut stalled) = (0, 0);
+    for seed in 0..60 {
+        for machine in MACHINES {
+            let options = if seed % 2 == 0 { Options::TAME } else { Options::WILD };
+            let mut emulator = loaded(&random_program(seed, machine, options), seed);
+            for _ in 0..600 {
+                let now = emulator.now();
+                let upcoming = emulator.upcoming();
+                match (emulator.step_cycle(), upcoming) {
+                    (Ok(Step::Issued { cycle, address }), Some(upcoming)) => {
+                        assert_eq!(
+                            (upcoming.issue.cycle, upcoming.address, upcoming.cause(now)),
+                            (cycle, address, None)
+                        );
+                        issued += 1;
+                    }
+                    (Ok(Step::Stalled { cycle, address, cause }), Some(upcoming)) => {
+                        assert_eq!((upcoming.address, upcoming.cause(cycle)), (address, Some(cause)));
+                        stalled += 1;
+                    }
+                    (Ok(Step::Issued { .. }), None) | (Ok(Step::Halted), Some(_)) => panic!("not upcoming"),
+                    (Ok(_), None) => {}
+                    (Err(_), _) => break,
+                }
+            }
+        }
+    }
+    assert!(issued > 300 && stalled > 1000, "{issued} {stalled}");
+}
+
+/// What is set is read by the bundle that issues next, even if a result arrives in the same cycle.
+#[test]
+fn what_is_set_is_read() {
+    let mut found = 0;
+    for seed in 0..40 {
+        let mut emulator = loaded(&random_program(seed, MACHINES[0], Options::TAME), seed);
+        for _ in 0..300 {
+            let now = emulator.now();
+            let due =
+                emulator.underway().find(|retire| retire.cycle == now).and_then(|retire| retire.register);
+            if let Some(register) = due {
+                emulator.set_register(register, 0x1234_5678);
+                emulator.step_cycle().unwrap();
+                assert_eq!(emulator.register(register), Some(0x1234_5678));
+                found += 1;
+            } else if emulator.step_cycle().is_err() {
+                break;
+            }
+        }
+    }
+    assert!(found > 100, "{found}");
+}
