@@ -489,6 +489,16 @@ impl Operands {
         if row.shape.sources() == 1 && row.source_type(0) == F && self.random.bits() & 1 == 0 {
             a = self.near_integer();
         }
+        // Operands at which the trigonometric functions are neither trivial nor refused.
+        use takt_isa::Function::{Arccosine, Arctangent, Sine};
+        if matches!(row.function, Sine | Arctangent | Arccosine) && self.random.bits() & 3 != 0 {
+            let highest = if row.function == Sine { 135 } else { 126 };
+            for operand in [&mut a, &mut b] {
+                let bits = self.random.bits();
+                let field = self.random.between(if bits & 1 == 0 { 111 } else { highest - 3 }, highest);
+                *operand = bits & 0x807f_ffff | (field as u32) << 23;
+            }
+        }
         [a, b, c]
     }
 }
