@@ -48,6 +48,14 @@ pub(crate) struct Preset {
     pub(crate) span: Span,
 }
 
+/// A `.deadline`, `.order` or `.late`: the directive, and the section that it is about.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Timing {
+    pub(crate) at: At,
+    pub(crate) directive: u32,
+    pub(crate) section: Section,
+}
+
 /// The expanded source.
 #[derive(Debug)]
 pub(crate) struct Flat {
@@ -55,6 +63,7 @@ pub(crate) struct Flat {
     pub(crate) period: Vec<Item>,
     pub(crate) data: Vec<Data>,
     pub(crate) presets: Vec<Preset>,
+    pub(crate) timing: Vec<Timing>,
     /// What each `.loc` says; the first is none at all.
     pub(crate) locs: Vec<Vec<Option<(u32, u32)>>>,
     /// Files that `.loc` names, in order, then those whose own lines are code.
@@ -143,6 +152,7 @@ impl<'l> Expander<'l> {
             period: Vec::new(),
             data: Vec::new(),
             presets: Vec::new(),
+            timing: Vec::new(),
             locs: vec![Vec::new()],
             files: Vec::new(),
             file_numbers: HashMap::new(),
@@ -478,6 +488,15 @@ impl<'l> Expander<'l> {
                         return Err(self.context.error(at.scope, "schedule", word.span, message));
                     }
                 }
+            }
+            DirectiveKind::Deadline(..) | DirectiveKind::Order(_) | DirectiveKind::Late(..) => {
+                if self.section == Section::Data {
+                    let error =
+                        Diagnostic::error("section", span, "ports are not read or written in `.data`")
+                            .help("open `.once` or `.period` before it");
+                    return Err(self.context.report(at.scope, error));
+                }
+                self.flat.timing.push(Timing { at, directive, section: self.section });
             }
             DirectiveKind::Error(text) => {
                 return Err(self.context.report(at.scope, Diagnostic::error("user", span, text.clone())));

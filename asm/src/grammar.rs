@@ -551,6 +551,23 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
     let schedule = is(Directive::Schedule)
         .ignore_then(name.clone().labelled("`on` or `off`"))
         .map(DirectiveKind::Schedule);
+    let ports = || {
+        let more = comma().or_not().ignore_then(name.clone()).repeated().collect::<Vec<_>>();
+        name.clone().labelled("a port").then(more).map(|(first, mut more)| {
+            more.insert(0, first);
+            more
+        })
+    };
+    let deadline = is(Directive::Deadline)
+        .ignore_then(ports())
+        .then_ignore(just(Token::Assign).labelled("`=`"))
+        .then(expr.clone().labelled("a cycle"))
+        .map(|(ports, cycle)| DirectiveKind::Deadline(ports, cycle));
+    let order = is(Directive::Order).ignore_then(ports()).map(DirectiveKind::Order);
+    let late = is(Directive::Late)
+        .ignore_then(ports())
+        .then(just(Token::Assign).labelled("`=`").ignore_then(expr.clone().labelled("cycles")).or_not())
+        .map(|(ports, cost)| DirectiveKind::Late(ports, cost));
     let error = is(Directive::Error).ignore_then(text()).map(DirectiveKind::Error);
     let at = text()
         .then(expr.clone().labelled("a line number"))
@@ -561,7 +578,7 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
         .map(DirectiveKind::Loc);
     choice((
         bare, declare, float, word, constant, preset, space, branch, elif, rep, macro_, include, error, loc,
-        schedule,
+        schedule, deadline, order, late,
     ))
     .map_with(|kind, e| Body::Directive(kind, e.span()))
 }

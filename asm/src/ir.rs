@@ -167,6 +167,30 @@ pub struct Label {
     pub span: Span,
 }
 
+/// What the source demands of the time at which ports are read or written.
+#[derive(Clone, Debug)]
+pub struct Demand {
+    /// What it demands.
+    pub kind: DemandKind,
+    /// The ports, in the order of the directive, and where they stand in it.
+    pub ports: Vec<(RegisterId, Span)>,
+    /// Whether it is about `.period`, else about `.once`.
+    pub period: bool,
+    /// The directive.
+    pub span: Span,
+}
+
+/// What a [`Demand`] demands.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum DemandKind {
+    /// Each output is written for the last time in this cycle or before; the section's first bundle issues in cycle 1.
+    Deadline(u32),
+    /// Whatever is read from or written to a port comes before what is read from or written to the next.
+    Order,
+    /// The inputs are read as late as a schedule allows that is at most so many cycles longer than the shortest found.
+    Late(u32),
+}
+
 /// A program before registers have addresses.
 #[derive(Clone, Debug)]
 pub struct Ir {
@@ -180,6 +204,8 @@ pub struct Ir {
     pub period: u32,
     /// The labels, in the order of the source.
     pub labels: Vec<Label>,
+    /// What is demanded of ports, in the order of the source.
+    pub demands: Vec<Demand>,
     /// Data memory.
     pub data: Vec<u32>,
     /// Words given bit by bit.

@@ -113,6 +113,44 @@ impl Resolver<'_> {
         Err(self.context.report(at.scope, error))
     }
 
+    /// The port that a name stands for, of a kind if one is wanted.
+    pub(crate) fn port(
+        &mut self,
+        at: At,
+        name: Name,
+        wanted: Option<RegisterKind>,
+    ) -> Result<RegisterId, Reported> {
+        let operand = Operand { kind: OperandKind::Name(name.name), span: name.span };
+        let (place, given, meaning) = self.meaning(at, operand)?;
+        if let Some((name, Binding::None)) = meaning {
+            return Err(self.context.unknown(place.scope, name, given.span, Wanted::Source));
+        }
+        let is_port = |kind| match wanted {
+            Some(wanted) => kind == wanted,
+            None => matches!(kind, RegisterKind::Input | RegisterKind::Output),
+        };
+        if let Some((_, Binding::Register(register))) = meaning
+            && is_port(self.context.registers[register.index()].kind)
+        {
+            return Ok(register);
+        }
+        let wanted = match wanted {
+            Some(RegisterKind::Output) => "an output port",
+            Some(_) => "an input port",
+            None => "a port",
+        };
+        let text = self.context.sources.text(given.span);
+        let message = match meaning {
+            Some((_, binding)) => format!("`{text}` is {}, not {wanted}", self.context.kind_text(binding)),
+            None => format!("{wanted} is needed here"),
+        };
+        let mut error = Diagnostic::error("operand", given.span, message);
+        if let Some(declared) = meaning.and_then(|(_, binding)| self.context.declaration(binding)) {
+            error = error.also(declared, "declared here");
+        }
+        Err(self.context.report(at.scope, error))
+    }
+
     /// A register to read: a register as such, or the one that holds a constant.
     fn source(&mut self, at: At, operand: Operand, ty: Type) -> Result<RegisterId, Reported> {
         let (place, given, meaning) = self.meaning(at, operand)?;

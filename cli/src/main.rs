@@ -6,6 +6,7 @@ mod arm;
 mod asm;
 mod completions;
 mod controller;
+mod cosim;
 mod disasm;
 mod eval;
 mod fault;
@@ -19,6 +20,7 @@ mod output;
 mod plot;
 mod ports;
 mod report;
+mod rtl;
 mod run;
 mod select;
 mod synthesis;
@@ -62,6 +64,8 @@ enum Command {
     Disasm(disasm::Disasm),
     Run(run::Run),
     Eval(eval::Eval),
+    Rtl(rtl::Rtl),
+    Cosim(cosim::Cosim),
     Isa(isa::Isa),
     Machines(machines::Machines),
     Completions(completions::Completions),
@@ -76,6 +80,8 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Disasm(disasm) => disasm::run(disasm, color),
         Command::Run(run) => run::run(run, color, out),
         Command::Eval(eval) => eval::run(eval, out),
+        Command::Rtl(rtl) => rtl::run(rtl, color, out),
+        Command::Cosim(cosim) => cosim::run(cosim, color, out),
         Command::Isa(isa) => isa::run(isa, out),
         Command::Machines(machines) => machines::run(machines, out),
         Command::Completions(completions) => completions::run(completions, out),
