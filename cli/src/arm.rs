@@ -181,7 +181,7 @@ fn draw_square(arm: &mut OnEmulator) -> Result<Drawn> {
     let mut drawn = Drawn { joints: Vec::new(), deviation: 0.0 };
     for period in 0..=square::PERIODS {
         let pose = square::square(period);
-        let found = arm.inverse(&narrow_pose(&pose), tool, [false; 3])?;
+        let found = arm.inverse(&narrow_pose(&pose), tool, square::CONFIGURATION)?;
         if found.status != GOOD {
             bail!("period {period}: the square is out of reach (status {})", found.status);
         }

@@ -1,6 +1,6 @@
 //! The path demonstration: the tool along a square in space.
 
-use super::Pose;
+use super::{Configuration, Pose};
 
 /// Length of a side, mm.
 pub const SIDE: f64 = 200.0;
@@ -10,6 +10,8 @@ pub const SPEED: f64 = 200.0;
 pub const PERIOD: f64 = 1e-3;
 /// Tool point.
 pub const TOOL: [f64; 3] = [0.0, 0.0, 100.0];
+/// The branch on which the arm goes: no joint passes ±180°.
+pub const CONFIGURATION: Configuration = [false, false, true];
 /// Periods of one round, the first point counted once.
 pub const PERIODS: u64 = (4.0 * SIDE / SPEED / PERIOD) as u64;
 
@@ -47,8 +49,11 @@ mod tests {
             let (a, b) = (square(period), square(period + 1));
             let moved = (0..3).map(|i| (b.position[i] - a.position[i]).powi(2)).sum::<f64>().sqrt();
             assert!((moved - step).abs() < 1e-9, "period {period}: {moved} mm");
-            let solution = inverse(&a, TOOL, [false; 3]).expect("it is in reach");
+            let [solution, next] =
+                [a, b].map(|pose| inverse(&pose, TOOL, CONFIGURATION).expect("it is in reach"));
             assert!(is_clear(&a, &solution), "period {period}: {solution:?}");
+            let turned = (0..6).map(|joint| (next.joints[joint] - solution.joints[joint]).abs());
+            assert!(turned.fold(0.0, f64::max) < 0.5, "period {period}: {solution:?} to {next:?}");
         }
     }
 }
