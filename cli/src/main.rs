@@ -4,6 +4,7 @@
 mod account;
 mod arm;
 mod asm;
+mod bound;
 mod completions;
 mod controller;
 mod cosim;
@@ -63,6 +64,7 @@ enum Command {
     Asm(asm::Asm),
     Disasm(disasm::Disasm),
     Run(run::Run),
+    Bound(bound::Bound),
     Eval(eval::Eval),
     Rtl(rtl::Rtl),
     Cosim(cosim::Cosim),
@@ -79,6 +81,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Asm(asm) => asm::run(asm, color, out),
         Command::Disasm(disasm) => disasm::run(disasm, color),
         Command::Run(run) => run::run(run, color, out),
+        Command::Bound(bound) => bound::run(bound, color, out),
         Command::Eval(eval) => eval::run(eval, out),
         Command::Rtl(rtl) => rtl::run(rtl, color, out),
         Command::Cosim(cosim) => cosim::run(cosim, color, out),

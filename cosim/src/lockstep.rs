@@ -324,7 +324,9 @@ fn fault_code(kind: &FaultKind) -> Option<u16> {
         FaultKind::DataAddress { .. } => Some(2),
         FaultKind::StackOverflow { .. } => Some(3),
         FaultKind::StackUnderflow => Some(4),
-        FaultKind::UnwrittenRegister { .. } | FaultKind::CycleLimit { .. } => None,
+        FaultKind::UnwrittenRegister { .. } | FaultKind::LoopBound { .. } | FaultKind::CycleLimit { .. } => {
+            None
+        }
     }
 }
 

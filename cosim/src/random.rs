@@ -92,6 +92,7 @@ pub fn run(
             takt_emu::FaultKind::UnwrittenRegister { .. } => "unwritten register",
             takt_emu::FaultKind::StackOverflow { .. } => "return stack full",
             takt_emu::FaultKind::StackUnderflow => "return stack empty",
+            takt_emu::FaultKind::LoopBound { .. } => "loop bound",
             takt_emu::FaultKind::CycleLimit { .. } => "cycle limit",
         });
     }

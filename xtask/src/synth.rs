@@ -31,6 +31,13 @@ const TARGET_MHZ: u32 = 200;
 /// Options of `synth_lattice`. Without the slices' wide multiplexers the logic is a third less and not slower.
 const OPTIONS: &str = "-nowidelut";
 
+/// Where the pins of a machine's top level are (those of the ULX3S board). Without a fixed place the placer takes ten times as long.
+const PINS: &str = "LOCATE COMP \"clk\" SITE \"G2\";
+LOCATE COMP \"rst\" SITE \"D6\";
+LOCATE COMP \"serial_in\" SITE \"R18\";
+LOCATE COMP \"serial_out\" SITE \"U1\";
+";
+
 /// What is measured, and how.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
@@ -81,6 +88,7 @@ struct Design {
     name: String,
     files: BTreeMap<String, String>,
     top: String,
+    pins: &'static str,
     wrapper: Resources,
 }
 
@@ -168,7 +176,7 @@ fn core(machine: &'static Machine, library: &Library, ecp5: bool) -> Result<Desi
     }
     files.insert("synthesis.v".to_owned(), core.synthesis);
     let wrapper = Resources::default();
-    Ok(Design { name: machine.name.to_owned(), files, top: synthesis_top(machine), wrapper })
+    Ok(Design { name: machine.name.to_owned(), files, top: synthesis_top(machine), pins: PINS, wrapper })
 }
 
 /// A unit between registers, on few pins: the operands come out of a shift register and a second register, the results go
@@ -216,7 +224,7 @@ endmodule
     );
     // 9 LUT4 for the groups of four, 3 for the rest. A constant output has no register: the count of flip-flops may be low by two.
     let wrapper = Resources { luts: 12, flip_flops: u64::from(2 * bits) + 46, ..Resources::default() };
-    Ok(Design { name: circuit.unit.name.to_owned(), files, top: "wrapper".to_owned(), wrapper })
+    Ok(Design { name: circuit.unit.name.to_owned(), files, top: "wrapper".to_owned(), pins: "", wrapper })
 }
 
 // ---- The tools
@@ -229,6 +237,7 @@ fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Result<Synthes
     for (name, text) in &design.files {
         fs::write(folder.join(name), text)?;
     }
+    fs::write(folder.join("pins.lpf"), design.pins)?;
     let sources: Vec<_> =
         design.files.keys().filter(|name| name.ends_with(".v")).map(String::as_str).collect();
 
@@ -281,6 +290,8 @@ fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Result<Synthes
             "--seed",
             &number,
             "--timing-allow-fail",
+            "--lpf",
+            "pins.lpf",
             "--lpf-allow-unconstrained",
             "--report",
             &report,

@@ -11,7 +11,7 @@ pub const PERIOD: f64 = 1e-3;
 /// Tool point.
 pub const TOOL: [f64; 3] = [0.0, 0.0, 100.0];
 /// The branch on which the arm goes: no joint passes ±180°.
-pub const CONFIGURATION: Configuration = [false, false, true];
+pub const CONFIGURATION: Configuration = [false, false, false];
 /// Periods of one round, the first point counted once.
 pub const PERIODS: u64 = (4.0 * SIDE / SPEED / PERIOD) as u64;
 
@@ -19,7 +19,7 @@ pub const PERIODS: u64 = (4.0 * SIDE / SPEED / PERIOD) as u64;
 const CORNER: [f64; 3] = [350.0, -100.0, 300.0];
 const SIDES: [[f64; 3]; 2] = [[0.866_025_403_784_438_6, 0.0, 0.5], [0.0, 1.0, 0.0]];
 /// The tool stands square to the plane and points down: roll, pitch, yaw.
-const ORIENTATION: [f64; 3] = [0.0, -60.0, 0.0];
+const ORIENTATION: [f64; 3] = [90.0, -60.0, 0.0];
 
 /// The tool's pose in a period, from 0 to [`PERIODS`], at constant speed; the last is the first.
 #[must_use]
