@@ -5,7 +5,7 @@ use crate::files::{self, Given, Out};
 use crate::load::Load;
 use crate::run::PERIOD_LIMIT;
 use crate::select::{self, MachineArgument};
-use crate::track::{PAPER_CLOCK, clock, progress};
+use crate::track::progress;
 use crate::{output, plot, ports};
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -37,7 +37,7 @@ pub(crate) struct Arm {
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     seed: u64,
     /// Clock in MHz, for cycles to time; the first paper's is 125.
-    #[arg(long, value_name = "MHZ", default_value_t = PAPER_CLOCK, value_parser = clock, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MHZ", default_value_t = select::PAPER_CLOCK, value_parser = select::clock, allow_negative_numbers = true)]
     clock: f64,
     /// Draw a square in space with the tool and write each period's joint angles as CSV; `-` is standard output.
     #[arg(long, value_name = "FILE")]

@@ -70,18 +70,6 @@ Examples:
 /// Bytes of G-code; beyond, the longest path that can be driven would be made of moves of a micrometre.
 const GCODE_LIMIT: usize = 16 << 20;
 
-<<<<<<< HEAD
-pub(crate) fn clock(text: &str) -> Result<f64, String> {
-    let mhz: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
-    if (0.01..=100_000.0).contains(&mhz) {
-        Ok(mhz)
-    } else {
-        Err("not between 0.01 and 100000 MHz".to_owned())
-    }
-}
-
-=======
->>>>>>> main
 /// Cycles that the sampling period has at a clock in MHz.
 fn period_cycles(clock: f64) -> Option<NonZeroU64> {
     NonZeroU64::new((clock * 1e6 * SAMPLE_TIME).round() as u64)
