@@ -292,6 +292,8 @@ pub enum DirectiveKind {
     Error(String),
     /// `.schedule` and `on` or `off`.
     Schedule(Name),
+    /// `.loop_bound`.
+    LoopBound(Expr),
     /// `.deadline`, the ports, and the cycle.
     Deadline(Vec<Name>, Expr),
     /// `.order` and the ports.
@@ -360,6 +362,7 @@ directives! {
     Loc ".loc" "\"file\" line";
     Error ".error" "\"text\"";
     Schedule ".schedule" "on|off";
+    LoopBound ".loop_bound" "turns";
     Deadline ".deadline" "port, port = cycle";
     Order ".order" "port, port, …";
     Late ".late" "port, port = cycles";

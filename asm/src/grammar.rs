@@ -551,6 +551,7 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
     let schedule = is(Directive::Schedule)
         .ignore_then(name.clone().labelled("`on` or `off`"))
         .map(DirectiveKind::Schedule);
+    let loop_bound = is(Directive::LoopBound).ignore_then(expr.clone()).map(DirectiveKind::LoopBound);
     let ports = || {
         let more = comma().or_not().ignore_then(name.clone()).repeated().collect::<Vec<_>>();
         name.clone().labelled("a port").then(more).map(|(first, mut more)| {
@@ -578,7 +579,7 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
         .map(DirectiveKind::Loc);
     choice((
         bare, declare, float, word, constant, preset, space, branch, elif, rep, macro_, include, error, loc,
-        schedule, deadline, order, late,
+        schedule, loop_bound, deadline, order, late,
     ))
     .map_with(|kind, e| Body::Directive(kind, e.span()))
 }

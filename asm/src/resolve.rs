@@ -3,8 +3,8 @@
 use crate::ast::*;
 use crate::context::{At, Context, Reported};
 use crate::diag::{Diagnostic, nearest};
-use crate::expand::{Data, Flat, Item, Timing};
-use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, Operation, RegisterId, RegisterKind};
+use crate::expand::{self, Data, Flat, Item, Timing};
+use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
 use crate::serialise;
 use crate::source::Span;
 use smallvec::SmallVec;
@@ -33,6 +33,7 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
         bundles: Vec::with_capacity(flat.once.len() + flat.period.len()),
         period: 0,
         labels: Vec::new(),
+        loop_bounds: Vec::new(),
         demands: Vec::new(),
         data: Vec::new(),
         raw: Vec::new(),
@@ -86,8 +87,14 @@ impl Resolver<'_> {
     /// Resolves the bundles of a section, and moves the section's labels from statements to bundles.
     fn section(&mut self, section: Section, items: &[Item]) {
         self.label = 0;
+        let mut bounds = self.flat.loop_bounds.clone();
+        bounds.retain(|bound| bound.section == section);
+        let mut bounds = bounds.into_iter().peekable();
         for (index, item) in items.iter().enumerate() {
             self.place_labels(section, index as u32);
+            if let Some(expand::LoopBound { most, .. }) = bounds.next_if(|bound| bound.item == index as u32) {
+                self.ir.loop_bounds.push(LoopBound { position: self.ir.bundles.len() as u32, most });
+            }
             self.item(item);
         }
         self.place_labels(section, u32::MAX);

@@ -2,7 +2,9 @@
 //! terminal.
 
 mod account;
+mod arm;
 mod asm;
+mod bound;
 mod completions;
 mod controller;
 mod cosim;
@@ -50,6 +52,7 @@ Exit status: 0 success, 1 an error in a file or while running, 2 an error in the
 
 Examples:
   takt track                         the main job: cycles, accuracy, tracking error
+  takt arm                           a six-axis arm's kinematics: cycles and errors
   takt asm prog.s                    assemble prog.s into prog.takt
   takt run prog.s --inputs in.csv    run it, one period for each row
   takt isa fdiv                      look an instruction up";
@@ -57,9 +60,11 @@ Examples:
 #[derive(Subcommand)]
 enum Command {
     Track(track::Track),
+    Arm(arm::Arm),
     Asm(asm::Asm),
     Disasm(disasm::Disasm),
     Run(run::Run),
+    Bound(bound::Bound),
     Eval(eval::Eval),
     Rtl(rtl::Rtl),
     Cosim(cosim::Cosim),
@@ -72,9 +77,11 @@ enum Command {
 fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
     match &arguments.command {
         Command::Track(track) => track::run(track, color, out),
+        Command::Arm(arm) => arm::run(arm, color, out),
         Command::Asm(asm) => asm::run(asm, color, out),
         Command::Disasm(disasm) => disasm::run(disasm, color),
         Command::Run(run) => run::run(run, color, out),
+        Command::Bound(bound) => bound::run(bound, color, out),
         Command::Eval(eval) => eval::run(eval, out),
         Command::Rtl(rtl) => rtl::run(rtl, color, out),
         Command::Cosim(cosim) => cosim::run(cosim, color, out),

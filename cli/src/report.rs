@@ -1,7 +1,8 @@
 //! `takt track`'s tables: ours beside the founding paper's.
 
 use crate::account::Account;
-use crate::track::{PAPER_CLOCK, Tracking};
+use crate::select::PAPER_CLOCK;
+use crate::track::Tracking;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -4,7 +4,8 @@
 //! instructions, so that rare ones come up as often as common ones. Instructions are taken from the specification's table;
 //! only the loop counter's decrement is named.
 
-use takt_isa::program::{Port, Section};
+use takt_isa::program::{LoopBound, Port, Section};
+use takt_isa::shape::WORD_BITS;
 use takt_isa::spec::machines::REGISTER_SPACE;
 use takt_isa::{Effect, Function, Instruction, Machine, Op, Operand, Program, ROWS, Row, Type, ZERO};
 
@@ -116,6 +117,7 @@ struct Generator {
     bundles: Vec<Vec<u64>>,
     /// Instructions that await the address of a subroutine: bundle, slot, which.
     calls: Vec<(usize, usize)>,
+    loop_bounds: Vec<LoopBound>,
 }
 
 impl Generator {
@@ -150,6 +152,7 @@ impl Generator {
             constants,
             bundles: Vec::new(),
             calls: Vec::new(),
+            loop_bounds: Vec::new(),
         }
     }
 
@@ -200,6 +203,7 @@ impl Generator {
         });
         let section = |name: &str, start, end| Section { name: name.to_owned(), start, end };
         self.constants.sort_unstable();
+        self.loop_bounds.sort_unstable_by_key(|bound| bound.address);
         Program {
             machine,
             lines: vec![None; self.bundles.len() * machine.slots.len()],
@@ -209,6 +213,7 @@ impl Generator {
             constants: self.constants,
             registers: Vec::new(),
             symbols: Vec::new(),
+            loop_bounds: self.loop_bounds,
             sections: vec![section("once", 0, period), section("period", period, end)],
             files: Vec::new(),
             code: self.bundles.into_iter().flatten().collect(),
@@ -222,7 +227,7 @@ impl Generator {
             match self.random.below(if self.options.control { 12 } else { 8 }) {
                 0..8 => self.plain(),
                 8 | 9 => self.skip(),
-                10 => self.repeat(),
+                10 => self.repeat(0),
                 _ => {
                     let at = self.bundles.len();
                     self.plain();
@@ -247,25 +252,34 @@ impl Generator {
         self.control(at, effect, at as u32 + 1 + over, Some(source));
     }
 
-    /// A loop of a few rounds.
-    fn repeat(&mut self) {
+    /// A loop of a few rounds, with branches and perhaps another loop in it. `depth` is 0 or 1: each depth counts in a
+    /// register of its own.
+    fn repeat(&mut self, depth: u16) {
         let Some((slot, _)) = self.machine.host(Op::isub.row().function) else { return };
-        let counter = self.machine.slots[slot].bank.base + BASES;
-        let (rounds, one) = (1 + self.random.below(5), counter + 1);
+        let (index, one_index) = (BASES + 2 * depth, BASES + 1);
+        let [counter, one] = [index, one_index].map(|index| self.machine.slots[slot].bank.base + index);
+        let rounds = 1 + self.random.below(5);
         let set =
             |dest, constant| Instruction { dest, constant, ..Instruction::bare(op_with(Effect::Immediate)) };
-        for (index, value) in [(BASES, rounds), (BASES + 1, 1)] {
+        for (index, value) in [(index, rounds), (one_index, 1)] {
             let mut bundle = self.nops();
             bundle[slot] = word(&set(index, value));
             self.bundles.push(bundle);
         }
         let start = self.bundles.len() as u32;
+        // A wild program may promise too little.
+        let most = if self.options.wild { 1 + self.random.below(5) } else { rounds };
+        self.loop_bounds.push(LoopBound { address: start, most });
         for _ in 0..1 + self.random.below(4) {
-            self.plain();
+            match self.random.below(8) {
+                0 => self.skip(),
+                1 if depth == 0 => self.repeat(1),
+                _ => self.plain(),
+            }
         }
         let mut bundle = self.nops();
         bundle[slot] =
-            word(&Instruction { dest: BASES, sources: [counter, one, 0], ..Instruction::bare(Op::isub) });
+            word(&Instruction { dest: index, sources: [counter, one, 0], ..Instruction::bare(Op::isub) });
         self.bundles.push(bundle);
         let at = self.bundles.len();
         self.plain();
@@ -351,14 +365,43 @@ impl Generator {
         }
     }
 
+    /// Lets a load or store go near the memory's end or beyond, or anywhere.
+    fn stray(&mut self) {
+        let memory = |word: &&mut u64| {
+            Instruction::decode(**word)
+                .is_ok_and(|instruction| matches!(instruction.effect(), Effect::Load | Effect::Store))
+        };
+        let mut candidates: Vec<&mut u64> = self.bundles.iter_mut().flatten().filter(memory).collect();
+        if candidates.is_empty() {
+            return;
+        }
+        let which = self.random.below(candidates.len() as u32) as usize;
+        if let Ok(mut instruction) = Instruction::decode(*candidates[which]) {
+            instruction.constant = match self.random.below(3) {
+                0 => self.random.below(4096),
+                _ => self.machine.data_depth.saturating_sub(2) + self.random.below(4),
+            };
+            instruction.sources[0] = match self.random.below(3) {
+                0 => ZERO,
+                1 => self.random.pick(&self.bases).0,
+                _ => *self.random.pick(&self.sources),
+            };
+            *candidates[which] = word(&instruction);
+        }
+    }
+
     /// Breaks a few words.
     fn derange(&mut self) {
         let (bundles, slots) = (self.bundles.len() as u32, self.machine.slots.len() as u32);
         for _ in 0..1 + self.random.below(3) {
             let (bundle, slot) = (self.random.below(bundles) as usize, self.random.below(slots) as usize);
-            let (target, register) =
+            let (mut target, register) =
                 (self.random.below(bundles + 2), self.random.below(REGISTER_SPACE as u32) as u16);
-            match self.random.below(12) {
+            if self.random.once_in(8) {
+                // Where a program memory that ignores an address's upper bits would find a bundle.
+                target += self.machine.code_depth << self.random.below(4);
+            }
+            match self.random.below(16) {
                 0 => self.bundles[bundle][slot] = 0,
                 1 => self.bundles[bundle][slot] = self.random.bits() >> 16,
                 2 => self.bundles[bundle][slot] = self.random.bits() >> 8,
@@ -371,6 +414,8 @@ impl Generator {
                     let source = *self.random.pick(&self.sources);
                     self.control(bundle, Effect::BranchNonzero, target, Some(source));
                 }
+                10..=12 => self.stray(),
+                13 | 14 => self.bundles[bundle][slot] ^= 1 << self.random.below(WORD_BITS),
                 _ => {
                     // Another source, or base: unwritten, or any value at all.
                     let source =

@@ -1,6 +1,7 @@
 //! What stands beside the core in an exported folder: file lists, memory image, test bench.
 
 use crate::export::{Design, DesignFile, INPUT_DELAY, RESET_CYCLES, synthesis_top};
+use crate::wishbone;
 use std::fmt::Write as _;
 use takt_isa::{Machine, Program};
 
@@ -86,6 +87,7 @@ pub fn folder(design: &Design, program: Option<&Program>) -> Vec<DesignFile> {
     files.push(put(format!("{top}_ecp5.f"), list(&[], true)));
     files.push(put(format!("{bench_name}.f"), list(std::slice::from_ref(&bench_file), false)));
     files.push(put(synthesis, design.synthesis.clone()));
+    files.push(put(format!("{}.v", wishbone::name(design)), wishbone::wrapper(design)));
     files.push(put(bench_file, bench(machine, top)));
     if let Some(program) = program {
         files.push(put("program.hex".to_owned(), image(program)));

@@ -12,6 +12,7 @@ pub mod export;
 mod files;
 pub mod synthesis;
 pub mod tables;
+pub mod wishbone;
 
 pub use circuit::{Circuit, CircuitError, Library, Operation};
 pub use export::{Design, ExportError, export};
