@@ -122,7 +122,11 @@ impl Plan {
                 return Err(refuse(format!("unit {} has a latency below 2", unit.name)));
             }
             let pipelined = writing().filter(|unit| unit.interval == 1).map(|unit| unit.latency);
-            let depth = pipelined.max().unwrap_or(0).max(4);
+            // A unit that takes the next operation has passed its last result on to the common places, or does now.
+            let left = writing()
+                .filter(|unit| unit.interval > 1)
+                .map(|unit| unit.latency.saturating_sub(unit.interval));
+            let depth = pipelined.chain(left).max().unwrap_or(0).max(4);
             depths.push(depth);
             late.push(writing().filter(|unit| unit.interval > 1).map(|unit| Late { unit }).collect());
         }
