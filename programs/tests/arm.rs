@@ -1,4 +1,5 @@
 //! The arm's programs on the emulator, against binary64: errors, cycles, round trips, and what cannot be reached.
+#![allow(clippy::print_stdout)]
 
 use takt_asm::{MemoryLoader, Options};
 use takt_emu::{Emulator, PeriodError};

@@ -113,9 +113,9 @@ const fn wave(x: u32, quadrants: u32) -> u32 {
     let product = if is_cosine {
         v << 9
     } else {
-        let (n_high, n_low) = (n >> 10, n >> 3 & 0x7f);
+        let (n_high, n_low) = (n >> 10, (n >> 3) & 0x7f);
         let (v_high, v_low) = (v >> 6, v & 0x3f);
-        (n_high * v_high >> 2) + ((n_high >> 10) * v_low << 2) + (n_low * (v_high >> 10) << 1)
+        ((n_high * v_high) >> 2) + (((n_high >> 10) * v_low) << 2) + ((n_low * (v_high >> 10)) << 1)
     };
 
     // n − n·V in (0.6, 2), rounded to 24 bits.
@@ -123,5 +123,5 @@ const fn wave(x: u32, quadrants: u32) -> u32 {
     let above_one = (result >> 36) as u32;
     let significand = ((result + (1 << (11 + above_one))) >> (12 + above_one)) as u32;
     // The significand's leading one raises the exponent by one, by two if rounding carried.
-    ((field - 2 + above_one) << 23) + significand | sign << 31
+    (((field - 2 + above_one) << 23) + significand) | (sign << 31)
 }

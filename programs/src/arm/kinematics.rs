@@ -88,8 +88,9 @@ pub fn inverse(pose: &Pose<f64>, tool: [f64; 3], configuration: Configuration) -
         - D4 * D4;
     let cosine = k / (2.0 * A2 * A3.hypot(D4));
     let wrist_radius = c[0].hypot(c[1]);
-    // A comparison that a NaN fails.
-    if !(cosine.abs() <= 1.0) {
+    // A NaN is not.
+    let reachable = cosine.abs() <= 1.0;
+    if !reachable {
         return Err(Failure::OutOfReach);
     }
     if wrist_radius * wrist_radius < AXIS_RADIUS2 {
