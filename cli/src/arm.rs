@@ -4,7 +4,7 @@ use crate::fault::explain;
 use crate::files::{self, Given, Out};
 use crate::load::Load;
 use crate::run::PERIOD_LIMIT;
-use crate::select::{self, MachineArgument};
+use crate::select;
 use crate::track::progress;
 use crate::{output, plot, ports};
 use anyhow::{Context, Result, bail};
@@ -14,8 +14,8 @@ use std::fmt::Write as _;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_emu::Emulator;
-use takt_isa::Program;
 use takt_isa::program::Port;
+use takt_isa::{Machine, Program, T3X};
 use takt_programs::arm::{
     Arm as OnArm, CONFIGURATIONS, Configuration, FORWARD_EXAMPLE, ForwardResult, GOOD, INVERSE_EXAMPLE,
     InverseResult, Pose, RoundTrip, Sweep, forward, inverse, square, sweep,
@@ -28,8 +28,9 @@ use takt_programs::arm::{
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arm {
-    #[command(flatten)]
-    machine: MachineArgument,
+    /// The machine, one with arctangents.
+    #[arg(long, short, value_name = "MACHINE", default_value = T3X.name, value_parser = select::machine)]
+    machine: &'static Machine,
     /// Random poses.
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = select::count, allow_negative_numbers = true)]
     poses: u64,
@@ -203,7 +204,7 @@ pub(crate) fn run(arguments: &Arm, color: bool, out: &mut Out) -> Result<()> {
     }
     files::check(&[], &writes)?;
 
-    let machine = arguments.machine.machine;
+    let machine = arguments.machine;
     let mut arm = OnEmulator::new(Load::new(machine, color))?;
     let mut table = arguments.csv.as_deref().map(Out::create).transpose()?;
     let mut picture = arguments.plot.as_deref().map(Out::create).transpose()?;
@@ -275,7 +276,7 @@ impl Report<'_> {
 
     fn write(&self, out: &mut String) -> std::fmt::Result {
         let Report { arguments, found, examples, drawn } = self;
-        let (machine, clock) = (arguments.machine.machine.name, arguments.clock);
+        let (machine, clock) = (arguments.machine.name, arguments.clock);
         writeln!(
             out,
             "programs/arm/forward.s and inverse.s on {machine}, {} random poses\n",
@@ -369,7 +370,7 @@ impl Report<'_> {
         };
         let ours = examples.forward;
         json!({
-            "machine": arguments.machine.machine.name,
+            "machine": arguments.machine.name,
             "clock_mhz": arguments.clock,
             "seed": arguments.seed,
             "poses": arguments.poses,
