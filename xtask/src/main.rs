@@ -168,7 +168,7 @@ fn seed() -> Result<()> {
     let (sources, images) = (root().join("fuzz/corpus/assemble"), root().join("fuzz/corpus/image"));
     std::fs::create_dir_all(&sources)?;
     std::fs::create_dir_all(&images)?;
-    for folder in ["programs/hybrid", "asm/tests/accepted", "asm/tests/mistakes"] {
+    for folder in ["programs/hybrid", "asm/tests/accepted", "asm/tests/mistakes", "asm/tests/kernels"] {
         for entry in
             std::fs::read_dir(root().join(folder)).with_context(|| format!("cannot read {folder}"))?
         {
