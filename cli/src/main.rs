@@ -2,6 +2,7 @@
 //! terminal.
 
 mod account;
+mod analyse;
 mod asm;
 mod bound;
 mod completions;
@@ -59,6 +60,7 @@ enum Command {
     Asm(asm::Asm),
     Disasm(disasm::Disasm),
     Run(run::Run),
+    Analyse(analyse::Analyse),
     Bound(bound::Bound),
     Eval(eval::Eval),
     Isa(isa::Isa),
@@ -73,6 +75,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Asm(asm) => asm::run(asm, color, out),
         Command::Disasm(disasm) => disasm::run(disasm, color),
         Command::Run(run) => run::run(run, color, out),
+        Command::Analyse(analyse) => analyse::run(analyse, color, out),
         Command::Bound(bound) => bound::run(bound, color, out),
         Command::Eval(eval) => eval::run(eval, out),
         Command::Isa(isa) => isa::run(isa, out),
