@@ -90,7 +90,7 @@ pub(crate) fn place(program: &Program, address: Address) -> String {
     }
 }
 
-fn describe(program: &Program, cause: Cause) -> String {
+pub(crate) fn describe(program: &Program, cause: Cause) -> String {
     match cause {
         Cause::Branch { from } => format!("front end refills after {}", place(program, from)),
         Cause::Operand { register, producer } => {

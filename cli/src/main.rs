@@ -2,6 +2,7 @@
 //! terminal.
 
 mod account;
+mod analyse;
 mod arm;
 mod asm;
 mod bound;
@@ -64,6 +65,7 @@ enum Command {
     Asm(asm::Asm),
     Disasm(disasm::Disasm),
     Run(run::Run),
+    Analyse(analyse::Analyse),
     Bound(bound::Bound),
     Eval(eval::Eval),
     Rtl(rtl::Rtl),
@@ -81,6 +83,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Asm(asm) => asm::run(asm, color, out),
         Command::Disasm(disasm) => disasm::run(disasm, color),
         Command::Run(run) => run::run(run, color, out),
+        Command::Analyse(analyse) => analyse::run(analyse, color, out),
         Command::Bound(bound) => bound::run(bound, color, out),
         Command::Eval(eval) => eval::run(eval, out),
         Command::Rtl(rtl) => rtl::run(rtl, color, out),

@@ -232,6 +232,30 @@ fn bounds_of_the_programs() {
     insta::assert_snapshot!("bounds", text);
 }
 
+#[test]
+fn where_the_cycles_of_a_period_go() {
+    let folder = Folder::new();
+    let text = folder.line(&format!("analyse {}", source("tracking.s"))).ok();
+    folder.line(&format!("asm {} -m t1 -o small", source("tracking.s"))).ok();
+    insta::assert_snapshot!("analyse", format!("{text}\n{}", folder.line("analyse small").ok()));
+    // The same cycles as the run counts, on recorded inputs; an image has no source to assemble anew.
+    folder.line("track --periods 4 --csv rec.csv -q").ok();
+    folder.line(&format!("asm {} -o image", source("tracking.s"))).ok();
+    let run: serde_json::Value =
+        serde_json::from_str(&folder.line("run image --inputs rec.csv --json").ok()).unwrap();
+    for (periods, cycles) in [("--periods 1", "max"), ("", "min"), ("--periods 3", "min")] {
+        let json = folder.line(&format!("analyse image --inputs rec.csv --json {periods}")).ok();
+        let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+        assert_eq!(json["cycles"], run["cycles"][cycles], "{periods}");
+        assert_eq!(json["one_cycle_less"][0]["assembled_anew"], serde_json::Value::Null);
+    }
+    // From standard input to standard output.
+    let page = folder.fed("analyse - --html -", &folder.read("image")).ok();
+    assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n"));
+    folder.write("halts.s", ".output y\n mov y, zero\n halt\n");
+    assert!(folder.line("analyse halts.s").ok().starts_with("what runs once on t3: "));
+}
+
 /// A loop that ends early or late, and its branch inside: best and worst; a deadline at its edge.
 #[test]
 fn a_deadline_decides_the_status() {

@@ -87,7 +87,7 @@ fn works(program: &str, argument: &str) -> bool {
 }
 
 /// What the tests call, how to ask whether it works, and the Debian package that has it.
-const TOOLS: [(&str, &str, &str); 5] = [
+const TOOLS: [(&str, &str, &str); 6] = [
     // Berkeley SoftFloat, the reference arithmetic, is C.
     ("cc", "--version", "gcc"),
     // The circuit runs in Verilator, which builds with make and a C++ compiler, and in Icarus Verilog.
@@ -95,6 +95,8 @@ const TOOLS: [(&str, &str, &str); 5] = [
     ("make", "--version", "make"),
     ("verilator", "--version", "verilator"),
     ("iverilog", "-V", "iverilog"),
+    // The page of `takt analyse` is opened in a browser.
+    ("chromium", "--version", "chromium"),
 ];
 
 /// Installs with apt-get what the tests call and is not there.
