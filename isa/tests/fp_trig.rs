@@ -1,6 +1,7 @@
 //! The trigonometric kernels against CORE-MATH: their errors in units in the last place, over samples, or with `TAKT_FULL=1` over
 //! every operand of the functions of one operand (then the documented maxima must come out exactly) and 10⁹ random pairs of
 //! atan2.
+#![allow(clippy::print_stdout)]
 
 #[allow(dead_code, reason = "each test uses a part of it")]
 mod fp_common;
