@@ -5,6 +5,7 @@ mod account;
 mod asm;
 mod completions;
 mod controller;
+mod debug;
 mod disasm;
 mod eval;
 mod fault;
@@ -57,6 +58,7 @@ enum Command {
     Asm(asm::Asm),
     Disasm(disasm::Disasm),
     Run(run::Run),
+    Debug(debug::Debug),
     Eval(eval::Eval),
     Isa(isa::Isa),
     Machines(machines::Machines),
@@ -70,6 +72,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Asm(asm) => asm::run(asm, color, out),
         Command::Disasm(disasm) => disasm::run(disasm, color),
         Command::Run(run) => run::run(run, color, out),
+        Command::Debug(debug) => debug::run(debug, color, out),
         Command::Eval(eval) => eval::run(eval, out),
         Command::Isa(isa) => isa::run(isa, out),
         Command::Machines(machines) => machines::run(machines, out),
