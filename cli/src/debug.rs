@@ -25,7 +25,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use takt_debug::console::{Console, complete, first_mistake};
-use takt_debug::session::{Options, Session, Unit, Why};
+use takt_debug::session::{Options, Rows, Session, Unit, Why};
 use takt_emu::Emulator;
 use takt_programs::hybrid::closed_loop::ClosedLoop;
 
@@ -128,7 +128,7 @@ fn script(path: &Path) -> Result<(String, String)> {
     Ok((name, text))
 }
 
-fn rows(path: &Path, loaded: &Loaded) -> Result<Arc<Vec<Vec<(u16, u32)>>>> {
+fn rows(path: &Path, loaded: &Loaded) -> Result<Arc<Rows>> {
     let name = files::input_name(path);
     let mut inputs = Inputs::open(path, &loaded.program.inputs)?;
     let (mut rows, mut row) = (Vec::new(), Vec::new());

@@ -190,7 +190,7 @@ impl Console {
         let session = &mut self.session;
         let (cycle, period) = (session.cycle(), session.period());
         let stall = session.stall();
-        let (address, issue) = session.next();
+        let (address, issue) = session.next_issue();
         let program = session.program();
         let head = format!("cycle {cycle}, period {period}: ");
         let mut text = match session.emulator().status() {
@@ -311,7 +311,7 @@ impl Console {
 
     fn add_break(&mut self, arguments: &str) -> Result<String, String> {
         let (place, condition) = match arguments.split_once(" if ") {
-            Some((place, condition)) => (place, Some(self.session.parse(condition)?)),
+            Some((place, condition)) => (place, Some(Box::new(self.session.parse(condition)?))),
             None => (arguments, None),
         };
         let at = Where::parse(place, self.session.program())?;
@@ -330,15 +330,19 @@ impl Console {
         } else if let Some(what) = arguments.strip_suffix(" subnormal") {
             (what, Test::Subnormal)
         } else if let Some((what, other)) = arguments.split_once(" == ") {
-            (what, Test::Equals(self.session.parse(other)?))
+            (what, Test::Equals(Box::new(self.session.parse(other)?)))
         } else if let Some((what, other)) = arguments.split_once(" > ") {
-            (what, Test::Above(self.session.parse(other)?))
+            (what, Test::Above(Box::new(self.session.parse(other)?)))
         } else {
             (arguments, Test::Changed)
         };
         let what = self.session.parse(what)?;
         let now = self.short(&what);
-        let id = self.session.add_stop(Stop::Watch { what, test, text: format!("watch {arguments}") });
+        let id = self.session.add_stop(Stop::Watch {
+            what: Box::new(what),
+            test,
+            text: format!("watch {arguments}"),
+        });
         Ok(format!("stop {id}; now {now}\n"))
     }
 

@@ -24,7 +24,7 @@ fn session(program: &Program, seed: u64, periods: u64) -> Session {
 /// All that can be seen at a position.
 fn fingerprint(session: &mut Session) -> String {
     let registers: Vec<Option<u32>> = (0..1024).map(|register| session.register(register)).collect();
-    let (next, stall, flight) = (session.next(), session.stall(), session.in_flight());
+    let (next, stall, flight) = (session.next_issue(), session.stall(), session.in_flight());
     let emulator = session.emulator();
     format!(
         "{} {} {next:?} {stall:?} {flight:?} {:?} {:?} {:?} {registers:?} {:?}",
@@ -220,7 +220,7 @@ fn stops_are_complete() {
             let before = session.go_to(cycle - 1);
             let old = session.register(register);
             assert_eq!((before, session.go_to(cycle)), (Why::Done, Why::Done));
-            if session.next() == (address, Some(cycle)) {
+            if session.next_issue() == (address, Some(cycle)) {
                 issues.push(cycle);
             }
             if session.register(register) != old {
@@ -231,7 +231,7 @@ fn stops_are_complete() {
         let what = session.parse(&name).unwrap();
         for (stop, expected) in [
             (Stop::Break { at: Where::Bundle(address), condition: None, text: String::new() }, issues),
-            (Stop::Watch { what, test: Test::Changed, text: String::new() }, changes),
+            (Stop::Watch { what: Box::new(what), test: Test::Changed, text: String::new() }, changes),
         ] {
             session.go_to(0);
             let id = session.add_stop(stop);

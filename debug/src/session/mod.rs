@@ -38,11 +38,14 @@ const INTERVAL: Cycle = 1 << 12;
 /// Cycles for which a command runs unless told otherwise.
 pub const RUN_LIMIT: Cycle = 1_000_000_000;
 
+/// Inputs of periods: for each, registers of input ports and their bits.
+pub type Rows = Vec<Vec<(u16, u32)>>;
+
 /// What a session is about.
 #[derive(Clone, Default)]
 pub struct Options {
     /// Values of input ports, register and bits, one row for each period; `None`: the inputs stay as they are.
-    pub inputs: Option<Arc<Vec<Vec<(u16, u32)>>>>,
+    pub inputs: Option<Arc<Rows>>,
     /// Cycles between ticks; `None`: the tick comes when the program is ready.
     pub tick: Option<NonZeroU64>,
     /// Named constants of the source.
@@ -206,7 +209,7 @@ impl Session {
     }
 
     /// The bundle that issues next, and the cycle in which it will if the program runs.
-    pub fn next(&mut self) -> (Address, Option<Cycle>) {
+    pub fn next_issue(&mut self) -> (Address, Option<Cycle>) {
         let issue = self.core.emulator.upcoming().map(|upcoming| upcoming.issue.cycle);
         (self.core.emulator.next_address(), issue)
     }
@@ -464,7 +467,7 @@ impl Session {
             }
         }
         while self.period() < period {
-            if let Err(end) = self.to_boundary() {
+            if let Err(end) = self.run_period() {
                 return end;
             }
         }
@@ -472,7 +475,7 @@ impl Session {
     }
 
     /// Runs to the end of the period.
-    fn to_boundary(&mut self) -> Result<(), End> {
+    fn run_period(&mut self) -> Result<(), End> {
         let (periods, until) = (self.period(), self.cycle().saturating_add(self.run_limit));
         self.make_edits();
         while self.period() == periods {
@@ -556,7 +559,7 @@ impl Session {
     pub fn step(&mut self, unit: Unit) -> Why {
         match unit {
             Unit::Cycle => return self.go_to(self.cycle() + 1),
-            Unit::Period => return self.to_boundary().err().unwrap_or(Why::Done),
+            Unit::Period => return self.run_period().err().unwrap_or(Why::Done),
             _ => {}
         }
         let depth = self.core.emulator.stack().len();

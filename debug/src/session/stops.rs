@@ -24,9 +24,9 @@ pub enum Test {
     /// The value is another.
     Changed,
     /// It equals another.
-    Equals(Live),
+    Equals(Box<Live>),
     /// It is above another.
-    Above(Live),
+    Above(Box<Live>),
     /// It is a NaN.
     Nan,
     /// It is a subnormal number.
@@ -41,14 +41,14 @@ pub enum Stop {
         /// The place.
         at: Where,
         /// The condition.
-        condition: Option<Live>,
+        condition: Option<Box<Live>>,
         /// As the user wrote it.
         text: String,
     },
     /// Stops when a value becomes what is waited for.
     Watch {
         /// The value.
-        what: Live,
+        what: Box<Live>,
         /// What is waited for.
         test: Test,
         /// As the user wrote it.
