@@ -75,42 +75,13 @@ impl Account {
             out.push_str("  the longest stalls:\n");
         }
         for ((address, cause), count) in causes.iter().take(most) {
-            let _ =
-                writeln!(out, "  {count:>8}  {}: {}", place(program, *address), describe(program, *cause));
+            let _ = writeln!(
+                out,
+                "  {count:>8}  {}: {}",
+                program.bundle_text(*address),
+                program.cause_text(*cause)
+            );
         }
         out
-    }
-}
-
-/// `bundle 12 (tracking.s:40)`.
-pub(crate) fn place(program: &Program, address: Address) -> String {
-    match program.location(address) {
-        Some(location) => format!("bundle {address} ({})", program.place_text(location)),
-        None => format!("bundle {address}"),
-    }
-}
-
-pub(crate) fn describe(program: &Program, cause: Cause) -> String {
-    match cause {
-        Cause::Branch { from } => format!("front end refills after {}", place(program, from)),
-        Cause::Operand { register, producer } => {
-            format!("awaits {} from {}", program.register_text(register), place(program, producer))
-        }
-        Cause::Destination { register, producer } => {
-            format!(
-                "{} is still to be written by {}",
-                program.register_text(register),
-                place(program, producer)
-            )
-        }
-        Cause::Unit { slot, unit } => {
-            let slot = &program.machine.slots[usize::from(slot)];
-            format!("unit {} is busy", slot.units[usize::from(unit)].name)
-        }
-        Cause::WritePort { slot } => {
-            format!("write port of bank {} is taken", program.machine.slots[usize::from(slot)].bank.name)
-        }
-        Cause::Drain => "earlier results must be written first".to_owned(),
-        Cause::Wait => "waits for the tick".to_owned(),
     }
 }

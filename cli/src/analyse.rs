@@ -1,6 +1,5 @@
 //! `takt analyse`: where the cycles of one period went, bundle by bundle, and what would make it shorter.
 
-use crate::account::{describe, place};
 use crate::files::{self, Out};
 use crate::load::Load;
 use crate::output;
@@ -310,7 +309,7 @@ impl Analysis<'_> {
             json!({
                 "cause": cause.name(),
                 "cycles": cycles,
-                "text": describe(program, *cause),
+                "text": program.cause_text(*cause),
                 "producer": producer,
                 "producer_place": line.map(|line| program.place_text(line)),
             })
@@ -374,7 +373,7 @@ impl Analysis<'_> {
         let stalled: u32 = stalls.iter().map(|(_, _, cycles)| cycles).sum();
         writeln!(out, "\nstalls: {}, {stalled} cycles; the longest:", stalls.len())?;
         for &(i, cause, cycles) in stalls.iter().take(SHOWN) {
-            let (at, what) = (place(program, issues[i].address), describe(program, cause));
+            let (at, what) = (program.bundle_text(issues[i].address), program.cause_text(cause));
             writeln!(out, "  {cycles:>5}  before cycle {:<5} {at}: {what}", self.cycle(i))?;
         }
 
@@ -389,7 +388,7 @@ impl Analysis<'_> {
         links.sort_by_key(|link| link.to);
         writeln!(out, "its longest links:")?;
         for link in links {
-            let (to, how) = (place(program, issues[link.to].address), self.link(link));
+            let (to, how) = (program.bundle_text(issues[link.to].address), self.link(link));
             writeln!(out, "  {:>5}  to cycle {:<5} {to}: {how}", link.cycles, self.cycle(link.to))?;
         }
 

@@ -121,7 +121,7 @@ impl OnEmulator {
         let (pose, joints) =
             ([&POSE[..], &CONFIGURATION, &["status"]].concat(), [&JOINTS[..], &["status"]].concat());
         let ported = |path, inputs: &[&str], outputs: &[&str]| {
-            let mut ported = Ported::new(&load.builtin(path)?, inputs, outputs)?;
+            let mut ported = Ported::new(&load.builtin(path)?.program, inputs, outputs)?;
             // What runs once belongs to no period.
             let zeros = vec![0; inputs.len()];
             ported.period(zeros.into_iter())?;

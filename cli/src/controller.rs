@@ -101,6 +101,11 @@ impl OnEmulator {
         Ok(OnEmulator { emulator, binding, until_detail: detail, report: None, detail: None })
     }
 
+    /// The registers of the algorithm's inputs, in their order.
+    pub(crate) fn inputs(&self) -> [u16; INPUTS.len()] {
+        self.binding.inputs
+    }
+
     /// Runs a period under observation.
     fn observed_period(&mut self) -> Result<PeriodReport, PeriodError> {
         let before = self.emulator.statistics();

@@ -5,6 +5,7 @@ use crate::output::{Failure, message};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
+use takt_asm::expr::Value;
 use takt_asm::limits::IMAGE_BYTES;
 use takt_asm::{Assembled, FileLoader, MemoryLoader, Options, Schedule, image};
 use takt_isa::{MACHINES, Machine, Program};
@@ -20,6 +21,23 @@ pub(crate) struct Load {
     pub(crate) schedule: Schedule,
     /// How long the scheduler searches.
     pub(crate) effort: u32,
+}
+
+/// A program and, if it was assembled here, what is known of its source.
+pub(crate) struct Loaded {
+    pub(crate) program: Program,
+    /// Named constants.
+    pub(crate) constants: Vec<(String, Value)>,
+    /// Texts, by the names that the program has for them.
+    pub(crate) sources: Vec<(String, String)>,
+}
+
+impl From<Assembled> for Loaded {
+    fn from(assembled: Assembled) -> Loaded {
+        let files = assembled.sources.files().iter();
+        let sources = files.map(|file| (file.name.to_string(), file.text.to_string())).collect();
+        Loaded { program: assembled.program, constants: assembled.constants, sources }
+    }
 }
 
 impl Load {
@@ -44,20 +62,28 @@ impl Load {
 
     /// The program in a file that is to run or be shown: an image, or a source, which is assembled.
     pub(crate) fn program(&self, path: &Path) -> Result<Program> {
+        Ok(self.with_source(path)?.program)
+    }
+
+    /// As [`Load::program`], with its source, if that is at hand.
+    pub(crate) fn with_source(&self, path: &Path) -> Result<Loaded> {
         let bytes = files::read(path, IMAGE_BYTES)?;
         let name = files::input_name(path);
-        let program = if image::is_image(&bytes) {
-            image::read(&bytes).with_context(|| format!("{name} is not an image that can run"))?
+        let loaded = if image::is_image(&bytes) {
+            let program =
+                image::read(&bytes).with_context(|| format!("{name} is not an image that can run"))?;
+            Loaded { program, constants: Vec::new(), sources: Vec::new() }
         } else {
-            self.finish(self.assemble(path, bytes))?.program
+            self.finish(self.assemble(path, bytes))?.into()
         };
+        let program = &loaded.program;
         if let Some(machine) = self.machine.filter(|machine| **machine != *program.machine) {
             bail!("{name} is an image for {}, not for {}", program.machine.name, machine.name);
         }
         if program.bundles() == 0 {
             bail!("{name} has no instruction");
         }
-        Ok(program)
+        Ok(loaded)
     }
 
     /// Assembles a source that was read from a file. What it includes is looked for beside it.
@@ -72,9 +98,9 @@ impl Load {
     }
 
     /// Assembles one of the programs that come with Takt.
-    pub(crate) fn builtin(&self, path: &str) -> Result<Program> {
+    pub(crate) fn builtin(&self, path: &str) -> Result<Loaded> {
         let loader = MemoryLoader::new(takt_programs::SOURCES);
-        Ok(self.finish(takt_asm::assemble(path, &loader, &self.options()))?.program)
+        Ok(self.finish(takt_asm::assemble(path, &loader, &self.options()))?.into())
     }
 
     /// Shows warnings on standard error; errors are the error.

@@ -9,6 +9,7 @@ mod bound;
 mod completions;
 mod controller;
 mod cosim;
+mod debug;
 mod disasm;
 mod eval;
 mod fault;
@@ -67,6 +68,7 @@ enum Command {
     Run(run::Run),
     Analyse(analyse::Analyse),
     Bound(bound::Bound),
+    Debug(debug::Debug),
     Eval(eval::Eval),
     Rtl(rtl::Rtl),
     Cosim(cosim::Cosim),
@@ -85,6 +87,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Run(run) => run::run(run, color, out),
         Command::Analyse(analyse) => analyse::run(analyse, color, out),
         Command::Bound(bound) => bound::run(bound, color, out),
+        Command::Debug(debug) => debug::run(debug, color, out),
         Command::Eval(eval) => eval::run(eval, out),
         Command::Rtl(rtl) => rtl::run(rtl, color, out),
         Command::Cosim(cosim) => cosim::run(cosim, color, out),

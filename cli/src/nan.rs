@@ -1,6 +1,5 @@
 //! Warnings of NaN on output ports.
 
-use crate::account::place;
 use crate::output::warning;
 use takt_emu::PortWrite;
 use takt_isa::Program;
@@ -24,7 +23,7 @@ impl NanWrites {
     pub(crate) fn warn(&self, program: &Program, total: u64, color: bool) {
         for write in &self.first {
             let port = program.register_text(write.register);
-            let place = place(program, write.address);
+            let place = program.bundle_text(write.address);
             warning(&format!("NaN written to {port} in cycle {} by {place}", write.cycle), color);
         }
         let more = total.saturating_sub(self.first.len() as u64);

@@ -66,7 +66,7 @@ Examples:
 /// The longest time between ticks, cycles: well within [`PERIOD_LIMIT`].
 const LONGEST_TICK: u64 = 100_000_000;
 
-fn tick(text: &str) -> Result<NonZeroU64, String> {
+pub(crate) fn tick(text: &str) -> Result<NonZeroU64, String> {
     let cycles = NonZeroU64::new(select::count(text)?).filter(|cycles| cycles.get() <= LONGEST_TICK);
     cycles.ok_or_else(|| format!("more than {LONGEST_TICK}"))
 }

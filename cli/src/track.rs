@@ -3,7 +3,7 @@
 use crate::account::Account;
 use crate::controller::{Latency, OnEmulator, port_type};
 use crate::files::{self, Given, Out};
-use crate::load::Load;
+use crate::load::{Load, Loaded};
 use crate::nan::NanWrites;
 use crate::plot::Plot;
 use crate::select::{self, OptionalMachine, suggest};
@@ -71,7 +71,7 @@ Examples:
 const GCODE_LIMIT: usize = 16 << 20;
 
 /// Cycles that the sampling period has at a clock in MHz.
-fn period_cycles(clock: f64) -> Option<NonZeroU64> {
+pub(crate) fn period_cycles(clock: f64) -> Option<NonZeroU64> {
     NonZeroU64::new((clock * 1e6 * SAMPLE_TIME).round() as u64)
 }
 
@@ -134,7 +134,8 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
     files::check(&reads, &writes)?;
 
     let (path, trajectory) = trajectory(arguments.gcode.as_deref())?;
-    let (name, program) = program(&arguments.program, Load::new(arguments.machine.machine, color))?;
+    let (name, loaded) = program(&arguments.program, Load::new(arguments.machine.machine, color))?;
+    let program = loaded.program;
     let periods = arguments.periods.unwrap_or(u64::MAX).min(trajectory.periods());
     let mut emulator = Emulator::new(&program)?;
     emulator.set_tick_period(period_cycles(arguments.clock));
@@ -209,7 +210,7 @@ impl Table {
 }
 
 /// The name and the plan of a tool path; without a file, the letters AGH.
-fn trajectory(file: Option<&Path>) -> Result<(String, Trajectory)> {
+pub(crate) fn trajectory(file: Option<&Path>) -> Result<(String, Trajectory)> {
     let (name, source) = match file {
         Some(file) => (files::input_name(file), files::read(file, GCODE_LIMIT)?),
         None => ("agh.ngc".to_owned(), takt_programs::AGH.as_bytes().to_vec()),
@@ -224,7 +225,7 @@ fn trajectory(file: Option<&Path>) -> Result<(String, Trajectory)> {
 }
 
 /// A program that comes with Takt, by name, or one in a file.
-fn program(path: &Path, load: Load) -> Result<(String, Program)> {
+pub(crate) fn program(path: &Path, load: Load) -> Result<(String, Loaded)> {
     let name = files::input_name(path);
     let builtin = format!("hybrid/{name}.s");
     if SOURCES.iter().any(|(path, _)| *path == builtin) {
@@ -235,7 +236,7 @@ fn program(path: &Path, load: Load) -> Result<(String, Program)> {
         let near = suggest(&name, names);
         bail!("there is no program and no file `{name}`{near} (programs: {})", names.join(", "));
     }
-    Ok((name, load.program(path)?))
+    Ok((name, load.with_source(path)?))
 }
 
 /// A bar on its way to `count` of `what`.

@@ -237,6 +237,16 @@ impl Emulator {
         self.cache = Cache::default();
     }
 
+    /// A copy to come back to, smaller than a clone: what was found out to run fast is left out, and found again.
+    pub fn snapshot(&mut self) -> Emulator {
+        self.list_recent();
+        let cache = std::mem::take(&mut self.cache);
+        let mut copy = self.clone();
+        cache.count(&mut copy.tally);
+        self.cache = cache;
+        copy
+    }
+
     /// Stops every run before cycle `limit` with [`FaultKind::CycleLimit`] (and never later than [`MAX_CYCLE`]). It is the
     /// host that stops the machine here: with a higher limit it goes on.
     pub fn set_cycle_limit(&mut self, limit: Cycle) {
@@ -384,6 +394,18 @@ impl Emulator {
             }
         };
         Some(Upcoming { address, delivered, from, issue })
+    }
+
+    /// The bundle that issued last; `None` if none has since reset.
+    pub fn last_issued(&self) -> Option<Address> {
+        match self.status {
+            Status::Waiting { address, .. } | Status::Halted { address, .. } => Some(address),
+            _ => self.has_issued().then_some(self.front.from),
+        }
+    }
+
+    fn has_issued(&self) -> bool {
+        !matches!(&self.recent, Recent::List(recent) if recent.is_empty())
     }
 
     /// A register's bits; `None` if it was never written. A result appears in the cycle of its writeback.

@@ -30,6 +30,8 @@ fn periods_in_slices() {
                     // Looking must not change what happens.
                     if random.once_in(3) {
                         sliced.upcoming();
+                    } else if random.once_in(5) {
+                        sliced = sliced.snapshot();
                     }
                     let until = sliced.now() + u64::from(random.below(60));
                     if let Some(report) = sliced.run_period_until(until).unwrap() {
@@ -37,6 +39,7 @@ fn periods_in_slices() {
                     }
                     assert_eq!(sliced.now(), until);
                 };
+                assert_eq!(whole.last_issued(), sliced.last_issued());
                 assert_eq!(report, again, "seed {seed} on {}", machine.name);
                 assert_eq!(whole.now(), sliced.now());
                 assert_eq!(whole.statistics(), sliced.statistics());
@@ -62,6 +65,7 @@ fn upcoming_is_what_comes() {
                             (upcoming.issue.cycle, upcoming.address, upcoming.cause(now)),
                             (cycle, address, None)
                         );
+                        assert_eq!(emulator.last_issued(), Some(address));
                         issued += 1;
                     }
                     (Ok(Step::Stalled { cycle, address, cause }), Some(upcoming)) => {

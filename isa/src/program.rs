@@ -3,7 +3,7 @@
 use crate::encode::{DecodeError, Instruction, PlacementError};
 use crate::spec::instructions::Type;
 use crate::spec::machines::Machine;
-use crate::timing::Address;
+use crate::timing::{Address, Cause};
 
 /// A program for one machine.
 #[derive(Clone, Debug, PartialEq)]
@@ -157,6 +157,40 @@ impl Program {
             .map(|port| port.name.clone())
             .or_else(|| self.machine.register_name(register))
             .unwrap_or_else(|| format!("?{register}"))
+    }
+
+    /// A bundle and its place: `bundle 12 (tracking.s:40)`.
+    pub fn bundle_text(&self, address: Address) -> String {
+        match self.location(address) {
+            Some(location) => format!("bundle {address} ({})", self.place_text(location)),
+            None => format!("bundle {address}"),
+        }
+    }
+
+    /// Why a cycle issued nothing, in words.
+    pub fn cause_text(&self, cause: Cause) -> String {
+        match cause {
+            Cause::Branch { from } => format!("front end refills after {}", self.bundle_text(from)),
+            Cause::Operand { register, producer } => {
+                format!("awaits {} from {}", self.register_text(register), self.bundle_text(producer))
+            }
+            Cause::Destination { register, producer } => {
+                format!(
+                    "{} is still to be written by {}",
+                    self.register_text(register),
+                    self.bundle_text(producer)
+                )
+            }
+            Cause::Unit { slot, unit } => {
+                let slot = &self.machine.slots[usize::from(slot)];
+                format!("unit {} is busy", slot.units[usize::from(unit)].name)
+            }
+            Cause::WritePort { slot } => {
+                format!("write port of bank {} is taken", self.machine.slots[usize::from(slot)].bank.name)
+            }
+            Cause::Drain => "earlier results must be written first".to_owned(),
+            Cause::Wait => "waits for the tick".to_owned(),
+        }
     }
 
     /// The label at, or last before, a bundle, and the distance from it.

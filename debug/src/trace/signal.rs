@@ -1,6 +1,7 @@
 //! Signals: what a waveform shows.
 
 use super::Format;
+use crate::matches;
 use takt_asm::diag::nearest;
 use takt_emu::Emulator;
 use takt_isa::timing::Cause;
@@ -126,44 +127,4 @@ pub(super) fn select(
     }
     let wanted = |signal: &Signal| patterns.iter().any(|pattern| matches(pattern, &signal.name));
     Ok(signals.into_iter().filter(wanted).collect())
-}
-
-/// Whether a name matches a pattern, in which `*` stands for any characters.
-pub(super) fn matches(pattern: &str, name: &str) -> bool {
-    let Some((head, rest)) = pattern.split_once('*') else { return pattern == name };
-    let Some(mut name) = name.strip_prefix(head) else { return false };
-    // Each part where it first fits leaves most for those behind it; the last must fit the end.
-    let mut parts = rest.split('*').peekable();
-    while let Some(part) = parts.next() {
-        if parts.peek().is_none() {
-            return name.ends_with(part);
-        }
-        let Some(at) = name.find(part) else { return false };
-        name = &name[at + part.len()..];
-    }
-    true
-}
-
-#[cfg(test)]
-mod tests {
-    use super::matches;
-
-    #[test]
-    fn patterns() {
-        for (pattern, name, expected) in [
-            ("a", "a", true),
-            ("a", "ab", false),
-            ("*", "", true),
-            ("a*", "abc", true),
-            ("*c", "abc", true),
-            ("a*c", "abc", true),
-            ("a*c", "ac", true),
-            ("a*b*c", "axxbyyc", true),
-            ("a*b*c", "acb", false),
-            ("ab*ba", "aba", false),
-            ("*ab*", "xaab", true),
-        ] {
-            assert_eq!(matches(pattern, name), expected, "{pattern} {name}");
-        }
-    }
 }

@@ -1,0 +1,114 @@
+//! `takt debug` as users run it.
+
+mod common;
+
+use common::{Folder, source};
+
+const SOURCE: &str = "\
+.output sum, count:int
+.reg    i:int n:int x
+        li      n, 3
+        mov     i, zero
+        fadd    sum, zero, zero
+next:   call    add
+        iadd    i, i, 1
+        ilt     x, i, n
+        bnz     x, next
+        mov     count, i
+        halt
+add:    ld      x, table[i]
+        fadd    sum, sum, x
+        ret
+.data
+table:  .float  0.5, 0.25, -1.75
+";
+
+#[test]
+fn a_script() {
+    let folder = Folder::new();
+    folder.write("sum.s", SOURCE);
+    folder.write(
+        "good.txt",
+        "# what the program is to do\nbreak add if i == 2\nwatch sum\ncontinue\ncontinue\nstops\nflight\nprint sum, i, table[i], @m0\n\
+         list\nstep out\nback line\nreverse\ndelete\ndisplay sum\nuntil count == 3\ncheck sum == -1.0\nulp sum, -1.0000001\nregisters *\nports\nmemory table 3\nstalls\nhelp until\n",
+    );
+    insta::assert_snapshot!("script", folder.line("debug sum.s --script good.txt").ok());
+    let script = folder.read("good.txt");
+    assert_eq!(folder.fed("debug sum.s", &script).ok(), folder.fed("debug sum.s --script -", &script).ok());
+    // An image has no source text, and all else.
+    folder.line("asm sum.s -o sum.takt").ok();
+    assert!(folder.fed("debug sum.takt", b"break add\nc\np sum\n").ok().contains("sum = 0.0 "));
+}
+
+#[test]
+fn help() {
+    let folder = Folder::new();
+    folder.write("sum.s", SOURCE);
+    let text = folder.fed("debug sum.s", b"help\nquit\nnever read\n").ok();
+    insta::assert_snapshot!("commands", text.split_once("(takt) help\n").unwrap().1);
+}
+
+#[test]
+fn mistakes() {
+    let folder = Folder::new();
+    folder.write("sum.s", SOURCE);
+    folder.write("typo.txt", "step\nprnt sum\n");
+    let mut text = String::new();
+    for line in [
+        "debug",
+        "debug sum.s --script typo.txt",
+        "debug sum.s --script none.txt",
+        "debug -",
+        "debug none.s",
+        "debug sum.s --gcode a",
+        "debug --track sum.s --periods 3",
+    ] {
+        let done = folder.line(line);
+        assert_eq!(done.stdout, "", "{line}");
+        text.push_str(&format!("$ takt {line}\n[{}]\n{}\n", done.status.unwrap(), done.stderr));
+    }
+    // A wrong command leaves the session alive; the status tells of it.
+    for command in [
+        "step sideways",
+        "break nowhere",
+        "break :99",
+        "break bundle 1000",
+        "print smu",
+        "print sum +",
+        "set zero = 1",
+        "set sum = 1e60",
+        "set i = 1.5",
+        "set add = 1",
+        "delete 7",
+        "goto somewhere",
+        "memory 5000",
+        "ulp sum",
+        "check i == 1",
+        "list x",
+        "until",
+        "watch",
+    ] {
+        let done = folder.fed("debug sum.s", format!("step 4\n{command}\necho alive\n").as_bytes());
+        assert_eq!(done.status, Some(1), "{command}");
+        assert!(done.stdout.ends_with("alive\n"), "{command}: {}", done.stdout);
+        text.push_str(&format!("(takt) {command}\n{}\n", done.stderr));
+    }
+    insta::assert_snapshot!("mistakes", text);
+}
+
+#[test]
+fn in_the_closed_loop() {
+    let folder = Folder::new();
+    let text = folder.fed("debug --track --periods 300", b"print F1, x\nback period\nstep period\n").ok();
+    insta::assert_snapshot!("closed_loop", text);
+    // What was recorded is what the session runs.
+    folder.line("track --periods 300 --csv rec.csv -q").ok();
+    let rows = folder.read_text("rec.csv");
+    let (title, row) = (rows.lines().next().unwrap(), rows.lines().nth(201).unwrap());
+    let column = title.split(',').position(|title| title == "F2").unwrap();
+    let force = row.split(',').nth(column).unwrap();
+    let commands = format!("goto period 201\ncheck bits(F2) == bits({force})\n");
+    folder.fed("debug --track --periods 300", commands.as_bytes()).ok();
+    let inputs = format!("debug {} --inputs rec.csv", source("tracking.s"));
+    folder.fed(&inputs, commands.as_bytes()).ok();
+}

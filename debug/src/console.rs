@@ -1,0 +1,581 @@
+//! Commands in, text out: what a prompt, a script and the command line of a full-screen view share. One table gives
+//! dispatch, help and completion.
+
+use crate::session::{Live, Session, Shown, Stop, Test, Unit, Where, Why, hex_float, ulp_distance};
+use std::fmt::Write as _;
+use takt_asm::diag::nearest;
+use takt_asm::expr::Value;
+use takt_emu::Status;
+use takt_isa::Type;
+use takt_isa::program::Space;
+use takt_isa::timing::Cause;
+
+/// What completes an argument.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Completion {
+    None,
+    Names,
+    Words(&'static [&'static str]),
+}
+
+type Run = fn(&mut Console, &str) -> Result<String, String>;
+
+/// A row of the table.
+struct Command {
+    name: &'static str,
+    short: &'static str,
+    arguments: &'static str,
+    text: &'static str,
+    completion: Completion,
+    run: Run,
+}
+
+const UNITS: &[&str] = &["cycle", "bundle", "line", "period", "call", "out"];
+
+macro_rules! commands {
+    ($($name:literal $short:literal $arguments:literal $completion:expr, $run:expr, $text:literal;)*) => {
+        const COMMANDS: &[Command] = &[$(Command {
+            name: $name, short: $short, arguments: $arguments, text: $text, completion: $completion, run: $run,
+        }),*];
+    };
+}
+
+#[rustfmt::skip]
+commands! {
+    "step" "s" "[UNIT] [N]" Completion::Words(UNITS), |c, a| c.step(a, false), "Step by a cycle, bundle (if nothing is said), line, period or call (calls passed over); `out` of a subroutine.";
+    "back" "b" "[UNIT] [N]" Completion::Words(UNITS), |c, a| c.step(a, true), "Step back by the same units.";
+    "continue" "c" "" Completion::None, |c, _| { let why = c.session.resume(); c.arrive(why) }, "Run on to a breakpoint or watchpoint.";
+    "reverse" "rc" "" Completion::None, |c, _| { let why = c.session.resume_back(); c.arrive(why) }, "Run back to one.";
+    "until" "u" "EXPR" Completion::Names, |c, a| { let live = c.session.parse(a)?; let why = c.session.run_until(&live); c.arrive(why) }, "Run on until an expression is not zero.";
+    "goto" "g" "PLACE" Completion::Words(&["cycle", "period", "start"]), Console::go, "Go to `cycle N` or `period N` (so many have passed), or to the `start`, whichever way that is.";
+    "break" "br" "PLACE [if EXPR]" Completion::Names, Console::add_break, "Stop where a bundle is about to issue: `label`, `label+2`, `file.s:12`, `:12`, `bundle 3`; or at `cycle N`, `period N`.";
+    "watch" "w" "EXPR [== EXPR | > EXPR | nan | subnormal]" Completion::Names, Console::add_watch, "Stop when a value changes, or becomes equal, above, a NaN, a subnormal number.";
+    "delete" "d" "[N]" Completion::None, Console::delete, "Remove a breakpoint or watchpoint, or all.";
+    "stops" "" "" Completion::None, |c, _| Ok(c.stops()), "List breakpoints and watchpoints.";
+    "print" "p" "EXPR, …" Completion::Names, Console::print, "Print values: as float, hexadecimal float, integer, bits. `x:int` reads x as an integer.";
+    "set" "" "PLACE = EXPR" Completion::Names, Console::set, "Set a register, port or data word (`table[3]`). What was run beyond this position is forgotten.";
+    "ulp" "" "EXPR, EXPR" Completion::Names, Console::ulp, "The distance of two values in units in the last place of the second.";
+    "check" "" "EXPR" Completion::Names, Console::check, "Fail if an expression is zero: a script then ends with exit status 1.";
+    "registers" "r" "[PATTERN]" Completion::Names, |c, a| Ok(c.registers(a)), "Named registers; `*` stands for any characters.";
+    "ports" "" "" Completion::None, |c, _| Ok(c.ports()), "Input and output ports.";
+    "memory" "m" "EXPR [COUNT]" Completion::Names, Console::memory, "Data words from an address on.";
+    "flight" "f" "" Completion::None, |c, _| Ok(c.flight()), "Operations underway, with the cycles until their results are there.";
+    "stalls" "" "" Completion::None, |c, _| Ok(c.stalls()), "Where the cycles since reset went.";
+    "list" "l" "[LINE]" Completion::None, Console::list, "Source lines around this position, or a line.";
+    "where" "" "" Completion::None, |c, _| Ok(c.place()), "This position; the calls that lead to it.";
+    "display" "" "[EXPR]" Completion::Names, Console::display, "Show a value at each stop; without one, show none any more.";
+    "echo" "" "TEXT" Completion::None, |_, a| Ok(format!("{a}\n")), "Print a text.";
+    "help" "h" "[COMMAND]" Completion::None, |_, a| help(a), "This list, or one command.";
+    "quit" "q" "" Completion::None, |c, _| { c.quit = true; Ok(String::new()) }, "Leave.";
+}
+
+/// A command by its name, its short name, or an unmistakable beginning.
+fn find(name: &str) -> Result<&'static Command, String> {
+    if let Some(command) = COMMANDS.iter().find(|command| command.name == name || command.short == name) {
+        return Ok(command);
+    }
+    let mut meant = COMMANDS.iter().filter(|command| command.name.starts_with(name));
+    match (meant.next(), meant.next()) {
+        (Some(command), None) => Ok(command),
+        (Some(a), Some(b)) => Err(format!("`{name}` may be `{}` or `{}`", a.name, b.name)),
+        (None, _) => {
+            let near = nearest(name, COMMANDS.iter().map(|command| command.name));
+            let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            Err(format!("there is no command `{name}`{near} (`help` lists them)"))
+        }
+    }
+}
+
+fn help(name: &str) -> Result<String, String> {
+    let usage = |command: &Command| format!("{} {}", command.name, command.arguments);
+    if !name.is_empty() {
+        let command = find(name)?;
+        let short =
+            if command.short.is_empty() { String::new() } else { format!("  (short: {})", command.short) };
+        return Ok(format!("{}{short}\n  {}\n", usage(command).trim_end(), command.text));
+    }
+    let width =
+        COMMANDS.iter().map(|command| usage(command).len()).filter(|width| *width < 24).max().unwrap_or(0);
+    let mut text = String::new();
+    for command in COMMANDS {
+        let _ = writeln!(text, "{:<2} {:<width$}  {}", command.short, usage(command), command.text);
+    }
+    text.push_str("An empty line repeats a step. Expressions are the assembler's, over live values; also `cycle period address depth`.\n");
+    Ok(text)
+}
+
+/// Names that complete the word that a line ends with, and where that word begins.
+pub fn complete(session: &Session, line: &str) -> (usize, Vec<String>) {
+    let start =
+        line.rfind(|c: char| !(c.is_ascii_alphanumeric() || c == '_' || c == '.')).map_or(0, |at| at + 1);
+    let word = &line[start..];
+    let matching = |names: &mut dyn Iterator<Item = &str>| {
+        names.filter(|name| name.starts_with(word)).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let Some((command, _)) = line.trim_start().split_once(' ') else {
+        return (start, matching(&mut COMMANDS.iter().map(|command| command.name)));
+    };
+    let found = match find(command).map(|command| command.completion) {
+        Ok(Completion::Names) => session.names(word),
+        Ok(Completion::Words(words)) => matching(&mut words.iter().copied()),
+        _ => Vec::new(),
+    };
+    (start, found)
+}
+
+/// A line's command and its arguments; `None` for a blank line or a comment.
+fn split(line: &str) -> Option<(&str, &str)> {
+    let line = line.trim();
+    if line.is_empty() || line.starts_with('#') || line.starts_with(';') {
+        return None;
+    }
+    Some(line.split_once(char::is_whitespace).map_or((line, ""), |(name, rest)| (name, rest.trim())))
+}
+
+/// The first line of a script that is no command, and why.
+pub fn first_mistake(script: &str) -> Option<(usize, String)> {
+    script.lines().enumerate().find_map(|(i, line)| Some((i + 1, find(split(line)?.0).err()?)))
+}
+
+/// A session with what commands add to it.
+pub struct Console {
+    /// The session.
+    pub session: Session,
+    displays: Vec<Live>,
+    /// Checks that have failed.
+    pub failed: u32,
+    /// Whether `quit` was said.
+    pub quit: bool,
+    /// The last step, which an empty line repeats.
+    last: String,
+}
+
+impl Console {
+    /// Commands on a session.
+    pub fn new(session: Session) -> Console {
+        Console { session, displays: Vec::new(), failed: 0, quit: false, last: String::new() }
+    }
+
+    /// Executes a line; what it has to say, in whole lines.
+    ///
+    /// # Errors
+    /// What is wrong with it. The session is as it was.
+    pub fn execute(&mut self, line: &str) -> Result<String, String> {
+        let repeated = self.last.clone();
+        let line = if line.trim().is_empty() { &repeated } else { line };
+        let Some((name, arguments)) = split(line) else { return Ok(String::new()) };
+        let command = find(name)?;
+        let moves = ["step", "back", "continue", "reverse"].contains(&command.name);
+        self.last = if moves { line.to_owned() } else { String::new() };
+        (command.run)(self, arguments)
+    }
+
+    /// The displayed expressions with their values.
+    pub fn displayed(&self) -> Vec<(String, String)> {
+        self.displays.iter().map(|live| (live.text().to_owned(), self.short(live))).collect()
+    }
+
+    fn short(&self, live: &Live) -> String {
+        match self.session.place(live) {
+            Ok(Some((_, ty, Some(bits)))) => Shown::new(ty, bits).text,
+            Ok(Some((.., None))) => "(never written)".to_owned(),
+            _ => self.session.evaluate(live).map_or_else(|error| format!("({error})"), number),
+        }
+    }
+
+    // ---- Positions.
+
+    /// Where the session is.
+    pub fn place(&mut self) -> String {
+        let session = &mut self.session;
+        let (cycle, period) = (session.cycle(), session.period());
+        let stall = session.stall();
+        let (address, issue) = session.next_issue();
+        let program = session.program();
+        let head = format!("cycle {cycle}, period {period}: ");
+        let mut text = match session.emulator().status() {
+            Status::Halted { .. } => format!("{head}halted at {}\n", program.bundle_text(address)),
+            Status::Faulted(fault) => format!("{head}{fault}\n"),
+            Status::Waiting { address, .. } => {
+                format!("{head}waits for the tick, since {}\n", program.bundle_text(*address))
+            }
+            Status::Running => {
+                let at = program.bundle_text(address);
+                let label = program.nearest_label(address);
+                let label = label.map_or(String::new(), |(label, distance)| match distance {
+                    0 => format!(", {label}"),
+                    distance => format!(", {label}+{distance}"),
+                });
+                match (stall, issue) {
+                    (Some(cause), Some(issue)) => {
+                        let why = program.cause_text(cause);
+                        format!("{head}{at}{label} issues in {} cycles: {why}\n", issue - cycle)
+                    }
+                    _ => format!("{head}{at}{label} issues\n"),
+                }
+            }
+        };
+        if let Some(location) = session.location()
+            && let Some(line) = session.source_line(location)
+        {
+            let _ = writeln!(text, "{:>5}  {}", location.line, line.trim_end());
+        }
+        for (slot, operation) in session.program().machine.slots.iter().zip(session.bundle(address)) {
+            if let Some(operation) = operation {
+                let _ = writeln!(text, "    {:<4} {operation}", slot.name);
+            }
+        }
+        for address in session.emulator().stack().iter().rev() {
+            let call = address.saturating_sub(1);
+            let _ = writeln!(text, "    called from {}", session.program().bundle_text(call));
+        }
+        text
+    }
+
+    /// Says why it stopped, where, and what is displayed.
+    fn arrive(&mut self, why: Why) -> Result<String, String> {
+        let mut text = match why {
+            Why::Done => String::new(),
+            Why::Stop { id, text, change: None } => format!("stop {id}: {text}\n"),
+            Why::Stop { id, text, change: Some((before, now)) } => {
+                format!("stop {id}: {text}: {before} -> {now}\n")
+            }
+            Why::Holds => "the expression holds\n".to_owned(),
+            Why::Start => "the beginning of the run\n".to_owned(),
+            Why::Halted => "the program has halted\n".to_owned(),
+            Why::InputsEnd => "the recorded inputs end here\n".to_owned(),
+            Why::Fault(_) => "the program has stopped with a fault\n".to_owned(),
+            Why::Limit(cycles) => format!("nothing to stop at in {cycles} cycles\n"),
+            Why::Interrupted => "interrupted\n".to_owned(),
+        };
+        text.push_str(&self.place());
+        for (name, value) in self.displayed() {
+            let _ = writeln!(text, "    {name} = {value}");
+        }
+        Ok(text)
+    }
+
+    fn step(&mut self, arguments: &str, back: bool) -> Result<String, String> {
+        let (mut unit, mut count) = (Unit::Bundle, 1u64);
+        for word in arguments.split_whitespace() {
+            unit = match word {
+                "cycle" => Unit::Cycle,
+                "bundle" => Unit::Bundle,
+                "line" => Unit::Line,
+                "period" => Unit::Period,
+                "call" => Unit::Call,
+                "out" => Unit::Out,
+                number => {
+                    count = number.parse().ok().filter(|count| *count > 0).ok_or_else(|| {
+                        let near = nearest(number, UNITS.iter().copied());
+                        let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+                        format!("`{number}` is neither a count nor one of {}{near}", UNITS.join(" "))
+                    })?;
+                    continue;
+                }
+            };
+        }
+        if unit == Unit::Cycle {
+            // At once, however many.
+            let now = self.session.cycle();
+            let at = if back { now.saturating_sub(count) } else { now.saturating_add(count) };
+            let why = if back && now == 0 { Why::Start } else { self.session.go_to(at) };
+            return self.arrive(why);
+        }
+        let mut why = Why::Done;
+        for _ in 0..count {
+            why = if back { self.session.step_back(unit) } else { self.session.step(unit) };
+            if why != Why::Done {
+                break;
+            }
+        }
+        self.arrive(why)
+    }
+
+    fn go(&mut self, arguments: &str) -> Result<String, String> {
+        let why = match arguments.split_whitespace().collect::<Vec<_>>()[..] {
+            ["start"] => self.session.go_to(0),
+            [unit @ ("cycle" | "period"), number] => {
+                let number = number.parse().map_err(|_| format!("`{number}` is no number of a {unit}"))?;
+                match unit {
+                    "cycle" => self.session.go_to(number),
+                    _ => self.session.go_to_period(number),
+                }
+            }
+            _ => return Err("goto wants `cycle N`, `period N` or `start`".to_owned()),
+        };
+        self.arrive(why)
+    }
+
+    // ---- Stops.
+
+    fn add_break(&mut self, arguments: &str) -> Result<String, String> {
+        let (place, condition) = match arguments.split_once(" if ") {
+            Some((place, condition)) => (place, Some(Box::new(self.session.parse(condition)?))),
+            None => (arguments, None),
+        };
+        let at = Where::parse(place, self.session.program())?;
+        let id = self.session.add_stop(Stop::Break { at, condition, text: format!("break {arguments}") });
+        let at = match at {
+            Where::Bundle(address) => self.session.program().bundle_text(address),
+            Where::Cycle(cycle) => format!("cycle {cycle}"),
+            Where::Period(period) => format!("period {period}"),
+        };
+        Ok(format!("stop {id} at {at}\n"))
+    }
+
+    fn add_watch(&mut self, arguments: &str) -> Result<String, String> {
+        let (what, test) = if let Some(what) = arguments.strip_suffix(" nan") {
+            (what, Test::Nan)
+        } else if let Some(what) = arguments.strip_suffix(" subnormal") {
+            (what, Test::Subnormal)
+        } else if let Some((what, other)) = arguments.split_once(" == ") {
+            (what, Test::Equals(Box::new(self.session.parse(other)?)))
+        } else if let Some((what, other)) = arguments.split_once(" > ") {
+            (what, Test::Above(Box::new(self.session.parse(other)?)))
+        } else {
+            (arguments, Test::Changed)
+        };
+        let what = self.session.parse(what)?;
+        let now = self.short(&what);
+        let id = self.session.add_stop(Stop::Watch {
+            what: Box::new(what),
+            test,
+            text: format!("watch {arguments}"),
+        });
+        Ok(format!("stop {id}; now {now}\n"))
+    }
+
+    fn delete(&mut self, arguments: &str) -> Result<String, String> {
+        if arguments.is_empty() {
+            let all: Vec<u32> = self.session.stops().iter().map(|(id, _)| *id).collect();
+            all.iter().for_each(|id| {
+                self.session.remove_stop(*id);
+            });
+            return Ok(format!("{} removed\n", all.len()));
+        }
+        let id = arguments.parse().ok().filter(|id| self.session.remove_stop(*id));
+        id.map(|_| String::new()).ok_or_else(|| format!("there is no stop {arguments} (`stops` lists them)"))
+    }
+
+    fn stops(&self) -> String {
+        self.session.stops().iter().map(|(id, stop)| format!("{id:>3}  {}\n", stop.text())).collect()
+    }
+
+    // ---- Values.
+
+    fn print(&mut self, arguments: &str) -> Result<String, String> {
+        let mut text = String::new();
+        for part in parts(arguments) {
+            let live = self.session.parse(part)?;
+            let _ = match self.session.place(&live)? {
+                Some((_, ty, Some(bits))) => writeln!(text, "{} = {}", live.text(), every_way(ty, bits)),
+                Some((.., None)) => writeln!(text, "{} = (never written)", live.text()),
+                None => writeln!(text, "{} = {}", live.text(), number(self.session.evaluate(&live)?)),
+            };
+        }
+        Ok(text)
+    }
+
+    fn set(&mut self, arguments: &str) -> Result<String, String> {
+        let (target, value) = arguments.split_once('=').ok_or("set wants `place = expression`")?;
+        let target = self.session.parse(target)?;
+        let (place, ty, _) = self
+            .session
+            .place(&target)?
+            .ok_or_else(|| format!("`{}` is no register, port or data word", target.text()))?;
+        let value = self.session.parse(value)?;
+        let bits = self.session.evaluate(&value)?.bits(ty).map_err(|fault| fault.to_string())?;
+        self.session.set(place, bits)?;
+        Ok(format!("{} = {}\n", target.text(), every_way(ty, bits)))
+    }
+
+    fn ulp(&mut self, arguments: &str) -> Result<String, String> {
+        let [a, b] = parts(arguments)[..] else { return Err("ulp wants two expressions".to_owned()) };
+        let value = |text| self.session.evaluate(&self.session.parse(text)?).map(Value::real);
+        let distance = ulp_distance(value(a)?, value(b)?);
+        let steps = match distance.steps {
+            Some(1) => "1 number further as binary32".to_owned(),
+            Some(steps) => format!("{steps} numbers further as binary32"),
+            None => "a NaN is no distance away".to_owned(),
+        };
+        Ok(format!("{a} is {:.3} ulp from {b}; {steps}\n", distance.error))
+    }
+
+    fn check(&mut self, arguments: &str) -> Result<String, String> {
+        let live = self.session.parse(arguments)?;
+        let holds = self.session.evaluate(&live);
+        if holds.as_ref().is_ok_and(|value| !value.is_zero()) {
+            return Ok(String::new());
+        }
+        self.failed += 1;
+        let why = holds.err().map_or(String::new(), |error| format!(" ({error})"));
+        let mut text = format!("check failed in cycle {}: {}{why}", self.session.cycle(), live.text());
+        for name in live.places() {
+            if let Ok(part) = self.session.parse(name) {
+                let _ = write!(text, "\n    {name} = {}", self.short(&part));
+            }
+        }
+        Err(text)
+    }
+
+    fn registers(&self, pattern: &str) -> String {
+        let pattern = if pattern.is_empty() { "*" } else { pattern };
+        let program = self.session.program();
+        let all = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
+        let mut text = String::new();
+        for port in all.filter(|port| crate::matches(pattern, &port.name)) {
+            let place = program.machine.register_name(port.register).unwrap_or_default();
+            let value = self.session.register(port.register);
+            let value = value.map_or("(never written)".to_owned(), |bits| every_way(port.ty, bits));
+            let _ = writeln!(text, "{:<20} {place:<5} {value}", port.name);
+        }
+        text
+    }
+
+    fn ports(&self) -> String {
+        let program = self.session.program();
+        let mut text = String::new();
+        for (kind, ports) in [("in", &program.inputs), ("out", &program.outputs)] {
+            for port in ports {
+                let value = self.session.register(port.register);
+                let value = value.map_or("(never written)".to_owned(), |bits| every_way(port.ty, bits));
+                let _ = writeln!(text, "{kind:<4} {:<16} {value}", port.name);
+            }
+        }
+        text
+    }
+
+    fn memory(&mut self, arguments: &str) -> Result<String, String> {
+        let (address, count) = match arguments.rsplit_once(' ') {
+            Some((address, count)) if count.parse::<usize>().is_ok() => (address, count.parse().unwrap_or(1)),
+            _ => (arguments, 8usize),
+        };
+        let live = self.session.parse(address)?;
+        let start = self.session.evaluate(&live)?.integer().map_err(|fault| fault.to_string())?;
+        let memory = self.session.emulator().memory();
+        let start = usize::try_from(start)
+            .ok()
+            .filter(|start| *start < memory.len())
+            .ok_or_else(|| format!("data word {start}: the memory has words 0 to {}", memory.len() - 1))?;
+        let program = self.session.program();
+        let mut text = String::new();
+        for (word, bits) in memory.iter().enumerate().skip(start).take(count) {
+            let labels = program.symbols.iter().filter(|symbol| symbol.space == Space::Data);
+            let label = labels.into_iter().find(|symbol| symbol.address as usize == word);
+            let label = label.map_or("", |symbol| symbol.name.as_str());
+            let _ = writeln!(text, "{word:>5} {label:<12} {}", every_way(Type::F, *bits));
+        }
+        Ok(text)
+    }
+
+    // ---- The machine.
+
+    fn flight(&self) -> String {
+        let program = self.session.program();
+        let mut text = String::new();
+        for (retire, left) in self.session.in_flight() {
+            let register = retire.register.map_or(String::new(), |register| program.register_text(register));
+            let cycles = if left == 1 { "cycle" } else { "cycles" };
+            let _ = writeln!(
+                text,
+                "{left:>3} {cycles:<6}  {register:<12} {} of {}",
+                retire.op.row().mnemonic,
+                program.bundle_text(retire.address)
+            );
+        }
+        if text.is_empty() { "nothing is underway\n".to_owned() } else { text }
+    }
+
+    fn stalls(&self) -> String {
+        let statistics = self.session.emulator().statistics();
+        let program = self.session.program();
+        let mut text = format!("{:>10}  issue\n", statistics.bundles);
+        for (kind, cycles) in Cause::KINDS.iter().zip(statistics.stalls()).filter(|(_, cycles)| *cycles > 0) {
+            let _ = writeln!(text, "{cycles:>10}  {kind}");
+        }
+        let mut causes: Vec<_> =
+            statistics.causes.iter().filter(|((_, cause), _)| *cause != Cause::Wait).collect();
+        causes.sort_by_key(|((address, _), cycles)| (std::cmp::Reverse(**cycles), *address));
+        for ((address, cause), cycles) in causes.into_iter().take(10) {
+            let (at, why) = (program.bundle_text(*address), program.cause_text(*cause));
+            let _ = writeln!(text, "{cycles:>10}  {at}: {why}");
+        }
+        text
+    }
+
+    fn list(&mut self, arguments: &str) -> Result<String, String> {
+        let here = self.session.location();
+        let line = match (arguments, here) {
+            ("", Some(location)) => location.line,
+            ("", None) => return Err("no source line belongs to this position".to_owned()),
+            (text, _) => text.parse().map_err(|_| format!("`{text}` is no line number"))?,
+        };
+        let file = here.map_or(0, |location| location.file);
+        let source = self.session.source(file).ok_or("the source is not at hand")?;
+        let mut text = String::new();
+        for (number, content) in (1u32..).zip(source.lines()) {
+            if number + 5 >= line && number <= line + 5 {
+                let mark = if here.is_some_and(|here| here.line == number) { '>' } else { ' ' };
+                let _ = writeln!(text, "{mark}{number:>5}  {}", content.trim_end());
+            }
+        }
+        Ok(text)
+    }
+
+    fn display(&mut self, arguments: &str) -> Result<String, String> {
+        if arguments.is_empty() {
+            self.displays.clear();
+            return Ok(String::new());
+        }
+        let live = self.session.parse(arguments)?;
+        let text = format!("{} = {}\n", live.text(), self.short(&live));
+        self.displays.push(live);
+        Ok(text)
+    }
+}
+
+/// The parts of a list between commas that stand in no brackets.
+fn parts(text: &str) -> Vec<&str> {
+    let (mut depth, mut start, mut parts) = (0i32, 0, Vec::new());
+    for (at, byte) in text.bytes().enumerate() {
+        match byte {
+            b'(' | b'[' | b'{' => depth += 1,
+            b')' | b']' | b'}' => depth -= 1,
+            b',' if depth == 0 => {
+                parts.push(text[start..at].trim());
+                start = at + 1;
+            }
+            _ => {}
+        }
+    }
+    parts.push(text[start..].trim());
+    parts
+}
+
+/// A computed value.
+fn number(value: Value) -> String {
+    match value {
+        Value::Int(value) => value.to_string(),
+        Value::Real(value) => {
+            let near = value as f32;
+            let exact = f64::from(near) == value;
+            let text = if exact { format!("{near:?}") } else { format!("{value:?}") };
+            if exact {
+                format!("{text}  {}", hex_float(near))
+            } else {
+                format!("{text}  (binary32: {near:?})")
+            }
+        }
+    }
+}
+
+/// Bits as their type has them, then in the other ways.
+fn every_way(ty: Type, bits: u32) -> String {
+    let shown = Shown::new(ty, bits);
+    match ty {
+        Type::F => format!("{:<14} {}  0x{bits:08x}", shown.text, shown.hex_float),
+        Type::I => format!("{:<14} 0x{bits:08x}", shown.text),
+        Type::B => format!("{:<14} {}  {:?}", shown.text, shown.integer, shown.float),
+    }
+}

@@ -1,0 +1,222 @@
+//! Breakpoints and watchpoints.
+
+use super::expression::{self, Live};
+use super::{Session, Why};
+use takt_asm::expr::Value;
+use takt_isa::Program;
+use takt_isa::program::Space;
+use takt_isa::timing::{Address, Cycle};
+
+/// Where a breakpoint stops.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Where {
+    /// Where this bundle is about to issue.
+    Bundle(Address),
+    /// When so many cycles have passed.
+    Cycle(Cycle),
+    /// When so many periods have ended.
+    Period(u64),
+}
+
+/// What a watchpoint waits for: that it is so, and was not so the cycle before.
+#[derive(Clone, Debug)]
+pub enum Test {
+    /// The value is another.
+    Changed,
+    /// It equals another.
+    Equals(Box<Live>),
+    /// It is above another.
+    Above(Box<Live>),
+    /// It is a NaN.
+    Nan,
+    /// It is a subnormal number.
+    Subnormal,
+}
+
+/// A breakpoint or watchpoint.
+#[derive(Clone, Debug)]
+pub enum Stop {
+    /// Stops at a place, if the condition, if any, holds.
+    Break {
+        /// The place.
+        at: Where,
+        /// The condition.
+        condition: Option<Box<Live>>,
+        /// As the user wrote it.
+        text: String,
+    },
+    /// Stops when a value becomes what is waited for.
+    Watch {
+        /// The value.
+        what: Box<Live>,
+        /// What is waited for.
+        test: Test,
+        /// As the user wrote it.
+        text: String,
+    },
+}
+
+impl Stop {
+    /// As the user wrote it.
+    pub fn text(&self) -> &str {
+        match self {
+            Stop::Break { text, .. } | Stop::Watch { text, .. } => text,
+        }
+    }
+}
+
+impl Where {
+    /// The place that a text names: `label`, `label+2`, `file.s:12` or `:12`, `bundle 3`, `cycle 100`, `period 5`.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn parse(text: &str, program: &Program) -> Result<Where, String> {
+        let text = text.trim();
+        let number = |rest: &str, what: &str| {
+            rest.trim().parse::<u64>().map_err(|_| format!("`{}` is no number of a {what}", rest.trim()))
+        };
+        let known = ["bundle", "cycle", "period"];
+        if let Some((word, rest)) = text.split_once(' ').filter(|(word, _)| known.contains(word)) {
+            let number = number(rest, word)?;
+            return match word {
+                "cycle" => Ok(Where::Cycle(number)),
+                "period" => Ok(Where::Period(number)),
+                _ => bundle(number, program),
+            };
+        }
+        if let Some((file, line)) = text.rsplit_once(':') {
+            return line_address(file, number(line, "line")?, program).map(Where::Bundle);
+        }
+        if let Ok(number) = text.parse() {
+            return bundle(number, program);
+        }
+        if let Some(address) = expression::code_address(text, program) {
+            return bundle(address.into(), program);
+        }
+        let labels = program.symbols.iter().filter(|symbol| symbol.space == Space::Code);
+        let near = takt_asm::diag::nearest(text, labels.map(|symbol| symbol.name.as_str()));
+        let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+        Err(format!(
+            "no label is named `{text}`{near} (places: label, label+2, file.s:12, :12, bundle 3, cycle 100, period 5)"
+        ))
+    }
+}
+
+fn bundle(number: u64, program: &Program) -> Result<Where, String> {
+    let bundles = program.bundles();
+    let address = u32::try_from(number).ok().filter(|address| *address < bundles);
+    address
+        .map(Where::Bundle)
+        .ok_or_else(|| format!("bundle {number}: the program has bundles 0 to {}", bundles - 1))
+}
+
+/// The first bundle with an operation of a source line.
+fn line_address(file: &str, line: u64, program: &Program) -> Result<Address, String> {
+    let names = || program.files.iter().map(String::as_str);
+    let ends = |name: &str| name == file || name.rsplit('/').next() == Some(file);
+    let file = if file.is_empty() { Some(0) } else { names().position(ends) };
+    let Some(file) = file else {
+        return Err(format!("no such source (sources: {})", names().collect::<Vec<_>>().join(" ")));
+    };
+    let slots = program.machine.slots.len();
+    let places = || {
+        let locations = program.lines.iter().enumerate();
+        locations
+            .filter_map(|(i, location)| location.map(|location| ((i / slots) as u32, location)))
+            .filter(|(_, location)| location.file as usize == file)
+    };
+    if let Some((address, _)) = places().find(|(_, location)| u64::from(location.line) == line) {
+        return Ok(address);
+    }
+    let next = places().map(|(_, location)| location.line).filter(|next| u64::from(*next) > line).min();
+    let next = next.map_or(String::new(), |next| format!("; the next line with one is {next}"));
+    Err(format!("line {line} of {} has no instruction{next}", program.files[file]))
+}
+
+/// Sees from position to position whether there is a reason to stop.
+pub(super) struct Watcher {
+    /// For each stop, what was there before.
+    before: Vec<Seen>,
+}
+
+/// A watched value and whether it was as waited for.
+#[derive(Clone, Default)]
+struct Seen {
+    value: Option<Value>,
+    is: bool,
+}
+
+impl Watcher {
+    pub(super) fn new(session: &Session) -> Watcher {
+        Watcher { before: session.stops.iter().map(|(_, stop)| see(session, stop)).collect() }
+    }
+
+    pub(super) fn visit(&mut self, session: &Session, issuing: Option<Address>) -> Option<Why> {
+        let mut why = None;
+        for ((id, stop), before) in session.stops.iter().zip(&mut self.before) {
+            match stop {
+                Stop::Break { at, condition, text } => {
+                    let here = match *at {
+                        Where::Bundle(address) => issuing == Some(address),
+                        Where::Cycle(cycle) => session.cycle() == cycle,
+                        Where::Period(period) => session.core.boundary && session.period() == period,
+                    };
+                    if here
+                        && why.is_none()
+                        && condition.as_ref().is_none_or(|condition| session.holds(condition))
+                    {
+                        why = Some(Why::Stop { id: *id, text: text.clone(), change: None });
+                    }
+                }
+                Stop::Watch { test, text, .. } => {
+                    let now = see(session, stop);
+                    let hit = match test {
+                        Test::Changed => !same(before.value, now.value),
+                        _ => now.is && !before.is,
+                    };
+                    if hit && why.is_none() {
+                        let change = Some((shown(before.value), shown(now.value)));
+                        why = Some(Why::Stop { id: *id, text: text.clone(), change });
+                    }
+                    *before = now;
+                }
+            }
+        }
+        why
+    }
+}
+
+/// Bit for bit: a NaN is the same as itself, the two zeros are not.
+fn same(a: Option<Value>, b: Option<Value>) -> bool {
+    let bits = |value: Option<Value>| match value {
+        None => (0, 0),
+        Some(Value::Int(value)) => (1, value.cast_unsigned()),
+        Some(Value::Real(value)) => (2, value.to_bits()),
+    };
+    bits(a) == bits(b)
+}
+
+/// A value in the fewest digits that tell it from its neighbours.
+fn shown(value: Option<Value>) -> String {
+    match value {
+        None => "(no value)".to_owned(),
+        Some(Value::Int(value)) => value.to_string(),
+        Some(Value::Real(value)) if f64::from(value as f32) == value => format!("{:?}", value as f32),
+        Some(Value::Real(value)) => format!("{value:?}"),
+    }
+}
+
+fn see(session: &Session, stop: &Stop) -> Seen {
+    let Stop::Watch { what, test, .. } = stop else { return Seen::default() };
+    let value = session.evaluate(what).ok();
+    let real = value.map(Value::real);
+    let other = |live: &Live| session.evaluate(live).ok().map(Value::real);
+    let is = match test {
+        Test::Changed => false,
+        Test::Equals(live) => real.is_some() && real == other(live),
+        Test::Above(live) => real.zip(other(live)).is_some_and(|(value, other)| value > other),
+        Test::Nan => real.is_some_and(f64::is_nan),
+        Test::Subnormal => real.is_some_and(|value| (value as f32).is_subnormal()),
+    };
+    Seen { value, is }
+}

@@ -1,0 +1,347 @@
+//! Sessions against the run that they are of: wherever one goes, forth or back, everything is as it was there.
+
+use std::sync::Arc;
+use takt_asm::{MemoryLoader, Options as AsmOptions, assemble};
+use takt_debug::console::Console;
+use takt_debug::session::{CHECKPOINTS, Options, Place, Session, Stop, Test, Unit, Where, Why};
+use takt_emu::testing::{INPUTS, Options as ProgramOptions, Random, random_program};
+use takt_isa::{MACHINES, Program, T3};
+
+/// A random program with inputs for some periods; with `subroutines` it has calls.
+fn random_session(seed: u64, index: usize, periods: u64) -> Session {
+    let machine = MACHINES[index % MACHINES.len()];
+    session(&random_program(seed, machine, ProgramOptions::TAME), seed, periods)
+}
+
+fn session(program: &Program, seed: u64, periods: u64) -> Session {
+    let mut random = Random::new(seed);
+    let first = program.machine.inputs.base;
+    let row = |random: &mut Random| (0..INPUTS).map(|i| (first + i, random.word())).collect::<Vec<_>>();
+    let rows = (0..periods).map(|_| row(&mut random)).collect();
+    Session::new(program, Options { inputs: Some(Arc::new(rows)), ..Options::default() }).unwrap()
+}
+
+/// All that can be seen at a position.
+fn fingerprint(session: &mut Session) -> String {
+    let registers: Vec<Option<u32>> = (0..1024).map(|register| session.register(register)).collect();
+    let (next, stall, flight) = (session.next_issue(), session.stall(), session.in_flight());
+    let emulator = session.emulator();
+    format!(
+        "{} {} {next:?} {stall:?} {flight:?} {:?} {:?} {:?} {registers:?} {:?}",
+        session.cycle(),
+        session.period(),
+        emulator.status(),
+        emulator.stack(),
+        emulator.flags(),
+        emulator.statistics()
+    ) + &format!("{:?}", emulator.memory())
+}
+
+/// Every position of a run, by stepping through it.
+fn all(session: &mut Session) -> Vec<String> {
+    session.go_to(0);
+    let mut positions = vec![fingerprint(session)];
+    while session.step(Unit::Cycle) == Why::Done {
+        positions.push(fingerprint(session));
+    }
+    positions
+}
+
+#[test]
+fn anywhere() {
+    for seed in 0..12 {
+        let mut session = random_session(seed, seed as usize, 6);
+        let positions = all(&mut session);
+        let end = positions.len() as u64 - 1;
+        let mut random = Random::new(seed);
+        for _ in 0..60 {
+            let cycle = u64::from(random.below(end as u32 + 1));
+            assert_eq!(session.go_to(cycle), Why::Done);
+            assert!(fingerprint(&mut session) == positions[cycle as usize], "seed {seed}, cycle {cycle}");
+            if random.once_in(3) && cycle > 0 {
+                assert_eq!(session.step_back(Unit::Cycle), Why::Done);
+                assert!(fingerprint(&mut session) == positions[cycle as usize - 1]);
+            }
+        }
+        // The session's run is the emulator's.
+        session.go_to(end);
+        let mut emulator = takt_emu::Emulator::new(session.program()).unwrap();
+        let mut random = Random::new(seed);
+        let first = session.program().machine.inputs.base;
+        for _ in 0..session.period() {
+            for i in 0..INPUTS {
+                emulator.set_input_bits(first + i, random.word()).unwrap();
+            }
+            emulator.run_period(&[]).unwrap();
+        }
+        if session.period() == 6 {
+            assert_eq!(emulator.now(), session.cycle());
+            assert_eq!(emulator.statistics(), session.emulator().statistics());
+        }
+    }
+}
+
+/// Positions at which stepping forth by a unit stops, from the beginning to the end.
+fn forth(session: &mut Session, unit: Unit) -> Vec<u64> {
+    session.go_to(0);
+    let mut positions = vec![0];
+    while session.step(unit) == Why::Done {
+        positions.push(session.cycle());
+    }
+    positions
+}
+
+#[test]
+fn back_is_forth_reversed() {
+    for seed in 0..16 {
+        let mut session = random_session(seed, seed as usize, 3);
+        for unit in [Unit::Bundle, Unit::Line, Unit::Period] {
+            let forth = forth(&mut session, unit);
+            let mut back = vec![];
+            loop {
+                let why = session.step_back(unit);
+                back.push(session.cycle());
+                if session.cycle() == 0 {
+                    assert!(why == Why::Start || unit == Unit::Period);
+                    break;
+                }
+                assert_eq!(why, Why::Done);
+            }
+            back.reverse();
+            // The end of the run may itself be such a position.
+            let end = if forth.len() > back.len() { back.len() } else { forth.len() };
+            assert_eq!(back[..end], forth[..end], "seed {seed} {unit:?}");
+            assert!(forth.len() - end <= 1);
+        }
+    }
+}
+
+/// A program with a subroutine and a loop.
+const SOURCE: &str = "\
+.output sum, count:int
+.reg    i:int n:int x q
+        li      n, 3
+        mov     i, zero
+        fadd    sum, zero, zero
+next:   call    add
+        iadd    i, i, 1
+        ilt     x, i, n
+        bnz     x, next
+        mov     count, i
+        halt
+add:    ld      x, table[i]
+        st      out[i], x
+        fadd    sum, sum, x
+        fdiv    q, x, zero
+        ret
+.data
+table:  .float  0.5, 0.25, -1.75
+out:    .space  3
+";
+
+fn console(source: &str) -> Console {
+    let files = [("a.s", source)];
+    let assembled = assemble("a.s", &MemoryLoader::new(&files), &AsmOptions::default()).unwrap();
+    let sources = vec![("a.s".to_owned(), source.to_owned())];
+    let options = Options { sources, constants: assembled.constants, ..Options::default() };
+    Console::new(Session::new(&assembled.program, options).unwrap())
+}
+
+fn value(console: &Console, text: &str) -> f64 {
+    console.session.evaluate(&console.session.parse(text).unwrap()).unwrap().real()
+}
+
+#[test]
+fn calls() {
+    let mut console = console(SOURCE);
+    console.execute("break next").unwrap();
+    console.execute("continue").unwrap();
+    let depth = |console: &Console| value(console, "depth");
+    assert_eq!((value(&console, "address"), depth(&console)), (3.0, 0.0));
+    console.execute("step call").unwrap();
+    assert_eq!((value(&console, "address"), depth(&console)), (4.0, 0.0), "over it");
+    console.execute("back call").unwrap();
+    assert_eq!((value(&console, "address"), depth(&console)), (3.0, 0.0), "and back");
+    console.execute("step").unwrap();
+    assert_eq!((value(&console, "address"), depth(&console)), (9.0, 1.0), "into it");
+    console.execute("step out").unwrap();
+    assert_eq!((value(&console, "address"), depth(&console)), (4.0, 0.0));
+}
+
+#[test]
+fn stops_forth_and_back() {
+    for (stop, expected) in [
+        ("break add", 3),
+        ("break add if i == 1", 1),
+        ("break :8", 3),
+        ("break next+1", 3),
+        ("break cycle 40", 1),
+        ("watch i", 4),
+        ("watch sum > 0.6", 1),
+        ("watch sum == 0.75", 1),
+        ("watch q nan", 0),
+        ("watch out[1]", 1),
+        ("watch i > 0", 1),
+        ("watch [table+2] > -2", 0),
+    ] {
+        let mut console = console(SOURCE);
+        let kind = stop.split(' ').next().unwrap();
+        console.execute(stop).unwrap();
+        let mut forth = vec![];
+        while matches!(console.session.resume(), Why::Stop { id: 1, .. }) {
+            forth.push((console.session.cycle(), fingerprint(&mut console.session)));
+        }
+        let mut back = vec![];
+        while matches!(console.session.resume_back(), Why::Stop { id: 1, .. }) {
+            back.push((console.session.cycle(), fingerprint(&mut console.session)));
+        }
+        back.reverse();
+        assert_eq!(forth.len(), expected, "{stop}");
+        assert!(
+            forth == back,
+            "{kind} {stop}: {:?}",
+            back.iter().map(|(cycle, _)| cycle).collect::<Vec<_>>()
+        );
+    }
+}
+
+/// In random runs a breakpoint stops before each issue of its bundle, and a watchpoint at each change, and nowhere else.
+#[test]
+fn stops_are_complete() {
+    let mut stopped = 0;
+    for seed in 0..16 {
+        let mut session = random_session(seed, seed as usize, 3);
+        let (program, end) = (session.program().clone(), all(&mut session).len() as u64 - 1);
+        let mut random = Random::new(seed);
+        let address = random.below(program.bundles());
+        let register = program.machine.slots[0].bank.base + 8 + random.below(4) as u16;
+        let (mut issues, mut changes) = (vec![], vec![]);
+        for cycle in 1..=end {
+            let before = session.go_to(cycle - 1);
+            let old = session.register(register);
+            assert_eq!((before, session.go_to(cycle)), (Why::Done, Why::Done));
+            if session.next_issue() == (address, Some(cycle)) {
+                issues.push(cycle);
+            }
+            if session.register(register) != old {
+                changes.push(cycle);
+            }
+        }
+        let name = format!("@{}", program.machine.register_name(register).unwrap());
+        let what = session.parse(&name).unwrap();
+        for (stop, expected) in [
+            (Stop::Break { at: Where::Bundle(address), condition: None, text: String::new() }, issues),
+            (Stop::Watch { what: Box::new(what), test: Test::Changed, text: String::new() }, changes),
+        ] {
+            session.go_to(0);
+            let id = session.add_stop(stop);
+            let mut found = vec![];
+            while matches!(session.resume(), Why::Stop { .. }) {
+                found.push(session.cycle());
+            }
+            assert_eq!(found, expected, "seed {seed}");
+            stopped += found.len();
+            session.remove_stop(id);
+        }
+    }
+    assert!(stopped > 100);
+}
+
+#[test]
+fn what_is_set_belongs_to_the_run() {
+    let mut console = console(SOURCE);
+    console.execute("break add if i == 1").unwrap();
+    console.execute("continue").unwrap();
+    let at = console.session.cycle();
+    console.execute("set table[1] = 100").unwrap();
+    console.execute("set @m5:int = -7").unwrap();
+    assert_eq!(value(&console, "table[1]"), 100.0);
+    console.execute("goto cycle 100000").unwrap_or_default();
+    assert_eq!(value(&console, "sum"), 0.5 + 100.0 - 1.75);
+    let end = fingerprint(&mut console.session);
+    // Before it was set it was not; again beyond, it is.
+    console.execute("back cycle 100").unwrap();
+    assert!(console.session.cycle() < at);
+    assert_eq!(value(&console, "table[1]"), 0.25);
+    console.execute("goto cycle 100000").unwrap_or_default();
+    assert!(fingerprint(&mut console.session) == end);
+    // Another value there, and the old one is forgotten.
+    console.execute(&format!("goto cycle {at}")).unwrap();
+    console.execute("set table[1] = 1").unwrap();
+    console.execute("goto cycle 100000").unwrap_or_default();
+    assert_eq!(value(&console, "sum"), 0.5 + 1.0 - 1.75);
+    assert!(console.session.set(Place::Register(takt_isa::ZERO), 1).is_err());
+    assert!(console.session.set(Place::Word(1 << 20), 1).is_err());
+}
+
+#[test]
+fn expressions() {
+    let mut console = console(SOURCE);
+    console.execute("until i == 2").unwrap();
+    for (text, expected) in [
+        ("i*2+1", 5.0),
+        ("[2]", -1.75),
+        ("table[1]", 0.25),
+        ("table[i-1]:bits", f64::from(0.25f32.to_bits())),
+        ("1[1]", -1.75),
+        ("abs(table[table[0]*4])", 1.75),
+        ("max(i, 3)", 3.0),
+        ("sum:bits", f64::from(0.75f32.to_bits())),
+        ("add", 9.0),
+        ("bits(sum)", f64::from(0.75f32.to_bits())),
+        ("-table[2]^2", -3.0625),
+        ("x1:int*0 + pi > 3", 1.0),
+    ] {
+        if text.starts_with("x1") {
+            console.execute("set x1 = 1").unwrap();
+        }
+        assert_eq!(value(&console, text), expected, "{text}");
+    }
+    let mut errors = String::new();
+    for text in [
+        "",
+        "sun",
+        "sum +",
+        "table[",
+        "table[1.5]",
+        "[5000]",
+        "@q7",
+        "sum:flot",
+        "add:int",
+        "1/0",
+        "count",
+        "sqrt(-1)",
+        "[[[[[[[[[[[[[[[[[0]]]]]]]]]]]]]]]]]",
+        "ß",
+    ] {
+        let error = match console.session.parse(text) {
+            Ok(live) => console.session.evaluate(&live).unwrap_err(),
+            Err(error) => error,
+        };
+        errors.push_str(&format!("{text}\n    {}\n", error.replace('\n', "\n    ")));
+    }
+    insta::assert_snapshot!(errors);
+}
+
+/// 10⁸ cycles, cheap ones: checkpoints stay few, and near enough that going back anywhere is a short run.
+#[test]
+fn a_long_run() {
+    let loader = MemoryLoader::new(takt_programs::SOURCES);
+    let options = AsmOptions { machine: &T3, effort: 0, ..AsmOptions::default() };
+    let program = assemble("hybrid/tracking.s", &loader, &options).unwrap().program;
+    let zeros: Vec<(u16, u32)> = program.inputs.iter().map(|port| (port.register, 0)).collect();
+    let rows = Some(Arc::new(vec![zeros; 10_000]));
+    let options = Options { inputs: rows, tick: std::num::NonZeroU64::new(12_500), ..Options::default() };
+    let mut session = Session::new(&program, options).unwrap();
+    assert_eq!(session.go_to(100_000_000), Why::Done);
+    let cycles = session.checkpoints();
+    assert!(cycles.len() <= CHECKPOINTS);
+    assert!(cycles.windows(2).all(|pair| pair[1] - pair[0] <= 1 << 19) && cycles.last() > Some(&99_000_000));
+    let at_end = fingerprint(&mut session);
+    for cycle in [99_999_999, 50_000_001, 3] {
+        assert_eq!(session.go_to(cycle), Why::Done);
+        assert_eq!(session.cycle(), cycle);
+    }
+    assert_eq!(session.go_to(100_000_000), Why::Done);
+    assert!(fingerprint(&mut session) == at_end);
+}
