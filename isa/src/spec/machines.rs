@@ -83,7 +83,11 @@ pub static T3: Machine = Machine {
     name: "t3",
     text: "The fast machine: three operations a cycle, everything pipelined.",
     slots: &[
-        Slot { name: "mul", bank: bank("m", 0, 256), units: &[MULTIPLY, DIVROOT, SINE] },
+        Slot {
+            name: "mul",
+            bank: bank("m", 0, 256),
+            units: &[MULTIPLY, DIVROOT, SINE, ARCTANGENT, ARCCOSINE],
+        },
         Slot { name: "add", bank: bank("a", 256, 256), units: &[ADD, CONVERT] },
         Slot { name: "aux", bank: bank("x", 512, 256), units: &[ALU, MEMORY, SEQUENCER] },
     ],
