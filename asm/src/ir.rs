@@ -129,6 +129,20 @@ impl Operation {
         &self.sources[..self.row().shape.sources()]
     }
 
+    /// One that does nothing, in its place.
+    pub(crate) fn idle(&self) -> Operation {
+        Operation {
+            op: Op::nop,
+            slot: None,
+            dest: None,
+            sources: [RegisterId::ZERO; 3],
+            constant: Constant::None,
+            location: None,
+            expansion: 0,
+            ..*self
+        }
+    }
+
     /// Whether execution may continue elsewhere than at the next bundle.
     #[inline]
     pub fn redirects(&self) -> bool {

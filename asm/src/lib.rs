@@ -124,6 +124,7 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
         Schedule::None => false,
     };
     ir.bundles.iter_mut().for_each(|bundle| bundle.scheduled = packs(bundle.scheduled));
+    check::integers(&mut context, &ir);
     values::split(&mut ir);
     check::check(&mut context, &ir);
     let context::Context { mut sink, sources, constants, .. } = context;

@@ -3,10 +3,12 @@
 
 mod account;
 mod analyse;
+mod arm;
 mod asm;
 mod bound;
 mod completions;
 mod controller;
+mod cosim;
 mod disasm;
 mod eval;
 mod fault;
@@ -20,6 +22,7 @@ mod output;
 mod plot;
 mod ports;
 mod report;
+mod rtl;
 mod run;
 mod select;
 mod synthesis;
@@ -50,6 +53,7 @@ Exit status: 0 success, 1 an error in a file or while running, 2 an error in the
 
 Examples:
   takt track                         the main job: cycles, accuracy, tracking error
+  takt arm                           a six-axis arm's kinematics: cycles and errors
   takt asm prog.s                    assemble prog.s into prog.takt
   takt run prog.s --inputs in.csv    run it, one period for each row
   takt isa fdiv                      look an instruction up";
@@ -57,12 +61,15 @@ Examples:
 #[derive(Subcommand)]
 enum Command {
     Track(track::Track),
+    Arm(arm::Arm),
     Asm(asm::Asm),
     Disasm(disasm::Disasm),
     Run(run::Run),
     Analyse(analyse::Analyse),
     Bound(bound::Bound),
     Eval(eval::Eval),
+    Rtl(rtl::Rtl),
+    Cosim(cosim::Cosim),
     Isa(isa::Isa),
     Machines(machines::Machines),
     Completions(completions::Completions),
@@ -72,12 +79,15 @@ enum Command {
 fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
     match &arguments.command {
         Command::Track(track) => track::run(track, color, out),
+        Command::Arm(arm) => arm::run(arm, color, out),
         Command::Asm(asm) => asm::run(asm, color, out),
         Command::Disasm(disasm) => disasm::run(disasm, color),
         Command::Run(run) => run::run(run, color, out),
         Command::Analyse(analyse) => analyse::run(analyse, color, out),
         Command::Bound(bound) => bound::run(bound, color, out),
         Command::Eval(eval) => eval::run(eval, out),
+        Command::Rtl(rtl) => rtl::run(rtl, color, out),
+        Command::Cosim(cosim) => cosim::run(cosim, color, out),
         Command::Isa(isa) => isa::run(isa, out),
         Command::Machines(machines) => machines::run(machines, out),
         Command::Completions(completions) => completions::run(completions, out),

@@ -9,4 +9,4 @@ mod model;
 pub mod random;
 
 pub use lockstep::{Difference, Lockstep, LockstepError};
-pub use model::{CircuitEvent, EventKind, Model, ModelError, Pin, Simulation, cache_folder, load_records};
+pub use model::{CircuitEvent, EventKind, Model, ModelError, Pin, Simulation, cache_folder};

@@ -1,14 +1,17 @@
 //! A core in Verilator: built once for each design and kept, run as a process.
 
 use std::collections::hash_map::DefaultHasher;
+use std::ffi::OsStr;
 use std::fs;
 use std::hash::{Hash, Hasher};
 use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::{Mutex, PoisonError};
 use takt_isa::Program;
 use takt_isa::timing::Cycle;
 use takt_rtl::Design;
+use takt_rtl::bench::{LoadRecord, Space, load_records};
 use takt_rtl::export::RESET_CYCLES;
 use thiserror::Error;
 
@@ -104,6 +107,9 @@ impl Model {
     /// # Errors
     /// If Verilator or a C++ compiler is missing or fails.
     pub fn build(design: &Design, folder: &Path, trace: bool) -> Result<Model, ModelError> {
+        // Threads that want the same design build it once.
+        static ONE: Mutex<()> = Mutex::new(());
+        let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
         let version = run("verilator", "verilator", Command::new("verilator").arg("--version"))?;
         let ports = ports(design);
         let mut hasher = DefaultHasher::new();
@@ -123,13 +129,13 @@ impl Model {
         compiled.map(|()| Model { program })
     }
 
-    /// Starts a simulation. `waveform` is where a model that can trace writes its waveform.
+    /// Starts a simulation. A model that can trace writes its waveform to the first argument; others are Verilog's plusargs.
     ///
     /// # Errors
     /// If the process cannot be started.
-    pub fn start(&self, waveform: Option<&Path>) -> Result<Simulation, ModelError> {
+    pub fn start(&self, arguments: &[&OsStr]) -> Result<Simulation, ModelError> {
         let mut process = Command::new(&self.program)
-            .args(waveform)
+            .args(arguments)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -241,27 +247,6 @@ pub struct Simulation {
     stdout: Option<ChildStdout>,
 }
 
-/// What the loader writes: space (0 program, 1 data, 2 registers, 3 input ports), slot, address, value.
-pub fn load_records(program: &Program) -> Vec<[u64; 4]> {
-    let machine = program.machine;
-    let slots = machine.slots.len();
-    let mut records = Vec::new();
-    // The rest of the program memory must be illegal words, the rest of the data memory zero.
-    for i in 0..machine.code_depth as usize * slots {
-        let word = program.code.get(i).copied().unwrap_or(0);
-        records.push([0, (i % slots) as u64, (i / slots) as u64, word]);
-    }
-    for i in 0..machine.data_depth as usize {
-        records.push([1, 0, i as u64, program.data.get(i).copied().unwrap_or(0).into()]);
-    }
-    for &(register, bits) in &program.constants {
-        let input = machine.inputs.contains(register);
-        let address = if input { register - machine.inputs.base } else { register };
-        records.push([if input { 3 } else { 2 }, 0, address.into(), bits.into()]);
-    }
-    records
-}
-
 impl Simulation {
     fn send(&mut self, words: &[u32]) -> Result<(), ModelError> {
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
@@ -288,13 +273,17 @@ impl Simulation {
     /// # Errors
     /// If the process has ended.
     pub fn load(&mut self, program: &Program, inputs: &[(u16, u32)]) -> Result<(), ModelError> {
-        let mut records = load_records(program);
         let base = program.machine.inputs.base;
-        records
-            .extend(inputs.iter().map(|&(register, bits)| [3, 0, u64::from(register - base), bits.into()]));
+        let first = inputs.iter().map(|&(register, bits)| LoadRecord {
+            space: Space::Input,
+            slot: 0,
+            address: register.saturating_sub(base),
+            value: bits.into(),
+        });
+        let records: Vec<LoadRecord> = load_records(program).into_iter().chain(first).collect();
         let mut words = vec![1, records.len() as u32];
-        for [space, slot, address, value] in records {
-            words.extend([space as u32, slot as u32, address as u32, value as u32, (value >> 32) as u32]);
+        for LoadRecord { space, slot, address, value } in records {
+            words.extend([space as u32, slot.into(), address.into(), value as u32, (value >> 32) as u32]);
         }
         self.send(&words)
     }
@@ -350,8 +339,8 @@ impl Simulation {
 
 impl Drop for Simulation {
     fn drop(&mut self) {
-        self.stdin = None;
-        let _ = self.process.kill();
+        // It ends when nobody speaks or listens to it.
+        (self.stdin, self.stdout) = (None, None);
         let _ = self.process.wait();
     }
 }

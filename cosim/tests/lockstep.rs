@@ -1,62 +1,52 @@
 //! The circuit of every machine against the emulator.
+#![allow(clippy::print_stdout)]
 
-use std::path::Path;
-use takt_cosim::{Lockstep, LockstepError, Model, random};
-use takt_isa::{MACHINES, Machine};
-use takt_programs::gcode;
-use takt_programs::hybrid::closed_loop::{ClosedLoop, Inputs};
-use takt_programs::hybrid::{Outputs, ports};
-use takt_programs::trajectory::Trajectory;
-use takt_rtl::{Library, export};
+mod common;
 
-fn model(machine: &'static Machine) -> Model {
-    let design = export(machine, &Library::builtin()).expect("every machine has a circuit");
-    Model::build(&design, Path::new(env!("CARGO_TARGET_TMPDIR")), false)
-        .unwrap_or_else(|error| panic!("{error}"))
-}
+use common::{assemble, drive, model};
+use takt_cosim::{Lockstep, LockstepError, random};
+use takt_isa::{MACHINES, Machine, Program, ROWS};
 
+/// `TAKT_PROGRAMS` random programs, 200 unless stated, from seed 0 on.
 #[test]
 fn random_programs() {
-    let count: u64 = std::env::var("TAKT_PROGRAMS").map_or(100, |text| text.parse().expect("a number"));
+    let count: u64 = std::env::var("TAKT_PROGRAMS").map_or(200, |text| text.parse().expect("a number"));
     for machine in MACHINES {
-        let mut simulation = model(machine).start(None).unwrap_or_else(|error| panic!("{error}"));
+        let mut simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
         let mut coverage = random::Coverage::default();
+        println!("{}: seeds 0 to {}", machine.name, count - 1);
         for seed in 0..count {
             simulation = random::run(seed, machine, simulation, &mut coverage)
                 .unwrap_or_else(|error| panic!("{} seed {seed}: {error}", machine.name));
         }
-        println!("{}: {coverage:?}", machine.name);
+        let never: Vec<_> = ROWS
+            .iter()
+            .map(|row| row.mnemonic)
+            .filter(|name| *name != "nop" && !coverage.operations.contains(name))
+            .collect();
+        assert_eq!(never, [""; 0], "{}: instructions that no program executed", machine.name);
+        let causes = ["branch", "destination", "drain", "operand", "unit", "wait", "write port"];
+        assert_eq!(coverage.stalls.iter().copied().collect::<Vec<_>>(), causes, "{}", machine.name);
+        for fault in
+            ["data address", "illegal word", "program counter", "return stack empty", "return stack full"]
+        {
+            assert!(coverage.faults.contains(fault), "{}: no program had the fault: {fault}", machine.name);
+        }
+        assert!(coverage.missed > count, "{}: {} deadlines missed", machine.name, coverage.missed);
     }
 }
 
-/// The tracking programs in closed loop with the robot, a number of periods.
+/// A tracking program in closed loop with the robot, a number of periods.
 fn tracking(machine: &'static Machine, source: &str, periods: usize) {
-    let options = takt_asm::Options { machine, ..takt_asm::Options::default() };
-    let loader = takt_asm::MemoryLoader::new(takt_programs::SOURCES);
-    let program = takt_asm::assemble(source, &loader, &options)
-        .unwrap_or_else(|diagnostics| panic!("{}", diagnostics.render(false)))
-        .program;
-    let register = |name: &str| {
-        let ports = program.inputs.iter().chain(&program.outputs);
-        ports.clone().find(|port| port.name == name).map(|port| port.register).expect("a tracking program")
-    };
-    let inputs = ports::INPUTS.map(|port| register(port.name));
-    let outputs = ports::OUTPUTS.map(|port| register(port.name));
-    let simulation = model(machine).start(None).unwrap_or_else(|error| panic!("{error}"));
+    let program: Program = assemble(machine, source);
+    let simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
     let mut lockstep = Lockstep::new(&program, simulation, &[]).unwrap_or_else(|error| panic!("{error}"));
-    let moves = gcode::read_bytes(takt_programs::AGH.as_bytes()).expect("the letters are G-code");
-    let trajectory = Trajectory::plan(&moves).expect("the letters can be driven");
-    let controller = |values: &Inputs| -> Result<Outputs<f64>, LockstepError> {
-        let values: Vec<(u16, u32)> = inputs.into_iter().zip(values.to_words()).collect();
-        assert!(lockstep.run_period(&values), "{:?}", lockstep.emulator().status());
+    drive(&program, periods, |inputs| -> Result<_, LockstepError> {
+        assert!(lockstep.run_period(inputs), "{:?}", lockstep.emulator().status());
         lockstep.compare()?;
-        let value =
-            |register| f32::from_bits(lockstep.emulator().register(register).expect("written")).into();
-        Ok(Outputs::from_array(outputs.map(value)))
-    };
-    for record in ClosedLoop::new(&trajectory, controller).take(periods) {
-        record.unwrap_or_else(|error| panic!("{}: {source}: {error}", machine.name));
-    }
+        let ports = program.outputs.iter().map(|port| port.register);
+        Ok(ports.filter_map(|port| Some((port, lockstep.emulator().register(port)?))).collect())
+    });
     lockstep.finish().unwrap_or_else(|error| panic!("{}: {source}: {error}", machine.name));
     assert!(lockstep.compared() > 300 * periods as u64, "only {} events", lockstep.compared());
 }

@@ -40,9 +40,9 @@ const EXAMPLES: &[Example] = &[
         name: "iterative",
         machine: &T1,
         source: "
-            fsin r1, i0
+            fdiv r1, i0, i1
             fadd r2, i0, i1
-            fsin r3, r2
+            fdiv r3, i0, r2
             fadd r3, i0, i1
             rdflags r4
             nop",

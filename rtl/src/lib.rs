@@ -5,12 +5,14 @@
 //! ([`circuit`]), the tables of `takt-isa` say how many operands they have and how long they take, and [`export()`] writes the
 //! complete core of a machine.
 
+pub mod bench;
 pub mod circuit;
 mod decode;
 pub mod export;
 mod files;
 pub mod synthesis;
 pub mod tables;
+pub mod wishbone;
 
 pub use circuit::{Circuit, CircuitError, Library, Operation};
 pub use export::{Design, ExportError, export};

@@ -49,15 +49,27 @@ fn every_operand(unit: &str, op: Op) {
 }
 
 #[test]
-#[ignore = "takes hours"]
+#[ignore = "takes half an hour"]
 fn sine() {
     every_operand("sine", Op::fsin);
 }
 
 #[test]
+#[ignore = "takes half an hour"]
+fn cosine() {
+    every_operand("sine", Op::fcos);
+}
+
+#[test]
 #[ignore = "takes hours"]
-fn divroot_serial() {
-    every_operand("divroot_serial", Op::fsqrt);
+fn arccosine() {
+    every_operand("arccosine", Op::facos);
+}
+
+#[test]
+#[ignore = "takes hours"]
+fn root() {
+    every_operand("root", Op::fsqrt);
 }
 
 #[test]

@@ -1,23 +1,10 @@
 //! The exported design, as other tools see it.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use takt_isa::MACHINES;
-use takt_rtl::export::synthesis_top;
-use takt_rtl::{Design, Library, export};
-
-fn write(design: &Design) -> Vec<String> {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("export-{}", design.machine.name));
-    let mut paths = Vec::new();
-    for file in &design.files {
-        let path = folder.join(&file.name);
-        fs::create_dir_all(path.parent().expect("a folder")).expect("the target folder can be written");
-        fs::write(&path, &file.text).expect("the target folder can be written");
-        paths.push(path.display().to_string());
-    }
-    paths
-}
+use takt_rtl::{Library, bench, export};
 
 fn silent(command: &mut Command) {
     let output = command.output().unwrap_or_else(|error| panic!("{command:?}: {error}"));
@@ -25,20 +12,34 @@ fn silent(command: &mut Command) {
     assert!(output.status.success() && text.trim().is_empty(), "{command:?}\n{text}");
 }
 
-#[test]
-fn lint() {
+/// Writes the folder of every machine and hands it on, with the core's name.
+fn folders(mut look: impl FnMut(&Path, &str)) {
     for machine in MACHINES {
         let design = export(machine, &Library::builtin()).expect("every machine has a circuit");
-        let paths = write(&design);
-        silent(
-            Command::new("verilator")
-                .args(["--lint-only", "-Wall", "--top-module", &synthesis_top(machine)])
-                .args(&paths),
-        );
-        silent(
-            Command::new("iverilog")
-                .args(["-g2005", "-Wall", "-Wno-timescale", "-t", "null", "-s", &synthesis_top(machine)])
-                .args(&paths),
-        );
+        let folder: PathBuf = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("export-{}", machine.name));
+        let _ = fs::remove_dir_all(&folder);
+        for file in bench::folder(&design, None) {
+            let path = folder.join(&file.name);
+            fs::create_dir_all(path.parent().expect("a folder")).expect("the target folder can be written");
+            fs::write(&path, &file.text).expect("the target folder can be written");
+        }
+        look(&folder, &design.top);
     }
+}
+
+#[test]
+fn no_tool_complains() {
+    folders(|folder, top| {
+        let verilator = |files: &[String], top: &str| {
+            let mut lint = Command::new("verilator");
+            lint.current_dir(folder).args(["--lint-only", "-Wall", "--top-module", top]);
+            silent(lint.args(files));
+        };
+        verilator(&["-f".to_owned(), format!("{top}.f")], top);
+        let synthesis = format!("{top}_synthesis");
+        verilator(&["-f".to_owned(), format!("{top}.f"), format!("{synthesis}.v")], &synthesis);
+        let mut icarus = Command::new("iverilog");
+        icarus.current_dir(folder).args(["-g2005", "-Wall", "-Wno-timescale", "-t", "null", "-s"]);
+        silent(icarus.args([format!("{top}_bench"), "-f".to_owned(), format!("{top}_bench.f")]));
+    });
 }

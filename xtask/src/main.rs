@@ -2,6 +2,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod docs;
+mod formal;
 mod synth;
 mod venv;
 
@@ -39,6 +40,8 @@ enum Task {
     Lint,
     /// Synthesise a machine or units, place and route them, and record clock and resources in docs/synthesis.md.
     Synth(synth::Arguments),
+    /// Prove for every program, up to a stated number of cycles, that the core keeps the rules of issue, and that its decoders are total.
+    Formal(formal::Arguments),
     /// Fuzz the assembler and the image loader, one after the other (installs cargo-fuzz if it is not there).
     Fuzz {
         /// Minutes for each target.
@@ -52,6 +55,7 @@ fn main() -> Result<()> {
         Task::Test { full, rest } => test(full, &rest),
         Task::Docs { check } => docs::run(&root(), check),
         Task::Lint => lint(),
+        Task::Formal(arguments) => formal::formal(&arguments),
         Task::Synth(arguments) => synth::synth(&arguments),
         Task::Fuzz { minutes } => fuzz(minutes),
     }

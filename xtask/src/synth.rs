@@ -18,8 +18,9 @@ use std::time::{Duration, Instant};
 use std::{fs, thread};
 use takt_isa::spec::machines::MACHINES;
 use takt_isa::{Machine, UNITS, Unit};
+use takt_rtl::export::{export, synthesis_top};
 use takt_rtl::synthesis::{self, Resources, Synthesis};
-use takt_rtl::{Circuit, Library, export};
+use takt_rtl::{Circuit, Library};
 
 /// Where measurements are recorded; [`takt_rtl::synthesis::committed`] has them.
 const RECORD: &str = "docs/synthesis.json";
@@ -29,6 +30,13 @@ const SEEDS: u32 = 5;
 const TARGET_MHZ: u32 = 200;
 /// Options of `synth_lattice`. Without the slices' wide multiplexers the logic is a third less and not slower.
 const OPTIONS: &str = "-nowidelut";
+
+/// Where the pins of a machine's top level are (those of the ULX3S board). Without a fixed place the placer takes ten times as long.
+const PINS: &str = "LOCATE COMP \"clk\" SITE \"G2\";
+LOCATE COMP \"rst\" SITE \"D6\";
+LOCATE COMP \"serial_in\" SITE \"R18\";
+LOCATE COMP \"serial_out\" SITE \"U1\";
+";
 
 /// What is measured, and how.
 #[derive(clap::Args)]
@@ -79,7 +87,8 @@ impl Device {
 struct Design {
     name: String,
     files: BTreeMap<String, String>,
-    top: &'static str,
+    top: String,
+    pins: &'static str,
     wrapper: Resources,
 }
 
@@ -149,7 +158,7 @@ fn designs(arguments: &Arguments) -> Result<Vec<Design>> {
         let wanted = offered.iter().filter(|unit| name == "all" || unit.name == name);
         let before = designs.len();
         for unit in wanted {
-            designs.push(alone(&library, &library.circuit(unit)?));
+            designs.push(between_registers(&library, &library.circuit(unit)?)?);
         }
         let names = || offered.iter().map(|unit| unit.name).collect::<Vec<_>>().join(", ");
         ensure!(designs.len() > before, "there is no unit `{name}`; there are {} and `all`", names());
@@ -157,116 +166,65 @@ fn designs(arguments: &Arguments) -> Result<Vec<Design>> {
     Ok(designs)
 }
 
-/// A machine with its memories. What is there for verification only stays unconnected, and so costs nothing.
+/// A machine with its memories, as `takt rtl` writes it: on a few pins, what serves verification only left out.
 fn core(machine: &'static Machine, library: &Library, ecp5: bool) -> Result<Design> {
     let core = export(machine, library)?;
     let mut files = BTreeMap::new();
-    let replaced = core.ecp5.iter().filter(|_| ecp5);
-    for file in core.files.iter().chain(replaced) {
+    for file in core.files.iter().chain(core.ecp5.iter().filter(|_| ecp5)) {
         let name = file.name.rsplit('/').next().unwrap_or(&file.name);
         files.insert(name.to_owned(), file.text.clone());
     }
-    let top = core
-        .files
-        .iter()
-        .find(|file| file.name == format!("{}.v", core.top))
-        .context("the core has no file")?;
-    let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
-    for line in top.text.lines().take_while(|line| !line.starts_with(");")) {
-        let mut words = line.split_whitespace();
-        let ports = match words.next() {
-            Some("input") => &mut inputs,
-            Some("output") => &mut outputs,
-            _ => continue,
-        };
-        let words: Vec<_> = words.filter(|word| *word != "wire").collect();
-        let (width, name) = match words[..] {
-            [range, name, ..] if range.starts_with('[') => {
-                (range[1..].split(':').next().unwrap_or("").parse::<u32>()? + 1, name)
-            }
-            [name, ..] => (1, name),
-            [] => continue,
-        };
-        ports.push((name.trim_end_matches(',').to_owned(), width));
-    }
-    inputs.retain(|port| port.0 != "clk");
-    let verification = ["issued", "stored", "retire"];
-    outputs.retain(|port| !verification.iter().any(|prefix| port.0.starts_with(prefix)));
-    Ok(between_registers(machine.name, files, &core.top, &inputs, &outputs))
+    files.insert("synthesis.v".to_owned(), core.synthesis);
+    let wrapper = Resources::default();
+    Ok(Design { name: machine.name.to_owned(), files, top: synthesis_top(machine), pins: PINS, wrapper })
 }
 
-/// A unit.
-fn alone(library: &Library, circuit: &Circuit) -> Design {
-    let text = |name: &String| Some((name.replace('/', "_"), library.text(name)?.to_owned()));
-    let files = circuit.files.iter().filter_map(text).collect();
-    let operands = ["a", "b", "c"].into_iter().take(circuit.operands).map(|name| (name, 32));
-    let inputs =
-        [("in_valid", 1), ("op", circuit.op_bits)].into_iter().filter(|port| port.1 > 0).chain(operands);
-    let inputs: Vec<_> = inputs.map(|(name, width)| (name.to_owned(), width)).collect();
-    let outputs =
-        [("out_valid", 1), ("result", 32), ("flags", 3)].map(|(name, width)| (name.to_owned(), width));
-    let parameters: Vec<_> = circuit.parameters().map(|(name, value)| format!(".{name}({value})")).collect();
-    let module = format!("{} #({})", circuit.unit.rtl, parameters.join(", "));
-    between_registers(circuit.unit.name, files, &module, &inputs, &outputs)
-}
-
-/// A module between registers, on four pins: the inputs come out of a shift register and a second register, the outputs go
+/// A unit between registers, on few pins: the operands come out of a shift register and a second register, the results go
 /// into a register and through a tree of XOR.
-fn between_registers(
-    name: &str,
-    mut files: BTreeMap<String, String>,
-    module: &str,
-    inputs: &[(String, u32)],
-    outputs: &[(String, u32)],
-) -> Design {
-    let bits = |ports: &[(String, u32)]| ports.iter().map(|port| port.1).sum::<u32>();
-    let connections = |vector: &str, ports: &[(String, u32)]| {
-        let mut low = 0;
-        let connect = |(name, width): &(String, u32)| {
-            low += width;
-            format!("        .{name}({vector}[{} +: {width}])", low - width)
-        };
-        ports.iter().map(connect).collect::<Vec<_>>().join(",\n")
-    };
-    let (wide, narrow) = (bits(inputs), bits(outputs));
-    // Each level of the tree is a quarter of the one before.
-    let (mut declarations, mut tree) = (String::new(), String::new());
-    let mut wrapper = Resources { flip_flops: u64::from(2 * wide + narrow), ..Resources::default() };
-    let (mut level, mut width) = ("outputs".to_owned(), narrow);
-    while width > 1 {
-        let (next, quarter) = (format!("parity_{width}"), width.div_ceil(4));
-        let _ = writeln!(declarations, "    reg [{quarter}-1:0] {next};");
-        for i in 0..quarter {
-            let size = (width - 4 * i).min(4);
-            let _ = writeln!(tree, "        {next}[{i}] <= ^{level}[{} +: {size}];", 4 * i);
-        }
-        wrapper.luts += u64::from(if width % 4 == 1 { quarter - 1 } else { quarter });
-        wrapper.flip_flops += u64::from(quarter);
-        (level, width) = (next, quarter);
+fn between_registers(library: &Library, circuit: &Circuit) -> Result<Design> {
+    let text = |name: &String| Some((name.replace('/', "_"), library.text(name)?.to_owned()));
+    let mut files: BTreeMap<_, _> = circuit.files.iter().filter_map(text).collect();
+    let operands = ["a", "b", "c"].into_iter().take(circuit.operands).map(|name| (name, 32));
+    let inputs: Vec<_> = [("in_valid", 1), ("op", circuit.op_bits)]
+        .into_iter()
+        .filter(|port| port.1 > 0)
+        .chain(operands)
+        .collect();
+    let bits: u32 = inputs.iter().map(|port| port.1).sum();
+    let mut connections = String::new();
+    let mut low = 0;
+    for (name, width) in inputs {
+        write!(connections, ".{name}(operands[{low} +: {width}]), ")?;
+        low += width;
     }
-    let text = format!(
-        "module wrapper (input wire clk, input wire serial_in, input wire load, output wire serial_out);
-    reg [{wide}-1:0] shift, inputs;
-    reg [{narrow}-1:0] outputs;
-    wire [{narrow}-1:0] results;
-{declarations}    {module} dut (
-        .clk(clk),
-{},
-{}
-    );
-    assign serial_out = {level}[0];
+    let parameters: Vec<_> = circuit.parameters().map(|(name, value)| format!(".{name}({value})")).collect();
+    let (module, parameters, last) = (circuit.unit.rtl, parameters.join(", "), bits - 2);
+    files.insert(
+        "wrapper.v".to_owned(),
+        format!(
+            "module wrapper (input wire clk, input wire serial_in, input wire load, output reg serial_out);
+    reg [{bits}-1:0] shift, operands;
+    wire out_valid;
+    wire [31:0] result;
+    wire [2:0] flags;
+    reg [35:0] outputs;
+    reg [8:0] parity;
+    {module} #({parameters}) unit (.clk(clk), {connections}.out_valid(out_valid), .result(result), .flags(flags));
+    integer i;
     always @(posedge clk) begin
-        shift <= {{shift[{wide}-2:0], serial_in}};
-        if (load) inputs <= shift;  // unconditionally it would be the shift register one bit on, and be merged with it
-        outputs <= results;
-{tree}    end
+        shift <= {{shift[{last}:0], serial_in}};
+        if (load) operands <= shift;  // unconditionally it would be the shift register one bit on, and be merged with it
+        outputs <= {{out_valid, flags, result}};
+        for (i = 0; i < 9; i = i + 1) parity[i] <= ^outputs[4 * i +: 4];
+        serial_out <= ^parity;
+    end
 endmodule
-",
-        connections("inputs", inputs),
-        connections("results", outputs)
+"
+        ),
     );
-    files.insert("wrapper.v".to_owned(), text);
-    Design { name: name.to_owned(), files, top: "wrapper", wrapper }
+    // 9 LUT4 for the groups of four, 3 for the rest. A constant output has no register: the count of flip-flops may be low by two.
+    let wrapper = Resources { luts: 12, flip_flops: u64::from(2 * bits) + 46, ..Resources::default() };
+    Ok(Design { name: circuit.unit.name.to_owned(), files, top: "wrapper".to_owned(), pins: "", wrapper })
 }
 
 // ---- The tools
@@ -279,6 +237,7 @@ fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Result<Synthes
     for (name, text) in &design.files {
         fs::write(folder.join(name), text)?;
     }
+    fs::write(folder.join("pins.lpf"), design.pins)?;
     let sources: Vec<_> =
         design.files.keys().filter(|name| name.ends_with(".v")).map(String::as_str).collect();
 
@@ -331,6 +290,8 @@ fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Result<Synthes
             "--seed",
             &number,
             "--timing-allow-fail",
+            "--lpf",
+            "pins.lpf",
             "--lpf-allow-unconstrained",
             "--report",
             &report,
@@ -540,7 +501,7 @@ RAMs of 18 kbit.\n",
     let (machines, units): (Vec<_>, Vec<_>) = rows.iter().partition(is_machine);
     let placed = |rows: &[&Synthesis]| rows.iter().any(|row| row.grade.is_some());
     if placed(&machines) {
-        text += "\n## Machines\n\nWith their memories. `cargo xtask synth --machine t3 --device 85k --grade 8`, and so on.\n";
+        text += "\n## Machines\n\nWith their memories, and with the shift register and the parity that stand for pins (about 230 flip-flops, 30 LUT4). `cargo xtask synth --machine t3 --device 85k --grade 8`, and so on.\n";
         text += &table(&machines);
         let (clock, [luts, flip_flops, memory, multipliers]) = PAPER;
         let _ = writeln!(

@@ -4,7 +4,7 @@
 use super::Block;
 use super::solve::{Edge, Problem};
 use crate::diag::{Diagnostic, Sink};
-use crate::ir::{Bundle, DemandKind, Ir, Operation, RegisterId};
+use crate::ir::{Bundle, Demand, DemandKind, Ir, Operation, RegisterId, RegisterKind};
 use crate::source::Span;
 use crate::values::Run;
 use std::cmp::Reverse;
@@ -54,7 +54,7 @@ pub(super) fn assign(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Vec<Vec<usize>> 
         for (index, run) in runs.iter().enumerate().filter(|(_, run)| is_of_section(run)) {
             let operations = ir.bundles[run.start..run.end].iter().flat_map(|bundle| &bundle.operations);
             for operation in operations {
-                for &(port, _) in demand.ports.iter().filter(|(port, _)| uses(operation, *port)) {
+                for &(port, _) in demand.ports.iter().filter(|(port, _)| uses(ir, operation, *port)) {
                     if !users.iter().any(|&(run, other, _)| (run, other) == (index, port)) {
                         users.push((index, port, operation.span));
                     }
@@ -104,8 +104,12 @@ pub(super) fn assign(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Vec<Vec<usize>> 
     assigned
 }
 
-fn uses(operation: &Operation, port: RegisterId) -> bool {
-    operation.dest == Some(port) || operation.reads().contains(&port)
+/// Whether an operation reads an input port, or writes an output port. (That a program reads its own output, nobody sees.)
+fn uses(ir: &Ir, operation: &Operation, port: RegisterId) -> bool {
+    match ir.register(port).kind {
+        RegisterKind::Output => operation.dest == Some(port),
+        _ => operation.reads().contains(&port),
+    }
 }
 
 /// A run's problem and its demands.
@@ -128,10 +132,9 @@ impl<'a> Demands<'a> {
             let parts = block.problem.tasks[task].parts.iter();
             for (operation, part) in self.bundles[origin].operations.iter().zip(parts) {
                 let span = operation.span;
-                if operation.dest == Some(port) {
-                    events.push(Event { task, after: part.writes.unwrap_or(0), span });
-                } else if operation.reads().contains(&port) {
-                    events.push(Event { task, after: 0, span });
+                if uses(self.ir, operation, port) {
+                    let after = if operation.dest == Some(port) { part.writes.unwrap_or(0) } else { 0 };
+                    events.push(Event { task, after, span });
                 }
             }
         }
@@ -180,7 +183,7 @@ impl<'a> Demands<'a> {
 
     /// Adds the orders as edges, and sorts the tasks so that every edge leads to a later one.
     fn order(&self, block: &mut Block, sink: &mut Sink) -> bool {
-        let mut ordered: Vec<(&crate::ir::Demand, usize, Event, Event)> = Vec::new();
+        let mut ordered: Vec<(&Demand, usize, Event, Event)> = Vec::new();
         for &number in self.of {
             let demand = &self.ir.demands[number];
             if demand.kind != DemandKind::Order {
@@ -207,10 +210,10 @@ impl<'a> Demands<'a> {
             // `y` happens after `x` does. That it also issues no sooner is more than is asked, and keeps bundles in order.
             let distance = (x.after + 1).saturating_sub(y.after);
             if x.task == y.task {
-                self.contradiction(demand, *at, x, y, "they are of one bundle", sink);
+                self.contradiction(demand, *at, x, y, "one bundle uses both", sink);
                 return false;
             }
-            block.problem.edges.push(Edge { from: x.task, to: y.task, distance });
+            block.problem.edges.push(Edge { from: x.task, to: y.task, distance, demanded: true });
         }
         if ordered.iter().all(|(_, _, x, y)| x.task < y.task) || sort(block) {
             return true;
@@ -229,22 +232,14 @@ impl<'a> Demands<'a> {
                 }
             }
             if seen[x.task] {
-                self.contradiction(demand, at, &x, &y, "the first waits for the second", sink);
+                self.contradiction(demand, at, &x, &y, "it must wait for it", sink);
                 break;
             }
         }
         false
     }
 
-    fn contradiction(
-        &self,
-        demand: &crate::ir::Demand,
-        at: usize,
-        x: &Event,
-        y: &Event,
-        why: &str,
-        sink: &mut Sink,
-    ) {
+    fn contradiction(&self, demand: &Demand, at: usize, x: &Event, y: &Event, why: &str, sink: &mut Sink) {
         let name = |index: usize| self.name(demand.ports[index].0);
         let does = |event: &Event| if event.after > 0 { "written" } else { "read" };
         let message = format!("`{}` cannot come before `{}`: {why}", name(at), name(at + 1));
@@ -319,8 +314,12 @@ impl<'a> Demands<'a> {
         sink: &mut Sink,
     ) -> Vec<TimingReport> {
         let mut reports: Vec<TimingReport> = Vec::new();
-        for &number in self.of {
-            let demand = &self.ir.demands[number];
+        for demand in self.of.iter().map(|&number| &self.ir.demands[number]) {
+            let is_late = |kind| matches!(kind, DemandKind::Late(_));
+            // What stands as it is written is not to be made late.
+            if is_late(demand.kind) && !scheduled {
+                continue;
+            }
             let cycle = |event: &Event| start[event.task] + event.after + 1;
             let mut ports: Vec<(String, u32, u32)> = Vec::new();
             let mut before: Option<(RegisterId, u32)> = None;
@@ -362,7 +361,6 @@ impl<'a> Demands<'a> {
                 before = Some((port, last));
                 ports.push((name.to_owned(), first, last));
             }
-            let is_late = |kind| matches!(kind, DemandKind::Late(_));
             let window = window.filter(|_| is_late(demand.kind));
             match reports.iter_mut().find(|report| is_late(report.kind)) {
                 Some(report) if is_late(demand.kind) => report.ports.extend(ports),

@@ -14,9 +14,9 @@ use crate::diag::Sink;
 use crate::ir::{Bundle, Constant, Ir, Operation, RegisterId, RegisterKind};
 use crate::values;
 use demand::Demands;
-use smallvec::SmallVec;
-use solve::{Edge, Part, Problem, Solution, Task};
-use std::collections::{BTreeMap, HashMap};
+use smallvec::{SmallVec, smallvec};
+use solve::{Edge, Part, Problem, Task};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use takt_isa::program::{Location, Space};
 use takt_isa::{Effect, Function, Machine, Operand};
 
@@ -76,8 +76,7 @@ pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
         let mut block = Block::new(ir, old, scheduled);
         if !scheduled {
             let start = block.problem.as_written();
-            let window = block.problem.window(&start);
-            report.timing.extend(demands.check(&block, &start, window, scheduled, sink));
+            report.timing.extend(demands.check(&block, &start, None, scheduled, sink));
             bundles.extend_from_slice(old);
             continue;
         }
@@ -87,12 +86,12 @@ pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
         }
         let solution = solve::solve(&block.problem, effort);
         report.timing.extend(demands.check(&block, &solution.start, solution.window, scheduled, sink));
-        let packed = pack(old, &block.origins, &solution);
+        let packed = block.pack(old, &solution.start);
         report.blocks.push(BlockReport {
             location: old.first().and_then(|bundle| bundle.operations.first()?.location),
             label: label_at(ir, run.start as u32),
             address,
-            operations: packed.iter().map(|bundle| bundle.operations.len() as u32).sum(),
+            operations: block.problem.tasks.iter().map(|task| task.parts.len() as u32).sum(),
             bundles: packed.len() as u32,
             cycles: solution.length,
             bound: solution.bound,
@@ -184,7 +183,7 @@ impl Block {
                 bundle.operations.iter().map(|operation| part(machine, operation)).collect();
             let mut after = |from: usize, distance: u32| {
                 if from != to {
-                    problem.edges.push(Edge { from, to, distance });
+                    problem.edges.push(Edge { from, to, distance, demanded: false });
                 }
             };
             for register in bundle.operations.iter().flat_map(Operation::reads) {
@@ -242,20 +241,33 @@ impl Block {
         }
         Block { problem, origins }
     }
-}
 
-/// The bundles of a solution: tasks that issue in one cycle become one bundle.
-fn pack(old: &[Bundle], origins: &[usize], solution: &Solution) -> Vec<Bundle> {
-    let mut by_cycle: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-    for (task, &cycle) in solution.start.iter().enumerate() {
-        by_cycle.entry(cycle).or_default().push(origins[task]);
+    /// The bundles of a schedule: tasks that issue in one cycle become one bundle. A gap that only a demand makes is filled, for
+    /// the machine would not wait.
+    fn pack(&self, old: &[Bundle], start: &[u32]) -> Vec<Bundle> {
+        let mut by_cycle: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for (&origin, &cycle) in self.origins.iter().zip(start) {
+            by_cycle.entry(cycle).or_default().push(origin);
+        }
+        let demanded = self.problem.edges.iter().filter(|edge| edge.demanded);
+        let held: BTreeSet<u32> = demanded
+            .filter(|edge| start[edge.to] == start[edge.from] + edge.distance)
+            .map(|edge| start[edge.to])
+            .collect();
+        let mut bundles = Vec::with_capacity(by_cycle.len());
+        let mut next = 0;
+        for (cycle, members) in by_cycle {
+            let mut operations: SmallVec<[Operation; 1]> =
+                members.iter().flat_map(|&b| old[b].operations.iter().copied()).collect();
+            operations.sort_by_key(|operation| operation.slot);
+            if let Some(first) = operations.first().filter(|_| held.contains(&cycle)) {
+                let filler = Bundle { operations: smallvec![first.idle()], explicit: false, scheduled: true };
+                bundles.extend(std::iter::repeat_n(filler, (cycle - next) as usize));
+            }
+            let explicit = members.iter().any(|&b| old[b].explicit);
+            bundles.push(Bundle { operations, explicit, scheduled: true });
+            next = cycle + 1;
+        }
+        bundles
     }
-    let bundle = |members: Vec<usize>| {
-        let mut operations: SmallVec<[Operation; 1]> =
-            members.iter().flat_map(|&b| old[b].operations.iter().copied()).collect();
-        operations.sort_by_key(|operation| operation.slot);
-        let explicit = members.iter().any(|&b| old[b].explicit);
-        Bundle { operations, explicit, scheduled: true }
-    };
-    by_cycle.into_values().map(bundle).collect()
 }

@@ -45,6 +45,8 @@ pub(super) struct Edge {
     pub(super) to: usize,
     /// Cycles between their issues.
     pub(super) distance: u32,
+    /// Whether only the source demands it: the machine would not wait.
+    pub(super) demanded: bool,
 }
 
 /// Tasks and their order.
@@ -204,7 +206,7 @@ impl<'p> Graph<'p> {
             preds: vec![Vec::new(); problem.tasks.len()],
             succs: vec![Vec::new(); problem.tasks.len()],
         };
-        for &Edge { from, to, distance } in &problem.edges {
+        for &Edge { from, to, distance, .. } in &problem.edges {
             graph.preds[to].push((from as u32, distance));
             graph.succs[from].push((to as u32, distance));
         }
@@ -407,7 +409,9 @@ impl Problem {
         let edge = |edge: &Edge| Some(Edge { from: index[edge.from]?, to: index[edge.to]?, ..*edge });
         let mut edges: Vec<Edge> = self.edges.iter().filter_map(edge).collect();
         let last = kept.len();
-        let end = |(from, &old): (usize, &usize)| Some(Edge { from, to: last, distance: ends(old)? });
+        let end = |(from, &old): (usize, &usize)| {
+            Some(Edge { from, to: last, distance: ends(old)?, demanded: false })
+        };
         edges.extend(kept.iter().enumerate().filter_map(end));
         let mut tasks: Vec<Task> = kept.iter().map(|&i| self.tasks[i].clone()).collect();
         tasks.push(Task::default());
@@ -430,13 +434,6 @@ impl Problem {
             }
         }
         chain
-    }
-
-    /// If there are late tasks that output ports depend on: cycles from the first late task's issue to the last such write, and
-    /// the bound of that.
-    pub(super) fn window(&self, start: &[u32]) -> Option<(u32, u32)> {
-        let window = self.watched();
-        (!window.outputs.is_empty()).then(|| (window.cycles(start), window.bound))
     }
 
     /// When the tasks issue one bundle each, in the order in which they stand.
@@ -503,7 +500,9 @@ impl Search<'_> {
     fn cost(&self, length: u32, start: &[u32]) -> Cost {
         let tasks = self.graph.problem.tasks.iter().zip(start);
         let tardy = tasks.filter_map(|(task, start)| Some(start.saturating_sub(task.latest?))).sum();
-        Cost { tardy, excess: length.max(self.allowed), window: self.window.cycles(start), length }
+        // While it is the length that is searched for, late tasks count for nothing: they cost what they are allowed and no more.
+        let window = if self.allowed == 0 { 0 } else { self.window.cycles(start) };
+        Cost { tardy, excess: length.max(self.allowed), window, length }
     }
 
     /// Whether the deadlines are met and nothing can be shorter.

@@ -83,7 +83,11 @@ pub static T3: Machine = Machine {
     name: "t3",
     text: "The fast machine: three operations a cycle, everything pipelined.",
     slots: &[
-        Slot { name: "mul", bank: bank("m", 0, 256), units: &[MULTIPLY, DIVROOT, SINE] },
+        Slot {
+            name: "mul",
+            bank: bank("m", 0, 256),
+            units: &[MULTIPLY, DIVROOT, SINE, ARCTANGENT, ARCCOSINE],
+        },
         Slot { name: "add", bank: bank("a", 256, 256), units: &[ADD, CONVERT] },
         Slot { name: "aux", bank: bank("x", 512, 256), units: &[ALU, MEMORY, SEQUENCER] },
     ],
@@ -103,7 +107,7 @@ pub static T1: Machine = Machine {
     slots: &[Slot {
         name: "one",
         bank: bank("r", 0, 512),
-        units: &[ADD, CONVERT, MULTIPLY, DIVROOT_SERIAL, SINE, ALU_LATE, MEMORY, SEQUENCER],
+        units: &[ADD, CONVERT, MULTIPLY, DIVIDE, ROOT, SINE, ALU_LATE, MEMORY, SEQUENCER],
     }],
     inputs: bank("i", 768, 256),
     outputs_per_bank: 32,
