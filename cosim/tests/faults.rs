@@ -21,7 +21,7 @@ const COMMON: &[Fault] = &[
     ("takt_multiply", "5'd23 - zeros1", "5'd22 - zeros1"),
     ("takt_convert", "x[31] & ~nan", "1'b0"),
     ("takt_alu", "a[31] ^ b[31] ^ less", "a[31] ^ b[31]"),
-    ("takt_sine", "x_8[31] ^ negative", "x_8[31]"),
+    ("takt_sine", "quadrant2[1] ^ (quadrant2[0] & op2)", "quadrant2[1]"),
     // Waiting for operands: too short, in each of the ways in which a result is underway.
     ("takt_hazard", "r_later | r_on_issue", "r_later"),
     ("takt_hazard", "(|hit[DEPTH-1:3]) | (|late_hit)", "|hit[DEPTH-1:3]"),
@@ -59,6 +59,8 @@ const COMMON: &[Fault] = &[
 #[rustfmt::skip]
 const OF_T3: &[Fault] = &[
     ("takt_divroot", "a_sign_1 & ~a_zero & ~a_nan", "a_sign_1 & ~a_nan"),
+    ("takt_arctangent", "sign & ~nan", "1'b0"),
+    ("takt_arccosine", "negative_19 ? HALF_TURN - shifted : shifted", "shifted"),
     ("takt_hazard", "r_at2 | r_on_issue_early", "r_at2"),
     ("takt_hazard", "m_at2 | (m_on_issue & i_early)", "m_at2"),
     ("takt_t3", "pending | (|i_writes)", "pending"),
@@ -74,7 +76,7 @@ const OF_T1: &[Fault] = &[
     ("takt_alu_late", "waiting[36*WAIT-1 -: 36]", "(waiting[36*WAIT-1 -: 36] & ~36'd8)"),
     ("takt_divide", "a_signaling | b_signaling | undefined", "a_signaling | b_signaling"),
     ("takt_root", "sign_1 & is_zero", "1'b0"),
-    ("takt_t1", "one_divide_at[13] | one_root_at[11] | one_sine_at[13] | i_one_control[ONE_RESULT_5]", "1'b0"),
+    ("takt_t1", "one_underway[5] | i_one_control[ONE_RESULT_5]", "1'b0"),
 ];
 
 /// Random programs that a fault may pass before it counts as not found.

@@ -319,6 +319,11 @@ impl Generator {
         if row.effect.drains() && !self.random.once_in(4) {
             row = *self.random.pick(&rows);
         }
+        // Not so rare that what they read and clear goes untested.
+        let draining: Vec<&Row> = rows.iter().copied().filter(|row| row.effect.drains()).collect();
+        if !draining.is_empty() && self.random.once_in(24) {
+            row = *self.random.pick(&draining);
+        }
         let mut instruction = Instruction::bare(row.op);
         for operand in row.shape.operands() {
             match *operand {
