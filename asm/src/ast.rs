@@ -292,6 +292,14 @@ pub enum DirectiveKind {
     Error(String),
     /// `.schedule` and `on` or `off`.
     Schedule(Name),
+    /// `.loop_bound`.
+    LoopBound(Expr),
+    /// `.deadline`, the ports, and the cycle.
+    Deadline(Vec<Name>, Expr),
+    /// `.order` and the ports.
+    Order(Vec<Name>),
+    /// `.late`, the ports, and the cycles that it may cost.
+    Late(Vec<Name>, Option<Expr>),
 }
 
 /// One place of a `.loc`.
@@ -354,6 +362,10 @@ directives! {
     Loc ".loc" "\"file\" line";
     Error ".error" "\"text\"";
     Schedule ".schedule" "on|off";
+    LoopBound ".loop_bound" "turns";
+    Deadline ".deadline" "port, port = cycle";
+    Order ".order" "port, port, …";
+    Late ".late" "port, port = cycles";
     Raw ".raw" "slot 0x…";
 }
 

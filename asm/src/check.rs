@@ -1,11 +1,11 @@
 //! What a program must keep to beyond each line's own rules: who writes a register, and whether anyone does.
 
 use crate::ast::Section;
-use crate::context::{Context, ScopeId};
+use crate::context::{Context, Integer, ScopeId};
 use crate::diag::{Diagnostic, Severity, nearest};
 use crate::ir::{Constant, Ir, Operation, Register, RegisterId, RegisterKind};
 use crate::source::Span;
-use takt_isa::{Field, Operand};
+use takt_isa::{Field, Operand, Type};
 
 /// An operation's place in the program: its bundle, and its index there.
 type Where = (u32, u32);
@@ -73,6 +73,36 @@ pub(crate) fn check(context: &mut Context, ir: &Ir) {
         }
     }
     targets(context, ir);
+}
+
+/// Warns of integers that are read as floats, as where `mov x, 1` means 1.0: 1 is the bits of 1.4e-45.
+pub(crate) fn integers(context: &mut Context, ir: &Ir) {
+    let suspects = std::mem::take(&mut context.integers);
+    if suspects.is_empty() {
+        return;
+    }
+    let mut as_float: Vec<bool> =
+        ir.registers.iter().map(|register| register.kind == RegisterKind::Output).collect();
+    for operation in ir.operations() {
+        for (index, source) in operation.reads().iter().enumerate() {
+            as_float[source.index()] |= operation.row().source_type(index) == Type::F;
+        }
+    }
+    for Integer { value, to, scope, span } in suspects {
+        if !as_float[to.index()] {
+            continue;
+        }
+        let register = ir.register(to);
+        let name = text(ir, register);
+        let what = if register.kind == RegisterKind::Output { "is" } else { "is read as" };
+        let bits = f32::from_bits(value as u32);
+        let message = format!("the integer {value} goes to `{name}`, which {what} a float");
+        let warning = Diagnostic::warning("integer-in-float", span, message)
+            .also(register.span, "declared here")
+            .note(format!("as binary32 its bits are {bits:e}"))
+            .help(format!("write `{value}.0`, or declare `{name}:int` if it is an integer"));
+        context.report(scope, warning);
+    }
 }
 
 fn at(ir: &Ir, (bundle, number): Where) -> &Operation {

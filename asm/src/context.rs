@@ -86,6 +86,15 @@ pub(crate) struct Argument {
     pub(crate) value: Option<Value>,
 }
 
+/// An integer constant that an operation which takes any bits brings to a register.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Integer {
+    pub(crate) value: i64,
+    pub(crate) to: RegisterId,
+    pub(crate) scope: ScopeId,
+    pub(crate) span: Span,
+}
+
 /// The mistake is in the report.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Reported;
@@ -111,6 +120,8 @@ pub(crate) struct Context {
     pub(crate) label_sections: Vec<Section>,
     pub(crate) macros: HashMap<NameId, crate::expand::MacroDefinition>,
     pub(crate) unknown: Vec<Unknown>,
+    /// Integers in the place of an operand of any type, and the registers that they reach.
+    pub(crate) integers: Vec<Integer>,
     /// Unknown names beyond those that are kept.
     pub(crate) more_unknown: usize,
     /// Arguments and templates under evaluation, one within the other.
@@ -153,6 +164,7 @@ impl Context {
             label_sections: Vec::new(),
             macros: HashMap::new(),
             unknown: Vec::new(),
+            integers: Vec::new(),
             more_unknown: 0,
             depth: 0,
         };

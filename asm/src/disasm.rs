@@ -102,6 +102,9 @@ impl<'p> Writer<'p> {
             while let Some(label) = labels.next_if(|label| label.address <= address) {
                 self.line(format_args!("{}:", label.name));
             }
+            if let Some(bound) = program.loop_bounds.iter().find(|bound| bound.address == address) {
+                self.line(format_args!("        .loop_bound {}", bound.most));
+            }
             let words = address as usize * slots..(address as usize + 1) * slots;
             let (text, places) = self.bundle(&program.code[words.clone()], &program.lines[words]);
             let wanted = match places.as_slice() {

@@ -5,8 +5,8 @@ use crate::ir::{Constant, Ir, Operation, RegisterKind};
 use crate::limits::NAME_BYTES;
 use crate::place::Placement;
 use crate::source::Span;
-use std::collections::HashSet;
-use takt_isa::program::{Port, Section, Space, Symbol};
+use std::collections::{BTreeMap, HashSet};
+use takt_isa::program::{LoopBound, Port, Section, Space, Symbol};
 use takt_isa::{Instruction, Program, ZERO};
 
 /// A program, and which of its words a macro or a repetition made (as indices into its code, ascending).
@@ -60,6 +60,7 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
         registers: ports(ir, placement, |kind| matches!(kind, RegisterKind::Plain | RegisterKind::State)),
         symbols: symbols(ir),
         sections: sections(ir),
+        loop_bounds: loop_bounds(ir),
         files: ir.files.clone(),
         lines,
     };
@@ -165,6 +166,16 @@ fn sections(ir: &Ir) -> Vec<Section> {
         .filter(|(_, start, end)| start < end)
         .map(|(name, start, end)| Section { name: name.to_owned(), start, end })
         .collect()
+}
+
+/// The bounds of loops. Where the scheduler left nothing of a block of idle bundles, two may have come to one place.
+fn loop_bounds(ir: &Ir) -> Vec<LoopBound> {
+    let mut bounds: BTreeMap<u32, u32> = BTreeMap::new();
+    for bound in ir.loop_bounds.iter().filter(|bound| (bound.position as usize) < ir.bundles.len()) {
+        let most = bounds.entry(bound.position).or_default();
+        *most = bound.most.max(*most);
+    }
+    bounds.into_iter().map(|(address, most)| LoopBound { address, most }).collect()
 }
 
 /// Gives every named thing a name of its own. The source's names are; those that the assembler makes, of a macro's locals and

@@ -37,6 +37,16 @@ pub(crate) enum Data {
     Space(u32),
 }
 
+/// A `.loop_bound`: of the bundle that follows, by its number in its section.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LoopBound {
+    pub(crate) section: Section,
+    pub(crate) item: u32,
+    pub(crate) most: u32,
+    pub(crate) at: At,
+    pub(crate) span: Span,
+}
+
 /// A `.preset`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Preset {
@@ -48,6 +58,14 @@ pub(crate) struct Preset {
     pub(crate) span: Span,
 }
 
+/// A `.deadline`, `.order` or `.late`: the directive, and the section that it is about.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Timing {
+    pub(crate) at: At,
+    pub(crate) directive: u32,
+    pub(crate) section: Section,
+}
+
 /// The expanded source.
 #[derive(Debug)]
 pub(crate) struct Flat {
@@ -55,6 +73,8 @@ pub(crate) struct Flat {
     pub(crate) period: Vec<Item>,
     pub(crate) data: Vec<Data>,
     pub(crate) presets: Vec<Preset>,
+    pub(crate) loop_bounds: Vec<LoopBound>,
+    pub(crate) timing: Vec<Timing>,
     /// What each `.loc` says; the first is none at all.
     pub(crate) locs: Vec<Vec<Option<(u32, u32)>>>,
     /// Files that `.loc` names, in order, then those whose own lines are code.
@@ -143,6 +163,8 @@ impl<'l> Expander<'l> {
             period: Vec::new(),
             data: Vec::new(),
             presets: Vec::new(),
+            loop_bounds: Vec::new(),
+            timing: Vec::new(),
             locs: vec![Vec::new()],
             files: Vec::new(),
             file_numbers: HashMap::new(),
@@ -190,6 +212,11 @@ impl<'l> Expander<'l> {
                 self.statement(at, index);
             } else {
                 self.leave();
+            }
+        }
+        for LoopBound { section, item, at, span, .. } in self.flat.loop_bounds.clone() {
+            if item as usize >= self.bundles(section) {
+                self.context.error(at.scope, "loop", span, "no bundle follows that could head the loop");
             }
         }
         (self.context, self.flat)
@@ -281,12 +308,41 @@ impl<'l> Expander<'l> {
         }
     }
 
+    /// Bundles of a section so far.
+    fn bundles(&self, section: Section) -> usize {
+        match section {
+            Section::Once => self.flat.once.len(),
+            Section::Period => self.flat.period.len(),
+            Section::Data => 0,
+        }
+    }
+
+    fn loop_bound(&mut self, at: At, most: Expr, span: Span) -> Result<(), Reported> {
+        let turns = self.context.integer(at, most)?;
+        let Some(turns) = u32::try_from(turns).ok().filter(|turns| *turns > 0) else {
+            let message = format!("{turns} turns: a loop has 1 to {}", u32::MAX);
+            return Err(self.context.error(at.scope, "range", most.span, message));
+        };
+        let section = self.section;
+        if section == Section::Data {
+            return Err(self.context.error(at.scope, "section", span, "a loop in `.data`"));
+        }
+        let item = self.bundles(section) as u32;
+        let mut before = self.flat.loop_bounds.iter();
+        if let Some(first) = before.find(|bound| (bound.section, bound.item) == (section, item)) {
+            let error = Diagnostic::error("declared-twice", span, "this bundle's loop has a bound already")
+                .also(first.span, "here");
+            return Err(self.context.report(at.scope, error));
+        }
+        self.flat.loop_bounds.push(LoopBound { section, item, most: turns, at, span });
+        Ok(())
+    }
+
     fn label(&mut self, at: At, label: Name) {
         let Ok(name) = self.context.name(at, label.name, label.span) else { return };
         let position = match self.section {
-            Section::Once => self.flat.once.len(),
-            Section::Period => self.flat.period.len(),
             Section::Data => self.data_words,
+            section => self.bundles(section),
         };
         let id = LabelId(self.context.labels.len() as u32);
         let space = space_of(self.section);
@@ -478,6 +534,16 @@ impl<'l> Expander<'l> {
                         return Err(self.context.error(at.scope, "schedule", word.span, message));
                     }
                 }
+            }
+            DirectiveKind::LoopBound(most) => self.loop_bound(at, *most, span)?,
+            DirectiveKind::Deadline(..) | DirectiveKind::Order(_) | DirectiveKind::Late(..) => {
+                if self.section == Section::Data {
+                    let error =
+                        Diagnostic::error("section", span, "ports are not read or written in `.data`")
+                            .help("open `.once` or `.period` before it");
+                    return Err(self.context.report(at.scope, error));
+                }
+                self.flat.timing.push(Timing { at, directive, section: self.section });
             }
             DirectiveKind::Error(text) => {
                 return Err(self.context.report(at.scope, Diagnostic::error("user", span, text.clone())));

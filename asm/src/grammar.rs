@@ -262,17 +262,16 @@ fn common_operands<'t, 'a, E: LineError<'t>>(
     Some(token)
 }
 
-/// The parser of one line, from its first token to its [`Token::Newline`].
-///
-/// With `shortcut` the commonest lines are recognised without it; what is recognised is the same.
-pub(crate) fn line<'t, 'a: 't, E: LineError<'t>>(
-    shortcut: bool,
-) -> impl Parser<'t, Tokens<'t>, Line, Extra<'a, E>> {
-    // Where the nodes of what follows begin.
-    let here = || empty().map_with(|(), e| (e.state() as &mut Builder<'a>).ast.nodes.len() as u32);
-    let plain = select! { Token::Name(name) => NameRef::plain(name) };
+/// Where the nodes of what follows begin.
+fn here<'t, 'a: 't, E: LineError<'t>>() -> impl Parser<'t, Tokens<'t>, u32, Extra<'a, E>> + Clone {
+    empty().map_with(|(), e| (e.state() as &mut Builder<'a>).ast.nodes.len() as u32)
+}
 
-    let mut expression = Recursive::declare();
+/// A name, plain or a template of expressions.
+fn name_ref<'t, 'a: 't, E: LineError<'t>>(
+    expression: impl Parser<'t, Tokens<'t>, (), Extra<'a, E>> + Clone + 't,
+) -> Boxed<'t, 't, Tokens<'t>, NameRef, Extra<'a, E>> {
+    let plain = select! { Token::Name(name) => NameRef::plain(name) };
     let template = {
         let begin = select! { Token::Begin(name) => name }
             .then(here())
@@ -292,48 +291,11 @@ pub(crate) fn line<'t, 'a: 't, E: LineError<'t>>(
                 builder.template(more, tail)
             })
     };
-    let name_ref = plain.or(template).labelled("a name").boxed();
-    let name = name_ref.clone().map_with(|name, e| Name { name, span: e.span() });
+    plain.or(template).labelled("a name").boxed()
+}
 
-    let arguments = expression
-        .clone()
-        .separated_by(just(Token::Comma))
-        .collect::<Vec<()>>()
-        .delimited_by(just(Token::Open), just(Token::Close).labelled("`)`"));
-    let call_or_name = name_ref.clone().then(arguments.or_not()).try_map_with(|(name, arguments), e| {
-        let span = e.span();
-        let kind = match (name.resolve(), arguments) {
-            (_, None) => NodeKind::Name(name),
-            (Ok(name), Some(count)) => NodeKind::Call(name, count.len() as u32),
-            (Err(_), Some(_)) => {
-                return Err(LabelError::<Tokens<'t>, &'static str>::expected_found(
-                    ["a function"],
-                    None,
-                    span,
-                ));
-            }
-        };
-        let builder: &mut Builder<'a> = e.state();
-        builder.node(kind, span);
-        Ok(())
-    });
-    let literal = select! {
-        Token::Int(value) => NodeKind::Int(value),
-        Token::Real(value) => NodeKind::Real(value),
-    }
-    .map_with(|kind, e| {
-        let span = e.span();
-        let builder: &mut Builder<'a> = e.state();
-        builder.node(kind, span);
-    });
-    let parenthesised =
-        expression.clone().delimited_by(just(Token::Open), just(Token::Close).labelled("`)`"));
-    let atom = choice((literal, call_or_name, parenthesised)).labelled("an operand");
-
-    let operator = |level: u16| {
-        select! { Token::Operator(operator) if operator.precedence() == level => operator }
-            .labelled("an operator")
-    };
+/// The parser of an expression. It knows itself weakly: one that owned itself would never be freed.
+fn expression<'t, 'a: 't, E: LineError<'t>>() -> impl Parser<'t, Tokens<'t>, (), Extra<'a, E>> + Clone {
     fn fold<'t, 'a, 'b, E: LineError<'t>>(
         _: (),
         operator: Operator,
@@ -343,7 +305,47 @@ pub(crate) fn line<'t, 'a: 't, E: LineError<'t>>(
         let span = e.span();
         e.state().node(NodeKind::Infix(operator), span);
     }
-    expression.define(
+    recursive(|expression| {
+        let name_ref = name_ref(expression.clone());
+        let arguments = expression
+            .clone()
+            .separated_by(just(Token::Comma))
+            .collect::<Vec<()>>()
+            .delimited_by(just(Token::Open), just(Token::Close).labelled("`)`"));
+        let call_or_name = name_ref.clone().then(arguments.or_not()).try_map_with(|(name, arguments), e| {
+            let span = e.span();
+            let kind = match (name.resolve(), arguments) {
+                (_, None) => NodeKind::Name(name),
+                (Ok(name), Some(count)) => NodeKind::Call(name, count.len() as u32),
+                (Err(_), Some(_)) => {
+                    return Err(LabelError::<Tokens<'t>, &'static str>::expected_found(
+                        ["a function"],
+                        None,
+                        span,
+                    ));
+                }
+            };
+            let builder: &mut Builder<'a> = e.state();
+            builder.node(kind, span);
+            Ok(())
+        });
+        let literal = select! {
+            Token::Int(value) => NodeKind::Int(value),
+            Token::Real(value) => NodeKind::Real(value),
+        }
+        .map_with(|kind, e| {
+            let span = e.span();
+            let builder: &mut Builder<'a> = e.state();
+            builder.node(kind, span);
+        });
+        let parenthesised =
+            expression.clone().delimited_by(just(Token::Open), just(Token::Close).labelled("`)`"));
+        let atom = choice((literal, call_or_name, parenthesised)).labelled("an operand");
+
+        let operator = |level: u16| {
+            select! { Token::Operator(operator) if operator.precedence() == level => operator }
+                .labelled("an operator")
+        };
         atom.pratt((
             prefix(
                 7,
@@ -363,8 +365,19 @@ pub(crate) fn line<'t, 'a: 't, E: LineError<'t>>(
             infix(left(2), operator(2), fold),
             infix(left(1), operator(1), fold),
         ))
-        .boxed(),
-    );
+        .boxed()
+    })
+}
+
+/// The parser of one line, from its first token to its [`Token::Newline`].
+///
+/// With `shortcut` the commonest lines are recognised without it; what is recognised is the same.
+pub(crate) fn line<'t, 'a: 't, E: LineError<'t>>(
+    shortcut: bool,
+) -> impl Parser<'t, Tokens<'t>, Line, Extra<'a, E>> {
+    let expression = expression().boxed();
+    let name_ref = name_ref(expression.clone());
+    let name = name_ref.clone().map_with(|name, e| Name { name, span: e.span() });
     let expr = here()
         .then(expression.clone())
         .map_with(|(first, ()), e| {
@@ -538,6 +551,24 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
     let schedule = is(Directive::Schedule)
         .ignore_then(name.clone().labelled("`on` or `off`"))
         .map(DirectiveKind::Schedule);
+    let loop_bound = is(Directive::LoopBound).ignore_then(expr.clone()).map(DirectiveKind::LoopBound);
+    let ports = || {
+        let more = comma().or_not().ignore_then(name.clone()).repeated().collect::<Vec<_>>();
+        name.clone().labelled("a port").then(more).map(|(first, mut more)| {
+            more.insert(0, first);
+            more
+        })
+    };
+    let deadline = is(Directive::Deadline)
+        .ignore_then(ports())
+        .then_ignore(just(Token::Assign).labelled("`=`"))
+        .then(expr.clone().labelled("a cycle"))
+        .map(|(ports, cycle)| DirectiveKind::Deadline(ports, cycle));
+    let order = is(Directive::Order).ignore_then(ports()).map(DirectiveKind::Order);
+    let late = is(Directive::Late)
+        .ignore_then(ports())
+        .then(just(Token::Assign).labelled("`=`").ignore_then(expr.clone().labelled("cycles")).or_not())
+        .map(|(ports, cost)| DirectiveKind::Late(ports, cost));
     let error = is(Directive::Error).ignore_then(text()).map(DirectiveKind::Error);
     let at = text()
         .then(expr.clone().labelled("a line number"))
@@ -548,7 +579,7 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
         .map(DirectiveKind::Loc);
     choice((
         bare, declare, float, word, constant, preset, space, branch, elif, rep, macro_, include, error, loc,
-        schedule,
+        schedule, loop_bound, deadline, order, late,
     ))
     .map_with(|kind, e| Body::Directive(kind, e.span()))
 }

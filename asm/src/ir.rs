@@ -9,7 +9,7 @@
 //! * every register that is written is written from one slot only;
 //! * bundles of `once` precede those of `period`; a label stands before the bundle at its position, or at the end.
 //!
-//! Whoever moves bundles must move [`Label::position`]s and [`Ir::period`] along, and leave alone, as fences, bundles that
+//! Whoever moves bundles must move [`Label::position`]s, [`LoopBound::position`]s and [`Ir::period`] along, and leave alone, as fences, bundles that
 //! hold a raw word ([`Bundle::is_opaque`]). Targets that the source wrote as numbers stay as they are.
 
 use crate::source::Span;
@@ -129,6 +129,20 @@ impl Operation {
         &self.sources[..self.row().shape.sources()]
     }
 
+    /// One that does nothing, in its place.
+    pub(crate) fn idle(&self) -> Operation {
+        Operation {
+            op: Op::nop,
+            slot: None,
+            dest: None,
+            sources: [RegisterId::ZERO; 3],
+            constant: Constant::None,
+            location: None,
+            expansion: 0,
+            ..*self
+        }
+    }
+
     /// Whether execution may continue elsewhere than at the next bundle.
     #[inline]
     pub fn redirects(&self) -> bool {
@@ -167,6 +181,39 @@ pub struct Label {
     pub span: Span,
 }
 
+/// How often a loop may turn.
+#[derive(Clone, Copy, Debug)]
+pub struct LoopBound {
+    /// Index of the bundle that heads the loop.
+    pub position: u32,
+    /// Turns at most.
+    pub most: u32,
+}
+
+/// What the source demands of the time at which ports are read or written.
+#[derive(Clone, Debug)]
+pub struct Demand {
+    /// What it demands.
+    pub kind: DemandKind,
+    /// The ports, in the order of the directive, and where they stand in it.
+    pub ports: Vec<(RegisterId, Span)>,
+    /// Whether it is about `.period`, else about `.once`.
+    pub period: bool,
+    /// The directive.
+    pub span: Span,
+}
+
+/// What a [`Demand`] demands.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum DemandKind {
+    /// Each output is written for the last time in this cycle or before; the section's first bundle issues in cycle 1.
+    Deadline(u32),
+    /// Whatever is read from or written to a port comes before what is read from or written to the next.
+    Order,
+    /// The inputs are read as late as a schedule allows that is at most so many cycles longer than the shortest found.
+    Late(u32),
+}
+
 /// A program before registers have addresses.
 #[derive(Clone, Debug)]
 pub struct Ir {
@@ -180,6 +227,10 @@ pub struct Ir {
     pub period: u32,
     /// The labels, in the order of the source.
     pub labels: Vec<Label>,
+    /// Bounds of loops, by ascending position.
+    pub loop_bounds: Vec<LoopBound>,
+    /// What is demanded of ports, in the order of the source.
+    pub demands: Vec<Demand>,
     /// Data memory.
     pub data: Vec<u32>,
     /// Words given bit by bit.

@@ -90,6 +90,8 @@ pub struct Assembled {
     pub constants: Vec<(String, expr::Value)>,
     /// What became of each block that the scheduler packed, in order.
     pub blocks: Vec<schedule::BlockReport>,
+    /// What is demanded of ports (`.deadline`, `.order`, `.late`) and how it is met.
+    pub timing: Vec<schedule::TimingReport>,
     /// Words that a macro or a repetition made: indices into the program's code, ascending.
     pub expanded: Vec<u32>,
 }
@@ -122,6 +124,7 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
         Schedule::None => false,
     };
     ir.bundles.iter_mut().for_each(|bundle| bundle.scheduled = packs(bundle.scheduled));
+    check::integers(&mut context, &ir);
     values::split(&mut ir);
     check::check(&mut context, &ir);
     let context::Context { mut sink, sources, constants, .. } = context;
@@ -130,7 +133,10 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
     if sink.errors > 0 {
         return Err(sink.finish(sources));
     }
-    let blocks = schedule::schedule(&mut ir, options.effort);
+    let schedule::Report { blocks, timing } = schedule::schedule(&mut ir, options.effort, &mut sink);
+    if sink.errors > 0 {
+        return Err(sink.finish(sources));
+    }
     let placement = place::place(&ir, &mut sink);
     let emitted = emit::emit(&ir, &placement, &mut sink);
     let errors = sink.errors;
@@ -147,6 +153,7 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
         sources,
         constants,
         blocks,
+        timing,
         expanded: emitted.expanded,
     })
 }

@@ -1,7 +1,7 @@
 //! Operands to registers, labels and numbers: the part of [`resolve`](crate::resolve) that looks at one operand.
 
 use crate::ast::*;
-use crate::context::{Argument, At, Binding, Reported};
+use crate::context::{Argument, At, Binding, Integer, Reported};
 use crate::declare::{address, register_at};
 use crate::diag::{Diagnostic, nearest};
 use crate::expr::{EvalError, Value};
@@ -28,12 +28,23 @@ impl Resolver<'_> {
         match place {
             Place::Dest => operation.dest = Some(self.dest(at, operand)?),
             Place::Source(index) => {
-                operation.sources[index] = self.source(at, operand, row.source_type(index))?
+                let source = self.source(at, operand, row.source_type(index))?;
+                operation.sources[index] = source;
+                let is_constant =
+                    matches!(self.context.registers[source.index()].kind, RegisterKind::Constant(_));
+                if is_constant && row.source_type(index) == Type::B {
+                    self.note_integer(at, row, operand, operation.dest);
+                }
             }
             Place::Immediate => {
                 operation.constant = match self.code_label(at, operand)? {
                     Some(label) => Constant::Code(label),
                     None => Constant::Value(self.constant(at, operand, row.result_type())?),
+                };
+                if operation.constant != Constant::Value(0)
+                    && !matches!(operation.constant, Constant::Code(_))
+                {
+                    self.note_integer(at, row, operand, operation.dest);
                 }
             }
             Place::Target => operation.constant = self.target(at, operand)?,
@@ -44,6 +55,16 @@ impl Resolver<'_> {
             }
         }
         Ok(())
+    }
+
+    /// Notes an integer that an operation brings to a register whatever its type. Most are well there: `check` tells.
+    fn note_integer(&mut self, at: At, row: &Row, operand: Operand, dest: Option<RegisterId>) {
+        if let Some(to) = dest.filter(|_| row.result_type() == Type::B)
+            && self.context.registers[to.index()].ty == Type::F
+            && let Ok(Value::Int(value)) = self.operand_value(at, operand)
+        {
+            self.context.integers.push(Integer { value, to, scope: at.scope, span: operand.span });
+        }
     }
 
     /// Follows parameters to the operand that was given for them, and what its name means if it is a name.
@@ -110,6 +131,44 @@ impl Resolver<'_> {
             }
             _ => return Ok(register),
         };
+        Err(self.context.report(at.scope, error))
+    }
+
+    /// The port that a name stands for, of a kind if one is wanted.
+    pub(crate) fn port(
+        &mut self,
+        at: At,
+        name: Name,
+        wanted: Option<RegisterKind>,
+    ) -> Result<RegisterId, Reported> {
+        let operand = Operand { kind: OperandKind::Name(name.name), span: name.span };
+        let (place, given, meaning) = self.meaning(at, operand)?;
+        if let Some((name, Binding::None)) = meaning {
+            return Err(self.context.unknown(place.scope, name, given.span, Wanted::Source));
+        }
+        let is_port = |kind| match wanted {
+            Some(wanted) => kind == wanted,
+            None => matches!(kind, RegisterKind::Input | RegisterKind::Output),
+        };
+        if let Some((_, Binding::Register(register))) = meaning
+            && is_port(self.context.registers[register.index()].kind)
+        {
+            return Ok(register);
+        }
+        let wanted = match wanted {
+            Some(RegisterKind::Output) => "an output port",
+            Some(_) => "an input port",
+            None => "a port",
+        };
+        let text = self.context.sources.text(given.span);
+        let message = match meaning {
+            Some((_, binding)) => format!("`{text}` is {}, not {wanted}", self.context.kind_text(binding)),
+            None => format!("{wanted} is needed here"),
+        };
+        let mut error = Diagnostic::error("operand", given.span, message);
+        if let Some(declared) = meaning.and_then(|(_, binding)| self.context.declaration(binding)) {
+            error = error.also(declared, "declared here");
+        }
         Err(self.context.report(at.scope, error))
     }
 

@@ -3,15 +3,19 @@
 use crate::ast::*;
 use crate::context::{At, Context, Reported};
 use crate::diag::{Diagnostic, nearest};
-use crate::expand::{Data, Flat, Item};
-use crate::ir::{Bundle, Constant, Ir, Operation, RegisterId};
+use crate::expand::{self, Data, Flat, Item, Timing};
+use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
 use crate::serialise;
+use crate::source::Span;
 use smallvec::SmallVec;
 use std::collections::HashMap;
 use std::rc::Rc;
 use takt_isa::program::Location;
 use takt_isa::spec::instructions::Function;
 use takt_isa::{Op, ROWS};
+
+/// The most cycles that a demand on ports can name: many times what a program memory holds.
+const MAX_CYCLES: u32 = 1 << 24;
 
 /// Resolves the expanded source. What has a mistake is left out; the report says whether there is any.
 pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
@@ -29,6 +33,8 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
         bundles: Vec::with_capacity(flat.once.len() + flat.period.len()),
         period: 0,
         labels: Vec::new(),
+        loop_bounds: Vec::new(),
+        demands: Vec::new(),
         data: Vec::new(),
         raw: Vec::new(),
         files: Vec::new(),
@@ -42,6 +48,12 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
     resolver.section(Section::Period, &period);
     resolver.data();
     resolver.presets();
+    for timing in std::mem::take(&mut resolver.flat.timing) {
+        // What goes wrong is in the report.
+        if let Ok(demand) = resolver.demand(&timing) {
+            resolver.ir.demands.push(demand);
+        }
+    }
     let Resolver { mut ir, flat, .. } = resolver;
     context.report_unknown();
     ir.registers = std::mem::take(&mut context.registers);
@@ -75,8 +87,14 @@ impl Resolver<'_> {
     /// Resolves the bundles of a section, and moves the section's labels from statements to bundles.
     fn section(&mut self, section: Section, items: &[Item]) {
         self.label = 0;
+        let mut bounds = self.flat.loop_bounds.clone();
+        bounds.retain(|bound| bound.section == section);
+        let mut bounds = bounds.into_iter().peekable();
         for (index, item) in items.iter().enumerate() {
             self.place_labels(section, index as u32);
+            if let Some(expand::LoopBound { most, .. }) = bounds.next_if(|bound| bound.item == index as u32) {
+                self.ir.loop_bounds.push(LoopBound { position: self.ir.bundles.len() as u32, most });
+            }
             self.item(item);
         }
         self.place_labels(section, u32::MAX);
@@ -307,6 +325,47 @@ impl Resolver<'_> {
                 }
             }
         }
+    }
+
+    /// A number of cycles, not less than `least`.
+    fn cycles(&mut self, at: At, cycles: Expr, least: u32) -> Result<u32, Reported> {
+        let value = self.context.integer(at, cycles)?;
+        u32::try_from(value).ok().filter(|cycles| (least..=MAX_CYCLES).contains(cycles)).ok_or_else(|| {
+            let message = format!("cycles are {least} to {MAX_CYCLES} here, not {value}");
+            self.context.error(at.scope, "range", cycles.span, message)
+        })
+    }
+
+    /// What a `.deadline`, `.order` or `.late` demands.
+    fn demand(&mut self, timing: &Timing) -> Result<Demand, Reported> {
+        let at = timing.at;
+        let ast = Rc::clone(&self.context.asts[at.ast as usize]);
+        let DirectiveLine { kind, span } = &ast.directives[timing.directive as usize];
+        let (kind, names, wanted) = match kind {
+            DirectiveKind::Deadline(names, cycle) => {
+                let limit = self.cycles(at, *cycle, 1)?;
+                (DemandKind::Deadline(limit), names, Some(RegisterKind::Output))
+            }
+            DirectiveKind::Order(names) => (DemandKind::Order, names, None),
+            DirectiveKind::Late(names, cost) => {
+                let cost = cost.map_or(Ok(0), |cost| self.cycles(at, cost, 0))?;
+                (DemandKind::Late(cost), names, Some(RegisterKind::Input))
+            }
+            _ => return Err(Reported),
+        };
+        let mut ports: Vec<(RegisterId, Span)> = Vec::with_capacity(names.len());
+        for name in names {
+            let port = self.port(at, *name, wanted)?;
+            if let Some((_, first)) = ports.iter().find(|(other, _)| *other == port) {
+                let message =
+                    format!("`{}` stands twice in one directive", self.context.sources.text(name.span));
+                let error =
+                    Diagnostic::error("declared-twice", name.span, message).also(*first, "first here");
+                return Err(self.context.report(at.scope, error));
+            }
+            ports.push((port, name.span));
+        }
+        Ok(Demand { kind, ports, period: timing.section == Section::Period, span: *span })
     }
 
     fn presets(&mut self) {

@@ -20,7 +20,7 @@ pub(crate) struct Run {
     pub(crate) scheduled: bool,
 }
 
-/// Cuts the program into runs: at labels, at the period's start, after redirections, around what must not move.
+/// Cuts the program into runs: at labels and heads of loops, at the period's start, after redirections, around what must not move.
 pub(crate) fn runs(ir: &Ir) -> Vec<Run> {
     let count = ir.bundles.len();
     let mut cut = vec![false; count + 1];
@@ -29,6 +29,9 @@ pub(crate) fn runs(ir: &Ir) -> Vec<Run> {
         if let Some(cut) = cut.get_mut(label.position as usize) {
             *cut = true;
         }
+    }
+    for bound in &ir.loop_bounds {
+        cut[bound.position as usize] = true;
     }
     for (i, bundle) in ir.bundles.iter().enumerate() {
         // The status register sees every operation before and none after: a wall.

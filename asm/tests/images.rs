@@ -174,6 +174,27 @@ fn every_defect_has_its_error() {
 }
 
 #[test]
+fn bounds_of_loops() {
+    let text = ".loop_bound 7\na: jmp a\n.loop_bound 4294967295\nb: jmp b\n halt\n";
+    let program = common::good(text).program;
+    let bytes = image::write(&program);
+    assert_eq!(image::read(&bytes).as_ref(), Ok(&program));
+    let words = |words: [u32; 4]| {
+        let mut bytes = bytes.clone();
+        let (offset, size) = section(&bytes, ".takt.loops");
+        assert_eq!(size, 16);
+        bytes[offset..offset + 16].copy_from_slice(&words.map(u32::to_le_bytes).concat());
+        image::read(&bytes)
+    };
+    assert_eq!(words([0, 7, 1, u32::MAX]), Ok(program.clone()));
+    for wrong in [[0, 0, 1, 1], [0, 1, 3, 1], [1, 1, 0, 1], [1, 1, 1, 1]] {
+        assert!(matches!(words(wrong), Err(ImageError::Loop { .. })), "{wrong:?}");
+    }
+    // Without bounds there is no such section.
+    assert!(!image::write(&common::good("a: jmp a\n").program).windows(11).any(|w| w == b".takt.loops"));
+}
+
+#[test]
 fn memories_that_overflow() {
     let mut program = program();
     let depth = program.machine.data_depth as usize;

@@ -4,7 +4,7 @@ mod common;
 
 use proptest::prelude::*;
 use takt_asm::{Expression, disasm, image};
-use takt_isa::program::{Location, Port, Section, Space, Symbol};
+use takt_isa::program::{Location, LoopBound, Port, Section, Space, Symbol};
 use takt_isa::shape::Field;
 use takt_isa::{Instruction, MACHINES, Machine, Program, ROWS, Type, ZERO};
 
@@ -180,6 +180,7 @@ prop_compose! {
         ports in prop::collection::btree_map(0..1023u16, 0..3usize, 0..12),
         labels in prop::collection::vec((any::<bool>(), any::<prop::sample::Index>()), 0..8),
         files in prop::sample::subsequence(vec!["a.s", "b \"c\".s", "dir/d.s", "\\e\n"], 0..=4).prop_shuffle(),
+        loops in prop::collection::btree_map(0..30u32, 1..=u32::MAX, 0..4),
         lines in prop::collection::vec(prop::option::of((any::<prop::sample::Index>(), 1..9u32)), 30),
         machine in Just(machine),
     ) -> Program {
@@ -229,6 +230,11 @@ prop_compose! {
                 .into_iter()
                 .filter(|(_, start, end)| start < end)
                 .map(|(name, start, end)| Section { name: name.to_owned(), start, end })
+                .collect(),
+            loop_bounds: loops
+                .into_iter()
+                .filter(|(address, _)| (*address as usize) < bundles)
+                .map(|(address, most)| LoopBound { address, most })
                 .collect(),
             files: files.clone(),
             lines,

@@ -3,6 +3,10 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use takt_asm::Assembled;
+use takt_asm::diag::{Diagnostics, Message, Severity};
+use takt_asm::ir::DemandKind;
+use takt_asm::schedule::TimingReport;
 use takt_asm::{MemoryLoader, Options, Schedule, assemble};
 use takt_emu::{Emulator, Event};
 use takt_isa::{MACHINES, Machine, Program};
@@ -161,14 +165,18 @@ fn the_same_source_gives_the_same_image() {
     }
 }
 
+/// A source whose period has no branches: one block.
+fn straight(seed: u64) -> String {
+    source(seed)
+        .lines()
+        .filter(|l| ["skip", "flags", " of,"].iter().all(|word| !l.contains(word)))
+        .fold(String::new(), |text, line| text + line + "\n")
+}
+
 #[test]
 fn predicted_cycles_are_those_of_the_machine() {
     for seed in 0..40 {
-        // A period without branches is one block.
-        let text: String = source(seed)
-            .lines()
-            .filter(|l| ["skip", "flags", " of,"].iter().all(|word| !l.contains(word)))
-            .fold(String::new(), |text, line| text + line + "\n");
+        let text = straight(seed);
         for machine in MACHINES {
             let options = Options { machine, effort: 1, ..Options::default() };
             let assembled = assemble("random.s", &MemoryLoader::of("random.s", text.as_str()), &options)
@@ -179,4 +187,173 @@ fn predicted_cycles_are_those_of_the_machine() {
             assert_eq!(cycles, [predicted; 4], "seed {seed} on {}:\n{text}", machine.name);
         }
     }
+}
+
+/// Assembles a source whose period has demands on ports.
+fn demanding(text: &str, demand: &str, machine: &'static Machine) -> Result<Assembled, Diagnostics> {
+    let text = text.replace("period:\n", &format!("{demand}\nperiod:\n"));
+    let options = Options { machine, effort: 1, ..Options::default() };
+    assemble("random.s", &MemoryLoader::of("random.s", text), &options)
+}
+
+/// The first error, which is about a demand.
+fn refusal(errors: &Diagnostics) -> Message {
+    let error = errors.messages().into_iter().find(|message| message.severity == Severity::Error);
+    error.filter(|error| error.code == "timing").unwrap_or_else(|| panic!("{}", errors.render(false)))
+}
+
+/// The cycles of a period in which a port's register is read or written, from 1.
+fn seen_cycles(program: &Program, register: u16) -> Vec<u32> {
+    let mut emulator = Emulator::new(program).expect("it fits");
+    for port in &program.inputs {
+        emulator.set_input_bits(port.register, 1.5f32.to_bits()).expect("it is an input");
+    }
+    emulator.run_to_wait().expect("it waits");
+    let mut cycles = Vec::new();
+    let mut sink = |event: &Event| match event {
+        Event::PortWrite(write) if write.register == register => cycles.push(write.cycle),
+        Event::Issue { cycle, address } => {
+            let bundle = program.bundle(*address).and_then(Result::ok);
+            if bundle.iter().flatten().any(|instruction| instruction.reads().contains(&register)) {
+                cycles.push(*cycle);
+            }
+        }
+        _ => {}
+    };
+    let report = emulator.observed(&mut sink).run_period(&[]).expect("it waits again");
+    cycles.iter().map(|cycle| (cycle - report.start) as u32).collect()
+}
+
+/// What a report says of a port is what the machine does.
+fn agrees(report: &TimingReport, program: &Program, text: &str) {
+    for (name, first, last) in &report.ports {
+        let mut ports = program.inputs.iter().chain(&program.outputs);
+        let port = ports.find(|port| port.name == *name).expect("it is a port");
+        let cycles = seen_cycles(program, port.register);
+        let found = (cycles.iter().min(), cycles.iter().max());
+        assert_eq!(found, (Some(first), Some(last)), "{name} on {}:\n{text}", program.machine.name);
+    }
+}
+
+#[test]
+fn deadlines_are_met_or_refused() {
+    let (mut met, mut refused) = (0, 0);
+    for seed in 0..20 {
+        let text = straight(seed);
+        for machine in MACHINES {
+            let random = &mut Random(seed * 7 + 3);
+            let values = run(&program(&text, machine, Schedule::None, 0), seed).0;
+            let free = demanding(&text, ".deadline oa = 100000", machine).expect("it has all the time");
+            let [report] = &free.timing[..] else { panic!("one demand, one report") };
+            agrees(report, &free.program, &text);
+            // From far too early to what the scheduler does anyway.
+            let freely = report.ports[0].2;
+            for _ in 0..3 {
+                let limit = freely.saturating_sub(random.below(16) as u32).max(1);
+                let demand = format!(".deadline {} = {limit}", random.pick(&["oa", "oa", "om, oa"]));
+                match demanding(&text, &demand, machine) {
+                    Ok(assembled) => {
+                        met += 1;
+                        let [report] = &assembled.timing[..] else { panic!("one demand, one report") };
+                        assert_eq!(report.kind, DemandKind::Deadline(limit));
+                        assert!(report.ports.iter().all(|(_, _, last)| *last <= limit), "{report:?}\n{text}");
+                        agrees(report, &assembled.program, &text);
+                        assert_eq!(run(&assembled.program, seed).0, values, "seed {seed}, {demand}:\n{text}");
+                    }
+                    Err(errors) => {
+                        refused += 1;
+                        let message = &refusal(&errors);
+                        // No schedule is better than what is said to be the bound.
+                        if let Some((_, bound)) =
+                            message.message.split_once("cannot be written before cycle ")
+                        {
+                            let bound: u32 = bound.parse().expect("a number");
+                            assert!(bound > limit, "{message:?}");
+                            let name = if message.message.contains("`oa`") { "oa" } else { "om" };
+                            let all = format!(".deadline {name} = 100000");
+                            let free = demanding(&text, &all, machine).expect("it has all the time");
+                            assert!(free.timing[0].ports[0].2 >= bound, "{message:?}\n{text}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+    assert!(met > 20 && refused > 20, "{met} met, {refused} refused");
+}
+
+#[test]
+fn orders_are_kept_or_refused() {
+    let (mut kept, mut refused) = (0, 0);
+    for seed in 0..20 {
+        let text = straight(seed);
+        for machine in MACHINES {
+            let random = &mut Random(seed * 5 + 1);
+            let values = run(&program(&text, machine, Schedule::None, 0), seed).0;
+            for _ in 0..3 {
+                let mut ports = vec!["om", "oa", "ox", "in0"];
+                let mut chosen = Vec::new();
+                for _ in 0..2 + random.below(2) {
+                    chosen.push(ports.remove(random.below(ports.len() as u64) as usize));
+                }
+                let demand = format!(".order {}", chosen.join(", "));
+                match demanding(&text, &demand, machine) {
+                    Ok(assembled) => {
+                        kept += 1;
+                        let [report] = &assembled.timing[..] else { panic!("one demand, one report") };
+                        let ordered = report.ports.windows(2).all(|pair| pair[0].2 < pair[1].1);
+                        assert!(ordered, "{demand}: {report:?}\n{text}");
+                        agrees(report, &assembled.program, &text);
+                        assert_eq!(run(&assembled.program, seed).0, values, "seed {seed}, {demand}:\n{text}");
+                    }
+                    Err(errors) => {
+                        refused += 1;
+                        refusal(&errors);
+                    }
+                }
+            }
+        }
+    }
+    assert!(kept > 10 && refused > 10, "{kept} kept, {refused} refused");
+}
+
+#[test]
+fn late_reads_come_later_and_cost_what_they_may() {
+    let (mut before, mut after) = (0, 0);
+    for seed in 0..12 {
+        let text = straight(seed);
+        for machine in MACHINES {
+            let values = run(&program(&text, machine, Schedule::None, 0), seed).0;
+            let length = |assembled: &Assembled| {
+                assembled
+                    .blocks
+                    .iter()
+                    .find(|block| block.address == assembled.program.sections[1].start)
+                    .map(|b| b.cycles)
+            };
+            let Ok(plain) = demanding(&text, ".deadline ox = 100000", machine) else { continue };
+            for cost in [0, 4] {
+                let demand = format!(".late in1, in2 = {cost}");
+                let late = demanding(&text, &demand, machine).expect("a wish is never refused");
+                let Some(report) = late.timing.first() else { continue };
+                agrees(report, &late.program, &text);
+                assert_eq!(run(&late.program, seed).0, values, "seed {seed}, {demand}:\n{text}");
+                assert!(length(&late) <= length(&plain).map(|length| length + cost), "seed {seed}, {demand}");
+                let first = |program: &Program| {
+                    let ports = program.inputs.iter().filter(|port| ["in1", "in2"].contains(&&*port.name));
+                    ports.flat_map(|port| seen_cycles(program, port.register)).min().unwrap_or(0)
+                };
+                before += first(&plain.program);
+                after += first(&late.program);
+                if let Some((window, bound)) = report.window {
+                    assert!(bound <= window, "{report:?}");
+                    let outputs = &late.program.outputs;
+                    let last =
+                        outputs.iter().flat_map(|port| seen_cycles(&late.program, port.register)).max();
+                    assert!(first(&late.program) + window <= last.unwrap_or(0), "{report:?}");
+                }
+            }
+        }
+    }
+    assert!(2 * after > 3 * before, "first reads in cycles {before} in all, late in {after}");
 }

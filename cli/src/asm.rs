@@ -10,7 +10,8 @@ use serde_json::{Value, json};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
-use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT};
+use takt_asm::ir::DemandKind;
+use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, TimingReport};
 use takt_asm::{Assembled, Schedule, image, listing};
 use takt_isa::Program;
 
@@ -154,6 +155,7 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
             program.machine.name
         )?;
         write_blocks(&assembled, out)?;
+        write_timing(&assembled, out)?;
     }
     Ok(())
 }
@@ -179,6 +181,33 @@ fn write_blocks(assembled: &Assembled, out: &mut Out) -> Result<()> {
         )?;
     }
     Ok(())
+}
+
+/// What is demanded of ports, all of which is met: the rest are errors.
+fn write_timing(assembled: &Assembled, out: &mut Out) -> Result<()> {
+    for report in &assembled.timing {
+        let cycles = |(name, first, last): &(String, u32, u32)| match first == last {
+            true => format!("{name} {first}"),
+            false => format!("{name} {first}…{last}"),
+        };
+        let ports = report.ports.iter().map(cycles).collect::<Vec<_>>().join(", ");
+        let (demand, result) = timing_text(report);
+        writeln!(out, "  {demand}: {result}; cycles: {ports}")?;
+    }
+    Ok(())
+}
+
+/// A demand, and that it is met or how far.
+fn timing_text(report: &TimingReport) -> (String, String) {
+    match (report.kind, report.window) {
+        (DemandKind::Deadline(cycle), _) => (format!("deadline {cycle}"), "met".to_owned()),
+        (DemandKind::Order, _) => ("order".to_owned(), "met".to_owned()),
+        (DemandKind::Late(_), Some((window, bound))) => (
+            "late".to_owned(),
+            format!("{window} cycles from the first read to the last output, bound {bound}"),
+        ),
+        (DemandKind::Late(_), None) => ("late".to_owned(), "no output depends on it".to_owned()),
+    }
 }
 
 /// A block's label, or else the place of its first operation.
@@ -218,6 +247,24 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
             "cycles": block.cycles,
             "bound": block.bound.cycles(),
             "bound_set_by": bound_text(block, program),
+            "bounds": {
+                "critical_path": block.bound.critical_path,
+                "slots": block.bound.slots,
+                "units": block.bound.units,
+            },
+        })
+    };
+    let timing = |report: &TimingReport| {
+        let (demand, result) = timing_text(report);
+        let port =
+            |(name, first, last): &(String, u32, u32)| json!({ "name": name, "first": first, "last": last });
+        json!({
+            "section": if report.period { "period" } else { "once" },
+            "demand": demand,
+            "result": result,
+            "window": report.window.map(|(window, _)| window),
+            "window_bound": report.window.map(|(_, bound)| bound),
+            "ports": report.ports.iter().map(port).collect::<Vec<_>>(),
         })
     };
     Ok(json!({
@@ -228,6 +275,7 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
         "constants": program.constants.len(),
         "data_words": program.data.len(),
         "blocks": assembled.blocks.iter().map(block).collect::<Vec<_>>(),
+        "timing": assembled.timing.iter().map(timing).collect::<Vec<_>>(),
         "messages": messages(&assembled.warnings)?,
     }))
 }

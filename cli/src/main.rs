@@ -3,8 +3,10 @@
 
 mod account;
 mod asm;
+mod bound;
 mod completions;
 mod controller;
+mod cosim;
 mod debug;
 mod disasm;
 mod eval;
@@ -19,8 +21,10 @@ mod output;
 mod plot;
 mod ports;
 mod report;
+mod rtl;
 mod run;
 mod select;
+mod synthesis;
 mod trace;
 mod track;
 
@@ -59,7 +63,10 @@ enum Command {
     Disasm(disasm::Disasm),
     Run(run::Run),
     Debug(debug::Debug),
+    Bound(bound::Bound),
     Eval(eval::Eval),
+    Rtl(rtl::Rtl),
+    Cosim(cosim::Cosim),
     Isa(isa::Isa),
     Machines(machines::Machines),
     Completions(completions::Completions),
@@ -73,7 +80,10 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Disasm(disasm) => disasm::run(disasm, color),
         Command::Run(run) => run::run(run, color, out),
         Command::Debug(debug) => debug::run(debug, color, out),
+        Command::Bound(bound) => bound::run(bound, color, out),
         Command::Eval(eval) => eval::run(eval, out),
+        Command::Rtl(rtl) => rtl::run(rtl, color, out),
+        Command::Cosim(cosim) => cosim::run(cosim, color, out),
         Command::Isa(isa) => isa::run(isa, out),
         Command::Machines(machines) => machines::run(machines, out),
         Command::Completions(completions) => completions::run(completions, out),

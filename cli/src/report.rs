@@ -1,7 +1,8 @@
 //! `takt track`'s tables: ours beside the founding paper's.
 
 use crate::account::Account;
-use crate::track::{PAPER_CLOCK, Tracking};
+use crate::select::PAPER_CLOCK;
+use crate::track::Tracking;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -110,10 +111,22 @@ fn time_table(tracking: &Tracking, out: &mut String) {
         let _ = writeln!(out, "  {name:<40}{clock:>7}{:>10}{time:>12.3}", digits(cycles));
     }
     let (_, fpga3_clock, fpga3_time) = PLATFORMS[3];
+    if let Some(placed) = crate::synthesis::placed(machine) {
+        let time = totals.longest as f64 / placed.mhz;
+        let name = format!("Takt {machine}, longest, as placed and routed");
+        let _ = writeln!(out, "  {name:<40}{:>7.0}{:>10}{time:>12.3}", placed.mhz, digits(totals.longest));
+        let _ = writeln!(
+            out,
+            "  Placed and routed on {} on {} (median of {} seeds: docs/synthesis.md).",
+            placed.device, placed.date, placed.seeds
+        );
+    } else {
+        let _ = writeln!(out, "  Takt's own circuit of {machine} is not placed and routed yet.");
+    }
     let whose = if clock == PAPER_CLOCK { "The clock is the paper's" } else { "The clock is --clock's" };
     let _ = writeln!(
         out,
-        "  FPGA3 takes {:.1} times the cycles. {whose}; Takt's own circuit is not placed and routed yet.",
+        "  FPGA3 takes {:.1} times the cycles. {whose} where nothing else is said.",
         fpga3_clock * fpga3_time / totals.longest as f64
     );
     if let Some(latency) = tracking.latency {
@@ -194,6 +207,7 @@ pub(crate) fn json(tracking: &Tracking) -> Value {
         "cycles": {"min": totals.shortest, "max": totals.longest},
         "clock_mhz": tracking.clock,
         "time_us": {"min": time(totals.shortest), "max": time(totals.longest)},
+        "placed": crate::synthesis::placed(tracking.program.machine.name),
         "encoder_to_force_cycles": tracking.latency,
         "deadlines_missed": totals.missed,
         "operations": tracking.account.operations,

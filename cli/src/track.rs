@@ -43,7 +43,7 @@ pub(crate) struct Track {
     #[arg(long, value_name = "N", value_parser = select::count, allow_negative_numbers = true)]
     periods: Option<u64>,
     /// Clock in MHz, for cycles to time and for the deadline; the paper's is 125.
-    #[arg(long, value_name = "MHZ", default_value_t = PAPER_CLOCK, value_parser = clock, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MHZ", default_value_t = select::PAPER_CLOCK, value_parser = select::clock, allow_negative_numbers = true)]
     clock: f64,
     /// Write inputs, outputs, cycles and errors of every period as CSV, which `takt run --inputs` reads; `-` is standard
     /// output.
@@ -67,20 +67,8 @@ Examples:
   takt track --program mine.s --gcode part.ngc   your own controller, your own path
   takt track --periods 1000 --csv path.csv       record inputs and outputs for `takt run`";
 
-/// The clock of the paper's FPGA3, MHz.
-pub(crate) const PAPER_CLOCK: f64 = 125.0;
-
 /// Bytes of G-code; beyond, the longest path that can be driven would be made of moves of a micrometre.
 const GCODE_LIMIT: usize = 16 << 20;
-
-pub(crate) fn clock(text: &str) -> Result<f64, String> {
-    let mhz: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
-    if (0.01..=100_000.0).contains(&mhz) {
-        Ok(mhz)
-    } else {
-        Err("not between 0.01 and 100000 MHz".to_owned())
-    }
-}
 
 /// Cycles that the sampling period has at a clock in MHz.
 pub(crate) fn period_cycles(clock: f64) -> Option<NonZeroU64> {

@@ -152,6 +152,24 @@ fn programs_that_go_wrong() {
     );
 }
 
+#[test]
+fn programs_that_cannot_be_bounded() {
+    check(
+        "bounds",
+        &[
+            "bound spins.s",
+            "bound falls.s",
+            "bound unwritten.s --deadline 100us",
+            "bound pd.s --deadline 100kg",
+            "bound pd.s --deadline 0",
+            "bound pd.s --deadline -1us",
+            "bound pd.s --deadline 100us --clock 125kHz",
+            "bound garbage",
+            "bound pd.takt --machine t1",
+        ],
+    );
+}
+
 /// Programs with the ports of a tracking program that are none; the robot's file is warned of, as nothing is used.
 #[test]
 fn controllers_that_go_wrong() {

@@ -125,6 +125,7 @@ fn period() -> Program {
         outputs: Vec::new(),
         registers: Vec::new(),
         symbols: Vec::new(),
+        loop_bounds: Vec::new(),
         sections: Vec::new(),
         files: Vec::new(),
     }

@@ -201,7 +201,9 @@ fn compile(code: &Code, entry: Address, recent: &Ages) -> Option<Block> {
     let mut stalls = Vec::new();
     let mut earliest = BASE;
     let mut address = entry;
-    while let Some(decoded) = code.legal(address).filter(|_| placed.len() < MAX_BUNDLES) {
+    // A loop whose turns are counted is entered at a block's start.
+    let ends = |address, bundles| bundles >= MAX_BUNDLES || (bundles > 0 && code.head(address).is_some());
+    while let Some(decoded) = code.legal(address).filter(|_| !ends(address, placed.len())) {
         let issue = scoreboard.issue(&decoded.timing, address, earliest);
         stalls.extend(issue.stalls().iter().map(|&(cause, cycles)| (address, cause, cycles)));
         placed.push(Placed { address, offset: (issue.cycle - BASE) as u32, decoded });

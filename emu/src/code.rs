@@ -1,7 +1,7 @@
 //! A program prepared for execution: every word decoded and checked once.
 
 use crate::fault::LoadError;
-use takt_isa::program::IllegalWord;
+use takt_isa::program::{IllegalWord, LoopBound};
 use takt_isa::timing::{Address, Bundle};
 use takt_isa::{Effect, Machine, Op, Program, Type, ZERO};
 
@@ -51,6 +51,8 @@ impl Decoded {
 pub(crate) struct Code {
     pub(crate) machine: &'static Machine,
     bundles: Vec<Result<Decoded, (u8, IllegalWord)>>,
+    /// Loops whose turns are counted, by ascending address of their heads.
+    pub(crate) loops: Vec<LoopBound>,
 }
 
 impl Code {
@@ -84,7 +86,7 @@ impl Code {
             }
             Ok(Decoded { operations: operations.into(), timing: Bundle::new(machine, &instructions), reach })
         });
-        Ok(Code { machine, bundles: bundles.collect() })
+        Ok(Code { machine, bundles: bundles.collect(), loops: program.loop_bounds.clone() })
     }
 
     /// Bundles in the program.
@@ -95,6 +97,15 @@ impl Code {
     /// The bundle at an address; `None` past the end.
     pub(crate) fn get(&self, address: Address) -> Option<&Result<Decoded, (u8, IllegalWord)>> {
         self.bundles.get(address as usize)
+    }
+
+    /// The index of the counted loop that the bundle at an address heads.
+    #[inline]
+    pub(crate) fn head(&self, address: Address) -> Option<usize> {
+        if self.loops.is_empty() {
+            return None;
+        }
+        self.loops.binary_search_by_key(&address, |bound| bound.address).ok()
     }
 
     /// The bundle at an address, if it can execute.

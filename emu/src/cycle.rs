@@ -102,6 +102,9 @@ impl Emulator {
     fn issue(&mut self, address: Address, sink: &mut Sink<'_>) -> Result<(), Fault> {
         let (now, machine) = (self.now, self.code.machine);
         let Some(decoded) = self.code.legal(address) else { return Ok(()) };
+        if let Some(most) = self.beyond_bound() {
+            return Err(self.fault(address, None, FaultKind::LoopBound { most }, sink));
+        }
         if let Some((slot, kind)) = execute::check(decoded, &self.state, machine, &self.program) {
             return Err(self.fault(address, Some(slot), kind, sink));
         }
@@ -115,6 +118,7 @@ impl Emulator {
         match flow {
             Flow::Sequential => self.continue_at(address + 1, timing::after_sequential(now), address),
             Flow::NotTaken => self.continue_at(address + 1, timing::after_not_taken(machine, now), address),
+            Flow::Jump(target) => self.jump_to(target, timing::after_redirect(machine, now), address),
             Flow::Redirect(target) => {
                 self.continue_at(target, timing::after_redirect(machine, now), address);
             }
@@ -130,8 +134,28 @@ impl Emulator {
         Ok(())
     }
 
+    /// Where execution goes on, other than by a jump: the first turn of a loop, if it is the head of one.
     pub(crate) fn continue_at(&mut self, next: Address, delivered: Cycle, from: Address) {
         (self.front.next, self.front.delivered, self.front.from) = (next, delivered, from);
+        if let Some(head) = self.code.head(next) {
+            self.turns[head] = 1;
+        }
+    }
+
+    /// Where a jump or a taken branch leads: a further turn of a loop, if it leads back to the head of one.
+    pub(crate) fn jump_to(&mut self, target: Address, delivered: Cycle, from: Address) {
+        let turns = self.code.head(target).map_or(0, |head| self.turns[head]);
+        self.continue_at(target, delivered, from);
+        if let Some(head) = self.code.head(target).filter(|_| target <= from) {
+            self.turns[head] = turns.saturating_add(1);
+        }
+    }
+
+    /// The bound of the loop that the next bundle heads, if its turn would be one too many.
+    pub(crate) fn beyond_bound(&self) -> Option<u32> {
+        let head = self.code.head(self.front.next)?;
+        let most = self.code.loops[head].most;
+        (self.turns[head] > most).then_some(most)
     }
 
     /// Stops the machine. What issued together with `halt` is still written back: nothing else can happen any more, so

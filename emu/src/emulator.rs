@@ -145,6 +145,8 @@ pub struct Emulator {
     /// The next cycle to pass; so many have.
     pub(crate) now: Cycle,
     pub(crate) front: Front,
+    /// For each counted loop, the turns of its present run.
+    pub(crate) turns: Vec<u32>,
     pub(crate) recent: Recent,
     /// The rules applied to everything issued; `None` when blocks have run since and it must be made anew.
     pub(crate) scoreboard: Option<Box<Scoreboard>>,
@@ -182,6 +184,11 @@ pub(crate) struct Goal {
     pub(crate) bundle: bool,
 }
 
+/// The turns counted at reset, which leads to bundle 0.
+fn first_turns(program: &Program) -> Vec<u32> {
+    program.loop_bounds.iter().map(|bound| u32::from(bound.address == 0)).collect()
+}
+
 impl Emulator {
     /// Loads a program and resets the machine.
     ///
@@ -195,6 +202,7 @@ impl Emulator {
             status: Status::Running,
             now: 0,
             front: Front { next: 0, delivered: timing::after_reset(program.machine), from: 0 },
+            turns: first_turns(program),
             recent: Recent::List(Vec::new()),
             scoreboard: None,
             planned: None,
@@ -218,6 +226,7 @@ impl Emulator {
         self.status = Status::Running;
         self.now = 0;
         self.front = Front { next: 0, delivered: timing::after_reset(self.program.machine), from: 0 };
+        self.turns = first_turns(&self.program);
         self.recent = Recent::List(Vec::new());
         self.scoreboard = None;
         self.planned = None;

@@ -15,7 +15,9 @@ pub(crate) enum Flow {
     Sequential,
     /// At the next bundle, a conditional branch not having been taken.
     NotTaken,
-    /// At the target.
+    /// At the target of a jump or of a branch that is taken.
+    Jump(Address),
+    /// At the target of a call, or where a return leads.
     Redirect(Address),
     /// At the target, on the tick.
     Wait(Address),
@@ -108,12 +110,12 @@ pub(crate) fn issue(
                 Value::exact(0)
             }
             Effect::Jump => {
-                flow = Flow::Redirect(target);
+                flow = Flow::Jump(target);
                 Value::exact(0)
             }
             Effect::BranchZero | Effect::BranchNonzero => {
                 let taken = (a == 0) == (operation.effect == Effect::BranchZero);
-                flow = if taken { Flow::Redirect(target) } else { Flow::NotTaken };
+                flow = if taken { Flow::Jump(target) } else { Flow::NotTaken };
                 Value::exact(0)
             }
             Effect::Call => {

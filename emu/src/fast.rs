@@ -92,6 +92,7 @@ impl Emulator {
                 Recent::List(recent) => self.cache.after(&self.code, recent, entry, entered),
             };
             let Some(id) = id else { return Fast::Step { until: entered + 1 } };
+            let beyond_bound = self.beyond_bound().is_some();
             let block = &mut self.cache.blocks[id as usize];
             let (state, ending) = (&mut self.state, block.ending);
             let last = entered + Cycle::from(block.last);
@@ -104,6 +105,7 @@ impl Emulator {
                 _ => false,
             };
             if stack_fault
+                || beyond_bound
                 || !(block.verified || has_required(state, block, last))
                 || !run(block, state, journal, entered)
             {
@@ -131,7 +133,7 @@ impl Emulator {
                     self.continue_at(address + 1, timing::after_not_taken(machine, last), address);
                 }
                 Ending::Jump(target) | Ending::Branch { target, .. } => {
-                    self.continue_at(target, timing::after_redirect(machine, last), address);
+                    self.jump_to(target, timing::after_redirect(machine, last), address);
                 }
                 Ending::Call(target) => {
                     self.state.stack.push(address + 1);

@@ -60,6 +60,12 @@ pub enum FaultKind {
     /// A return with the return stack empty.
     #[error("return with the return stack empty")]
     StackUnderflow,
+    /// The head of a loop is reached more often in one run of the loop than the source promises.
+    #[error("the loop turns more than the {most} times that its .loop_bound promises")]
+    LoopBound {
+        /// Turns at most.
+        most: u32,
+    },
     /// The machine has run for as many cycles as it may.
     #[error("limit of {limit} cycles reached")]
     CycleLimit {

@@ -4,7 +4,7 @@
 //! instructions, so that rare ones come up as often as common ones. Instructions are taken from the specification's table;
 //! only the loop counter's decrement is named.
 
-use takt_isa::program::{Port, Section};
+use takt_isa::program::{LoopBound, Port, Section};
 use takt_isa::spec::machines::REGISTER_SPACE;
 use takt_isa::{Effect, Function, Instruction, Machine, Op, Operand, Program, ROWS, Row, Type, ZERO};
 
@@ -116,6 +116,7 @@ struct Generator {
     bundles: Vec<Vec<u64>>,
     /// Instructions that await the address of a subroutine: bundle, slot, which.
     calls: Vec<(usize, usize)>,
+    loop_bounds: Vec<LoopBound>,
 }
 
 impl Generator {
@@ -150,6 +151,7 @@ impl Generator {
             constants,
             bundles: Vec::new(),
             calls: Vec::new(),
+            loop_bounds: Vec::new(),
         }
     }
 
@@ -200,6 +202,7 @@ impl Generator {
         });
         let section = |name: &str, start, end| Section { name: name.to_owned(), start, end };
         self.constants.sort_unstable();
+        self.loop_bounds.sort_unstable_by_key(|bound| bound.address);
         Program {
             machine,
             lines: vec![None; self.bundles.len() * machine.slots.len()],
@@ -209,6 +212,7 @@ impl Generator {
             constants: self.constants,
             registers: Vec::new(),
             symbols: Vec::new(),
+            loop_bounds: self.loop_bounds,
             sections: vec![section("once", 0, period), section("period", period, end)],
             files: Vec::new(),
             code: self.bundles.into_iter().flatten().collect(),
@@ -222,7 +226,7 @@ impl Generator {
             match self.random.below(if self.options.control { 12 } else { 8 }) {
                 0..8 => self.plain(),
                 8 | 9 => self.skip(),
-                10 => self.repeat(),
+                10 => self.repeat(0),
                 _ => {
                     let at = self.bundles.len();
                     self.plain();
@@ -247,25 +251,34 @@ impl Generator {
         self.control(at, effect, at as u32 + 1 + over, Some(source));
     }
 
-    /// A loop of a few rounds.
-    fn repeat(&mut self) {
+    /// A loop of a few rounds, with branches and perhaps another loop in it. `depth` is 0 or 1: each depth counts in a
+    /// register of its own.
+    fn repeat(&mut self, depth: u16) {
         let Some((slot, _)) = self.machine.host(Op::isub.row().function) else { return };
-        let counter = self.machine.slots[slot].bank.base + BASES;
-        let (rounds, one) = (1 + self.random.below(5), counter + 1);
+        let (index, one_index) = (BASES + 2 * depth, BASES + 1);
+        let [counter, one] = [index, one_index].map(|index| self.machine.slots[slot].bank.base + index);
+        let rounds = 1 + self.random.below(5);
         let set =
             |dest, constant| Instruction { dest, constant, ..Instruction::bare(op_with(Effect::Immediate)) };
-        for (index, value) in [(BASES, rounds), (BASES + 1, 1)] {
+        for (index, value) in [(index, rounds), (one_index, 1)] {
             let mut bundle = self.nops();
             bundle[slot] = word(&set(index, value));
             self.bundles.push(bundle);
         }
         let start = self.bundles.len() as u32;
+        // A wild program may promise too little.
+        let most = if self.options.wild { 1 + self.random.below(5) } else { rounds };
+        self.loop_bounds.push(LoopBound { address: start, most });
         for _ in 0..1 + self.random.below(4) {
-            self.plain();
+            match self.random.below(8) {
+                0 => self.skip(),
+                1 if depth == 0 => self.repeat(1),
+                _ => self.plain(),
+            }
         }
         let mut bundle = self.nops();
         bundle[slot] =
-            word(&Instruction { dest: BASES, sources: [counter, one, 0], ..Instruction::bare(Op::isub) });
+            word(&Instruction { dest: index, sources: [counter, one, 0], ..Instruction::bare(Op::isub) });
         self.bundles.push(bundle);
         let at = self.bundles.len();
         self.plain();

@@ -136,6 +136,7 @@ fn wild_programs_agree() {
         "UnwrittenRegister",
         "StackOverflow",
         "StackUnderflow",
+        "LoopBound",
         "CycleLimit",
     ] {
         assert!(kinds.get(kind).is_some_and(|&count| count >= 5), "{kind} is rare: {kinds:?}");

@@ -26,6 +26,8 @@ pub struct Program {
     pub symbols: Vec<Symbol>,
     /// What runs once and what runs every period.
     pub sections: Vec<Section>,
+    /// How often loops may turn, by ascending address.
+    pub loop_bounds: Vec<LoopBound>,
     /// Source files, as the source names them.
     pub files: Vec<String>,
     /// Where each operation comes from, parallel to `code`; `None` for filler.
@@ -73,6 +75,19 @@ pub struct Section {
     pub start: Address,
     /// Bundle after the last.
     pub end: Address,
+}
+
+/// How often a loop may turn: a promise of the source, on which static bounds of time rest and which the emulator checks.
+///
+/// An issue of the bundle that heads the loop is one *turn*. A turn that a jump or a taken branch from the same or a later
+/// address leads to follows the one before; one that anything else leads to (the bundle before, a jump from an earlier
+/// address, a call, a return, the tick) is the first of a new run of the loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LoopBound {
+    /// The bundle that heads the loop.
+    pub address: Address,
+    /// Turns of one run at most; at least 1.
+    pub most: u32,
 }
 
 /// A place in a source.

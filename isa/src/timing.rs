@@ -167,6 +167,36 @@ impl Issue {
     }
 }
 
+/// What of a scoreboard counts from some cycle on, in cycles from that one: two states with equal residues time every
+/// program alike.
+///
+/// The results still pending say it all but for the units that are busy: `drained` is the last of them, and a bank's bookings are
+/// those of its registers, since rule 3 lets no register have two results pending.
+#[derive(Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Debug, Default)]
+pub struct Residue {
+    /// Registers, ascending, and the cycles until their results are on the bus.
+    pending: Vec<(u16, u16)>,
+    /// Slots, units, ascending, and the cycles until they accept an operation.
+    busy: Vec<(u8, u8, u16)>,
+}
+
+impl Residue {
+    /// What is left after so many more cycles without an issue.
+    pub fn later(&self, cycles: u16) -> Residue {
+        let pending = self.pending.iter().filter(|(_, left)| *left > cycles);
+        let busy = self.busy.iter().filter(|(_, _, left)| *left > cycles);
+        Residue {
+            pending: pending.map(|&(register, left)| (register, left - cycles)).collect(),
+            busy: busy.map(|&(slot, unit, left)| (slot, unit, left - cycles)).collect(),
+        }
+    }
+
+    /// Whether nothing is left: the state after a reset.
+    pub fn is_empty(&self) -> bool {
+        self.pending.is_empty() && self.busy.is_empty()
+    }
+}
+
 const PORT_WINDOW: usize = MAX_LATENCY as usize;
 
 /// The scoreboard: what is pending, busy and booked.
@@ -259,6 +289,35 @@ impl Scoreboard {
         }
         issue.advance(cycle, Cause::WritePort { slot });
         issue
+    }
+
+    /// What of the past can still hold up bundles that are delivered in cycle `now`, which no bundle has issued in or after.
+    pub fn residue(&self, now: Cycle) -> Residue {
+        let pending = self.ready.iter().enumerate().filter(|(_, (ready, _))| *ready > now);
+        let units = self.free.iter().enumerate().flat_map(|(s, units)| {
+            units.iter().enumerate().filter(|(_, free)| **free > now).map(move |(u, free)| (s, u, free))
+        });
+        Residue {
+            pending: pending.map(|(register, (ready, _))| (register as u16, (ready - now) as u16)).collect(),
+            busy: units.map(|(slot, unit, free)| (slot as u8, unit as u8, (free - now) as u16)).collect(),
+        }
+    }
+
+    /// A scoreboard on which a bundle delivered in cycle 0 meets what one delivered in a residue's cycle did.
+    pub fn resume(machine: &Machine, residue: &Residue) -> Scoreboard {
+        let mut scoreboard = Scoreboard::new(machine);
+        for &(register, cycles) in &residue.pending {
+            let writeback = Cycle::from(cycles);
+            scoreboard.ready[usize::from(register) % REGISTER_SPACE] = (writeback, 0);
+            scoreboard.drained = scoreboard.drained.max(writeback);
+            if let Some(slot) = machine.slots.iter().position(|slot| slot.bank.contains(register)) {
+                scoreboard.booked[slot][writeback as usize % PORT_WINDOW] = writeback;
+            }
+        }
+        for &(slot, unit, cycles) in &residue.busy {
+            scoreboard.free[usize::from(slot)][usize::from(unit)] = cycles.into();
+        }
+        scoreboard
     }
 
     /// The cycle in which the last pending result is on its bus.

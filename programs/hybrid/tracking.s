@@ -7,6 +7,8 @@
 .schedule on
 
 .const  gain = Ts*KI                    ; of the integrator, without boost
+.const  J    = J0 + ms*c^2              ; kg·m², an arm about its pivot, with its slider
+.const  Rc   = R/lcount                 ; R in counts
 
 ; ---- State, kept between periods ----------------------------------------------------------------------------------
 .rep i, 1, 5
@@ -30,6 +32,7 @@ first:                                  ; before the first period: previous posi
 
 .period
 period:
+        .late   n1, n2, n3, n4, n5 = 2  ; what needs no measurement goes before the sample, for up to 2 cycles
 
 ; ---- 1. Inverse kinematics with derivatives, (7)-(11) --------------------------------------------------------------
 ; With |p_i| = R: l² = |d|² = x² + y² + z² + R² - 2·(x·xp + y·yp), and likewise d·v = x·vx + y·vy + z·vz - (xp·vx + yp·vy).
@@ -37,16 +40,17 @@ period:
 ; addition rounds at the size of the sum.
 .const  xp = sqrt(3)/2*R                ; xp_2 = -xp_3; yp_1 = R, yp_2 = yp_3 = -R/2
 .macro  arms    s, f, px, py, sum       ; s_i = sum - f·(px·xp_i + py·yp_i), i = 1, 2, 3
-.reg    px2 py2 both py1
+.reg    px2 py2 e2 e3 py1
         fmul    px2, px, f*xp
         fmul    py2, py, f*R/2
-        fadd    both, sum, py2
-        fsub    {s}2, both, px2
-        fadd    {s}3, both, px2
-        fmul    py1, py, f*R
+        fsub    e2, py2, px2
+        fadd    e3, py2, px2
+        fadd    {s}2, sum, e2
+        fadd    {s}3, sum, e3
+        fadd    py1, py2, py2           ; yp_1 = -2·yp_2
         fsub    {s}1, sum, py1
 .endm
-.reg    xx yy zz xy  ll1 ll2 ll3  r1 r2 r3
+.reg    xx yy zz xy  ll1 ll2 ll3
         fmul    xx, x, x
         fmul    yy, y, y
         fmul    zz, z, z
@@ -57,7 +61,6 @@ period:
         .rep i, 1, 3
         fadd    ll{i}, ll{i}, R^2 + 0.5
         fsqrt   l{i}d, ll{i}            ; l = |d|
-        fdiv    r{i}, 1.0, l{i}d
         .endr
 
 ; v = (d·(vx,vy,vz)) / l
@@ -69,7 +72,7 @@ period:
         fadd    dv, dv, zv
         arms    dv, 1, vx, vy, dv
         .rep i, 1, 3
-        fmul    v{i}d, dv{i}, r{i}
+        fdiv    v{i}d, dv{i}, l{i}d
         .endr
 
 ; a = (vx² + vy² + vz² + d·(ax,ay,az) - v²) / l
@@ -89,7 +92,7 @@ period:
         .rep i, 1, 3
         fmul    w{i}, v{i}d, v{i}d
         fsub    da{i}, da{i}, w{i}
-        fmul    a{i}d, da{i}, r{i}
+        fdiv    a{i}d, da{i}, l{i}d
         .endr
 
 ; Table, (18)-(20).
@@ -101,61 +104,59 @@ period:
         mov     ep5d, eps_gamma
 
 ; ---- 2. Encoders to positions and velocities; the difference of counts is exact -------------------------------------
+; Of the velocity only KV·v is wanted, and lengths are wanted in counts, too: exact up to 2^24, 4 m.
 .rep i, 1, 5
-.reg    p{i} dn{i}:int vel{i}
-        itof    p{i}, n{i}
-        fmul    p{i}, p{i}, count{i}
+.reg    p{i} c{i} dn{i}:int vel{i}
+        itof    c{i}, n{i}
+        fmul    p{i}, c{i}, count{i}
         isub    dn{i}, n{i}, np{i}
         mov     np{i}, n{i}
         itof    vel{i}, dn{i}
-        fmul    vel{i}, vel{i}, count{i}/Ts
+        fmul    vel{i}, vel{i}, KV*count{i}/Ts
 .endr
 
-; ---- 3. Forward kinematics, (14)-(15) --------------------------------------------------------------------------------
-; With u = (l1² - l2²)/(3R²), w = (l1² - l3²)/(3R²): y = -R/2·(u + w), x = -√3R/2·(w - u).
+; ---- 3. Forward kinematics, (14)-(15), in counts ---------------------------------------------------------------------
+; With u = l1² - l2², w = l1² - l3²: y = -(u + w)/(6R), x = -(w - u)/(2√3R).
 .reg    q1 q2 q3  u w uw  wu fx fxx fy fyy fzz fz
         .rep i, 1, 3
-        fmul    q{i}, p{i}, p{i}
+        fmul    q{i}, c{i}, c{i}
         .endr
         fsub    u, q1, q2
         fsub    w, q1, q3
-        fmul    u, u, 1/(3*R^2)
-        fmul    w, w, 1/(3*R^2)
         fadd    uw, u, w
         fsub    wu, w, u
-        fmul    fx, wu, sqrt(3)/2*R     ; -x
+        fmul    fx, wu, 1/(2*sqrt(3)*Rc) ; -x
         fmul    fxx, fx, fx
-        fmul    fy, uw, R/2
-        fadd    fy, fy, R               ; R - y
+        fmul    fy, uw, 1/(6*Rc)
+        fadd    fy, fy, Rc              ; R - y
         fmul    fyy, fy, fy
         fsub    fzz, q1, fxx
         fsub    fzz, fzz, fyy
         fsqrt   fz, fzz                 ; z = √(l1² - x² - (y - R)²)
 
-; ---- 4. Reduced masses, (23) ------------------------------------------------------------------------------------------
-; With b_i = √½/l_i: c_ij = (l_i² + l_j² - 3R²)·b_i·b_j, and
+; ---- 4. Reduced masses, (23), in kg ------------------------------------------------------------------------------------
+; With b_i = kb/l_i: 2·kb²·c_ij = (l_i² + l_j² - 3R²)·b_i·b_j, and
 ; M_ii = m_s + m_p + Σ_j [m_s·c_ij² + κ_j·(1 - c_ij²)] = 3·m_s + m_p - Σ_j (m_s - κ_j)·(1 - c_ij²),
-; m_s - κ_j = b_j·(2√2·m_s·c - 2·(J0 + m_s·c²)·b_j).
+; m_s - κ_j = 2·m_s·c/l_j - J/l_j² = J/kb²·b_j·(2·kb·m_s·c/J - b_j). kb is such that the factors J/kb² and 1/(2·kb²)² cancel.
+.const  kb = (J/4/lcount^2)^(1/6)       ; counts; in the formula m
 .reg    b1 b2 b3  t12 t13 t23 qm  s12 s13 s23  k1 k2 k3  M1 M2 M3
         .rep i, 1, 3
-        fdiv    b{i}, sqrt(0.5), p{i}
+        fdiv    b{i}, kb, c{i}
         .endr
-        fsub    qm, q1, 3*R^2
+        fsub    qm, q1, 3*Rc^2
         fadd    t12, qm, q2
         fadd    t13, qm, q3
-        fsub    qm, q2, 3*R^2
-        fadd    t23, qm, q3
+        fsub    t23, t12, w
         .rep i, 1, 3
-        fmul    k{i}, b{i}, 2*(J0 + ms*c^2)
-        fsub    k{i}, 2*sqrt(2)*ms*c, k{i}
+        fsub    k{i}, 2*kb*ms*c/J*lcount, b{i}
         fmul    k{i}, k{i}, b{i}
         .endr
-.macro  sine2   i, j                    ; s_ij = 1 - c_ij²
+.macro  sine2   i, j                    ; s_ij = (2·kb²)²·(1 - c_ij²)
 .reg    bb
         fmul    bb, b{i}, b{j}
         fmul    bb, bb, t{i}{j}
         fmul    bb, bb, bb
-        fsub    s{i}{j}, 1.0, bb
+        fsub    s{i}{j}, 4*kb^4, bb
 .endm
         sine2   1, 2
         sine2   1, 3
@@ -172,19 +173,19 @@ period:
         mass    3, 1, s13, 2, s23
 
 ; ---- 5. Gravity, (24)-(25), in closed form ----------------------------------------------------------------------------
-; G_i = l_i·λ_i·m_z·g/z; λ1 = 1/3 - (u + w)/3, λ2 = λ1 + u, λ3 = λ1 + w; m_z = m_p + 3·m_s + q·Σ 1/l_i.
+; G_i = l_i·λ_i·m_z·g/z; 3R²·λ1 = R² - (u + w)/3, 3R²·λ2 = 3R²·λ1 + u, 3R²·λ3 = 3R²·λ1 + w; m_z = m_p + 3·m_s + q·Σ 1/l_i.
 .reg    la1 la2 la3 third sb mg  G1 G2 G3
         fmul    third, uw, 1/3
-        fsub    la1, 1/3, third
+        fsub    la1, Rc^2, third
         fadd    la2, la1, u
         fadd    la3, la1, w
         fadd    sb, b1, b2
         fadd    sb, sb, b3
-        fmul    mg, sb, q*sqrt(2)*g
-        fadd    mg, mg, (mp + 3*ms)*g
+        fmul    mg, sb, q/(kb*lcount)*g/(3*Rc^2)
+        fadd    mg, mg, (mp + 3*ms)*g/(3*Rc^2)
         fdiv    mg, mg, fz
         .rep i, 1, 3
-        fmul    G{i}, p{i}, la{i}
+        fmul    G{i}, c{i}, la{i}
         fmul    G{i}, G{i}, mg
         .endr
 
@@ -216,16 +217,16 @@ period:
         fadd    step, s{i}, step
         fsat    s{i}, step, smax{i}*KI
 .endm
-.macro  control i, qd, vd, ad           ; acc_i = a_d + KP·e + KV·(v_d - v) + KI·s
-.reg    e ev
+.macro  control i, qd, vd, ad           ; acc_i = (a_d + KV·v_d) - KV·v + KP·e + KI·s
+.reg    ff e
+        fmul    ff, vd, KV
+        fadd    ff, ad, ff              ; up to here no measurement
         fsub    e, qd, p{i}
-        fsub    ev, vd, vel{i}
         integrator i, vd, e
+        fsub    ff, ff, vel{i}
         fmul    e, e, KP
-        fmul    ev, ev, KV
-        fadd    e, e, ev
         fadd    e, e, s{i}
-        fadd    acc{i}, ad, e
+        fadd    acc{i}, ff, e
 .endm
 .reg    acc1 acc2 acc3 acc4 acc5
         .rep i, 1, 3

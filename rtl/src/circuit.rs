@@ -12,6 +12,7 @@
 //! unit around another one's module has that one's codes: `//@ as alu`. The remaining ports follow from the unit's row:
 //! operands `a`, `b`, `c` as many as its instructions have sources.
 
+use crate::files;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::{fs, io};
@@ -81,6 +82,12 @@ fn computes(unit: &Unit, row: &Row) -> bool {
 }
 
 impl Library {
+    /// The files that come with this crate.
+    pub fn builtin() -> Library {
+        let files = files::UNITS.iter().map(|&(name, text)| (name.to_owned(), text.to_owned()));
+        Library { files: files.collect() }
+    }
+
     /// The files of a folder and of its folder `common`.
     ///
     /// # Errors

@@ -1,10 +1,18 @@
 //! Takt's circuit.
 //!
-//! The arithmetic units are Verilog, one module per file in `rtl/units/`. This crate binds them to the specification: what
-//! stands at the top of a unit's file says which instructions it executes ([`circuit`]), the tables of `takt-isa` say how
-//! many operands they have and how long they take.
+//! The arithmetic units are Verilog, one module per file in `rtl/units/`; so are the parts of a core in `rtl/core/`. This crate
+//! binds them to the specification: what stands at the top of a unit's file says which instructions it executes
+//! ([`circuit`]), the tables of `takt-isa` say how many operands they have and how long they take, and [`export()`] writes the
+//! complete core of a machine.
 
+pub mod bench;
 pub mod circuit;
+mod decode;
+pub mod export;
+mod files;
+pub mod synthesis;
 pub mod tables;
+pub mod wishbone;
 
 pub use circuit::{Circuit, CircuitError, Library, Operation};
+pub use export::{Design, ExportError, export};

@@ -3,15 +3,21 @@
 use anyhow::{Context, Result, bail};
 use std::path::Path;
 
+/// What synthesis measured.
+pub(crate) const SYNTHESIS: &str = "docs/synthesis.md";
+
 /// Generated files: path from the project's folder, and contents.
-fn generated() -> Vec<(&'static str, String)> {
-    vec![("docs/isa.md", takt_isa::manual::markdown())]
+fn generated() -> Result<Vec<(&'static str, String)>> {
+    Ok(vec![
+        ("docs/isa.md", takt_isa::manual::markdown()),
+        (SYNTHESIS, crate::synth::markdown(&crate::synth::recorded()?)),
+    ])
 }
 
 /// Writes every generated file, or checks that it is as it would be written.
 pub(crate) fn run(root: &Path, check: bool) -> Result<()> {
     let mut stale = Vec::new();
-    for (path, contents) in generated() {
+    for (path, contents) in generated()? {
         let file = root.join(path);
         let is_fresh = std::fs::read_to_string(&file).is_ok_and(|old| old == contents);
         if is_fresh {

@@ -2,6 +2,8 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod docs;
+mod synth;
+mod venv;
 
 use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
@@ -35,6 +37,8 @@ enum Task {
     },
     /// Format, lints, generated files: what CI checks before the tests.
     Lint,
+    /// Synthesise a machine or units, place and route them, and record clock and resources in docs/synthesis.md.
+    Synth(synth::Arguments),
     /// Fuzz the assembler and the image loader, one after the other (installs cargo-fuzz if it is not there).
     Fuzz {
         /// Minutes for each target.
@@ -48,6 +52,7 @@ fn main() -> Result<()> {
         Task::Test { full, rest } => test(full, &rest),
         Task::Docs { check } => docs::run(&root(), check),
         Task::Lint => lint(),
+        Task::Synth(arguments) => synth::synth(&arguments),
         Task::Fuzz { minutes } => fuzz(minutes),
     }
 }
@@ -91,14 +96,20 @@ const TOOLS: [(&str, &str, &str); 5] = [
 /// Installs with apt-get what the tests call and is not there.
 fn install() -> Result<()> {
     let missing = TOOLS.iter().filter(|(tool, ask, _)| !works(tool, ask));
-    let packages: Vec<&str> = missing.map(|(_, _, package)| *package).collect();
+    let mut packages: Vec<&str> = missing.map(|(_, _, package)| *package).collect();
     if packages.is_empty() {
         return Ok(());
     }
-    eprintln!("installing {} with apt-get: the tests call them", packages.join(" "));
+    packages.push("libc6-dev");
+    apt_install(&packages)
+}
+
+/// Installs Debian packages.
+fn apt_install(packages: &[&str]) -> Result<()> {
+    eprintln!("installing {} with apt-get", packages.join(" "));
     run(Command::new("apt-get").args(["update", "-qq"]))?;
     let mut install = Command::new("apt-get");
-    install.args(["install", "-y", "-qq", "--no-install-recommends", "libc6-dev"]).args(packages);
+    install.args(["install", "-y", "-qq", "--no-install-recommends"]).args(packages);
     run(install.env("DEBIAN_FRONTEND", "noninteractive"))
 }
 
@@ -137,18 +148,13 @@ fn fuzz(minutes: u32) -> Result<()> {
     }
     seed()?;
     for target in ["assemble", "image"] {
-        // cargo-fuzz wants unstable compiler flags; the variable admits them on the stable compiler. Leaks are not looked for:
-        // chumsky's recursive parsers keep each other alive, two kilobytes for each source.
-        run(cargo()
-            .env("RUSTC_BOOTSTRAP", "1")
-            .env("ASAN_OPTIONS", "detect_leaks=0")
-            .args(["fuzz", "run", target, "--"])
-            .args([
-                format!("-max_total_time={}", 60 * minutes),
-                "-max_len=65536".to_owned(),
-                "-rss_limit_mb=4096".to_owned(),
-                "-timeout=60".to_owned(),
-            ]))?;
+        // cargo-fuzz wants unstable compiler flags; the variable admits them on the stable compiler.
+        run(cargo().env("RUSTC_BOOTSTRAP", "1").args(["fuzz", "run", target, "--"]).args([
+            format!("-max_total_time={}", 60 * minutes),
+            "-max_len=65536".to_owned(),
+            "-rss_limit_mb=4096".to_owned(),
+            "-timeout=60".to_owned(),
+        ]))?;
     }
     Ok(())
 }

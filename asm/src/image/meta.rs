@@ -138,6 +138,7 @@ impl Meta {
             outputs: ports(self.outputs),
             registers: ports(self.registers),
             symbols,
+            loop_bounds: Vec::new(),
             sections: self.sections.into_iter().map(section).collect(),
             files: self.files,
             lines: self

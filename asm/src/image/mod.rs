@@ -15,7 +15,7 @@ use object::read::elf::{FileHeader as _, SectionHeader as _, Sym as _};
 use object::write::elf as write;
 use object::{Endianness, LittleEndian as LE};
 use takt_isa::encode::WORD_MASK;
-use takt_isa::program::{Space, Symbol};
+use takt_isa::program::{LoopBound, Space, Symbol};
 use takt_isa::{Machine, Program};
 
 /// The largest file that is read.
@@ -29,6 +29,8 @@ const CODE: &str = ".takt.code";
 const DATA: &str = ".takt.data";
 const CONSTANTS: &str = ".takt.constants";
 const META: &str = ".takt.meta";
+/// There only if a loop has a bound.
+const LOOPS: &str = ".takt.loops";
 
 /// Why a file is not an image that can be loaded.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
@@ -138,6 +140,14 @@ pub enum ImageError {
         /// Bundles of the program.
         bundles: u32,
     },
+    /// A bound of a loop is of no bundle, is 0, or is out of order.
+    #[error("the bound of the loop at bundle {address}: {reason}")]
+    Loop {
+        /// The bundle.
+        address: u32,
+        /// What is wrong.
+        reason: &'static str,
+    },
     /// The source lines do not fit the code.
     #[error("the source lines do not fit the code: {0}")]
     Lines(String),
@@ -167,29 +177,37 @@ pub fn write(program: &Program) -> Vec<u8> {
 fn write_elf(program: &Program, names: &[String], bytes: &mut Vec<u8>) -> Result<(), object::write::Error> {
     let code: Vec<u8> = program.code.iter().flat_map(|word| word.to_le_bytes()).collect();
     let data: Vec<u8> = program.data.iter().flat_map(|word| word.to_le_bytes()).collect();
-    let pair = |&(register, bits): &(u16, u32)| {
-        let [a, b, c, d] = u32::from(register).to_le_bytes();
-        let [e, f, g, h] = bits.to_le_bytes();
+    let pair = |(first, second): (u32, u32)| {
+        let [a, b, c, d] = first.to_le_bytes();
+        let [e, f, g, h] = second.to_le_bytes();
         [a, b, c, d, e, f, g, h]
     };
-    let constants: Vec<u8> = program.constants.iter().flat_map(pair).collect();
+    let constants = program.constants.iter().map(|&(register, bits)| (register.into(), bits));
+    let constants: Vec<u8> = constants.flat_map(pair).collect();
+    let loops = program.loop_bounds.iter().map(|bound| (bound.address, bound.most));
+    let loops: Vec<u8> = loops.flat_map(pair).collect();
     let meta = Meta::of(program).to_json();
     // First everything is given its place, then everything is written there, in the same order.
     let mut writer = write::Writer::new(Endianness::Little, false, bytes);
     writer.reserve_file_header();
-    let contents = [
+    let mut contents = vec![
         (CODE, &code[..], 8, elf::SHF_ALLOC | elf::SHF_EXECINSTR),
         (DATA, &data[..], 4, elf::SHF_ALLOC | elf::SHF_WRITE),
         (CONSTANTS, &constants[..], 4, elf::SHF_ALLOC),
         (META, &meta[..], 1, elf::SectionFlags(0)),
     ];
+    if !loops.is_empty() {
+        contents.push((LOOPS, &loops[..], 4, elf::SectionFlags(0)));
+    }
     writer.reserve_null_section_index();
-    let sections = contents.map(|(name, content, align, flags)| {
+    let mut place = |(name, content, align, flags): (&'static str, _, _, _)| {
+        let content: &[u8] = content;
         let index = writer.reserve_section_index();
         let id = writer.add_section_name(name.as_bytes());
         let offset = writer.reserve(content.len() as u64, align);
         (index, id, offset, content, align, flags)
-    });
+    };
+    let sections: Vec<_> = contents.into_iter().map(&mut place).collect();
     writer.reserve_null_symbol_index();
     let labels: Vec<_> = names
         .iter()
@@ -282,7 +300,7 @@ pub fn read(bytes: &[u8]) -> Result<Program, ImageError> {
         return Err(ImageError::Version { found: flags & 0xff });
     }
     let sections = header.sections(LE, bytes).map_err(damaged)?;
-    let section = |name: &'static str| -> Result<(usize, &[u8]), ImageError> {
+    let optional = |name: &'static str| -> Result<Option<(usize, &[u8])>, ImageError> {
         let mut found = None;
         for (index, header) in sections.iter().enumerate() {
             if sections.section_name(LE, header).map_err(damaged)? != name.as_bytes() {
@@ -296,8 +314,9 @@ pub fn read(bytes: &[u8]) -> Result<Program, ImageError> {
             }
             found = Some((index, header.data(LE, bytes).map_err(damaged)?));
         }
-        found.ok_or(ImageError::MissingSection(name))
+        Ok(found)
     };
+    let section = |name| optional(name)?.ok_or(ImageError::MissingSection(name));
     let elements = |name: &'static str, content: &[u8], element: usize| match content.len() % element {
         0 => Ok(()),
         _ => Err(ImageError::SectionSize { section: name, bytes: content.len(), element }),
@@ -311,6 +330,8 @@ pub fn read(bytes: &[u8]) -> Result<Program, ImageError> {
     elements(DATA, data, 4)?;
     let (_, constants) = section(CONSTANTS)?;
     elements(CONSTANTS, constants, 8)?;
+    let loops = optional(LOOPS)?.map_or(&[][..], |(_, loops)| loops);
+    elements(LOOPS, loops, 8)?;
     let words = |content: &[u8]| -> Vec<u32> {
         content.as_chunks::<4>().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect()
     };
@@ -344,7 +365,9 @@ pub fn read(bytes: &[u8]) -> Result<Program, ImageError> {
         }
         symbols
     };
-    let program = meta.into_program(machine, code, words(data), constants, symbols)?;
+    let mut program = meta.into_program(machine, code, words(data), constants, symbols)?;
+    let bound = |&[address, most]: &[u32; 2]| LoopBound { address, most };
+    program.loop_bounds = words(loops).as_chunks::<2>().0.iter().map(bound).collect();
     validate::program(&program)?;
     Ok(program)
 }

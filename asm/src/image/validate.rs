@@ -3,7 +3,7 @@
 use super::ImageError;
 use crate::limits;
 use std::collections::HashSet;
-use takt_isa::program::{Port, Space};
+use takt_isa::program::{LoopBound, Port, Space};
 use takt_isa::{Machine, Program, ZERO};
 
 /// The longest name of a source file.
@@ -56,7 +56,25 @@ pub(super) fn program(program: &Program) -> Result<(), ImageError> {
     names(program)?;
     labels(program)?;
     sections(program)?;
+    loops(program)?;
     lines(program)
+}
+
+fn loops(program: &Program) -> Result<(), ImageError> {
+    let mut last = None;
+    for &LoopBound { address, most } in &program.loop_bounds {
+        let reason = match () {
+            () if address >= program.bundles() => "there is no such bundle",
+            () if most == 0 => "a loop that is entered turns at least once",
+            () if last.is_some_and(|last| last >= address) => "bounds are not in ascending order",
+            () => "",
+        };
+        if !reason.is_empty() {
+            return Err(ImageError::Loop { address, reason });
+        }
+        last = Some(address);
+    }
+    Ok(())
 }
 
 fn ports(program: &Program) -> Result<(), ImageError> {

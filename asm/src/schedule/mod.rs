@@ -4,15 +4,19 @@
 //! its last. What must keep its order is an edge between two operations (see [`Block`]); everything else may move.
 //! `docs/scheduling.md` says what that means for who writes a program.
 
+mod demand;
 mod solve;
 
+pub use demand::TimingReport;
 pub use solve::Bound;
 
+use crate::diag::Sink;
 use crate::ir::{Bundle, Constant, Ir, Operation, RegisterId, RegisterKind};
 use crate::values;
-use smallvec::SmallVec;
-use solve::{Edge, Part, Problem, Solution, Task};
-use std::collections::{BTreeMap, HashMap};
+use demand::Demands;
+use smallvec::{SmallVec, smallvec};
+use solve::{Edge, Part, Problem, Task};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use takt_isa::program::{Location, Space};
 use takt_isa::{Effect, Function, Machine, Operand};
 
@@ -38,32 +42,56 @@ pub struct BlockReport {
     pub bound: Bound,
 }
 
-/// Schedules every block of bundles that ask for it ([`Bundle::scheduled`]).
-pub fn schedule(ir: &mut Ir, effort: u32) -> Vec<BlockReport> {
-    if jumps_to_numbers(ir) {
-        return Vec::new();
+/// What became of a program.
+#[derive(Clone, Debug, Default)]
+pub struct Report {
+    /// Of each block that was scheduled.
+    pub blocks: Vec<BlockReport>,
+    /// Of each demand on ports.
+    pub timing: Vec<TimingReport>,
+}
+
+/// Schedules every block of bundles that ask for it ([`Bundle::scheduled`]), and checks what is demanded of ports.
+pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
+    let fixed = jumps_to_numbers(ir);
+    if fixed && ir.demands.is_empty() {
+        return Report::default();
     }
-    let blocks = values::runs(ir);
-    let mut reports = Vec::new();
+    let runs = values::runs(ir);
+    let demands = demand::assign(ir, &runs, sink);
+    let mut report = Report::default();
     let mut bundles: Vec<Bundle> = Vec::with_capacity(ir.bundles.len());
     // New address of each block's start, by its old one.
     let mut moved = BTreeMap::new();
-    for block in &blocks {
+    for (run, demands) in runs.iter().zip(&demands) {
         let address = bundles.len() as u32;
-        moved.insert(block.start as u32, address);
-        let old = &ir.bundles[block.start..block.end];
-        if !block.scheduled || old.len() < 2 {
+        moved.insert(run.start as u32, address);
+        let old = &ir.bundles[run.start..run.end];
+        let scheduled = run.scheduled && old.len() >= 2 && !fixed;
+        if !scheduled && demands.is_empty() {
             bundles.extend_from_slice(old);
             continue;
         }
-        let (problem, origins) = Block::new(ir, old).problem();
-        let solution = solve::solve(&problem, effort);
-        let packed = pack(old, &origins, &solution);
-        reports.push(BlockReport {
+        let demands = Demands::new(ir, old, demands);
+        let mut block = Block::new(ir, old, scheduled);
+        if !scheduled {
+            let start = block.problem.as_written();
+            report.timing.extend(demands.check(&block, &start, None, scheduled, sink));
+            bundles.extend_from_slice(old);
+            continue;
+        }
+        if !demands.apply(&mut block, sink) {
+            bundles.extend_from_slice(old);
+            continue;
+        }
+        let solution = solve::solve(&block.problem, effort);
+        report.timing.extend(demands.check(&block, &solution.start, solution.window, scheduled, sink));
+        let packed = block.pack(old, &solution.start);
+        report.blocks.push(BlockReport {
             location: old.first().and_then(|bundle| bundle.operations.first()?.location),
-            label: label_at(ir, block.start as u32),
+            label: label_at(ir, run.start as u32),
             address,
-            operations: packed.iter().map(|bundle| bundle.operations.len() as u32).sum(),
+            operations: block.problem.tasks.iter().map(|task| task.parts.len() as u32).sum(),
             bundles: packed.len() as u32,
             cycles: solution.length,
             bound: solution.bound,
@@ -76,8 +104,11 @@ pub fn schedule(ir: &mut Ir, effort: u32) -> Vec<BlockReport> {
     for label in ir.labels.iter_mut().filter(|label| label.space == Space::Code) {
         label.position = relocate(label.position);
     }
+    for bound in &mut ir.loop_bounds {
+        bound.position = relocate(bound.position);
+    }
     ir.bundles = bundles;
-    reports
+    report
 }
 
 /// Whether a target is a number: then every bundle must stay at its address.
@@ -119,23 +150,20 @@ fn part(machine: &Machine, operation: &Operation) -> Part {
 /// - A load or store may fault, and what was on the output ports before must be the same: outputs written before it in the
 ///   source issue before it, outputs written after it not before it.
 /// - What redirects control comes last; what drains comes when all is written.
-struct Block<'a> {
-    machine: &'static Machine,
-    bundles: &'a [Bundle],
-    is_output: Box<dyn Fn(RegisterId) -> bool + 'a>,
+struct Block {
+    problem: Problem,
+    /// For each task the bundle that it is.
+    origins: Vec<usize>,
 }
 
-impl<'a> Block<'a> {
-    fn new(ir: &'a Ir, bundles: &'a [Bundle]) -> Block<'a> {
-        let is_output = Box::new(move |id: RegisterId| ir.register(id).kind == RegisterKind::Output);
-        Block { machine: ir.machine, bundles, is_output }
-    }
-
-    /// The problem, and for each of its tasks the bundle that it is.
-    fn problem(&self) -> (Problem, Vec<usize>) {
+impl Block {
+    /// The problem of a run of bundles. Fillers, which a schedule has no use for, are tasks only where it is as written.
+    fn new(ir: &Ir, bundles: &[Bundle], scheduled: bool) -> Block {
+        let machine = ir.machine;
+        let is_output = |id: RegisterId| ir.register(id).kind == RegisterKind::Output;
         let mut problem = Problem {
-            slots: self.machine.slots.len(),
-            units: self.machine.slots.iter().map(|slot| slot.units.len()).sum(),
+            slots: machine.slots.len(),
+            units: machine.slots.iter().map(|slot| slot.units.len()).sum(),
             ..Problem::default()
         };
         let mut origins = Vec::new();
@@ -144,18 +172,18 @@ impl<'a> Block<'a> {
         let mut readers: HashMap<RegisterId, Vec<usize>> = HashMap::new();
         let (mut store, mut loads): (Option<usize>, Vec<usize>) = (None, Vec::new());
         let (mut access, mut outputs): (Option<usize>, Vec<usize>) = (None, Vec::new());
-        for (b, bundle) in self.bundles.iter().enumerate() {
+        for (b, bundle) in bundles.iter().enumerate() {
             let effects = || bundle.operations.iter().map(|operation| operation.row().effect);
-            if !bundle.explicit && effects().all(|effect| effect == Effect::Nothing) {
-                continue; // A filler has nothing to fill here.
+            if scheduled && !bundle.explicit && effects().all(|effect| effect == Effect::Nothing) {
+                continue;
             }
             let to = problem.tasks.len();
             origins.push(b);
             let parts: Vec<Part> =
-                bundle.operations.iter().map(|operation| part(self.machine, operation)).collect();
+                bundle.operations.iter().map(|operation| part(machine, operation)).collect();
             let mut after = |from: usize, distance: u32| {
                 if from != to {
-                    problem.edges.push(Edge { from, to, distance });
+                    problem.edges.push(Edge { from, to, distance, demanded: false });
                 }
             };
             for register in bundle.operations.iter().flat_map(Operation::reads) {
@@ -164,6 +192,7 @@ impl<'a> Block<'a> {
                 }
                 readers.entry(*register).or_default().push(to);
             }
+            let mut output = None;
             for (operation, part) in bundle.operations.iter().zip(&parts) {
                 let Some(dest) = operation.dest else { continue };
                 for from in readers.remove(&dest).unwrap_or_default() {
@@ -172,7 +201,8 @@ impl<'a> Block<'a> {
                 if let Some((from, latency)) = values.insert(dest, (to, part.writes.unwrap_or(0))) {
                     after(from, latency);
                 }
-                if (self.is_output)(dest) {
+                if is_output(dest) {
+                    output = output.max(part.writes);
                     if let Some(from) = access {
                         after(from, 0);
                     }
@@ -207,24 +237,37 @@ impl<'a> Block<'a> {
                     after(from, written.filter(|_| drains).unwrap_or(0));
                 }
             }
-            problem.tasks.push(Task { parts });
+            problem.tasks.push(Task { parts, output, ..Task::default() });
         }
-        (problem, origins)
+        Block { problem, origins }
     }
-}
 
-/// The bundles of a solution: tasks that issue in one cycle become one bundle.
-fn pack(old: &[Bundle], origins: &[usize], solution: &Solution) -> Vec<Bundle> {
-    let mut by_cycle: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-    for (task, &cycle) in solution.start.iter().enumerate() {
-        by_cycle.entry(cycle).or_default().push(origins[task]);
+    /// The bundles of a schedule: tasks that issue in one cycle become one bundle. A gap that only a demand makes is filled, for
+    /// the machine would not wait.
+    fn pack(&self, old: &[Bundle], start: &[u32]) -> Vec<Bundle> {
+        let mut by_cycle: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for (&origin, &cycle) in self.origins.iter().zip(start) {
+            by_cycle.entry(cycle).or_default().push(origin);
+        }
+        let demanded = self.problem.edges.iter().filter(|edge| edge.demanded);
+        let held: BTreeSet<u32> = demanded
+            .filter(|edge| start[edge.to] == start[edge.from] + edge.distance)
+            .map(|edge| start[edge.to])
+            .collect();
+        let mut bundles = Vec::with_capacity(by_cycle.len());
+        let mut next = 0;
+        for (cycle, members) in by_cycle {
+            let mut operations: SmallVec<[Operation; 1]> =
+                members.iter().flat_map(|&b| old[b].operations.iter().copied()).collect();
+            operations.sort_by_key(|operation| operation.slot);
+            if let Some(first) = operations.first().filter(|_| held.contains(&cycle)) {
+                let filler = Bundle { operations: smallvec![first.idle()], explicit: false, scheduled: true };
+                bundles.extend(std::iter::repeat_n(filler, (cycle - next) as usize));
+            }
+            let explicit = members.iter().any(|&b| old[b].explicit);
+            bundles.push(Bundle { operations, explicit, scheduled: true });
+            next = cycle + 1;
+        }
+        bundles
     }
-    let bundle = |members: Vec<usize>| {
-        let mut operations: SmallVec<[Operation; 1]> =
-            members.iter().flat_map(|&b| old[b].operations.iter().copied()).collect();
-        operations.sort_by_key(|operation| operation.slot);
-        let explicit = members.iter().any(|&b| old[b].explicit);
-        Bundle { operations, explicit, scheduled: true }
-    };
-    by_cycle.into_values().map(bundle).collect()
 }

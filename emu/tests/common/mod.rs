@@ -19,6 +19,7 @@ pub(crate) fn program(machine: &'static Machine, source: &str) -> Program {
         outputs: Vec::new(),
         registers: Vec::new(),
         symbols: Vec::new(),
+        loop_bounds: Vec::new(),
         sections: Vec::new(),
         files: vec!["test.s".to_owned()],
         lines: Vec::new(),

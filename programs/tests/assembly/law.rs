@@ -60,8 +60,9 @@ impl Measured {
 pub(crate) struct Effort {
     /// Its value, N or N·m.
     pub(crate) value: f64,
-    /// The largest of the terms that it is the sum of: `M·a_d`, `M·KP·e`, `M·KV·e_v`, `M·KI·s`, and of gravity the
-    /// largest over the arms, since an arm that carries little has its share from a difference of thirds.
+    /// The largest of the terms that it is the sum of: `M·a_d`, `M·KP·e`, `M·KV·v_d`, `M·KV·v`, `M·KI·s`, and of gravity the
+    /// largest over the arms, since an arm that carries little has its share from a difference of thirds. The terms of the
+    /// velocities count each, for one of them can be computed before the other is measured.
     pub(crate) largest: f64,
     /// What one unit of acceleration costs: the mass, kg or kg·m².
     pub(crate) mass: f64,
@@ -105,9 +106,10 @@ impl Law {
                 load[i],
             ];
             let share = if i < 3 { heaviest } else { 0.0 };
+            let fastest = mass[i] * params::KV * v.abs().max(measured.velocity[i].abs());
             Effort {
                 value: terms.iter().sum(),
-                largest: terms.iter().fold(share, |largest, term| largest.max(term.abs())),
+                largest: terms.iter().fold(share.max(fastest), |largest, term| largest.max(term.abs())),
                 mass: mass[i],
             }
         })

@@ -94,8 +94,8 @@ fn factor(name: &str) -> &'static str {
     }
 }
 
-/// Lines that say the same in other words: `wu` is only squared.
-const EQUIVALENT: [&str; 1] = ["fsub wu, u, w"];
+/// Lines that say the same in other words: `wu` and `t23` are only squared.
+const EQUIVALENT: [&str; 2] = ["fsub wu, u, w", "fsub t23, w, t12"];
 
 /// Every mistake that is made by rule.
 fn by_rule() -> Vec<Mutation> {
@@ -138,7 +138,7 @@ fn by_rule() -> Vec<Mutation> {
 const BY_HAND: [(&str, &str); 12] = [
     ("fmul    xv, x, vx", "fmul    xv, x, vy"),
     ("fmul    za, z, az", "fmul    za, z, vz"),
-    ("fsub    {s}2, both, px2", "fsub    {s}2, sum, px2"),
+    ("fadd    {s}2, sum, e2", "fadd    {s}2, sum, px2"),
     ("fmul    w{i}, v{i}d, v{i}d", "fmul    w{i}, v{i}d, v1d"),
     ("arms    dv, 1, vx, vy, dv", "arms    dv, 2, vx, vy, dv"),
     ("mov     om5d, omega_gamma", "mov     om5d, omega_alpha"),

@@ -1,0 +1,474 @@
+//! The best and the worst that each section of a program can take, from the program alone.
+//!
+//! Every way through the program is followed with the machine's exact timing state, by the rules of
+//! [`takt_isa::timing`] that the emulator applies. Two ways that meet are one from there on only if their states time every
+//! future alike ([`Residue`]); then the shorter and the longer time are kept. Nothing else is merged, so that no assumption
+//! is made of what a delay does to what follows. `docs/analysis.md` has the argument.
+
+use crate::error::{BoundError, Refusal, place};
+use crate::graph::{Edge, Flow, Graph};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::rc::Rc;
+use takt_isa::Program;
+use takt_isa::program::Location;
+use takt_isa::timing::{self, Address, Cycle, Residue, Scoreboard};
+
+/// Straight runs of bundles and turns of loops that are gone through at most, each from each state in which it is entered.
+pub const MAX_STEPS: u64 = 1 << 20;
+/// Subroutines and counted loops within one another.
+pub const MAX_DEPTH: usize = 64;
+
+/// Cycles of a section at most.
+pub const MAX_CYCLES: Cycle = 1 << 62;
+
+/// Cycles, from the fewest to the most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Span {
+    /// No run takes fewer.
+    pub best: Cycle,
+    /// No run takes more.
+    pub worst: Cycle,
+}
+
+impl Span {
+    const NONE: Span = Span { best: 0, worst: 0 };
+
+    fn and(self, other: Span) -> Span {
+        Span { best: self.best.saturating_add(other.best), worst: self.worst.saturating_add(other.worst) }
+    }
+
+    fn or(self, other: Span) -> Span {
+        Span { best: self.best.min(other.best), worst: self.worst.max(other.worst) }
+    }
+
+    fn after(self, cycles: Cycle) -> Span {
+        self.and(Span { best: cycles, worst: cycles })
+    }
+}
+
+/// What a section can take.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SectionBounds {
+    /// The label that it begins at; of what runs once, `once`.
+    pub name: String,
+    /// Its first bundle.
+    pub address: Address,
+    /// Its place in the source.
+    pub location: Option<Location>,
+    /// The bundles that end it: `wait`s and `halt`s, ascending.
+    pub ends: Vec<Address>,
+    /// Whether it begins with reset, not with a tick.
+    pub once: bool,
+    /// Cycles that it takes: of what runs once, from reset to the issue of the `wait`, both included; of a period, from the cycle after
+    /// that of its tick to the issue of its `wait`, the tick coming when the front end has refilled
+    /// ([`takt_isa::Machine::refill`] cycles after the `wait` before, or later).
+    pub cycles: Span,
+    /// Of a period whose tick comes in time, however soon after the `wait` before.
+    pub in_time: Span,
+    /// Of a period whose tick came too early and missed the deadline: from the cycle after that of the `wait` that takes it.
+    pub missed: Span,
+}
+
+/// What the sections of a program can take.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Bounds {
+    /// First what runs once, then periods by address: one for each bundle at which a `wait` goes on.
+    pub sections: Vec<SectionBounds>,
+    /// Straight runs and turns gone through, of [`MAX_STEPS`].
+    pub steps: u64,
+}
+
+impl Bounds {
+    /// The worst of any period whose tick comes in time; `None` if there is no period.
+    pub fn worst_period(&self) -> Option<Cycle> {
+        self.sections.iter().filter(|section| !section.once).map(|section| section.in_time.worst).max()
+    }
+}
+
+/// Bounds of what each section of a program takes, whatever its inputs and data, in every run without fault.
+///
+/// # Errors
+/// Where a program cannot be bounded: see [`Refusal`].
+pub fn bound(program: &Program) -> Result<Bounds, BoundError> {
+    let graph = Graph::new(program)?;
+    let machine = program.machine;
+    let mut explorer =
+        Explorer { graph, known: HashMap::new(), orders: HashMap::new(), active: Vec::new(), steps: 0 };
+    // Tick in time or not, and what is pending when the section's first bundle is delivered.
+    let mut sections: BTreeMap<(bool, Address), SectionBounds> = BTreeMap::new();
+    let mut seen = BTreeSet::new();
+    let mut left = vec![(true, 0, Residue::default())];
+    while let Some((once, address, residue)) = left.pop() {
+        if !seen.insert((once, address, residue.clone())) {
+            continue;
+        }
+        let mut delivered = vec![residue];
+        while let Some(later) = delivered.last().filter(|last| !once && !last.is_empty()) {
+            delivered.push(later.later(1));
+        }
+        for (later, residue) in delivered.into_iter().enumerate() {
+            let region = Region::Subroutine(address);
+            let summary = explorer.explore(region, &residue)?;
+            if summary.calls > machine.stack_depth {
+                let refusal = Refusal::StackOverflow { needed: summary.calls, depth: machine.stack_depth };
+                return Err(BoundError::new(program, address, refusal));
+            }
+            for (outcome, span) in &summary.outcomes {
+                let end = match *outcome {
+                    Outcome::Wait { at, target, ref residue } => {
+                        left.push((false, target, residue.clone()));
+                        at
+                    }
+                    Outcome::Halt { at } => at,
+                    Outcome::Return { at, .. } => {
+                        return Err(BoundError::new(program, at, Refusal::StackUnderflow));
+                    }
+                    Outcome::Go { .. } => continue,
+                };
+                // The cycle of the last issue counts.
+                let refill = Cycle::from(machine.refill);
+                let plain = span.after(1 + if once { refill } else { 0 });
+                let missed = span.after(1 + refill);
+                // The tick comes in the cycle after the wait at the earliest: one cycle of the refill has passed.
+                let soonest = span.after(1 + refill.saturating_sub(1));
+                let mut in_time = plain;
+                if !once && later == 0 {
+                    in_time = in_time.or(soonest);
+                }
+                if missed.worst >= MAX_CYCLES {
+                    let what = "cycles in a section";
+                    return Err(BoundError::new(
+                        program,
+                        address,
+                        Refusal::Limit { limit: MAX_CYCLES, what },
+                    ));
+                }
+                let section = sections.entry((!once, address)).or_insert_with(|| SectionBounds {
+                    name: name(program, once, address),
+                    address,
+                    location: (address < program.bundles()).then(|| program.location(address)).flatten(),
+                    ends: Vec::new(),
+                    once,
+                    cycles: plain,
+                    in_time,
+                    missed,
+                });
+                section.cycles = section.cycles.or(plain);
+                section.in_time = section.in_time.or(in_time);
+                if later == 0 {
+                    section.missed = section.missed.or(missed);
+                }
+                if let Err(place) = section.ends.binary_search(&end) {
+                    section.ends.insert(place, end);
+                }
+            }
+        }
+    }
+    Ok(Bounds { sections: sections.into_values().collect(), steps: explorer.steps })
+}
+
+fn name(program: &Program, once: bool, address: Address) -> String {
+    match program.nearest_label(address) {
+        _ if once => "once".to_owned(),
+        Some((label, 0)) => label.to_owned(),
+        _ => format!("bundle {address}"),
+    }
+}
+
+/// A part of the program that is gone through from one bundle on.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+enum Region {
+    /// From its first bundle to a return, a `wait`, a `halt`; a section is one too.
+    Subroutine(Address),
+    /// All turns of the counted loop with this head.
+    Loop(Address),
+    /// One turn of it.
+    Turn(Address),
+}
+
+/// How a region is left. Residues are those at the delivery of the next bundle, which is also up to when cycles are counted; for `wait`,
+/// `halt`, up to the issue.
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
+enum Outcome {
+    /// To a bundle outside of a loop, or, from a turn, to the head.
+    Go {
+        edge: Edge,
+        residue: Residue,
+    },
+    Return {
+        at: Address,
+        residue: Residue,
+    },
+    /// The residue is that at the earliest delivery of the target.
+    Wait {
+        at: Address,
+        target: Address,
+        residue: Residue,
+    },
+    Halt {
+        at: Address,
+    },
+}
+
+/// What becomes of a region that is entered in some state.
+#[derive(Default, Debug)]
+struct Summary {
+    outcomes: BTreeMap<Outcome, Span>,
+    /// Entries of the return stack that it takes at most.
+    calls: u32,
+}
+
+impl Summary {
+    fn add(&mut self, outcome: Outcome, span: Span) {
+        add(&mut self.outcomes, outcome, span);
+    }
+}
+
+fn add<K: Ord>(spans: &mut BTreeMap<K, Span>, key: K, span: Span) {
+    spans.entry(key).and_modify(|known| *known = known.or(span)).or_insert(span);
+}
+
+struct Explorer<'p> {
+    graph: Graph<'p>,
+    known: HashMap<(Region, Residue), Rc<Summary>>,
+    /// For each region, its bundles so that each comes before those that follow it.
+    orders: HashMap<Region, Rc<HashMap<Address, usize>>>,
+    active: Vec<Region>,
+    steps: u64,
+}
+
+impl Explorer<'_> {
+    fn error(&self, address: Address, refusal: Refusal) -> BoundError {
+        BoundError::new(self.graph.program, address, refusal)
+    }
+
+    fn step(&mut self, address: Address) -> Result<(), BoundError> {
+        self.steps += 1;
+        if self.steps > MAX_STEPS {
+            return Err(
+                self.error(address, Refusal::Limit { limit: MAX_STEPS, what: "steps on the way here" })
+            );
+        }
+        Ok(())
+    }
+
+    fn explore(&mut self, region: Region, entry: &Residue) -> Result<Rc<Summary>, BoundError> {
+        let key = (region, entry.clone());
+        if let Some(known) = self.known.get(&key) {
+            return Ok(Rc::clone(known));
+        }
+        let (Region::Subroutine(address) | Region::Loop(address) | Region::Turn(address)) = region;
+        if self.active.len() >= MAX_DEPTH {
+            let what = "subroutines and loops within one another";
+            return Err(self.error(address, Refusal::Limit { limit: MAX_DEPTH as u64, what }));
+        }
+        if self.active.contains(&region) {
+            return Err(self.error(address, Refusal::Overlap));
+        }
+        self.active.push(region);
+        let summary = match region {
+            Region::Loop(head) => self.turns(head, entry)?,
+            Region::Subroutine(_) | Region::Turn(_) => self.ways(region, address, entry)?,
+        };
+        self.active.pop();
+        let summary = Rc::new(summary);
+        self.known.insert(key, Rc::clone(&summary));
+        Ok(summary)
+    }
+
+    /// All turns of a loop.
+    fn turns(&mut self, head: Address, entry: &Residue) -> Result<Summary, BoundError> {
+        let (most, again) = (self.graph.loops[&head].most, Edge { to: head, back: true });
+        let mut summary = Summary::default();
+        let mut heads = BTreeMap::from([(entry.clone(), Span::NONE)]);
+        for turn in 1..=most {
+            let mut next: BTreeMap<Residue, Span> = BTreeMap::new();
+            let mut left: Vec<(Outcome, Span)> = Vec::new();
+            for (residue, before) in &heads {
+                self.step(head)?;
+                let one = self.explore(Region::Turn(head), residue)?;
+                summary.calls = summary.calls.max(one.calls);
+                for (outcome, span) in &one.outcomes {
+                    let span = before.and(*span);
+                    match outcome {
+                        Outcome::Go { edge, residue } if *edge == again => {
+                            add(&mut next, residue.clone(), span)
+                        }
+                        _ => left.push((outcome.clone(), span)),
+                    }
+                }
+            }
+            // One state that leads to itself: from here on every turn is like this one.
+            let steady = heads.len() == 1 && next.keys().eq(heads.keys());
+            let each =
+                |spans: &BTreeMap<Residue, Span>| spans.values().map(|span| span.worst).max().unwrap_or(0);
+            let turns_left = Cycle::from(if steady { most - turn } else { 0 });
+            let rest = (each(&next).saturating_sub(each(&heads))).saturating_mul(turns_left);
+            for (outcome, span) in left {
+                summary.add(outcome, Span { best: span.best, worst: span.worst.saturating_add(rest) });
+            }
+            if next.is_empty() || steady {
+                break;
+            }
+            heads = next;
+        }
+        Ok(summary)
+    }
+
+    /// All ways through a subroutine, or through one turn of a loop.
+    fn ways(&mut self, region: Region, entry: Address, residue: &Residue) -> Result<Summary, BoundError> {
+        let order = self.order(region, entry)?;
+        let mut summary = Summary::default();
+        let mut left =
+            BTreeMap::from([((order[&entry], entry), BTreeMap::from([(residue.clone(), Span::NONE)]))]);
+        while let Some(((_, address), states)) = left.pop_first() {
+            for (residue, before) in states {
+                let here = if self.graph.loops.contains_key(&address) && region != Region::Turn(address) {
+                    self.explore(Region::Loop(address), &residue)?
+                } else {
+                    self.step(address)?;
+                    Rc::new(self.run(address, &residue)?)
+                };
+                summary.calls = summary.calls.max(here.calls);
+                for (outcome, span) in &here.outcomes {
+                    let span = before.and(*span);
+                    match outcome {
+                        Outcome::Go { edge, residue } if self.stays(region, edge.to) => {
+                            // Not there if a loop within this one ends outside of it.
+                            let number = order.get(&edge.to).copied();
+                            let place = number.ok_or_else(|| self.error(address, Refusal::Overlap))?;
+                            add(left.entry((place, edge.to)).or_default(), residue.clone(), span);
+                        }
+                        _ => add(&mut summary.outcomes, outcome.clone(), span),
+                    }
+                }
+            }
+        }
+        Ok(summary)
+    }
+
+    /// Whether a bundle belongs to a region, other than as the head of the turn after.
+    fn stays(&self, region: Region, to: Address) -> bool {
+        match region {
+            Region::Turn(head) => to != head && self.graph.loops[&head].body.contains(&to),
+            Region::Subroutine(_) | Region::Loop(_) => true,
+        }
+    }
+
+    /// The straight run from a bundle to where ways part or meet.
+    fn run(&mut self, entry: Address, residue: &Residue) -> Result<Summary, BoundError> {
+        let machine = self.graph.program.machine;
+        let mut scoreboard = Scoreboard::resume(machine, residue);
+        let (mut address, mut delivered) = (entry, 0);
+        let mut summary = Summary::default();
+        let (at, cycle, flow) = loop {
+            let node = self.graph.node(address)?;
+            let cycle = scoreboard.issue(&node.timing, address, delivered).cycle;
+            if node.flow != Flow::Next || self.graph.is_leader(address + 1) {
+                break (address, cycle, node.flow);
+            }
+            (address, delivered) = (address + 1, timing::after_sequential(cycle));
+        };
+        let exactly = |cycles| Span { best: cycles, worst: cycles };
+        let mut go = |to, back, delivered| {
+            let residue = scoreboard.residue(delivered);
+            summary.add(Outcome::Go { edge: Edge { to, back }, residue }, exactly(delivered));
+        };
+        let redirected = timing::after_redirect(machine, cycle);
+        match flow {
+            Flow::Next => go(at + 1, false, timing::after_sequential(cycle)),
+            Flow::Jump(target) => go(target, target <= at, redirected),
+            Flow::Branch { target, taken } => {
+                if taken != Some(false) {
+                    go(target, target <= at, redirected);
+                }
+                if taken != Some(true) {
+                    go(at + 1, false, timing::after_not_taken(machine, cycle));
+                }
+            }
+            Flow::Call(target) => {
+                if self.active.contains(&Region::Subroutine(target)) {
+                    let callee = place(self.graph.program, target);
+                    return Err(self.error(at, Refusal::Recursion { callee }));
+                }
+                let callee = self.explore(Region::Subroutine(target), &scoreboard.residue(redirected))?;
+                summary.calls = callee.calls + 1;
+                for (outcome, span) in &callee.outcomes {
+                    let outcome = match outcome {
+                        Outcome::Return { residue, .. } => {
+                            Outcome::Go { edge: Edge { to: at + 1, back: false }, residue: residue.clone() }
+                        }
+                        Outcome::Wait { at, .. } => return Err(self.error(*at, Refusal::WaitInSubroutine)),
+                        Outcome::Halt { .. } | Outcome::Go { .. } => outcome.clone(),
+                    };
+                    summary.add(outcome, span.after(redirected));
+                }
+            }
+            Flow::Return => {
+                let residue = scoreboard.residue(redirected);
+                summary.add(Outcome::Return { at, residue }, exactly(redirected));
+            }
+            Flow::Wait(target) => {
+                let residue = scoreboard.residue(redirected);
+                summary.add(Outcome::Wait { at, target, residue }, exactly(cycle));
+            }
+            Flow::Halt | Flow::Two => summary.add(Outcome::Halt { at }, exactly(cycle)),
+        }
+        Ok(summary)
+    }
+
+    /// Numbers the bundles of a region so that every way leads upwards. Counted loops within it are passed over as wholes.
+    fn order(&mut self, region: Region, entry: Address) -> Result<Rc<HashMap<Address, usize>>, BoundError> {
+        if let Some(known) = self.orders.get(&region) {
+            return Ok(Rc::clone(known));
+        }
+        let follow = |address: Address| -> Result<Vec<Address>, BoundError> {
+            let inner = self.graph.loops.get(&address).filter(|_| region != Region::Turn(address));
+            let edges: Vec<Edge> = match inner {
+                Some(inner) => inner.exits.iter().copied().collect(),
+                None => self.graph.successors(address).collect(),
+            };
+            if let Region::Turn(head) = region
+                && edges.contains(&Edge { to: head, back: false })
+            {
+                return Err(self.error(head, Refusal::Uncounted { from: place(self.graph.program, address) }));
+            }
+            Ok(edges.iter().map(|edge| edge.to).filter(|to| self.stays(region, *to)).collect())
+        };
+        // Depth first; a bundle gets its number when all that follows it has one, from the last to the first.
+        let mut order = HashMap::new();
+        let mut open = BTreeSet::from([entry]);
+        let mut stack = vec![(entry, follow(entry)?)];
+        let mut number = usize::MAX;
+        while let Some((address, following)) = stack.last_mut() {
+            let address = *address;
+            match following.pop() {
+                Some(to) if open.contains(&to) => {
+                    let from = place(self.graph.program, address);
+                    let counted = self.graph.loops.contains_key(&to);
+                    let refusal = if counted {
+                        Refusal::Uncounted { from }
+                    } else {
+                        Refusal::Unbounded { closed: from }
+                    };
+                    return Err(self.error(to, refusal));
+                }
+                Some(to) if !order.contains_key(&to) => {
+                    let follows = follow(to)?;
+                    open.insert(to);
+                    stack.push((to, follows));
+                }
+                Some(_) => {}
+                None => {
+                    order.insert(address, number);
+                    number -= 1;
+                    open.remove(&address);
+                    stack.pop();
+                }
+            }
+        }
+        let order = Rc::new(order);
+        self.orders.insert(region, Rc::clone(&order));
+        Ok(order)
+    }
+}

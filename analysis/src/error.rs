@@ -1,0 +1,117 @@
+//! Why a program has no bound.
+
+use takt_isa::Program;
+use takt_isa::program::Location;
+use takt_isa::timing::Address;
+
+/// Why no bound can be given, and where.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{place}: {refusal}")]
+pub struct BoundError {
+    /// The bundle.
+    pub address: Address,
+    /// Its place in the source, as far as the program knows it.
+    pub location: Option<Location>,
+    /// What is the matter.
+    pub refusal: Refusal,
+    /// Where it is, in words.
+    place: String,
+}
+
+/// What a [`BoundError`] is about. Nothing is ever guessed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Refusal {
+    /// A loop without a bound.
+    #[error(
+        "a loop begins here ({closed} leads back) and has no bound: write `.loop_bound N` before its first \
+         bundle, N being how often that one is executed each time the loop is entered"
+    )]
+    Unbounded {
+        /// The bundle that closes it.
+        closed: String,
+    },
+    /// A loop whose head is reached again in a way that the bound does not count.
+    #[error(
+        "this loop has a bound, but {from} leads to it again in a way that begins the count anew: let a backward \
+         jump or branch close the loop"
+    )]
+    Uncounted {
+        /// The bundle.
+        from: String,
+    },
+    /// Two loops, each of which contains the other's head.
+    #[error("this loop and another each contain the head of the other: their turns cannot be told apart")]
+    Overlap,
+    /// A bound where no jump leads back.
+    #[error(".loop_bound stands here, but no jump or branch leads back to this bundle: it heads no loop")]
+    NoLoop,
+    /// A subroutine that calls itself.
+    #[error("recursion: {callee} is being executed already when it is called here")]
+    Recursion {
+        /// The subroutine.
+        callee: String,
+    },
+    /// Calls deeper than the return stack.
+    #[error("calls nest {needed} deep from here, and the return stack holds {depth}")]
+    StackOverflow {
+        /// Entries needed.
+        needed: u32,
+        /// Entries there are.
+        depth: u32,
+    },
+    /// A return that no call leads to.
+    #[error("a return without a call: where it leads is not known")]
+    StackUnderflow,
+    /// A `wait` in a subroutine.
+    #[error("`wait` within a subroutine: where the next period returns to is not known")]
+    WaitInSubroutine,
+    /// A bundle that cannot execute.
+    #[error("illegal word in slot {slot}: {reason}")]
+    IllegalWord {
+        /// The slot.
+        slot: &'static str,
+        /// Why.
+        reason: String,
+    },
+    /// Two operations of a bundle that continue elsewhere.
+    #[error("two operations of this bundle continue elsewhere: which one wins is not known")]
+    TwoRedirections,
+    /// Execution leaves the program.
+    #[error("execution goes on past the end of the program, which has {bundles} bundles")]
+    LeavesProgram {
+        /// Bundles in the program.
+        bundles: u32,
+    },
+    /// More than the analysis takes on.
+    #[error("more than {limit} {what}: the analysis gives up")]
+    Limit {
+        /// How many there may be.
+        limit: u64,
+        /// Of what.
+        what: &'static str,
+    },
+}
+
+impl BoundError {
+    pub(crate) fn new(program: &Program, address: Address, refusal: Refusal) -> BoundError {
+        // Program::location slices, which an address far outside would overflow.
+        let location = (address < program.bundles()).then(|| program.location(address)).flatten();
+        BoundError { address, location, refusal, place: place(program, address) }
+    }
+}
+
+/// `tracking.s:40: bundle 12 (loop)`: a bundle, its line and its label.
+pub(crate) fn place(program: &Program, address: Address) -> String {
+    let mut text = format!("bundle {address}");
+    if let Some((label, distance)) = program.nearest_label(address) {
+        text.push_str(&if distance == 0 {
+            format!(" ({label})")
+        } else {
+            format!(" ({label} + {distance})")
+        });
+    }
+    match (address < program.bundles()).then(|| program.location(address)).flatten() {
+        Some(location) => format!("{}: {text}", program.place_text(location)),
+        None => text,
+    }
+}

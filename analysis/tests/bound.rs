@@ -1,0 +1,291 @@
+//! Bounds against the emulator: equal where no branch depends on data, never exceeded anywhere.
+
+use std::collections::BTreeSet;
+use std::num::NonZeroU64;
+use takt_analysis::{Bounds, Refusal, SectionBounds, bound};
+use takt_asm::{MemoryLoader, Options, assemble};
+use takt_emu::testing::{self, INPUTS, Random, random_program};
+use takt_emu::{Emulator, FaultKind, PeriodError, PeriodReport, Stop};
+use takt_isa::timing::{Address, Cycle};
+use takt_isa::{MACHINES, Machine, Program, T3};
+
+fn shipped(name: &str, machine: &'static Machine) -> Program {
+    let loader = MemoryLoader::new(takt_programs::SOURCES);
+    let options = Options { machine, ..Options::default() };
+    assemble(&format!("hybrid/{name}.s"), &loader, &options).unwrap().program
+}
+
+fn source(text: &str, machine: &'static Machine) -> Program {
+    let options = Options { machine, ..Options::default() };
+    takt_asm::assemble_bytes("test.s", text.into(), &MemoryLoader::new(&[]), &options).unwrap().program
+}
+
+/// What a section took, and how it was entered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Entered {
+    Reset,
+    /// The tick came so many cycles after the `wait`.
+    Tick(Cycle),
+    Missed,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Measured {
+    address: Address,
+    entered: Entered,
+    cycles: Cycle,
+}
+
+/// Runs a program: what ran once, then so many periods. Ends early where the program halts.
+fn measure(emulator: &mut Emulator, periods: u32, mut inputs: impl FnMut(&mut Emulator)) -> Vec<Measured> {
+    inputs(emulator);
+    let mut all = Vec::new();
+    let mut waited = match emulator.run_to_wait().unwrap() {
+        Stop::Wait { cycle, .. } => cycle,
+        stop => {
+            assert_eq!(stop, Stop::Halted);
+            emulator.now() - 1
+        }
+    };
+    all.push(Measured { address: 0, entered: Entered::Reset, cycles: waited + 1 });
+    for _ in 0..periods {
+        inputs(emulator);
+        // Where the `wait` leads, whether or not it had a tick to take.
+        let address = emulator.next_address();
+        match emulator.run_period(&[]) {
+            Ok(PeriodReport { tick, start, wait, cycles, .. }) => {
+                let entered = if start == tick && tick > waited {
+                    Entered::Tick(tick - waited)
+                } else {
+                    Entered::Missed
+                };
+                all.push(Measured { address, entered, cycles });
+                waited = wait;
+            }
+            Err(PeriodError::Halted) => break,
+            Err(error) => panic!("{error}"),
+        }
+    }
+    all
+}
+
+fn section(bounds: &Bounds, measured: Measured) -> &SectionBounds {
+    let once = measured.entered == Entered::Reset;
+    bounds
+        .sections
+        .iter()
+        .find(|section| (section.once, section.address) == (once, measured.address))
+        .unwrap_or_else(|| panic!("{measured:?} has no section in {bounds:?}"))
+}
+
+/// Asserts that what was measured lies within the bounds; whether it is both of them.
+fn check(bounds: &Bounds, measured: Measured, refill: u32) -> bool {
+    let section = section(bounds, measured);
+    let span = match measured.entered {
+        Entered::Missed => section.missed,
+        Entered::Tick(after) if after < refill.into() => section.in_time,
+        Entered::Tick(_) | Entered::Reset => section.cycles,
+    };
+    assert!(
+        span.best <= measured.cycles && measured.cycles <= span.worst,
+        "{measured:?} is not in {section:?}"
+    );
+    span.best == span.worst
+}
+
+#[test]
+fn shipped_programs_take_exactly_their_bounds() {
+    for machine in MACHINES {
+        for name in ["tracking", "tracking_literal"] {
+            let program = shipped(name, machine);
+            let bounds = bound(&program).unwrap();
+            assert_eq!(bounds.sections.len(), 3, "once, the first period, the others: {bounds:?}");
+            let worst = bounds.worst_period().unwrap();
+            let steady = bounds.sections.last().unwrap().in_time.worst;
+            for tick in [None, Some(1), Some(steady - 20), Some(steady), Some(worst + 1), Some(12_500)] {
+                let mut emulator = Emulator::new(&program).unwrap();
+                emulator.set_tick_period(tick.and_then(NonZeroU64::new));
+                let set = |emulator: &mut Emulator| {
+                    for port in &program.inputs {
+                        emulator.set_input_bits(port.register, 0).unwrap();
+                    }
+                };
+                let measured = measure(&mut emulator, 20, set);
+                assert_eq!(measured.len(), 21);
+                for &one in &measured {
+                    check(&bounds, one, machine.refill);
+                    let SectionBounds { cycles, missed, .. } = section(&bounds, one);
+                    assert_eq!(
+                        (cycles.best, missed.best),
+                        (cycles.worst, missed.worst),
+                        "{name} does not branch"
+                    );
+                }
+                // The first period begins elsewhere than the others.
+                let periods = bounds.sections.iter().filter(|section| !section.once);
+                let measured: BTreeSet<Address> = measured[1..].iter().map(|one| one.address).collect();
+                assert!(measured.into_iter().eq(periods.map(|section| section.address)));
+                // A deadline beyond the worst is kept; one that is not is missed, if only by and by: each late period
+                // leaves less of the refill hidden in the next.
+                assert_eq!(
+                    emulator.deadline_missed(),
+                    tick.is_some_and(|tick| tick <= worst),
+                    "{name} {tick:?}"
+                );
+            }
+        }
+    }
+}
+
+/// Random inputs before every period.
+fn random_inputs(random: &mut Random) -> impl FnMut(&mut Emulator) + use<'_> {
+    |emulator| {
+        for i in 0..INPUTS {
+            emulator.set_input_bits(emulator.machine().inputs.base + i, random.word()).unwrap();
+        }
+    }
+}
+
+fn random_programs(
+    options: testing::Options,
+    programs: u64,
+    mut judge: impl FnMut(u64, &Program, &Bounds, &[Measured]),
+) {
+    for machine in MACHINES {
+        for seed in 0..programs {
+            let program = random_program(seed, machine, options);
+            let bounds =
+                bound(&program).unwrap_or_else(|error| panic!("seed {seed} on {}: {error}", machine.name));
+            let mut random = Random::new(!seed);
+            for _ in 0..3 {
+                let mut emulator = Emulator::new(&program).unwrap();
+                if random.once_in(2) {
+                    emulator.set_tick_period(NonZeroU64::new(u64::from(1 + random.below(900))));
+                }
+                let measured = measure(&mut emulator, 6, random_inputs(&mut random));
+                judge(seed, &program, &bounds, &measured);
+            }
+        }
+    }
+}
+
+#[test]
+fn straight_programs_take_exactly_their_bounds() {
+    let options = testing::Options { control: false, ..testing::Options::TAME };
+    let mut kinds = [0; 3];
+    random_programs(options, 300, |seed, program, bounds, measured| {
+        for &one in measured {
+            let exact = check(bounds, one, program.machine.refill);
+            // A period that begins with what the `wait`'s own bundle left underway may depend on when the tick comes.
+            let section = section(bounds, one);
+            if one.entered == Entered::Reset {
+                assert!(exact, "seed {seed}");
+            } else if section.cycles == section.in_time {
+                assert_eq!(section.missed.best, section.missed.worst, "seed {seed}");
+            }
+            kinds[match one.entered {
+                Entered::Reset => 0,
+                Entered::Tick(_) => 1,
+                Entered::Missed => 2,
+            }] += 1;
+        }
+    });
+    assert!(kinds.iter().all(|&count| count > 500), "{kinds:?}");
+}
+
+#[test]
+fn random_programs_keep_to_their_bounds() {
+    let (mut tight, mut wide, mut reached) = (0, 0, [0; 2]);
+    random_programs(testing::Options::TAME, 300, |_, program, bounds, measured| {
+        for &one in measured {
+            if check(bounds, one, program.machine.refill) {
+                tight += 1;
+            } else {
+                wide += 1;
+                let section = section(bounds, one);
+                reached[0] += u32::from(one.cycles == section.in_time.best);
+                reached[1] += u32::from(one.cycles == section.in_time.worst);
+            }
+        }
+    });
+    // Bounds that are never reached would be no good: some runs take just the best and the worst.
+    assert!(
+        tight > 1000 && wide > 1000 && reached.iter().all(|&count| count > 50),
+        "{tight} {wide} {reached:?}"
+    );
+}
+
+/// Sources, and what a bound is refused for. Each names the line.
+#[test]
+fn what_cannot_be_bounded_is_refused() {
+    let cases = [
+        (
+            "loop: nop\n jmp loop\n",
+            "test.s:1: bundle 0 (loop): a loop begins here (test.s:2: bundle 1 (loop + 1) leads back)",
+        ),
+        (".input n\nloop: nop\n bnz n, loop\n halt\n", "test.s:2: bundle 0 (loop): a loop begins here"),
+        (".input n\n.loop_bound 3\nloop: nop\n bz n, on\n jmp loop\non: halt\n nop\n", ""),
+        (".loop_bound 3\n nop\n halt\n", "test.s:2: bundle 0: .loop_bound stands here"),
+        // Falling into the head counts anew.
+        (
+            ".input n\n jmp head\na: jmp head\n.loop_bound 3\nhead: bz n, a\n bnz n, head\n halt\n",
+            "test.s:5: bundle 2 (head): this loop has a bound, but test.s:3: bundle 1 (a) leads to it again",
+        ),
+        (" call f\n halt\nf: nop\n call f\n ret\n", "test.s:4: bundle 3 (f + 1): recursion"),
+        (" call f\n halt\nf: call g\n ret\ng: call f\n ret\n", "test.s:5: bundle 4 (g): recursion"),
+        (" nop\n ret\n", "test.s:2: bundle 1: a return without a call"),
+        (" call f\n halt\nf: wait f\n", "test.s:3: bundle 2 (f): `wait` within a subroutine"),
+        (" nop\n nop\n", "bundle 2: execution goes on past the end"),
+        (" .raw aux 0\n halt\n", "illegal word in slot aux"),
+    ];
+    for (text, wanted) in cases {
+        let result = bound(&source(text, &T3));
+        match result {
+            Ok(_) => assert_eq!(wanted, "", "{text}"),
+            Err(error) => {
+                assert!(!wanted.is_empty() && error.to_string().contains(wanted), "{text}: {error}");
+            }
+        }
+    }
+    let calls: String = (0..20).map(|i| format!("f{i}: call f{}\n ret\n", i + 1)).collect();
+    let error = bound(&source(&format!(" call f0\n halt\n{calls}f20: ret\n"), &T3)).unwrap_err();
+    assert!(matches!(error.refusal, Refusal::StackOverflow { needed: 21, depth: 16 }), "{error}");
+}
+
+/// `turns` rounds of a loop with another of 3 in it; the counter's register is `n`.
+fn nest(turns: u32, bound: u32) -> String {
+    format!(
+        ".reg n:int m:int\n.output k:int\n.once\n li n, {turns}\n.loop_bound {bound}\nouter: li m, 3\n.loop_bound 3\n\
+         inner: isub m, m, 1\n bnz m, inner\n isub n, n, 1\n bnz n, outer\n mov k, n\n halt\n"
+    )
+}
+
+#[test]
+fn counted_loops_are_bounded_by_their_turns() {
+    for machine in MACHINES {
+        for turns in [1, 2, 7, 1000] {
+            let program = source(&nest(turns, turns), machine);
+            let bounds = bound(&program).unwrap();
+            let mut emulator = Emulator::new(&program).unwrap();
+            assert_eq!(emulator.run(), Ok(Stop::Halted));
+            assert_eq!(bounds.sections[0].cycles.worst, emulator.now(), "all turns are taken: the worst");
+            // One turn fewer is a fault, in both ways of execution.
+            if turns > 1 {
+                let program = source(&nest(turns, turns - 1), machine);
+                for blocks in [true, false] {
+                    let mut emulator = Emulator::new(&program).unwrap();
+                    emulator.set_blocks(blocks);
+                    let fault = emulator.run().unwrap_err();
+                    assert_eq!(fault.kind, FaultKind::LoopBound { most: turns - 1 });
+                    assert!(fault.to_string().starts_with("test.s:6: bundle 1"), "{fault}");
+                }
+            }
+        }
+        // A steady loop takes no longer to bound the longer it turns.
+        let bounds = bound(&source(&nest(u32::MAX, u32::MAX), machine)).unwrap();
+        let small = bound(&source(&nest(1000, 1000), machine)).unwrap().sections[0].cycles.worst;
+        let each = small - bound(&source(&nest(999, 999), machine)).unwrap().sections[0].cycles.worst;
+        assert_eq!(bounds.sections[0].cycles.worst, small + each * (Cycle::from(u32::MAX) - 1000));
+        assert!(bounds.steps < 1000, "{}", bounds.steps);
+    }
+}

@@ -1,0 +1,408 @@
+//! What the source demands of ports (`.deadline`, `.order`, `.late`): which run of bundles it is about, what it means for the
+//! scheduling problem, whether a schedule keeps it, and who stands in the way if none can.
+
+use super::Block;
+use super::solve::{Edge, Problem};
+use crate::diag::{Diagnostic, Sink};
+use crate::ir::{Bundle, Demand, DemandKind, Ir, Operation, RegisterId, RegisterKind};
+use crate::source::Span;
+use crate::values::Run;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// Pairs of reads and writes that the orders of a run may give: far beyond what a port is used for.
+const ORDER_EDGES: usize = 1 << 16;
+
+/// Places of a chain of operations that an error points at.
+const SHOWN: usize = 8;
+
+/// What became of a demand that is met: `.late` directives of a run are one.
+#[derive(Clone, Debug)]
+pub struct TimingReport {
+    /// What was demanded.
+    pub kind: DemandKind,
+    /// Whether of `.period`, else of `.once`.
+    pub period: bool,
+    /// For each port its name and the cycles in which it was first and last read, or written. The first bundle of the
+    /// section issues in cycle 1; in a later run of bundles that of the run does.
+    pub ports: Vec<(String, u32, u32)>,
+    /// For inputs read late: cycles from the first read to the last write of an output that depends on one, and what no
+    /// schedule can be shorter than.
+    pub window: Option<(u32, u32)>,
+}
+
+/// A read or write of a port.
+#[derive(Clone, Copy)]
+struct Event {
+    task: usize,
+    /// Cycles after the task's issue.
+    after: u32,
+    span: Span,
+}
+
+/// For each run the demands that are about it, by index. Those that cannot be told from the runs are reported.
+pub(super) fn assign(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Vec<Vec<usize>> {
+    let mut assigned = vec![Vec::new(); runs.len()];
+    if ir.demands.is_empty() {
+        return assigned;
+    }
+    for (number, demand) in ir.demands.iter().enumerate() {
+        let is_of_section = |run: &&Run| (run.start >= ir.period as usize) == demand.period;
+        let section = if demand.period { ".period" } else { ".once" };
+        // The runs that use each port, and where first.
+        let mut users: Vec<(usize, RegisterId, Span)> = Vec::new();
+        for (index, run) in runs.iter().enumerate().filter(|(_, run)| is_of_section(run)) {
+            let operations = ir.bundles[run.start..run.end].iter().flat_map(|bundle| &bundle.operations);
+            for operation in operations {
+                for &(port, _) in demand.ports.iter().filter(|(port, _)| uses(ir, operation, *port)) {
+                    if !users.iter().any(|&(run, other, _)| (run, other) == (index, port)) {
+                        users.push((index, port, operation.span));
+                    }
+                }
+            }
+        }
+        if !matches!(demand.kind, DemandKind::Late(_)) {
+            let unused =
+                demand.ports.iter().find(|(port, _)| !users.iter().any(|(_, other, _)| other == port));
+            if let Some((port, span)) = unused {
+                let name = &ir.register(*port).name;
+                let message = format!("`{name}` is neither read nor written in `{section}`");
+                let help = "the directive is about the section in which it stands";
+                sink.push(Diagnostic::error("timing", *span, message).help(help));
+                continue;
+            }
+            let first = match demand.kind {
+                DemandKind::Deadline(_) => runs.iter().position(|run| is_of_section(&run)),
+                _ => users.first().map(|(run, ..)| *run),
+            };
+            if let Some((_, port, span)) = users.iter().find(|(run, ..)| Some(*run) != first) {
+                let name = &ir.register(*port).name;
+                let (message, what) = match demand.kind {
+                    DemandKind::Deadline(_) => (
+                        format!("in which cycle `{name}` is written is not known"),
+                        format!("written after a place that cuts `{section}`"),
+                    ),
+                    _ => (
+                        "the order of what is not in one straight run is that of the source".to_owned(),
+                        format!("`{name}` is used in another run"),
+                    ),
+                };
+                let error = Diagnostic::error("timing", demand.span, message).also(*span, what);
+                sink.push(error.note(
+                    "labels, branches, calls, `rdflags` and `clrflags` cut a section into runs; times are known within one",
+                ));
+                continue;
+            }
+        }
+        let mut of: Vec<usize> = users.iter().map(|(run, ..)| *run).collect();
+        of.sort_unstable();
+        of.dedup();
+        for run in of {
+            assigned[run].push(number);
+        }
+    }
+    assigned
+}
+
+/// Whether an operation reads an input port, or writes an output port. (That a program reads its own output, nobody sees.)
+fn uses(ir: &Ir, operation: &Operation, port: RegisterId) -> bool {
+    match ir.register(port).kind {
+        RegisterKind::Output => operation.dest == Some(port),
+        _ => operation.reads().contains(&port),
+    }
+}
+
+/// A run's problem and its demands.
+pub(super) struct Demands<'a> {
+    ir: &'a Ir,
+    bundles: &'a [Bundle],
+    /// Of the whole program.
+    of: &'a [usize],
+}
+
+impl<'a> Demands<'a> {
+    pub(super) fn new(ir: &'a Ir, bundles: &'a [Bundle], of: &'a [usize]) -> Demands<'a> {
+        Demands { ir, bundles, of }
+    }
+
+    /// Reads and writes of a port, in the order of the source.
+    fn events(&self, block: &Block, port: RegisterId) -> Vec<Event> {
+        let mut events = Vec::new();
+        for (task, &origin) in block.origins.iter().enumerate() {
+            let parts = block.problem.tasks[task].parts.iter();
+            for (operation, part) in self.bundles[origin].operations.iter().zip(parts) {
+                let span = operation.span;
+                if uses(self.ir, operation, port) {
+                    let after = if operation.dest == Some(port) { part.writes.unwrap_or(0) } else { 0 };
+                    events.push(Event { task, after, span });
+                }
+            }
+        }
+        events.sort_by_key(|event| block.origins[event.task]);
+        events
+    }
+
+    fn name(&self, port: RegisterId) -> &'a str {
+        &self.ir.register(port).name
+    }
+
+    /// Adds to a problem what is demanded. Reports what cannot be, and then gives false.
+    pub(super) fn apply(&self, block: &mut Block, sink: &mut Sink) -> bool {
+        self.order(block, sink) && {
+            let mut possible = true;
+            for &number in self.of {
+                let demand = &self.ir.demands[number];
+                match demand.kind {
+                    DemandKind::Order => {}
+                    DemandKind::Late(cost) => {
+                        block.problem.slack = block.problem.slack.max(cost);
+                        for &(port, _) in &demand.ports {
+                            for event in self.events(block, port) {
+                                block.problem.tasks[event.task].late = true;
+                            }
+                        }
+                    }
+                    DemandKind::Deadline(limit) => {
+                        for &(port, span) in &demand.ports {
+                            let Some(last) = self.last(block, port) else { continue };
+                            possible &= self.can_meet(block, limit, port, span, last, sink);
+                            let latest = (limit - 1).saturating_sub(last.after);
+                            let task = &mut block.problem.tasks[last.task];
+                            task.latest = Some(task.latest.map_or(latest, |other| other.min(latest)));
+                        }
+                    }
+                }
+            }
+            possible
+        }
+    }
+
+    fn last(&self, block: &Block, port: RegisterId) -> Option<Event> {
+        self.events(block, port).into_iter().rfind(|event| event.after > 0)
+    }
+
+    /// Adds the orders as edges, and sorts the tasks so that every edge leads to a later one.
+    fn order(&self, block: &mut Block, sink: &mut Sink) -> bool {
+        let mut ordered: Vec<(&Demand, usize, Event, Event)> = Vec::new();
+        for &number in self.of {
+            let demand = &self.ir.demands[number];
+            if demand.kind != DemandKind::Order {
+                continue;
+            }
+            for (at, pair) in demand.ports.windows(2).enumerate() {
+                let (before, after) = (self.events(block, pair[0].0), self.events(block, pair[1].0));
+                // Of writes, which keep their own order, the last and the first are enough.
+                let writes = |events: &[Event]| events.iter().all(|event| event.after > 0);
+                let before =
+                    if writes(&before) { &before[before.len().saturating_sub(1)..] } else { &before };
+                let after = if writes(&after) { &after[..after.len().min(1)] } else { &after };
+                if before.len().saturating_mul(after.len()) > ORDER_EDGES - ordered.len() {
+                    let message = format!("more than {ORDER_EDGES} pairs of reads and writes to order");
+                    sink.push(Diagnostic::error("limit", demand.span, message));
+                    return false;
+                }
+                for &x in before {
+                    ordered.extend(after.iter().map(|&y| (demand, at, x, y)));
+                }
+            }
+        }
+        for (demand, at, x, y) in &ordered {
+            // `y` happens after `x` does. That it also issues no sooner is more than is asked, and keeps bundles in order.
+            let distance = (x.after + 1).saturating_sub(y.after);
+            if x.task == y.task {
+                self.contradiction(demand, *at, x, y, "one bundle uses both", sink);
+                return false;
+            }
+            block.problem.edges.push(Edge { from: x.task, to: y.task, distance, demanded: true });
+        }
+        if ordered.iter().all(|(_, _, x, y)| x.task < y.task) || sort(block) {
+            return true;
+        }
+        // There is a cycle, which only an order can have closed.
+        let mut succs = vec![Vec::new(); block.problem.tasks.len()];
+        for edge in &block.problem.edges {
+            succs[edge.from].push(edge.to);
+        }
+        for (demand, at, x, y) in ordered {
+            let mut seen = vec![false; succs.len()];
+            let mut reached = vec![y.task];
+            while let Some(task) = reached.pop() {
+                if !std::mem::replace(&mut seen[task], true) {
+                    reached.extend_from_slice(&succs[task]);
+                }
+            }
+            if seen[x.task] {
+                self.contradiction(demand, at, &x, &y, "it must wait for it", sink);
+                break;
+            }
+        }
+        false
+    }
+
+    fn contradiction(&self, demand: &Demand, at: usize, x: &Event, y: &Event, why: &str, sink: &mut Sink) {
+        let name = |index: usize| self.name(demand.ports[index].0);
+        let does = |event: &Event| if event.after > 0 { "written" } else { "read" };
+        let message = format!("`{}` cannot come before `{}`: {why}", name(at), name(at + 1));
+        let error = Diagnostic::error("timing", demand.ports[at].1.to(demand.ports[at + 1].1), message)
+            .here("this order")
+            .also(x.span, format!("`{}` is {} here", name(at), does(x)))
+            .also(y.span, format!("`{}` is {} here", name(at + 1), does(y)));
+        sink.push(error.note("results, memory, faults and other orders say what waits for what"));
+    }
+
+    /// Whether a port can be written by a cycle for all that is known before the search; if not, says who stands in the way.
+    fn can_meet(
+        &self,
+        block: &Block,
+        limit: u32,
+        port: RegisterId,
+        span: Span,
+        last: Event,
+        sink: &mut Sink,
+    ) -> bool {
+        let keep = block.problem.before(|i| i == last.task);
+        let (part, kept) = block.problem.part(&keep, |i| (i == last.task).then_some(last.after));
+        let bound = part.bound();
+        if bound.cycles() <= limit {
+            return true;
+        }
+        let name = self.name(port);
+        let cycles = bound.cycles();
+        let mut error =
+            Diagnostic::error("timing", span, format!("`{name}` cannot be written before cycle {cycles}"))
+                .here(format!("demanded in cycle {limit}"));
+        let operation = |task: usize| self.bundles[block.origins[kept[task]]].operations.first();
+        if bound.critical_path == cycles {
+            let chain: Vec<usize> = part.chain().into_iter().filter(|&task| task < kept.len()).collect();
+            error = error.note(format!("a chain of {} dependent operations leads there", chain.len()));
+            // Of a long chain its first and its last, which bring what is computed and what for.
+            let (head, tail) = (SHOWN / 2, chain.len().saturating_sub(SHOWN / 2));
+            let shown = (1..).zip(&chain).filter(|(place, _)| *place <= head || *place > tail);
+            for (place, operation) in shown.filter_map(|(place, &task)| Some((place, operation(task)?))) {
+                error = error.also(operation.span, format!("{place} of the chain"));
+            }
+        } else {
+            let slots = self.ir.machine.slots;
+            let units = || slots.iter().flat_map(|slot| slot.units);
+            let slot = bound.slots.iter().position(|slot| *slot == cycles);
+            let unit = bound.units.iter().position(|unit| *unit == cycles);
+            let (what, count) = match (slot, unit) {
+                (Some(slot), _) => {
+                    let parts = part.tasks.iter().flat_map(|task| &task.parts);
+                    (format!("slot `{}`", slots[slot].name), parts.filter(|part| part.slot == slot).count())
+                }
+                (None, unit) => {
+                    let parts = part.tasks.iter().flat_map(|task| &task.parts);
+                    let name = unit.and_then(|unit| units().nth(unit)).map_or("", |unit| unit.name);
+                    (format!("unit `{name}`"), parts.filter(|part| part.unit == unit).count())
+                }
+            };
+            error = error.note(format!("{what} has {count} operations to issue for it, one after another"));
+            error = error.also(last.span, "written here");
+        }
+        sink.push(error.help(format!("allow cycle {cycles} or later, or compute less before it")));
+        false
+    }
+
+    /// Whether a schedule keeps the demands, and when what was read and written. Reports what is not kept.
+    pub(super) fn check(
+        &self,
+        block: &Block,
+        start: &[u32],
+        window: Option<(u32, u32)>,
+        scheduled: bool,
+        sink: &mut Sink,
+    ) -> Vec<TimingReport> {
+        let mut reports: Vec<TimingReport> = Vec::new();
+        for demand in self.of.iter().map(|&number| &self.ir.demands[number]) {
+            let is_late = |kind| matches!(kind, DemandKind::Late(_));
+            // What stands as it is written is not to be made late.
+            if is_late(demand.kind) && !scheduled {
+                continue;
+            }
+            let cycle = |event: &Event| start[event.task] + event.after + 1;
+            let mut ports: Vec<(String, u32, u32)> = Vec::new();
+            let mut before: Option<(RegisterId, u32)> = None;
+            for &(port, span) in &demand.ports {
+                let events = self.events(block, port);
+                let (Some(first), Some(last)) =
+                    (events.iter().map(cycle).min(), events.iter().map(cycle).max())
+                else {
+                    continue;
+                };
+                let name = self.name(port);
+                let help = if scheduled {
+                    "`takt asm --effort` lets the scheduler search longer"
+                } else {
+                    "`.schedule on` lets the assembler order the operations"
+                };
+                match (demand.kind, before) {
+                    (DemandKind::Deadline(limit), _) if last > limit => {
+                        let message = format!("`{name}` is written in cycle {last}, demanded in {limit}");
+                        let mut error = Diagnostic::error("timing", span, message);
+                        if let Some(event) = self.last(block, port) {
+                            let keep = block.problem.before(|i| i == event.task);
+                            let ends = |i| (i == event.task).then_some(event.after);
+                            let bound = block.problem.part(&keep, ends).0.bound().cycles();
+                            error = error
+                                .also(event.span, "written here")
+                                .note(format!("by itself it cannot be written before cycle {bound}"));
+                        }
+                        sink.push(error.help(help));
+                    }
+                    (DemandKind::Order, Some((other, end))) if first <= end => {
+                        let other = self.name(other);
+                        let message =
+                            format!("`{name}` comes in cycle {first}, and `{other}` before it in {end}");
+                        sink.push(Diagnostic::error("timing", span, message).help(help));
+                    }
+                    _ => {}
+                }
+                before = Some((port, last));
+                ports.push((name.to_owned(), first, last));
+            }
+            let window = window.filter(|_| is_late(demand.kind));
+            match reports.iter_mut().find(|report| is_late(report.kind)) {
+                Some(report) if is_late(demand.kind) => report.ports.extend(ports),
+                _ => reports.push(TimingReport { kind: demand.kind, period: demand.period, ports, window }),
+            }
+        }
+        reports
+    }
+}
+
+/// Sorts the tasks by their edges, else as they stand. False if there is a cycle.
+fn sort(block: &mut Block) -> bool {
+    let n = block.problem.tasks.len();
+    let mut succs = vec![Vec::new(); n];
+    let mut waiting = vec![0u32; n];
+    for edge in &block.problem.edges {
+        succs[edge.from].push(edge.to);
+        waiting[edge.to] += 1;
+    }
+    let mut ready: BinaryHeap<Reverse<usize>> = (0..n).filter(|&i| waiting[i] == 0).map(Reverse).collect();
+    let mut order = Vec::with_capacity(n);
+    while let Some(Reverse(task)) = ready.pop() {
+        order.push(task);
+        for &next in &succs[task] {
+            waiting[next] -= 1;
+            if waiting[next] == 0 {
+                ready.push(Reverse(next));
+            }
+        }
+    }
+    if order.len() < n {
+        return false;
+    }
+    let mut place = vec![0; n];
+    for (new, &old) in order.iter().enumerate() {
+        place[old] = new;
+    }
+    let Problem { tasks, edges, .. } = &mut block.problem;
+    *tasks = order.iter().map(|&old| tasks[old].clone()).collect();
+    block.origins = order.iter().map(|&old| block.origins[old]).collect();
+    for edge in edges {
+        (edge.from, edge.to) = (place[edge.from], place[edge.to]);
+    }
+    true
+}

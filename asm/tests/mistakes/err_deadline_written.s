@@ -1,0 +1,11 @@
+; What stands as it is written is held to its demands, too.
+.input  a, b
+.output x, y
+.reg    t
+.period
+period: .deadline y = 11
+        .order  y, x
+        fmul    t, a, b
+        fadd    x, a, b
+        fadd    y, t, b
+        wait    period

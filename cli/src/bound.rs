@@ -1,0 +1,180 @@
+//! `takt bound`: the best and the worst that each section can take, from the program alone.
+
+use crate::files::{self, Out};
+use crate::load::Load;
+use crate::output::{self, Failure};
+use crate::select::{self, OptionalMachine};
+use anyhow::{Result, anyhow, bail};
+use clap::Args;
+use serde_json::{Value, json};
+use std::io::Write;
+use std::path::PathBuf;
+use takt_analysis::{Bounds, SectionBounds, Span};
+use takt_isa::Program;
+use takt_isa::timing::Cycle;
+
+/// Bound the cycles of each section, whatever the inputs.
+///
+/// Follows every way through the program with the machine's exact timing. Loops need `.loop_bound N` before their first bundle, which
+/// the emulator checks. What cannot be bounded for certain is an error.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Bound {
+    /// Source or image; `-` is standard input.
+    file: PathBuf,
+    #[command(flatten)]
+    machine: OptionalMachine,
+    /// Fail (status 1) unless every period ends before the next tick, this time after its own: `100us`, `0.1ms`, or a
+    /// number of cycles.
+    #[arg(long, value_name = "TIME", value_parser = deadline, allow_negative_numbers = true)]
+    deadline: Option<Deadline>,
+    /// Clock in MHz, for a deadline in seconds and for cycles to time.
+    #[arg(long, value_name = "MHZ", default_value_t = select::PAPER_CLOCK, value_parser = select::clock, allow_negative_numbers = true)]
+    clock: f64,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  takt bound prog.s                                  best and worst of every section
+  takt bound prog.s --deadline 100us --clock 125MHz  for CI: status 1 if a period can take longer";
+
+/// The time from one tick to the next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Deadline {
+    Cycles(Cycle),
+    Seconds(f64),
+}
+
+fn deadline(text: &str) -> Result<Deadline, String> {
+    const UNITS: [(&str, f64); 5] = [("ns", 1e-9), ("us", 1e-6), ("µs", 1e-6), ("ms", 1e-3), ("s", 1.0)];
+    if let Ok(cycles) = select::count(text) {
+        return Ok(Deadline::Cycles(cycles));
+    }
+    let wrong = || "neither a time (`100us`, `0.1ms`) nor a number of cycles".to_owned();
+    let unit = UNITS.iter().find_map(|(unit, seconds)| Some((text.strip_suffix(unit)?, *seconds)));
+    let (number, scale) = unit.ok_or_else(wrong)?;
+    let seconds = number.trim_end().parse::<f64>().map_err(|_| wrong())? * scale;
+    if (1e-9..=1e6).contains(&seconds) { Ok(Deadline::Seconds(seconds)) } else { Err(wrong()) }
+}
+
+impl Deadline {
+    /// Whole cycles from tick to tick. A time that is a whole number of cycles but for rounding is that number.
+    fn cycles(self, clock: f64) -> Cycle {
+        match self {
+            Deadline::Cycles(cycles) => cycles,
+            Deadline::Seconds(seconds) => (seconds * clock * 1e6 + 1e-6).floor() as Cycle,
+        }
+    }
+}
+
+/// The deadline against the worst period.
+struct Verdict {
+    deadline: Cycle,
+    worst: Cycle,
+}
+
+impl Verdict {
+    /// The tick of the next period must come after the cycle in which `wait` issues.
+    fn kept(&self) -> bool {
+        self.worst < self.deadline
+    }
+}
+
+pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
+    files::check(&[("FILE", &arguments.file)], &[])?;
+    let program = Load::new(arguments.machine.machine, color).program(&arguments.file)?;
+    let bounds = takt_analysis::bound(&program).map_err(|error| anyhow!("no bound: {error}"))?;
+    let verdict = match (arguments.deadline, bounds.worst_period()) {
+        (None, _) => None,
+        (Some(_), None) => bail!("a deadline, and the program has no period: it never waits for the tick"),
+        (Some(deadline), Some(worst)) => Some(Verdict { deadline: deadline.cycles(arguments.clock), worst }),
+    };
+    if arguments.json {
+        output::json(&result_json(arguments, &program, &bounds, verdict.as_ref()), out)?;
+    } else {
+        write_text(arguments, &program, &bounds, verdict.as_ref(), out)?;
+    }
+    match verdict {
+        Some(verdict) if !verdict.kept() => Err(Failure::Reported.into()),
+        _ => Ok(()),
+    }
+}
+
+fn result_json(arguments: &Bound, program: &Program, bounds: &Bounds, verdict: Option<&Verdict>) -> Value {
+    let span = |span: Span| json!({ "best": span.best, "worst": span.worst });
+    let section = |section: &SectionBounds| {
+        let mut value = json!({
+            "name": section.name,
+            "address": section.address,
+            "place": section.location.map(|location| program.place_text(location)),
+            "ends": section.ends,
+            "once": section.once,
+            "cycles": span(section.cycles),
+        });
+        if !section.once {
+            value["in_time"] = span(section.in_time);
+            value["missed"] = span(section.missed);
+        }
+        value
+    };
+    json!({
+        "program": files::input_name(&arguments.file),
+        "machine": program.machine.name,
+        "sections": bounds.sections.iter().map(section).collect::<Vec<_>>(),
+        "deadline": verdict.map(|verdict| json!({
+            "cycles": verdict.deadline,
+            "clock_mhz": arguments.clock,
+            "worst": verdict.worst,
+            "kept": verdict.kept(),
+        })),
+    })
+}
+
+fn write_text(
+    arguments: &Bound,
+    program: &Program,
+    bounds: &Bounds,
+    verdict: Option<&Verdict>,
+    out: &mut Out,
+) -> Result<()> {
+    let text = |span: Span| match span.best == span.worst {
+        true => span.worst.to_string(),
+        false => format!("{} to {}", span.best, span.worst),
+    };
+    let (clock, refill) = (arguments.clock, program.machine.refill);
+    let microseconds = |cycles: Cycle| format!("{:.3} µs", cycles as f64 / clock);
+    writeln!(out, "cycles on {}, whatever the inputs", program.machine.name)?;
+    let width = bounds.sections.iter().map(|section| section.name.len()).max().unwrap_or(0);
+    for section in &bounds.sections {
+        let place = section.location.map_or_else(String::new, |location| program.place_text(location));
+        let (name, time) = (&section.name, microseconds(section.cycles.worst));
+        writeln!(out, "  {name:<width$}  {:>12}  {time:>12}  {place}", text(section.cycles))?;
+    }
+    for section in bounds.sections.iter().filter(|section| !section.once) {
+        writeln!(
+            out,
+            "{}: {} if the tick comes less than {refill} cycles after the wait, {} after a missed deadline",
+            section.name,
+            text(section.in_time),
+            text(section.missed)
+        )?;
+    }
+    if let Some(verdict) = verdict {
+        let Verdict { deadline, worst } = *verdict;
+        let time = microseconds(deadline);
+        if verdict.kept() {
+            let spare = deadline - 1 - worst;
+            writeln!(out, "deadline of {deadline} cycles ({time} at {clock} MHz): kept, {spare} to spare")?;
+        } else {
+            writeln!(
+                out,
+                "deadline of {deadline} cycles ({time} at {clock} MHz): not kept, a period can take {worst} and \
+                 must take fewer than {deadline}"
+            )?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,265 @@
+//! `takt cosim`: a program on the circuit and on the emulator, in lockstep.
+
+use crate::files::{self, Out};
+use crate::load::Load;
+use crate::output::{self, Failure};
+use crate::ports::Inputs;
+use crate::select::{self, OptionalMachine};
+use anyhow::{Result, bail};
+use clap::Args;
+use serde_json::{Value, json};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use takt_cosim::{Difference, Lockstep, LockstepError, Model, Simulation, cache_folder, random};
+use takt_isa::{MACHINES, Machine, Program};
+use takt_rtl::{Design, Library, export};
+
+/// Run a program on the circuit, in Verilator, and on the emulator, and compare every cycle.
+///
+/// Compared are the cycle and address of every bundle that issues, every register, flag, data word and output port that is
+/// written, missed deadlines, halts and faults. Each row of --inputs is one period. With --seed or --programs it is random
+/// programs that run. On a difference the waveform around it is written.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Cosim {
+    /// Source or image; `-` is standard input.
+    #[arg(required_unless_present_any = ["seed", "programs"], conflicts_with_all = ["seed", "programs"])]
+    file: Option<PathBuf>,
+    #[command(flatten)]
+    machine: OptionalMachine,
+    /// CSV with one named column for each input port and one row for each period; `-` is standard input.
+    #[arg(long, value_name = "CSV", requires = "file")]
+    inputs: Option<PathBuf>,
+    /// Run at most this many periods [default: one for each row; without --inputs, 100].
+    #[arg(long, value_name = "N", value_parser = select::count, requires = "file", allow_negative_numbers = true)]
+    periods: Option<u64>,
+    /// Run random programs, the first from this seed [default: 0].
+    #[arg(long, value_name = "S")]
+    seed: Option<u64>,
+    /// Run so many random programs [default: 1].
+    #[arg(long, value_name = "N", value_parser = select::count, allow_negative_numbers = true)]
+    programs: Option<u64>,
+    /// Where the waveform of a difference goes, as VCD.
+    #[arg(long, value_name = "FILE", default_value = "cosim.vcd")]
+    waveform: PathBuf,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  takt track --periods 100 --csv in.csv            record inputs,
+  takt cosim programs/hybrid/tracking.s --inputs in.csv   and run the circuit on them
+  takt cosim --programs 10000 --machine t1         random programs
+  takt cosim --seed 4711                           one of them again";
+
+/// Cycles before a difference from which the waveform shows it, and after it.
+const SHOWN: (u64, u64) = (64, 16);
+
+/// Periods without `--inputs`.
+const PERIODS: u64 = 100;
+
+pub(crate) fn run(arguments: &Cosim, color: bool, out: &mut Out) -> Result<()> {
+    let mut reads: Vec<(&'static str, &Path)> = Vec::new();
+    reads.extend(arguments.file.as_deref().map(|path| ("FILE", path)));
+    reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
+    files::check(&reads, &[("--waveform", &arguments.waveform)])?;
+    match &arguments.file {
+        Some(file) => one(arguments, file, color, out),
+        None => many(arguments, out),
+    }
+}
+
+fn model(machine: &'static Machine) -> Result<(Design, Model)> {
+    let design = export(machine, &Library::builtin())?;
+    let model = Model::build(&design, &cache_folder(), false)?;
+    Ok((design, model))
+}
+
+/// A program from a file.
+fn one(arguments: &Cosim, file: &Path, color: bool, out: &mut Out) -> Result<()> {
+    let program = Load::new(arguments.machine.machine, color).program(file)?;
+    let rows = match &arguments.inputs {
+        Some(path) => {
+            let mut inputs = Inputs::open(path, &program.inputs)?;
+            let (mut rows, mut values) = (Vec::new(), Vec::new());
+            while arguments.periods.is_none_or(|periods| (rows.len() as u64) < periods)
+                && inputs.next(&mut values)?
+            {
+                rows.push(values.clone());
+            }
+            rows
+        }
+        None => {
+            // What no row gives is zero: an input that was never written would be a fault.
+            let zero = program.inputs.iter().map(|port| (port.register, 0)).collect();
+            vec![zero; arguments.periods.unwrap_or(PERIODS) as usize]
+        }
+    };
+    let (design, model) = model(program.machine)?;
+    let ran = run_rows(&program, &rows, model.start(&[])?);
+    let result = match ran {
+        Ok(result) => result,
+        Err(error) => {
+            let again = |simulation| run_rows(&program, &rows, simulation).map(|_| ());
+            return report(arguments, &design, error, None, out, again);
+        }
+    };
+    if arguments.json {
+        return output::json(
+            &json!({
+                "machine": program.machine.name,
+                "periods": result.periods,
+                "cycles": result.cycles,
+                "events": result.events,
+                "stopped": result.stopped,
+                "difference": Value::Null,
+            }),
+            out,
+        );
+    }
+    writeln!(
+        out,
+        "{} periods on {}, {} cycles: {} events, no difference",
+        result.periods, program.machine.name, result.cycles, result.events
+    )?;
+    if let Some(stopped) = result.stopped {
+        writeln!(out, "  both sides stopped: {stopped}")?;
+    }
+    Ok(())
+}
+
+struct Ran {
+    periods: u64,
+    cycles: u64,
+    events: u64,
+    stopped: Option<String>,
+}
+
+fn run_rows(
+    program: &Program,
+    rows: &[Vec<(u16, u32)>],
+    simulation: Simulation,
+) -> Result<Ran, LockstepError> {
+    let first = rows.first().map(Vec::as_slice).unwrap_or_default();
+    let mut lockstep = Lockstep::new(program, simulation, first)?;
+    let mut periods = 0;
+    for row in rows {
+        let ended = !lockstep.run_period(row);
+        lockstep.compare()?;
+        if ended {
+            break;
+        }
+        periods += 1;
+    }
+    lockstep.finish()?;
+    let halted = matches!(lockstep.emulator().status(), takt_emu::Status::Halted { .. });
+    let stopped = lockstep.fault().map(ToString::to_string).or(halted.then(|| "halt".to_owned()));
+    let ran = Ran { periods, cycles: lockstep.emulator().now(), events: lockstep.compared(), stopped };
+    lockstep.into_simulation().finish();
+    Ok(ran)
+}
+
+/// Random programs.
+fn many(arguments: &Cosim, out: &mut Out) -> Result<()> {
+    let machine = arguments.machine.machine.unwrap_or(MACHINES[0]);
+    let first = arguments.seed.unwrap_or(0);
+    let count = arguments.programs.unwrap_or(1);
+    let Some(end) = first.checked_add(count) else { bail!("seeds end at {}", u64::MAX) };
+    let (design, model) = model(machine)?;
+    let mut simulation = model.start(&[])?;
+    let mut coverage = random::Coverage::default();
+    for seed in first..end {
+        simulation = match random::run(seed, machine, simulation, &mut coverage) {
+            Ok(simulation) => simulation,
+            Err(error) => {
+                let again = |simulation| {
+                    random::run(seed, machine, simulation, &mut random::Coverage::default())
+                        .map(Simulation::finish)
+                };
+                return report(arguments, &design, error, Some(seed), out, again);
+            }
+        };
+    }
+    if arguments.json {
+        return output::json(
+            &json!({
+                "machine": machine.name,
+                "seeds": [first, end - 1],
+                "programs": coverage.programs,
+                "cycles": coverage.cycles,
+                "events": coverage.events,
+                "instructions": coverage.operations,
+                "hazards": coverage.hazards.len(),
+                "stalls": coverage.stalls,
+                "faults": coverage.faults,
+                "difference": Value::Null,
+            }),
+            out,
+        );
+    }
+    writeln!(
+        out,
+        "{} random programs on {}, seeds {first} to {}: {} cycles, {} events, no difference",
+        coverage.programs,
+        machine.name,
+        end - 1,
+        coverage.cycles,
+        coverage.events
+    )?;
+    writeln!(
+        out,
+        "  {} instructions, {} pairs of which the second waited for the first; faults: {}",
+        coverage.operations.len(),
+        coverage.hazards.len(),
+        coverage.faults.iter().copied().collect::<Vec<_>>().join(", ")
+    )?;
+    Ok(())
+}
+
+/// Tells of a difference, and runs again for its waveform.
+fn report(
+    arguments: &Cosim,
+    design: &Design,
+    error: LockstepError,
+    seed: Option<u64>,
+    out: &mut Out,
+    again: impl FnOnce(Simulation) -> Result<(), LockstepError>,
+) -> Result<()> {
+    let LockstepError::Difference(difference) = error else { return Err(error.into()) };
+    let waveform = waveform(arguments, design, &difference, again)?;
+    let name = arguments.waveform.display();
+    if arguments.json {
+        output::json(
+            &json!({
+                "machine": design.machine.name,
+                "seed": seed,
+                "difference": {
+                    "cycle": difference.cycle,
+                    "instruction": difference.instruction,
+                    "text": difference.to_string(),
+                    "waveform": waveform.then(|| name.to_string()),
+                },
+            }),
+            out,
+        )?;
+        return Err(Failure::Reported.into());
+    }
+    let program = seed.map_or(String::new(), |seed| format!("random program {seed}: "));
+    let shown = if waveform { format!("\n  waveform: {name}") } else { String::new() };
+    bail!("{program}circuit and emulator differ in {difference}{shown}")
+}
+
+/// Writes the waveform; whether the difference came again.
+fn waveform(
+    arguments: &Cosim,
+    design: &Design,
+    difference: &Difference,
+    again: impl FnOnce(Simulation) -> Result<(), LockstepError>,
+) -> Result<bool> {
+    let model = Model::build(design, &cache_folder(), true)?;
+    let mut simulation = model.start(&[arguments.waveform.as_os_str()])?;
+    simulation.trace(difference.cycle.saturating_sub(SHOWN.0), difference.cycle + SHOWN.1)?;
+    Ok(matches!(again(simulation), Err(LockstepError::Difference(_))))
+}

@@ -1,0 +1,68 @@
+//! `takt rtl`: the circuit of a machine as Verilog.
+
+use crate::files::{self, Out};
+use crate::load::Load;
+use crate::output;
+use crate::select::OptionalMachine;
+use anyhow::{Context, Result};
+use clap::Args;
+use serde_json::json;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use takt_isa::MACHINES;
+use takt_rtl::{Library, bench, export};
+
+/// Write the circuit of a machine: a complete Verilog design, with a test bench.
+///
+/// The folder then holds the core and its parts, one module per file; `<machine>.f`, the list of them for other tools; a top
+/// level for synthesis without a board; a test bench, which with --program runs that program.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Rtl {
+    /// The folder; it is made if it is not there.
+    #[arg(long, short, value_name = "DIR")]
+    output: PathBuf,
+    #[command(flatten)]
+    machine: OptionalMachine,
+    /// Source or image whose memory image the test bench loads; `-` is standard input.
+    #[arg(long, value_name = "FILE")]
+    program: Option<PathBuf>,
+    /// Print what was written as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  takt rtl -o t3                                 the fast machine
+  takt rtl -o t1 --machine t1 --program prog.s   the small one, and a program for its test bench
+  cd t1 && iverilog -g2005 -f takt_t1_bench.f -o bench && ./bench";
+
+pub(crate) fn run(arguments: &Rtl, color: bool, out: &mut Out) -> Result<()> {
+    let load = Load::new(arguments.machine.machine, color);
+    let program = arguments.program.as_deref().map(|path| load.program(path)).transpose()?;
+    let machine = match (&program, arguments.machine.machine) {
+        (Some(program), _) => program.machine,
+        (None, machine) => machine.unwrap_or(MACHINES[0]),
+    };
+    let design = export(machine, &Library::builtin())?;
+    let mut written = Vec::new();
+    for file in bench::folder(&design, program.as_ref()) {
+        write(&arguments.output, &file.name, &file.text)?;
+        written.push(file.name);
+    }
+    if arguments.json {
+        return output::json(&json!({ "machine": machine.name, "top": design.top, "files": written }), out);
+    }
+    let folder = arguments.output.display();
+    writeln!(out, "{} files in {folder}; the core is {}.v", written.len(), design.top)?;
+    Ok(())
+}
+
+fn write(folder: &Path, name: &str, text: &str) -> Result<()> {
+    let path = folder.join(name);
+    let parent = path.parent().unwrap_or(folder);
+    std::fs::create_dir_all(parent)
+        .with_context(|| format!("cannot make the folder {}", parent.display()))?;
+    files::write(&path, text.as_bytes())
+}

@@ -1,0 +1,12 @@
+//! The circuit against the emulator, in lockstep.
+//!
+//! [`Model`] compiles an exported design with Verilator, [`Lockstep`] runs a program on it and on the emulator and compares all
+//! that can be seen, cycle by cycle: bundles that issue, registers, flags and memory that are written, output ports, deadlines,
+//! halts, faults. [`random`] makes programs and inputs for it.
+
+mod lockstep;
+mod model;
+pub mod random;
+
+pub use lockstep::{Difference, Lockstep, LockstepError};
+pub use model::{CircuitEvent, EventKind, Model, ModelError, Pin, Simulation, cache_folder};

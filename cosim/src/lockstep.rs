@@ -1,0 +1,370 @@
+//! A program on both sides.
+
+use crate::model::{CircuitEvent, EventKind, ModelError, Pin, Simulation};
+use std::fmt::Write as _;
+use takt_emu::{Emulator, Event, Fault, FaultKind, LoadError, Status, Stop};
+use takt_isa::Program;
+use takt_isa::spec::units::MAX_LATENCY;
+use takt_isa::timing::Cycle;
+use takt_rtl::export::{INPUT_DELAY, TICK_DELAY};
+use thiserror::Error;
+
+/// The circuit tells of an event at most so many cycles after it.
+const REPORT_DELAY: Cycle = 3;
+
+/// Why a lockstep run came to no result.
+#[derive(Debug, Error)]
+pub enum LockstepError {
+    /// The emulator does not take the program.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// The simulation does not run.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The two sides differ.
+    #[error(transparent)]
+    Difference(#[from] Box<Difference>),
+}
+
+/// The first thing in which the two sides differ.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Difference {
+    /// Its cycle.
+    pub cycle: Cycle,
+    /// What the emulator says, if it says anything that the circuit does not.
+    pub emulator: Option<CircuitEvent>,
+    /// What the circuit says.
+    pub circuit: Option<CircuitEvent>,
+    /// The instruction and its place in the source, as far as the event has them.
+    pub instruction: String,
+    text: String,
+}
+
+impl std::fmt::Display for Difference {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+impl std::error::Error for Difference {}
+
+/// A program on the emulator and on the circuit.
+///
+/// The emulator goes ahead; [`Lockstep::compare`] lets the circuit follow. Inputs and ticks that the emulator is given are
+/// put on the circuit's pins so much earlier that they are seen in the same cycle.
+pub struct Lockstep {
+    emulator: Emulator,
+    simulation: Simulation,
+    expected: Vec<CircuitEvent>,
+    found: Vec<CircuitEvent>,
+    pins: Vec<(Cycle, Pin)>,
+    /// The first cycle whose input pin is free.
+    free_pin: Cycle,
+    simulated: Cycle,
+    compared: u64,
+    stopped: Option<Fault>,
+}
+
+impl Lockstep {
+    /// Loads a program and the first values of input ports, by register.
+    ///
+    /// # Errors
+    /// If a side does not take it.
+    pub fn new(
+        program: &Program,
+        mut simulation: Simulation,
+        inputs: &[(u16, u32)],
+    ) -> Result<Lockstep, LockstepError> {
+        let mut emulator = Emulator::new(program)?;
+        for &(register, bits) in inputs {
+            // A register that is no input is refused by both sides alike.
+            let _ = emulator.set_input_bits(register, bits);
+        }
+        simulation.load(program, inputs)?;
+        Ok(Lockstep {
+            emulator,
+            simulation,
+            expected: Vec::new(),
+            found: Vec::new(),
+            pins: Vec::new(),
+            free_pin: 0,
+            simulated: 0,
+            compared: 0,
+            stopped: None,
+        })
+    }
+
+    /// The emulator.
+    pub fn emulator(&self) -> &Emulator {
+        &self.emulator
+    }
+
+    /// The fault that the emulator stopped with.
+    pub fn fault(&self) -> Option<&Fault> {
+        self.stopped.as_ref()
+    }
+
+    /// Events that were the same on both sides.
+    pub fn compared(&self) -> u64 {
+        self.compared
+    }
+
+    /// The simulation, to be used for another program.
+    pub fn into_simulation(self) -> Simulation {
+        self.simulation
+    }
+
+    /// Asks for the tick in a cycle to come.
+    pub fn tick_at(&mut self, cycle: Cycle) {
+        if cycle >= TICK_DELAY + self.simulated && self.emulator.tick_at(cycle) {
+            self.pins.push((cycle - TICK_DELAY, Pin::Tick));
+        }
+    }
+
+    /// Sets an input port, by its register: bundles that issue from now on see the value. Inputs that are set at the same
+    /// time reach the circuit one a cycle; returns the cycle in which this one does.
+    pub fn set_input(&mut self, register: u16, bits: u32) -> Cycle {
+        let index = register.wrapping_sub(self.emulator.machine().inputs.base);
+        let pin = self.emulator.now().saturating_sub(INPUT_DELAY).max(self.free_pin);
+        if self.emulator.set_input_bits(register, bits).is_ok() {
+            self.free_pin = pin + 1;
+            self.pins.push((pin, Pin::Input { index, value: bits }));
+        }
+        pin + INPUT_DELAY
+    }
+
+    /// Lets the emulator run until `cycle` cycles have passed; false if it stopped before.
+    pub fn run_until(&mut self, cycle: Cycle) -> bool {
+        self.drive(|observed| observed.run_until(cycle)) == Some(Stop::Reached)
+    }
+
+    /// Sets inputs, raises the tick as soon as the circuit has them and the front end is refilled, and lets the emulator run
+    /// until the next `wait` issues; false if it stopped before. The first call also runs the part before the first `wait`.
+    pub fn run_period(&mut self, inputs: &[(u16, u32)]) -> bool {
+        let limit = self.emulator.now() + 1_000_000;
+        self.emulator.set_cycle_limit(limit);
+        if matches!(self.emulator.status(), Status::Running)
+            && !matches!(self.drive(|observed| observed.run_to_wait()), Some(Stop::Wait { .. }))
+        {
+            return false;
+        }
+        let Status::Waiting { since, .. } = *self.emulator.status() else { return false };
+        let mut tick = since + 1 + Cycle::from(self.emulator.machine().refill);
+        for &(register, bits) in inputs {
+            tick = tick.max(self.set_input(register, bits));
+        }
+        self.tick_at(tick);
+        matches!(self.drive(|observed| observed.run_to_wait()), Some(Stop::Wait { .. }))
+    }
+
+    fn drive(
+        &mut self,
+        run: impl FnOnce(&mut takt_emu::Observed<'_>) -> Result<Stop, Fault>,
+    ) -> Option<Stop> {
+        let expected = &mut self.expected;
+        let mut sink = |event: &Event| expected.extend(expect(event));
+        match run(&mut self.emulator.observed(&mut sink)) {
+            Ok(stop) => Some(stop),
+            Err(fault) => {
+                self.stopped = Some(fault);
+                None
+            }
+        }
+    }
+
+    /// Lets the circuit follow, as far as the inputs to come allow, and compares.
+    ///
+    /// # Errors
+    /// A difference, or a simulation that ended.
+    pub fn compare(&mut self) -> Result<(), LockstepError> {
+        // What the host does next stands on the pins INPUT_DELAY cycles before now.
+        let now = self.emulator.now().saturating_sub(INPUT_DELAY + 1);
+        if now > self.simulated {
+            self.simulate(now)?;
+        }
+        let horizon = self.simulated.saturating_sub(REPORT_DELAY);
+        self.check(|event| event.cycle < horizon)
+    }
+
+    /// Lets the circuit run to the end and compares the rest.
+    ///
+    /// # Errors
+    /// As [`Lockstep::compare`].
+    pub fn finish(&mut self) -> Result<(), LockstepError> {
+        let now = self.emulator.now();
+        self.simulate((now + Cycle::from(MAX_LATENCY)).max(self.simulated) + REPORT_DELAY)?;
+        match (&self.stopped, self.emulator.status()) {
+            // A tick that comes after the halt is no event to the emulator.
+            (None, &Status::Halted { cycle, .. }) => self.check(|event| {
+                event.cycle <= cycle || !matches!(event.kind, EventKind::Missed | EventKind::Lost)
+            }),
+            (None, _) => self.check(|event| event.cycle < now),
+            (Some(fault), _) => {
+                let (cycle, shown) = (fault.cycle, fault_code(&fault.kind).is_some());
+                self.check(|event| {
+                    let wrote = matches!(
+                        event.kind,
+                        EventKind::Retire | EventKind::Port | EventKind::Missed | EventKind::Lost
+                    );
+                    event.cycle < cycle || event.cycle == cycle && (wrote || shown)
+                })
+            }
+        }
+    }
+
+    fn simulate(&mut self, until: Cycle) -> Result<(), LockstepError> {
+        self.pins.sort_by_key(|&(cycle, _)| cycle);
+        let due = self.pins.partition_point(|&(cycle, _)| cycle < until);
+        let pins: Vec<_> = self.pins.drain(..due).collect();
+        self.found.extend(self.simulation.run(until, &pins)?);
+        self.simulated = until;
+        Ok(())
+    }
+
+    /// Compares the events of which the answer is known, in order.
+    fn check(&mut self, known: impl Fn(&CircuitEvent) -> bool) -> Result<(), LockstepError> {
+        let take = |events: &mut Vec<CircuitEvent>| {
+            let (mut taken, left): (Vec<_>, Vec<_>) = events.drain(..).partition(|event| known(event));
+            *events = left;
+            taken.sort_unstable();
+            taken
+        };
+        let (expected, found) = (take(&mut self.expected), take(&mut self.found));
+        let same = expected.iter().zip(&found).take_while(|(a, b)| a == b).count();
+        self.compared += same as u64;
+        match (expected.get(same), found.get(same)) {
+            (None, None) => Ok(()),
+            (emulator, circuit) => Err(Box::new(self.difference(emulator, circuit)).into()),
+        }
+    }
+
+    fn difference(&self, emulator: Option<&CircuitEvent>, circuit: Option<&CircuitEvent>) -> Difference {
+        // Events of one place are shown side by side; else the earlier one is what the other side lacks.
+        let place = |event: &CircuitEvent| (event.cycle, event.kind, event.slot);
+        let (emulator, circuit) = match (emulator, circuit) {
+            (Some(a), Some(b)) if place(a) < place(b) => (Some(a), None),
+            (Some(a), Some(b)) if place(a) > place(b) => (None, Some(b)),
+            pair => pair,
+        };
+        let event = emulator.or(circuit).copied();
+        let cycle = event.map_or(0, |event| event.cycle);
+        let program = self.emulator.program();
+        let mut instruction = String::new();
+        if let Some(event) = event
+            && !matches!(event.kind, EventKind::Store | EventKind::Port | EventKind::Missed | EventKind::Lost)
+        {
+            let slot = (event.kind == EventKind::Retire).then_some(event.slot);
+            instruction = describe(program, event.address, slot);
+        }
+        let side =
+            |event: Option<&CircuitEvent>| event.map_or("nothing".to_owned(), |event| show(program, event));
+        let at = if instruction.is_empty() { String::new() } else { format!(" at {instruction}") };
+        let text =
+            format!("cycle {cycle}{at}\n  emulator: {}\n  circuit:  {}", side(emulator), side(circuit));
+        Difference { cycle, emulator: emulator.copied(), circuit: circuit.copied(), instruction, text }
+    }
+}
+
+/// `bundle 12 (tracking.s:40): fadd a1, a2, a3`, with one slot's instruction or all.
+fn describe(program: &Program, address: u32, slot: Option<u8>) -> String {
+    let mut text = format!("bundle {address}");
+    if let Some(location) = (address < program.bundles()).then(|| program.location(address)).flatten() {
+        let _ = write!(text, " ({})", program.place_text(location));
+    }
+    let machine = program.machine;
+    let words = program.words(address).unwrap_or_default().iter().enumerate();
+    let shown: Vec<String> = words
+        .filter(|(s, _)| slot.is_none_or(|slot| usize::from(slot) == *s))
+        .map(|(s, &word)| match takt_isa::Instruction::decode(word) {
+            Ok(instruction) => instruction.text(machine, s),
+            Err(_) => format!("0x{word:012x}"),
+        })
+        .collect();
+    if !shown.is_empty() {
+        let _ = write!(text, ": {}", shown.join(" || "));
+    }
+    text
+}
+
+fn show(program: &Program, event: &CircuitEvent) -> String {
+    let name = || program.register_text(event.register);
+    let slot = || program.machine.slots.get(usize::from(event.slot)).map_or("?", |slot| slot.name);
+    let flags = takt_isa::fp::Flags::from_bits(event.flags);
+    match event.kind {
+        EventKind::Issue => format!("issues bundle {}", event.address),
+        EventKind::Store => format!("stores 0x{:08x} in data word {}", event.value, event.address),
+        EventKind::Retire => format!(
+            "slot {} writes {} = 0x{:08x}, flags {flags}, for bundle {}",
+            slot(),
+            name(),
+            event.value,
+            event.address
+        ),
+        EventKind::Port => format!("output port {} takes 0x{:08x}", name(), event.value),
+        EventKind::Missed => "the deadline is missed".to_owned(),
+        EventKind::Lost => "the tick is lost".to_owned(),
+        EventKind::Halt => "halts".to_owned(),
+        EventKind::Fault => {
+            let kind = match event.register {
+                1 => "illegal word",
+                2 => "data address",
+                3 => "return stack full",
+                4 => "return stack empty",
+                _ => "unknown",
+            };
+            format!("fault ({kind}) at bundle {}, slot {}", event.address, slot())
+        }
+    }
+}
+
+/// The circuit's number for a fault; `None` for one that only the emulator knows.
+fn fault_code(kind: &FaultKind) -> Option<u16> {
+    match kind {
+        FaultKind::IllegalWord(_) | FaultKind::ProgramCounter { .. } => Some(1),
+        FaultKind::DataAddress { .. } => Some(2),
+        FaultKind::StackOverflow { .. } => Some(3),
+        FaultKind::StackUnderflow => Some(4),
+        FaultKind::UnwrittenRegister { .. } | FaultKind::LoopBound { .. } | FaultKind::CycleLimit { .. } => {
+            None
+        }
+    }
+}
+
+/// What the circuit is expected to show of an event of the emulator.
+fn expect(event: &Event) -> Option<CircuitEvent> {
+    let bare =
+        |kind, cycle| CircuitEvent { cycle, kind, slot: 0, address: 0, register: 0, value: 0, flags: 0 };
+    Some(match *event {
+        Event::Issue { cycle, address } => CircuitEvent { address, ..bare(EventKind::Issue, cycle) },
+        Event::Retire(retire) => match (retire.register, retire.memory) {
+            (Some(register), _) => CircuitEvent {
+                slot: retire.slot,
+                address: retire.address,
+                register,
+                value: retire.value,
+                flags: retire.flags.bits(),
+                ..bare(EventKind::Retire, retire.cycle)
+            },
+            (None, Some(address)) => {
+                CircuitEvent { address, value: retire.value, ..bare(EventKind::Store, retire.cycle) }
+            }
+            (None, None) => return None,
+        },
+        Event::PortWrite(write) => CircuitEvent {
+            slot: write.slot,
+            register: write.register,
+            value: write.value,
+            ..bare(EventKind::Port, write.cycle)
+        },
+        Event::DeadlineMissed { cycle } => bare(EventKind::Missed, cycle),
+        Event::TickLost { cycle } => bare(EventKind::Lost, cycle),
+        Event::Halt { cycle, .. } => bare(EventKind::Halt, cycle),
+        Event::Fault(ref fault) => CircuitEvent {
+            slot: fault.slot.unwrap_or(0),
+            address: fault.address,
+            register: fault_code(&fault.kind)?,
+            ..bare(EventKind::Fault, fault.cycle)
+        },
+        Event::Tick { .. } | Event::Wait { .. } => return None,
+    })
+}

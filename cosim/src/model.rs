@@ -1,0 +1,342 @@
+//! A core in Verilator: built once for each design and kept, run as a process.
+
+use std::collections::hash_map::DefaultHasher;
+use std::ffi::OsStr;
+use std::fs;
+use std::hash::{Hash, Hasher};
+use std::io::{ErrorKind, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use takt_isa::Program;
+use takt_isa::timing::Cycle;
+use takt_rtl::Design;
+use takt_rtl::bench::{LoadRecord, Space, load_records};
+use takt_rtl::export::RESET_CYCLES;
+use thiserror::Error;
+
+/// The other half of [`Simulation`].
+const DRIVER: &str = include_str!("driver.cpp");
+
+/// Why the circuit cannot be simulated.
+#[derive(Debug, Error)]
+pub enum ModelError {
+    /// A tool is not there.
+    #[error("{tool} is not installed; on Debian: apt-get install {package}")]
+    Missing {
+        /// The program.
+        tool: &'static str,
+        /// Debian's package that has it.
+        package: &'static str,
+    },
+    /// A tool failed.
+    #[error("{tool} failed:\n{text}")]
+    Tool {
+        /// The program.
+        tool: &'static str,
+        /// What it said.
+        text: String,
+    },
+    /// A file cannot be written or read.
+    #[error("{path}: {source}")]
+    File {
+        /// The file.
+        path: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The simulation ended.
+    #[error("the simulation ended early: {0}")]
+    Ended(String),
+}
+
+fn file_error(path: &Path) -> impl FnOnce(std::io::Error) -> ModelError {
+    let path = path.display().to_string();
+    move |source| ModelError::File { path, source }
+}
+
+/// A design compiled for simulation.
+#[derive(Clone, Debug)]
+pub struct Model {
+    program: PathBuf,
+}
+
+/// Where compiled designs are kept: `takt` in the user's cache folder.
+pub fn cache_folder() -> PathBuf {
+    let from = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    from("XDG_CACHE_HOME")
+        .or_else(|| from("HOME").map(|home| home.join(".cache")))
+        .unwrap_or_else(std::env::temp_dir)
+        .join("takt")
+}
+
+fn run(tool: &'static str, package: &'static str, command: &mut Command) -> Result<String, ModelError> {
+    let output = command.output().map_err(|error| match error.kind() {
+        ErrorKind::NotFound => ModelError::Missing { tool, package },
+        _ => ModelError::Tool { tool, text: error.to_string() },
+    })?;
+    let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    if output.status.success() {
+        Ok(text.into_owned())
+    } else {
+        Err(ModelError::Tool { tool, text: text.into_owned() })
+    }
+}
+
+/// What the driver must know of the machine.
+fn ports(design: &Design) -> String {
+    let slots = design.machine.slots;
+    let mut text = format!(
+        "#define SLOTS {}\n#define RESET_CYCLES {RESET_CYCLES}\nextern Vcore *the_core();\n\
+         template <class F> static void outputs_of(Vcore *core, F f) {{\n",
+        slots.len()
+    );
+    for (s, slot) in slots.iter().enumerate() {
+        let (b, first) = (slot.bank.name, slot.bank.base + slot.bank.depth - design.machine.outputs_per_bank);
+        text.push_str(&format!(
+            "    f({s}, core->output_{b}_write && !core->rst, {first} + core->output_{b}_index, core->output_{b}_value);\n"
+        ));
+    }
+    text.push_str("}\n#define outputs(...) outputs_of(core, __VA_ARGS__)\n");
+    text
+}
+
+impl Model {
+    /// Compiles a design, or finds it in the folder as it was compiled before. With `trace` it can write waveforms.
+    ///
+    /// # Errors
+    /// If Verilator or a C++ compiler is missing or fails.
+    pub fn build(design: &Design, folder: &Path, trace: bool) -> Result<Model, ModelError> {
+        let version = run("verilator", "verilator", Command::new("verilator").arg("--version"))?;
+        let ports = ports(design);
+        let mut hasher = DefaultHasher::new();
+        (version, DRIVER, &ports, trace).hash(&mut hasher);
+        for file in &design.files {
+            (&file.name, &file.text).hash(&mut hasher);
+        }
+        let name = format!("{}-{:016x}", design.top, hasher.finish());
+        let program = folder.join(&name);
+        if program.exists() {
+            return Ok(Model { program });
+        }
+        let work = folder.join(format!("{name}.{}.partial", std::process::id()));
+        let compiled = compile(design, &ports, &work, trace)
+            .and_then(|built| fs::rename(built, &program).map_err(file_error(&program)));
+        let _ = fs::remove_dir_all(&work);
+        compiled.map(|()| Model { program })
+    }
+
+    /// Starts a simulation. A model that can trace writes its waveform to the first argument; others are Verilog's plusargs.
+    ///
+    /// # Errors
+    /// If the process cannot be started.
+    pub fn start(&self, arguments: &[&OsStr]) -> Result<Simulation, ModelError> {
+        let mut process = Command::new(&self.program)
+            .args(arguments)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(file_error(&self.program))?;
+        let (stdin, stdout) = (process.stdin.take(), process.stdout.take());
+        Ok(Simulation { process, stdin, stdout })
+    }
+}
+
+fn compile(design: &Design, ports: &str, work: &Path, trace: bool) -> Result<PathBuf, ModelError> {
+    let write = |name: &str, text: &str| {
+        let path = work.join(name);
+        let parent = path.parent().unwrap_or(work);
+        fs::create_dir_all(parent).map_err(file_error(parent))?;
+        fs::write(&path, text).map_err(file_error(&path))?;
+        Ok(path)
+    };
+    let mut sources = Vec::new();
+    for file in &design.files {
+        sources.push(write(&file.name, &file.text)?);
+    }
+    let driver = write("driver.cpp", DRIVER)?;
+    write("ports.h", ports)?;
+    // X becomes random: what the circuit does not initialise must not matter.
+    let mut command = Command::new("verilator");
+    command.args(["--cc", "--exe", "--build", "-O3", "--x-assign", "unique", "--x-initial", "unique"]);
+    command.args(["--prefix", "Vcore", "--top-module", &design.top, "-o", "simulation"]);
+    command.args(["-CFLAGS", "-O1 -std=gnu++17", "-MAKEFLAGS", "OPT_FAST=-O1 OPT_SLOW=-O0 OPT_GLOBAL=-O1"]);
+    if trace {
+        command.args(["--trace", "-CFLAGS", "-DTRACE"]);
+    }
+    command.arg("-CFLAGS").arg(format!("-I{}", work.display()));
+    command.arg("--Mdir").arg(work.join("obj")).arg(driver).args(sources);
+    run("verilator", "verilator", &mut command)?;
+    Ok(work.join("obj/simulation"))
+}
+
+/// Something that happens in the circuit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct CircuitEvent {
+    /// The cycle: that of the issue, the writeback, the tick.
+    pub cycle: Cycle,
+    /// What.
+    pub kind: EventKind,
+    /// The slot, where it is one's.
+    pub slot: u8,
+    /// The bundle; of a store, the data word.
+    pub address: u32,
+    /// The register that is written; of a fault, its kind.
+    pub register: u16,
+    /// The value that is written.
+    pub value: u32,
+    /// The flags that were raised, as the status register has them.
+    pub flags: u8,
+}
+
+/// What happens.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum EventKind {
+    /// A bundle issues.
+    Issue,
+    /// A store issues.
+    Store,
+    /// A register is written.
+    Retire,
+    /// An output port is written.
+    Port,
+    /// A deadline is missed.
+    Missed,
+    /// A tick is lost.
+    Lost,
+    /// The machine halts.
+    Halt,
+    /// A fault.
+    Fault,
+}
+
+const KINDS: [EventKind; 8] = [
+    EventKind::Issue,
+    EventKind::Store,
+    EventKind::Retire,
+    EventKind::Port,
+    EventKind::Missed,
+    EventKind::Lost,
+    EventKind::Halt,
+    EventKind::Fault,
+];
+
+/// What stands on a pin in a cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pin {
+    /// The tick.
+    Tick,
+    /// A value for an input port.
+    Input {
+        /// The port: index into the inputs' bank.
+        index: u16,
+        /// Its new value.
+        value: u32,
+    },
+}
+
+/// A running simulation.
+#[derive(Debug)]
+pub struct Simulation {
+    process: Child,
+    stdin: Option<ChildStdin>,
+    stdout: Option<ChildStdout>,
+}
+
+impl Simulation {
+    fn send(&mut self, words: &[u32]) -> Result<(), ModelError> {
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        let sent = self.stdin.as_mut().map(|stdin| stdin.write_all(&bytes).and_then(|()| stdin.flush()));
+        if matches!(sent, Some(Ok(()))) { Ok(()) } else { Err(self.ended()) }
+    }
+
+    fn receive(&mut self, bytes: &mut [u8]) -> Result<(), ModelError> {
+        let read = self.stdout.as_mut().map(|stdout| stdout.read_exact(bytes));
+        if matches!(read, Some(Ok(()))) { Ok(()) } else { Err(self.ended()) }
+    }
+
+    fn ended(&mut self) -> ModelError {
+        self.stdin = None;
+        let mut text = String::new();
+        if let Some(stderr) = self.process.stderr.as_mut() {
+            let _ = stderr.read_to_string(&mut text);
+        }
+        ModelError::Ended(text)
+    }
+
+    /// Resets the circuit and loads a program and the first values of input ports.
+    ///
+    /// # Errors
+    /// If the process has ended.
+    pub fn load(&mut self, program: &Program, inputs: &[(u16, u32)]) -> Result<(), ModelError> {
+        let base = program.machine.inputs.base;
+        let first = inputs.iter().map(|&(register, bits)| LoadRecord {
+            space: Space::Input,
+            slot: 0,
+            address: register.saturating_sub(base),
+            value: bits.into(),
+        });
+        let records: Vec<LoadRecord> = load_records(program).into_iter().chain(first).collect();
+        let mut words = vec![1, records.len() as u32];
+        for LoadRecord { space, slot, address, value } in records {
+            words.extend([space as u32, slot.into(), address.into(), value as u32, (value >> 32) as u32]);
+        }
+        self.send(&words)
+    }
+
+    /// Runs until so many cycles have passed since reset. `pins` are sorted by cycle; none of a cycle that has passed.
+    ///
+    /// # Errors
+    /// If the process has ended.
+    pub fn run(&mut self, until: Cycle, pins: &[(Cycle, Pin)]) -> Result<Vec<CircuitEvent>, ModelError> {
+        let mut words = vec![2, until as u32, pins.len() as u32];
+        for &(cycle, pin) in pins {
+            words.extend(match pin {
+                Pin::Tick => [cycle as u32, 1, 0, 0],
+                Pin::Input { index, value } => [cycle as u32, 2, index.into(), value],
+            });
+        }
+        self.send(&words)?;
+        let mut count = [0; 4];
+        self.receive(&mut count)?;
+        let mut bytes = vec![0; 32 * u32::from_le_bytes(count) as usize];
+        self.receive(&mut bytes)?;
+        let word = |bytes: &[u8], i: usize| {
+            let mut word = [0; 4];
+            word.copy_from_slice(&bytes[4 * i..4 * i + 4]);
+            u32::from_le_bytes(word)
+        };
+        let event = |bytes: &[u8]| CircuitEvent {
+            kind: KINDS[word(bytes, 0) as usize % KINDS.len()],
+            cycle: word(bytes, 1).into(),
+            address: word(bytes, 2),
+            slot: word(bytes, 3) as u8,
+            register: word(bytes, 4) as u16,
+            value: word(bytes, 5),
+            flags: word(bytes, 6) as u8,
+        };
+        Ok(bytes.chunks_exact(32).map(event).collect())
+    }
+
+    /// Writes a waveform of these cycles of the next run; the model must have been built for it.
+    ///
+    /// # Errors
+    /// If the process has ended.
+    pub fn trace(&mut self, first: Cycle, last: Cycle) -> Result<(), ModelError> {
+        self.send(&[3, first as u32, last as u32])
+    }
+
+    /// Ends the simulation in order, so that its waveform is whole.
+    pub fn finish(mut self) {
+        self.stdin = None;
+        let _ = self.process.wait();
+    }
+}
+
+impl Drop for Simulation {
+    fn drop(&mut self) {
+        // It ends when nobody speaks or listens to it.
+        (self.stdin, self.stdout) = (None, None);
+        let _ = self.process.wait();
+    }
+}

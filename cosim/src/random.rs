@@ -1,0 +1,117 @@
+//! Random programs with random inputs and ticks.
+
+use crate::lockstep::{Lockstep, LockstepError};
+use crate::model::Simulation;
+use std::collections::BTreeSet;
+use takt_emu::testing::{INPUTS, Options, Random, random_program};
+use takt_isa::timing::{Cause, Cycle};
+use takt_isa::{Machine, Op, Program, ROWS};
+
+/// Cycles that a random program runs, unless it stops before.
+pub const CYCLES: Cycle = 1500;
+
+/// What random programs came to do.
+#[derive(Clone, Debug, Default)]
+pub struct Coverage {
+    /// Programs.
+    pub programs: u64,
+    /// Cycles.
+    pub cycles: u64,
+    /// Events that were the same on both sides.
+    pub events: u64,
+    /// Instructions that were executed.
+    pub operations: BTreeSet<&'static str>,
+    /// Pairs of instructions of which the second waited for the first's result.
+    pub hazards: BTreeSet<(&'static str, &'static str)>,
+    /// Kinds of stalls.
+    pub stalls: BTreeSet<&'static str>,
+    /// Kinds of faults, in words.
+    pub faults: BTreeSet<&'static str>,
+    /// Deadlines that were missed, and ticks lost.
+    pub missed: u64,
+}
+
+/// The program of a seed: every other one may do anything.
+pub fn program(seed: u64, machine: &'static Machine) -> Program {
+    random_program(seed, machine, if seed % 2 == 1 { Options::WILD } else { Options::TAME })
+}
+
+/// Runs the program of a seed on both sides and adds to the coverage. The simulation comes back.
+///
+/// # Errors
+/// A difference, or a simulation that ended.
+pub fn run(
+    seed: u64,
+    machine: &'static Machine,
+    simulation: Simulation,
+    coverage: &mut Coverage,
+) -> Result<Simulation, LockstepError> {
+    let program = program(seed, machine);
+    let mut random = Random::new(!seed);
+    let port = |random: &mut Random| machine.inputs.base + random.below(INPUTS.into()) as u16;
+    let first: Vec<(u16, u32)> = (0..INPUTS).map(|i| (machine.inputs.base + i, random.word())).collect();
+    let mut lockstep = Lockstep::new(&program, simulation, &first)?;
+    let mut cycle = 0;
+    while cycle < CYCLES {
+        cycle += 1 + Cycle::from(if random.once_in(3) { random.below(12) } else { random.below(400) });
+        lockstep.tick_at(cycle);
+    }
+    let mut cycle = 4;
+    let mut running = true;
+    while running && cycle < CYCLES {
+        running = lockstep.run_until(cycle);
+        if running {
+            lockstep.set_input(port(&mut random), random.word());
+        }
+        cycle += 1 + Cycle::from(if random.once_in(3) { random.below(4) } else { random.below(60) });
+    }
+    if running {
+        lockstep.run_until(CYCLES);
+    }
+    lockstep.finish()?;
+
+    let statistics = lockstep.emulator().statistics();
+    coverage.programs += 1;
+    coverage.cycles += statistics.cycles;
+    coverage.events += lockstep.compared();
+    coverage.missed += statistics.missed + statistics.lost;
+    coverage
+        .operations
+        .extend(ROWS.iter().filter(|row| statistics.operation(row.op) > 0).map(|row| row.mnemonic));
+    for &(address, cause) in statistics.causes.keys() {
+        coverage.stalls.insert(cause.name());
+        if let Cause::Operand { register, producer } = cause {
+            hazard(&program, address, register, producer, coverage);
+        }
+    }
+    if let Some(fault) = lockstep.fault() {
+        coverage.faults.insert(match fault.kind {
+            takt_emu::FaultKind::IllegalWord(_) => "illegal word",
+            takt_emu::FaultKind::ProgramCounter { .. } => "program counter",
+            takt_emu::FaultKind::DataAddress { .. } => "data address",
+            takt_emu::FaultKind::UnwrittenRegister { .. } => "unwritten register",
+            takt_emu::FaultKind::StackOverflow { .. } => "return stack full",
+            takt_emu::FaultKind::StackUnderflow => "return stack empty",
+            takt_emu::FaultKind::LoopBound { .. } => "loop bound",
+            takt_emu::FaultKind::CycleLimit { .. } => "cycle limit",
+        });
+    }
+    Ok(lockstep.into_simulation())
+}
+
+/// Notes which instruction waited for which.
+fn hazard(program: &Program, address: u32, register: u16, producer: u32, coverage: &mut Coverage) {
+    let bundle = |address| program.bundle(address).and_then(Result::ok).unwrap_or_default();
+    let slots = program.machine.slots;
+    let producers: Vec<Op> = bundle(producer)
+        .iter()
+        .zip(slots)
+        .filter(|(instruction, slot)| instruction.writes(slot) == Some(register))
+        .map(|(instruction, _)| instruction.op)
+        .collect();
+    for reader in bundle(address).iter().filter(|instruction| instruction.reads().contains(&register)) {
+        for producer in &producers {
+            coverage.hazards.insert((producer.row().mnemonic, reader.op.row().mnemonic));
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! Faults planted in the circuit, in every unit and in the scoreboard, each of which lockstep must find.
+//!
+//! A fault replaces one expression. All of a machine's stand in one simulation, which chooses one by `+fault=`; without it,
+//! the circuit is as it was.
+#![allow(clippy::print_stdout)]
+
+mod common;
+
+use common::folder;
+use takt_cosim::{LockstepError, Model, random};
+use takt_isa::{Machine, T1, T3};
+use takt_rtl::{Library, export};
+
+/// A module, an expression that occurs once in it, and what takes its place.
+type Fault = (&'static str, &'static str, &'static str);
+
+/// In what both machines have.
+#[rustfmt::skip]
+const COMMON: &[Fault] = &[
+    ("takt_add", "close & ~difference[24]", "close"),
+    ("takt_multiply", "5'd23 - zeros1", "5'd22 - zeros1"),
+    ("takt_convert", "x[31] & ~nan", "1'b0"),
+    ("takt_alu", "a[31] ^ b[31] ^ less", "a[31] ^ b[31]"),
+    ("takt_sine", "x_8[31] ^ negative", "x_8[31]"),
+    // Waiting for operands: too short, in each of the ways in which a result is underway.
+    ("takt_hazard", "r_later | r_on_issue", "r_later"),
+    ("takt_hazard", "(|hit[DEPTH-1:3]) | (|late_hit)", "|hit[DEPTH-1:3]"),
+    ("takt_hazard", "(|hit[DEPTH-1:3]) | (|late_hit)", "|late_hit"),
+    ("takt_hazard", "(r_later & ~(|r_at2)) | r_on_issue_late", "r_later & ~(|r_at2)"),
+    ("takt_hazard", "(|m_later) | (|(m_on_issue & ~i_early))", "|m_later"),
+    // Too long.
+    ("takt_hazard", "i_later & ~(|i_at2)", "i_later"),
+    // Forwarding.
+    ("takt_hazard", "advance ? r_at1 : i_at1", "r_at1"),
+    ("takt_hazard", "advance ? r_at0 : {SLOTS{1'b0}}", "{SLOTS{1'b0}}"),
+    ("takt_source", "({32{r_past[i]}} & was_result[32*i +: 32])", "32'd0"),
+    ("takt_source", "advance ? m_index : r_index", "m_index"),
+    ("takt_source", "advance ? r_is_next : i_is_next", "r_is_next"),
+    ("takt_source", "advance ? r_value : value", "advance ? r_value : held"),
+    // A bundle at fault.
+    ("takt_underway", "above[j+1] & ~(above_fresh[j+1] & cancel)", "above[j+1]"),
+    ("takt_underway", "insert[j+1] & ~cancel", "insert[j+1]"),
+    // The unit's interval.
+    ("takt_late", "working & ~age[INTERVAL-1]", "1'b0"),
+    // Branches, calls, the tick.
+    ("takt_sequencer", "x_branch_zero & zero", "x_branch_zero"),
+    ("takt_sequencer", "x_call & entries[4]", "1'b0"),
+    ("takt_sequencer", "x_return & (entries == 5'd0)", "1'b0"),
+    ("takt_sequencer", "x_address + 16'd1", "x_address + 16'd2"),
+    ("takt_sequencer", "x_wait & ~remembered", "x_wait"),
+    ("takt_sequencer", "remembered & ~x_wait", "remembered"),
+    ("takt_sequencer", "issue & redirects", "1'b0"),
+    ("takt_issue", "refused <= next_valid & next_illegal & ~block", "refused <= 1'b0"),
+    // The data memory.
+    ("takt_memory", "above | ~upper", "above"),
+    ("takt_memory", "x_store & ~fault", "x_store"),
+];
+
+/// In the generated part of t3, and in its own units.
+#[rustfmt::skip]
+const OF_T3: &[Fault] = &[
+    ("takt_divroot", "a_sign_1 & ~a_zero & ~a_nan", "a_sign_1 & ~a_nan"),
+    ("takt_hazard", "r_at2 | r_on_issue_early", "r_at2"),
+    ("takt_hazard", "m_at2 | (m_on_issue & i_early)", "m_at2"),
+    ("takt_t3", "pending | (|i_writes)", "pending"),
+    ("takt_t3", "sticky & {3{~x_clear_flags}}", "sticky"),
+    ("takt_t3", "mul_underway[6]", "1'b0"),
+    ("takt_t3", "d_mul_illegal | d_outside", "d_mul_illegal"),
+    ("takt_t3_decode_mul", "|(word[40:0] & 41'h00000000fff)", "1'b0"),
+];
+
+/// Likewise of t1.
+#[rustfmt::skip]
+const OF_T1: &[Fault] = &[
+    ("takt_alu_late", "waiting[36*WAIT-1 -: 36]", "(waiting[36*WAIT-1 -: 36] & ~36'd8)"),
+    ("takt_divide", "a_signaling | b_signaling | undefined", "a_signaling | b_signaling"),
+    ("takt_root", "sign_1 & is_zero", "1'b0"),
+    ("takt_t1", "one_divide_at[13] | one_root_at[11] | one_sine_at[13] | i_one_control[ONE_RESULT_5]", "1'b0"),
+];
+
+/// Random programs that a fault may pass before it counts as not found.
+const PROGRAMS: u64 = 400;
+
+fn faults_are_found(machine: &'static Machine, faults: &[Fault]) {
+    let mut design = export(machine, &Library::builtin()).expect("every machine has a circuit");
+    let top = design.top.clone();
+    for (number, (module, from, to)) in faults.iter().enumerate() {
+        let own = format!("{module}.v");
+        let file = design.files.iter_mut().find(|file| file.name.rsplit('/').next() == Some(&own));
+        let file = file.unwrap_or_else(|| panic!("no module {module}"));
+        // An assignment is a statement of its own.
+        let (head, from) = from.split_once("<= ").map_or(("", *from), |(head, from)| (head, from));
+        let to = to.split_once("<= ").map_or(*to, |(_, to)| to);
+        let place = if head.is_empty() { from.to_owned() } else { format!("{head}<= {from}") };
+        assert_eq!(file.text.matches(&place).count(), 1, "`{place}` must occur once in {module}");
+        let head = if head.is_empty() { String::new() } else { format!("{head}<= ") };
+        let choice = format!("{head}({top}.planted == {} ? ({to}) : ({from}))", number + 1);
+        file.text = file.text.replace(&place, &choice);
+    }
+    let core = design.files.iter_mut().find(|file| file.name == format!("{top}.v")).expect("the core");
+    let planted =
+        ");\n\n    integer planted;\n    initial if (!$value$plusargs(\"fault=%d\", planted)) planted = 0;\n";
+    core.text = core.text.replacen(");\n", planted, 1);
+
+    let model = Model::build(&design, &folder(), false).unwrap_or_else(|error| panic!("{error}"));
+    let mut survivors = Vec::new();
+    for number in 0..=faults.len() {
+        let argument = format!("+fault={number}");
+        let mut simulation = model.start(&[argument.as_ref()]).unwrap_or_else(|error| panic!("{error}"));
+        let mut found = None;
+        for seed in 0..if number == 0 { 20 } else { PROGRAMS } {
+            match random::run(seed, machine, simulation, &mut random::Coverage::default()) {
+                Ok(again) => simulation = again,
+                Err(LockstepError::Difference(difference)) => {
+                    found = Some((seed, difference));
+                    break;
+                }
+                Err(error) => panic!("{error}"),
+            }
+        }
+        match (number.checked_sub(1).map(|index| faults[index]), found) {
+            (None, None) => {}
+            (None, Some((seed, difference))) => panic!("without a fault, seed {seed}: {difference}"),
+            (Some(fault), None) => survivors.push(format!("{fault:?}")),
+            (Some(fault), Some((seed, difference))) => {
+                println!(
+                    "{}: {} `{}`: program {seed}, cycle {}",
+                    machine.name, fault.0, fault.1, difference.cycle
+                );
+            }
+        }
+    }
+    assert!(survivors.is_empty(), "{}: not found:\n{}", machine.name, survivors.join("\n"));
+}
+
+#[test]
+fn planted_faults_are_found_on_t3() {
+    faults_are_found(&T3, &[COMMON, OF_T3].concat());
+}
+
+/// What t3 has not.
+#[test]
+fn planted_faults_are_found_on_t1() {
+    faults_are_found(&T1, OF_T1);
+}

@@ -1,0 +1,60 @@
+//! The circuit of every machine against the emulator.
+#![allow(clippy::print_stdout)]
+
+mod common;
+
+use common::{assemble, drive, model};
+use takt_cosim::{Lockstep, LockstepError, random};
+use takt_isa::{MACHINES, Machine, Program, ROWS};
+
+/// `TAKT_PROGRAMS` random programs, 200 unless stated, from seed 0 on.
+#[test]
+fn random_programs() {
+    let count: u64 = std::env::var("TAKT_PROGRAMS").map_or(200, |text| text.parse().expect("a number"));
+    for machine in MACHINES {
+        let mut simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        let mut coverage = random::Coverage::default();
+        println!("{}: seeds 0 to {}", machine.name, count - 1);
+        for seed in 0..count {
+            simulation = random::run(seed, machine, simulation, &mut coverage)
+                .unwrap_or_else(|error| panic!("{} seed {seed}: {error}", machine.name));
+        }
+        let never: Vec<_> = ROWS
+            .iter()
+            .map(|row| row.mnemonic)
+            .filter(|name| *name != "nop" && !coverage.operations.contains(name))
+            .collect();
+        assert_eq!(never, [""; 0], "{}: instructions that no program executed", machine.name);
+        let causes = ["branch", "destination", "drain", "operand", "unit", "wait", "write port"];
+        assert_eq!(coverage.stalls.iter().copied().collect::<Vec<_>>(), causes, "{}", machine.name);
+        for fault in
+            ["data address", "illegal word", "program counter", "return stack empty", "return stack full"]
+        {
+            assert!(coverage.faults.contains(fault), "{}: no program had the fault: {fault}", machine.name);
+        }
+        assert!(coverage.missed > count, "{}: {} deadlines missed", machine.name, coverage.missed);
+    }
+}
+
+/// A tracking program in closed loop with the robot, a number of periods.
+fn tracking(machine: &'static Machine, source: &str, periods: usize) {
+    let program: Program = assemble(machine, source);
+    let simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+    let mut lockstep = Lockstep::new(&program, simulation, &[]).unwrap_or_else(|error| panic!("{error}"));
+    drive(&program, periods, |inputs| -> Result<_, LockstepError> {
+        assert!(lockstep.run_period(inputs), "{:?}", lockstep.emulator().status());
+        lockstep.compare()?;
+        let ports = program.outputs.iter().map(|port| port.register);
+        Ok(ports.filter_map(|port| Some((port, lockstep.emulator().register(port)?))).collect())
+    });
+    lockstep.finish().unwrap_or_else(|error| panic!("{}: {source}: {error}", machine.name));
+    assert!(lockstep.compared() > 300 * periods as u64, "only {} events", lockstep.compared());
+}
+
+#[test]
+fn tracking_programs() {
+    for machine in MACHINES {
+        tracking(machine, "hybrid/tracking.s", 100);
+        tracking(machine, "hybrid/tracking_literal.s", 20);
+    }
+}

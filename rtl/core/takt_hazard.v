@@ -1,0 +1,112 @@
+// takt_hazard: one register address of a bundle, from match to issue: where in the pipelines its pending result is.
+//
+// The address accompanies its bundle through three stages: match (m_), read (r_), issue (i_). In match it is compared with all
+// results underway and with the destinations of the two bundles ahead; from then on only with place 2 of takt_underway, for
+// what comes closer must pass there. A register has at most one result pending (rule 3 of docs/timing.md), so that a few bits
+// say all.
+//
+// Contract
+//   advance: the bundles move on by a stage at the end of this cycle (the one in issue issues, or there is none).
+//   r_waits: a bundle that moves from read to issue at the end of this cycle cannot issue in the next one.
+//   i_waits: a bundle that stays in issue cannot issue in the next cycle.
+//   r_past[s]: the result was on slot s's bus in the last cycle, and the bank's copy does not show it in this one.
+//   i_now[s], i_past[s]: it is on the bus in this cycle; it was in the last, when the bundle was in read.
+//   next_now, next_past: what i_now and i_past will be in the next cycle.
+//   No latency is less than 2.
+
+module takt_hazard #(
+    parameter SLOTS = 3,   // slots whose banks the address can be in
+    parameter DEPTH = 10,  // places of takt_underway, at least 4
+    parameter LATE  = 1,   // units with takt_late, at most, of a slot
+    parameter INDEX = 8
+) (
+    input  wire                         clk,
+    input  wire                         advance,
+    input  wire [SLOTS-1:0]             m_bank,    // one-hot; none: no register that could be pending
+    input  wire [INDEX-1:0]             m_index,
+    input  wire [SLOTS-1:0]             r_bank,
+    input  wire [INDEX-1:0]             r_index,
+    input  wire [SLOTS-1:0]             i_bank,
+    input  wire [INDEX-1:0]             i_index,
+    // For each slot: results underway, and what the bundles in read and issue will write: early with a latency of 2.
+    input  wire [SLOTS*DEPTH-1:0]       underway,
+    input  wire [SLOTS*DEPTH*INDEX-1:0] underway_index,
+    input  wire [SLOTS*LATE-1:0]        late,
+    input  wire [SLOTS*LATE*INDEX-1:0]  late_index,
+    input  wire [SLOTS-1:0]             r_writes,
+    input  wire [SLOTS-1:0]             r_early,
+    input  wire [SLOTS*INDEX-1:0]       r_dest,
+    input  wire [SLOTS-1:0]             i_writes,
+    input  wire [SLOTS-1:0]             i_early,
+    input  wire [SLOTS*INDEX-1:0]       i_dest,
+    output wire                         r_waits,
+    output wire                         i_waits,
+    output reg  [SLOTS-1:0]             r_past,
+    output reg  [SLOTS-1:0]             i_now,
+    output reg  [SLOTS-1:0]             i_past,
+    output wire [SLOTS-1:0]             next_now,
+    output wire [SLOTS-1:0]             next_past
+);
+
+    // Comparisons with all that is underway; m_at[j] for place j, m_later for place 3 and beyond.
+    wire [SLOTS-1:0] m_at0, m_at1, m_at2, m_later, m_on_read, m_on_issue, r_at2, i_at2;
+
+    genvar s, j;
+    generate
+        for (s = 0; s < SLOTS; s = s + 1) begin : g_slot
+            wire [DEPTH-1:0] hit;
+            wire [LATE-1:0]  late_hit;
+            for (j = 0; j < DEPTH; j = j + 1) begin : g_place
+                assign hit[j] = underway[s*DEPTH+j] & (underway_index[(s*DEPTH+j)*INDEX +: INDEX] == m_index);
+            end
+            for (j = 0; j < LATE; j = j + 1) begin : g_late
+                assign late_hit[j] = late[s*LATE+j] & (late_index[(s*LATE+j)*INDEX +: INDEX] == m_index);
+            end
+            wire [INDEX-1:0] index2 = underway_index[(s*DEPTH+2)*INDEX +: INDEX];
+            assign m_at0[s]      = m_bank[s] & hit[0];
+            assign m_at1[s]      = m_bank[s] & hit[1];
+            assign m_at2[s]      = m_bank[s] & hit[2];
+            assign m_later[s]    = m_bank[s] & ((|hit[DEPTH-1:3]) | (|late_hit));
+            assign m_on_read[s]  = m_bank[s] & r_writes[s] & (r_dest[s*INDEX +: INDEX] == m_index);
+            assign m_on_issue[s] = m_bank[s] & i_writes[s] & (i_dest[s*INDEX +: INDEX] == m_index);
+            assign r_at2[s]      = r_bank[s] & underway[s*DEPTH+2] & (index2 == r_index);
+            assign i_at2[s]      = i_bank[s] & underway[s*DEPTH+2] & (index2 == i_index);
+        end
+    endgenerate
+
+    // In read: the result is in place 2 or beyond (r_later), in place 1, in place 0; or the bundle in issue computes it.
+    reg             r_later, r_on_issue, r_on_issue_late;
+    reg [SLOTS-1:0] r_on_issue_early, r_at1, r_at0;
+    // In issue: likewise.
+    reg             i_later;
+    reg [SLOTS-1:0] i_at1;
+
+    assign r_waits   = r_later | r_on_issue;
+    assign i_waits   = i_later;
+    assign next_now  = advance ? r_at1 : i_at1;
+    assign next_past = advance ? r_at0 : {SLOTS{1'b0}};
+
+    always @(posedge clk) begin
+        i_now  <= next_now;
+        i_past <= next_past;
+        if (advance) begin
+            r_later          <= (|m_later) | (|(m_on_issue & ~i_early));
+            r_at1            <= m_at2 | (m_on_issue & i_early);
+            r_at0            <= m_at1;
+            r_past           <= m_at0;
+            r_on_issue       <= |m_on_read;
+            r_on_issue_early <= m_on_read & r_early;
+            r_on_issue_late  <= |(m_on_read & ~r_early);
+            i_later          <= (r_later & ~(|r_at2)) | r_on_issue_late;
+            i_at1            <= r_at2 | r_on_issue_early;
+        end else begin
+            r_later <= r_later & ~(|r_at2);
+            r_at1   <= r_at2;
+            r_at0   <= r_at1;
+            r_past  <= r_at0;
+            i_later <= i_later & ~(|i_at2);
+            i_at1   <= i_at2;
+        end
+    end
+
+endmodule

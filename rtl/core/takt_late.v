@@ -1,0 +1,61 @@
+// takt_late: the result of a unit that works on one operation at a time and takes longer than the slot's pipelined units.
+//
+// Contract
+//   An operation that issues now, insert, is in at[1] in the next cycle, in at[2] in the one after, and so on; underway until
+//   its result passes on to takt_underway's last place: last, in the cycle before. busy: the unit would not accept an
+//   operation in the next cycle even if none issues now.
+//   Requires INTERVAL >= LATENCY - DEPTH, so that one operation at a time is underway here.
+//   cancel: what issued in the last cycle and what issues now do not count.
+
+module takt_late #(
+    parameter LATENCY  = 18,
+    parameter INTERVAL = 14,
+    parameter DEPTH    = 10,  // places of takt_underway
+    parameter INDEX    = 8,
+    parameter ADDRESS  = 16
+) (
+    input  wire                   clk,
+    input  wire                   rst,
+    input  wire                   cancel,
+    input  wire                   insert,
+    input  wire [INDEX-1:0]       insert_index,
+    input  wire [ADDRESS-1:0]     insert_address,
+    output wire [LATENCY-DEPTH:1] at,
+    output reg                    underway,
+    output reg  [INDEX-1:0]       index,
+    output reg  [ADDRESS-1:0]     address,
+    output wire                   last,
+    output wire                   busy
+);
+
+    localparam AGES = LATENCY - DEPTH > INTERVAL - 1 ? LATENCY - DEPTH : INTERVAL - 1;
+
+    generate
+        if (LATENCY <= DEPTH || INTERVAL < LATENCY - DEPTH || INTERVAL < 3) begin : g_interval
+            takt_late_has_interval_of_at_least_its_latency_beyond_the_places unsupported ();
+        end
+    endgenerate
+
+    reg [AGES:1] age;
+    reg          working;
+
+    assign at   = age[LATENCY-DEPTH:1];
+    assign last = age[LATENCY-DEPTH] & ~(LATENCY - DEPTH == 1 ? cancel : 1'b0);
+    assign busy = working & ~age[INTERVAL-1];
+
+    always @(posedge clk) begin
+        age      <= {age[AGES-1:2], age[1] & ~cancel, insert & ~cancel};
+        working  <= insert | busy;
+        underway <= insert | (underway & ~age[LATENCY-DEPTH]);
+        if (insert) begin
+            index   <= insert_index;
+            address <= insert_address;
+        end
+        if (rst) begin
+            age      <= {AGES{1'b0}};
+            working  <= 1'b0;
+            underway <= 1'b0;
+        end
+    end
+
+endmodule

@@ -1,0 +1,69 @@
+// takt_memory: the data memory, one load or store a cycle.
+//
+// Contract
+//   x_load, x_store with operands a (base) and b (what is stored) in the cycle after issue. A load's result has out_valid in
+//   cycle LATENCY after issue. fault: the address lies outside the memory; then nothing happens.
+//   load_write: in reset, the loader writes.
+//
+// Pipeline
+//   1  address
+//   2  memory output
+//   3  output register
+
+module takt_memory #(
+    parameter LATENCY = 4,
+    parameter DEPTH   = 1024,
+    parameter ADDRESS = 10    // bits of an address, at most 12; DEPTH is 2 to this power
+) (
+    input  wire               clk,
+    input  wire               rst,
+    input  wire               load_write,
+    input  wire [ADDRESS-1:0] load_address,
+    input  wire [31:0]        load_value,
+    input  wire               x_load,
+    input  wire               x_store,
+    input  wire [11:0]        offset,
+    input  wire [31:0]        a,
+    input  wire [31:0]        b,
+    output wire               fault,
+    output reg                out_valid,
+    output reg  [31:0]        result,
+    // What was stored two cycles after issue, for verification.
+    output reg                write,
+    output reg  [ADDRESS-1:0] address,
+    output reg  [31:0]        value
+);
+
+    generate
+        if (LATENCY != 4) begin : g_latency
+            takt_memory_has_latency_4 unsupported ();
+        end
+        if (DEPTH != 1 << ADDRESS || ADDRESS > 12) begin : g_depth
+            takt_memory_has_a_power_of_two_of_words unsupported ();
+        end
+    endgenerate
+
+    // offset + a lies in the memory if the low bits' sum does and a is not negative, or a is negative and the low bits carry.
+    wire [12:0] sum   = {1'b0, a[11:0]} + {1'b0, offset};
+    wire        above = |(sum[12:0] & ~(13'd4096 | ((13'd1 << ADDRESS) - 13'd1)));
+    wire        upper = sum[12] ? &a[31:12] : ~|a[31:12];
+    assign fault = (x_load | x_store) & (above | ~upper);
+
+    (* no_rw_check *)
+    reg [31:0] words [0:DEPTH-1];
+    reg [31:0] read;
+    reg        loading, delivers;
+
+    always @(posedge clk) begin
+        address <= rst ? load_address : sum[ADDRESS-1:0];
+        value   <= rst ? load_value : b;
+        write   <= rst ? load_write : x_store & ~fault;
+        loading <= x_load & ~fault & ~rst;
+        if (write) words[address] <= value;
+        else read <= words[address];
+        delivers  <= loading;
+        out_valid <= delivers;
+        result    <= read;
+    end
+
+endmodule

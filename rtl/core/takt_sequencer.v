@@ -1,0 +1,173 @@
+// takt_sequencer: which bundle comes next: branches, calls, the tick, halts and faults.
+//
+// The bundle that issued in the last cycle is in the execute stage (x_). There a redirecting operation is decided, and the
+// target's address goes to the program memory in the same cycle.
+//
+// Contract
+//   flush: what was fetched after the bundle in execute does not issue; fetch is the target's address. Without flush, fetch
+//   is the address after the last one fetched.
+//   cancel: the bundle in execute is at fault: neither it nor what issues in this cycle takes effect.
+//   stop: nothing issues from the next cycle on. wait_next: the program waits in the next cycle.
+//   Reset acts as a jump to 0 in the cycle before cycle 0.
+//   tick is seen in the cycle in which it is high. missed, lost: in that cycle, the deadline was missed, the tick was lost.
+//   fault_*: from the second cycle after that of the fault. kind: 1 illegal word, 2 data address, 3 return stack full, 4 empty.
+
+module takt_sequencer #(
+    parameter PROGRAM = 10,  // bits of an address of the program memory, less than 16
+    parameter STACK   = 16,  // entries of the return stack
+    parameter REFILL  = 5,
+    parameter RESOLVE = 1,
+    parameter SLOT    = 2,   // its number
+    parameter MEMORY  = 2,   // number of the data memory's slot
+    parameter SLOTS   = 3
+) (
+    input  wire             clk,
+    input  wire             rst,
+    input  wire             advance,
+    input  wire             issue,
+    input  wire             refused,
+    input  wire [SLOTS-1:0] i_illegal,
+    // The redirecting operation of the bundle in issue, and its target.
+    input  wire             i_jump,
+    input  wire             i_branch_zero,
+    input  wire             i_branch_nonzero,
+    input  wire             i_call,
+    input  wire             i_return,
+    input  wire             i_wait,
+    input  wire             i_halt,
+    input  wire [15:0]      i_target,
+    input  wire [31:0]      x_operand,
+    input  wire             x_address_fault,
+    input  wire             tick,
+    output wire             flush,
+    output wire [PROGRAM-1:0] fetch,
+    output wire             f_outside,     // what the program memory delivers is no part of it
+    output wire             cancel,
+    output wire             block,
+    output reg  [15:0]      i_address,
+    output reg              x_issued,
+    output reg  [15:0]      x_address,
+    output reg              waiting,
+    output wire             missed,
+    output wire             lost,
+    output reg              deadline_missed,
+    output reg              halted,
+    output reg              fault,
+    output reg  [2:0]       fault_kind,
+    output reg  [2:0]       fault_slot,
+    output reg  [15:0]      fault_address
+);
+
+    localparam [2:0] OWN_SLOT    = SLOT;
+    localparam [2:0] MEMORY_SLOT = MEMORY;
+
+    generate
+        if (REFILL != 5 || RESOLVE != 1) begin : g_refill
+            takt_sequencer_has_refill_5_and_resolve_1 unsupported ();
+        end
+        if (STACK != 16) begin : g_stack
+            takt_sequencer_has_a_stack_of_16 unsupported ();
+        end
+    endgenerate
+
+    // ---- execute
+
+    reg        x_jump, x_branch_zero, x_branch_nonzero, x_call, x_return, x_wait, x_halt, x_refused;
+    reg [15:0] x_target;
+    reg [2:0]  x_illegal_slot;
+
+    reg [15:0] stack [0:15];
+    reg [4:0]  entries;
+    reg [3:0]  top;  // entries - 1
+
+    wire stack_full  = x_call & entries[4];
+    wire stack_empty = x_return & (entries == 5'd0);
+    assign cancel = x_refused | x_address_fault | stack_full | stack_empty;
+
+    wire zero = x_operand == 32'd0;
+    assign flush = x_jump | x_call | x_return | x_wait | (x_branch_zero & zero) | (x_branch_nonzero & ~zero);
+
+    reg  [15:0] fetched;  // the address of what the program memory delivers
+    wire [15:0] target     = x_return ? stack[top] : x_target;
+    wire [15:0] next_fetch = fetched + 16'd1;
+    wire [15:0] chosen     = flush ? target : next_fetch;
+    assign fetch     = chosen[PROGRAM-1:0];
+    assign f_outside = |fetched[15:PROGRAM];
+
+    wire take = issue & ~cancel;
+    integer s;
+    always @(posedge clk) begin
+        if (flush | advance) fetched <= chosen;
+        if (flush) i_address <= target;
+        else if (issue) i_address <= i_address + 16'd1;
+        x_address        <= i_address;
+        x_target         <= i_target;
+        x_issued         <= take;
+        x_jump           <= take & i_jump;
+        x_branch_zero    <= take & i_branch_zero;
+        x_branch_nonzero <= take & i_branch_nonzero;
+        x_call           <= take & i_call;
+        x_return         <= take & i_return;
+        x_wait           <= take & i_wait;
+        x_halt           <= take & i_halt;
+        x_refused        <= refused & ~cancel & ~fault;
+        for (s = SLOTS - 1; s >= 0; s = s - 1) if (i_illegal[s]) x_illegal_slot <= s[2:0];
+        if (x_call) begin
+            stack[entries[3:0]] <= x_address + 16'd1;
+            entries <= entries + 5'd1;
+            top     <= top + 4'd1;
+        end
+        if (x_return) begin
+            entries <= entries - 5'd1;
+            top     <= top - 4'd1;
+        end
+        if (rst) begin
+            {x_branch_zero, x_branch_nonzero, x_call, x_return, x_wait, x_halt, x_refused, x_issued} <= 8'd0;
+            x_jump   <= 1'b1;
+            x_target <= 16'd0;
+            entries  <= 5'd0;
+            top      <= 4'd15;
+        end
+    end
+
+    // ---- the tick
+
+    reg  remembered;
+    wire waits = waiting | (x_wait & ~remembered);
+    wire still = remembered & ~x_wait;  // is remembered when the tick comes
+
+    assign missed = tick & ~waits & ~still;
+    assign lost   = tick & ~waits & still;
+    wire wait_next = waits & ~tick;
+
+    always @(posedge clk) begin
+        waiting    <= wait_next;
+        remembered <= still | missed;
+        if (missed) deadline_missed <= 1'b1;
+        if (rst) begin
+            waiting         <= 1'b0;
+            remembered      <= 1'b0;
+            deadline_missed <= 1'b0;
+        end
+    end
+
+    // ---- stops
+
+    wire redirects = i_jump | i_branch_zero | i_branch_nonzero | i_call | i_return | i_wait | i_halt;
+    assign block = (issue & redirects) | wait_next | x_halt | halted | refused | cancel | fault;
+
+    always @(posedge clk) begin
+        if (x_halt) halted <= 1'b1;
+        if (cancel & ~fault) begin
+            fault         <= 1'b1;
+            fault_kind    <= x_refused ? 3'd1 : x_address_fault ? 3'd2 : stack_full ? 3'd3 : 3'd4;
+            fault_slot    <= x_refused ? x_illegal_slot : x_address_fault ? MEMORY_SLOT : OWN_SLOT;
+            fault_address <= x_address;
+        end
+        if (rst) begin
+            halted <= 1'b0;
+            fault  <= 1'b0;
+        end
+    end
+
+endmodule

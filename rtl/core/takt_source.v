@@ -1,0 +1,123 @@
+// takt_source: one source operand of a slot, from match to the operand register of the units: banks, forwarding, hazards.
+//
+// Stages: match (m_), read (r_), issue (i_); operand stands in the cycle after issue. In read the banks' copies have delivered
+// the register; while a bundle waits there it is read anew in every cycle. While it waits in issue, what is written to
+// its register is taken from the bus.
+//
+// Contract
+//   As takt_hazard. m_bank: one-hot, the slots' banks, then the inputs; none if there is no such operand or it is `zero`.
+//   result: the slots' buses. was_result: the same, one cycle later.
+//   input_write, _index: a value for an input port, which goes into the bank; input_next, _index the same one cycle later;
+//   input_value one more: bundles that issue in the cycle of input_value or later read it.
+//   r_constant: what takes a source's place. Zero if there is a source. i_status: likewise, later.
+
+module takt_source #(
+    parameter SLOTS = 3,
+    parameter DEPTH = 10,
+    parameter LATE  = 1,
+    parameter INDEX = 8
+) (
+    input  wire                         clk,
+    input  wire                         advance,
+    input  wire [SLOTS:0]               m_bank,
+    input  wire [INDEX-1:0]             m_index,
+    input  wire [SLOTS*DEPTH-1:0]       underway,
+    input  wire [SLOTS*DEPTH*INDEX-1:0] underway_index,
+    input  wire [SLOTS*LATE-1:0]        late,
+    input  wire [SLOTS*LATE*INDEX-1:0]  late_index,
+    input  wire [SLOTS-1:0]             r_writes,
+    input  wire [SLOTS-1:0]             r_early,
+    input  wire [SLOTS*INDEX-1:0]       r_dest,
+    input  wire [SLOTS-1:0]             i_writes,
+    input  wire [SLOTS-1:0]             i_early,
+    input  wire [SLOTS*INDEX-1:0]       i_dest,
+    input  wire [SLOTS*32-1:0]          result,
+    input  wire [SLOTS*32-1:0]          was_result,
+    input  wire                         input_write,
+    input  wire [INDEX-1:0]             input_write_index,
+    input  wire [31:0]                  input_write_value,
+    input  wire                         input_next,
+    input  wire [INDEX-1:0]             input_next_index,
+    input  wire [31:0]                  input_value,
+    input  wire [31:0]                  r_constant,
+    input  wire [31:0]                  i_status,
+    output wire                         r_waits,
+    output wire                         i_waits,
+    output reg  [31:0]                  operand
+);
+
+    reg [SLOTS:0]   r_bank, i_bank;
+    reg [INDEX-1:0] r_index, i_index;
+    always @(posedge clk) begin
+        if (advance) begin
+            r_bank  <= m_bank;
+            r_index <= m_index;
+            i_bank  <= r_bank;
+            i_index <= r_index;
+        end
+    end
+
+    wire [SLOTS-1:0] r_past, i_now, i_past, next_now, next_past;
+    takt_hazard #(.SLOTS(SLOTS), .DEPTH(DEPTH), .LATE(LATE), .INDEX(INDEX)) hazard (
+        .clk(clk), .advance(advance),
+        .m_bank(m_bank[SLOTS-1:0]), .m_index(m_index), .r_bank(r_bank[SLOTS-1:0]), .r_index(r_index),
+        .i_bank(i_bank[SLOTS-1:0]), .i_index(i_index),
+        .underway(underway), .underway_index(underway_index), .late(late), .late_index(late_index),
+        .r_writes(r_writes), .r_early(r_early), .r_dest(r_dest), .i_writes(i_writes), .i_early(i_early), .i_dest(i_dest),
+        .r_waits(r_waits), .i_waits(i_waits), .r_past(r_past), .i_now(i_now), .i_past(i_past),
+        .next_now(next_now), .next_past(next_past)
+    );
+
+    // ---- read: the bank's copy, or what is too recent for it
+
+    wire [INDEX-1:0] read_index = advance ? m_index : r_index;
+    wire [32*SLOTS+31:0] read;
+
+    takt_bank #(.INDEX(INDEX)) inputs (
+        .clk(clk), .write(input_write), .write_index(input_write_index), .write_value(input_write_value),
+        .read_index(read_index), .value(read[32*SLOTS +: 32])
+    );
+
+    genvar s;
+    generate
+        for (s = 0; s < SLOTS; s = s + 1) begin : g_slot
+            takt_bank #(.INDEX(INDEX)) bank (
+                .clk(clk), .write(underway[s*DEPTH]), .write_index(underway_index[s*DEPTH*INDEX +: INDEX]),
+                .write_value(result[32*s +: 32]), .read_index(read_index), .value(read[32*s +: 32])
+            );
+        end
+    endgenerate
+
+    reg [31:0] r_value;
+    integer    i;
+    always @* begin
+        r_value = r_constant | ({32{r_bank[SLOTS]}} & read[32*SLOTS +: 32]);
+        for (i = 0; i < SLOTS; i = i + 1) begin
+            r_value = r_value | ({32{r_bank[i] & ~r_past[i]}} & read[32*i +: 32]) | ({32{r_past[i]}} & was_result[32*i +: 32]);
+        end
+    end
+
+    // ---- issue: what was read, or what is on a bus
+
+    reg  [31:0] held, value;
+    reg         i_held, i_input;
+    integer     k;
+    always @* begin
+        value = ({32{i_held}} & held) | ({32{i_input}} & input_value);
+        for (k = 0; k < SLOTS; k = k + 1) begin
+            value = value | ({32{i_now[k]}} & result[32*k +: 32]) | ({32{i_past[k]}} & was_result[32*k +: 32]);
+        end
+    end
+
+    wire r_is_next = r_bank[SLOTS] & (r_index == input_next_index);
+    wire i_is_next = i_bank[SLOTS] & (i_index == input_next_index);
+    wire next_input = input_next & (advance ? r_is_next : i_is_next);
+
+    always @(posedge clk) begin
+        i_input <= next_input;
+        i_held  <= ~(next_input | (|next_now) | (|next_past));
+        held    <= advance ? r_value : value;
+        operand <= value | i_status;
+    end
+
+endmodule

@@ -1,0 +1,68 @@
+//! The Verilog files, as they stand in `rtl/`.
+
+/// A file's name and text.
+pub(crate) type File = (&'static str, &'static str);
+
+macro_rules! files {
+    ($folder:literal: $($name:literal)*) => {
+        &[$(($name, include_str!(concat!("../", $folder, "/", $name)))),*]
+    };
+}
+
+/// The arithmetic units and what they share.
+#[rustfmt::skip]
+pub(crate) const UNITS: &[File] = files!("units":
+    "add.v"
+    "alu.v"
+    "alu_late.v"
+    "convert.v"
+    "divide.v"
+    "divroot.v"
+    "multiply.v"
+    "root.v"
+    "sine.v"
+    "common/takt_leading_zeros.v"
+    "common/takt_product.v"
+    "common/takt_reciprocal_table.v"
+    "common/takt_sine_table.v"
+    "common/takt_unpack.v"
+);
+
+/// Modules that take the place of shared ones on Lattice ECP5.
+pub(crate) const ECP5: &[File] = files!("ecp5":
+    "takt_product.v"
+);
+
+/// The modules of which a core is made, apart from what is generated.
+#[rustfmt::skip]
+pub(crate) const CORE: &[File] = files!("core":
+    "takt_bank.v"
+    "takt_hazard.v"
+    "takt_issue.v"
+    "takt_late.v"
+    "takt_memory.v"
+    "takt_program.v"
+    "takt_sequencer.v"
+    "takt_source.v"
+    "takt_underway.v"
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+    use std::path::Path;
+
+    #[test]
+    fn every_file_is_listed() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let count = |folder: &str| {
+            let entries = fs::read_dir(root.join(folder)).expect("the project's folder");
+            entries
+                .filter(|entry| entry.as_ref().is_ok_and(|e| e.path().extension().is_some_and(|x| x == "v")))
+                .count()
+        };
+        assert_eq!(UNITS.len(), count("units") + count("units/common"));
+        assert_eq!((ECP5.len(), CORE.len()), (count("ecp5"), count("core")));
+    }
+}

@@ -1,0 +1,114 @@
+//! What synthesis measured: the committed `docs/synthesis.json`, which `cargo xtask synth` writes.
+
+use serde::{Deserialize, Serialize};
+
+/// One design on one device.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Synthesis {
+    /// Name of the machine, or of the unit.
+    pub design: String,
+    /// The device, as its maker calls it: `LFE5U-85F`.
+    pub device: String,
+    /// Speed grade; none where only resources are counted.
+    pub grade: Option<u8>,
+    /// The clock in MHz after place and route, for seeds 1, 2, …; empty where only resources are counted.
+    pub mhz: Vec<f64>,
+    /// What it takes of the device.
+    pub resources: Resources,
+    /// The longest path of the seed that is the median, in words.
+    pub critical_path: String,
+    /// Day of the measurement: `2026-11-21`.
+    pub date: String,
+    /// The tools and their versions.
+    pub tools: String,
+}
+
+/// What a design takes of a device.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Resources {
+    /// Look-up tables, those of carry chains and of memories in logic included: LUT4 on ECP5, ALUTs on Cyclone V.
+    pub luts: u64,
+    /// Flip-flops.
+    pub flip_flops: u64,
+    /// Multipliers of 18 x 18 bits (on Cyclone V up to 27 x 27).
+    pub multipliers: u64,
+    /// Block RAMs: 18 kbit on ECP5, 10 kbit on Cyclone V.
+    pub block_rams: u64,
+}
+
+impl Synthesis {
+    /// Clocks in MHz from the lowest to the highest.
+    fn sorted(&self) -> Vec<f64> {
+        let mut mhz = self.mhz.clone();
+        mhz.sort_by(f64::total_cmp);
+        mhz
+    }
+
+    /// The lowest clock of all seeds in MHz.
+    pub fn least(&self) -> Option<f64> {
+        self.sorted().first().copied()
+    }
+
+    /// The median clock in MHz; of an even number of seeds the lower one of the two in the middle.
+    pub fn median(&self) -> Option<f64> {
+        let mhz = self.sorted();
+        mhz.get(mhz.len().saturating_sub(1) / 2).copied()
+    }
+
+    /// The highest clock of all seeds in MHz.
+    pub fn greatest(&self) -> Option<f64> {
+        self.sorted().last().copied()
+    }
+}
+
+/// Reads the text of `docs/synthesis.json`.
+///
+/// # Errors
+/// If it is none.
+pub fn parse(text: &str) -> serde_json::Result<Vec<Synthesis>> {
+    serde_json::from_str(text)
+}
+
+/// Every committed measurement.
+pub fn committed() -> Vec<Synthesis> {
+    serde_json::from_str(include_str!("../../docs/synthesis.json"))
+        .expect("`cargo xtask synth` wrote the file")
+}
+
+/// The measurement that speaks for a machine: on the largest device, at the best speed grade.
+pub fn of_machine(name: &str) -> Option<Synthesis> {
+    let placed = committed().into_iter().filter(|row| row.design == name && row.device == "LFE5U-85F");
+    placed.max_by_key(|row| row.grade)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn median_is_a_clock_that_was_reached() {
+        let row = |mhz: &[f64]| Synthesis {
+            design: "x".to_owned(),
+            device: "LFE5U-85F".to_owned(),
+            grade: Some(8),
+            mhz: mhz.to_vec(),
+            resources: Resources::default(),
+            critical_path: String::new(),
+            date: String::new(),
+            tools: String::new(),
+        };
+        assert_eq!(row(&[]).median(), None);
+        assert_eq!(row(&[3.0, 1.0, 2.0]).median(), Some(2.0));
+        assert_eq!(row(&[4.0, 3.0, 1.0, 2.0]).median(), Some(2.0));
+        assert_eq!((row(&[3.0, 1.0, 2.0]).least(), row(&[3.0, 1.0, 2.0]).greatest()), (Some(1.0), Some(3.0)));
+    }
+
+    #[test]
+    fn committed_file_can_be_read() {
+        for row in committed() {
+            assert_ne!(row.grade.is_some(), row.mhz.is_empty(), "{row:?}");
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! The exported design, as other tools see it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use takt_isa::MACHINES;
+use takt_rtl::{Library, bench, export};
+
+fn silent(command: &mut Command) {
+    let output = command.output().unwrap_or_else(|error| panic!("{command:?}: {error}"));
+    let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && text.trim().is_empty(), "{command:?}\n{text}");
+}
+
+/// Writes the folder of every machine and hands it on, with the core's name.
+fn folders(mut look: impl FnMut(&Path, &str)) {
+    for machine in MACHINES {
+        let design = export(machine, &Library::builtin()).expect("every machine has a circuit");
+        let folder: PathBuf = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("export-{}", machine.name));
+        let _ = fs::remove_dir_all(&folder);
+        for file in bench::folder(&design, None) {
+            let path = folder.join(&file.name);
+            fs::create_dir_all(path.parent().expect("a folder")).expect("the target folder can be written");
+            fs::write(&path, &file.text).expect("the target folder can be written");
+        }
+        look(&folder, &design.top);
+    }
+}
+
+#[test]
+fn no_tool_complains() {
+    folders(|folder, top| {
+        let verilator = |files: &[String], top: &str| {
+            let mut lint = Command::new("verilator");
+            lint.current_dir(folder).args(["--lint-only", "-Wall", "--top-module", top]);
+            silent(lint.args(files));
+        };
+        verilator(&["-f".to_owned(), format!("{top}.f")], top);
+        let synthesis = format!("{top}_synthesis");
+        verilator(&["-f".to_owned(), format!("{top}.f"), format!("{synthesis}.v")], &synthesis);
+        let mut icarus = Command::new("iverilog");
+        icarus.current_dir(folder).args(["-g2005", "-Wall", "-Wno-timescale", "-t", "null", "-s"]);
+        silent(icarus.args([format!("{top}_bench"), "-f".to_owned(), format!("{top}_bench.f")]));
+    });
+}
