@@ -2,9 +2,14 @@
 //!
 //! - [`bound`]: the best and the worst that each section of a program can take, from the program alone.
 
+//! - [`trace`]: where the cycles of one period, or of a run, went: every issue and what it waited for, the chain of
+//!   operations that sets the time, and what a faster unit would bring.
+
 pub mod bound;
 mod error;
 mod graph;
+mod trace;
 
 pub use bound::{Bounds, SectionBounds, Span, bound};
 pub use error::{BoundError, Refusal};
+pub use trace::{Issued, Link, LinkKind, MAX_ISSUES, Trace, TraceError, WhatIf, trace};

@@ -89,13 +89,14 @@ pub(crate) fn integers(context: &mut Context, ir: &Ir) {
         }
     }
     for Integer { value, to, scope, span } in suspects {
-        if !as_float[to.index()] {
+        let bits = f32::from_bits(value as u32);
+        // The pattern of an ordinary number, as `bits(0.5)` gives it, is meant.
+        if !as_float[to.index()] || !(bits.is_subnormal() || bits.is_nan()) {
             continue;
         }
         let register = ir.register(to);
         let name = text(ir, register);
         let what = if register.kind == RegisterKind::Output { "is" } else { "is read as" };
-        let bits = f32::from_bits(value as u32);
         let message = format!("the integer {value} goes to `{name}`, which {what} a float");
         let warning = Diagnostic::warning("integer-in-float", span, message)
             .also(register.span, "declared here")

@@ -25,7 +25,7 @@ pub const BLOCK_DEPTH: usize = 64;
 pub const REPETITIONS: i64 = 1 << 20;
 /// Statements met during expansion, each repetition and each macro use counted (fewer in the fuzz targets, where each
 /// takes a hundred times as long, and every limit is worth reaching).
-pub const STATEMENTS: usize = if cfg!(fuzzing) { 1 << 14 } else { 4 << 20 };
+pub const STATEMENTS: usize = if cfg!(fuzzing) { 1 << 12 } else { 4 << 20 };
 /// Operations of the expanded program, whatever the machine's program memory.
 pub const OPERATIONS: usize = 4 << 20;
 /// Operations of one bundle, on a machine that issues them one after another.

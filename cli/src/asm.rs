@@ -167,7 +167,7 @@ fn write_blocks(assembled: &Assembled, out: &mut Out) -> Result<()> {
     let Some(longest) = names.iter().map(|name| name.chars().count()).max() else { return Ok(()) };
     let width = longest.clamp(12, 40);
     let title = format!("{:<1$}", "scheduled", width + 2);
-    writeln!(out, "{title} operations  bundles  cycles   bound   above it   bound set by")?;
+    writeln!(out, "{title} operations  bundles  cycles   bound   above it   bounds")?;
     for (block, name) in assembled.blocks.iter().zip(&names) {
         let bound = block.bound.cycles();
         let above = 100.0 * f64::from(block.cycles.saturating_sub(bound)) / f64::from(bound.max(1));
@@ -177,7 +177,7 @@ fn write_blocks(assembled: &Assembled, out: &mut Out) -> Result<()> {
             block.operations,
             block.bundles,
             block.cycles,
-            bound_text(block, program)
+            bounds_text(block, program)
         )?;
     }
     Ok(())
@@ -214,6 +214,18 @@ fn timing_text(report: &TimingReport) -> (String, String) {
 fn block_name(program: &Program, block: &BlockReport) -> String {
     let place = || block.location.map(|at| program.place_text(at));
     block.label.clone().or_else(place).unwrap_or_else(|| format!("bundle {}", block.address))
+}
+
+/// The bounds of the critical path, of the slot and of the unit that need most.
+fn bounds_text(block: &BlockReport, program: &Program) -> String {
+    let slots = program.machine.slots;
+    // The first of equals.
+    let slot = slots.iter().zip(&block.bound.slots).rev().max_by_key(|(_, cycles)| **cycles);
+    let units = slots.iter().flat_map(|slot| slot.units).zip(&block.bound.units);
+    let unit = units.collect::<Vec<_>>().into_iter().rev().max_by_key(|(_, cycles)| **cycles);
+    let slot = slot.map_or(String::new(), |(slot, cycles)| format!(", slot {} {cycles}", slot.name));
+    let unit = unit.map_or(String::new(), |(unit, cycles)| format!(", unit {} {cycles}", unit.name));
+    format!("chain {}{slot}{unit}", block.bound.critical_path)
 }
 
 /// What sets a bound.

@@ -166,7 +166,7 @@ fn along_path(
     let registers = controller.inputs();
     let mut closed_loop = ClosedLoop::new(&trajectory, controller);
     let (mut rows, mut worst) = (Vec::new(), (0, -1.0, false));
-    let progress = track::progress(periods, false);
+    let progress = track::progress(periods, "periods", false);
     for _ in 0..periods {
         let record = closed_loop.next().context("the path ended early")?.with_context(|| path.clone())?;
         rows.push(registers.iter().copied().zip(record.inputs.to_words()).collect::<Vec<_>>());

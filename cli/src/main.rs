@@ -2,6 +2,8 @@
 //! terminal.
 
 mod account;
+mod analyse;
+mod arm;
 mod asm;
 mod bound;
 mod completions;
@@ -52,6 +54,7 @@ Exit status: 0 success, 1 an error in a file or while running, 2 an error in the
 
 Examples:
   takt track                         the main job: cycles, accuracy, tracking error
+  takt arm                           a six-axis arm's kinematics: cycles and errors
   takt asm prog.s                    assemble prog.s into prog.takt
   takt run prog.s --inputs in.csv    run it, one period for each row
   takt isa fdiv                      look an instruction up";
@@ -59,10 +62,12 @@ Examples:
 #[derive(Subcommand)]
 enum Command {
     Track(track::Track),
+    Arm(arm::Arm),
     Asm(asm::Asm),
     Disasm(disasm::Disasm),
     Run(run::Run),
     Debug(debug::Debug),
+    Analyse(analyse::Analyse),
     Bound(bound::Bound),
     Eval(eval::Eval),
     Rtl(rtl::Rtl),
@@ -76,10 +81,12 @@ enum Command {
 fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
     match &arguments.command {
         Command::Track(track) => track::run(track, color, out),
+        Command::Arm(arm) => arm::run(arm, color, out),
         Command::Asm(asm) => asm::run(asm, color, out),
         Command::Disasm(disasm) => disasm::run(disasm, color),
         Command::Run(run) => run::run(run, color, out),
         Command::Debug(debug) => debug::run(debug, color, out),
+        Command::Analyse(analyse) => analyse::run(analyse, color, out),
         Command::Bound(bound) => bound::run(bound, color, out),
         Command::Eval(eval) => eval::run(eval, out),
         Command::Rtl(rtl) => rtl::run(rtl, color, out),

@@ -1,4 +1,4 @@
-//! The tool path and the tracking error over time, as SVG.
+//! Pictures as SVG: the tool path and the tracking error over time; an arm's joint angles over time.
 
 use anyhow::{Result, anyhow};
 use plotters::coord::Shift;
@@ -16,6 +16,17 @@ const FINE: u32 = 8;
 const CUT: RGBColor = RGBColor(0x1f, 0x4e, 0x9c);
 const RAPID: RGBColor = RGBColor(0xa8, 0xa8, 0xa8);
 const LIMIT: RGBColor = RGBColor(0xc0, 0x30, 0x20);
+/// Of θ1 to θ6.
+const JOINT_COLORS: [RGBColor; 6] = [
+    CUT,
+    LIMIT,
+    RGBColor(0x2a, 0x8a, 0x3c),
+    RGBColor(0xd0, 0x88, 0x10),
+    RGBColor(0x7a, 0x3c, 0xa0),
+    RGBColor(0x40, 0x40, 0x40),
+];
+/// Height of the picture of an arm's joints.
+const JOINTS_HEIGHT: u32 = 500;
 /// The paper's requirement on the tool, µm.
 const REQUIRED: f64 = 10.0;
 
@@ -80,8 +91,7 @@ impl Plot {
     pub(crate) fn draw(&self, title: &str) -> Result<String> {
         let mut svg = String::new();
         self.draw_into(title, &mut svg).map_err(|error| anyhow!("cannot draw: {error}"))?;
-        let fine = format!("width=\"{0}\" height=\"{0}\"", SIZE * FINE);
-        Ok(svg.replacen(&fine, &format!("width=\"{SIZE}\" height=\"{SIZE}\""), 1))
+        Ok(in_pixels(&svg, SIZE, SIZE))
     }
 
     fn draw_into(&self, title: &str, svg: &mut String) -> Outcome<()> {
@@ -165,6 +175,41 @@ impl Plot {
         }
         outlines
     }
+}
+
+/// Joint angles, degrees, over time; `period` in seconds.
+pub(crate) fn joints(joints: &[[f32; 6]], period: f64) -> Result<String> {
+    let mut svg = String::new();
+    draw_joints(joints, period, &mut svg).map_err(|error| anyhow!("cannot draw: {error}"))?;
+    Ok(in_pixels(&svg, SIZE, JOINTS_HEIGHT))
+}
+
+fn draw_joints(joints: &[[f32; 6]], period: f64, svg: &mut String) -> Outcome<()> {
+    let root = SVGBackend::with_string(svg, (px(SIZE), px(JOINTS_HEIGHT))).into_drawing_area();
+    root.fill(&WHITE)?;
+    let names = ["θ1", "θ2", "θ3", "θ4", "θ5", "θ6"];
+    let styles = JOINT_COLORS.map(|color| color.stroke_width(px(2)));
+    let lines: Vec<_> = names.into_iter().zip(styles).collect();
+    let area = headed(&root, "Joint angles, the tool along a square in space", &lines)?;
+    let angles = || joints.iter().flatten().copied().map(f64::from);
+    let (low, high) = (angles().fold(f64::MAX, f64::min) - 10.0, angles().fold(f64::MIN, f64::max) + 10.0);
+    let end = joints.len().saturating_sub(1) as f64 * period;
+    let mut chart = chart(&area).build_cartesian_2d(0.0..end, low..high)?;
+    mesh(&mut chart, "time, s", "angle, degrees")?;
+    let every = joints.len().div_ceil(POINTS as usize).max(1);
+    for (joint, (_, style)) in lines.into_iter().enumerate() {
+        let point = |(index, angles): (usize, &[f32; 6])| (index as f64 * period, f64::from(angles[joint]));
+        // Corners, at quarters of the way, fall on points of the curve.
+        chart.draw_series(LineSeries::new(joints.iter().enumerate().step_by(every).map(point), style))?;
+    }
+    root.present()?;
+    Ok(())
+}
+
+/// The picture, drawn in fine units, with its size in pixels.
+fn in_pixels(svg: &str, width: u32, height: u32) -> String {
+    let size = |unit: u32| format!("width=\"{}\" height=\"{}\"", width * unit, height * unit);
+    svg.replacen(&size(FINE), &size(1), 1)
 }
 
 /// Pixels in units of drawing.

@@ -20,7 +20,8 @@ pub(crate) struct OptionalMachine {
     pub(crate) machine: Option<&'static Machine>,
 }
 
-fn machine(name: &str) -> Result<&'static Machine, String> {
+/// The machine of a name, for clap.
+pub(crate) fn machine(name: &str) -> Result<&'static Machine, String> {
     Machine::from_name(name).ok_or_else(|| {
         let names: Vec<&str> = MACHINES.iter().map(|machine| machine.name).collect();
         let near = suggest(name, names.iter().copied());

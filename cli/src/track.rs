@@ -146,7 +146,7 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
     let mut table = arguments.csv.as_deref().map(Table::create).transpose()?;
     let mut drawing =
         arguments.plot.as_deref().map(Out::create).transpose()?.map(|file| (file, Plot::new(periods)));
-    let progress = progress(periods, arguments.quiet);
+    let progress = progress(periods, "periods", arguments.quiet);
     let mut totals = Totals::new();
     let mut nans = NanWrites::default();
     while totals.periods < periods {
@@ -239,12 +239,15 @@ pub(crate) fn program(path: &Path, load: Load) -> Result<(String, Loaded)> {
     Ok((name, load.with_source(path)?))
 }
 
-pub(crate) fn progress(periods: u64, quiet: bool) -> ProgressBar {
+/// A bar on its way to `count` of `what`.
+pub(crate) fn progress(count: u64, what: &str, quiet: bool) -> ProgressBar {
     if quiet {
         return ProgressBar::hidden();
     }
     // On standard error, and only if that is a terminal.
-    let style = ProgressStyle::with_template("{bar:40} {human_pos}/{human_len} periods, {eta} to go")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(periods).with_style(style)
+    let style = ProgressStyle::with_template(&format!(
+        "{{bar:40}} {{human_pos}}/{{human_len}} {what}, {{eta}} to go"
+    ))
+    .unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(count).with_style(style)
 }

@@ -49,6 +49,62 @@ fn track() {
     assert_eq!(folder.list(), [""; 0]);
 }
 
+#[test]
+fn arm() {
+    let folder = Folder::new();
+    let text = folder.line("arm --poses 200").ok();
+    assert_eq!(folder.line("arm --poses 200 -q").ok(), text, "the same every time");
+    insta::assert_snapshot!("arm", text);
+
+    // The keys that issue 5 promises.
+    let json: serde_json::Value = serde_json::from_str(&folder.line("arm --poses 200 --json").ok()).unwrap();
+    let number = |pointer: &str| json.pointer(pointer).and_then(serde_json::Value::as_f64).unwrap();
+    assert!(number("/forward/cycles/max") <= 107.0 && number("/inverse/cycles/max") <= 240.0, "{json}");
+    for error in ["/forward/max_error_mm", "/forward/max_error_deg", "/inverse/max_error_deg"] {
+        assert!((1e-6..=0.0005).contains(&number(error)), "{error}");
+    }
+    for (example, names) in [("forward", ["x", "y", "z"]), ("inverse", ["th1", "th2", "th3"])] {
+        for name in names {
+            let value = |whose: &str| number(&format!("/{example}/example/{whose}/{name}"));
+            assert!((value("takt") - value("binary64")).abs() < 0.0005, "{example} {name}");
+            assert!((value("takt") - value("paper")).abs() < 0.02, "{example} {name}");
+        }
+    }
+    for trip in ["forward_of_inverse", "inverse_of_forward"] {
+        let tried = json["round_trips"][trip]["tried_by_configuration"].as_array().unwrap();
+        assert!(tried.len() == 8 && tried.iter().all(|tried| tried.as_u64().unwrap() > 0), "{json}");
+    }
+    assert_eq!((number("/poses"), number("/disagreements")), (200.0, 0.0));
+    assert_eq!(folder.list(), [""; 0]);
+}
+
+/// Joint angles along a square in space, which lead back to it; and their picture.
+#[test]
+fn the_arm_draws_a_square() {
+    let folder = Folder::new();
+    let text = folder.line("arm --poses 1 --csv s.csv --plot s.svg").ok();
+    assert!(text.contains("The square of 200 mm, 4001 periods of 1 ms"), "{text}");
+    let table = columns(&folder.read_text("s.csv"));
+    let number = |name: &str, row: usize| table[name][row].parse::<f64>().unwrap();
+    assert_eq!(table["period"].len(), 4001);
+    for name in ["x", "y", "z", "th1", "th2", "th3", "th4", "th5", "th6"] {
+        assert_eq!(number(name, 0), number(name, 4000), "{name} ends where it began");
+        assert!((0..4000).all(|row| (number(name, row) - number(name, row + 1)).abs() < 0.5), "{name} jumps");
+    }
+    assert!((number("y", 2000) - number("y", 1000) - 200.0).abs() < 1e-3);
+    let svg = folder.read_text("s.svg");
+    assert!(svg.starts_with("<svg") && svg.matches("<polyline").count() >= 6 && svg.contains("θ6"));
+    assert_eq!(folder.line("arm --poses 1 --plot -").ok(), svg);
+}
+
+#[test]
+fn the_small_machine_has_no_arctangent() {
+    let refused = Folder::new().line("arm --machine t1");
+    assert_eq!((refused.status, refused.stdout.as_str()), (Some(1), ""));
+    let text = refused.stderr;
+    assert!(text.contains("t1 has no unit for `fatan2`") && text.contains("arm/forward.s:"), "{text}");
+}
+
 /// The keys that issue 2 promises, on every program and machine.
 #[test]
 fn track_as_json() {
@@ -174,6 +230,30 @@ fn bounds_of_the_programs() {
         }
     }
     insta::assert_snapshot!("bounds", text);
+}
+
+#[test]
+fn where_the_cycles_of_a_period_go() {
+    let folder = Folder::new();
+    let text = folder.line(&format!("analyse {}", source("tracking.s"))).ok();
+    folder.line(&format!("asm {} -m t1 -o small", source("tracking.s"))).ok();
+    insta::assert_snapshot!("analyse", format!("{text}\n{}", folder.line("analyse small").ok()));
+    // The same cycles as the run counts, on recorded inputs; an image has no source to assemble anew.
+    folder.line("track --periods 4 --csv rec.csv -q").ok();
+    folder.line(&format!("asm {} -o image", source("tracking.s"))).ok();
+    let run: serde_json::Value =
+        serde_json::from_str(&folder.line("run image --inputs rec.csv --json").ok()).unwrap();
+    for (periods, cycles) in [("--periods 1", "max"), ("", "min"), ("--periods 3", "min")] {
+        let json = folder.line(&format!("analyse image --inputs rec.csv --json {periods}")).ok();
+        let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+        assert_eq!(json["cycles"], run["cycles"][cycles], "{periods}");
+        assert_eq!(json["one_cycle_less"][0]["assembled_anew"], serde_json::Value::Null);
+    }
+    // From standard input to standard output.
+    let page = folder.fed("analyse - --html -", &folder.read("image")).ok();
+    assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n"));
+    folder.write("halts.s", ".output y\n mov y, zero\n halt\n");
+    assert!(folder.line("analyse halts.s").ok().starts_with("what runs once on t3: "));
 }
 
 /// A loop that ends early or late, and its branch inside: best and worst; a deadline at its edge.
@@ -437,7 +517,7 @@ fn help() {
     let folder = Folder::new();
     let mut all = folder.line("--help").ok();
     assert_eq!(folder.line("help").ok(), all);
-    for command in ["track", "asm", "disasm", "run", "eval", "isa", "machines", "completions", "man"] {
+    for command in ["track", "arm", "asm", "disasm", "run", "eval", "isa", "machines", "completions", "man"] {
         let text = folder.line(&format!("{command} --help")).ok();
         assert!(folder.line(&format!("{command} -h")).ok().lines().count() <= text.lines().count());
         all.push_str(&format!("\n$ takt {command} --help\n{text}"));

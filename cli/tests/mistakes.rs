@@ -153,6 +153,24 @@ fn programs_that_go_wrong() {
 }
 
 #[test]
+fn programs_that_cannot_be_analysed() {
+    check(
+        "analyse",
+        &[
+            "analyse spins.s",
+            "analyse falls.s",
+            "analyse halts.s --periods 3",
+            "analyse pd.s --periods 2 --inputs ok.csv",
+            "analyse pd.s --inputs header.csv",
+            "analyse pd.s --periods 10000000",
+            "analyse pd.s --html pd.s",
+            "analyse pd.s --html - --json",
+            "analyse pd.s --html folder",
+        ],
+    );
+}
+
+#[test]
 fn programs_that_cannot_be_bounded() {
     check(
         "bounds",

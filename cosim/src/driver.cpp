@@ -64,7 +64,7 @@ static void dump(int edge) {
 }
 
 static void observe() {
-    if (core->issued) event(ISSUE, cycle - 1, core->issued_address, 0, 0, 0, 0);
+    if (core->issued) event(ISSUE, cycle - 2, core->issued_address, 0, 0, 0, 0);
     if (core->stored) event(STORE, cycle - 2, core->stored_address, 0, 0, core->stored_value, 0);
     for (unsigned s = 0; s < SLOTS; s++) {
         if (bits(core->retire, s, 1)) {

@@ -2,7 +2,7 @@
 
 use crate::model::{CircuitEvent, EventKind, ModelError, Pin, Simulation};
 use std::fmt::Write as _;
-use takt_emu::{Emulator, Event, Fault, FaultKind, LoadError, Status, Stop};
+use takt_emu::{Emulator, Event, Fault, FaultKind, LoadError, PortWrite, Status, Stop};
 use takt_isa::Program;
 use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::Cycle;
@@ -199,15 +199,27 @@ impl Lockstep {
                 event.cycle <= cycle || !matches!(event.kind, EventKind::Missed | EventKind::Lost)
             }),
             (None, _) => self.check(|event| event.cycle < now),
-            (Some(fault), _) => {
-                let (cycle, shown) = (fault.cycle, fault_code(&fault.kind).is_some());
+            // What issued before the fault is still written, and nothing else; the emulator leaves it underway.
+            (Some(fault), _) if fault_code(&fault.kind).is_some() => {
+                let cycle = fault.cycle;
+                let machine = self.emulator.machine();
+                for &retire in self.emulator.underway() {
+                    self.expected.extend(expect(&Event::Retire(retire)));
+                    if let Some(register) = retire.register.filter(|&register| machine.is_output(register)) {
+                        let (cycle, slot, address, value) =
+                            (retire.cycle, retire.slot, retire.address, retire.value);
+                        let write = PortWrite { cycle, slot, address, register, value, nan: false };
+                        self.expected.extend(expect(&Event::PortWrite(write)));
+                    }
+                }
                 self.check(|event| {
-                    let wrote = matches!(
-                        event.kind,
-                        EventKind::Retire | EventKind::Port | EventKind::Missed | EventKind::Lost
-                    );
-                    event.cycle < cycle || event.cycle == cycle && (wrote || shown)
+                    event.cycle <= cycle || !matches!(event.kind, EventKind::Missed | EventKind::Lost)
                 })
+            }
+            // The circuit knows nothing of this fault and goes on.
+            (Some(fault), _) => {
+                let cycle = fault.cycle;
+                self.check(|event| event.cycle < cycle)
             }
         }
     }

@@ -7,6 +7,7 @@ use std::hash::{Hash, Hasher};
 use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::{Mutex, PoisonError};
 use takt_isa::Program;
 use takt_isa::timing::Cycle;
 use takt_rtl::Design;
@@ -106,6 +107,9 @@ impl Model {
     /// # Errors
     /// If Verilator or a C++ compiler is missing or fails.
     pub fn build(design: &Design, folder: &Path, trace: bool) -> Result<Model, ModelError> {
+        // Threads that want the same design build it once.
+        static ONE: Mutex<()> = Mutex::new(());
+        let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
         let version = run("verilator", "verilator", Command::new("verilator").arg("--version"))?;
         let ports = ports(design);
         let mut hasher = DefaultHasher::new();

@@ -4,6 +4,7 @@ use crate::lockstep::{Lockstep, LockstepError};
 use crate::model::Simulation;
 use std::collections::BTreeSet;
 use takt_emu::testing::{INPUTS, Options, Random, random_program};
+use takt_isa::encode::WORD_MASK;
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{Machine, Op, Program, ROWS};
 
@@ -33,7 +34,11 @@ pub struct Coverage {
 
 /// The program of a seed: every other one may do anything.
 pub fn program(seed: u64, machine: &'static Machine) -> Program {
-    random_program(seed, machine, if seed % 2 == 1 { Options::WILD } else { Options::TAME })
+    let options = if seed % 2 == 1 { Options::WILD } else { Options::TAME };
+    let mut program = random_program(seed, machine, options);
+    // The program memory has 48 bits a word.
+    program.code.iter_mut().for_each(|word| *word &= WORD_MASK);
+    program
 }
 
 /// Runs the program of a seed on both sides and adds to the coverage. The simulation comes back.

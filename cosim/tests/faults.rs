@@ -36,10 +36,9 @@ const COMMON: &[Fault] = &[
     ("takt_source", "({32{r_past[i]}} & was_result[32*i +: 32])", "32'd0"),
     ("takt_source", "advance ? m_index : r_index", "m_index"),
     ("takt_source", "advance ? r_is_next : i_is_next", "r_is_next"),
-    ("takt_source", "advance ? r_value : value", "advance ? r_value : held"),
+    ("takt_source", "~advance & ~next_taken", "~advance"),
     // A bundle at fault.
-    ("takt_underway", "above[j+1] & ~(above_fresh[j+1] & cancel)", "above[j+1]"),
-    ("takt_underway", "insert[j+1] & ~cancel", "insert[j+1]"),
+    ("takt_underway", "above[j+1] & ~((above_fresh[j+1] | above_recent[j+1]) & cancel)", "above[j+1]"),
     // The unit's interval.
     ("takt_late", "working & ~age[INTERVAL-1]", "1'b0"),
     // Branches, calls, the tick.
@@ -47,13 +46,13 @@ const COMMON: &[Fault] = &[
     ("takt_sequencer", "x_call & entries[4]", "1'b0"),
     ("takt_sequencer", "x_return & (entries == 5'd0)", "1'b0"),
     ("takt_sequencer", "x_address + 16'd1", "x_address + 16'd2"),
-    ("takt_sequencer", "x_wait & ~remembered", "x_wait"),
+    ("takt_sequencer", "x_wait & ~remembered & ~fault", "x_wait & ~fault"),
     ("takt_sequencer", "remembered & ~x_wait", "remembered"),
     ("takt_sequencer", "issue & redirects", "1'b0"),
     ("takt_issue", "refused <= next_valid & next_illegal & ~block", "refused <= 1'b0"),
     // The data memory.
     ("takt_memory", "above | ~upper", "above"),
-    ("takt_memory", "x_store & ~fault", "x_store"),
+    ("takt_memory", "x_store & ~fault & ~cancel", "x_store & ~cancel"),
 ];
 
 /// In the generated part of t3, and in its own units.
@@ -63,8 +62,8 @@ const OF_T3: &[Fault] = &[
     ("takt_hazard", "r_at2 | r_on_issue_early", "r_at2"),
     ("takt_hazard", "m_at2 | (m_on_issue & i_early)", "m_at2"),
     ("takt_t3", "pending | (|i_writes)", "pending"),
-    ("takt_t3", "sticky & {3{~x_clear_flags}}", "sticky"),
-    ("takt_t3", "mul_underway[6]", "1'b0"),
+    ("takt_t3", "sticky & {3{~x_clear_flags | fault}}", "sticky"),
+    ("takt_t3", "(r_mul_control[MUL_RESULT_5] & (mul_underway[6]))", "1'b0"),
     ("takt_t3", "d_mul_illegal | d_outside", "d_mul_illegal"),
     ("takt_t3_decode_mul", "|(word[40:0] & 41'h00000000fff)", "1'b0"),
 ];
@@ -79,7 +78,7 @@ const OF_T1: &[Fault] = &[
 ];
 
 /// Random programs that a fault may pass before it counts as not found.
-const PROGRAMS: u64 = 400;
+const PROGRAMS: u64 = 1000;
 
 fn faults_are_found(machine: &'static Machine, faults: &[Fault]) {
     let mut design = export(machine, &Library::builtin()).expect("every machine has a circuit");

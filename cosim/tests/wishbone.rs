@@ -135,7 +135,7 @@ fn tracking(machine: &'static Machine) {
     list.extend(design.files.iter().map(|file| file.name.clone()));
     let files = bench::folder(&design, None).into_iter().map(|file| (file.name, file.text));
     let own = [("master.v".to_owned(), master(&name)), ("bus.hex".to_owned(), script)];
-    for (path, text) in files.chain(own).chain([("files.f".to_owned(), list.join("\n"))]) {
+    for (path, text) in files.chain(own).chain([("files.f".to_owned(), list.join("\n") + "\n")]) {
         let path = folder.join(path);
         fs::create_dir_all(path.parent().expect("a folder")).expect("the target folder can be written");
         fs::write(&path, text).expect("the target folder can be written");
@@ -145,7 +145,11 @@ fn tracking(machine: &'static Machine) {
         "iverilog",
         &["-g2005", "-Wall", "-Wno-timescale", "-s", "master", "-f", "files.f", "-o", "master"],
     );
-    assert_eq!(run(&folder, "vvp", &["-n", "master"]), expected);
+    // Some versions of Icarus Verilog remark that the script does not fill its memory.
+    let said = run(&folder, "vvp", &["-n", "master"]);
+    let said: String =
+        said.lines().filter(|line| !line.starts_with("WARNING")).map(|line| format!("{line}\n")).collect();
+    assert_eq!(said, expected);
     let waivers = ["-Wno-DECLFILENAME", "-Wno-PINCONNECTEMPTY"];
     let mut lint = vec!["--lint-only", "-Wall"];
     lint.extend(waivers);

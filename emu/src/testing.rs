@@ -5,6 +5,7 @@
 //! only the loop counter's decrement is named.
 
 use takt_isa::program::{LoopBound, Port, Section};
+use takt_isa::shape::WORD_BITS;
 use takt_isa::spec::machines::REGISTER_SPACE;
 use takt_isa::{Effect, Function, Instruction, Machine, Op, Operand, Program, ROWS, Row, Type, ZERO};
 
@@ -364,14 +365,43 @@ impl Generator {
         }
     }
 
+    /// Lets a load or store go near the memory's end or beyond, or anywhere.
+    fn stray(&mut self) {
+        let memory = |word: &&mut u64| {
+            Instruction::decode(**word)
+                .is_ok_and(|instruction| matches!(instruction.effect(), Effect::Load | Effect::Store))
+        };
+        let mut candidates: Vec<&mut u64> = self.bundles.iter_mut().flatten().filter(memory).collect();
+        if candidates.is_empty() {
+            return;
+        }
+        let which = self.random.below(candidates.len() as u32) as usize;
+        if let Ok(mut instruction) = Instruction::decode(*candidates[which]) {
+            instruction.constant = match self.random.below(3) {
+                0 => self.random.below(4096),
+                _ => self.machine.data_depth.saturating_sub(2) + self.random.below(4),
+            };
+            instruction.sources[0] = match self.random.below(3) {
+                0 => ZERO,
+                1 => self.random.pick(&self.bases).0,
+                _ => *self.random.pick(&self.sources),
+            };
+            *candidates[which] = word(&instruction);
+        }
+    }
+
     /// Breaks a few words.
     fn derange(&mut self) {
         let (bundles, slots) = (self.bundles.len() as u32, self.machine.slots.len() as u32);
         for _ in 0..1 + self.random.below(3) {
             let (bundle, slot) = (self.random.below(bundles) as usize, self.random.below(slots) as usize);
-            let (target, register) =
+            let (mut target, register) =
                 (self.random.below(bundles + 2), self.random.below(REGISTER_SPACE as u32) as u16);
-            match self.random.below(12) {
+            if self.random.once_in(8) {
+                // Where a program memory that ignores an address's upper bits would find a bundle.
+                target += self.machine.code_depth << self.random.below(4);
+            }
+            match self.random.below(16) {
                 0 => self.bundles[bundle][slot] = 0,
                 1 => self.bundles[bundle][slot] = self.random.bits() >> 16,
                 2 => self.bundles[bundle][slot] = self.random.bits() >> 8,
@@ -384,6 +414,8 @@ impl Generator {
                     let source = *self.random.pick(&self.sources);
                     self.control(bundle, Effect::BranchNonzero, target, Some(source));
                 }
+                10..=12 => self.stray(),
+                13 | 14 => self.bundles[bundle][slot] ^= 1 << self.random.below(WORD_BITS),
                 _ => {
                     // Another source, or base: unwritten, or any value at all.
                     let source =

@@ -135,6 +135,15 @@ impl Bundle {
         bundle
     }
 
+    /// The bundle on a machine that differs in one unit: what a unit of another speed would do to a program as it is.
+    pub fn with_unit(mut self, slot: u8, unit: u8, latency: u32, interval: u32) -> Bundle {
+        let same = |operation: &&mut Operation| (operation.slot, operation.unit) == (slot, unit);
+        for operation in self.operations.iter_mut().filter(same) {
+            (operation.latency, operation.interval) = (latency, interval);
+        }
+        self
+    }
+
     /// The destinations, each with the cycles from issue to its writeback.
     pub fn writebacks(&self) -> impl Iterator<Item = (u16, u32)> + '_ {
         self.operations.iter().filter_map(|operation| Some((operation.dest?, operation.latency)))

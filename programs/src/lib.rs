@@ -4,11 +4,13 @@
 //!   sampling period;
 //! - [`hybrid`] is the five-axis hybrid robot of the founding paper: kinematics, dynamics, the tracking
 //!   controller in binary64 and in native binary32, the plant, and the loop that joins them;
+//! - [`arm`] is the six-axis arm of the second founding paper: kinematics in binary64, and the measurement of its programs;
 //! - [`accuracy`] measures binary32 results against binary64.
 //!
-//! Everything is in SI units (m, rad, s, kg, N, N·m), nothing here prints, and no input makes it panic.
+//! Everything but the six-axis arm (mm, degrees) is in SI units (m, rad, s, kg, N, N·m), nothing here prints, and no input makes it panic.
 
 pub mod accuracy;
+pub mod arm;
 pub mod gcode;
 pub mod hybrid;
 pub mod path;
@@ -20,6 +22,9 @@ pub const AGH: &str = include_str!("../data/agh.ngc");
 
 /// The assembly sources: path within this crate's folder, and text.
 pub const SOURCES: &[(&str, &str)] = &[
+    ("arm/arm.s", include_str!("../arm/arm.s")),
+    ("arm/forward.s", include_str!("../arm/forward.s")),
+    ("arm/inverse.s", include_str!("../arm/inverse.s")),
     ("hybrid/robot.s", include_str!("../hybrid/robot.s")),
     ("hybrid/tracking.s", include_str!("../hybrid/tracking.s")),
     ("hybrid/tracking_literal.s", include_str!("../hybrid/tracking_literal.s")),

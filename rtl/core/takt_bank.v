@@ -1,8 +1,9 @@
 // takt_bank: one copy of a register bank; one port writes, one reads.
 //
 // Contract
-//   value holds in cycle t + 1 the word at read_index of cycle t, as writes of cycle t - 1 and before have left it. What is read
-//   in the very cycle in which it is written is undefined: takt_source does not use it.
+//   value holds in cycle t + 2 the word at read_index of cycle t, as writes of cycle t - 1 and before have left it. What is read
+//   in the very cycle in which it is written is undefined: takt_source does not use it. The second cycle is the block RAM's own
+//   delay, half a cycle, and the way from it.
 
 module takt_bank #(
     parameter INDEX = 8  // bits of an index
@@ -17,10 +18,12 @@ module takt_bank #(
 
     (* no_rw_check *)
     reg [31:0] words [0:(1<<INDEX)-1];
+    reg [31:0] read;
 
     always @(posedge clk) begin
         if (write) words[write_index] <= write_value;
-        value <= words[read_index];
+        read  <= words[read_index];
+        value <= read;
     end
 
 endmodule

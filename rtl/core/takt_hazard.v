@@ -9,6 +9,7 @@
 //   advance: the bundles move on by a stage at the end of this cycle (the one in issue issues, or there is none).
 //   r_waits: a bundle that moves from read to issue at the end of this cycle cannot issue in the next one.
 //   i_waits: a bundle that stays in issue cannot issue in the next cycle.
+//   r_copy[s]: the bank's copy shows the register in this cycle.
 //   r_past[s]: the result was on slot s's bus in the last cycle, and the bank's copy does not show it in this one.
 //   i_now[s], i_past[s]: it is on the bus in this cycle; it was in the last, when the bundle was in read.
 //   next_now, next_past: what i_now and i_past will be in the next cycle.
@@ -41,6 +42,7 @@ module takt_hazard #(
     input  wire [SLOTS*INDEX-1:0]       i_dest,
     output wire                         r_waits,
     output wire                         i_waits,
+    output reg  [SLOTS-1:0]             r_copy,
     output reg  [SLOTS-1:0]             r_past,
     output reg  [SLOTS-1:0]             i_now,
     output reg  [SLOTS-1:0]             i_past,
@@ -94,6 +96,7 @@ module takt_hazard #(
             r_at1            <= m_at2 | (m_on_issue & i_early);
             r_at0            <= m_at1;
             r_past           <= m_at0;
+            r_copy           <= m_bank & ~m_at0;
             r_on_issue       <= |m_on_read;
             r_on_issue_early <= m_on_read & r_early;
             r_on_issue_late  <= |(m_on_read & ~r_early);
@@ -104,6 +107,7 @@ module takt_hazard #(
             r_at1   <= r_at2;
             r_at0   <= r_at1;
             r_past  <= r_at0;
+            r_copy  <= r_bank & ~r_at0;
             i_later <= i_later & ~(|i_at2);
             i_at1   <= i_at2;
         end

@@ -5,7 +5,8 @@
 //   its result passes on to takt_underway's last place: last, in the cycle before. busy: the unit would not accept an
 //   operation in the next cycle even if none issues now.
 //   Requires INTERVAL >= LATENCY - DEPTH, so that one operation at a time is underway here.
-//   cancel: what issued in the last cycle and what issues now do not count.
+//   cancel, which stays: what issued in the last two cycles and what issues from now on does not count.
+//   Requires LATENCY - DEPTH >= 3: none is cancelled that has passed on.
 
 module takt_late #(
     parameter LATENCY  = 18,
@@ -31,8 +32,8 @@ module takt_late #(
     localparam AGES = LATENCY - DEPTH > INTERVAL - 1 ? LATENCY - DEPTH : INTERVAL - 1;
 
     generate
-        if (LATENCY <= DEPTH || INTERVAL < LATENCY - DEPTH || INTERVAL < 3) begin : g_interval
-            takt_late_has_interval_of_at_least_its_latency_beyond_the_places unsupported ();
+        if (LATENCY < DEPTH + 3 || INTERVAL < LATENCY - DEPTH || INTERVAL < 3) begin : g_interval
+            takt_late_has_an_interval_of_its_latency_beyond_the_places unsupported ();
         end
     endgenerate
 
@@ -40,11 +41,11 @@ module takt_late #(
     reg          working;
 
     assign at   = age[LATENCY-DEPTH:1];
-    assign last = age[LATENCY-DEPTH] & ~(LATENCY - DEPTH == 1 ? cancel : 1'b0);
+    assign last = age[LATENCY-DEPTH];
     assign busy = working & ~age[INTERVAL-1];
 
     always @(posedge clk) begin
-        age      <= {age[AGES-1:2], age[1] & ~cancel, insert & ~cancel};
+        age      <= {age[AGES-1:3], age[2] & ~cancel, age[1] & ~cancel, insert};
         working  <= insert | busy;
         underway <= insert | (underway & ~age[LATENCY-DEPTH]);
         if (insert) begin

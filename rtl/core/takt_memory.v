@@ -3,6 +3,7 @@
 // Contract
 //   x_load, x_store with operands a (base) and b (what is stored) in the cycle after issue. A load's result has out_valid in
 //   cycle LATENCY after issue. fault: the address lies outside the memory; then nothing happens.
+//   cancel: what is in execute does not count.
 //   load_write: in reset, the loader writes.
 //
 // Pipeline
@@ -25,6 +26,7 @@ module takt_memory #(
     input  wire [11:0]        offset,
     input  wire [31:0]        a,
     input  wire [31:0]        b,
+    input  wire               cancel,
     output wire               fault,
     output reg                out_valid,
     output reg  [31:0]        result,
@@ -57,7 +59,7 @@ module takt_memory #(
     always @(posedge clk) begin
         address <= rst ? load_address : sum[ADDRESS-1:0];
         value   <= rst ? load_value : b;
-        write   <= rst ? load_write : x_store & ~fault;
+        write   <= rst ? load_write : x_store & ~fault & ~cancel;
         loading <= x_load & ~fault & ~rst;
         if (write) words[address] <= value;
         else read <= words[address];

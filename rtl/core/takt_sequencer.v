@@ -6,11 +6,11 @@
 // Contract
 //   flush: what was fetched after the bundle in execute does not issue; fetch is the target's address. Without flush, fetch
 //   is the address after the last one fetched.
-//   cancel: the bundle in execute is at fault: neither it nor what issues in this cycle takes effect.
-//   stop: nothing issues from the next cycle on. wait_next: the program waits in the next cycle.
+//   fault: the bundle that issued two cycles ago was at fault: neither it nor what has issued since takes effect.
+//   block: nothing issues in the next cycle.
 //   Reset acts as a jump to 0 in the cycle before cycle 0.
 //   tick is seen in the cycle in which it is high. missed, lost: in that cycle, the deadline was missed, the tick was lost.
-//   fault_*: from the second cycle after that of the fault. kind: 1 illegal word, 2 data address, 3 return stack full, 4 empty.
+//   fault and fault_* stand from the second cycle after that of the fault on. kind: 1 illegal word, 2 data address, 3 return stack full, 4 empty.
 
 module takt_sequencer #(
     parameter PROGRAM = 10,  // bits of an address of the program memory, less than 16
@@ -42,7 +42,6 @@ module takt_sequencer #(
     output wire             flush,
     output wire [PROGRAM-1:0] fetch,
     output wire             f_outside,     // what the program memory delivers is no part of it
-    output wire             cancel,
     output wire             block,
     output reg  [15:0]      i_address,
     output reg              x_issued,
@@ -82,7 +81,6 @@ module takt_sequencer #(
 
     wire stack_full  = x_call & entries[4];
     wire stack_empty = x_return & (entries == 5'd0);
-    assign cancel = x_refused | x_address_fault | stack_full | stack_empty;
 
     wire zero = x_operand == 32'd0;
     assign flush = x_jump | x_call | x_return | x_wait | (x_branch_zero & zero) | (x_branch_nonzero & ~zero);
@@ -94,7 +92,7 @@ module takt_sequencer #(
     assign fetch     = chosen[PROGRAM-1:0];
     assign f_outside = |fetched[15:PROGRAM];
 
-    wire take = issue & ~cancel;
+    wire take = issue & ~fault;
     integer s;
     always @(posedge clk) begin
         if (flush | advance) fetched <= chosen;
@@ -110,7 +108,7 @@ module takt_sequencer #(
         x_return         <= take & i_return;
         x_wait           <= take & i_wait;
         x_halt           <= take & i_halt;
-        x_refused        <= refused & ~cancel & ~fault;
+        x_refused        <= refused;
         for (s = SLOTS - 1; s >= 0; s = s - 1) if (i_illegal[s]) x_illegal_slot <= s[2:0];
         if (x_call) begin
             stack[entries[3:0]] <= x_address + 16'd1;
@@ -133,7 +131,7 @@ module takt_sequencer #(
     // ---- the tick
 
     reg  remembered;
-    wire waits = waiting | (x_wait & ~remembered);
+    wire waits = waiting | (x_wait & ~remembered & ~fault);
     wire still = remembered & ~x_wait;  // is remembered when the tick comes
 
     assign missed = tick & ~waits & ~still;
@@ -154,11 +152,11 @@ module takt_sequencer #(
     // ---- stops
 
     wire redirects = i_jump | i_branch_zero | i_branch_nonzero | i_call | i_return | i_wait | i_halt;
-    assign block = (issue & redirects) | wait_next | x_halt | halted | refused | cancel | fault;
+    assign block = (issue & redirects) | wait_next | x_halt | halted | refused | x_refused | fault;
 
     always @(posedge clk) begin
-        if (x_halt) halted <= 1'b1;
-        if (cancel & ~fault) begin
+        if (x_halt & ~fault) halted <= 1'b1;
+        if (~fault & (x_refused | x_address_fault | stack_full | stack_empty)) begin
             fault         <= 1'b1;
             fault_kind    <= x_refused ? 3'd1 : x_address_fault ? 3'd2 : stack_full ? 3'd3 : 3'd4;
             fault_slot    <= x_refused ? x_illegal_slot : x_address_fault ? MEMORY_SLOT : OWN_SLOT;

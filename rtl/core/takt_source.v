@@ -1,6 +1,6 @@
 // takt_source: one source operand of a slot, from match to the operand register of the units: banks, forwarding, hazards.
 //
-// Stages: match (m_), read (r_), issue (i_); operand stands in the cycle after issue. In read the banks' copies have delivered
+// Stages: match (m_), read (r_), issue (i_); operand stands in the cycle after issue. In read the banks' copies deliver
 // the register; while a bundle waits there it is read anew in every cycle. While it waits in issue, what is written to
 // its register is taken from the bus.
 //
@@ -23,6 +23,7 @@ module takt_source #(
     input  wire [INDEX-1:0]             m_index,
     input  wire [SLOTS*DEPTH-1:0]       underway,
     input  wire [SLOTS*DEPTH*INDEX-1:0] underway_index,
+    input  wire [SLOTS-1:0]             writes,          // takt_underway's
     input  wire [SLOTS*LATE-1:0]        late,
     input  wire [SLOTS*LATE*INDEX-1:0]  late_index,
     input  wire [SLOTS-1:0]             r_writes,
@@ -57,55 +58,57 @@ module takt_source #(
         end
     end
 
-    wire [SLOTS-1:0] r_past, i_now, i_past, next_now, next_past;
+    wire [SLOTS-1:0] r_copy, r_past, i_now, i_past, next_now, next_past;
     takt_hazard #(.SLOTS(SLOTS), .DEPTH(DEPTH), .LATE(LATE), .INDEX(INDEX)) hazard (
         .clk(clk), .advance(advance),
         .m_bank(m_bank[SLOTS-1:0]), .m_index(m_index), .r_bank(r_bank[SLOTS-1:0]), .r_index(r_index),
         .i_bank(i_bank[SLOTS-1:0]), .i_index(i_index),
         .underway(underway), .underway_index(underway_index), .late(late), .late_index(late_index),
         .r_writes(r_writes), .r_early(r_early), .r_dest(r_dest), .i_writes(i_writes), .i_early(i_early), .i_dest(i_dest),
-        .r_waits(r_waits), .i_waits(i_waits), .r_past(r_past), .i_now(i_now), .i_past(i_past),
+        .r_waits(r_waits), .i_waits(i_waits), .r_copy(r_copy), .r_past(r_past), .i_now(i_now), .i_past(i_past),
         .next_now(next_now), .next_past(next_past)
     );
 
     // ---- read: the bank's copy, or what is too recent for it
 
     wire [INDEX-1:0] read_index = advance ? m_index : r_index;
-    wire [32*SLOTS+31:0] read;
+    wire [32*SLOTS+31:0] copy;  // of the bundle that was in read in the last cycle
 
     takt_bank #(.INDEX(INDEX)) inputs (
         .clk(clk), .write(input_write), .write_index(input_write_index), .write_value(input_write_value),
-        .read_index(read_index), .value(read[32*SLOTS +: 32])
+        .read_index(read_index), .value(copy[32*SLOTS +: 32])
     );
 
     genvar s;
     generate
         for (s = 0; s < SLOTS; s = s + 1) begin : g_slot
             takt_bank #(.INDEX(INDEX)) bank (
-                .clk(clk), .write(underway[s*DEPTH]), .write_index(underway_index[s*DEPTH*INDEX +: INDEX]),
-                .write_value(result[32*s +: 32]), .read_index(read_index), .value(read[32*s +: 32])
+                .clk(clk), .write(writes[s]), .write_index(underway_index[s*DEPTH*INDEX +: INDEX]),
+                .write_value(result[32*s +: 32]), .read_index(read_index), .value(copy[32*s +: 32])
             );
         end
     endgenerate
 
-    reg [31:0] r_value;
+    reg [31:0] r_recent;
     integer    i;
     always @* begin
-        r_value = r_constant | ({32{r_bank[SLOTS]}} & read[32*SLOTS +: 32]);
+        r_recent = r_constant;
         for (i = 0; i < SLOTS; i = i + 1) begin
-            r_value = r_value | ({32{r_bank[i] & ~r_past[i]}} & read[32*i +: 32]) | ({32{r_past[i]}} & was_result[32*i +: 32]);
+            r_recent = r_recent | ({32{r_past[i]}} & was_result[32*i +: 32]);
         end
     end
 
     // ---- issue: what was read, or what is on a bus
 
-    reg  [31:0] held, value;
-    reg         i_held, i_input;
-    integer     k;
+    reg  [31:0]    recent, held, value;
+    reg  [SLOTS:0] i_copy;
+    reg            i_recent, i_held, i_input;
+    integer        k;
     always @* begin
-        value = ({32{i_held}} & held) | ({32{i_input}} & input_value);
+        value = ({32{i_recent}} & recent) | ({32{i_held}} & held) | ({32{i_input}} & input_value) | ({32{i_copy[SLOTS]}} & copy[32*SLOTS +: 32]);
         for (k = 0; k < SLOTS; k = k + 1) begin
-            value = value | ({32{i_now[k]}} & result[32*k +: 32]) | ({32{i_past[k]}} & was_result[32*k +: 32]);
+            value = value | ({32{i_copy[k]}} & copy[32*k +: 32])
+                | ({32{i_now[k]}} & result[32*k +: 32]) | ({32{i_past[k]}} & was_result[32*k +: 32]);
         end
     end
 
@@ -113,11 +116,16 @@ module takt_source #(
     wire i_is_next = i_bank[SLOTS] & (i_index == input_next_index);
     wire next_input = input_next & (advance ? r_is_next : i_is_next);
 
+    wire next_taken = next_input | (|next_now) | (|next_past);
+
     always @(posedge clk) begin
-        i_input <= next_input;
-        i_held  <= ~(next_input | (|next_now) | (|next_past));
-        held    <= advance ? r_value : value;
-        operand <= value | i_status;
+        i_input  <= next_input;
+        i_copy   <= {r_bank[SLOTS], r_copy} & {(SLOTS + 1){advance & ~next_taken}};
+        i_recent <= advance & ~next_taken;
+        i_held   <= ~advance & ~next_taken;
+        recent   <= r_recent;
+        held     <= value;
+        operand  <= value | i_status;
     end
 
 endmodule

@@ -4,7 +4,9 @@
 //   Place j holds the result that is on the slot's bus j cycles from now: valid[j], the register's index, the bundle's address.
 //   Results move down a place each cycle; the one in place 0 is written back. A result of latency L that issues now, insert[L],
 //   is in place L - 1 in the next cycle. late is one that comes from takt_late into the last place.
-//   cancel: what issued in the last cycle and what issues now do not count.
+//   cancel, which stays: what issued in the last two cycles and what issues from now on does not count.
+//   (Only a slot that does not host what is at fault can have a result of latency 2 to cancel in place 0.)
+//   writes: what is in place 0 is written; valid[0], unless it is cancelled in this very cycle.
 //   load: in reset, the loader's write takes place 0 in the next cycle.
 
 module takt_underway #(
@@ -25,29 +27,35 @@ module takt_underway #(
     input  wire [ADDRESS-1:0]     late_address,
     output reg  [DEPTH-1:0]       valid,
     output reg  [DEPTH*INDEX-1:0] index,
+    output wire                   writes,
     output wire [ADDRESS-1:0]     address    // of place 0
 );
 
     reg [DEPTH*ADDRESS-1:0] addresses;
-    reg [DEPTH-1:0]         fresh;      // issued in the last cycle
+    reg [DEPTH-1:0]         fresh;      // issued in the last cycle, in the one before
+    reg [DEPTH-1:0]         recent;
 
     wire [DEPTH:0]               above         = {late, valid};
     wire [DEPTH:0]               above_fresh   = {1'b0, fresh};
+    wire [DEPTH:0]               above_recent  = {1'b0, recent};
     wire [(DEPTH+1)*INDEX-1:0]   above_index   = {late_index, index};
     wire [(DEPTH+1)*ADDRESS-1:0] above_address = {late_address, addresses};
 
     assign address = addresses[ADDRESS-1:0];
+    assign writes  = valid[0] & ~(recent[0] & cancel);
 
     integer j;
     always @(posedge clk) begin
         for (j = 0; j < DEPTH; j = j + 1) begin
-            fresh[j] <= insert[j+1];
-            valid[j] <= (above[j+1] & ~(above_fresh[j+1] & cancel)) | (insert[j+1] & ~cancel);
+            fresh[j]  <= insert[j+1];
+            recent[j] <= above_fresh[j+1];
+            valid[j]  <= (above[j+1] & ~((above_fresh[j+1] | above_recent[j+1]) & cancel)) | insert[j+1];
             index[j*INDEX +: INDEX] <= insert[j+1] ? insert_index : above_index[(j+1)*INDEX +: INDEX];
             addresses[j*ADDRESS +: ADDRESS] <= insert[j+1] ? insert_address : above_address[(j+1)*ADDRESS +: ADDRESS];
         end
         if (rst) begin
             fresh    <= {DEPTH{1'b0}};
+            recent   <= {DEPTH{1'b0}};
             valid    <= {DEPTH{1'b0}};
             valid[0] <= load;
             index[INDEX-1:0] <= load_index;

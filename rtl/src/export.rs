@@ -122,7 +122,11 @@ impl Plan {
                 return Err(refuse(format!("unit {} has a latency below 2", unit.name)));
             }
             let pipelined = writing().filter(|unit| unit.interval == 1).map(|unit| unit.latency);
-            let depth = pipelined.max().unwrap_or(0).max(4);
+            // A unit that takes the next operation has passed its last result on to the common places, or does now.
+            let left = writing()
+                .filter(|unit| unit.interval > 1)
+                .map(|unit| unit.latency.saturating_sub(unit.interval));
+            let depth = pipelined.chain(left).max().unwrap_or(0).max(4);
             depths.push(depth);
             late.push(writing().filter(|unit| unit.interval > 1).map(|unit| Late { unit }).collect());
         }
@@ -396,7 +400,7 @@ impl Plan {
         line!(v, "    output wire [15:0] fault_address,");
         line!(
             v,
-            "    // For verification: the bundle that issued in the last cycle, a store two cycles after its issue, and each slot's writeback."
+            "    // For verification: a bundle two cycles after its issue, a store likewise, and each slot's writeback."
         );
         line!(v, "    output wire        issued,");
         line!(v, "    output wire [15:0] issued_address,");
@@ -479,7 +483,7 @@ impl Plan {
         line!(v, "\n    // ---- fetch and decode\n");
         line!(
             v,
-            "    wire        advance, issue, flush, cancel, block, refused, m_valid, f_outside;\n    wire [{}:0] fetch;",
+            "    wire        advance, issue, flush, block, refused, m_valid, f_outside;\n    wire [{}:0] fetch;",
             code_bits - 1
         );
         line!(v, "    reg         d_outside;  // beyond the program memory");
@@ -642,7 +646,7 @@ impl Plan {
                 );
                 line!(
                     v,
-                    "        .clk(clk), .rst(rst), .cancel(cancel), .insert(issue & {}),\n        .insert_index(i_{name}_dest), .insert_address(i_address),",
+                    "        .clk(clk), .rst(rst), .cancel(fault), .insert(issue & {}),\n        .insert_index(i_{name}_dest), .insert_address(i_address),",
                     self.bit("i", s, &format!("unit_{}", unit.name))
                 );
                 line!(
@@ -671,14 +675,14 @@ impl Plan {
                 .collect();
             line!(
                 v,
-                "    wire [{}:0] {name}_underway;\n    wire [{}:0] {name}_underway_index;\n    wire [15:0] {name}_retire_address;",
+                "    wire [{}:0] {name}_underway;\n    wire {name}_writes;\n    wire [{}:0] {name}_underway_index;\n    wire [15:0] {name}_retire_address;",
                 d - 1,
                 d * index - 1
             );
             line!(v, "    takt_underway #(.DEPTH({d}), .INDEX({index})) {name}_results (");
             line!(
                 v,
-                "        .clk(clk), .rst(rst), .cancel(cancel), .load({name}_load), .load_index(loads_address[{}:0]),",
+                "        .clk(clk), .rst(rst), .cancel(fault), .load({name}_load), .load_index(loads_address[{}:0]),",
                 index - 1
             );
             line!(v, "        .insert({}),", concat(&insert));
@@ -692,7 +696,7 @@ impl Plan {
             );
             line!(
                 v,
-                "        .valid({name}_underway), .index({name}_underway_index), .address({name}_retire_address)\n    );"
+                "        .writes({name}_writes), .valid({name}_underway), .index({name}_underway_index), .address({name}_retire_address)\n    );"
             );
             line!(
                 v,
@@ -762,10 +766,10 @@ impl Plan {
         );
         line!(
             v,
-            "    wire [2:0] new_flags = {};",
-            any(&(0..slots)
-                .map(|s| format!("({{3{{{0}_underway[0]}}}} & {0}_flags)", n(s)))
-                .collect::<Vec<_>>())
+            "    wire [{}:0] writes = {};\n    wire [2:0] new_flags = {};",
+            slots - 1,
+            vector(&|s| format!("{}_writes", n(s))),
+            any(&(0..slots).map(|s| format!("({{3{{{0}_writes}}}} & {0}_flags)", n(s))).collect::<Vec<_>>())
         );
 
         // ---- Operands.
@@ -796,7 +800,7 @@ impl Plan {
                 line!(v, "        .clk(clk), .advance(advance), .m_bank(m_{o}_bank), .m_index(m_{o}_index),");
                 line!(
                     v,
-                    "        .underway(underway), .underway_index(underway_index), .late(late), .late_index(late_index),"
+                    "        .underway(underway), .underway_index(underway_index), .writes(writes), .late(late), .late_index(late_index),"
                 );
                 line!(
                     v,
@@ -824,7 +828,7 @@ impl Plan {
             line!(v);
             line!(
                 v,
-                "    wire {name}_r_waits, {name}_i_waits, {name}_unused_past, {name}_unused_now, {name}_unused_i_past, {name}_unused_next, {name}_unused_next_past;"
+                "    wire {name}_r_waits, {name}_i_waits, {name}_unused_copy, {name}_unused_past, {name}_unused_now, {name}_unused_i_past, {name}_unused_next, {name}_unused_next_past;"
             );
             line!(
                 v,
@@ -859,7 +863,7 @@ impl Plan {
             );
             line!(
                 v,
-                "        .r_waits({name}_r_waits), .i_waits({name}_i_waits), .r_past({name}_unused_past), .i_now({name}_unused_now),"
+                "        .r_waits({name}_r_waits), .i_waits({name}_i_waits), .r_copy({name}_unused_copy), .r_past({name}_unused_past), .i_now({name}_unused_now),"
             );
             line!(
                 v,
@@ -977,11 +981,11 @@ impl Plan {
         );
         line!(
             v,
-            "        .flush(flush), .fetch(fetch), .f_outside(f_outside), .cancel(cancel), .block(block), .i_address(i_address),"
+            "        .flush(flush), .fetch(fetch), .f_outside(f_outside), .block(block), .i_address(i_address),"
         );
         line!(
             v,
-            "        .x_issued(issued_any), .x_address(x_address), .waiting(waiting), .missed(tick_missed), .lost(tick_lost),"
+            "        .x_issued(x_issued), .x_address(x_address), .waiting(waiting), .missed(tick_missed), .lost(tick_lost),"
         );
         line!(
             v,
@@ -989,12 +993,15 @@ impl Plan {
         );
         line!(v, "        .fault_address(fault_address)\n    );");
         let marker = "\n    // ---- execute: the sequencer and the data memory\n";
-        v = v.replace(marker, &format!("{marker}\n    wire issued_any;"));
-        line!(v, "    assign issued = issued_any & ~cancel;\n    assign issued_address = x_address;\n");
+        v = v.replace(marker, &format!("{marker}\n    wire x_issued;"));
+        line!(
+            v,
+            "    reg        was_issued;\n    reg [15:0] was_address;\n    always @(posedge clk) begin\n        was_issued  <= x_issued;\n        was_address <= x_address;\n    end\n    assign issued = was_issued & ~fault;\n    assign issued_address = was_address;\n"
+        );
         line!(v, "    reg x_load, x_store;\n    reg [11:0] x_offset;\n    always @(posedge clk) begin");
         line!(
             v,
-            "        x_load   <= issue & ~cancel & {};\n        x_store  <= issue & ~cancel & {};\n        x_offset <= i_{m}_constant[11:0];\n    end",
+            "        x_load   <= issue & ~fault & {};\n        x_store  <= issue & ~fault & {};\n        x_offset <= i_{m}_constant[11:0];\n    end",
             self.bit_or_0("i", memory_slot, "load"),
             self.bit_or_0("i", memory_slot, "store")
         );
@@ -1018,7 +1025,7 @@ impl Plan {
         );
         line!(
             v,
-            "        .x_load(x_load), .x_store(x_store), .offset(x_offset), .a(x_{m}_a), .b(x_{m}_b), .fault(x_address_fault),"
+            "        .x_load(x_load), .x_store(x_store), .offset(x_offset), .a(x_{m}_a), .b(x_{m}_b), .cancel(fault), .fault(x_address_fault),"
         );
         line!(
             v,
@@ -1100,11 +1107,11 @@ impl Plan {
             .collect();
         line!(
             v,
-            "    reg x_clear_flags;\n    assign sticky_now = (sticky & {{3{{~x_clear_flags}}}}) | new_flags;\n    assign status = sticky_now;"
+            "    reg x_clear_flags;\n    assign sticky_now = (sticky & {{3{{~x_clear_flags | fault}}}}) | new_flags;\n    assign status = sticky_now;"
         );
         line!(
             v,
-            "    always @(posedge clk) begin\n        x_clear_flags <= issue & ~cancel & ({});\n        sticky <= rst ? 3'd0 : sticky_now;\n    end",
+            "    always @(posedge clk) begin\n        x_clear_flags <= issue & ~fault & ({});\n        sticky <= rst ? 3'd0 : sticky_now;\n    end",
             any(&clears)
         );
 
@@ -1114,7 +1121,7 @@ impl Plan {
             let log = bank.depth.trailing_zeros();
             line!(
                 v,
-                "    assign output_{}_write = {name}_underway[0] & (&{name}_underway_index[{}:{port_bits}]);",
+                "    assign output_{}_write = {name}_writes & (&{name}_underway_index[{}:{port_bits}]);",
                 bank.name,
                 log - 1
             );
@@ -1126,7 +1133,7 @@ impl Plan {
                 bank.name
             );
         }
-        line!(v, "    assign retire         = {};", vector(&|s| format!("{}_underway[0] & ~rst", n(s))));
+        line!(v, "    assign retire         = {};", vector(&|s| format!("{}_writes & ~rst", n(s))));
         line!(v, "    assign retire_address = {};", vector(&|s| format!("{}_retire_address", n(s))));
         line!(
             v,

@@ -15,17 +15,22 @@ pub(crate) const UNITS: &[File] = files!("units":
     "add.v"
     "alu.v"
     "alu_late.v"
+    "arccosine.v"
+    "arctangent.v"
     "convert.v"
     "divide.v"
     "divroot.v"
     "multiply.v"
     "root.v"
     "sine.v"
+    "common/takt_arccosine_table.v"
+    "common/takt_arctangent_table.v"
     "common/takt_leading_zeros.v"
     "common/takt_product.v"
+    "common/takt_quarter_table.v"
     "common/takt_reciprocal_table.v"
-    "common/takt_sine_table.v"
     "common/takt_unpack.v"
+    "common/takt_wave_table.v"
 );
 
 /// Modules that take the place of shared ones on Lattice ECP5.

@@ -49,9 +49,21 @@ fn every_operand(unit: &str, op: Op) {
 }
 
 #[test]
-#[ignore = "takes hours"]
+#[ignore = "takes half an hour"]
 fn sine() {
     every_operand("sine", Op::fsin);
+}
+
+#[test]
+#[ignore = "takes half an hour"]
+fn cosine() {
+    every_operand("sine", Op::fcos);
+}
+
+#[test]
+#[ignore = "takes hours"]
+fn arccosine() {
+    every_operand("arccosine", Op::facos);
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::Path;
+use takt_rtl::tables::angle;
 use takt_rtl::tables::reciprocal::{Digits, Function, Tables};
 use takt_rtl::tables::sine;
 
@@ -25,8 +26,15 @@ fn reciprocal_file() {
 }
 
 #[test]
-fn sine_file() {
-    check_file("takt_sine_table.v", &sine::verilog());
+fn sine_files() {
+    check_file("takt_quarter_table.v", &sine::multiples());
+    check_file("takt_wave_table.v", &sine::polynomials());
+}
+
+#[test]
+fn angle_files() {
+    check_file("takt_arctangent_table.v", &angle::arctangents());
+    check_file("takt_arccosine_table.v", &angle::arccosines());
 }
 
 /// What `units/divroot.v` says of widths and of the last residual.

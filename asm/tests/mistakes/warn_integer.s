@@ -18,5 +18,7 @@ period: mov     one, 1
         mov     k, index
         mov     scale, 0
         fadd    y, y, scale
+        li      scale, bits(0.5)
+        fadd    y, y, scale
         mov     out, -5
         wait    period

@@ -17,22 +17,26 @@
 //! | [`Host`] | the host's binary32, NaN made canonical, flags derived from the operands | what the emulator runs |
 //!
 //! `isa/tests/fp_host.rs` shows that the two agree. The remaining functions ([`minimum`], [`maximum`], [`saturate`],
-//! [`sign`], [`abs`], [`neg`], [`sin`](sin())) are integer kernels without a floating-point operation in them. They are their
+//! [`sign`], [`abs`], [`neg`], [`sin`](sin()), [`cos`], [`atan2`], [`acos`](acos())) are integer kernels without a floating-point operation in them. They are their
 //! own definition, shared by the reference and the emulator, and the circuit computes the same bits.
 
 use std::fmt;
 use std::ops::{BitOr, BitOrAssign};
 
+pub mod acos;
+pub mod atan;
 mod host;
 mod kernels;
 pub mod sin;
-mod sin_table;
 #[cfg(feature = "softfloat")]
 mod softfloat;
+pub mod tables;
 
+pub use acos::{ACOS_MAX_ULP, acos};
+pub use atan::{ATAN2_MAX_ULP, atan2};
 pub use host::Host;
 pub use kernels::{abs, maximum, minimum, neg, saturate, sign};
-pub use sin::{SIN_CORRECTLY_ROUNDED, SIN_IDENTITY, SIN_LIMIT, SIN_MAX_ULP, SIN_WORST_INPUT, sin};
+pub use sin::{COS_MAX_ULP, SIN_IDENTITY, SIN_LIMIT, SIN_MAX_ULP, cos, sin};
 #[cfg(feature = "softfloat")]
 pub use softfloat::SoftFloat;
 

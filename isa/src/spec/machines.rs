@@ -114,8 +114,24 @@ pub static T1: Machine = Machine {
     resolve: 1,
 };
 
+/// The fast machine with arctangent and arccosine.
+pub static T3X: Machine = Machine {
+    name: "t3x",
+    text: "The fast machine with arctangent and arccosine, for the kinematics of arms.",
+    slots: &[
+        Slot {
+            name: "mul",
+            bank: bank("m", 0, 256),
+            units: &[MULTIPLY, DIVROOT, SINE, ARCTANGENT, ARCCOSINE],
+        },
+        T3.slots[1],
+        T3.slots[2],
+    ],
+    ..T3
+};
+
 /// Every machine; the first is the default.
-pub static MACHINES: &[&Machine] = &[&T3, &T1];
+pub static MACHINES: &[&Machine] = &[&T3, &T1, &T3X];
 
 impl Machine {
     /// The machine of this name.

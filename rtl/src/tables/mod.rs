@@ -5,6 +5,7 @@
 //! runs in. `tests/tables.rs` keeps the files in `units/common` equal to what is computed here (`TAKT_BLESS=1` writes
 //! them) and proves what the circuits rely on.
 
+pub mod angle;
 pub mod reciprocal;
 pub mod sine;
 

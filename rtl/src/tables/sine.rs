@@ -1,25 +1,44 @@
-//! The sine's coefficients for `units/sine.v`. They are `takt_isa`'s; here they are laid out for two block RAMs.
+//! The tables of `units/sine.v`. Their contents are `takt_isa`'s; here they are laid out for block RAMs.
 
 use super::{Memory, module};
-use takt_isa::fp::sin::SEGMENTS;
+use takt_isa::fp::tables::{BENDS, COSINE, QUARTERS, SINE, Segment};
 
-/// The Verilog module.
-///
-/// Odd quadrants run backwards. Their rows are the segments in reverse order, so that a position within its quadrant is an
-/// address without further ado, and both quadrants together fill the block RAMs' 512 rows.
+/// The Verilog module of the multiples of π/2.
 #[must_use]
-pub fn verilog() -> String {
-    let contract = "takt_sine_table: the sine's coefficients, by segment.\n\
+pub fn multiples() -> String {
+    let contract = "takt_quarter_table: multiples of pi/2.\n\
         \n\
         Contract\n\
-        \x20 row: {the quadrant is odd, first eight bits of the position within it}. A cycle after enable, and until the next one,\n\
-        \x20 value = c0 - 1, 32 bits after the point; slopes = {|c1|, 22 bits after the point, |c2|, 14 bits}.";
-    let rows = || SEGMENTS.iter().chain(SEGMENTS.iter().rev());
-    let values: Vec<_> = rows().map(|&(c0, _, _)| u64::from(c0)).collect();
-    let slopes: Vec<_> = rows().map(|&(_, c1, c2)| u64::from(c1) << 14 | u64::from(c2)).collect();
+        \x20 value: -k pi/2 modulo 2, 56 bits after the point, a cycle after k, which is at most 256.";
+    let mut words = QUARTERS.to_vec();
+    words.resize(512, 0);
+    module(
+        "takt_quarter_table",
+        contract,
+        false,
+        &[Memory { name: "value", address: "k", bits: 57, words: &words }],
+    )
+}
+
+/// The Verilog module of the polynomials' coefficients.
+#[must_use]
+pub fn polynomials() -> String {
+    let contract = "takt_wave_table: coefficients of 1 - sin(r)/r and of 1 - cos(r), by segment.\n\
+        \n\
+        Contract\n\
+        \x20 row: {cosine, first nine bits after the point of r}; place: {cosine, first five bits of r, first six of |h|}. A cycle\n\
+        \x20 later coefficients = {c0, 29 bits after the point, c1, 18 bits}, bend = c2 h^2, 29 bits; r is less than 0.875.";
+    // A function's rows, filled up to a power of two.
+    let word = |&(c0, c1): &Segment| u64::from(c0) << 18 | u64::from(c1);
+    let fill = |words: [Vec<u64>; 2], rows| -> Vec<u64> {
+        words.into_iter().flat_map(|words| words.into_iter().chain(std::iter::repeat(0)).take(rows)).collect()
+    };
+    let rows = fill([&SINE, &COSINE].map(|table| table.iter().map(word).collect()), 512);
+    let (sine, cosine) = BENDS.split_at(BENDS.len() / 2);
+    let cells = fill([sine, cosine].map(|table| table.iter().copied().map(u64::from).collect()), 2048);
     let memories = [
-        Memory { name: "value", address: "row", bits: 32, words: &values },
-        Memory { name: "slopes", address: "row", bits: 36, words: &slopes },
+        Memory { name: "coefficients", address: "row", bits: 46, words: &rows },
+        Memory { name: "bend", address: "place", bits: 8, words: &cells },
     ];
-    module("takt_sine_table", contract, true, &memories)
+    module("takt_wave_table", contract, false, &memories)
 }

@@ -1,0 +1,293 @@
+//! Where the cycles of a run went, issue by issue.
+
+use takt_emu::{Emulator, Fault, Status, Step};
+use takt_isa::spec::instructions::Function;
+use takt_isa::timing::{Address, Bundle, Cause, Cycle, Scoreboard};
+use takt_isa::{Instruction, Program};
+
+/// Bundles that a trace holds at most.
+pub const MAX_ISSUES: usize = 1 << 16;
+
+/// A bundle that issued.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Issued {
+    /// Its address.
+    pub address: Address,
+    /// The cycle of its issue.
+    pub cycle: Cycle,
+    /// What the cycles before it were charged to, and how many; in time order.
+    pub stalls: Vec<(Cause, u32)>,
+    /// Cycles from the issue before, or from the trace's start, to its delivery.
+    distance: Cycle,
+}
+
+/// What happened from a tick, or from reset, to a `wait` or `halt`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Trace {
+    /// Cycles are counted after this one: that of the tick. `None`: from reset.
+    pub tick: Option<Cycle>,
+    /// Cycles that passed, the last issue's included.
+    pub cycles: Cycle,
+    /// The bundles, in order.
+    pub issues: Vec<Issued>,
+    /// The bundle that waited for the tick, and the cycle of its issue: what issued with it may still be underway.
+    before: Option<(Address, Cycle)>,
+}
+
+/// Why there is no trace.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum TraceError {
+    /// The program faulted.
+    #[error(transparent)]
+    Fault(#[from] Fault),
+    /// It has halted before.
+    #[error("the program has halted: there is no further period")]
+    Halted,
+    /// It runs too long.
+    #[error("more than {MAX_ISSUES} bundles issue: too many to show one by one")]
+    TooLong,
+}
+
+/// Runs the machine to the next `wait` or `halt`, cycle by cycle, and keeps what happens. If it waits for a tick that nobody has asked for, the tick
+/// comes when the front end has refilled, as in [`Emulator::run_period`].
+///
+/// # Errors
+/// See [`TraceError`].
+pub fn trace(emulator: &mut Emulator) -> Result<Trace, TraceError> {
+    let refill = Cycle::from(emulator.machine().refill);
+    let mut before = None;
+    let mut start = None;
+    if let Status::Waiting { since, address } = *emulator.status() {
+        emulator.tick_at(emulator.now().max(since + refill));
+        before = Some((address, since));
+    }
+    let first = emulator.now();
+    let mut issues: Vec<Issued> = Vec::new();
+    let mut stalls: Vec<(Cause, u32)> = Vec::new();
+    loop {
+        match emulator.step_cycle()? {
+            Step::Halted => return Err(TraceError::Halted),
+            // The last of these cycles is the tick's.
+            Step::Stalled { cycle, cause: Cause::Wait, .. } => start = Some(cycle),
+            Step::Stalled { cause, .. } => match stalls.last_mut() {
+                Some((last, cycles)) if *last == cause => *cycles += 1,
+                _ => stalls.push((cause, 1)),
+            },
+            Step::Issued { cycle, address } => {
+                let stalls = std::mem::take(&mut stalls);
+                let held = |(cause, cycles): &(Cause, u32)| match cause {
+                    Cause::Branch { .. } => 0,
+                    _ => Cycle::from(*cycles),
+                };
+                let previous = issues.last().map_or(start.unwrap_or(first), |issue| issue.cycle);
+                let distance = cycle - stalls.iter().map(held).sum::<Cycle>() - previous;
+                issues.push(Issued { address, cycle, stalls, distance });
+                if issues.len() > MAX_ISSUES {
+                    return Err(TraceError::TooLong);
+                }
+                if !matches!(emulator.status(), Status::Running) {
+                    let cycles = match start {
+                        Some(tick) => cycle - tick,
+                        None => cycle + 1 - first,
+                    };
+                    return Ok(Trace { tick: start, cycles, issues, before });
+                }
+            }
+        }
+    }
+}
+
+/// What ties the issue of a bundle to that of one before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LinkKind {
+    /// It reads, or overwrites, a result of the other: the latency of the other's unit.
+    Result {
+        /// The register.
+        register: u16,
+    },
+    /// It uses a unit that the other keeps busy.
+    Unit {
+        /// Slot of the machine.
+        slot: u8,
+        /// Unit of the slot.
+        unit: u8,
+    },
+    /// It waits until the other's result, the last of all, is written.
+    Drain,
+    /// Its result would be written in the same cycle as the other's.
+    WritePort {
+        /// The slot whose bank it is.
+        slot: u8,
+    },
+    /// The other redirected the fetch, or decided a branch.
+    FrontEnd,
+    /// The other issued in the cycle before: one bundle a cycle.
+    Order,
+}
+
+/// A link of the chain that sets the time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Link {
+    /// Index of the earlier issue.
+    pub from: usize,
+    /// Index of the later one.
+    pub to: usize,
+    /// What ties them.
+    pub kind: LinkKind,
+    /// Cycles between their issues.
+    pub cycles: Cycle,
+}
+
+/// What a faster unit, or front end, would bring to the program as it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WhatIf {
+    /// The unit, by slot and index; `None` is the front end.
+    pub unit: Option<(u8, u8)>,
+    /// Cycles that the trace would then take.
+    pub cycles: Cycle,
+}
+
+/// An operation as the rules see it.
+struct Part {
+    slot: u8,
+    unit: u8,
+    latency: Cycle,
+    dest: Option<u16>,
+    sources: Vec<u16>,
+}
+
+impl Trace {
+    /// The chain of issues from the first to the last in which each could not have been earlier because of the one before: its cycles add up to
+    /// those between the first and the last issue. Of several reasons that hold alike, a result that came just in time counts before the order of issue.
+    pub fn critical_path(&self, program: &Program) -> Vec<Link> {
+        let parts: Vec<Vec<Part>> = self.issues.iter().map(|issue| parts(program, issue.address)).collect();
+        let mut chain = Vec::new();
+        let mut to = self.issues.len().saturating_sub(1);
+        while to > 0 {
+            let link = self.link(&parts, to);
+            chain.push(link);
+            to = link.from;
+        }
+        chain.reverse();
+        chain
+    }
+
+    fn link(&self, parts: &[Vec<Part>], to: usize) -> Link {
+        let issue = &self.issues[to];
+        let link = |from: usize, kind| Link { from, to, kind, cycles: issue.cycle - self.issues[from].cycle };
+        let earlier = |wanted: &dyn Fn(&Part, Cycle) -> bool| {
+            (0..to).rev().find(|&from| parts[from].iter().any(|part| wanted(part, self.issues[from].cycle)))
+        };
+        let just_written = |register: u16| {
+            earlier(&|part, cycle| part.dest == Some(register) && cycle + part.latency == issue.cycle)
+        };
+        let found = match issue.stalls.last() {
+            Some(&(Cause::Operand { register, .. } | Cause::Destination { register, .. }, _)) => {
+                just_written(register).map(|from| (from, LinkKind::Result { register }))
+            }
+            Some(&(Cause::Unit { slot, unit }, _)) => {
+                earlier(&|part, _| (part.slot, part.unit) == (slot, unit))
+                    .map(|from| (from, LinkKind::Unit { slot, unit }))
+            }
+            Some((Cause::Drain, _)) => {
+                earlier(&|part, cycle| part.dest.is_some() && cycle + part.latency == issue.cycle)
+                    .map(|from| (from, LinkKind::Drain))
+            }
+            Some(&(Cause::WritePort { slot }, _)) => {
+                // It was in the way in the cycle before.
+                let mine = parts[to].iter().find(|part| part.slot == slot).map_or(0, |part| part.latency);
+                earlier(&|part, cycle| {
+                    part.slot == slot && part.dest.is_some() && cycle + part.latency + 1 == issue.cycle + mine
+                })
+                .map(|from| (from, LinkKind::WritePort { slot }))
+            }
+            Some((Cause::Branch { .. }, _)) => Some((to - 1, LinkKind::FrontEnd)),
+            Some((Cause::Wait, _)) => None,
+            None => {
+                let mut sources = parts[to].iter().flat_map(|part| part.sources.iter().copied());
+                sources.find_map(|register| Some((just_written(register)?, LinkKind::Result { register })))
+            }
+        };
+        let (from, kind) = found.unwrap_or((to - 1, LinkKind::Order));
+        link(from, kind)
+    }
+
+    /// What one cycle less would bring: of the latency (and interval) of each unit that the trace uses, and of the front end's refill. The bundles stay as they
+    /// are; the rules are applied anew.
+    pub fn what_if(&self, program: &Program) -> Vec<WhatIf> {
+        let machine = program.machine;
+        let mut used: Vec<(u8, u8)> = self
+            .issues
+            .iter()
+            .flat_map(|issue| parts(program, issue.address))
+            .map(|part| (part.slot, part.unit))
+            .collect();
+        used.sort_unstable();
+        used.dedup();
+        let faster = used.into_iter().filter_map(|(slot, unit)| {
+            let row = &machine.slots[usize::from(slot)].units[usize::from(unit)];
+            // Less than a cycle is no latency; a unit that writes nothing has none.
+            (row.latency > 1).then_some(())?;
+            let interval = row.interval.saturating_sub(1).max(1);
+            let change = |bundle: Bundle| bundle.with_unit(slot, unit, row.latency - 1, interval);
+            Some(WhatIf { unit: Some((slot, unit)), cycles: self.replay(program, change, 0) })
+        });
+        let front = WhatIf { unit: None, cycles: self.replay(program, |bundle| bundle, 1) };
+        faster.chain([front].into_iter().filter(|_| machine.refill > 0)).collect()
+    }
+
+    /// The rules applied anew to the bundles as they are: [`Trace::cycles`] again, unless the emulator has another idea of the rules.
+    pub fn replayed(&self, program: &Program) -> Cycle {
+        self.replay(program, |bundle| bundle, 0)
+    }
+
+    /// The cycles of the trace, the rules applied anew to changed bundles, with so many cycles of refill fewer.
+    fn replay(&self, program: &Program, change: impl Fn(Bundle) -> Bundle, sooner: Cycle) -> Cycle {
+        let bundle = |address| {
+            let instructions = program.bundle(address).and_then(Result::ok).unwrap_or_default();
+            change(Bundle::new(program.machine, &instructions))
+        };
+        let mut scoreboard = Scoreboard::new(program.machine);
+        if let Some((address, cycle)) = self.before {
+            scoreboard.issue(&bundle(address), address, cycle);
+        }
+        let Some(first) = self.issues.first() else { return 0 };
+        let redirects = 1 + Cycle::from(program.machine.refill);
+        let held: Cycle = first.stalls.iter().map(|(_, cycles)| Cycle::from(*cycles)).sum();
+        let branch: Cycle = first
+            .stalls
+            .iter()
+            .filter(|(cause, _)| matches!(cause, Cause::Branch { .. }))
+            .map(|(_, cycles)| Cycle::from(*cycles))
+            .sum();
+        let mut delivered = first.cycle - held + branch - sooner.min(branch);
+        let mut last = delivered;
+        for issue in &self.issues {
+            if issue.cycle != first.cycle {
+                let less = if issue.distance == redirects { sooner } else { 0 };
+                delivered = last + issue.distance - less;
+            }
+            last = scoreboard.issue(&bundle(issue.address), issue.address, delivered).cycle;
+        }
+        let end = self.issues.last().map_or(0, |issue| issue.cycle);
+        (self.cycles + last).saturating_sub(end)
+    }
+}
+
+/// The operations of a bundle that use a unit.
+fn parts(program: &Program, address: Address) -> Vec<Part> {
+    let instructions: Vec<Instruction> = program.bundle(address).and_then(Result::ok).unwrap_or_default();
+    let part = |(s, instruction): (usize, &Instruction)| {
+        let slot = &program.machine.slots[s];
+        let function = instruction.op.row().function;
+        let unit = slot.unit_for(function).filter(|_| function != Function::Idle)?;
+        Some(Part {
+            slot: s as u8,
+            unit: unit as u8,
+            latency: slot.units[unit].latency.into(),
+            dest: instruction.writes(slot),
+            sources: instruction.reads().to_vec(),
+        })
+    };
+    instructions.iter().enumerate().filter_map(part).collect()
+}

@@ -1,0 +1,66 @@
+//! Traces against the emulator's own accounts.
+
+use takt_analysis::{Trace, trace};
+use takt_asm::{MemoryLoader, Options, assemble};
+use takt_emu::Emulator;
+use takt_emu::testing::{self, INPUTS, Random, random_program};
+use takt_isa::timing::Cycle;
+use takt_isa::{MACHINES, Program};
+
+/// What must hold of every trace.
+fn check(program: &Program, trace: &Trace) {
+    let stalled: Cycle =
+        trace.issues.iter().flat_map(|issue| &issue.stalls).map(|(_, cycles)| Cycle::from(*cycles)).sum();
+    assert_eq!(trace.cycles, trace.issues.len() as Cycle + stalled, "every cycle issued or is charged");
+    assert_eq!(trace.replayed(program), trace.cycles);
+    let chain = trace.critical_path(program);
+    let (first, last) = (&trace.issues[0], trace.issues.last().unwrap());
+    assert_eq!(chain.iter().map(|link| link.cycles).sum::<Cycle>(), last.cycle - first.cycle);
+    assert!(chain.windows(2).all(|pair| pair[0].to == pair[1].from), "a chain");
+}
+
+#[test]
+fn traces_account_for_every_cycle() {
+    let mut gains = 0;
+    for machine in MACHINES {
+        for seed in 0..200 {
+            let program = random_program(seed, machine, testing::Options::TAME);
+            let mut emulator = Emulator::new(&program).unwrap();
+            let mut random = Random::new(seed);
+            for i in 0..INPUTS {
+                emulator.set_input_bits(machine.inputs.base + i, random.word()).unwrap();
+            }
+            let once = trace(&mut emulator).unwrap();
+            assert_eq!(once.cycles, emulator.now());
+            check(&program, &once);
+            let mut other = emulator.clone();
+            let Ok(period) = trace(&mut emulator) else { continue };
+            check(&program, &period);
+            if let Ok(report) = other.run_period(&[]) {
+                assert_eq!((report.cycles, Some(report.tick)), (period.cycles, period.tick), "seed {seed}");
+            }
+            gains += period.what_if(&program).iter().filter(|what| what.cycles < period.cycles).count();
+        }
+    }
+    assert!(gains > 500, "{gains}");
+}
+
+#[test]
+fn the_tracking_program_waits_for_its_units() {
+    for machine in MACHINES {
+        let options = Options { machine, ..Options::default() };
+        let loader = MemoryLoader::new(takt_programs::SOURCES);
+        let program = assemble("hybrid/tracking.s", &loader, &options).unwrap().program;
+        let mut emulator = Emulator::new(&program).unwrap();
+        for port in &program.inputs {
+            emulator.set_input_bits(port.register, 0).unwrap();
+        }
+        emulator.run_period(&[]).unwrap();
+        let period = trace(&mut emulator).unwrap();
+        check(&program, &period);
+        for what in period.what_if(&program) {
+            // A faster unit may cost cycles: its results meet others at the write port.
+            assert!(what.cycles.abs_diff(period.cycles) < 60, "{what:?} {}", period.cycles);
+        }
+    }
+}

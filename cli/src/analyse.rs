@@ -1,0 +1,403 @@
+//! `takt analyse`: where the cycles of one period went, bundle by bundle, and what would make it shorter.
+
+use crate::files::{self, Out};
+use crate::load::Load;
+use crate::output;
+use crate::ports::Inputs;
+use crate::select::OptionalMachine;
+use anyhow::{Result, anyhow, bail};
+use clap::Args;
+use serde_json::{Value, json};
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use takt_analysis::{Issued, Link, LinkKind, Trace, WhatIf};
+use takt_emu::{Emulator, Status};
+use takt_isa::program::Location;
+use takt_isa::spec::instructions::Function;
+use takt_isa::timing::{Cause, Cycle};
+use takt_isa::{Instruction, Machine, Program};
+
+/// Show where the cycles of a period went: every bundle, every stall, the chain that sets the time.
+///
+/// Runs the program and looks at its last period; at a program without periods from reset to `halt`. Input ports are 0
+/// unless --inputs says otherwise.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Analyse {
+    /// Source or image; `-` is standard input.
+    file: PathBuf,
+    #[command(flatten)]
+    machine: OptionalMachine,
+    /// CSV with one named column for each input port and one row for each period; `-` is standard input.
+    #[arg(long, value_name = "CSV")]
+    inputs: Option<PathBuf>,
+    /// Run so many periods and look at the last; 0 is what runs once [default: the rows of --inputs, else 2].
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    periods: Option<u64>,
+    /// Write the picture of the pipeline as a page for a browser, which needs nothing else; `-` is standard output.
+    #[arg(long, value_name = "OUT")]
+    html: Option<PathBuf>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  takt analyse prog.s                     the second period: stalls, critical path, what a faster unit would bring
+  takt analyse prog.s --html prog.html    the pipeline as a picture
+  takt analyse prog.s --periods 0         what runs once
+
+`takt track --csv in.csv` records inputs of the tracking programs.";
+
+/// Periods that are run at most on the way to the one to look at.
+const MOST_PERIODS: u64 = 1_000_000;
+/// Lines of each list of the text; --json has all.
+const SHOWN: usize = 12;
+
+pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()> {
+    let mut reads = vec![("FILE", arguments.file.as_path())];
+    reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
+    let mut writes: Vec<_> = arguments.html.as_deref().map(|path| ("--html", path)).into_iter().collect();
+    if arguments.json {
+        writes.push(("--json", Path::new("-")));
+    }
+    files::check(&reads, &writes)?;
+    let load = Load::new(arguments.machine.machine, color);
+    let program = load.program(&arguments.file)?;
+    let rows = read_inputs(arguments, &program)?;
+    let (trace, period) = follow(arguments, &program, rows.as_ref())?;
+    let analysis = Analysis {
+        chain: trace.critical_path(&program),
+        faster: faster(arguments, &load, &program, &trace, rows.as_ref()),
+        program: &program,
+        name: files::input_name(&arguments.file),
+        period,
+        trace,
+    };
+    if let Some(path) = &arguments.html {
+        // `</` would end the script.
+        let data = serde_json::to_string(&analysis.json())?.replace("</", "<\\/");
+        files::write(path, include_str!("analyse.html").replace("/*DATA*/", &data).as_bytes())?;
+    }
+    if arguments.json {
+        output::json(&analysis.json(), out)?;
+    } else if !arguments.html.as_deref().is_some_and(files::is_dash) {
+        analysis.text(out)?;
+    }
+    Ok(())
+}
+
+/// Values of the input ports, for each period.
+type Rows = Vec<Vec<(u16, u32)>>;
+
+fn read_inputs(arguments: &Analyse, program: &Program) -> Result<Option<Rows>> {
+    let Some(path) = &arguments.inputs else { return Ok(None) };
+    let mut inputs = Inputs::open(path, &program.inputs)?;
+    let (mut rows, mut row) = (Vec::new(), Vec::new());
+    let wanted = arguments.periods.map_or(MOST_PERIODS, |wanted| wanted.max(1));
+    while (rows.len() as u64) < wanted && inputs.next(&mut row)? {
+        rows.push(row.clone());
+    }
+    if rows.is_empty() || arguments.periods.is_some_and(|wanted| (rows.len() as u64) < wanted) {
+        let plural = if rows.len() == 1 { "" } else { "s" };
+        bail!("{} has {} row{plural}, so there is no such period", files::input_name(path), rows.len());
+    }
+    Ok(Some(rows))
+}
+
+/// Runs the program and follows the last period asked for; its number, 0 being what runs once.
+fn follow(arguments: &Analyse, program: &Program, rows: Option<&Rows>) -> Result<(Trace, u64)> {
+    let wanted = arguments.periods.unwrap_or(rows.map_or(2, |rows| rows.len() as u64));
+    if wanted > MOST_PERIODS {
+        bail!("{wanted} periods: at most {MOST_PERIODS} are run on the way to the one to look at");
+    }
+    let mut emulator = Emulator::new(program)?;
+    let set = |emulator: &mut Emulator, period: u64| -> Result<()> {
+        let row = rows.and_then(|rows| rows.get(period.saturating_sub(1) as usize));
+        for port in &program.inputs {
+            let set = row.and_then(|row| row.iter().find(|(register, _)| *register == port.register));
+            emulator.set_input_bits(port.register, set.map_or(0, |(_, bits)| *bits))?;
+        }
+        emulator.set_cycle_limit(emulator.now() + crate::run::PERIOD_LIMIT);
+        Ok(())
+    };
+    set(&mut emulator, 0)?;
+    let mut trace = takt_analysis::trace(&mut emulator).map_err(|error| anyhow!("{error}"))?;
+    let mut period = 0;
+    while period < wanted && !matches!(emulator.status(), Status::Halted { .. }) {
+        period += 1;
+        set(&mut emulator, period)?;
+        let failed = |error: &dyn std::fmt::Display| anyhow!("period {period}: {error}");
+        if period < wanted {
+            emulator.run_period(&[]).map_err(|error| failed(&error))?;
+        } else {
+            trace = takt_analysis::trace(&mut emulator).map_err(|error| failed(&error))?;
+        }
+    }
+    if period < wanted && (arguments.periods.is_some() || period > 0) {
+        bail!("the program halts before period {wanted}; --periods {period} looks at the last");
+    }
+    Ok((trace, period))
+}
+
+/// What a faster unit would bring: to the program as it is, and assembled anew for a machine that has it.
+struct Faster {
+    what: WhatIf,
+    anew: Option<Cycle>,
+}
+
+fn faster(
+    arguments: &Analyse,
+    load: &Load,
+    program: &Program,
+    trace: &Trace,
+    rows: Option<&Rows>,
+) -> Vec<Faster> {
+    // Standard input has been read; an image has no source.
+    let source = Some(&arguments.file).filter(|file| !files::is_dash(file));
+    let source = source.and_then(|file| Load::source(file).ok());
+    let anew = |what: &WhatIf| {
+        let machine = Some(quicker(program.machine, what.unit));
+        let assembled = Load { machine, ..*load }.assemble(&arguments.file, source.clone()?).ok()?;
+        Some(follow(arguments, &assembled.program, rows).ok()?.0.cycles)
+    };
+    trace.what_if(program).into_iter().map(|what| Faster { anew: anew(&what), what }).collect()
+}
+
+/// A machine with one cycle less in a unit, or in the front end. It is never given back: there are as many as units.
+fn quicker(machine: &Machine, unit: Option<(u8, u8)>) -> &'static Machine {
+    let mut slots = machine.slots.to_vec();
+    let mut refill = machine.refill;
+    match unit {
+        Some((slot, unit)) => {
+            let slot = &mut slots[usize::from(slot)];
+            let mut units = slot.units.to_vec();
+            let row = &mut units[usize::from(unit)];
+            row.latency -= 1;
+            row.interval = row.interval.saturating_sub(1).max(1);
+            slot.units = Box::leak(units.into());
+        }
+        None => refill -= 1,
+    }
+    Box::leak(Box::new(Machine { slots: Box::leak(slots.into()), refill, ..*machine }))
+}
+
+/// All that is known of the period.
+struct Analysis<'p> {
+    program: &'p Program,
+    name: String,
+    period: u64,
+    trace: Trace,
+    chain: Vec<Link>,
+    faster: Vec<Faster>,
+}
+
+impl Analysis<'_> {
+    fn unit(&self, unit: Option<(u8, u8)>) -> &'static str {
+        unit.map_or("front end", |(slot, unit)| {
+            self.program.machine.slots[usize::from(slot)].units[usize::from(unit)].name
+        })
+    }
+
+    fn bundle(&self, issue: usize) -> Vec<Instruction> {
+        self.program.bundle(self.trace.issues[issue].address).and_then(Result::ok).unwrap_or_default()
+    }
+
+    /// Cycles are counted from the tick or from reset: the first is 1.
+    fn cycle(&self, issue: usize) -> Cycle {
+        let last = self.trace.issues.last().map_or(0, |issue| issue.cycle);
+        self.trace.issues[issue].cycle + self.trace.cycles - last
+    }
+
+    /// What a link of the chain goes through, and the register that it is about.
+    fn through(&self, link: &Link) -> (String, Option<String>) {
+        let machine = self.program.machine;
+        let text = match link.kind {
+            LinkKind::Result { register } => {
+                let bundle = self.bundle(link.from);
+                let mut writers = bundle.iter().zip(machine.slots);
+                let writer = writers.find(|(instruction, slot)| instruction.writes(slot) == Some(register));
+                let unit = writer.and_then(|(instruction, slot)| {
+                    Some(slot.units[slot.unit_for(instruction.op.row().function)?].name)
+                });
+                return (unit.unwrap_or("?").to_owned(), Some(self.program.register_text(register)));
+            }
+            LinkKind::Unit { slot, unit } => format!("{} busy", self.unit(Some((slot, unit)))),
+            LinkKind::Drain => "drain".to_owned(),
+            LinkKind::WritePort { slot } => {
+                format!("write port of bank {}", machine.slots[usize::from(slot)].bank.name)
+            }
+            LinkKind::FrontEnd => "front end".to_owned(),
+            LinkKind::Order => "order of issue".to_owned(),
+        };
+        (text, None)
+    }
+
+    fn link(&self, link: &Link) -> String {
+        match self.through(link) {
+            (unit, Some(register)) => format!("{register} through {unit}"),
+            (text, None) => text,
+        }
+    }
+
+    /// Cycles of the chain by what they go through.
+    fn chain_by_kind(&self) -> Vec<(String, Cycle)> {
+        let mut kinds: BTreeMap<String, Cycle> = BTreeMap::new();
+        for link in &self.chain {
+            *kinds.entry(self.through(link).0).or_default() += link.cycles;
+        }
+        let mut kinds: Vec<_> = kinds.into_iter().collect();
+        kinds.sort_by_key(|(_, cycles)| Reverse(*cycles));
+        kinds
+    }
+
+    /// Bundles and stalled cycles by source line.
+    fn lines(&self) -> BTreeMap<(u32, u32), (u64, Cycle)> {
+        let mut lines: BTreeMap<(u32, u32), (u64, Cycle)> = BTreeMap::new();
+        for issue in &self.trace.issues {
+            let Some(location) = self.program.location(issue.address) else { continue };
+            let line = lines.entry((location.file, location.line)).or_default();
+            line.0 += 1;
+            line.1 += issue.stalls.iter().map(|(_, cycles)| Cycle::from(*cycles)).sum::<Cycle>();
+        }
+        lines
+    }
+
+    /// Operations that each slot issued.
+    fn slots(&self) -> Vec<(&'static str, u64)> {
+        let mut counts: Vec<_> = self.program.machine.slots.iter().map(|slot| (slot.name, 0)).collect();
+        for issue in 0..self.trace.issues.len() {
+            for (count, instruction) in counts.iter_mut().zip(&self.bundle(issue)) {
+                count.1 += u64::from(instruction.op.row().function != Function::Idle);
+            }
+        }
+        counts
+    }
+
+    fn operation_json(&self, address: u32, s: usize, instruction: &Instruction) -> Option<Value> {
+        let (program, slot) = (self.program, &self.program.machine.slots[s]);
+        let function = instruction.op.row().function;
+        let unit = &slot.units[slot.unit_for(function).filter(|_| function != Function::Idle)?];
+        let target = |address: u32| match program.nearest_label(address) {
+            Some((label, 0)) => label.to_owned(),
+            _ => address.to_string(),
+        };
+        let word = address as usize * program.machine.slots.len() + s;
+        let place = program.lines.get(word).copied().flatten();
+        Some(json!({
+            "slot": slot.name,
+            "unit": unit.name,
+            "text": instruction.text_with(program.machine, s, |register| program.register_text(register), target),
+            "place": place.map(|place| program.place_text(place)),
+            "latency": instruction.writes(slot).map(|_| unit.latency),
+        }))
+    }
+
+    fn json(&self) -> Value {
+        let program = self.program;
+        let critical: BTreeSet<usize> = self.chain.iter().flat_map(|link| [link.from, link.to]).collect();
+        let stall = |(cause, cycles): &(Cause, u32)| {
+            let producer = match *cause {
+                Cause::Operand { producer, .. } | Cause::Destination { producer, .. } => Some(producer),
+                Cause::Branch { from } => Some(from),
+                _ => None,
+            };
+            let line = producer.and_then(|address| program.location(address));
+            json!({
+                "cause": cause.name(),
+                "cycles": cycles,
+                "text": program.cause_text(*cause),
+                "producer": producer,
+                "producer_place": line.map(|line| program.place_text(line)),
+            })
+        };
+        let bundle = |(i, issue): (usize, &Issued)| {
+            let operations = self.bundle(i);
+            let operations = operations.iter().enumerate();
+            json!({
+                "address": issue.address,
+                "cycle": self.cycle(i),
+                "place": program.location(issue.address).map(|place| program.place_text(place)),
+                "stalls": issue.stalls.iter().map(stall).collect::<Vec<_>>(),
+                "critical": critical.contains(&i),
+                "operations": operations
+                    .filter_map(|(s, instruction)| self.operation_json(issue.address, s, instruction))
+                    .collect::<Vec<_>>(),
+            })
+        };
+        let line = |(&(file, line), &(bundles, stalled)): (&(u32, u32), &(u64, Cycle))| {
+            let place = program.place_text(Location { file, line });
+            json!({ "place": place, "bundles": bundles, "stalled": stalled })
+        };
+        let link = |link: &Link| {
+            let (through, register) = self.through(link);
+            json!({
+                "from": link.from, "to": link.to, "cycles": link.cycles, "through": through, "register": register,
+            })
+        };
+        let faster = |Faster { what, anew }: &Faster| json!({ "unit": self.unit(what.unit), "as_it_is": what.cycles, "assembled_anew": anew });
+        json!({
+            "program": self.name,
+            "machine": program.machine.name,
+            "period": self.period,
+            "cycles": self.trace.cycles,
+            "slots": self.slots().into_iter().collect::<BTreeMap<_, _>>(),
+            "bundles": self.trace.issues.iter().enumerate().map(bundle).collect::<Vec<_>>(),
+            "lines": self.lines().iter().map(line).collect::<Vec<_>>(),
+            "critical_path": self.chain.iter().map(link).collect::<Vec<_>>(),
+            "one_cycle_less": self.faster.iter().map(faster).collect::<Vec<_>>(),
+        })
+    }
+
+    fn text(&self, out: &mut Out) -> Result<()> {
+        let Analysis { program, trace, .. } = self;
+        let issues = &trace.issues;
+        let what =
+            if self.period == 0 { "what runs once".to_owned() } else { format!("period {}", self.period) };
+        let (machine, cycles) = (program.machine.name, trace.cycles);
+        writeln!(out, "{what} on {machine}: {cycles} cycles, {} bundles", issues.len())?;
+        let share = |count: u64| 100.0 * count as f64 / cycles.max(1) as f64;
+        let slots = self.slots().into_iter();
+        let slots: Vec<String> =
+            slots.map(|(name, count)| format!("{name} {count} ({:.0} %)", share(count))).collect();
+        writeln!(out, "operations by slot, and their share of the cycles: {}", slots.join(", "))?;
+
+        let mut stalls: Vec<(usize, Cause, u32)> = Vec::new();
+        for (i, issue) in issues.iter().enumerate() {
+            stalls.extend(issue.stalls.iter().map(|&(cause, cycles)| (i, cause, cycles)));
+        }
+        stalls.sort_by_key(|&(i, _, cycles)| (Reverse(cycles), i));
+        let stalled: u32 = stalls.iter().map(|(_, _, cycles)| cycles).sum();
+        writeln!(out, "\nstalls: {}, {stalled} cycles; the longest:", stalls.len())?;
+        for &(i, cause, cycles) in stalls.iter().take(SHOWN) {
+            let (at, what) = (program.bundle_text(issues[i].address), program.cause_text(cause));
+            writeln!(out, "  {cycles:>5}  before cycle {:<5} {at}: {what}", self.cycle(i))?;
+        }
+
+        let chain: Cycle = self.chain.iter().map(|link| link.cycles).sum();
+        writeln!(out, "\nthe chain that sets the time: {} links, {chain} cycles, through", self.chain.len())?;
+        for (kind, cycles) in self.chain_by_kind() {
+            writeln!(out, "  {cycles:>5}  {kind}")?;
+        }
+        let mut links: Vec<&Link> = self.chain.iter().filter(|link| link.cycles > 1).collect();
+        links.sort_by_key(|link| (Reverse(link.cycles), link.to));
+        links.truncate(SHOWN);
+        links.sort_by_key(|link| link.to);
+        writeln!(out, "its longest links:")?;
+        for link in links {
+            let (to, how) = (program.bundle_text(issues[link.to].address), self.link(link));
+            writeln!(out, "  {:>5}  to cycle {:<5} {to}: {how}", link.cycles, self.cycle(link.to))?;
+        }
+
+        writeln!(out, "\none cycle less in      as it is   assembled anew")?;
+        for Faster { what, anew } in &self.faster {
+            let gain = |new: Cycle| format!("{new} ({:+})", new.cast_signed() - trace.cycles.cast_signed());
+            let anew = anew.map_or_else(|| "-".to_owned(), gain);
+            writeln!(out, "  {:<16} {:>12} {anew:>16}", self.unit(what.unit), gain(what.cycles))?;
+        }
+        Ok(())
+    }
+}

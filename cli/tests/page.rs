@@ -1,0 +1,60 @@
+//! The page of `takt analyse` in a browser: it opens, its script runs to the end and draws every operation.
+
+mod common;
+
+use common::{Folder, source};
+use std::process::Command;
+
+/// The page as the browser has it once scripts have run, and what the browser's console says.
+fn open(folder: &Folder, page: &str) -> (String, String) {
+    let profile = folder.path().join("profile");
+    let output = Command::new("chromium")
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"])
+        .args(["--enable-logging=stderr", "--v=0", "--dump-dom"])
+        .arg(format!("--user-data-dir={}", profile.display()))
+        .arg(format!("file://{}", folder.path().join(page).display()))
+        .output()
+        .expect("chromium is there: `cargo xtask test` installs it");
+    let console = String::from_utf8_lossy(&output.stderr);
+    let console = console.lines().filter(|line| line.contains("CONSOLE")).collect::<Vec<_>>().join("\n");
+    (String::from_utf8_lossy(&output.stdout).into_owned(), console)
+}
+
+#[test]
+fn the_page_opens_and_draws_every_operation() {
+    let folder = Folder::new();
+    folder.line(&format!("asm {} -m t1 -o image", source("tracking.s"))).ok();
+    folder.line("analyse image --html page.html").ok();
+    let json = folder.line("analyse image --json").ok();
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let bundles = json["bundles"].as_array().unwrap();
+    let stalls: usize = bundles.iter().map(|bundle| bundle["stalls"].as_array().unwrap().len()).sum();
+
+    let (page, console) = open(&folder, "page.html");
+    assert_eq!(console, "");
+    assert!(page.contains(&format!("data-rows=\"{}\"", bundles.len())), "one operation for each bundle");
+    assert!(page.contains(&format!("{} cycles, {} bundles</h1>", json["cycles"], bundles.len())));
+    assert_eq!(page.matches("before cycle").count(), stalls + 1, "one in the script itself");
+    // Nothing is fetched from anywhere.
+    let text = folder.read_text("page.html");
+    assert!(!text.contains("src=") && !text.contains("href="));
+
+    // A page whose script fails is told apart.
+    folder.write("broken.html", text.replace("\"use strict\";", "missing();"));
+    let (page, console) = open(&folder, "broken.html");
+    assert!(!page.contains("data-rows=\"") && console.contains("missing is not defined"), "{console}");
+}
+
+#[test]
+fn names_cannot_leave_the_data() {
+    let folder = Folder::new();
+    // A file's path is the one text of a program that can hold anything.
+    let name = "</script><script>document.body.dataset.evil=1</script>.s";
+    std::fs::create_dir_all(folder.path().join(name).parent().unwrap()).unwrap();
+    folder.write(name, ".output y\n.period\np: mov y, zero\n wait p\n");
+    let done = folder.takt(&["analyse", name, "--html", "page.html"]);
+    assert_eq!(done.status, Some(0), "{done:?}");
+    let (page, console) = open(&folder, "page.html");
+    assert_eq!(console, "");
+    assert!(page.contains("data-rows=\"2\"") && !page.contains("data-evil"));
+}

@@ -1,0 +1,228 @@
+//! Random poses through the programs, against binary64 and back.
+
+use super::{
+    A1, CONFIGURATIONS, Configuration, Failure, GOOD, ON_AXIS, OUT_OF_REACH, Pose, WRIST_SINGULAR, forward,
+    inverse, is_clear,
+};
+
+/// What a forward program gives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ForwardResult {
+    /// The tool's pose.
+    pub pose: Pose<f32>,
+    /// The configuration that leads back.
+    pub configuration: Configuration,
+    /// Its `status` port.
+    pub status: u32,
+    /// Cycles of the period.
+    pub cycles: u64,
+}
+
+/// What an inverse program gives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InverseResult {
+    /// Joint angles, degrees.
+    pub joints: [f32; 6],
+    /// Its `status` port.
+    pub status: u32,
+    /// Cycles of the period.
+    pub cycles: u64,
+}
+
+/// The two programs on something that runs them.
+pub trait Arm {
+    /// Why a program could not be run.
+    type Error;
+    /// One period of the forward program.
+    fn forward(&mut self, joints: [f32; 6], tool: [f32; 3]) -> Result<ForwardResult, Self::Error>;
+    /// One period of the inverse program.
+    fn inverse(
+        &mut self,
+        pose: &Pose<f32>,
+        tool: [f32; 3],
+        configuration: Configuration,
+    ) -> Result<InverseResult, Self::Error>;
+}
+
+/// How far a way there and back leads from the start.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RoundTrip {
+    /// Ways tried, by configuration, in the order of [`CONFIGURATIONS`].
+    pub tried: [u64; 8],
+    /// Largest distance, mm; 0 if the way ends in angles.
+    pub max_error_mm: f64,
+    /// Largest difference of an angle, degrees.
+    pub max_error_deg: f64,
+}
+
+/// What a sweep came to. Errors count where the pose is clear of the singularities ([`is_clear`]).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Sweep {
+    /// Poses of the forward program compared with binary64.
+    pub forward_poses: u64,
+    /// Largest error of a coordinate, mm.
+    pub forward_mm: f64,
+    /// Largest error of an angle, degrees.
+    pub forward_deg: f64,
+    /// Shortest and longest period of the forward program, cycles.
+    pub forward_cycles: Option<(u64, u64)>,
+    /// Solutions of the inverse program compared with binary64.
+    pub inverse_solutions: u64,
+    /// Largest error of a joint, degrees.
+    pub inverse_deg: f64,
+    /// Shortest and longest period of the inverse program, cycles.
+    pub inverse_cycles: Option<(u64, u64)>,
+    /// Configurations that do not reach the pose, where binary64 and the program agree.
+    pub unreachable: u64,
+    /// Solutions too close to a singularity to count.
+    pub near_singular: u64,
+    /// Results whose status, or configuration, is not binary64's, away from where it changes.
+    pub disagreements: u64,
+    /// Pose to joints to pose.
+    pub forward_of_inverse: RoundTrip,
+    /// Joints to pose to joints.
+    pub inverse_of_forward: RoundTrip,
+}
+
+/// The difference of two angles, degrees, whatever turns lie between; NaN if one is.
+#[must_use]
+pub fn angle_between(a: f64, b: f64) -> f64 {
+    let turn = (a - b).rem_euclid(360.0);
+    turn.min(360.0 - turn)
+}
+
+/// The larger; a NaN is the largest.
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b || a.is_nan() { a } else { b }
+}
+
+/// Largest difference in position and in orientation.
+fn distance(a: &Pose<f32>, b: &Pose<f64>) -> (f64, f64) {
+    let position = (0..3).map(|i| (f64::from(a.position[i]) - b.position[i]).abs());
+    let orientation = (0..3).map(|i| angle_between(a.orientation[i].into(), b.orientation[i]));
+    (position.fold(0.0, larger), orientation.fold(0.0, larger))
+}
+
+fn joint_distance(a: [f32; 6], b: [f64; 6]) -> f64 {
+    (0..6).map(|i| angle_between(a[i].into(), b[i])).fold(0.0, larger)
+}
+
+fn widen<const N: usize>(values: [f32; N]) -> [f64; N] {
+    values.map(f64::from)
+}
+
+fn wide(pose: &Pose<f32>) -> Pose<f64> {
+    Pose { position: widen(pose.position), orientation: widen(pose.orientation) }
+}
+
+fn span(cycles: &mut Option<(u64, u64)>, period: u64) {
+    let (shortest, longest) = cycles.unwrap_or((period, period));
+    *cycles = Some((shortest.min(period), longest.max(period)));
+}
+
+/// SplitMix64.
+struct Random(u64);
+
+impl Random {
+    /// Uniform in `-limit..limit`, as a binary32.
+    fn within(&mut self, limit: f64) -> f32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        let unit = ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64;
+        ((2.0 * unit - 1.0) * limit) as f32
+    }
+}
+
+impl Sweep {
+    /// One set of joints and a tool: forward, from there back, and to the other solutions.
+    fn add<A: Arm>(&mut self, arm: &mut A, joints: [f32; 6], tool: [f32; 3]) -> Result<(), A::Error> {
+        let tool64 = widen(tool);
+        let (pose, configuration) = forward(widen(joints), tool64);
+        let clear = inverse(&pose, tool64, configuration).is_ok_and(|solution| is_clear(&pose, &solution));
+        let result = arm.forward(joints, tool)?;
+        span(&mut self.forward_cycles, result.cycles);
+        if clear {
+            let (mm, deg) = distance(&result.pose, &pose);
+            self.forward_poses += 1;
+            self.forward_mm = larger(mm, self.forward_mm);
+            self.forward_deg = larger(deg, self.forward_deg);
+            self.disagreements += u64::from(result.status != GOOD || result.configuration != configuration);
+
+            let back = arm.inverse(&result.pose, tool, result.configuration)?;
+            let trip = &mut self.inverse_of_forward;
+            trip.max_error_deg = larger(joint_distance(back.joints, widen(joints)), trip.max_error_deg);
+            trip.tried[index(configuration)] += 1;
+            self.disagreements += u64::from(back.status != GOOD);
+        }
+
+        // The pose as the inverse gets it.
+        let pose = result.pose;
+        for configuration in CONFIGURATIONS {
+            let found = arm.inverse(&pose, tool, configuration)?;
+            span(&mut self.inverse_cycles, found.cycles);
+            match inverse(&wide(&pose), tool64, configuration) {
+                Ok(solution) if is_clear(&wide(&pose), &solution) => {
+                    self.inverse_solutions += 1;
+                    self.inverse_deg =
+                        larger(joint_distance(found.joints, solution.joints), self.inverse_deg);
+                    self.disagreements += u64::from(found.status != GOOD);
+                    let back = arm.forward(found.joints, tool)?;
+                    let (mm, deg) = distance(&back.pose, &wide(&pose));
+                    let trip = &mut self.forward_of_inverse;
+                    trip.tried[index(configuration)] += 1;
+                    trip.max_error_mm = larger(mm, trip.max_error_mm);
+                    trip.max_error_deg = larger(deg, trip.max_error_deg);
+                    self.disagreements +=
+                        u64::from(back.status != GOOD || back.configuration != configuration);
+                }
+                Ok(_) => self.near_singular += 1,
+                Err(Failure::OutOfReach) if found.status == OUT_OF_REACH => self.unreachable += 1,
+                Err(Failure::WristSingular) if found.status == WRIST_SINGULAR => self.near_singular += 1,
+                Err(Failure::OnAxis) if found.status == ON_AXIS => self.near_singular += 1,
+                // Just beyond a limit that rounding moves, or not.
+                Err(failure) if is_just_beyond(&pose, tool64, configuration, failure) => {
+                    self.near_singular += 1
+                }
+                Err(_) => self.disagreements += 1,
+            }
+        }
+        Ok(())
+    }
+}
+
+fn index(configuration: Configuration) -> usize {
+    configuration.iter().rev().fold(0, |index, &bit| 2 * index + usize::from(bit))
+}
+
+/// Whether a pose that lies a little closer to the arm does not fail like this.
+fn is_just_beyond(pose: &Pose<f32>, tool: [f64; 3], configuration: Configuration, failure: Failure) -> bool {
+    let pose = wide(pose);
+    [-0.01, 0.01].iter().any(|step| {
+        (0..3).any(|axis| {
+            let mut moved = pose;
+            moved.position[axis] += step;
+            inverse(&moved, tool, configuration).err() != Some(failure)
+        })
+    })
+}
+
+/// `count` random sets of joints, each anywhere in its turn, and tools up to 2·[`A1`] long in each direction.
+///
+/// Every one goes forward, and its pose back by all eight configurations; what is found goes forward again.
+pub fn sweep<A: Arm>(
+    arm: &mut A,
+    count: u64,
+    seed: u64,
+    mut progress: impl FnMut(u64),
+) -> Result<Sweep, A::Error> {
+    let mut random = Random(seed);
+    let mut sweep = Sweep::default();
+    for done in 0..count {
+        let joints = [(); 6].map(|()| random.within(180.0));
+        let tool = [(); 3].map(|()| random.within(2.0 * A1));
+        sweep.add(arm, joints, tool)?;
+        progress(done + 1);
+    }
+    Ok(sweep)
+}

