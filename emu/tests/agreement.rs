@@ -285,8 +285,8 @@ fn random_programs_cover_the_machine() {
         for row in ROWS.iter().filter(|row| row.effect != Effect::Nothing).filter(hosted) {
             assert!(operations[row.op as usize] > 0, "{}: no {}", machine.name, row.mnemonic);
         }
-        for (kind, cycles) in Cause::KINDS.iter().zip(stalls) {
-            assert!(cycles > 0, "{}: no stall of kind {kind}", machine.name);
-        }
+        let seen = Cause::KINDS.into_iter().zip(stalls).filter(|(_, cycles)| *cycles > 0);
+        let kinds: Vec<_> = seen.map(|(kind, _)| kind).collect();
+        assert_eq!(kinds, Cause::kinds_of(machine).collect::<Vec<_>>(), "{}", machine.name);
     }
 }

@@ -83,6 +83,12 @@ impl Cause {
         }
     }
 
+    /// The names of the kinds that a machine can have: it waits for a unit only if one takes an operation in fewer than all cycles.
+    pub fn kinds_of(machine: &Machine) -> impl Iterator<Item = &'static str> {
+        let iterative = machine.slots.iter().flat_map(|slot| slot.units).any(|unit| unit.interval > 1);
+        Cause::KINDS.into_iter().filter(move |&kind| kind != "unit" || iterative)
+    }
+
     /// The kind's name.
     pub const fn name(self) -> &'static str {
         Cause::KINDS[self.kind()]

@@ -52,7 +52,7 @@ impl Folder {
     /// `takt` in this folder, with at most 1 GiB of address space and 60 s of processor time: what hangs or fills the
     /// memory dies, and its status is no exit code.
     pub fn command(&self, arguments: &[impl AsRef<OsStr>]) -> Command {
-        let mut command = Command::new("sh");
+        let mut command = Command::new("/bin/sh");
         command
             .args(["-c", "ulimit -v 1048576; ulimit -t 60; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_takt")])
             .args(arguments)

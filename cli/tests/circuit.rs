@@ -1,0 +1,54 @@
+//! `takt rtl` and `takt cosim`.
+
+mod common;
+
+use common::{Done, Folder};
+
+const PROGRAM: &str = ".input in0\n.output out0\n.period\nloop: fadd out0, in0, in0\nwait loop\n";
+
+fn cosim(folder: &Folder, line: &str) -> Done {
+    let arguments: Vec<&str> = line.split_whitespace().collect();
+    let mut command = folder.command(&arguments);
+    // Compiled circuits are kept from one run of the tests to the next.
+    command.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
+    Done::of(command)
+}
+
+#[test]
+fn design_is_complete() {
+    let folder = Folder::new();
+    folder.write("p.s", PROGRAM);
+    assert!(folder.line("rtl -o out --machine t1 --program p.s").ok().contains("takt_t1.v"));
+    for line in folder.read_text("out/takt_t1.f").lines() {
+        let module =
+            line.rsplit('/').next().and_then(|name| name.strip_suffix(".v")).expect("a Verilog file");
+        assert!(folder.read_text(&format!("out/{line}")).contains(&format!("module {module}")), "{line}");
+    }
+    assert!(folder.read_text("out/program.hex").lines().count() > 2048);
+    let json: serde_json::Value =
+        serde_json::from_str(&folder.line("rtl -o out2 --json").ok()).expect("JSON");
+    assert_eq!(json["top"], "takt_t3");
+}
+
+#[test]
+fn circuit_and_emulator_agree() {
+    let folder = Folder::new();
+    folder.write("p.s", PROGRAM);
+    folder.write("in.csv", "in0\n1.5\n-2\n0.25\n");
+    let text = cosim(&folder, "cosim p.s --inputs in.csv").ok();
+    assert!(text.starts_with("3 periods on t3") && text.contains("no difference"), "{text}");
+    let json = cosim(&folder, "cosim --seed 3 --programs 4 --json").ok();
+    let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!((&json["programs"], &json["seeds"]), (&4.into(), &serde_json::json!([3, 6])));
+}
+
+#[test]
+fn without_verilator_its_package_is_named() {
+    let folder = Folder::new();
+    folder.write("p.s", PROGRAM);
+    let mut command = folder.command(&["cosim", "p.s"]);
+    command.env("PATH", "");
+    let done = Done::of(command);
+    assert_eq!(done.status, Some(1));
+    assert!(done.stderr.contains("apt-get install verilator"), "{}", done.stderr);
+}
