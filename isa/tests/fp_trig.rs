@@ -209,6 +209,47 @@ fn the_arctangent_of_one_operand() {
     measured.check("atan", ATAN2_MAX_ULP, 4_000_000, false);
 }
 
+/// The convergents of a positive number's continued fraction: the last whose terms are below 2²⁴, both exact in binary32.
+fn convergent(value: f64) -> [f32; 2] {
+    let exponent = (value.to_bits() >> 52) as i32 - 1075;
+    let mantissa = u128::from(value.to_bits() & ((1 << 52) - 1) | 1 << 52);
+    let (mut a, mut b) = (mantissa << exponent.max(0), 1 << (-exponent).max(0));
+    let (mut last, mut next) = ([0_u128, 1], [1_u128, 0]);
+    while b != 0 {
+        let after = [0, 1].map(|i| a / b * next[i] + last[i]);
+        if after.iter().any(|&term| term >= 1 << 24) {
+            break;
+        }
+        (last, next, a, b) = (next, after, b, a % b);
+    }
+    next.map(|term| term as f32)
+}
+
+/// The pairs whose angle is hardest to round, found as CORE-MATH's authors found theirs (`atan2f.wc`): for each angle of 25
+/// bits, that is for binary32 numbers and the middles between them, the pair with the nearest tangent. One in 1,009
+/// angles, with `TAKT_FULL=1` all.
+#[test]
+fn the_arctangent_where_it_is_hard_to_round() {
+    let angle = |index: u32| f64::from_bits((f64::to_bits(1.0 / 128.0)) + (u64::from(index) << 28));
+    let count = ((PI.to_bits() - f64::to_bits(1.0 / 128.0)) >> 28) as u32;
+    let stride = if full() { 1 } else { 1009 };
+    let measured = measure(0, count, stride, |measured, index| {
+        let tangent = core_math::tan(angle(index));
+        let [y, x] = convergent(tangent.abs());
+        take_atan2(measured, y.to_bits(), x.copysign(tangent as f32).to_bits());
+    });
+    measured.check("atan2, hard to round", ATAN2_MAX_ULP, 130_000, false);
+}
+
+#[test]
+fn convergents_of_known_numbers() {
+    assert_eq!(convergent(PI), [5_419_351.0, 1_725_033.0]);
+    assert_eq!(convergent(0.75), [3.0, 4.0]);
+    // One of CORE-MATH's list: atan2(0x1.c84ca8p21, -0x1.00b24ap23) is 0x1.5c98a9p1 and 50 more bits of zeros or ones.
+    let tangent = core_math::tan(f64::from_bits(0x4005_c98a_9000_0000));
+    assert_eq!((convergent(-tangent), tangent < 0.0), ([3_738_005.0, 8_411_429.0], true));
+}
+
 /// IEEE 754-2019, 9.2.1, for every pair of special values; and the angles of the rest.
 #[test]
 fn the_arctangent_of_zeros_infinities_and_nans() {
