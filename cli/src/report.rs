@@ -89,7 +89,9 @@ pub(crate) fn text(tracking: &Tracking) -> String {
     let _ = writeln!(out, "\nLargest tracking error of the tool{:>11}", "µm");
     for (name, error) in [("while cutting", totals.error.cutting), ("over everything", totals.error.overall)]
     {
-        let _ = writeln!(out, "  {name:<32}{:>11.3}", error * 1e6);
+        // Exactly none: no period was of that kind.
+        let figure = if error > 0.0 { format!("{:.3}", error * 1e6) } else { "-".to_owned() };
+        let _ = writeln!(out, "  {name:<32}{figure:>11}");
     }
     let _ = writeln!(out, "  {:<32}{:>11.3}", "required while cutting", REQUIREMENT * 1e6);
 

@@ -128,8 +128,7 @@ impl Library {
             Ok::<_, CircuitError>((name, text))
         };
         let (own, text) = file(unit.name)?;
-        let mut files: Vec<_> =
-            self.files.keys().filter(|name| name.starts_with("common/")).cloned().collect();
+        let mut files = Vec::new();
         let inner = text.lines().find_map(|line| line.strip_prefix("//@ as "));
         let (op_bits, operations) = match inner {
             None => codes(unit, text)?,
@@ -140,10 +139,31 @@ impl Library {
             }
         };
         files.push(own);
+        let files = self.with_common(files);
         let operands =
             operations.iter().map(|operation| operand_ports(operation.op.row())).max().unwrap_or(0);
         let has_interval = text.contains("parameter INTERVAL");
         Ok(Circuit { unit: *unit, op_bits, operands, operations, has_interval, files })
+    }
+
+    /// The files, and before them those of `common/` whose modules they instantiate, and so on.
+    fn with_common(&self, mut files: Vec<String>) -> Vec<String> {
+        let mut seen = 0;
+        while seen < files.len() {
+            let text = self.text(&files[seen]).unwrap_or_default();
+            let words = |text: &str, word: &str| {
+                text.split(|c: char| !c.is_alphanumeric() && c != '_').any(|other| other == word)
+            };
+            for name in self.files.keys().filter(|name| !files.contains(name)).cloned().collect::<Vec<_>>() {
+                let module = name.strip_prefix("common/").and_then(|name| name.strip_suffix(".v"));
+                if module.is_some_and(|module| words(text, module)) {
+                    files.push(name);
+                }
+            }
+            seen += 1;
+        }
+        files.reverse();
+        files
     }
 }
 

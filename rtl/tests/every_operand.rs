@@ -48,32 +48,24 @@ fn every_operand(unit: &str, op: Op) {
     });
 }
 
-#[test]
-#[ignore = "takes half an hour"]
-fn sine() {
-    every_operand("sine", Op::fsin);
+macro_rules! tests {
+    ($($name:ident: $unit:ident $op:ident, $time:literal;)*) => {
+        $(
+            #[test]
+            #[ignore = $time]
+            fn $name() {
+                every_operand(stringify!($unit), Op::$op);
+            }
+        )*
+    };
 }
 
-#[test]
-#[ignore = "takes half an hour"]
-fn cosine() {
-    every_operand("sine", Op::fcos);
-}
-
-#[test]
-#[ignore = "takes hours"]
-fn arccosine() {
-    every_operand("arccosine", Op::facos);
-}
-
-#[test]
-#[ignore = "takes hours"]
-fn root() {
-    every_operand("root", Op::fsqrt);
-}
-
-#[test]
-#[ignore = "takes half an hour"]
-fn divroot() {
-    every_operand("divroot", Op::fsqrt);
+tests! {
+    sine: sine fsin, "takes half an hour";
+    cosine: sine fcos, "takes half an hour";
+    arccosine: arccosine facos, "takes hours";
+    root: root fsqrt, "takes hours";
+    divroot: divroot fsqrt, "takes half an hour";
+    to_float: convert itof, "takes a quarter of an hour";
+    to_integer: convert ftoi, "takes a quarter of an hour";
 }

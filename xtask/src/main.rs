@@ -82,6 +82,9 @@ fn cargo() -> Command {
     command
 }
 
+/// How tests are built.
+const PROFILE: &str = "tests";
+
 fn works(program: &str, argument: &str) -> bool {
     Command::new(program).arg(argument).output().is_ok_and(|output| output.status.success())
 }
@@ -122,7 +125,7 @@ fn apt_install(packages: &[&str]) -> Result<()> {
 fn test(full: bool, rest: &[String]) -> Result<()> {
     install()?;
     let mut tests = cargo();
-    tests.args(["test", "--workspace", "--release"]).args(rest);
+    tests.args(["test", "--workspace", "--profile", PROFILE]).args(rest);
     if full {
         tests.env("TAKT_FULL", "1");
     }
@@ -131,11 +134,21 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
 
 fn lint() -> Result<()> {
     run(cargo().args(["fmt", "--all", "--check"]))?;
-    run(cargo().args(["clippy", "--workspace", "--all-targets", "--release", "--", "-D", "warnings"]))?;
+    run(cargo().args([
+        "clippy",
+        "--workspace",
+        "--all-targets",
+        "--profile",
+        PROFILE,
+        "--",
+        "-D",
+        "warnings",
+    ]))?;
     // isa, asm and emu stand without C: SoftFloat is a feature.
     run(cargo().args([
         "check",
-        "--release",
+        "--profile",
+        PROFILE,
         "--no-default-features",
         "-p",
         "takt-isa",
