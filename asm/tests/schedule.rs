@@ -1,8 +1,10 @@
 //! The scheduler changes when operations issue, and nothing else: on random programs the scheduled program writes the same
 //! values to every port, in the same order, and leaves the same memory and flags, in no more cycles than the source's order.
 
+mod random_source;
+
+use random_source::{Random, source};
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use takt_asm::Assembled;
 use takt_asm::diag::{Diagnostics, Message, Severity};
 use takt_asm::ir::DemandKind;
@@ -10,96 +12,6 @@ use takt_asm::schedule::TimingReport;
 use takt_asm::{MemoryLoader, Options, Schedule, assemble};
 use takt_emu::{Emulator, Event};
 use takt_isa::{MACHINES, Machine, Program};
-
-/// xorshift64*: the same programs on every machine.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, n: u64) -> u64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 33) % n
-    }
-
-    fn pick<'a>(&mut self, from: &[&'a str]) -> &'a str {
-        from[self.below(from.len() as u64) as usize]
-    }
-}
-
-const BINARY: [&[&str]; 3] = [
-    &["fmul", "fmul", "fmul", "fdiv"],
-    &["fadd", "fsub"],
-    &["iadd", "ixor", "iand", "fmin", "fmax", "fsat", "feq", "flt", "ilt", "ishr"],
-];
-const UNARY: [&[&str]; 3] = [&["fsqrt", "fsin"], &["itof", "ftoi"], &["mov", "fabs", "fneg", "fsign"]];
-/// First letters of the names that each slot of t3 writes: a name is written by one slot, so that runs may differ.
-const PREFIX: [&str; 3] = ["m", "a", "x"];
-const NAMES: u64 = 6;
-const INPUTS: [&str; 4] = ["in0", "in1", "in2", "in3"];
-
-/// A source of some hundred operations: arithmetic with reuse of names, loads and stores, ports, flags, bundles, branches.
-fn source(seed: u64) -> String {
-    let random = &mut Random(seed * 2 + 0x9e37_79b9_7f4a_7c15);
-    let mut text =
-        String::from(".schedule on\n.input in0, in1, in2:int, in3\n.output om, oa, ox:bits, of:bits\n");
-    for prefix in PREFIX {
-        for k in 0..NAMES {
-            let _ = writeln!(text, ".state {prefix}{k}");
-        }
-    }
-    text.push_str(".reg t u:int index:int\n.data\nbuf: .float 1.0, -2.5, 1e-30, 3e38\n .space 12\n.once\n");
-    for k in 0..NAMES {
-        let _ =
-            writeln!(text, " fmul m{k}, {k}.5, 1.25\n fadd a{k}, {k}.0, 0.5\n li x{k}, {}", random.below(9));
-    }
-    text.push_str(" wait period\n.period\nperiod:\n");
-    let mut label = 0;
-    let mut open: Option<(u64, u64)> = None;
-    for _ in 0..20 + random.below(200) {
-        if let Some((name, left)) = open {
-            if left == 0 {
-                let _ = writeln!(text, "skip{name}:");
-                open = None;
-            } else {
-                open = Some((name, left - 1));
-            }
-        }
-        let operand = |random: &mut Random| match random.below(12) {
-            0 => random.pick(&INPUTS).to_owned(),
-            1 => random.below(5).to_string(),
-            _ => format!("{}{}", random.pick(&PREFIX), random.below(NAMES)),
-        };
-        let slot = random.below(3) as usize;
-        let dest = match random.below(14) {
-            0 => format!("o{}", PREFIX[slot]),
-            _ => format!("{}{}", PREFIX[slot], random.below(NAMES)),
-        };
-        let (a, b, c) = (operand(random), operand(random), operand(random));
-        let _ = match random.below(24) {
-            0 => writeln!(text, " iand index, {a}, 15\n ld x{}, buf[index]", random.below(NAMES)),
-            1 => writeln!(text, " iand index, {a}, 7\n st buf+4[index], {b}"),
-            2 => writeln!(text, " ld {}, buf+2", format_args!("x{}", random.below(NAMES))),
-            3 => writeln!(text, " sel x{}, {a}, {b}, {c}", random.below(NAMES)),
-            // One name for values of several slots.
-            4 => writeln!(text, " fmul t, {a}, {b}\n fadd t, t, {c}\n fabs t, t\n mov ox, t"),
-            5 => writeln!(text, " fmul m0, a0, m1 || fadd a2, m1, a0 || mov x2, x3"),
-            6 if random.below(3) == 0 => writeln!(text, " rdflags u\n mov of, u\n clrflags"),
-            7 if open.is_none() => {
-                label += 1;
-                open = Some((label, 1 + random.below(12)));
-                writeln!(text, " {} {a}, skip{label}", random.pick(&["bz", "bnz"]))
-            }
-            8 | 9 => writeln!(text, " {} {dest}, {a}", random.pick(UNARY[slot])),
-            _ => writeln!(text, " {} {dest}, {a}, {b}", random.pick(BINARY[slot])),
-        };
-    }
-    if let Some((name, _)) = open {
-        let _ = writeln!(text, "skip{name}:");
-    }
-    text.push_str(" fmul om, m0, m1\n fadd oa, a0, a1\n mov ox, x0\n rdflags u\n mov of, u\n wait period\n");
-    text
-}
 
 fn program(text: &str, machine: &'static Machine, schedule: Schedule, effort: u32) -> Program {
     let options = Options { machine, schedule, effort };

@@ -2,8 +2,12 @@
 #![allow(clippy::print_stdout)]
 
 mod common;
+#[path = "../../asm/tests/random_source/mod.rs"]
+mod random_source;
 
 use common::{assemble, drive, model};
+use random_source::{Random, source};
+use takt_asm::{MemoryLoader, Options, Schedule};
 use takt_cosim::{Lockstep, LockstepError, random};
 use takt_isa::timing::Cause;
 use takt_isa::{MACHINES, Machine, Program, ROWS};
@@ -59,5 +63,41 @@ fn tracking_programs() {
     for machine in MACHINES {
         tracking(machine, "hybrid/tracking.s", 100);
         tracking(machine, "hybrid/tracking_literal.s", 20);
+    }
+}
+
+/// What the scheduler makes of a program runs on the circuit as on the emulator, and gives what the unscheduled program gives.
+#[test]
+fn scheduled_programs() {
+    for machine in MACHINES {
+        let mut simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        for seed in 0..30 {
+            let text = source(seed);
+            let mut outcomes = Vec::new();
+            for schedule in [Schedule::None, Schedule::AsWritten] {
+                let options = Options { machine, schedule, effort: 1 };
+                let assembled =
+                    takt_asm::assemble("random.s", &MemoryLoader::of("random.s", text.as_str()), &options);
+                let program =
+                    assembled.unwrap_or_else(|errors| panic!("{text}\n{}", errors.render(false))).program;
+                let mut lockstep =
+                    Lockstep::new(&program, simulation, &[]).unwrap_or_else(|error| panic!("{error}"));
+                let random = &mut Random(seed + 77);
+                let mut seen = Vec::new();
+                for _ in 0..4 {
+                    let value = |random: &mut Random| (random.below(2000) as f32 / 64.0 - 10.0).to_bits();
+                    let inputs: Vec<_> =
+                        program.inputs.iter().map(|port| (port.register, value(random))).collect();
+                    assert!(lockstep.run_period(&inputs), "{:?}", lockstep.emulator().status());
+                    lockstep.compare().unwrap_or_else(|error| panic!("seed {seed}: {error}\n{text}"));
+                    let outputs = program.outputs.iter();
+                    seen.extend(outputs.map(|port| lockstep.emulator().register(port.register)));
+                }
+                outcomes.push((seen, lockstep.emulator().memory().to_vec(), lockstep.emulator().flags()));
+                lockstep.finish().unwrap_or_else(|error| panic!("seed {seed}: {error}\n{text}"));
+                simulation = lockstep.into_simulation();
+            }
+            assert_eq!(outcomes[0], outcomes[1], "seed {seed} on {}:\n{text}", machine.name);
+        }
     }
 }
