@@ -33,10 +33,12 @@ const COMMON: &[Fault] = &[
     // Forwarding.
     ("takt_hazard", "advance ? r_at1 : i_at1", "r_at1"),
     ("takt_hazard", "advance ? r_at0 : {SLOTS{1'b0}}", "{SLOTS{1'b0}}"),
-    ("takt_source", "({32{r_past[i]}} & was_result[32*i +: 32])", "32'd0"),
+    ("takt_source", "r_past & {SLOTS{~next_input}}", "{SLOTS{1'b0}}"),
     ("takt_source", "advance ? m_index : r_index", "m_index"),
     ("takt_source", "advance ? r_is_next : i_is_next", "r_is_next"),
     ("takt_source", "~advance & ~next_taken", "~advance"),
+    ("takt_source", "~next_fresh & ~next_input", "1'b0"),
+    ("takt_bank", "show ? read : 32'd0", "read"),
     // A bundle at fault.
     ("takt_underway", "above[j+1] & ~((above_fresh[j+1] | above_recent[j+1]) & cancel)", "above[j+1]"),
     // The unit's interval.

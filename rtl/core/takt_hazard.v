@@ -11,8 +11,8 @@
 //   i_waits: a bundle that stays in issue cannot issue in the next cycle.
 //   r_copy[s]: the bank's copy shows the register in this cycle.
 //   r_past[s]: the result was on slot s's bus in the last cycle, and the bank's copy does not show it in this one.
-//   i_now[s], i_past[s]: it is on the bus in this cycle; it was in the last, when the bundle was in read.
-//   next_now, next_past: what i_now and i_past will be in the next cycle.
+//   next_now[s], next_past[s]: for the bundle that will be in issue in the next cycle: it will be on the bus then; it is on the
+//   bus in this cycle, with the bundle still in read.
 //   No latency is less than 2.
 
 module takt_hazard #(
@@ -44,8 +44,6 @@ module takt_hazard #(
     output wire                         i_waits,
     output reg  [SLOTS-1:0]             r_copy,
     output reg  [SLOTS-1:0]             r_past,
-    output reg  [SLOTS-1:0]             i_now,
-    output reg  [SLOTS-1:0]             i_past,
     output wire [SLOTS-1:0]             next_now,
     output wire [SLOTS-1:0]             next_past
 );
@@ -89,8 +87,6 @@ module takt_hazard #(
     assign next_past = advance ? r_at0 : {SLOTS{1'b0}};
 
     always @(posedge clk) begin
-        i_now  <= next_now;
-        i_past <= next_past;
         if (advance) begin
             r_later          <= (|m_later) | (|(m_on_issue & ~i_early));
             r_at1            <= m_at2 | (m_on_issue & i_early);
