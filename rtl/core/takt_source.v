@@ -7,8 +7,8 @@
 // Contract
 //   As takt_hazard. m_bank: one-hot, the slots' banks, then the inputs; none if there is no such operand or it is `zero`.
 //   result: the slots' buses. was_result: the same, one cycle later.
-//   input_write, _index, _value: a value for an input port, which goes into the bank; input_next, _index, _value: the same one
-//   cycle later. Bundles that issue in the cycle after that or later read it.
+//   input_write, _index, _value: a value for an input port, which goes into the bank; input_next_value: the same one cycle later.
+//   Bundles that issue in the cycle after that or later read it.
 //   r_constant: what takes a source's place. Zero if there is a source. i_status: likewise, with i_reads_status, later.
 
 module takt_source #(
@@ -37,8 +37,6 @@ module takt_source #(
     input  wire                         input_write,
     input  wire [INDEX-1:0]             input_write_index,
     input  wire [31:0]                  input_write_value,
-    input  wire                         input_next,
-    input  wire [INDEX-1:0]             input_next_index,
     input  wire [31:0]                  input_next_value,
     input  wire [31:0]                  r_constant,
     input  wire                         i_reads_status,
@@ -60,22 +58,27 @@ module takt_source #(
     end
 
     wire [SLOTS-1:0] r_copy, r_past, next_now, next_past;
+    wire r_taken, i_taken;
     takt_hazard #(.SLOTS(SLOTS), .DEPTH(DEPTH), .LATE(LATE), .INDEX(INDEX)) hazard (
         .clk(clk), .advance(advance),
         .m_bank(m_bank[SLOTS-1:0]), .m_index(m_index), .r_bank(r_bank[SLOTS-1:0]), .r_index(r_index),
         .i_bank(i_bank[SLOTS-1:0]), .i_index(i_index),
         .underway(underway), .underway_index(underway_index), .late(late), .late_index(late_index),
         .r_writes(r_writes), .r_early(r_early), .r_dest(r_dest), .i_writes(i_writes), .i_early(i_early), .i_dest(i_dest),
-        .r_waits(r_waits), .i_waits(i_waits), .r_copy(r_copy), .r_past(r_past), .next_now(next_now), .next_past(next_past)
+        .r_waits(r_waits), .i_waits(i_waits), .r_copy(r_copy), .r_past(r_past), .r_taken(r_taken), .i_taken(i_taken), .next_now(next_now), .next_past(next_past)
     );
 
     // ---- read: the bank's copy, or what is too recent for it
 
-    wire r_is_next  = r_bank[SLOTS] & (r_index == input_next_index);
-    wire i_is_next  = i_bank[SLOTS] & (i_index == input_next_index);
-    wire next_input = input_next & (advance ? r_is_next : i_is_next);
-    wire next_taken = next_input | (|next_now) | (|next_past);
-    wire next_fresh = advance & ~next_taken;  // the bundle in issue will be new there, and its operand what was read
+    // Whether input_next_value is for the bundle in read, in issue.
+    reg  r_is_next, i_is_next;
+    wire r_is_written = r_bank[SLOTS] & (r_index == input_write_index);
+    always @(posedge clk) begin
+        r_is_next <= input_write & (advance ? m_bank[SLOTS] & (m_index == input_write_index) : r_is_written);
+        i_is_next <= input_write & (advance ? r_is_written : i_bank[SLOTS] & (i_index == input_write_index));
+    end
+    wire next_input = advance ? r_is_next : i_is_next;
+    wire next_fresh = advance & ~r_taken & ~r_is_next;  // the bundle that will be in issue is new there, and what was read is its operand
 
     wire [INDEX-1:0]  read_index = advance ? m_index : r_index;
     wire [SLOTS:0]    next_copy  = {r_bank[SLOTS], r_copy} & {(SLOTS + 1){next_fresh}};
@@ -117,7 +120,7 @@ module takt_source #(
     end
 
     always @(posedge clk) begin
-        i_stays <= ~advance & ~next_taken;
+        i_stays <= ~advance & ~i_taken & ~i_is_next;
         recent  <= r_recent | (r_constant & {32{~next_input}});
         if (~next_fresh & ~next_input) recent <= 32'd0;
         if (~i_stays | i_reads_status) operand <= value;

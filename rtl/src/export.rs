@@ -440,7 +440,7 @@ impl Plan {
         );
         line!(
             v,
-            "    reg         input1, input2;\n    reg [{0}:0]   input1_index, input2_index;\n    reg [31:0]  input1_value, input2_value;\n    reg         ticks;",
+            "    reg         input1;\n    reg [{0}:0]   input1_index;\n    reg [31:0]  input1_value, input2_value;\n    reg         ticks;",
             index - 1
         );
         line!(v, "    always @(posedge clk) begin");
@@ -458,10 +458,7 @@ impl Plan {
             v,
             "        input1        <= input_write;\n        input1_index  <= {extended};\n        input1_value  <= input_value;"
         );
-        line!(
-            v,
-            "        input2        <= input1;\n        input2_index  <= input1_index;\n        input2_value  <= input1_value;"
-        );
+        line!(v, "        input2_value  <= input1_value;");
         line!(v, "        ticks         <= tick & ~rst;\n    end");
         line!(
             v,
@@ -812,10 +809,7 @@ impl Plan {
                     v,
                     "        .input_write(input1), .input_write_index(input1_index), .input_write_value(input1_value),"
                 );
-                line!(
-                    v,
-                    "        .input_next(input2), .input_next_index(input2_index), .input_next_value(input2_value),"
-                );
+                line!(v, "        .input_next_value(input2_value),");
                 line!(
                     v,
                     "        .r_constant({constant}), .i_reads_status({reads_status}), .i_status({status}),"
@@ -832,7 +826,7 @@ impl Plan {
             line!(v);
             line!(
                 v,
-                "    wire {name}_r_waits, {name}_i_waits, {name}_unused_copy, {name}_unused_past, {name}_unused_next, {name}_unused_next_past;"
+                "    wire {name}_r_waits, {name}_i_waits, {name}_unused_copy, {name}_unused_past, {name}_unused_taken, {name}_unused_i_taken, {name}_unused_next, {name}_unused_next_past;"
             );
             line!(
                 v,
@@ -867,7 +861,7 @@ impl Plan {
             );
             line!(
                 v,
-                "        .r_waits({name}_r_waits), .i_waits({name}_i_waits), .r_copy({name}_unused_copy), .r_past({name}_unused_past),"
+                "        .r_waits({name}_r_waits), .i_waits({name}_i_waits), .r_copy({name}_unused_copy), .r_past({name}_unused_past), .r_taken({name}_unused_taken), .i_taken({name}_unused_i_taken),"
             );
             line!(v, "        .next_now({name}_unused_next), .next_past({name}_unused_next_past)\n    );");
             r_waits.push(format!("{name}_r_waits"));
