@@ -31,12 +31,14 @@ const COMMON: &[Fault] = &[
     // Too long.
     ("takt_hazard", "i_later & ~(|i_at2)", "i_later"),
     // Forwarding.
-    ("takt_hazard", "advance ? r_at1 : i_at1", "r_at1"),
-    ("takt_hazard", "advance ? r_at0 : {SLOTS{1'b0}}", "{SLOTS{1'b0}}"),
-    ("takt_source", "({32{r_past[i]}} & was_result[32*i +: 32])", "32'd0"),
+    ("takt_hazard", "advance ? r_bank & {SLOTS{r_at1}} : i_bank & {SLOTS{i_at1}}", "r_bank & {SLOTS{r_at1}}"),
+    ("takt_hazard", "advance & r_at0", "1'b0"),
+    ("takt_source", "r_past & {SLOTS{~next_input}}", "{SLOTS{1'b0}}"),
     ("takt_source", "advance ? m_index : r_index", "m_index"),
     ("takt_source", "advance ? r_is_next : i_is_next", "r_is_next"),
-    ("takt_source", "~advance & ~next_taken", "~advance"),
+    ("takt_source", "~advance & ~i_taken & ~i_is_next", "~advance"),
+    ("takt_source", "~next_fresh & ~next_input", "1'b0"),
+    ("takt_bank", "show ? read : 32'd0", "read"),
     // A bundle at fault.
     ("takt_underway", "above[j+1] & ~((above_fresh[j+1] | above_recent[j+1]) & cancel)", "above[j+1]"),
     // The unit's interval.
@@ -61,7 +63,7 @@ const OF_T3X: &[Fault] = &[
     ("takt_divroot", "a_sign_1 & ~a_zero & ~a_nan", "a_sign_1 & ~a_nan"),
     ("takt_arctangent", "sign & ~nan", "1'b0"),
     ("takt_arccosine", "negative_19 ? HALF_TURN - shifted : shifted", "shifted"),
-    ("takt_hazard", "r_at2 | r_on_issue_early", "r_at2"),
+    ("takt_hazard", "(|r_at2) | r_on_issue_early", "|r_at2"),
     ("takt_hazard", "m_at2 | (m_on_issue & i_early)", "m_at2"),
     ("takt_t3x", "pending | (|i_writes)", "pending"),
     ("takt_t3x", "sticky & {3{~x_clear_flags | fault}}", "sticky"),

@@ -11,8 +11,9 @@
 //   i_waits: a bundle that stays in issue cannot issue in the next cycle.
 //   r_copy[s]: the bank's copy shows the register in this cycle.
 //   r_past[s]: the result was on slot s's bus in the last cycle, and the bank's copy does not show it in this one.
-//   i_now[s], i_past[s]: it is on the bus in this cycle; it was in the last, when the bundle was in read.
-//   next_now, next_past: what i_now and i_past will be in the next cycle.
+//   next_now[s], next_past[s]: for the bundle that will be in issue in the next cycle: it will be on the bus then; it is on the
+//   bus in this cycle, with the bundle still in read.
+//   r_taken, i_taken: next_now or next_past would have it if the bundle in read, the one in issue, were in issue in the next cycle.
 //   No latency is less than 2.
 
 module takt_hazard #(
@@ -44,8 +45,8 @@ module takt_hazard #(
     output wire                         i_waits,
     output reg  [SLOTS-1:0]             r_copy,
     output reg  [SLOTS-1:0]             r_past,
-    output reg  [SLOTS-1:0]             i_now,
-    output reg  [SLOTS-1:0]             i_past,
+    output wire                         r_taken,
+    output wire                         i_taken,
     output wire [SLOTS-1:0]             next_now,
     output wire [SLOTS-1:0]             next_past
 );
@@ -77,39 +78,37 @@ module takt_hazard #(
     endgenerate
 
     // In read: the result is in place 2 or beyond (r_later), in place 1, in place 0; or the bundle in issue computes it.
-    reg             r_later, r_on_issue, r_on_issue_late;
-    reg [SLOTS-1:0] r_on_issue_early, r_at1, r_at0;
+    reg r_later, r_on_issue, r_on_issue_early, r_on_issue_late, r_at1, r_at0;
     // In issue: likewise.
-    reg             i_later;
-    reg [SLOTS-1:0] i_at1;
+    reg i_later, i_at1;
 
     assign r_waits   = r_later | r_on_issue;
     assign i_waits   = i_later;
-    assign next_now  = advance ? r_at1 : i_at1;
-    assign next_past = advance ? r_at0 : {SLOTS{1'b0}};
+    assign r_taken   = r_at1 | r_at0;
+    assign i_taken   = i_at1;
+    assign next_now  = advance ? r_bank & {SLOTS{r_at1}} : i_bank & {SLOTS{i_at1}};
+    assign next_past = r_bank & {SLOTS{advance & r_at0}};
 
     always @(posedge clk) begin
-        i_now  <= next_now;
-        i_past <= next_past;
         if (advance) begin
             r_later          <= (|m_later) | (|(m_on_issue & ~i_early));
-            r_at1            <= m_at2 | (m_on_issue & i_early);
-            r_at0            <= m_at1;
+            r_at1            <= |(m_at2 | (m_on_issue & i_early));
+            r_at0            <= |m_at1;
             r_past           <= m_at0;
             r_copy           <= m_bank & ~m_at0;
             r_on_issue       <= |m_on_read;
-            r_on_issue_early <= m_on_read & r_early;
+            r_on_issue_early <= |(m_on_read & r_early);
             r_on_issue_late  <= |(m_on_read & ~r_early);
             i_later          <= (r_later & ~(|r_at2)) | r_on_issue_late;
-            i_at1            <= r_at2 | r_on_issue_early;
+            i_at1            <= (|r_at2) | r_on_issue_early;
         end else begin
             r_later <= r_later & ~(|r_at2);
-            r_at1   <= r_at2;
+            r_at1   <= |r_at2;
             r_at0   <= r_at1;
-            r_past  <= r_at0;
-            r_copy  <= r_bank & ~r_at0;
+            r_past  <= r_bank & {SLOTS{r_at0}};
+            r_copy  <= r_bank & {SLOTS{~r_at0}};
             i_later <= i_later & ~(|i_at2);
-            i_at1   <= i_at2;
+            i_at1   <= |i_at2;
         end
     end
 

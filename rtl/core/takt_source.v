@@ -7,9 +7,9 @@
 // Contract
 //   As takt_hazard. m_bank: one-hot, the slots' banks, then the inputs; none if there is no such operand or it is `zero`.
 //   result: the slots' buses. was_result: the same, one cycle later.
-//   input_write, _index: a value for an input port, which goes into the bank; input_next, _index the same one cycle later;
-//   input_value one more: bundles that issue in the cycle of input_value or later read it.
-//   r_constant: what takes a source's place. Zero if there is a source. i_status: likewise, later.
+//   input_write, _index, _value: a value for an input port, which goes into the bank; input_next_value: the same one cycle later.
+//   Bundles that issue in the cycle after that or later read it.
+//   r_constant: what takes a source's place. Zero if there is a source. i_status: likewise, with i_reads_status, later.
 
 module takt_source #(
     parameter SLOTS = 3,
@@ -37,10 +37,9 @@ module takt_source #(
     input  wire                         input_write,
     input  wire [INDEX-1:0]             input_write_index,
     input  wire [31:0]                  input_write_value,
-    input  wire                         input_next,
-    input  wire [INDEX-1:0]             input_next_index,
-    input  wire [31:0]                  input_value,
+    input  wire [31:0]                  input_next_value,
     input  wire [31:0]                  r_constant,
+    input  wire                         i_reads_status,
     input  wire [31:0]                  i_status,
     output wire                         r_waits,
     output wire                         i_waits,
@@ -58,25 +57,36 @@ module takt_source #(
         end
     end
 
-    wire [SLOTS-1:0] r_copy, r_past, i_now, i_past, next_now, next_past;
+    wire [SLOTS-1:0] r_copy, r_past, next_now, next_past;
+    wire r_taken, i_taken;
     takt_hazard #(.SLOTS(SLOTS), .DEPTH(DEPTH), .LATE(LATE), .INDEX(INDEX)) hazard (
         .clk(clk), .advance(advance),
         .m_bank(m_bank[SLOTS-1:0]), .m_index(m_index), .r_bank(r_bank[SLOTS-1:0]), .r_index(r_index),
         .i_bank(i_bank[SLOTS-1:0]), .i_index(i_index),
         .underway(underway), .underway_index(underway_index), .late(late), .late_index(late_index),
         .r_writes(r_writes), .r_early(r_early), .r_dest(r_dest), .i_writes(i_writes), .i_early(i_early), .i_dest(i_dest),
-        .r_waits(r_waits), .i_waits(i_waits), .r_copy(r_copy), .r_past(r_past), .i_now(i_now), .i_past(i_past),
-        .next_now(next_now), .next_past(next_past)
+        .r_waits(r_waits), .i_waits(i_waits), .r_copy(r_copy), .r_past(r_past), .r_taken(r_taken), .i_taken(i_taken), .next_now(next_now), .next_past(next_past)
     );
 
     // ---- read: the bank's copy, or what is too recent for it
 
-    wire [INDEX-1:0] read_index = advance ? m_index : r_index;
-    wire [32*SLOTS+31:0] copy;  // of the bundle that was in read in the last cycle
+    // Whether input_next_value is for the bundle in read, in issue.
+    reg  r_is_next, i_is_next;
+    wire r_is_written = r_bank[SLOTS] & (r_index == input_write_index);
+    always @(posedge clk) begin
+        r_is_next <= input_write & (advance ? m_bank[SLOTS] & (m_index == input_write_index) : r_is_written);
+        i_is_next <= input_write & (advance ? r_is_written : i_bank[SLOTS] & (i_index == input_write_index));
+    end
+    wire next_input = advance ? r_is_next : i_is_next;
+    wire next_fresh = advance & ~r_taken & ~r_is_next;  // the bundle that will be in issue is new there, and what was read is its operand
+
+    wire [INDEX-1:0]  read_index = advance ? m_index : r_index;
+    wire [SLOTS:0]    next_copy  = {r_bank[SLOTS], r_copy} & {(SLOTS + 1){next_fresh}};
+    wire [32*SLOTS+31:0] copy;  // of the bundle that was in read in the last cycle, or 0
 
     takt_bank #(.INDEX(INDEX)) inputs (
         .clk(clk), .write(input_write), .write_index(input_write_index), .write_value(input_write_value),
-        .read_index(read_index), .value(copy[32*SLOTS +: 32])
+        .read_index(read_index), .show(next_copy[SLOTS]), .value(copy[32*SLOTS +: 32])
     );
 
     genvar s;
@@ -84,48 +94,36 @@ module takt_source #(
         for (s = 0; s < SLOTS; s = s + 1) begin : g_slot
             takt_bank #(.INDEX(INDEX)) bank (
                 .clk(clk), .write(writes[s]), .write_index(underway_index[s*DEPTH*INDEX +: INDEX]),
-                .write_value(result[32*s +: 32]), .read_index(read_index), .value(copy[32*s +: 32])
+                .write_value(result[32*s +: 32]), .read_index(read_index), .show(next_copy[s]), .value(copy[32*s +: 32])
             );
         end
     endgenerate
 
-    reg [31:0] r_recent;
-    integer    i;
+    wire [31:0] r_recent;
+    takt_choice #(.VALUES(SLOTS + 1), .AHEAD(0)) choice_recent (
+        .clk(clk), .choose({next_input, r_past & {SLOTS{~next_input}}}), .values({input_next_value, was_result}), .value(r_recent)
+    );
+
+    // ---- issue: what was read, or what is on a bus; or nothing new, and the operand stays
+
+    wire [31:0] bus;
+    takt_choice #(.VALUES(2 * SLOTS), .AHEAD(1)) choice_bus (
+        .clk(clk), .choose({next_now, next_past}), .values({result, was_result}), .value(bus)
+    );
+
+    reg [31:0] recent, value;
+    reg        i_stays;
+    integer    k;
     always @* begin
-        r_recent = r_constant;
-        for (i = 0; i < SLOTS; i = i + 1) begin
-            r_recent = r_recent | ({32{r_past[i]}} & was_result[32*i +: 32]);
-        end
+        value = bus | recent | i_status;
+        for (k = 0; k <= SLOTS; k = k + 1) value = value | copy[32*k +: 32];
     end
-
-    // ---- issue: what was read, or what is on a bus
-
-    reg  [31:0]    recent, held, value;
-    reg  [SLOTS:0] i_copy;
-    reg            i_recent, i_held, i_input;
-    integer        k;
-    always @* begin
-        value = ({32{i_recent}} & recent) | ({32{i_held}} & held) | ({32{i_input}} & input_value) | ({32{i_copy[SLOTS]}} & copy[32*SLOTS +: 32]);
-        for (k = 0; k < SLOTS; k = k + 1) begin
-            value = value | ({32{i_copy[k]}} & copy[32*k +: 32])
-                | ({32{i_now[k]}} & result[32*k +: 32]) | ({32{i_past[k]}} & was_result[32*k +: 32]);
-        end
-    end
-
-    wire r_is_next = r_bank[SLOTS] & (r_index == input_next_index);
-    wire i_is_next = i_bank[SLOTS] & (i_index == input_next_index);
-    wire next_input = input_next & (advance ? r_is_next : i_is_next);
-
-    wire next_taken = next_input | (|next_now) | (|next_past);
 
     always @(posedge clk) begin
-        i_input  <= next_input;
-        i_copy   <= {r_bank[SLOTS], r_copy} & {(SLOTS + 1){advance & ~next_taken}};
-        i_recent <= advance & ~next_taken;
-        i_held   <= ~advance & ~next_taken;
-        recent   <= r_recent;
-        held     <= value;
-        operand  <= value | i_status;
+        i_stays <= ~advance & ~i_taken & ~i_is_next;
+        recent  <= r_recent | (r_constant & {32{~next_input}});
+        if (~next_fresh & ~next_input) recent <= 32'd0;
+        if (~i_stays | i_reads_status) operand <= value;
     end
 
 endmodule

@@ -440,7 +440,7 @@ impl Plan {
         );
         line!(
             v,
-            "    reg         input1, input2;\n    reg [{0}:0]   input1_index, input2_index;\n    reg [31:0]  input1_value, input2_value, input3_value;\n    reg         ticks;",
+            "    reg         input1;\n    reg [{0}:0]   input1_index;\n    reg [31:0]  input1_value, input2_value;\n    reg         ticks;",
             index - 1
         );
         line!(v, "    always @(posedge clk) begin");
@@ -458,10 +458,7 @@ impl Plan {
             v,
             "        input1        <= input_write;\n        input1_index  <= {extended};\n        input1_value  <= input_value;"
         );
-        line!(
-            v,
-            "        input2        <= input1;\n        input2_index  <= input1_index;\n        input2_value  <= input1_value;\n        input3_value  <= input2_value;"
-        );
+        line!(v, "        input2_value  <= input1_value;");
         line!(v, "        ticks         <= tick & ~rst;\n    end");
         line!(
             v,
@@ -786,10 +783,11 @@ impl Plan {
                 } else {
                     "32'd0".to_owned()
                 };
-                let status = if k == 0 && flags_slots.contains(&s) {
-                    format!("{{27'd0, {{3{{{}}}}} & sticky_now, 2'd0}}", self.bit("i", s, "read_flags"))
+                let (reads_status, status) = if k == 0 && flags_slots.contains(&s) {
+                    let reads = self.bit("i", s, "read_flags");
+                    (reads.clone(), format!("{{27'd0, {{3{{{reads}}}}} & sticky_now, 2'd0}}"))
                 } else {
-                    "32'd0".to_owned()
+                    ("1'b0".to_owned(), "32'd0".to_owned())
                 };
                 line!(v);
                 line!(v, "    wire [31:0] x_{o};\n    wire {o}_r_waits, {o}_i_waits;");
@@ -811,11 +809,11 @@ impl Plan {
                     v,
                     "        .input_write(input1), .input_write_index(input1_index), .input_write_value(input1_value),"
                 );
+                line!(v, "        .input_next_value(input2_value),");
                 line!(
                     v,
-                    "        .input_next(input2), .input_next_index(input2_index), .input_value(input3_value),"
+                    "        .r_constant({constant}), .i_reads_status({reads_status}), .i_status({status}),"
                 );
-                line!(v, "        .r_constant({constant}), .i_status({status}),");
                 line!(v, "        .r_waits({o}_r_waits), .i_waits({o}_i_waits), .operand(x_{o})\n    );");
                 r_waits.push(format!("{o}_r_waits"));
                 i_waits.push(format!("{o}_i_waits"));
@@ -828,7 +826,7 @@ impl Plan {
             line!(v);
             line!(
                 v,
-                "    wire {name}_r_waits, {name}_i_waits, {name}_unused_copy, {name}_unused_past, {name}_unused_now, {name}_unused_i_past, {name}_unused_next, {name}_unused_next_past;"
+                "    wire {name}_r_waits, {name}_i_waits, {name}_unused_copy, {name}_unused_past, {name}_unused_taken, {name}_unused_i_taken, {name}_unused_next, {name}_unused_next_past;"
             );
             line!(
                 v,
@@ -863,12 +861,9 @@ impl Plan {
             );
             line!(
                 v,
-                "        .r_waits({name}_r_waits), .i_waits({name}_i_waits), .r_copy({name}_unused_copy), .r_past({name}_unused_past), .i_now({name}_unused_now),"
+                "        .r_waits({name}_r_waits), .i_waits({name}_i_waits), .r_copy({name}_unused_copy), .r_past({name}_unused_past), .r_taken({name}_unused_taken), .i_taken({name}_unused_i_taken),"
             );
-            line!(
-                v,
-                "        .i_past({name}_unused_i_past), .next_now({name}_unused_next), .next_past({name}_unused_next_past)\n    );"
-            );
+            line!(v, "        .next_now({name}_unused_next), .next_past({name}_unused_next_past)\n    );");
             r_waits.push(format!("{name}_r_waits"));
             i_waits.push(format!("{name}_i_waits"));
         }

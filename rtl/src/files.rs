@@ -42,6 +42,7 @@ pub(crate) const ECP5: &[File] = files!("ecp5":
 #[rustfmt::skip]
 pub(crate) const CORE: &[File] = files!("core":
     "takt_bank.v"
+    "takt_choice.v"
     "takt_hazard.v"
     "takt_issue.v"
     "takt_late.v"

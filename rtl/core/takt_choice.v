@@ -1,0 +1,61 @@
+// takt_choice: one of several values, or 0, in half as many 4-input lookup tables a bit as there are values: a chain, each link
+// of which takes the next two, and what comes down the chain chooses between them.
+//
+// Contract
+//   choose: one-hot, or none, for which value is 0. With AHEAD it is that of the cycle before.
+
+module takt_choice #(
+    parameter VALUES = 6,  // even
+    parameter AHEAD  = 0
+) (
+    input  wire                 clk,
+    input  wire [VALUES-1:0]    choose,
+    input  wire [32*VALUES-1:0] values,
+    output reg  [31:0]          value
+);
+
+    localparam LINKS = VALUES / 2;
+
+    generate
+        if (VALUES != 2 * LINKS) begin : g_even
+            takt_choice_has_an_even_number_of_values unsupported ();
+        end
+    endgenerate
+
+    // The first link delivers 0 without low and high, one of its values with one of them, and 1 with both, which chooses the
+    // second value of the link that is on.
+    reg             second;
+    reg [LINKS-1:0] on;
+    integer         i;
+    always @* begin
+        second = 1'b0;
+        on     = {LINKS{1'b0}};
+        for (i = 1; i < LINKS; i = i + 1) begin
+            second = second | choose[2*i+1];
+            on[i]  = choose[2*i] | choose[2*i+1];
+        end
+    end
+    wire [LINKS+1:0] next = {on, choose[1] | second, choose[0] | second};
+
+    wire [LINKS+1:0] now;
+    generate
+        if (AHEAD != 0) begin : g_ahead
+            reg [LINKS+1:0] kept;
+            always @(posedge clk) kept <= next;
+            assign now = kept;
+        end else begin : g_now
+            assign now = next;
+        end
+    endgenerate
+
+    integer j;
+    always @* begin
+        value = now[1] ? values[63:32] | {32{now[0]}} : values[31:0] & {32{now[0]}};
+        for (j = 1; j < LINKS; j = j + 1) begin
+            if (now[j+2]) value = (value & values[64*j+32 +: 32]) | (~value & values[64*j +: 32]);
+        end
+    end
+
+    wire unused = &{1'b0, clk, now[2]};
+
+endmodule
