@@ -74,7 +74,7 @@ const BUFFER: usize = 1 << 16;
 impl Out {
     /// Standard output.
     pub(crate) fn stdout() -> Out {
-        let writer = BufWriter::with_capacity(BUFFER, io::stdout().lock());
+        let writer = BufWriter::with_capacity(BUFFER, io::stdout());
         Out { writer: Box::new(writer), name: "standard output".to_owned(), partial: None }
     }
 

@@ -1,14 +1,13 @@
 //! Commands in, text out: what a prompt, a script and the command line of a full-screen view share. One table gives
 //! dispatch, help and completion.
 
+use crate::panes::{self, Flying, Kind, Panes};
 use crate::session::{Live, Session, Shown, Stop, Test, Unit, Where, Why, hex_float, ulp_distance};
 use std::fmt::Write as _;
 use takt_asm::diag::nearest;
 use takt_asm::expr::Value;
-use takt_emu::Status;
 use takt_isa::Type;
 use takt_isa::program::Space;
-use takt_isa::timing::Cause;
 
 /// What completes an argument.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -69,6 +68,15 @@ commands! {
     "quit" "q" "" Completion::None, |c, _| { c.quit = true; Ok(String::new()) }, "Leave.";
 }
 
+/// Keys of the full-screen view, each with the command that it stands for. One that ends in a blank is left to be completed.
+#[rustfmt::skip]
+pub const KEYS: &[(char, &str)] = &[
+    ('s', "step"), ('S', "back"), ('n', "step call"), ('N', "back call"), ('l', "step line"), ('L', "back line"),
+    ('i', "step cycle"), ('I', "back cycle"), ('p', "step period"), ('P', "back period"), ('o', "step out"),
+    ('c', "continue"), ('C', "reverse"), ('b', "break "), ('w', "watch "), ('u', "until "), ('d', "display "),
+    ('g', "goto "), ('q', "quit"),
+];
+
 /// A command by its name, its short name, or an unmistakable beginning.
 fn find(name: &str) -> Result<&'static Command, String> {
     if let Some(command) = COMMANDS.iter().find(|command| command.name == name || command.short == name) {
@@ -102,6 +110,15 @@ fn help(name: &str) -> Result<String, String> {
     }
     text.push_str("An empty line repeats a step. Expressions are the assembler's, over live values; also `cycle period address depth`.\n");
     Ok(text)
+}
+
+/// Every command for the help of the full-screen view: its use, the keys that stand for it, and its text.
+pub fn commands() -> impl Iterator<Item = (String, String, &'static str)> {
+    COMMANDS.iter().map(|command| {
+        let keys = KEYS.iter().filter(|(_, line)| line.split(' ').next() == Some(command.name));
+        let keys: Vec<String> = keys.map(|(key, line)| format!("{key} {}", line.trim_end())).collect();
+        (format!("{} {}", command.name, command.arguments), keys.join(", "), command.text)
+    })
 }
 
 /// Names that complete the word that a line ends with, and where that word begins.
@@ -148,12 +165,15 @@ pub struct Console {
     pub quit: bool,
     /// The last step, which an empty line repeats.
     last: String,
+    /// What named registers held before the last command that moved or changed something.
+    before: Vec<Option<u32>>,
 }
 
 impl Console {
     /// Commands on a session.
     pub fn new(session: Session) -> Console {
-        Console { session, displays: Vec::new(), failed: 0, quit: false, last: String::new() }
+        let before = panes::values(&session);
+        Console { session, displays: Vec::new(), failed: 0, quit: false, last: String::new(), before }
     }
 
     /// Executes a line; what it has to say, in whole lines.
@@ -167,7 +187,18 @@ impl Console {
         let command = find(name)?;
         let moves = ["step", "back", "continue", "reverse"].contains(&command.name);
         self.last = if moves { line.to_owned() } else { String::new() };
-        (command.run)(self, arguments)
+        let (cycle, before) = (self.session.cycle(), panes::values(&self.session));
+        let result = (command.run)(self, arguments);
+        if self.session.cycle() != cycle || panes::values(&self.session) != before {
+            self.before = before;
+        }
+        result
+    }
+
+    /// What there is to see at this position.
+    pub fn panes(&mut self) -> Panes {
+        let displays = self.displayed();
+        Panes::new(&mut self.session, &self.before, displays)
     }
 
     /// The displayed expressions with their values.
@@ -187,47 +218,21 @@ impl Console {
 
     /// Where the session is.
     pub fn place(&mut self) -> String {
-        let session = &mut self.session;
-        let (cycle, period) = (session.cycle(), session.period());
-        let stall = session.stall();
-        let (address, issue) = session.next_issue();
-        let program = session.program();
-        let head = format!("cycle {cycle}, period {period}: ");
-        let mut text = match session.emulator().status() {
-            Status::Halted { .. } => format!("{head}halted at {}\n", program.bundle_text(address)),
-            Status::Faulted(fault) => format!("{head}{fault}\n"),
-            Status::Waiting { address, .. } => {
-                format!("{head}waits for the tick, since {}\n", program.bundle_text(*address))
-            }
-            Status::Running => {
-                let at = program.bundle_text(address);
-                let label = program.nearest_label(address);
-                let label = label.map_or(String::new(), |(label, distance)| match distance {
-                    0 => format!(", {label}"),
-                    distance => format!(", {label}+{distance}"),
-                });
-                match (stall, issue) {
-                    (Some(cause), Some(issue)) => {
-                        let why = program.cause_text(cause);
-                        format!("{head}{at}{label} issues in {} cycles: {why}\n", issue - cycle)
-                    }
-                    _ => format!("{head}{at}{label} issues\n"),
-                }
-            }
-        };
+        let mut text = panes::head(&mut self.session);
+        text.push('\n');
+        let session = &self.session;
         if let Some(location) = session.location()
             && let Some(line) = session.source_line(location)
         {
             let _ = writeln!(text, "{:>5}  {}", location.line, line.trim_end());
         }
-        for (slot, operation) in session.program().machine.slots.iter().zip(session.bundle(address)) {
+        for (slot, operation) in panes::bundle(session) {
             if let Some(operation) = operation {
-                let _ = writeln!(text, "    {:<4} {operation}", slot.name);
+                let _ = writeln!(text, "    {slot:<4} {operation}");
             }
         }
-        for address in session.emulator().stack().iter().rev() {
-            let call = address.saturating_sub(1);
-            let _ = writeln!(text, "    called from {}", session.program().bundle_text(call));
+        for call in panes::calls(session) {
+            let _ = writeln!(text, "    called from {call}");
         }
         text
     }
@@ -369,7 +374,9 @@ impl Console {
         for part in parts(arguments) {
             let live = self.session.parse(part)?;
             let _ = match self.session.place(&live)? {
-                Some((_, ty, Some(bits))) => writeln!(text, "{} = {}", live.text(), every_way(ty, bits)),
+                Some((_, ty, Some(bits))) => {
+                    writeln!(text, "{} = {}", live.text(), Shown::every_way(ty, bits))
+                }
                 Some((.., None)) => writeln!(text, "{} = (never written)", live.text()),
                 None => writeln!(text, "{} = {}", live.text(), number(self.session.evaluate(&live)?)),
             };
@@ -387,7 +394,7 @@ impl Console {
         let value = self.session.parse(value)?;
         let bits = self.session.evaluate(&value)?.bits(ty).map_err(|fault| fault.to_string())?;
         self.session.set(place, bits)?;
-        Ok(format!("{} = {}\n", target.text(), every_way(ty, bits)))
+        Ok(format!("{} = {}\n", target.text(), Shown::every_way(ty, bits)))
     }
 
     fn ulp(&mut self, arguments: &str) -> Result<String, String> {
@@ -421,26 +428,20 @@ impl Console {
 
     fn registers(&self, pattern: &str) -> String {
         let pattern = if pattern.is_empty() { "*" } else { pattern };
-        let program = self.session.program();
-        let all = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
         let mut text = String::new();
-        for port in all.filter(|port| crate::matches(pattern, &port.name)) {
-            let place = program.machine.register_name(port.register).unwrap_or_default();
-            let value = self.session.register(port.register);
-            let value = value.map_or("(never written)".to_owned(), |bits| every_way(port.ty, bits));
-            let _ = writeln!(text, "{:<20} {place:<5} {value}", port.name);
+        for kind in [Kind::Input, Kind::Output, Kind::Register] {
+            for row in panes::named(&self.session, kind).filter(|row| crate::matches(pattern, &row.name)) {
+                let _ = writeln!(text, "{:<20} {:<5} {}", row.name, row.place, row.every_way());
+            }
         }
         text
     }
 
     fn ports(&self) -> String {
-        let program = self.session.program();
         let mut text = String::new();
-        for (kind, ports) in [("in", &program.inputs), ("out", &program.outputs)] {
-            for port in ports {
-                let value = self.session.register(port.register);
-                let value = value.map_or("(never written)".to_owned(), |bits| every_way(port.ty, bits));
-                let _ = writeln!(text, "{kind:<4} {:<16} {value}", port.name);
+        for (word, kind) in [("in", Kind::Input), ("out", Kind::Output)] {
+            for row in panes::named(&self.session, kind) {
+                let _ = writeln!(text, "{word:<4} {:<16} {}", row.name, row.every_way());
             }
         }
         text
@@ -464,7 +465,7 @@ impl Console {
             let labels = program.symbols.iter().filter(|symbol| symbol.space == Space::Data);
             let label = labels.into_iter().find(|symbol| symbol.address as usize == word);
             let label = label.map_or("", |symbol| symbol.name.as_str());
-            let _ = writeln!(text, "{word:>5} {label:<12} {}", every_way(Type::F, *bits));
+            let _ = writeln!(text, "{word:>5} {label:<12} {}", Shown::every_way(Type::F, *bits));
         }
         Ok(text)
     }
@@ -472,36 +473,17 @@ impl Console {
     // ---- The machine.
 
     fn flight(&self) -> String {
-        let program = self.session.program();
         let mut text = String::new();
-        for (retire, left) in self.session.in_flight() {
-            let register = retire.register.map_or(String::new(), |register| program.register_text(register));
+        for Flying { left, register, mnemonic, from } in panes::flight(&self.session) {
             let cycles = if left == 1 { "cycle" } else { "cycles" };
-            let _ = writeln!(
-                text,
-                "{left:>3} {cycles:<6}  {register:<12} {} of {}",
-                retire.op.row().mnemonic,
-                program.bundle_text(retire.address)
-            );
+            let _ = writeln!(text, "{left:>3} {cycles:<6}  {register:<12} {mnemonic} of {from}");
         }
         if text.is_empty() { "nothing is underway\n".to_owned() } else { text }
     }
 
     fn stalls(&self) -> String {
-        let statistics = self.session.emulator().statistics();
-        let program = self.session.program();
-        let mut text = format!("{:>10}  issue\n", statistics.bundles);
-        for (kind, cycles) in Cause::KINDS.iter().zip(statistics.stalls()).filter(|(_, cycles)| *cycles > 0) {
-            let _ = writeln!(text, "{cycles:>10}  {kind}");
-        }
-        let mut causes: Vec<_> =
-            statistics.causes.iter().filter(|((_, cause), _)| *cause != Cause::Wait).collect();
-        causes.sort_by_key(|((address, _), cycles)| (std::cmp::Reverse(**cycles), *address));
-        for ((address, cause), cycles) in causes.into_iter().take(10) {
-            let (at, why) = (program.bundle_text(*address), program.cause_text(*cause));
-            let _ = writeln!(text, "{cycles:>10}  {at}: {why}");
-        }
-        text
+        let rows = panes::stalls(&self.session);
+        rows.iter().map(|(cycles, what)| format!("{cycles:>10}  {what}\n")).collect()
     }
 
     fn list(&mut self, arguments: &str) -> Result<String, String> {
@@ -512,13 +494,12 @@ impl Console {
             (text, _) => text.parse().map_err(|_| format!("`{text}` is no line number"))?,
         };
         let file = here.map_or(0, |location| location.file);
-        let source = self.session.source(file).ok_or("the source is not at hand")?;
+        let lines = panes::lines(&self.session, file, line.saturating_sub(5)..=line.saturating_add(5));
+        let lines = lines.ok_or("the source is not at hand")?;
         let mut text = String::new();
-        for (number, content) in (1u32..).zip(source.lines()) {
-            if number + 5 >= line && number <= line + 5 {
-                let mark = if here.is_some_and(|here| here.line == number) { '>' } else { ' ' };
-                let _ = writeln!(text, "{mark}{number:>5}  {}", content.trim_end());
-            }
+        for line in lines {
+            let mark = if line.next { '>' } else { ' ' };
+            let _ = writeln!(text, "{mark}{:>5}  {}", line.number, line.text);
         }
         Ok(text)
     }
@@ -567,15 +548,5 @@ fn number(value: Value) -> String {
                 format!("{text}  (binary32: {near:?})")
             }
         }
-    }
-}
-
-/// Bits as their type has them, then in the other ways.
-fn every_way(ty: Type, bits: u32) -> String {
-    let shown = Shown::new(ty, bits);
-    match ty {
-        Type::F => format!("{:<14} {}  0x{bits:08x}", shown.text, shown.hex_float),
-        Type::I => format!("{:<14} 0x{bits:08x}", shown.text),
-        Type::B => format!("{:<14} {}  {:?}", shown.text, shown.integer, shown.float),
     }
 }

@@ -1,8 +1,10 @@
 //! What an engineer looks at a running program with: traces, and debug sessions. Plain data in and out; nothing here prints.
 
 pub mod console;
+pub mod panes;
 pub mod session;
 pub mod trace;
+pub mod view;
 
 /// Whether a name matches a pattern, in which `*` stands for any characters.
 fn matches(pattern: &str, name: &str) -> bool {

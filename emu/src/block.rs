@@ -129,6 +129,7 @@ impl Cache {
     pub(crate) fn successor(
         &mut self,
         code: &Code,
+        pauses: &[Address],
         id: u32,
         last: Cycle,
         entry: Address,
@@ -141,7 +142,7 @@ impl Cache {
             return Some(edge.id);
         }
         let recent = self.recent(id).iter().map(|&(address, age)| (address, age.saturating_add(distance)));
-        let next = self.find(code, entry, ages(code, recent))?;
+        let next = self.find(code, pauses, entry, ages(code, recent))?;
         let edges = &mut self.blocks[id as usize].edges;
         if edges.len() < MAX_EDGES {
             edges.push(Edge { target: entry, distance, id: next });
@@ -153,20 +154,25 @@ impl Cache {
     pub(crate) fn after(
         &mut self,
         code: &Code,
+        pauses: &[Address],
         recent: &[(Address, Cycle)],
         entry: Address,
         at: Cycle,
     ) -> Option<u32> {
         let recent = recent.iter().map(|&(address, cycle)| (address, (at - cycle).min(u8::MAX.into()) as u8));
-        self.find(code, entry, ages(code, recent))
+        self.find(code, pauses, entry, ages(code, recent))
     }
 
-    fn find(&mut self, code: &Code, entry: Address, recent: Ages) -> Option<u32> {
+    fn find(&mut self, code: &Code, pauses: &[Address], entry: Address, recent: Ages) -> Option<u32> {
+        // Before these bundles the stepper looks whether they issue.
+        if pauses.binary_search(&entry).is_ok() {
+            return None;
+        }
         let key = (entry, recent);
         if let Some(&id) = self.ids.get(&key) {
             return Some(id);
         }
-        let block = compile(code, entry, &key.1)?;
+        let block = compile(code, pauses, entry, &key.1)?;
         let id = self.blocks.len() as u32;
         self.micros += block.micros.len() + block.bundles as usize;
         self.blocks.push(block);
@@ -189,8 +195,9 @@ struct Placed<'a> {
     decoded: &'a Decoded,
 }
 
-/// The block from `entry` on, entered after the bundles `recent`; `None` if the first bundle cannot execute.
-fn compile(code: &Code, entry: Address, recent: &Ages) -> Option<Block> {
+/// The block from `entry` on, entered after the bundles `recent`, up to one of `pauses`; `None` if the first bundle cannot
+/// execute.
+fn compile(code: &Code, pauses: &[Address], entry: Address, recent: &Ages) -> Option<Block> {
     // Offset 0 is this cycle of the scoreboard's.
     const BASE: Cycle = MAX_LATENCY as Cycle;
     let mut scoreboard = Scoreboard::new(code.machine);
@@ -202,7 +209,11 @@ fn compile(code: &Code, entry: Address, recent: &Ages) -> Option<Block> {
     let mut earliest = BASE;
     let mut address = entry;
     // A loop whose turns are counted is entered at a block's start.
-    let ends = |address, bundles| bundles >= MAX_BUNDLES || (bundles > 0 && code.head(address).is_some());
+    let ends = |address, bundles| {
+        bundles >= MAX_BUNDLES
+            || pauses.binary_search(&address).is_ok()
+            || (bundles > 0 && code.head(address).is_some())
+    };
     while let Some(decoded) = code.legal(address).filter(|_| !ends(address, placed.len())) {
         let issue = scoreboard.issue(&decoded.timing, address, earliest);
         stalls.extend(issue.stalls().iter().map(|&(cause, cycles)| (address, cause, cycles)));

@@ -8,6 +8,7 @@ use crate::fault::{Fault, FaultKind, LoadError};
 use crate::machine::State;
 use crate::statistics::{Statistics, Tally};
 use crate::system::{Period, PeriodReport, Ticks};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use takt_isa::fp::Flags;
 use takt_isa::timing::{self, Address, Cause, Cycle, Issue, Scoreboard};
@@ -85,6 +86,8 @@ pub enum Stop {
     Halted,
     /// The cycle asked for is reached ([`Emulator::run_until`]).
     Reached,
+    /// A bundle of those to pause at issues in the cycle to come ([`Emulator::set_pauses`]).
+    Paused,
 }
 
 /// How the next bundle is going to issue.
@@ -161,6 +164,8 @@ pub struct Emulator {
     pub(crate) journal: Journal,
     pub(crate) cycle_limit: Cycle,
     pub(crate) blocks_enabled: bool,
+    /// Bundles before whose issue runs pause, ascending.
+    pub(crate) pauses: Arc<[Address]>,
 }
 
 /// Where events go.
@@ -176,6 +181,8 @@ pub(crate) fn emit(sink: &mut Sink<'_>, event: impl FnOnce() -> Event) {
 /// When a run ends, apart from halts and faults.
 #[derive(Clone, Copy)]
 pub(crate) struct Goal {
+    /// Where it began: there it does not pause.
+    pub(crate) start: Cycle,
     /// Before this cycle.
     pub(crate) until: Cycle,
     /// Once a `wait` has issued.
@@ -214,13 +221,14 @@ impl Emulator {
             journal: Journal::default(),
             cycle_limit: MAX_CYCLE,
             blocks_enabled: true,
+            pauses: Arc::default(),
             program: Arc::new(program.clone()),
             code: Arc::new(code),
         })
     }
 
     /// Loads the program anew and resets the machine: everything is as [`Emulator::new`] made it, except the settings
-    /// (cycle limit, tick period).
+    /// (cycle limit, tick period, pauses).
     pub fn reset(&mut self) {
         self.state = State::new(&self.program);
         self.status = Status::Running;
@@ -259,6 +267,32 @@ impl Emulator {
         self.blocks_enabled = enabled;
     }
 
+    /// Lets runs pause at these bundles: once a cycle has passed, wherever the cycle to come is the one in which one of them
+    /// issues. ([`Emulator::step_cycle`], [`Emulator::step_bundle`] and [`Emulator::run_period`] go on.)
+    pub fn set_pauses(&mut self, bundles: impl IntoIterator<Item = Address>) {
+        let bundles: BTreeSet<Address> = bundles.into_iter().collect();
+        if !self.pauses.iter().eq(&bundles) {
+            self.pauses = bundles.into_iter().collect();
+            // Blocks end before them.
+            self.drop_blocks();
+        }
+    }
+
+    /// Forgets the blocks, but not what they did.
+    pub(crate) fn drop_blocks(&mut self) {
+        self.list_recent();
+        self.cache.count(&mut self.tally);
+        self.cache = Cache::default();
+    }
+
+    /// Whether the bundle of a pause issues in the cycle to come.
+    fn pauses_here(&mut self) -> bool {
+        let Front { next, delivered, .. } = self.front;
+        self.now >= delivered
+            && self.pauses.binary_search(&next).is_ok()
+            && self.upcoming().is_some_and(|upcoming| upcoming.issue.cycle == self.now)
+    }
+
     // ---- Running.
 
     /// Lets one cycle pass.
@@ -274,7 +308,7 @@ impl Emulator {
     /// # Errors
     /// A fault; asked again, the same one.
     pub fn step_bundle(&mut self) -> Result<Stop, Fault> {
-        self.drive(Goal { until: Cycle::MAX, wait: false, bundle: true }, &mut None)
+        self.drive(Goal { start: self.now, until: Cycle::MAX, wait: false, bundle: true }, &mut None)
     }
 
     /// Runs until `cycle` cycles have passed since reset.
@@ -282,7 +316,7 @@ impl Emulator {
     /// # Errors
     /// A fault; asked again, the same one.
     pub fn run_until(&mut self, cycle: Cycle) -> Result<Stop, Fault> {
-        self.drive(Goal { until: cycle, wait: false, bundle: false }, &mut None)
+        self.drive(Goal { start: self.now, until: cycle, wait: false, bundle: false }, &mut None)
     }
 
     /// Runs until a `wait` has issued.
@@ -290,7 +324,7 @@ impl Emulator {
     /// # Errors
     /// A fault; asked again, the same one.
     pub fn run_to_wait(&mut self) -> Result<Stop, Fault> {
-        self.drive(Goal { until: Cycle::MAX, wait: true, bundle: false }, &mut None)
+        self.drive(Goal { start: self.now, until: Cycle::MAX, wait: true, bundle: false }, &mut None)
     }
 
     /// Runs until the machine halts, or waits and no tick is going to come.
@@ -298,7 +332,7 @@ impl Emulator {
     /// # Errors
     /// A fault; asked again, the same one.
     pub fn run(&mut self) -> Result<Stop, Fault> {
-        self.drive(Goal { until: Cycle::MAX, wait: false, bundle: false }, &mut None)
+        self.drive(Goal { start: self.now, until: Cycle::MAX, wait: false, bundle: false }, &mut None)
     }
 
     /// The machine with an observer: the same ways of running it, and `sink` hears every [`Event`].
@@ -310,6 +344,7 @@ impl Emulator {
         // Up to here only the stepper may go.
         let mut step_until = 0;
         let fast = self.blocks_enabled && sink.is_none() && !goal.bundle;
+        let pauses = !self.pauses.is_empty() && !goal.bundle;
         loop {
             match self.status {
                 Status::Halted { .. } => return Ok(Stop::Halted),
@@ -328,6 +363,9 @@ impl Emulator {
                     }
                 }
                 Status::Running => {
+                    if pauses && self.now > goal.start && self.pauses_here() {
+                        return Ok(Stop::Paused);
+                    }
                     if fast && self.now >= step_until && self.now <= self.front.delivered {
                         match self.run_blocks(goal.until.min(self.cycle_limit), goal.wait) {
                             Fast::Step { until } => step_until = until,
@@ -516,7 +554,7 @@ impl Observed<'_> {
     /// # Errors
     /// As there.
     pub fn step_bundle(&mut self) -> Result<Stop, Fault> {
-        self.drive(Goal { until: Cycle::MAX, wait: false, bundle: true })
+        self.drive(Goal { start: self.emulator.now, until: Cycle::MAX, wait: false, bundle: true })
     }
 
     /// As [`Emulator::run_until`].
@@ -524,7 +562,7 @@ impl Observed<'_> {
     /// # Errors
     /// As there.
     pub fn run_until(&mut self, cycle: Cycle) -> Result<Stop, Fault> {
-        self.drive(Goal { until: cycle, wait: false, bundle: false })
+        self.drive(Goal { start: self.emulator.now, until: cycle, wait: false, bundle: false })
     }
 
     /// As [`Emulator::run_to_wait`].
@@ -532,7 +570,7 @@ impl Observed<'_> {
     /// # Errors
     /// As there.
     pub fn run_to_wait(&mut self) -> Result<Stop, Fault> {
-        self.drive(Goal { until: Cycle::MAX, wait: true, bundle: false })
+        self.drive(Goal { start: self.emulator.now, until: Cycle::MAX, wait: true, bundle: false })
     }
 
     /// As [`Emulator::run`].
@@ -540,7 +578,7 @@ impl Observed<'_> {
     /// # Errors
     /// As there.
     pub fn run(&mut self) -> Result<Stop, Fault> {
-        self.drive(Goal { until: Cycle::MAX, wait: false, bundle: false })
+        self.drive(Goal { start: self.emulator.now, until: Cycle::MAX, wait: false, bundle: false })
     }
 
     /// As [`Emulator::run_period`].

@@ -1,7 +1,7 @@
 //! Running blocks. What is out of the ordinary is left to the stepper: before a block, if that can be seen; else the block
 //! is undone.
 
-use crate::block::{Block, Cache};
+use crate::block::Block;
 use crate::emulator::{Emulator, Recent, Status};
 use crate::event::Retire;
 use crate::machine::{Pending, RegisterSet, State};
@@ -82,14 +82,14 @@ impl Emulator {
     fn chain(&mut self, bound: Cycle, stop_at_wait: bool, journal: &mut Journal) -> Fast {
         loop {
             if self.cache.is_full() {
-                self.list_recent();
-                self.cache.count(&mut self.tally);
-                self.cache = Cache::default();
+                self.drop_blocks();
             }
             let (entry, entered) = (self.front.next, self.front.delivered);
             let id = match &self.recent {
-                Recent::Block { id, cycle } => self.cache.successor(&self.code, *id, *cycle, entry, entered),
-                Recent::List(recent) => self.cache.after(&self.code, recent, entry, entered),
+                Recent::Block { id, cycle } => {
+                    self.cache.successor(&self.code, &self.pauses, *id, *cycle, entry, entered)
+                }
+                Recent::List(recent) => self.cache.after(&self.code, &self.pauses, recent, entry, entered),
             };
             let Some(id) = id else { return Fast::Step { until: entered + 1 } };
             let beyond_bound = self.beyond_bound().is_some();

@@ -345,7 +345,7 @@ impl Emulator {
     }
 
     /// As [`Emulator::run_period`] with the inputs as they are, but no further than until `cycle` cycles have passed since
-    /// reset: then there is no report yet, and the next call goes on with the period.
+    /// reset, or to a pause: then there is no report yet, and the next call goes on with the period.
     ///
     /// # Errors
     /// A fault, or a machine that has halted.
@@ -368,7 +368,7 @@ impl Emulator {
         until: Cycle,
         sink: &mut Sink<'_>,
     ) -> Result<Option<PeriodReport>, PeriodError> {
-        let goal = Goal { until, wait: true, bundle: false };
+        let goal = Goal { start: self.now, until, wait: true, bundle: false };
         self.report = None;
         loop {
             if let Status::Waiting { since, .. } = self.status
@@ -378,7 +378,7 @@ impl Emulator {
             }
             match self.drive(goal, sink)? {
                 Stop::Halted => return Err(PeriodError::Halted),
-                Stop::Reached => return Ok(None),
+                Stop::Reached | Stop::Paused => return Ok(None),
                 // Without a report it was the wait before the first period.
                 _ => {
                     if let Some(mut report) = self.report.take() {

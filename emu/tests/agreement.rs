@@ -71,6 +71,12 @@ fn compare_runs(seed: u64, program: &Program, wild: bool) -> Result<Stop, Fault>
         emulator.set_cycle_limit(limit);
     }
     loop {
+        if random.once_in(10) {
+            let pauses: Vec<u32> = (0..random.below(4)).map(|_| random.below(program.bundles())).collect();
+            for emulator in [&mut fast, &mut step] {
+                emulator.set_pauses(pauses.iter().copied());
+            }
+        }
         if random.once_in(4) {
             let (port, bits) =
                 (program.machine.inputs.base + random.below(INPUTS.into()) as u16, random.word());
@@ -141,6 +147,41 @@ fn wild_programs_agree() {
     ] {
         assert!(kinds.get(kind).is_some_and(|&count| count >= 5), "{kind} is rare: {kinds:?}");
     }
+}
+
+/// A run pauses wherever a bundle that it is to pause at is about to issue, and nowhere else.
+#[test]
+fn pauses_are_complete() {
+    let mut paused = 0;
+    for machine in MACHINES {
+        for seed in 0..PROGRAMS / 10 {
+            let program = random_program(seed, machine, Options::TAME);
+            let mut random = Random::new(seed);
+            let [mut fast, mut step] = pair(&program, &mut random, false);
+            let pauses: Vec<u32> = (0..2).map(|_| random.below(program.bundles())).collect();
+            fast.set_pauses(pauses.iter().copied());
+            for emulator in [&mut fast, &mut step] {
+                emulator.set_tick_period(NonZeroU64::new(500));
+            }
+            while fast.now() < 3000 && fast.run_until(3000) == Ok(Stop::Paused) {
+                paused += 1;
+                while step.now() < fast.now() {
+                    step.step_cycle().unwrap();
+                    let upcoming = step.upcoming().filter(|upcoming| upcoming.issue.cycle == step.now());
+                    let is_pause = upcoming.is_some_and(|upcoming| pauses.contains(&upcoming.address));
+                    assert_eq!(is_pause, step.now() == fast.now(), "seed {seed}, cycle {}", step.now());
+                }
+                assert_same(seed, &mut fast, &mut step);
+            }
+            while step.now() < fast.now() {
+                step.step_cycle().unwrap();
+                let upcoming = step.upcoming().filter(|upcoming| upcoming.issue.cycle == step.now());
+                let is_pause = upcoming.is_some_and(|upcoming| pauses.contains(&upcoming.address));
+                assert!(!is_pause || step.now() == 3000, "seed {seed}, cycle {}", step.now());
+            }
+        }
+    }
+    assert!(paused > 1000, "{paused}");
 }
 
 /// Programs of any words at all: mostly instructions with any fields, in any slot.

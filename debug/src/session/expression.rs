@@ -8,6 +8,7 @@
 //! | `x:int`, `@m12:bits`, `[i]:float` | the same bits as a value of that type |
 //! | `cycle period address depth` | cycles and periods that have passed; the next bundle; entries of the return stack |
 
+use std::collections::BTreeSet;
 use takt_asm::Expression;
 use takt_asm::diag::nearest;
 use takt_asm::expr::{BUILTINS, Value};
@@ -37,6 +38,17 @@ enum Operand {
     Period,
     Address,
     Depth,
+}
+
+/// What of the machine an expression reads.
+#[derive(Default)]
+pub(crate) struct Reads {
+    pub(crate) registers: BTreeSet<u16>,
+    pub(crate) memory: bool,
+    /// What changes in every cycle.
+    pub(crate) clock: bool,
+    /// What can change in every cycle in which something happens.
+    pub(crate) every: bool,
 }
 
 /// An expression with its names resolved.
@@ -111,6 +123,26 @@ impl Live {
     /// The text that it was parsed from.
     pub fn text(&self) -> &str {
         &self.text
+    }
+
+    /// Adds what it reads.
+    pub(crate) fn reads(&self, reads: &mut Reads) {
+        for (_, operand, _) in &self.operands {
+            match operand {
+                Operand::Register(register, _) => {
+                    reads.registers.insert(*register);
+                }
+                Operand::Memory { offset, index, .. } => {
+                    reads.memory = true;
+                    offset.reads(reads);
+                    index.reads(reads);
+                }
+                Operand::Cycle => reads.clock = true,
+                Operand::Address | Operand::Depth => reads.every = true,
+                // Periods end where every search looks.
+                Operand::Constant(_) | Operand::Period => {}
+            }
+        }
     }
 
     /// The registers and data words that it reads, as written.

@@ -12,6 +12,7 @@
 //! the next row when its predecessor's `wait` issues, as `takt run --inputs` does; after the last, the run ends.
 
 mod expression;
+mod interest;
 mod number;
 mod stops;
 
@@ -20,21 +21,26 @@ pub use number::{Shown, UlpDistance, hex_float, ulp_distance};
 pub use stops::{Stop, Test, Where};
 
 use expression::Machine;
+use interest::Interest;
 use std::collections::BTreeSet;
 use std::num::NonZeroU64;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use stops::Watcher;
 use takt_asm::expr::Value;
 use takt_emu::{Emulator, Fault, LoadError, PeriodError, PeriodReport, Retire, Status, Upcoming};
 use takt_isa::program::Location;
 use takt_isa::timing::{Address, Cause, Cycle};
-use takt_isa::{Program, Type, ZERO};
+use takt_isa::{Effect, Program, Type, ZERO};
 
 /// Checkpoints that are kept. At 10⁸ cycles they are at most 2¹⁹ cycles apart.
 pub const CHECKPOINTS: usize = 512;
 /// Cycles between checkpoints at first.
 const INTERVAL: Cycle = 1 << 12;
+/// Cycles that run at once at most: so often is looked for an interrupt.
+const SLICE: Cycle = 1 << 20;
+/// Positions that are searched first, looking back.
+const WINDOW: Cycle = 1 << 6;
 /// Cycles for which a command runs unless told otherwise.
 pub const RUN_LIMIT: Cycle = 1_000_000_000;
 
@@ -52,8 +58,32 @@ pub struct Options {
     pub constants: Vec<(String, Value)>,
     /// Sources, by the names that the program has for them.
     pub sources: Vec<(String, String)>,
-    /// Set from outside to stop a command that runs.
-    pub interrupt: Arc<AtomicBool>,
+    /// What is shared with whoever watches.
+    pub control: Arc<Control>,
+}
+
+/// What a session shares with whoever watches a command that runs, from another thread or a signal handler.
+#[derive(Default, Debug)]
+pub struct Control {
+    interrupt: AtomicBool,
+    cycle: AtomicU64,
+}
+
+impl Control {
+    /// Stops the command that runs.
+    pub fn interrupt(&self) {
+        self.interrupt.store(true, Ordering::Relaxed);
+    }
+
+    /// Forgets an interrupt that no command has heard.
+    pub fn clear(&self) {
+        self.interrupt.store(false, Ordering::Relaxed);
+    }
+
+    /// How far the command has come.
+    pub fn cycle(&self) -> Cycle {
+        self.cycle.load(Ordering::Relaxed)
+    }
 }
 
 /// Why a command stopped.
@@ -386,7 +416,10 @@ impl Session {
 
     /// Runs on towards a cycle: to the end of the period, to the next edit or checkpoint, if they come before.
     fn slice(&mut self, target: Cycle) -> Result<(), End> {
-        if self.options.interrupt.swap(false, Ordering::Relaxed) {
+        let control = &self.options.control;
+        control.cycle.store(self.cycle(), Ordering::Relaxed);
+        if control.interrupt.load(Ordering::Relaxed) {
+            control.clear();
             return Err(Why::Interrupted);
         }
         if self.options.inputs.as_ref().is_some_and(|rows| self.core.periods >= rows.len() as u64) {
@@ -396,7 +429,8 @@ impl Session {
         let last = self.checkpoints.last().map_or(0, |checkpoint| checkpoint.emulator.now());
         // Before the last checkpoint there is none to make.
         let checkpoint = if self.cycle() < last { Cycle::MAX } else { last + self.interval };
-        let result = self.core.emulator.run_period_until(target.min(edit).min(checkpoint));
+        let until = target.min(edit).min(checkpoint).min(self.cycle() + SLICE);
+        let result = self.core.emulator.run_period_until(until);
         self.core.boundary = false;
         match result {
             Ok(None) => {}
@@ -441,31 +475,23 @@ impl Session {
     /// # Returns
     /// [`Why::Done`], or why the run ends before.
     pub fn go_to(&mut self, cycle: Cycle) -> Why {
-        if cycle < self.cycle() {
-            self.restore(cycle);
-        }
+        self.approach(|core| core.emulator.now() <= cycle);
         self.advance(cycle).err().unwrap_or(Why::Done)
     }
 
-    /// Restores the last checkpoint at a cycle or before it.
-    fn restore(&mut self, cycle: Cycle) {
-        let index = self.checkpoints.partition_point(|checkpoint| checkpoint.emulator.now() <= cycle);
-        if let Some(checkpoint) = self.checkpoints.get(index.saturating_sub(1)) {
+    /// Restores the last checkpoint at which `is_before` holds, unless this position is nearer to the end of those.
+    fn approach(&mut self, is_before: impl Fn(&Core) -> bool) {
+        let index = self.checkpoints.partition_point(&is_before);
+        let Some(checkpoint) = self.checkpoints.get(index.saturating_sub(1)) else { return };
+        if checkpoint.emulator.now() > self.cycle() || !is_before(&self.core) {
             self.core = checkpoint.restore();
         }
+        self.make_edits();
     }
 
     /// Goes to where so many periods have ended.
     pub fn go_to_period(&mut self, period: u64) -> Why {
-        if period < self.period() || period == self.period() && !self.core.boundary {
-            let index = self.checkpoints.partition_point(|checkpoint| {
-                checkpoint.periods < period || checkpoint.periods == period && checkpoint.boundary
-            });
-            if let Some(checkpoint) = self.checkpoints.get(index.saturating_sub(1)) {
-                self.core = checkpoint.restore();
-                self.make_edits();
-            }
-        }
+        self.approach(|core| core.periods < period || core.periods == period && core.boundary);
         while self.period() < period {
             if let Err(end) = self.run_period() {
                 return end;
@@ -487,20 +513,31 @@ impl Session {
         Ok(())
     }
 
-    /// Visits the positions after this one, up to `until`, until `visit` finds one.
+    /// Visits the positions after this one that are of interest, up to `until`, until `visit` finds one.
     fn scan(
         &mut self,
         until: Cycle,
+        interest: &Interest,
         visit: &mut dyn FnMut(&Session, Option<Address>) -> Option<Why>,
     ) -> Result<Why, End> {
-        let mut upcoming: Option<Upcoming> = None;
+        self.core.emulator.set_pauses(interest.pauses());
+        let result = self.scan_positions(until, interest, visit);
+        self.core.emulator.set_pauses([]);
+        result
+    }
+
+    fn scan_positions(
+        &mut self,
+        until: Cycle,
+        interest: &Interest,
+        visit: &mut dyn FnMut(&Session, Option<Address>) -> Option<Why>,
+    ) -> Result<Why, End> {
+        self.make_edits();
+        let mut upcoming = self.core.emulator.upcoming();
         while self.cycle() < until {
-            let now = self.cycle();
-            // While the program waits and nothing is on its way, nothing changes.
-            let waits = matches!(self.core.emulator.status(), Status::Waiting { .. });
-            let idle = waits && self.core.emulator.underway().next().is_none();
-            let tick = self.core.emulator.next_tick().filter(|_| idle).unwrap_or(now);
-            self.advance(tick.clamp(now + 1, until))?;
+            let is_now = |upcoming: &Upcoming| upcoming.issue.cycle == self.cycle();
+            let issuing = upcoming.filter(is_now).map(|upcoming| upcoming.address);
+            self.slice(interest.next(&self.core.emulator, issuing, until))?;
             let now = self.cycle();
             if upcoming.is_none_or(|upcoming| upcoming.issue.cycle < now) {
                 upcoming = self.core.emulator.upcoming();
@@ -514,24 +551,35 @@ impl Session {
     }
 
     /// Goes to the next position that `visit` finds.
-    fn forward(&mut self, mut visit: impl FnMut(&Session, Option<Address>) -> Option<Why>) -> Why {
+    fn forward(
+        &mut self,
+        interest: &Interest,
+        mut visit: impl FnMut(&Session, Option<Address>) -> Option<Why>,
+    ) -> Why {
         let until = self.cycle().saturating_add(self.run_limit);
-        self.scan(until, &mut visit).unwrap_or_else(|end| end)
+        self.scan(until, interest, &mut visit).unwrap_or_else(|end| end)
     }
 
-    /// Goes to the last position before this one that `visit` finds; `begin` is told where each stretch begins.
+    /// Goes to the last position before this one that `visit` finds; `begin` is told where each stretch begins. Interrupted,
+    /// it stays here.
     fn backward<V: FnMut(&Session, Option<Address>) -> Option<Why>>(
         &mut self,
+        interest: &Interest,
         begin: impl Fn(&Session) -> V,
     ) -> Why {
         let from = self.cycle();
         // Positions from here on are seen, or not wanted.
-        let mut end = from;
+        let (mut end, mut window) = (from, WINDOW);
         while end >= 2 {
-            // What is found lies behind the beginning of the stretch, so that it is known how things were before.
-            self.restore(end - 2);
-            self.make_edits();
-            let start = self.cycle();
+            // What is found lies behind the beginning of the stretch, so that it is known how things were before. What is
+            // looked for may be near, and else a stretch begins at a checkpoint.
+            let near = (end - 1).saturating_sub(window);
+            let index = self.checkpoints.partition_point(|checkpoint| checkpoint.emulator.now() <= end - 2);
+            let checkpoint =
+                self.checkpoints[..index].last().map_or(0, |checkpoint| checkpoint.emulator.now());
+            let start = near.max(checkpoint);
+            window *= 8;
+            let mut found = self.go_to(start);
             let (mut visit, mut last) = (begin(self), None);
             let mut all = |session: &Session, issuing| {
                 if let Some(why) = visit(session, issuing) {
@@ -539,8 +587,12 @@ impl Session {
                 }
                 None
             };
-            if let Err(Why::Interrupted) = self.scan(end - 1, &mut all) {
-                return Why::Interrupted;
+            if found == Why::Done {
+                found = self.scan(end - 1, interest, &mut all).unwrap_or_else(|end| end);
+            }
+            if found == Why::Interrupted {
+                self.go_to(from);
+                return found;
             }
             if let Some((cycle, why)) = last {
                 self.go_to(cycle);
@@ -562,8 +614,24 @@ impl Session {
             Unit::Period => return self.run_period().err().unwrap_or(Why::Done),
             _ => {}
         }
-        let depth = self.core.emulator.stack().len();
-        self.forward(move |session, issuing| session.ends_step(unit, depth, issuing))
+        let stack = self.core.emulator.stack();
+        let (depth, caller) = (stack.len(), stack.last().copied());
+        let next = self.core.emulator.next_address();
+        let interest = match unit {
+            // Nowhere else does it end that it is over.
+            Unit::Call if self.calls(next) => Interest::bundles([next, next + 1]),
+            Unit::Out => Interest::bundles(caller),
+            _ => Interest::everything(),
+        };
+        self.forward(&interest, move |session, issuing| session.ends_step(unit, depth, issuing))
+    }
+
+    /// Whether a bundle calls a subroutine.
+    fn calls(&self, address: Address) -> bool {
+        let bundle = self.program().bundle(address).and_then(Result::ok);
+        bundle.is_some_and(|bundle| {
+            bundle.iter().any(|instruction| instruction.op.row().effect == Effect::Call)
+        })
     }
 
     /// Steps back.
@@ -580,7 +648,10 @@ impl Session {
             _ => {}
         }
         let depth = self.core.emulator.stack().len();
-        self.backward(|_| move |session: &Session, issuing| session.ends_step(unit, depth, issuing))
+        let interest = Interest::everything();
+        self.backward(&interest, |_| {
+            move |session: &Session, issuing| session.ends_step(unit, depth, issuing)
+        })
     }
 
     /// Whether a step by `unit` that began `depth` calls deep ends here, where `issuing` is about to issue.
@@ -603,12 +674,14 @@ impl Session {
     /// Runs on to the next breakpoint or watchpoint.
     pub fn resume(&mut self) -> Why {
         let mut watcher = Watcher::new(self);
-        self.forward(move |session, issuing| watcher.visit(session, issuing))
+        let interest = Interest::stops(&self.stops, self.program());
+        self.forward(&interest, move |session, issuing| watcher.visit(session, issuing))
     }
 
     /// Runs back to the last breakpoint or watchpoint.
     pub fn resume_back(&mut self) -> Why {
-        self.backward(|session| {
+        let interest = Interest::stops(&self.stops, self.program());
+        self.backward(&interest, |session| {
             let mut watcher = Watcher::new(session);
             move |session: &Session, issuing| watcher.visit(session, issuing)
         })
@@ -616,7 +689,8 @@ impl Session {
 
     /// Runs on until an expression holds (is not zero). Where it has no value it does not.
     pub fn run_until(&mut self, live: &Live) -> Why {
-        self.forward(|session, _| session.holds(live).then_some(Why::Holds))
+        let interest = Interest::value(live, self.program());
+        self.forward(&interest, |session, _| session.holds(live).then_some(Why::Holds))
     }
 
     /// Whether an expression has a value other than zero.

@@ -28,6 +28,16 @@ impl Shown {
         };
         Shown { text, hex_float: hex_float(float), float, integer, bits }
     }
+
+    /// Bits as their type has them, then in the other ways.
+    pub fn every_way(ty: Type, bits: u32) -> String {
+        let shown = Shown::new(ty, bits);
+        match ty {
+            Type::F => format!("{:<14} {}  0x{bits:08x}", shown.text, shown.hex_float),
+            Type::I => format!("{:<14} 0x{bits:08x}", shown.text),
+            Type::B => format!("{:<14} {}  {:?}", shown.text, shown.integer, shown.float),
+        }
+    }
 }
 
 /// A binary32 value in hexadecimal, exactly: `0x1.99999ap-4`.

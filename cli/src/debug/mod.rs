@@ -1,5 +1,9 @@
 //! `takt debug`: a session at a prompt, from a script, or full-screen.
 
+mod history;
+mod prompt;
+mod screen;
+
 use crate::controller::OnEmulator;
 use crate::files::{self, Given, Out};
 use crate::load::{Load, Loaded};
@@ -11,22 +15,15 @@ use crate::select::{self, OptionalMachine};
 use crate::track::{self, period_cycles};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
-use rustyline::completion::Completer;
-use rustyline::error::ReadlineError;
-use rustyline::highlight::Highlighter;
-use rustyline::hint::Hinter;
-use rustyline::history::MemHistory;
-use rustyline::validate::Validator;
-use rustyline::{Config, Editor, Helper};
-use std::cell::RefCell;
+use indicatif::HumanCount;
 use std::io::{BufRead, BufReader, IsTerminal, Write};
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use takt_debug::console::{Console, complete, first_mistake};
-use takt_debug::session::{Options, Rows, Session, Unit, Why};
+use std::sync::{Arc, mpsc};
+use std::thread;
+use std::time::Duration;
+use takt_debug::console::{Console, first_mistake};
+use takt_debug::session::{Control, Options, Rows, Session, Unit, Why};
 use takt_emu::Emulator;
 use takt_programs::hybrid::closed_loop::ClosedLoop;
 
@@ -49,8 +46,11 @@ pub(crate) struct Debug {
     #[arg(long, value_name = "CYCLES", value_parser = tick, allow_negative_numbers = true, conflicts_with = "track")]
     tick: Option<NonZeroU64>,
     /// Commands from a file; `-` is standard input.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "tui")]
     script: Option<PathBuf>,
+    /// Full-screen: source, bundle, registers, operations in flight, stalls, ports, watches, and the same commands.
+    #[arg(long)]
+    tui: bool,
     /// Run the program as the hybrid robot's controller along the tool path first, and begin in the period in which the
     /// tracking error is largest.
     #[arg(long)]
@@ -66,6 +66,7 @@ pub(crate) struct Debug {
 const EXAMPLES: &str = "\
 Examples:
   takt debug prog.s                          at a prompt
+  takt debug prog.s --tui                    full-screen; `?` shows keys and commands
   takt debug prog.s --inputs in.csv          with recorded inputs
   takt debug prog.s --script checks.txt      commands from a file: a test
   takt debug --track                         the robot's controller, where the tracking error is largest";
@@ -74,6 +75,8 @@ Examples:
 const ROWS: usize = 1 << 20;
 /// Bytes of a script.
 const SCRIPT_LIMIT: usize = 16 << 20;
+/// How often a command that runs is looked after.
+const WATCH: Duration = Duration::from_millis(50);
 
 pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
     let mut reads: Vec<Given<'_>> = Vec::new();
@@ -90,29 +93,35 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
     // A mistake in a script is found before the program runs.
     let script = arguments.script.as_deref().map(script).transpose()?;
 
-    let interrupt = Arc::new(AtomicBool::new(false));
+    if arguments.tui && !(std::io::stdin().is_terminal() && std::io::stdout().is_terminal()) {
+        let text = "--tui wants a terminal as standard input and output; without one, commands come from --script or standard input";
+        return Err(Failure::Usage(text.to_owned()).into());
+    }
+
+    let control = Arc::new(Control::default());
     let load = Load::new(arguments.machine.machine, color);
     let session = if arguments.track {
         let path = arguments.file.as_deref().unwrap_or(Path::new("tracking"));
         let (name, loaded) = track::program(path, load)?;
-        along_path(arguments, &name, loaded, &interrupt, out)?
+        along_path(arguments, &name, loaded, &control, out)?
     } else {
         let path = arguments.file.as_deref().context("no file")?;
         let loaded = load.with_source(path)?;
         let inputs = arguments.inputs.as_deref().map(|path| rows(path, &loaded)).transpose()?;
         let Loaded { program, constants, sources } = loaded;
         let tick = arguments.tick;
-        Session::new(
-            &program,
-            Options { inputs, tick, constants, sources, interrupt: Arc::clone(&interrupt) },
-        )?
+        Session::new(&program, Options { inputs, tick, constants, sources, control: Arc::clone(&control) })?
     };
     let mut console = Console::new(session);
+    if arguments.tui {
+        out.flush()?;
+        return screen::run(&mut console, &control);
+    }
     let place = console.place();
     out.write_all(place.as_bytes())?;
     match script {
         Some((name, text)) => batch(&mut console, &name, &mut text.as_bytes(), color, out)?,
-        None if std::io::stdin().is_terminal() => prompt(console, &interrupt, color, out)?,
+        None if std::io::stdin().is_terminal() => prompt::run(console, &control, color, out)?,
         None => batch(&mut console, "standard input", &mut BufReader::new(std::io::stdin()), color, out)?,
     }
     Ok(())
@@ -150,7 +159,7 @@ fn along_path(
     arguments: &Debug,
     name: &str,
     loaded: Loaded,
-    interrupt: &Arc<AtomicBool>,
+    control: &Arc<Control>,
     out: &mut Out,
 ) -> Result<Session> {
     let Loaded { program, constants, sources } = loaded;
@@ -179,10 +188,8 @@ fn along_path(
     }
     progress.finish_and_clear();
     let inputs = Some(Arc::new(rows));
-    let mut session = Session::new(
-        &program,
-        Options { inputs, tick, constants, sources, interrupt: Arc::clone(interrupt) },
-    )?;
+    let mut session =
+        Session::new(&program, Options { inputs, tick, constants, sources, control: Arc::clone(control) })?;
     let (period, error, cutting) = worst;
     let doing = if cutting { "cutting" } else { "not cutting" };
     writeln!(
@@ -231,53 +238,28 @@ fn batch(
     if failed { Err(Failure::Reported.into()) } else { Ok(()) }
 }
 
-/// Completion over the session of the prompt.
-struct Prompt(Rc<RefCell<Console>>);
-
-impl Helper for Prompt {}
-impl Highlighter for Prompt {}
-impl Validator for Prompt {}
-impl Hinter for Prompt {
-    type Hint = String;
+/// Executes a line in a thread of its own; `meanwhile` is called every so often until there is an answer.
+fn execute(
+    console: &mut Console,
+    line: &str,
+    control: &Control,
+    mut meanwhile: impl FnMut() -> Result<()>,
+) -> Result<Result<String, String>> {
+    control.clear();
+    thread::scope(|scope| {
+        let (sender, answer) = mpsc::channel();
+        scope.spawn(move || sender.send(console.execute(line)));
+        loop {
+            match answer.recv_timeout(WATCH) {
+                Ok(answer) => return Ok(answer),
+                Err(mpsc::RecvTimeoutError::Timeout) => meanwhile().inspect_err(|_| control.interrupt())?,
+                Err(mpsc::RecvTimeoutError::Disconnected) => bail!("`{line}` ended without an answer"),
+            }
+        }
+    })
 }
 
-impl Completer for Prompt {
-    type Candidate = String;
-
-    fn complete(
-        &self,
-        line: &str,
-        at: usize,
-        _: &rustyline::Context<'_>,
-    ) -> rustyline::Result<(usize, Vec<String>)> {
-        Ok(complete(&self.0.borrow().session, &line[..at]))
-    }
-}
-
-fn prompt(console: Console, interrupt: &Arc<AtomicBool>, color: bool, out: &mut Out) -> Result<()> {
-    let flag = Arc::clone(interrupt);
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot catch Ctrl-C")?;
-    let console = Rc::new(RefCell::new(console));
-    let config = Config::builder().auto_add_history(true).build();
-    let mut editor: Editor<Prompt, MemHistory> =
-        Editor::with_history(config, MemHistory::new()).context("cannot use the terminal")?;
-    editor.set_helper(Some(Prompt(Rc::clone(&console))));
-    loop {
-        out.flush()?;
-        let line = match editor.readline("(takt) ") {
-            Ok(line) => line,
-            Err(ReadlineError::Interrupted) => continue,
-            Err(ReadlineError::Eof) => return Ok(()),
-            Err(error) => return Err(error).context("cannot read the terminal"),
-        };
-        interrupt.store(false, Ordering::Relaxed);
-        let mut console = console.borrow_mut();
-        match console.execute(&line) {
-            Ok(text) => out.write_all(text.as_bytes())?,
-            Err(error) => output::error(&error, color),
-        }
-        if console.quit {
-            return Ok(());
-        }
-    }
+/// What to say of a command that runs.
+fn running(control: &Control) -> String {
+    format!("in cycle {}; Ctrl-C stops", HumanCount(control.cycle()))
 }

@@ -1,0 +1,87 @@
+//! The prompt of `takt debug`.
+
+use super::history::{self, Past};
+use super::{execute, running};
+use crate::files::Out;
+use crate::output;
+use anyhow::{Context, Result};
+use rustyline::completion::Completer;
+use rustyline::error::ReadlineError;
+use rustyline::highlight::Highlighter;
+use rustyline::hint::Hinter;
+use rustyline::history::FileHistory;
+use rustyline::validate::Validator;
+use rustyline::{Editor, Helper};
+use std::cell::RefCell;
+use std::io::{IsTerminal, Write};
+use std::rc::Rc;
+use std::sync::Arc;
+use takt_debug::console::{Console, complete};
+use takt_debug::session::Control;
+
+/// Clears a terminal's line from here on.
+const CLEAR: &str = "\x1b[K";
+
+/// Completion over the session of the prompt.
+struct Prompt(Rc<RefCell<Console>>);
+
+impl Helper for Prompt {}
+impl Highlighter for Prompt {}
+impl Validator for Prompt {}
+impl Hinter for Prompt {
+    type Hint = String;
+}
+
+impl Completer for Prompt {
+    type Candidate = String;
+
+    fn complete(
+        &self,
+        line: &str,
+        at: usize,
+        _: &rustyline::Context<'_>,
+    ) -> rustyline::Result<(usize, Vec<String>)> {
+        Ok(complete(&self.0.borrow().session, &line[..at]))
+    }
+}
+
+/// Reads and executes commands until there are no more.
+pub(super) fn run(console: Console, control: &Arc<Control>, color: bool, out: &mut Out) -> Result<()> {
+    let heard = Arc::clone(control);
+    ctrlc::set_handler(move || heard.interrupt()).context("cannot catch Ctrl-C")?;
+    let console = Rc::new(RefCell::new(console));
+    let Past { history, file } = Past::load();
+    let mut editor: Editor<Prompt, FileHistory> =
+        Editor::with_history(history::config(), history).context("cannot use the terminal")?;
+    editor.set_helper(Some(Prompt(Rc::clone(&console))));
+    loop {
+        out.flush()?;
+        let line = match editor.readline("(takt) ") {
+            Ok(line) => line,
+            Err(ReadlineError::Interrupted) => continue,
+            Err(ReadlineError::Eof) => return Ok(()),
+            Err(error) => return Err(error).context("cannot read the terminal"),
+        };
+        history::append(editor.history_mut(), file.as_deref());
+        let mut console = console.borrow_mut();
+        let mut shown = false;
+        let answer = execute(&mut console, &line, control, || {
+            shown = std::io::stderr().is_terminal();
+            if shown {
+                // A bar would fill the line, and the terminal's `^C` break it.
+                write!(std::io::stderr(), "\r{}{CLEAR}", running(control))?;
+            }
+            Ok(())
+        });
+        if shown {
+            write!(std::io::stderr(), "\r{CLEAR}")?;
+        }
+        match answer? {
+            Ok(text) => out.write_all(text.as_bytes())?,
+            Err(error) => output::error(&error, color),
+        }
+        if console.quit {
+            return Ok(());
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! The full-screen front of `takt debug`: keys in, commands out. What is drawn is `takt_debug::view`'s affair.
+
+use super::history::Past;
+use super::{execute, running};
+use anyhow::{Context, Result};
+use ratatui::DefaultTerminal;
+use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use ratatui::layout::Rect;
+use std::time::Duration;
+use takt_debug::console::{Console, KEYS, complete};
+use takt_debug::session::Control;
+use takt_debug::view::{self, Screen};
+use tui_input::Input;
+use tui_input::backend::crossterm::EventHandler;
+
+/// Lines that Page Up and Page Down scroll by.
+const PAGE: isize = 10;
+
+/// The terminal, given back as it was however this ends. (At a panic ratatui's own hook does it, before the message.)
+struct Terminal(DefaultTerminal);
+
+impl Terminal {
+    /// Clears it and forgets what is on it: what it made of the old picture nobody knows. (ratatui's own `clear` asks the
+    /// terminal where the cursor is, which not every one answers.)
+    fn renew(&mut self) -> Result<()> {
+        let size = self.0.size()?;
+        self.0.resize(Rect::new(0, 0, size.width, size.height))?;
+        Ok(())
+    }
+}
+
+impl Drop for Terminal {
+    fn drop(&mut self) {
+        ratatui::restore();
+    }
+}
+
+/// A command that is being typed.
+#[derive(Default)]
+struct Typing {
+    input: Input,
+    /// How far back in the history, from 1; 0 is what was not there yet.
+    back: usize,
+}
+
+struct Front<'c> {
+    console: &'c mut Console,
+    control: &'c Control,
+    terminal: Terminal,
+    screen: Screen,
+    typing: Option<Typing>,
+    past: Past,
+}
+
+/// Shows the session and executes commands until it is left.
+pub(super) fn run(console: &mut Console, control: &Control) -> Result<()> {
+    let screen = Screen::new(console.panes());
+    let terminal = Terminal(ratatui::try_init().context("cannot use the terminal")?);
+    let mut front = Front { console, control, terminal, screen, typing: None, past: Past::load() };
+    while !front.console.quit {
+        front.draw()?;
+        match event::read().context("cannot read the terminal")? {
+            Event::Key(key) if key.kind != KeyEventKind::Release => front.key(key)?,
+            Event::Resize(..) => front.terminal.renew()?,
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn is_control(key: KeyEvent, letter: char) -> bool {
+    key.modifiers.contains(KeyModifiers::CONTROL) && key.code == KeyCode::Char(letter)
+}
+
+impl Front<'_> {
+    fn draw(&mut self) -> Result<()> {
+        let typed = self.typing.as_ref();
+        self.screen.typed = typed.map(|Typing { input, .. }| (input.value().to_owned(), input.cursor()));
+        self.terminal
+            .0
+            .draw(|frame| view::draw(frame, &mut self.screen))
+            .context("cannot write to the terminal")?;
+        Ok(())
+    }
+
+    fn key(&mut self, key: KeyEvent) -> Result<()> {
+        if is_control(key, 'd') {
+            self.console.quit = true;
+        } else if is_control(key, 'l') {
+            self.terminal.renew()?;
+        } else if is_control(key, 'c') {
+            self.typing = None;
+        } else if self.screen.help.is_some() {
+            self.help_key(key);
+        } else if self.typing.is_some() {
+            self.typing_key(key)?;
+        } else {
+            self.command_key(key)?;
+        }
+        Ok(())
+    }
+
+    /// Whether the key scrolls; then it has.
+    fn scrolls(&mut self, key: KeyEvent) -> bool {
+        let lines = match key.code {
+            KeyCode::Up => -1,
+            KeyCode::Down => 1,
+            KeyCode::PageUp => -PAGE,
+            KeyCode::PageDown => PAGE,
+            _ => return false,
+        };
+        self.screen.scroll(lines);
+        true
+    }
+
+    fn help_key(&mut self, key: KeyEvent) {
+        if !self.scrolls(key) {
+            self.screen.help = None;
+        }
+    }
+
+    fn command_key(&mut self, key: KeyEvent) -> Result<()> {
+        if self.scrolls(key) {
+            return Ok(());
+        }
+        match key.code {
+            KeyCode::Char(':') => self.typing = Some(Typing::default()),
+            KeyCode::Char('?') => self.screen.help = Some(0),
+            KeyCode::Tab => self.screen.turn(1),
+            KeyCode::BackTab => self.screen.turn(-1),
+            KeyCode::Enter => self.execute("")?,
+            KeyCode::Char(letter) => match KEYS.iter().find(|(key, _)| *key == letter) {
+                Some((_, line)) if line.ends_with(' ') => {
+                    self.typing = Some(Typing { input: Input::from(*line), back: 0 });
+                }
+                Some((_, line)) => self.execute(line)?,
+                None => {}
+            },
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn typing_key(&mut self, key: KeyEvent) -> Result<()> {
+        let Some(typing) = &mut self.typing else { return Ok(()) };
+        let step = match key.code {
+            KeyCode::Enter => {
+                let line =
+                    self.typing.take().map(|typing| typing.input.value().to_owned()).unwrap_or_default();
+                self.past.add(&line);
+                return self.execute(&line);
+            }
+            KeyCode::Esc => {
+                self.typing = None;
+                return Ok(());
+            }
+            KeyCode::Tab => {
+                self.complete();
+                return Ok(());
+            }
+            KeyCode::Up => typing.back + 1,
+            KeyCode::Down => typing.back.saturating_sub(1),
+            _ => {
+                typing.input.handle_event(&Event::Key(key));
+                return Ok(());
+            }
+        };
+        let line = if step == 0 { Some(String::new()) } else { self.past.back(step) };
+        if let Some(line) = line {
+            *typing = Typing { input: Input::from(line), back: step };
+        }
+        Ok(())
+    }
+
+    /// Completes the word before the cursor as far as it is certain, and says what it may be.
+    fn complete(&mut self) {
+        let Some(Typing { input, .. }) = &mut self.typing else { return };
+        let before: String = input.value().chars().take(input.cursor()).collect();
+        let after: String = input.value().chars().skip(input.cursor()).collect();
+        let (start, found) = complete(&self.console.session, &before);
+        let Some(first) = found.first() else { return };
+        let common = found.iter().fold(first.len(), |common, name| {
+            first.bytes().zip(name.bytes()).take(common).take_while(|(a, b)| a == b).count()
+        });
+        let certain = format!("{}{}", &before[..start], &first[..common]);
+        let cursor = certain.chars().count();
+        *input = Input::from(certain + &after).with_cursor(cursor);
+        if found.len() > 1 {
+            let panes = self.console.panes();
+            self.screen.said(&before, &Ok(found.join("  ")), panes);
+        }
+    }
+
+    /// Executes a line, with the terminal alive meanwhile.
+    fn execute(&mut self, line: &str) -> Result<()> {
+        let Front { console, control, terminal, screen, .. } = self;
+        screen.typed = None;
+        let answer = execute(console, line, control, || {
+            while event::poll(Duration::ZERO)? {
+                match event::read()? {
+                    Event::Key(key) if is_control(key, 'c') || key.code == KeyCode::Esc => {
+                        control.interrupt()
+                    }
+                    Event::Resize(..) => terminal.renew()?,
+                    _ => {}
+                }
+            }
+            screen.running = Some(running(control));
+            terminal.0.draw(|frame| view::draw(frame, screen))?;
+            Ok(())
+        });
+        screen.running = None;
+        let panes = console.panes();
+        screen.said(line, &answer?, panes);
+        Ok(())
+    }
+}

@@ -1,0 +1,259 @@
+//! `takt debug` on a terminal: a pseudo-terminal on one side, a terminal's screen on the other.
+
+mod common;
+
+use common::Folder;
+use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
+use std::io::{Read, Write};
+use std::num::NonZeroU16;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+const SOURCE: &str = "\
+.output sum, count:int
+.reg    i:int n:int x
+        li      n, 3
+        mov     i, zero
+        fadd    sum, zero, zero
+next:   call    add
+        iadd    i, i, 1
+        ilt     x, i, n
+        bnz     x, next
+        mov     count, i
+        halt
+add:    ld      x, table[i]
+        fadd    sum, sum, x
+        ret
+.data
+table:  .float  0.5, 0.25, -1.75
+";
+
+/// Runs for as long as anybody lets it.
+const ENDLESS: &str = ".output n:int\n        mov n, zero\nloop:   iadd n, n, 1\n        jmp loop\n";
+
+/// How long anything may take to show.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// `takt` on a terminal.
+struct Terminal {
+    master: Box<dyn MasterPty + Send>,
+    keys: Box<dyn Write + Send>,
+    child: Box<dyn Child + Send + Sync>,
+    output: Receiver<Vec<u8>>,
+    parser: vt100::Parser,
+}
+
+impl Terminal {
+    /// A shell's line on a terminal of this size, in a folder, with state in that folder.
+    fn new(folder: &Folder, line: &str, rows: u16, cols: u16) -> Terminal {
+        let size = PtySize { rows, cols, ..PtySize::default() };
+        let pair = native_pty_system().openpty(size).unwrap();
+        let mut command = CommandBuilder::new("/bin/sh");
+        command.args(["-c", &line.replace("takt ", concat!(env!("CARGO_BIN_EXE_takt"), " "))]);
+        command.cwd(folder.path());
+        command.env("TERM", "xterm-256color");
+        command.env("XDG_STATE_HOME", folder.path().join("state"));
+        command.env_remove("NO_COLOR");
+        let child = pair.slave.spawn_command(command).unwrap();
+        let mut reader = pair.master.try_clone_reader().unwrap();
+        let (sender, output) = channel();
+        std::thread::spawn(move || {
+            let mut bytes = [0; 4096];
+            while let Ok(count @ 1..) = reader.read(&mut bytes) {
+                if sender.send(bytes[..count].to_vec()).is_err() {
+                    return;
+                }
+            }
+        });
+        let [height, width] = [rows, cols].map(|size| NonZeroU16::new(size).unwrap());
+        let parser = vt100::Parser::new(height, width, 0);
+        Terminal { keys: pair.master.take_writer().unwrap(), master: pair.master, child, output, parser }
+    }
+
+    fn text(&self) -> String {
+        self.parser.screen().contents()
+    }
+
+    fn press(&mut self, keys: &str) {
+        self.keys.write_all(keys.as_bytes()).unwrap();
+        self.keys.flush().unwrap();
+    }
+
+    /// Waits until the screen is as wanted.
+    #[track_caller]
+    fn until(&mut self, what: &str, is: impl Fn(&vt100::Screen) -> bool) {
+        let end = Instant::now() + PATIENCE;
+        while !is(self.parser.screen()) {
+            match self.output.recv_timeout(end.saturating_duration_since(Instant::now())) {
+                Ok(bytes) => {
+                    self.parser.process(&bytes);
+                    // A terminal answers when it is asked where its cursor is.
+                    if bytes.windows(4).any(|window| window == b"\x1b[6n") {
+                        self.press("\x1b[1;1R");
+                    }
+                }
+                Err(_) => panic!("no {what}:\n{}", self.text()),
+            }
+        }
+    }
+
+    /// Waits until a text is on the screen.
+    #[track_caller]
+    fn shows(&mut self, text: &str) {
+        self.until(text, |screen| screen.contents().contains(text));
+    }
+
+    /// Waits for the prompt, then types a line.
+    #[track_caller]
+    fn line(&mut self, line: &str) {
+        self.until("prompt", |screen| screen.contents().trim_end().ends_with("(takt)"));
+        self.press(line);
+    }
+
+    /// Waits for the end, which must be a success.
+    #[track_caller]
+    fn ends(&mut self) {
+        let end = Instant::now() + PATIENCE;
+        loop {
+            while let Ok(bytes) = self.output.recv_timeout(Duration::from_millis(10)) {
+                self.parser.process(&bytes);
+            }
+            if let Some(status) = self.child.try_wait().unwrap() {
+                assert!(status.success(), "{status}:\n{}", self.text());
+                return;
+            }
+            if Instant::now() > end {
+                let _ = self.child.kill();
+                panic!("it does not end:\n{}", self.text());
+            }
+        }
+    }
+
+    /// Changes the size, and waits for something to be drawn.
+    fn resize(&mut self, rows: u16, cols: u16) {
+        self.master.resize(PtySize { rows, cols, ..PtySize::default() }).unwrap();
+        let [height, width] = [rows, cols].map(|size| NonZeroU16::new(size).unwrap());
+        self.parser.set_size(height, width);
+        let bytes = self.output.recv_timeout(PATIENCE).unwrap();
+        self.parser.process(&bytes);
+    }
+}
+
+#[test]
+fn full_screen() {
+    let folder = Folder::new();
+    folder.write("sum.s", SOURCE);
+    let line = "takt debug sum.s --tui; echo status $?; stty -a";
+    let mut terminal = Terminal::new(&folder, line, 24, 80);
+    terminal.until("the alternate screen", vt100::Screen::alternate_screen);
+    terminal.shows("cycle 0, period 0");
+    terminal.press("s");
+    terminal.shows("(takt) step");
+    // A command line, completed: history and completion are the prompt's.
+    terminal.press(":break ad\t if i == 1\r");
+    terminal.shows("stop 1 at bundle");
+    terminal.press("c");
+    terminal.shows("stop 1: break add if i == 1");
+    terminal.press(":display su\t\r");
+    terminal.shows("sum = 0.5");
+    terminal.press(":\x1b[A\x1b[A\r");
+    terminal.shows("stop 2 at bundle");
+    terminal.press(":prnt\r");
+    terminal.shows("no command `prnt`");
+    terminal.press("?");
+    terminal.shows("Run on to a breakpoint");
+    terminal.press("\x1b");
+    terminal.until("the help gone", |screen| !screen.contents().contains("Run on to"));
+    for (rows, cols) in [(1, 1), (5, 20), (40, 120), (2, 200), (24, 80)] {
+        terminal.resize(rows, cols);
+    }
+    terminal.shows("in flight");
+    terminal.shows("cycle 41, period 0");
+    terminal.press("q");
+    terminal.ends();
+    // The screen, the cursor, and the terminal's way with keys are as they were.
+    let screen = terminal.parser.screen();
+    assert!(!screen.alternate_screen() && !screen.hide_cursor());
+    let text = terminal.text();
+    assert!(text.contains("status 0\n"), "{text}");
+    assert!(text.contains("isig icanon iexten echo "), "{text}");
+}
+
+#[test]
+fn a_long_run_is_interrupted_full_screen() {
+    let folder = Folder::new();
+    folder.write("endless.s", ENDLESS);
+    let mut terminal = Terminal::new(&folder, "echo before; takt debug endless.s --tui; echo after", 24, 80);
+    terminal.shows("cycle 0, period 0");
+    terminal.press(":until n < 0\r");
+    terminal.shows("Ctrl-C stops");
+    terminal.press("\x03");
+    terminal.shows("interrupted");
+    terminal.press(":echo alive\r");
+    terminal.shows("\nalive");
+    terminal.press("\x04");
+    terminal.ends();
+    assert_eq!(terminal.text(), "before\nafter");
+}
+
+#[test]
+fn full_screen_wants_a_terminal() {
+    let folder = Folder::new();
+    folder.write("sum.s", SOURCE);
+    let done = folder.line("debug sum.s --tui");
+    assert_eq!((done.status, done.stdout.as_str()), (Some(2), ""));
+    assert!(done.stderr.contains("--tui wants a terminal"), "{}", done.stderr);
+    let mut terminal = Terminal::new(&folder, "takt debug sum.s --tui | cat", 24, 80);
+    terminal.shows("--tui wants a terminal");
+    terminal.ends();
+}
+
+#[test]
+fn the_prompt() {
+    let folder = Folder::new();
+    folder.write("sum.s", SOURCE);
+    let mut terminal = Terminal::new(&folder, "takt debug sum.s", 40, 100);
+    // Commands, labels and registers complete.
+    terminal.line("disp\t cou\t\r");
+    terminal.shows("count = (never written)");
+    terminal.line("break ad\t if i == 1\r");
+    terminal.shows("stop 1 at bundle");
+    terminal.line("continue\r");
+    terminal.shows("stop 1: break add if i == 1");
+    terminal.line("print sum +\r");
+    terminal.shows("^");
+    terminal.line("echo al");
+    terminal.shows("(takt) echo al");
+    terminal.press("\x03");
+    terminal.until("another prompt", |screen| screen.contents().contains("(takt) echo al\n(takt)"));
+    terminal.line("echo still here\r");
+    terminal.shows("\nstill here");
+    terminal.line("\x04");
+    terminal.ends();
+
+    // The next session has the commands of this one.
+    let mut terminal = Terminal::new(&folder, "takt debug sum.s", 40, 100);
+    terminal.line("\x1b[A\r");
+    terminal.shows("\nstill here");
+    terminal.line("\x1b[A\x1b[A\x1b[A\x1b[A\r");
+    terminal.shows("stop 1 at bundle");
+    terminal.line("quit\r");
+    terminal.ends();
+    let history = folder.read_text("state/takt/history");
+    assert!(history.contains("echo still here\n") && history.ends_with("quit\n"), "{history}");
+}
+
+#[test]
+fn a_long_run_is_interrupted() {
+    let folder = Folder::new();
+    folder.write("endless.s", ENDLESS);
+    let mut terminal = Terminal::new(&folder, "exec takt debug endless.s", 24, 100);
+    terminal.line("until n < 0\r");
+    terminal.shows("Ctrl-C stops");
+    terminal.press("\x03");
+    terminal.shows("interrupted");
+    terminal.line("echo alive\r");
+    terminal.shows("\nalive");
+    terminal.line("\x04");
+    terminal.ends();
+}

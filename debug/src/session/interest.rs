@@ -1,0 +1,107 @@
+//! What a search through a run must look at: between the positions that matter nothing changes that it asks for, and the
+//! machine runs at full speed.
+
+use super::Live;
+use super::expression::Reads;
+use super::stops::{Stop, Test, Where};
+use std::collections::BTreeSet;
+use takt_emu::{Emulator, Status};
+use takt_isa::timing::{Address, Cycle};
+use takt_isa::{Effect, Program};
+
+/// Positions that matter. Those where a period ends, inputs are set or something was set by hand always do.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Interest {
+    /// Every position, while the program waits too.
+    clock: bool,
+    /// Every position in which something can happen.
+    every: bool,
+    /// Those where these bundles are about to issue, and those behind until their results are there.
+    bundles: BTreeSet<Address>,
+    /// Those in which so many cycles have passed.
+    cycles: BTreeSet<Cycle>,
+}
+
+impl Interest {
+    /// Every position in which something can happen.
+    pub(super) fn everything() -> Interest {
+        Interest { every: true, ..Interest::default() }
+    }
+
+    /// Where one of these bundles is about to issue.
+    pub(super) fn bundles(bundles: impl IntoIterator<Item = Address>) -> Interest {
+        Interest { bundles: bundles.into_iter().collect(), ..Interest::default() }
+    }
+
+    /// Where the value of an expression can change.
+    pub(super) fn value(live: &Live, program: &Program) -> Interest {
+        let mut interest = Interest::default();
+        interest.add_value(live, program);
+        interest
+    }
+
+    /// Where one of these can have a reason to stop.
+    pub(super) fn stops(stops: &[(u32, Stop)], program: &Program) -> Interest {
+        let mut interest = Interest::default();
+        for (_, stop) in stops {
+            match stop {
+                Stop::Break { at: Where::Bundle(address), .. } => {
+                    interest.bundles.insert(*address);
+                }
+                Stop::Break { at: Where::Cycle(cycle), .. } => {
+                    interest.cycles.insert(*cycle);
+                }
+                Stop::Break { at: Where::Period(_), .. } => {}
+                Stop::Watch { what, test, .. } => {
+                    interest.add_value(what, program);
+                    if let Test::Equals(other) | Test::Above(other) = test {
+                        interest.add_value(other, program);
+                    }
+                }
+            }
+        }
+        interest
+    }
+
+    fn add_value(&mut self, live: &Live, program: &Program) {
+        let mut reads = Reads::default();
+        live.reads(&mut reads);
+        self.clock |= reads.clock;
+        self.every |= reads.every;
+        for address in 0..program.bundles() {
+            let Some(Ok(instructions)) = program.bundle(address) else { continue };
+            let mut slots = instructions.iter().zip(program.machine.slots);
+            let writes = slots.any(|(instruction, slot)| {
+                instruction.writes(slot).is_some_and(|register| reads.registers.contains(&register))
+                    || reads.memory && instruction.op.row().effect == Effect::Store
+            });
+            if writes {
+                self.bundles.insert(address);
+            }
+        }
+    }
+
+    /// The bundles to pause at.
+    pub(super) fn pauses(&self) -> impl Iterator<Item = Address> {
+        self.bundles.iter().copied().filter(|_| !self.every && !self.clock)
+    }
+
+    /// The next position that matters but for the pauses, at `until` at the latest; `issuing` is about to issue.
+    pub(super) fn next(&self, emulator: &Emulator, issuing: Option<Address>, until: Cycle) -> Cycle {
+        let now = emulator.now();
+        let waits = matches!(emulator.status(), Status::Waiting { .. });
+        // While the program waits and nothing is on its way, nothing changes.
+        let idle = waits && emulator.underway().next().is_none();
+        let mut underway = emulator.underway().filter(|retire| retire.cycle > now);
+        let each = self.clock
+            || self.every && !idle
+            || issuing.is_some_and(|address| self.bundles.contains(&address))
+            || underway.any(|retire| self.bundles.contains(&retire.address));
+        if each {
+            return (now + 1).min(until);
+        }
+        let tick = emulator.next_tick().filter(|_| idle && self.every);
+        let cycle = self.cycles.range(now + 1..).next().copied();
+        [tick.map(|tick| tick.max(now + 1)), cycle, Some(until)].into_iter().flatten().min().unwrap_or(until)
+    }
+}

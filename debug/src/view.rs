@@ -1,0 +1,392 @@
+//! The full-screen view: draws plain data into cells. It decides nothing and knows neither session nor terminal.
+
+use crate::console::{KEYS, commands};
+use crate::panes::{self, Named, Panes};
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect, Spacing};
+use ratatui::style::{Color, Modifier, Style, Stylize};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Block, Borders, Clear, Paragraph, Wrap};
+
+/// From this width on there are three columns.
+const WIDE: u16 = 110;
+/// Lines of output that are kept.
+const LOG: usize = 2000;
+/// Columns to the next tab stop.
+const TAB: usize = 8;
+/// Columns of a name at most, where something stands beside it.
+const NAME: usize = 20;
+/// Columns of a value.
+const VALUE: usize = 15;
+
+const CHANGED: Style = Style::new().fg(Color::Yellow).add_modifier(Modifier::BOLD);
+const NEXT: Style = Style::new().fg(Color::Black).bg(Color::Green);
+const STOP: Style = Style::new().fg(Color::Red).add_modifier(Modifier::BOLD);
+const DIM: Style = Style::new().fg(Color::DarkGray);
+const TITLE: Style = Style::new().fg(Color::Cyan);
+
+/// A part of the view.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "they are named for what they show")]
+pub enum Pane {
+    Source,
+    Bundle,
+    Output,
+    Registers,
+    Watches,
+    Ports,
+    Flight,
+    Stalls,
+}
+
+impl Pane {
+    /// All, in the order in which a key goes through them.
+    pub const ALL: [Pane; 8] = [
+        Pane::Source,
+        Pane::Bundle,
+        Pane::Output,
+        Pane::Registers,
+        Pane::Watches,
+        Pane::Ports,
+        Pane::Flight,
+        Pane::Stalls,
+    ];
+}
+
+/// What a line of the output is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Said {
+    /// A command, as it was given.
+    Command,
+    /// An answer.
+    Answer,
+    /// An error.
+    Error,
+}
+
+/// All that is drawn.
+pub struct Screen {
+    /// The machine.
+    pub panes: Panes,
+    /// Commands and their answers, by line.
+    log: Vec<(Said, String)>,
+    /// Where in the log the last command is.
+    latest: usize,
+    /// The command that is being typed, and the column of the cursor in it.
+    pub typed: Option<(String, usize)>,
+    /// What to say of a command that runs.
+    pub running: Option<String>,
+    /// The line of the help that is on top, while help is shown.
+    pub help: Option<usize>,
+    /// The pane that keys scroll.
+    pub focus: Pane,
+    /// Lines by which each pane is scrolled.
+    scroll: [isize; Pane::ALL.len()],
+}
+
+impl Screen {
+    /// A machine, and nothing said yet.
+    pub fn new(panes: Panes) -> Screen {
+        Screen {
+            panes,
+            log: Vec::new(),
+            latest: 0,
+            typed: None,
+            running: None,
+            help: None,
+            focus: Pane::Source,
+            scroll: [0; Pane::ALL.len()],
+        }
+    }
+
+    /// Adds a command and its answer to the output, and shows the machine as it is now.
+    pub fn said(&mut self, command: &str, answer: &Result<String, String>, panes: Panes) {
+        self.log.drain(..self.log.len().saturating_sub(LOG));
+        self.latest = self.log.len();
+        self.log.push((Said::Command, command.to_owned()));
+        let (said, text) = match answer {
+            Ok(text) => (Said::Answer, text),
+            Err(text) => (Said::Error, text),
+        };
+        self.log.extend(text.lines().map(|line| (said, line.to_owned())));
+        self.panes = panes;
+        self.scroll = [0; Pane::ALL.len()];
+    }
+
+    /// Scrolls the help, or the pane that has the focus.
+    pub fn scroll(&mut self, lines: isize) {
+        match &mut self.help {
+            Some(top) => *top = top.saturating_add_signed(lines),
+            None => self.scroll[self.focus as usize] += lines,
+        }
+    }
+
+    /// Gives the focus to a pane further on, or back.
+    pub fn turn(&mut self, panes: isize) {
+        let at = (self.focus as isize + panes).rem_euclid(Pane::ALL.len() as isize);
+        self.focus = Pane::ALL[at as usize];
+    }
+}
+
+/// Draws everything.
+pub fn draw(frame: &mut Frame<'_>, screen: &mut Screen) {
+    let [head, body, foot] =
+        Layout::vertical([Constraint::Length(1), Constraint::Fill(1), Constraint::Length(1)])
+            .areas(frame.area());
+    frame.render_widget(Line::from(plain(&screen.panes.head)).style(Style::new().reversed()), head);
+    for (pane, area) in areas(body, &screen.panes) {
+        draw_pane(frame, screen, pane, area);
+    }
+    draw_command(frame, screen, foot);
+    if let Some(top) = &mut screen.help {
+        draw_help(frame, top, body);
+    }
+}
+
+/// Where each pane is.
+fn areas(body: Rect, panes: &Panes) -> Vec<(Pane, Rect)> {
+    let rows = |lines: usize| lines as u16 + 1;
+    let bundle = Constraint::Length(rows(panes.bundle.len().max(1)));
+    let watches =
+        Constraint::Length(if panes.displays.is_empty() { 0 } else { rows(panes.displays.len().min(5)) });
+    let ports = Constraint::Fill(2);
+    let fill = Constraint::Fill;
+    let columns =
+        |constraints: &[Constraint]| Layout::horizontal(constraints).spacing(Spacing::Space(1)).split(body);
+    let left = |area: Rect| {
+        let [source, bundle, output] = Layout::vertical([fill(3), bundle, fill(2)]).areas(area);
+        [(Pane::Source, source), (Pane::Bundle, bundle), (Pane::Output, output)]
+    };
+    let mut areas = Vec::new();
+    if body.width >= WIDE {
+        let columns = columns(&[fill(9), fill(7), fill(7)]);
+        areas.extend(left(columns[0]));
+        let [registers, watches] = Layout::vertical([fill(1), watches]).areas(columns[1]);
+        areas.extend([(Pane::Registers, registers), (Pane::Watches, watches)]);
+        let [ports, flight, stalls] = Layout::vertical([ports, fill(1), fill(1)]).areas(columns[2]);
+        areas.extend([(Pane::Ports, ports), (Pane::Flight, flight), (Pane::Stalls, stalls)]);
+    } else {
+        let columns = columns(&[fill(1), fill(1)]);
+        areas.extend(left(columns[0]));
+        let parts = [fill(3), watches, ports, fill(2), fill(2)];
+        let [registers, watches, ports, flight, stalls] = Layout::vertical(parts).areas(columns[1]);
+        areas.extend([(Pane::Registers, registers), (Pane::Watches, watches), (Pane::Ports, ports)]);
+        areas.extend([(Pane::Flight, flight), (Pane::Stalls, stalls)]);
+    }
+    areas
+}
+
+fn draw_pane(frame: &mut Frame<'_>, screen: &mut Screen, pane: Pane, area: Rect) {
+    let height = usize::from(area.height.saturating_sub(1));
+    let panes = &screen.panes;
+    // What the pane shows, and the line that is on top if nobody scrolls.
+    let (title, lines, top) = match pane {
+        Pane::Source => {
+            let next = panes.lines.iter().position(|line| line.next).unwrap_or(0);
+            (plain(&panes.file), source(panes), next.saturating_sub(height / 3))
+        }
+        Pane::Bundle => ("bundle".to_owned(), bundle(panes), 0),
+        Pane::Output => {
+            let (lines, latest) = log(&screen.log, screen.latest, area.width);
+            let tail = lines.len().saturating_sub(height);
+            ("output".to_owned(), lines, tail.min(latest))
+        }
+        Pane::Registers => ("registers".to_owned(), values(&panes.registers, "", area.width), 0),
+        Pane::Watches => ("watches".to_owned(), displays(panes), 0),
+        Pane::Ports => ("ports".to_owned(), ports(panes, area.width), 0),
+        Pane::Flight => ("in flight".to_owned(), flight(panes), 0),
+        Pane::Stalls => ("stalls".to_owned(), stalls(panes), 0),
+    };
+    let last = lines.len().saturating_sub(height);
+    let scroll = &mut screen.scroll[pane as usize];
+    let wanted = top.saturating_add_signed(*scroll);
+    let shown = wanted.min(last.max(top));
+    *scroll = shown as isize - top as isize;
+    let below = lines.len().saturating_sub(shown + height);
+    let style = if screen.focus == pane { TITLE.reversed() } else { TITLE };
+    let mut block =
+        Block::new().borders(Borders::TOP).border_style(DIM).title(Span::styled(format!(" {title} "), style));
+    if below > 0 {
+        block = block.title(Line::from(format!(" {below} more ")).right_aligned());
+    }
+    let lines: Vec<Line<'_>> = lines.into_iter().skip(shown).take(height).collect();
+    frame.render_widget(Paragraph::new(lines).block(block), area);
+}
+
+fn source(panes: &Panes) -> Vec<Line<'static>> {
+    let row = |line: &panes::Line| {
+        let mark = if line.next {
+            '>'
+        } else if line.part {
+            '+'
+        } else {
+            ' '
+        };
+        let text = Span::raw(plain(&line.text));
+        Line::from(vec![
+            Span::styled(if line.stop { "●" } else { " " }, STOP),
+            Span::styled(format!("{mark}{:>4} ", line.number), DIM),
+            if line.next {
+                text.style(NEXT)
+            } else if line.part {
+                text.fg(Color::Green)
+            } else {
+                text
+            },
+        ])
+    };
+    panes.lines.iter().map(row).collect()
+}
+
+fn bundle(panes: &Panes) -> Vec<Line<'static>> {
+    let row = |(slot, operation): &(&str, Option<String>)| {
+        let operation = operation.as_deref().map_or(Span::styled("-", DIM), |text| Span::raw(plain(text)));
+        Line::from(vec![Span::styled(format!("{slot:<5}"), TITLE), operation])
+    };
+    panes.bundle.iter().map(row).collect()
+}
+
+/// The output, its long lines broken, and the line at which the last command is.
+fn log(log: &[(Said, String)], latest: usize, room: u16) -> (Vec<Line<'static>>, usize) {
+    let (mut lines, mut top) = (Vec::new(), 0);
+    for (i, (said, text)) in log.iter().enumerate() {
+        if i == latest {
+            top = lines.len();
+        }
+        let (prompt, style) = match said {
+            Said::Command => ("(takt) ", Style::new().bold()),
+            Said::Answer => ("", Style::new()),
+            Said::Error => ("", STOP),
+        };
+        let text: Vec<char> = (prompt.to_owned() + &plain(text)).chars().collect();
+        let parts = text.chunks(usize::from(room).max(1)).map(|part| part.iter().collect::<String>());
+        lines.extend(parts.map(|part| Line::styled(part, style)));
+    }
+    (lines, top)
+}
+
+/// Names and values, those that have changed marked; bits too, where `room` columns hold them whole.
+fn values(rows: &[Named], prefix: &'static str, room: u16) -> Vec<Line<'static>> {
+    let width = rows.iter().map(|row| row.name.len()).max().unwrap_or(0).min(NAME);
+    let has_room = usize::from(room) >= prefix.len() + 1 + width + 1 + VALUE + 1 + 8;
+    let row = |row: &Named| {
+        let style = if row.changed {
+            CHANGED
+        } else if row.used {
+            Style::new().green()
+        } else {
+            Style::new()
+        };
+        let (mark, value) = (if row.changed { '*' } else { ' ' }, row.value());
+        let mut spans = vec![
+            Span::styled(prefix, DIM),
+            Span::styled(format!("{mark}{:<width$} {value:<VALUE$} ", row.name), style),
+        ];
+        spans.extend(row.bits.filter(|_| has_room).map(|bits| Span::styled(format!("{bits:08x}"), DIM)));
+        Line::from(spans)
+    };
+    rows.iter().map(row).collect()
+}
+
+fn ports(panes: &Panes, room: u16) -> Vec<Line<'static>> {
+    // What goes out is what changes.
+    let mut lines = values(&panes.outputs, "out ", room);
+    lines.extend(values(&panes.inputs, "in  ", room));
+    lines
+}
+
+fn displays(panes: &Panes) -> Vec<Line<'static>> {
+    panes.displays.iter().map(|(name, value)| Line::raw(plain(&format!("{name} = {value}")))).collect()
+}
+
+fn flight(panes: &Panes) -> Vec<Line<'static>> {
+    let width = panes.flight.iter().map(|row| row.register.len()).max().unwrap_or(0).min(NAME);
+    let row = |row: &panes::Flying| {
+        Line::from(vec![
+            Span::styled(format!("{:>3} ", row.left), CHANGED),
+            Span::raw(format!("{:<width$} {:<7}", row.register, row.mnemonic)),
+            Span::styled(format!(" {}", row.from), DIM),
+        ])
+    };
+    panes.flight.iter().map(row).collect()
+}
+
+fn stalls(panes: &Panes) -> Vec<Line<'static>> {
+    let now = panes.cause.iter().map(|cause| Line::styled(format!("now: {cause}"), CHANGED));
+    let rows = panes.stalls.iter().map(|(cycles, what)| Line::raw(format!("{cycles:>10}  {what}")));
+    now.chain(rows).collect()
+}
+
+/// The command line; while nothing is typed, what keys do.
+fn draw_command(frame: &mut Frame<'_>, screen: &Screen, area: Rect) {
+    if let Some(text) = &screen.running {
+        frame.render_widget(Line::styled(plain(text), CHANGED), area);
+        return;
+    }
+    const PROMPT: &str = "(takt) ";
+    let Some((text, cursor)) = &screen.typed else {
+        let mut hints = vec![
+            Span::styled(": ", TITLE),
+            Span::raw("command  "),
+            Span::styled("? ", TITLE),
+            Span::raw("help"),
+        ];
+        for (key, line) in KEYS.iter().filter(|(key, _)| key.is_ascii_lowercase()) {
+            hints.extend([Span::styled(format!("  {key} "), TITLE), Span::raw(line.trim_end())]);
+        }
+        frame.render_widget(Line::from(hints), area);
+        return;
+    };
+    // As far to the right as keeps the cursor in sight.
+    let room = usize::from(area.width).saturating_sub(PROMPT.len() + 1);
+    let skipped = cursor.saturating_sub(room);
+    let shown: String = text.chars().skip(skipped).collect();
+    frame.render_widget(Line::from(vec![Span::styled(PROMPT, TITLE), Span::raw(shown)]), area);
+    let column = area.x + (PROMPT.len() + cursor - skipped) as u16;
+    if column < area.right() && area.height > 0 {
+        frame.set_cursor_position((column, area.y));
+    }
+}
+
+fn draw_help(frame: &mut Frame<'_>, top: &mut usize, body: Rect) {
+    let mut lines = vec![
+        Line::raw(
+            "Keys that stand for commands are in brackets. `:` types a command (Tab completes, up and down go through",
+        ),
+        Line::raw(
+            "earlier ones, Esc leaves), Tab and Shift-Tab choose a pane, up, down, Page Up and Page Down scroll it,",
+        ),
+        Line::raw(
+            "Enter repeats the last step, Ctrl-C stops a command that runs. A * marks what the last command changed.",
+        ),
+        Line::default(),
+    ];
+    for (usage, keys, text) in commands() {
+        let keys = if keys.is_empty() { String::new() } else { format!("  [{keys}]") };
+        lines.push(Line::from(vec![Span::styled(usage, TITLE), Span::styled(keys, CHANGED)]));
+        lines.push(Line::raw(format!("    {text}")));
+    }
+    // At the least as many rows as lines.
+    *top = (*top).min(lines.len().saturating_sub(1));
+    let block = Block::bordered().border_style(DIM).title(Span::styled(" help (Esc leaves) ", TITLE));
+    let text = Paragraph::new(lines).wrap(Wrap { trim: false }).scroll((*top as u16, 0)).block(block);
+    frame.render_widget(Clear, body);
+    frame.render_widget(text, body);
+}
+
+/// A text without tabs and other control characters.
+fn plain(text: &str) -> String {
+    let mut plain = String::with_capacity(text.len());
+    let mut column = 0;
+    for c in text.chars() {
+        if c == '\t' {
+            let blanks = TAB - column % TAB;
+            plain.extend(std::iter::repeat_n(' ', blanks));
+            column += blanks;
+        } else {
+            plain.push(if c.is_control() { '·' } else { c });
+            column += 1;
+        }
+    }
+    plain
+}
