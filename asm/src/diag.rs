@@ -128,6 +128,13 @@ pub struct Sink {
 }
 
 impl Sink {
+    /// Takes its help from the last diagnostic.
+    pub(crate) fn drop_help(&mut self) {
+        if let Some(last) = self.kept.last_mut() {
+            last.help = None;
+        }
+    }
+
     /// Whether a further diagnostic of this severity would be kept: if not, its text need not be made.
     pub fn keeps(&self, severity: Severity) -> bool {
         match severity {

@@ -72,7 +72,11 @@ pub(crate) fn parse_expression(
             let id = value.id;
             Some((ast, id))
         }
-        _ => None,
+        _ => {
+            // It would tell how a constant is written.
+            sink.drop_help();
+            None
+        }
     }
 }
 

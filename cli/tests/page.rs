@@ -45,6 +45,45 @@ fn the_page_opens_and_draws_every_operation() {
     assert!(!page.contains("data-rows=\"") && console.contains("missing is not defined"), "{console}");
 }
 
+/// What the mouse finds over an operation is told beside it.
+#[test]
+fn hovering_shows_the_details() {
+    let folder = Folder::new();
+    folder.write(
+        "mean.s",
+        ".input a, b\n.output mean\n.period\n.reg sum\np:  fadd sum, a, b\n    fdiv mean, sum, 2.0\n    wait p\n",
+    );
+    folder.line("analyse mean.s --html page.html").ok();
+    let hover = "<script>
+        const over = (element) => {
+            // Beside the chain, which is drawn through the middle.
+            const box = element.getBoundingClientRect(), x = box.x + box.width / 2, y = box.y + 2;
+            const found = document.elementFromPoint(x, y);
+            found.dispatchEvent(new MouseEvent('mousemove', { bubbles: true, clientX: x, clientY: y }));
+            const tip = document.getElementById('tip'), at = tip.getBoundingClientRect();
+            const shown = tip.style.display === 'block' && at.right <= innerWidth && at.bottom <= innerHeight;
+            document.body.append(`[${shown}: ${tip.textContent}]`);
+        };
+        const about = (text) => [...document.querySelectorAll('rect')].find((rect) => rect.dataset.tip.includes(text));
+        over(about('slot mul'));
+        over(about('before cycle'));
+        over(document.getElementById('labels'));
+    </script>";
+    let page = folder.read_text("page.html").replace("</body>", &format!("{hover}</body>"));
+    folder.write("hover.html", page);
+    let (page, console) = open(&folder, "hover.html");
+    assert_eq!(console, "");
+    let told: Vec<&str> =
+        page.split("[true: ").skip(1).filter_map(|rest| rest.split_once(']')).map(|(told, _)| told).collect();
+    let [operation, stall] = told[..] else { panic!("{page}") };
+    assert!(
+        operation.contains("fdiv mean") && operation.contains("mean.s:6") && operation.contains("latency"),
+        "{operation}"
+    );
+    assert!(stall.contains("operand") && stall.contains("awaits"), "{stall}");
+    assert!(page.contains("[false: "), "nothing is told where there is nothing");
+}
+
 #[test]
 fn names_cannot_leave_the_data() {
     let folder = Folder::new();

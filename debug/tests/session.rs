@@ -344,4 +344,19 @@ fn a_long_run() {
     }
     assert_eq!(session.go_to(100_000_000), Why::Done);
     assert!(fingerprint(&mut session) == at_end);
+    // Through all of it for what is not there, and for what is.
+    let [what, never] = ["F1", "1e9"].map(|text| Box::new(session.parse(text).unwrap()));
+    let rare = Stop::Watch { what, test: Test::Above(never), text: String::new() };
+    let id = session.add_stop(rare);
+    assert_eq!(session.resume_back(), Why::Start);
+    session.remove_stop(id);
+    assert_eq!(session.go_to(100_000_000), Why::Done);
+    session.add_stop(Stop::Break { at: Where::Period(7), condition: None, text: String::new() });
+    assert!(matches!(session.resume_back(), Why::Stop { .. }) && session.period() == 7);
+    // In a cycle in which the program waits and nothing happens, too.
+    session.go_to(0);
+    session.add_stop(Stop::Break { at: Where::Cycle(59_000), condition: None, text: String::new() });
+    assert!(matches!(session.resume(), Why::Stop { .. }) && session.cycle() == 59_000);
+    let clock = session.parse("cycle == 71999").unwrap();
+    assert!(session.run_until(&clock) == Why::Holds && session.cycle() == 71_999);
 }

@@ -10,7 +10,7 @@
 
 use std::collections::BTreeSet;
 use takt_asm::Expression;
-use takt_asm::diag::nearest;
+use takt_asm::diag::{Diagnostics, nearest};
 use takt_asm::expr::{BUILTINS, Value};
 use takt_emu::Emulator;
 use takt_isa::program::Space;
@@ -203,7 +203,7 @@ impl Live {
         });
         match fault {
             Some(fault) => Err(fault),
-            None => result.map_err(|diagnostics| diagnostics.render(false).trim_end().to_owned()),
+            None => result.map_err(|diagnostics| told(&diagnostics)),
         }
     }
 }
@@ -290,9 +290,14 @@ fn parse(text: &str, program: &Program, constants: &[(String, Value)], depth: us
         plain.push_str(&placeholder);
         operands.push((placeholder, operand, text[start..at].to_owned()));
     }
-    let expression =
-        Expression::parse(&plain).map_err(|diagnostics| diagnostics.render(false).trim_end().to_owned())?;
+    let expression = Expression::parse(&plain).map_err(|diagnostics| told(&diagnostics))?;
     Ok(Live { text: text.to_owned(), expression, operands })
+}
+
+/// Diagnostics without their head, which says that they are errors: whoever shows them says so.
+fn told(diagnostics: &Diagnostics) -> String {
+    let text = diagnostics.render(false);
+    text.split_once("]: ").map_or(text.as_str(), |(_, text)| text).trim_end().to_owned()
 }
 
 /// The bracket that closes the one at `open`.

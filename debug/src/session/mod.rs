@@ -578,7 +578,7 @@ impl Session {
             let checkpoint =
                 self.checkpoints[..index].last().map_or(0, |checkpoint| checkpoint.emulator.now());
             let start = near.max(checkpoint);
-            window *= 8;
+            window = window.saturating_mul(8);
             let mut found = self.go_to(start);
             let (mut visit, mut last) = (begin(self), None);
             let mut all = |session: &Session, issuing| {
