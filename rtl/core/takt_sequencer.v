@@ -10,7 +10,7 @@
 //   block: nothing issues in the next cycle.
 //   Reset acts as a jump to 0 in the cycle before cycle 0.
 //   tick is seen in the cycle in which it is high. missed, lost: in that cycle, the deadline was missed, the tick was lost.
-//   fault and fault_* stand from the second cycle after that of the fault on. kind: 1 illegal word, 2 data address, 3 return stack full, 4 empty.
+//   fault and fault_* stand from the second cycle after that of the fault on; without a fault, fault_* mean nothing. kind: 1 illegal word, 2 data address, 3 return stack full, 4 empty.
 
 module takt_sequencer #(
     parameter PROGRAM = 10,  // bits of an address of the program memory, less than 16
@@ -156,8 +156,9 @@ module takt_sequencer #(
 
     always @(posedge clk) begin
         if (x_halt & ~fault) halted <= 1'b1;
-        if (~fault & (x_refused | x_address_fault | stack_full | stack_empty)) begin
-            fault         <= 1'b1;
+        // The particulars follow the bundle in execute until there is a fault: so they do not wait for its detection.
+        if (~fault) begin
+            fault         <= x_refused | x_address_fault | stack_full | stack_empty;
             fault_kind    <= x_refused ? 3'd1 : x_address_fault ? 3'd2 : stack_full ? 3'd3 : 3'd4;
             fault_slot    <= x_refused ? x_illegal_slot : x_address_fault ? MEMORY_SLOT : OWN_SLOT;
             fault_address <= x_address;

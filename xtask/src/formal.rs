@@ -12,7 +12,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::time::Instant;
 use takt_isa::spec::machines::MACHINES;
-use takt_isa::{Function, Machine, ROWS, Slot};
+use takt_isa::{Bank, Field, Function, Machine, ROWS, Slot};
 use takt_rtl::export::export;
 use takt_rtl::{Design, Library};
 
@@ -41,7 +41,7 @@ pub(crate) fn formal(arguments: &Arguments) -> Result<()> {
         let design = export(machine, &library)?;
         for slot in machine.slots {
             let module = format!("{}_decode_{}", design.top, slot.name);
-            prove(&venv, &design, &module, &decoder(slot), 1)?;
+            prove(&venv, &design, &module, &decoder(machine, slot), 1)?;
             println!(
                 "{}: slot {}: every word is one operation or is illegal: proved",
                 machine.name, slot.name
@@ -68,6 +68,8 @@ fn prove(venv: &Venv, design: &Design, module: &str, properties: &str, cycles: u
         if name == format!("{module}.v") {
             let end = text.rfind("endmodule").context("a module ends")?;
             text.insert_str(end, properties);
+            // A property of a name that there is not would speak of an arbitrary value.
+            text = format!("`default_nettype none\n{text}`default_nettype wire\n");
         }
         fs::write(folder.join(name), text)?;
         let is_cut = file.name.starts_with("units/")
@@ -107,17 +109,31 @@ fn prove(venv: &Venv, design: &Design, module: &str, properties: &str, cycles: u
 }
 
 /// A decoder: a word is illegal unless it is one of the table's; of units and of latencies it names one at most.
-fn decoder(slot: &Slot) -> String {
+fn decoder(machine: &Machine, slot: &Slot) -> String {
+    // Operands lie in one of the machine's banks, inputs and constants included.
+    let exists = |field: Field| {
+        let bits = field.bits();
+        let (low, high) = (bits.low, bits.low + bits.width - 1);
+        let within = |bank: &Bank| {
+            let (first, last) = (u32::from(bank.base), u32::from(bank.base + (bank.depth - 1)));
+            format!("(11'd{first} <= word[{high}:{low}] && word[{high}:{low}] <= 11'd{last})")
+        };
+        let banks: Vec<_> = machine.banks().map(within).collect();
+        format!(" && ({})", banks.join(" || "))
+    };
     let mut v = String::from("    always @* begin\n        assert (illegal == ~(");
     let rows =
         ROWS.iter().filter(|row| row.function == Function::Idle || slot.unit_for(row.function).is_some());
     let mut legal = Vec::new();
     for row in rows {
-        // The opcode, what the shape leaves unused, and the bank of the destination.
+        // The opcode, what the shape leaves unused, the bank of the destination, those of the operands.
         let unused = !row.shape.mask() & ((1 << 41) - 1);
         let mut text = format!("word[47:41] == 7'h{:02x} && (word[40:0] & 41'h{unused:x}) == 0", row.opcode);
         if row.shape.has_dest() {
             let _ = write!(text, " && word[40:32] < {}", slot.bank.depth);
+        }
+        for field in [Field::A, Field::B, Field::C].into_iter().take(row.shape.sources()) {
+            text += &exists(field);
         }
         legal.push(format!("({text})"));
     }
@@ -136,23 +152,23 @@ fn scoreboard(machine: &Machine) -> String {
     // ---- properties, added by `cargo xtask formal`
 
     reg [7:0] f_cycle = 8'd0;
-    reg f_cancelled = 1'b0;
+    reg f_stopped = 1'b0;
     (* anyconst *) reg [{last}:0] f_register;
     always @(posedge clk) begin
         if (f_cycle != 8'hff) f_cycle <= f_cycle + 8'd1;
-        if (cancel) f_cancelled <= 1'b1;
-        if (rst) f_cancelled <= 1'b0;
+        if (fault) f_stopped <= 1'b1;
+        if (rst) f_stopped <= 1'b0;
     end
     always @* begin
         assume (rst == (f_cycle < {RESET}));
         assume (~load);
     end
     // After a fault nothing issues any more.
-    wire f_issue = issue & ~cancel & ~f_cancelled & ~rst;
-    wire f_check = ~f_cancelled & ~cancel & ~rst;
+    wire f_issue = issue & ~fault & ~f_stopped & ~rst;
+    wire f_check = ~f_stopped & ~fault & ~rst;
 "
     );
-    let mut checks = String::from("        if (f_cancelled & ~rst) assert (~issue);\n");
+    let mut checks = String::from("        if (f_stopped & ~rst) assert (~issue);\n");
     let mut drains = Vec::new();
     for slot in machine.slots {
         let (name, upper) = (slot.name, slot.name.to_uppercase());
