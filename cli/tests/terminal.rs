@@ -119,6 +119,10 @@ impl Terminal {
                 self.parser.process(&bytes);
             }
             if let Some(status) = self.child.try_wait().unwrap() {
+                // What it wrote last may still be on its way; the end of file comes behind it.
+                while let Ok(bytes) = self.output.recv_timeout(PATIENCE) {
+                    self.parser.process(&bytes);
+                }
                 assert!(status.success(), "{status}:\n{}", self.text());
                 return;
             }

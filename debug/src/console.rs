@@ -428,13 +428,13 @@ impl Console {
 
     fn registers(&self, pattern: &str) -> String {
         let pattern = if pattern.is_empty() { "*" } else { pattern };
-        let mut text = String::new();
-        for kind in [Kind::Input, Kind::Output, Kind::Register] {
-            for row in panes::named(&self.session, kind).filter(|row| crate::matches(pattern, &row.name)) {
-                let _ = writeln!(text, "{:<20} {:<5} {}", row.name, row.place, row.every_way());
-            }
-        }
-        text
+        let kinds = [Kind::Input, Kind::Output, Kind::Register].into_iter();
+        let rows = kinds.flat_map(|kind| panes::named(&self.session, kind));
+        let rows: Vec<_> = rows.filter(|row| crate::matches(pattern, &row.name)).collect();
+        let width = rows.iter().map(|row| row.name.len()).max().unwrap_or(0).max(12);
+        let line =
+            |row: &panes::Named| format!("{:<width$} {:<5} {}\n", row.name, row.place, row.every_way());
+        rows.iter().map(line).collect()
     }
 
     fn ports(&self) -> String {
@@ -474,9 +474,11 @@ impl Console {
 
     fn flight(&self) -> String {
         let mut text = String::new();
-        for Flying { left, register, mnemonic, from } in panes::flight(&self.session) {
+        let flying = panes::flight(&self.session);
+        let width = flying.iter().map(|row| row.register.len()).max().unwrap_or(0).max(12);
+        for Flying { left, register, mnemonic, from } in flying {
             let cycles = if left == 1 { "cycle" } else { "cycles" };
-            let _ = writeln!(text, "{left:>3} {cycles:<6}  {register:<12} {mnemonic} of {from}");
+            let _ = writeln!(text, "{left:>3} {cycles:<6}  {register:<width$} {mnemonic} of {from}");
         }
         if text.is_empty() { "nothing is underway\n".to_owned() } else { text }
     }

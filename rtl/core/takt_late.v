@@ -6,7 +6,7 @@
 //   operation in the next cycle even if none issues now.
 //   Requires INTERVAL >= LATENCY - DEPTH, so that one operation at a time is underway here.
 //   cancel, which stays: what issued in the last two cycles and what issues from now on does not count.
-//   Requires LATENCY - DEPTH >= 3: none is cancelled that has passed on.
+//   Requires LATENCY - DEPTH >= 2: none is cancelled that has passed on.
 
 module takt_late #(
     parameter LATENCY  = 18,
@@ -32,7 +32,7 @@ module takt_late #(
     localparam AGES = LATENCY - DEPTH > INTERVAL - 1 ? LATENCY - DEPTH : INTERVAL - 1;
 
     generate
-        if (LATENCY < DEPTH + 3 || INTERVAL < LATENCY - DEPTH || INTERVAL < 3) begin : g_interval
+        if (LATENCY < DEPTH + 2 || INTERVAL < LATENCY - DEPTH || INTERVAL < 3) begin : g_interval
             takt_late_has_an_interval_of_its_latency_beyond_the_places unsupported ();
         end
     endgenerate
@@ -41,7 +41,7 @@ module takt_late #(
     reg          working;
 
     assign at   = age[LATENCY-DEPTH:1];
-    assign last = age[LATENCY-DEPTH];
+    assign last = age[LATENCY-DEPTH] & ~((LATENCY - DEPTH == 2) & cancel);
     assign busy = working & ~age[INTERVAL-1];
 
     always @(posedge clk) begin

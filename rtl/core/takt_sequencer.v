@@ -71,7 +71,9 @@ module takt_sequencer #(
 
     // ---- execute
 
-    reg        x_jump, x_branch_zero, x_branch_nonzero, x_call, x_return, x_wait, x_halt, x_refused;
+    // Whether the bundle in execute redirects if its operand is 0, and if it is not: little is left to do when the operand is there.
+    reg        x_if_zero, x_if_nonzero;
+    reg        x_call, x_return, x_wait, x_halt, x_refused;
     reg [15:0] x_target;
     reg [2:0]  x_illegal_slot;
 
@@ -82,8 +84,7 @@ module takt_sequencer #(
     wire stack_full  = x_call & entries[4];
     wire stack_empty = x_return & (entries == 5'd0);
 
-    wire zero = x_operand == 32'd0;
-    assign flush = x_jump | x_call | x_return | x_wait | (x_branch_zero & zero) | (x_branch_nonzero & ~zero);
+    assign flush = x_operand == 32'd0 ? x_if_zero : x_if_nonzero;
 
     reg  [15:0] fetched;  // the address of what the program memory delivers
     wire [15:0] target     = x_return ? stack[top] : x_target;
@@ -93,22 +94,22 @@ module takt_sequencer #(
     assign f_outside = |fetched[15:PROGRAM];
 
     wire take = issue & ~fault;
+    wire always_redirects = i_jump | i_call | i_return | i_wait;
     integer s;
     always @(posedge clk) begin
         if (flush | advance) fetched <= chosen;
         if (flush) i_address <= target;
         else if (issue) i_address <= i_address + 16'd1;
-        x_address        <= i_address;
-        x_target         <= i_target;
-        x_issued         <= take;
-        x_jump           <= take & i_jump;
-        x_branch_zero    <= take & i_branch_zero;
-        x_branch_nonzero <= take & i_branch_nonzero;
-        x_call           <= take & i_call;
-        x_return         <= take & i_return;
-        x_wait           <= take & i_wait;
-        x_halt           <= take & i_halt;
-        x_refused        <= refused;
+        x_address    <= i_address;
+        x_target     <= i_target;
+        x_issued     <= take;
+        x_if_zero    <= take & (always_redirects | i_branch_zero);
+        x_if_nonzero <= take & (always_redirects | i_branch_nonzero);
+        x_call       <= take & i_call;
+        x_return     <= take & i_return;
+        x_wait       <= take & i_wait;
+        x_halt       <= take & i_halt;
+        x_refused    <= refused;
         for (s = SLOTS - 1; s >= 0; s = s - 1) if (i_illegal[s]) x_illegal_slot <= s[2:0];
         if (x_call) begin
             stack[entries[3:0]] <= x_address + 16'd1;
@@ -120,8 +121,8 @@ module takt_sequencer #(
             top     <= top - 4'd1;
         end
         if (rst) begin
-            {x_branch_zero, x_branch_nonzero, x_call, x_return, x_wait, x_halt, x_refused, x_issued} <= 8'd0;
-            x_jump   <= 1'b1;
+            {x_call, x_return, x_wait, x_halt, x_refused, x_issued} <= 6'd0;
+            {x_if_zero, x_if_nonzero} <= 2'b11;
             x_target <= 16'd0;
             entries  <= 5'd0;
             top      <= 4'd15;
@@ -151,7 +152,7 @@ module takt_sequencer #(
 
     // ---- stops
 
-    wire redirects = i_jump | i_branch_zero | i_branch_nonzero | i_call | i_return | i_wait | i_halt;
+    wire redirects = always_redirects | i_branch_zero | i_branch_nonzero | i_halt;
     assign block = (issue & redirects) | wait_next | x_halt | halted | refused | x_refused | fault;
 
     always @(posedge clk) begin

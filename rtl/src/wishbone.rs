@@ -15,7 +15,7 @@ pub const REGISTERS: &[(u16, &str, &str, &str)] = &[
         1,
         "status",
         "r",
-        "bit 0 waiting, 1 deadline missed, 2 halted, 3 fault, 6:4 fault's kind, 9:7 fault's slot, 12:10 sticky flags, 31:16 fault's bundle.",
+        "bit 0 waiting, 1 deadline missed, 2 halted, 3 fault, 12:10 sticky flags; with a fault, 6:4 its kind, 9:7 its slot, 31:16 its bundle.",
     ),
     (
         2,

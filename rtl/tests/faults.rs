@@ -110,7 +110,7 @@ const FAULTS: &[Fault] = &[
     ("sine", "wire        zeros16 = ~|n0[55:40]", "wire        zeros16 = 1'b0"),
     ("sine", "tiny1 | (k == 9'd0)", "(k == 9'd0)"),
     ("sine", "& {18{~tiny4}}", ""),
-    ("sine", "& {28{~tiny5}}", ""),
+    ("sine", "& {28{~tiny6}}", ""),
     ("sine", "31'h43c90fda", "31'h43c90fdb"),
     ("sine", "8'd115", "8'd116"),
     ("sine", "one ? result11[12] : result11[11]", "result11[11]"),

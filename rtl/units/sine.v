@@ -16,20 +16,21 @@
 //
 // Pipeline
 //   1   aligned              |x| with 27 bits after the point
-//   2   multiple             k; the table of k pi/2 is read
-//   3   multiple, registered
-//   4   remainder            r
-//   5   segment              |r|; the table of coefficients is read; n, normalised over stages 5 to 8
-//   6   coefficients         into the first multiplier: h, the place in the segment, and c1
-//   7   slope's product      h c1; c0 + c2 h^2, which comes from a table
-//   8   polynomial           V; into the second multiplier, with n
-//   9   product              of n and V; of their low parts in logic
-//   10  sums
-//   11  difference           n - n V
-//   12  rounded              the result
+//   2   multiple             k
+//   3   table                of k pi/2, is read
+//   4   multiple of pi/2     out of the table
+//   5   remainder            r
+//   6   segment              |r|; the table of coefficients is read; n, normalised over stages 6 to 9
+//   7   coefficients         into the first multiplier: h, the place in the segment, and c1
+//   8   slope's product      h c1; c0 + c2 h^2, which comes from a table
+//   9   polynomial           V; into the second multiplier, with n
+//   10  product              of n and V; of their low parts in logic
+//   11  sums
+//   12  difference           n - n V
+//   13  rounded              the result
 
 module takt_sine #(
-    parameter LATENCY = 13
+    parameter LATENCY = 14
 ) (
     input  wire        clk,
     input  wire        in_valid,
@@ -41,15 +42,15 @@ module takt_sine #(
 );
 
     generate
-        if (LATENCY != 13) begin : g_latency
-            takt_sine_has_latency_13 unsupported ();
+        if (LATENCY != 14) begin : g_latency
+            takt_sine_has_latency_14 unsupported ();
         end
     endgenerate
 
     localparam [30:0] LIMIT    = 31'h43c90fda;  // largest accepted magnitude
     localparam [7:0]  IDENTITY = 8'd115;        // exponent field, below which the sine is its argument and the cosine 1
 
-    reg [11:1] valid;
+    reg [12:1] valid;
     always @(posedge clk) {out_valid, valid} <= {valid, in_valid};
 
     // =============================================================== 1: |x| with 27 bits after the point
@@ -80,56 +81,66 @@ module takt_sine #(
     wire [17:0] by_5  = {1'b0, whole, 2'd0} + {3'd0, whole};
     wire [16:0] by_3  = {1'b0, whole, 1'b0} + {2'd0, whole};
     wire [22:0] by163 = {by_5, 5'b0} + {6'd0, by_3} + 23'd8192;
-    wire [8:0]  k     = by163[22:14];
+
+    reg [8:0]  k;
+    reg [27:0] fixed2;                          // modulo 2
+    reg        tiny2, op2, sign2, refused2;
+    reg [30:0] x2;
+    always @(posedge clk) begin
+        k      <= by163[22:14];
+        fixed2 <= fixed1[27:0];
+        {tiny2, op2, sign2, refused2, x2} <= {tiny1, op1, sign1, refused1, x1};
+    end
+
+    // =============================================================== 3: the table of k pi/2
 
     wire [56:0] multiple;
     takt_quarter_table multiples (.clk(clk), .k(k), .value(multiple));
 
-    reg [27:0] fixed2;                          // modulo 2
-    reg        first2, op2, tiny2, sign2, refused2;
-    reg [1:0]  quadrant2;
-    reg [30:0] x2;
-    always @(posedge clk) begin
-        fixed2    <= fixed1[27:0];
-        first2    <= tiny1 | (k == 9'd0);
-        quadrant2 <= k[1:0] & {2{~tiny1}};
-        {tiny2, op2, sign2, refused2, x2} <= {tiny1, op1, sign1, refused1, x1};
-    end
-
-    // =============================================================== 3: out of the block RAM
-
-    reg [56:0] multiple3;
     reg [27:0] fixed3;
-    reg        first3, cosine3, tiny3, negative3, refused3;
+    reg        first3, op3, tiny3, sign3, refused3;
+    reg [1:0]  quadrant3;
     reg [30:0] x3;
     always @(posedge clk) begin
-        multiple3 <= multiple;
-        fixed3    <= fixed2;
-        cosine3   <= quadrant2[0] ^ op2;
-        negative3 <= sign2 ^ quadrant2[1] ^ (quadrant2[0] & op2);
-        {first3, tiny3, refused3, x3} <= {first2, tiny2, refused2, x2};
+        first3    <= tiny2 | (k == 9'd0);
+        quadrant3 <= k[1:0] & {2{~tiny2}};
+        {fixed3, tiny3, op3, sign3, refused3, x3} <= {fixed2, tiny2, op2, sign2, refused2, x2};
     end
 
-    // =============================================================== 4: r, 56 bits after the point
+    // =============================================================== 4: out of the block RAM
+
+    reg [56:0] multiple4;
+    reg [27:0] fixed4;
+    reg        first4, cosine4, tiny4, negative4, refused4;
+    reg [30:0] x4;
+    always @(posedge clk) begin
+        multiple4 <= multiple;
+        fixed4    <= fixed3;
+        cosine4   <= quadrant3[0] ^ op3;
+        negative4 <= sign3 ^ quadrant3[1] ^ (quadrant3[0] & op3);
+        {first4, tiny4, refused4, x4} <= {first3, tiny3, refused3, x3};
+    end
+
+    // =============================================================== 5: r, 56 bits after the point
 
     // What takes the place of |r| in n: the operand's own significand, or 1 for a cosine.
-    reg [56:0] r4;
-    reg        given4, cosine4, tiny4, negative4, refused4;
-    reg [22:0] given_fraction4;
-    reg [7:0]  given_field4;
+    reg [56:0] r5;
+    reg        given5, cosine5, tiny5, negative5, refused5;
+    reg [22:0] given_fraction5;
+    reg [7:0]  given_field5;
     always @(posedge clk) begin
-        r4              <= {fixed3 + multiple3[56:29], multiple3[28:0]};
-        given4          <= first3 | cosine3;
-        given_fraction4 <= x3[22:0] & {23{~cosine3}};
-        given_field4    <= cosine3 ? 8'd127 : x3[30:23];
-        {cosine4, tiny4, negative4, refused4} <= {cosine3, tiny3, negative3, refused3};
+        r5              <= {fixed4 + multiple4[56:29], multiple4[28:0]};
+        given5          <= first4 | cosine4;
+        given_fraction5 <= x4[22:0] & {23{~cosine4}};
+        given_field5    <= cosine4 ? 8'd127 : x4[30:23];
+        {cosine5, tiny5, negative5, refused5} <= {cosine4, tiny4, negative4, refused4};
     end
 
-    // =============================================================== 5: |r|, by one's complement; n without 16 zeros
+    // =============================================================== 6: |r|, by one's complement; n without 16 zeros
 
-    wire        minus = r4[56];
-    wire [55:0] r     = r4[55:0] ^ {56{minus}};
-    wire [55:0] n0    = given4 ? {1'b1, given_fraction4, 32'd0} : r;
+    wire        minus = r5[56];
+    wire [55:0] r     = r5[55:0] ^ {56{minus}};
+    wire [55:0] n0    = given5 ? {1'b1, given_fraction5, 32'd0} : r;
     wire        zeros16 = ~|n0[55:40];
 
     // The six leading bits of |h|, by one's complement; h is in two's complement.
@@ -138,136 +149,136 @@ module takt_sine #(
     wire [7:0]  bend;
     takt_wave_table polynomials (
         .clk(clk),
-        .row({cosine4, r[55:47]}), .coefficients(coefficients),
-        .place({cosine4, r[55:51], h[16:11] ^ {6{h[17]}}}), .bend(bend)
+        .row({cosine5, r[55:47]}), .coefficients(coefficients),
+        .place({cosine5, r[55:51], h[16:11] ^ {6{h[17]}}}), .bend(bend)
     );
 
-    reg [17:0] h5;
-    reg [42:0] n5;
-    reg        zeros16_5, given5, cosine5, tiny5, negative5, refused5;
-    reg [7:0]  given_field5;
-    always @(posedge clk) begin
-        h5        <= h & {18{~tiny4}};
-        n5        <= zeros16 ? {n0[39:0], 3'd0} : n0[55:13];
-        zeros16_5 <= zeros16;
-        negative5 <= negative4 ^ (minus & ~given4);
-        {given5, given_field5, cosine5, tiny5, refused5} <= {given4, given_field4, cosine4, tiny4, refused4};
-    end
-
-    // =============================================================== 6: into the first multiplier; n without 8 zeros
-
-    wire        zeros8 = ~|n5[42:35];
-    wire [35:0] slope_product;
-    takt_product #(.SIGNED_A(1), .INPUT_REGS(1)) slope (
-        .clk(clk), .a(h5), .b(coefficients[17:0]), .p(slope_product)
-    );
-
-    reg [27:0] c0_6;
-    reg [7:0]  bend6;
-    reg [34:0] n6;
-    reg        zeros16_6, zeros8_6, given6, cosine6, negative6, refused6;
+    reg [17:0] h6;
+    reg [42:0] n6;
+    reg        zeros16_6, given6, cosine6, tiny6, negative6, refused6;
     reg [7:0]  given_field6;
     always @(posedge clk) begin
-        // A tiny operand's V is 0.
-        c0_6     <= coefficients[45:18] & {28{~tiny5}};
-        bend6    <= bend & {8{~tiny5}};
-        n6       <= zeros8 ? n5[34:0] : n5[42:8];
-        zeros8_6 <= zeros8;
-        {zeros16_6, given6, given_field6, cosine6, negative6, refused6} <=
-            {zeros16_5, given5, given_field5, cosine5, negative5, refused5};
+        h6        <= h & {18{~tiny5}};
+        n6        <= zeros16 ? {n0[39:0], 3'd0} : n0[55:13];
+        zeros16_6 <= zeros16;
+        negative6 <= negative5 ^ (minus & ~given5);
+        {given6, given_field6, cosine6, tiny6, refused6} <= {given5, given_field5, cosine5, tiny5, refused5};
     end
 
-    // =============================================================== 7: slope's product; n without 4 zeros and 2
+    // =============================================================== 7: into the first multiplier; n without 8 zeros
 
-    wire        zeros4 = ~|n6[34:31];
-    wire [30:0] n6_4   = zeros4 ? n6[30:0] : n6[34:4];
-    wire        zeros2 = ~|n6_4[30:29];
+    wire        zeros8 = ~|n6[42:35];
+    wire [35:0] slope_product;
+    takt_product #(.SIGNED_A(1), .INPUT_REGS(1)) slope (
+        .clk(clk), .a(h6), .b(coefficients[17:0]), .p(slope_product)
+    );
 
     reg [27:0] c0_7;
-    reg [28:0] n7;
-    reg        zeros16_7, zeros8_7, zeros4_7, zeros2_7, given7, cosine7, negative7, refused7;
+    reg [7:0]  bend7;
+    reg [34:0] n7;
+    reg        zeros16_7, zeros8_7, given7, cosine7, negative7, refused7;
     reg [7:0]  given_field7;
     always @(posedge clk) begin
-        c0_7     <= c0_6 + {20'd0, bend6};
-        n7       <= zeros2 ? n6_4[28:0] : n6_4[30:2];
-        zeros4_7 <= zeros4;
-        zeros2_7 <= zeros2;
-        {zeros16_7, zeros8_7, given7, given_field7, cosine7, negative7, refused7} <=
-            {zeros16_6, zeros8_6, given6, given_field6, cosine6, negative6, refused6};
+        // A tiny operand's V is 0.
+        c0_7     <= coefficients[45:18] & {28{~tiny6}};
+        bend7    <= bend & {8{~tiny6}};
+        n7       <= zeros8 ? n6[34:0] : n6[42:8];
+        zeros8_7 <= zeros8;
+        {zeros16_7, given7, given_field7, cosine7, negative7, refused7} <=
+            {zeros16_6, given6, given_field6, cosine6, negative6, refused6};
     end
 
-    // =============================================================== 8: V, 29 bits after the point, of which 27 are used; n
+    // =============================================================== 8: slope's product; n without 4 zeros and 2
 
-    wire        zeros1 = ~n7[28];
-    wire [27:0] n      = zeros1 ? n7[27:0] : n7[28:1];
-    wire [27:0] v      = c0_7 + {{8{slope_product[35]}}, slope_product[35:16]};
+    wire        zeros4 = ~|n7[34:31];
+    wire [30:0] n7_4   = zeros4 ? n7[30:0] : n7[34:4];
+    wire        zeros2 = ~|n7_4[30:29];
+
+    reg [27:0] c0_8;
+    reg [28:0] n8;
+    reg        zeros16_8, zeros8_8, zeros4_8, zeros2_8, given8, cosine8, negative8, refused8;
+    reg [7:0]  given_field8;
+    always @(posedge clk) begin
+        c0_8     <= c0_7 + {20'd0, bend7};
+        n8       <= zeros2 ? n7_4[28:0] : n7_4[30:2];
+        zeros4_8 <= zeros4;
+        zeros2_8 <= zeros2;
+        {zeros16_8, zeros8_8, given8, given_field8, cosine8, negative8, refused8} <=
+            {zeros16_7, zeros8_7, given7, given_field7, cosine7, negative7, refused7};
+    end
+
+    // =============================================================== 9: V, 29 bits after the point, of which 27 are used; n
+
+    wire        zeros1 = ~n8[28];
+    wire [27:0] n      = zeros1 ? n8[27:0] : n8[28:1];
+    wire [27:0] v      = c0_8 + {{8{slope_product[35]}}, slope_product[35:16]};
 
     // V of a sine is less than 1/8.
     wire [35:0] high_high;
     takt_product #(.INPUT_REGS(1)) products (.clk(clk), .a(n[27:10]), .b(v[25:8]), .p(high_high));
 
-    reg [27:0] n8;
-    reg [25:0] v8;
-    reg [7:0]  field8;
-    reg        cosine8, negative8, refused8;
+    reg [27:0] n9;
+    reg [25:0] v9;
+    reg [7:0]  field9;
+    reg        cosine9, negative9, refused9;
     always @(posedge clk) begin
-        n8        <= n;
-        v8        <= v[27:2];
-        field8    <= given7 ? given_field7 : 8'd126 - {3'd0, zeros16_7, zeros8_7, zeros4_7, zeros2_7, zeros1};
-        {cosine8, negative8, refused8} <= {cosine7, negative7, refused7};
+        n9        <= n;
+        v9        <= v[27:2];
+        field9    <= given8 ? given_field8 : 8'd126 - {3'd0, zeros16_8, zeros8_8, zeros4_8, zeros2_8, zeros1};
+        {cosine9, negative9, refused9} <= {cosine8, negative8, refused8};
     end
 
-    // =============================================================== 9: the products with the low parts, row by row
+    // =============================================================== 10: the products with the low parts, row by row
 
-    wire [7:0]  p = n8[27:20];                  // times the low 6 bits of V
-    wire [7:0]  q = v8[23:16];                  // times the next 7 bits of n
+    wire [7:0]  p = n9[27:20];                  // times the low 6 bits of V
+    wire [7:0]  q = v9[23:16];                  // times the next 7 bits of n
     reg  [9:0]  high_low01, high_low23, high_low45, low_high01, low_high23, low_high45;
     reg  [7:0]  low_high6;
-    reg  [27:0] n9;
-    reg  [25:0] v9;
-    reg  [7:0]  field9;
-    reg         cosine9, negative9, refused9;
+    reg  [27:0] n10;
+    reg  [25:0] v10;
+    reg  [7:0]  field10;
+    reg         cosine10, negative10, refused10;
     always @(posedge clk) begin
-        high_low01 <= {2'd0, p & {8{v8[0]}}} + {1'd0, p & {8{v8[1]}}, 1'd0};
-        high_low23 <= {2'd0, p & {8{v8[2]}}} + {1'd0, p & {8{v8[3]}}, 1'd0};
-        high_low45 <= {2'd0, p & {8{v8[4]}}} + {1'd0, p & {8{v8[5]}}, 1'd0};
-        low_high01 <= {2'd0, q & {8{n8[3]}}} + {1'd0, q & {8{n8[4]}}, 1'd0};
-        low_high23 <= {2'd0, q & {8{n8[5]}}} + {1'd0, q & {8{n8[6]}}, 1'd0};
-        low_high45 <= {2'd0, q & {8{n8[7]}}} + {1'd0, q & {8{n8[8]}}, 1'd0};
-        low_high6  <= q & {8{n8[9]}};
-        {n9, v9, field9, cosine9, negative9, refused9} <= {n8, v8, field8, cosine8, negative8, refused8};
+        high_low01 <= {2'd0, p & {8{v9[0]}}} + {1'd0, p & {8{v9[1]}}, 1'd0};
+        high_low23 <= {2'd0, p & {8{v9[2]}}} + {1'd0, p & {8{v9[3]}}, 1'd0};
+        high_low45 <= {2'd0, p & {8{v9[4]}}} + {1'd0, p & {8{v9[5]}}, 1'd0};
+        low_high01 <= {2'd0, q & {8{n9[3]}}} + {1'd0, q & {8{n9[4]}}, 1'd0};
+        low_high23 <= {2'd0, q & {8{n9[5]}}} + {1'd0, q & {8{n9[6]}}, 1'd0};
+        low_high45 <= {2'd0, q & {8{n9[7]}}} + {1'd0, q & {8{n9[8]}}, 1'd0};
+        low_high6  <= q & {8{n9[9]}};
+        {n10, v10, field10, cosine10, negative10, refused10} <= {n9, v9, field9, cosine9, negative9, refused9};
     end
 
-    // =============================================================== 10, 11: n - n V in (0.6, 2), 36 bits after the point
+    // =============================================================== 11, 12: n - n V in (0.6, 2), 36 bits after the point
 
-    wire [35:0] most = cosine9 ? {1'b0, v9, 9'd0} : {2'd0, high_high[35:2]};
-    reg [36:0] most10, result11;
-    reg [13:0] high_low10;
-    reg [14:0] low_high10;
-    reg [7:0]  field10, field11, less11;
-    reg        cosine10, negative10, refused10, negative11, refused11;
-    wire [16:0] least10 = {1'd0, high_low10, 2'd0} + {1'd0, low_high10, 1'd0};
+    wire [35:0] most = cosine10 ? {1'b0, v10, 9'd0} : {2'd0, high_high[35:2]};
+    reg [36:0] most11, result12;
+    reg [13:0] high_low11;
+    reg [14:0] low_high11;
+    reg [7:0]  field11, field12, less12;
+    reg        cosine11, negative11, refused11, negative12, refused12;
+    wire [16:0] least11 = {1'd0, high_low11, 2'd0} + {1'd0, low_high11, 1'd0};
     always @(posedge clk) begin
-        most10     <= {n9, 9'd0} - {1'b0, most};
-        high_low10 <= {4'd0, high_low01} + {2'd0, high_low23, 2'd0} + {high_low45, 4'd0};
-        low_high10 <= {5'd0, low_high01} + {3'd0, low_high23, 2'd0} + {1'd0, low_high45, 4'd0} + {1'd0, low_high6, 6'd0};
-        result11   <= most10 - {20'd0, least10 & {17{~cosine10}}};
-        field11    <= field10;
-        less11     <= field10 - 8'd1;
-        {field10, cosine10, negative10, refused10} <= {field9, cosine9, negative9, refused9};
-        {negative11, refused11} <= {negative10, refused10};
+        most11     <= {n10, 9'd0} - {1'b0, most};
+        high_low11 <= {4'd0, high_low01} + {2'd0, high_low23, 2'd0} + {high_low45, 4'd0};
+        low_high11 <= {5'd0, low_high01} + {3'd0, low_high23, 2'd0} + {1'd0, low_high45, 4'd0} + {1'd0, low_high6, 6'd0};
+        result12   <= most11 - {20'd0, least11 & {17{~cosine11}}};
+        field12    <= field11;
+        less12     <= field11 - 8'd1;
+        {field11, cosine11, negative11, refused11} <= {field10, cosine10, negative10, refused10};
+        {negative12, refused12} <= {negative11, refused11};
     end
 
-    // =============================================================== 12: rounded to nearest, by adding half a unit
+    // =============================================================== 13: rounded to nearest, by adding half a unit
 
     // The leading one is not added to the exponent field, which is therefore one less below 1.
-    wire        one     = result11[36];
-    wire [30:0] rounded = {one ? field11 : less11, one ? result11[35:13] : result11[34:12]} + {30'd0, one ? result11[12] : result11[11]};
+    wire        one     = result12[36];
+    wire [30:0] rounded = {one ? field12 : less12, one ? result12[35:13] : result12[34:12]} + {30'd0, one ? result12[12] : result12[11]};
     always @(posedge clk) begin
-        result <= refused11 ? 32'h7fc00000 : {negative11, rounded};
-        flags  <= {refused11, 2'b00};
+        result <= refused12 ? 32'h7fc00000 : {negative12, rounded};
+        flags  <= {refused12, 2'b00};
     end
 
-    wire unused = &{1'b0, by163[13:0], slope_product[15:0], v[1:0], v8[15:6], n8[19:10], n8[2:0], high_high[1:0], result11[10:0]};
+    wire unused = &{1'b0, by163[13:0], slope_product[15:0], v[1:0], v9[15:6], n9[19:10], n9[2:0], high_high[1:0], result12[10:0]};
 
 endmodule

@@ -21,12 +21,12 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Install what the tests need and is not there, then run every test, optimised.
+    /// Install what the tests need and is not there, then run formal verification's share and every test, optimised.
     Test {
         /// Exhaustive: all 2³² operands of every operation of one operand (about ten minutes on two cores).
         #[arg(long)]
         full: bool,
-        /// Passed on to `cargo test`.
+        /// Passed on to `cargo test`, which then runs alone.
         #[arg(last = true)]
         rest: Vec<String>,
     },
@@ -124,6 +124,9 @@ fn apt_install(packages: &[&str]) -> Result<()> {
 
 fn test(full: bool, rest: &[String]) -> Result<()> {
     install()?;
+    if rest.is_empty() {
+        formal::formal(&formal::Arguments::SHARE)?;
+    }
     let mut tests = cargo();
     tests.args(["test", "--workspace", "--profile", PROFILE]).args(rest);
     if full {
