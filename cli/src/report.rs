@@ -116,7 +116,7 @@ fn time_table(tracking: &Tracking, out: &mut String) {
     if let Some(placed) = crate::synthesis::placed(machine) {
         let time = totals.longest as f64 / placed.mhz;
         let name = format!("Takt {machine}, longest, as placed and routed");
-        let _ = writeln!(out, "  {name:<40}{:>7.0}{:>10}{time:>12.3}", placed.mhz, digits(totals.longest));
+        let _ = writeln!(out, "  {name:<40}{:>7.1}{:>10}{time:>12.3}", placed.mhz, digits(totals.longest));
         let _ = writeln!(
             out,
             "  Placed and routed on {} on {} (median of {} seeds: docs/synthesis.md).",
