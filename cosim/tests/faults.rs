@@ -21,7 +21,7 @@ const COMMON: &[Fault] = &[
     ("takt_multiply", "5'd23 - zeros1", "5'd22 - zeros1"),
     ("takt_convert", "x[31] & ~nan", "1'b0"),
     ("takt_alu", "a[31] ^ b[31] ^ less", "a[31] ^ b[31]"),
-    ("takt_sine", "quadrant2[1] ^ (quadrant2[0] & op2)", "quadrant2[1]"),
+    ("takt_sine", "quadrant3[1] ^ (quadrant3[0] & op3)", "quadrant3[1]"),
     // Waiting for operands: too short, in each of the ways in which a result is underway.
     ("takt_hazard", "r_later | r_on_issue", "r_later"),
     ("takt_hazard", "(|hit[DEPTH-1:3]) | (|late_hit)", "|hit[DEPTH-1:3]"),
