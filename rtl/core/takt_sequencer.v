@@ -1,7 +1,7 @@
 // takt_sequencer: which bundle comes next: branches, calls, the tick, halts and faults.
 //
-// The bundle that issued in the last cycle is in the execute stage (x_). There a redirecting operation is decided, and the
-// target's address goes to the program memory in the same cycle.
+// The bundle that issued in the last cycle is in the execute stage (x_). There a redirecting operation is decided; in the next
+// cycle the target's address goes to the program memory.
 //
 // Contract
 //   flush: what was fetched after the bundle in execute does not issue; fetch is the target's address. Without flush, fetch
@@ -15,8 +15,8 @@
 module takt_sequencer #(
     parameter PROGRAM = 10,  // bits of an address of the program memory, less than 16
     parameter STACK   = 16,  // entries of the return stack
-    parameter REFILL  = 5,
-    parameter RESOLVE = 1,
+    parameter REFILL  = 6,
+    parameter RESOLVE = 2,
     parameter SLOT    = 2,   // its number
     parameter MEMORY  = 2,   // number of the data memory's slot
     parameter SLOTS   = 3
@@ -39,7 +39,7 @@ module takt_sequencer #(
     input  wire [31:0]      x_operand,
     input  wire             x_address_fault,
     input  wire             tick,
-    output wire             flush,
+    output reg              flush,
     output wire [PROGRAM-1:0] fetch,
     output wire             f_outside,     // what the program memory delivers is no part of it
     output wire             block,
@@ -61,8 +61,8 @@ module takt_sequencer #(
     localparam [2:0] MEMORY_SLOT = MEMORY;
 
     generate
-        if (REFILL != 5 || RESOLVE != 1) begin : g_refill
-            takt_sequencer_has_refill_5_and_resolve_1 unsupported ();
+        if (REFILL != 6 || RESOLVE != 2) begin : g_refill
+            takt_sequencer_has_refill_6_and_resolve_2 unsupported ();
         end
         if (STACK != 16) begin : g_stack
             takt_sequencer_has_a_stack_of_16 unsupported ();
@@ -71,8 +71,7 @@ module takt_sequencer #(
 
     // ---- execute
 
-    // Whether the bundle in execute redirects if its operand is 0, and if it is not: little is left to do when the operand is there.
-    reg        x_if_zero, x_if_nonzero;
+    reg        x_if_zero, x_if_nonzero;  // it redirects if its operand is 0, if it is not
     reg        x_call, x_return, x_wait, x_halt, x_refused;
     reg [15:0] x_target;
     reg [2:0]  x_illegal_slot;
@@ -84,10 +83,8 @@ module takt_sequencer #(
     wire stack_full  = x_call & entries[4];
     wire stack_empty = x_return & (entries == 5'd0);
 
-    assign flush = x_operand == 32'd0 ? x_if_zero : x_if_nonzero;
-
     reg  [15:0] fetched;  // the address of what the program memory delivers
-    wire [15:0] target     = x_return ? stack[top] : x_target;
+    reg  [15:0] target;
     wire [15:0] next_fetch = fetched + 16'd1;
     wire [15:0] chosen     = flush ? target : next_fetch;
     assign fetch     = chosen[PROGRAM-1:0];
@@ -100,6 +97,8 @@ module takt_sequencer #(
         if (flush | advance) fetched <= chosen;
         if (flush) i_address <= target;
         else if (issue) i_address <= i_address + 16'd1;
+        flush        <= x_operand == 32'd0 ? x_if_zero : x_if_nonzero;
+        target       <= x_return ? stack[top] : x_target;
         x_address    <= i_address;
         x_target     <= i_target;
         x_issued     <= take;
@@ -122,7 +121,7 @@ module takt_sequencer #(
         end
         if (rst) begin
             {x_call, x_return, x_wait, x_halt, x_refused, x_issued} <= 6'd0;
-            {x_if_zero, x_if_nonzero} <= 2'b11;
+            {flush, x_if_zero, x_if_nonzero} <= 3'b011;
             x_target <= 16'd0;
             entries  <= 5'd0;
             top      <= 4'd15;
@@ -153,7 +152,7 @@ module takt_sequencer #(
     // ---- stops
 
     wire redirects = always_redirects | i_branch_zero | i_branch_nonzero | i_halt;
-    assign block = (issue & redirects) | wait_next | x_halt | halted | refused | x_refused | fault;
+    assign block = (issue & redirects) | x_if_zero | x_if_nonzero | wait_next | x_halt | halted | refused | x_refused | fault;
 
     always @(posedge clk) begin
         if (x_halt & ~fault) halted <= 1'b1;

@@ -92,8 +92,8 @@ pub static T3: Machine = Machine {
     code_depth: 1024,
     data_depth: 1024,
     stack_depth: 16,
-    refill: 5,
-    resolve: 1,
+    refill: 6,
+    resolve: 2,
 };
 
 /// The small machine: one slot.
@@ -110,8 +110,8 @@ pub static T1: Machine = Machine {
     code_depth: 2048,
     data_depth: 1024,
     stack_depth: 16,
-    refill: 5,
-    resolve: 1,
+    refill: 6,
+    resolve: 2,
 };
 
 /// The fast machine with arctangent and arccosine.
