@@ -2,31 +2,12 @@
 
 mod common;
 
-use common::{Folder, source};
-
-const SOURCE: &str = "\
-.output sum, count:int
-.reg    i:int n:int x
-        li      n, 3
-        mov     i, zero
-        fadd    sum, zero, zero
-next:   call    add
-        iadd    i, i, 1
-        ilt     x, i, n
-        bnz     x, next
-        mov     count, i
-        halt
-add:    ld      x, table[i]
-        fadd    sum, sum, x
-        ret
-.data
-table:  .float  0.5, 0.25, -1.75
-";
+use common::{Folder, SUM, source};
 
 #[test]
 fn a_script() {
     let folder = Folder::new();
-    folder.write("sum.s", SOURCE);
+    folder.write("sum.s", SUM);
     folder.write(
         "good.txt",
         "# what the program is to do\nbreak add if i == 2\nwatch sum\ncontinue\ncontinue\nstops\nflight\nprint sum, i, table[i], @m0\n\
@@ -43,7 +24,7 @@ fn a_script() {
 #[test]
 fn help() {
     let folder = Folder::new();
-    folder.write("sum.s", SOURCE);
+    folder.write("sum.s", SUM);
     let text = folder.fed("debug sum.s", b"help\nquit\nnever read\n").ok();
     insta::assert_snapshot!("commands", text.split_once("(takt) help\n").unwrap().1);
 }
@@ -51,7 +32,7 @@ fn help() {
 #[test]
 fn mistakes() {
     let folder = Folder::new();
-    folder.write("sum.s", SOURCE);
+    folder.write("sum.s", SUM);
     folder.write("typo.txt", "step\nprnt sum\n");
     let mut text = String::new();
     for line in [

@@ -2,31 +2,12 @@
 
 mod common;
 
-use common::Folder;
+use common::{Folder, SUM};
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
 use std::io::{Read, Write};
 use std::num::NonZeroU16;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
-
-const SOURCE: &str = "\
-.output sum, count:int
-.reg    i:int n:int x
-        li      n, 3
-        mov     i, zero
-        fadd    sum, zero, zero
-next:   call    add
-        iadd    i, i, 1
-        ilt     x, i, n
-        bnz     x, next
-        mov     count, i
-        halt
-add:    ld      x, table[i]
-        fadd    sum, sum, x
-        ret
-.data
-table:  .float  0.5, 0.25, -1.75
-";
 
 /// Runs for as long as anybody lets it.
 const ENDLESS: &str = ".output n:int\n        mov n, zero\nloop:   iadd n, n, 1\n        jmp loop\n";
@@ -146,7 +127,7 @@ impl Terminal {
 #[test]
 fn full_screen() {
     let folder = Folder::new();
-    folder.write("sum.s", SOURCE);
+    folder.write("sum.s", SUM);
     let line = "takt debug sum.s --tui; echo status $?; stty -a";
     let mut terminal = Terminal::new(&folder, line, 24, 80);
     terminal.until("the alternate screen", vt100::Screen::alternate_screen);
@@ -203,7 +184,7 @@ fn a_long_run_is_interrupted_full_screen() {
 #[test]
 fn full_screen_wants_a_terminal() {
     let folder = Folder::new();
-    folder.write("sum.s", SOURCE);
+    folder.write("sum.s", SUM);
     let done = folder.line("debug sum.s --tui");
     assert_eq!((done.status, done.stdout.as_str()), (Some(2), ""));
     assert!(done.stderr.contains("--tui wants a terminal"), "{}", done.stderr);
@@ -215,7 +196,7 @@ fn full_screen_wants_a_terminal() {
 #[test]
 fn the_prompt() {
     let folder = Folder::new();
-    folder.write("sum.s", SOURCE);
+    folder.write("sum.s", SUM);
     let mut terminal = Terminal::new(&folder, "takt debug sum.s", 40, 100);
     // Commands, labels and registers complete.
     terminal.line("disp\t cou\t\r");

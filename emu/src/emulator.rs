@@ -295,6 +295,11 @@ impl Emulator {
 
     // ---- Running.
 
+    /// From here to the end.
+    pub(crate) fn goal(&self) -> Goal {
+        Goal { start: self.now, until: Cycle::MAX, wait: false, bundle: false }
+    }
+
     /// Lets one cycle pass.
     ///
     /// # Errors
@@ -308,7 +313,7 @@ impl Emulator {
     /// # Errors
     /// A fault; asked again, the same one.
     pub fn step_bundle(&mut self) -> Result<Stop, Fault> {
-        self.drive(Goal { start: self.now, until: Cycle::MAX, wait: false, bundle: true }, &mut None)
+        self.drive(Goal { bundle: true, ..self.goal() }, &mut None)
     }
 
     /// Runs until `cycle` cycles have passed since reset.
@@ -316,7 +321,7 @@ impl Emulator {
     /// # Errors
     /// A fault; asked again, the same one.
     pub fn run_until(&mut self, cycle: Cycle) -> Result<Stop, Fault> {
-        self.drive(Goal { start: self.now, until: cycle, wait: false, bundle: false }, &mut None)
+        self.drive(Goal { until: cycle, ..self.goal() }, &mut None)
     }
 
     /// Runs until a `wait` has issued.
@@ -324,7 +329,7 @@ impl Emulator {
     /// # Errors
     /// A fault; asked again, the same one.
     pub fn run_to_wait(&mut self) -> Result<Stop, Fault> {
-        self.drive(Goal { start: self.now, until: Cycle::MAX, wait: true, bundle: false }, &mut None)
+        self.drive(Goal { wait: true, ..self.goal() }, &mut None)
     }
 
     /// Runs until the machine halts, or waits and no tick is going to come.
@@ -332,7 +337,7 @@ impl Emulator {
     /// # Errors
     /// A fault; asked again, the same one.
     pub fn run(&mut self) -> Result<Stop, Fault> {
-        self.drive(Goal { start: self.now, until: Cycle::MAX, wait: false, bundle: false }, &mut None)
+        self.drive(self.goal(), &mut None)
     }
 
     /// The machine with an observer: the same ways of running it, and `sink` hears every [`Event`].
@@ -554,7 +559,7 @@ impl Observed<'_> {
     /// # Errors
     /// As there.
     pub fn step_bundle(&mut self) -> Result<Stop, Fault> {
-        self.drive(Goal { start: self.emulator.now, until: Cycle::MAX, wait: false, bundle: true })
+        self.drive(Goal { bundle: true, ..self.emulator.goal() })
     }
 
     /// As [`Emulator::run_until`].
@@ -562,7 +567,7 @@ impl Observed<'_> {
     /// # Errors
     /// As there.
     pub fn run_until(&mut self, cycle: Cycle) -> Result<Stop, Fault> {
-        self.drive(Goal { start: self.emulator.now, until: cycle, wait: false, bundle: false })
+        self.drive(Goal { until: cycle, ..self.emulator.goal() })
     }
 
     /// As [`Emulator::run_to_wait`].
@@ -570,7 +575,7 @@ impl Observed<'_> {
     /// # Errors
     /// As there.
     pub fn run_to_wait(&mut self) -> Result<Stop, Fault> {
-        self.drive(Goal { start: self.emulator.now, until: Cycle::MAX, wait: true, bundle: false })
+        self.drive(Goal { wait: true, ..self.emulator.goal() })
     }
 
     /// As [`Emulator::run`].
@@ -578,7 +583,7 @@ impl Observed<'_> {
     /// # Errors
     /// As there.
     pub fn run(&mut self) -> Result<Stop, Fault> {
-        self.drive(Goal { start: self.emulator.now, until: Cycle::MAX, wait: false, bundle: false })
+        self.drive(self.emulator.goal())
     }
 
     /// As [`Emulator::run_period`].

@@ -368,7 +368,7 @@ impl Emulator {
         until: Cycle,
         sink: &mut Sink<'_>,
     ) -> Result<Option<PeriodReport>, PeriodError> {
-        let goal = Goal { start: self.now, until, wait: true, bundle: false };
+        let goal = Goal { until, wait: true, ..self.goal() };
         self.report = None;
         loop {
             if let Status::Waiting { since, .. } = self.status

@@ -115,7 +115,7 @@ fn prove(venv: &Venv, design: &Design, module: &str, properties: &str, cycles: u
 
 /// A decoder: a word is illegal unless it is one of the table's; of units and of latencies it names one at most.
 fn decoder(machine: &Machine, slot: &Slot) -> String {
-    // Operands lie in one of the machine's banks, inputs and constants included.
+    // Operands lie in one of the machine's banks, the input ports' included.
     let exists = |field: Field| {
         let bits = field.bits();
         let (low, high) = (bits.low, bits.low + bits.width - 1);

@@ -128,7 +128,7 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
         formal::formal(&formal::Arguments::SHARE)?;
     }
     let mut tests = cargo();
-    tests.args(["test", "--workspace", "--profile", PROFILE]).args(rest);
+    tests.args(["test", "--workspace", "--no-fail-fast", "--profile", PROFILE]).args(rest);
     if full {
         tests.env("TAKT_FULL", "1");
     }

@@ -7,6 +7,26 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 
+/// Sums a table, a call for each element.
+pub const SUM: &str = "\
+.output sum, count:int
+.reg    i:int n:int x
+        li      n, 3
+        mov     i, zero
+        fadd    sum, zero, zero
+next:   call    add
+        iadd    i, i, 1
+        ilt     x, i, n
+        bnz     x, next
+        mov     count, i
+        halt
+add:    ld      x, table[i]
+        fadd    sum, sum, x
+        ret
+.data
+table:  .float  0.5, 0.25, -1.75
+";
+
 /// A source that comes with the repository.
 pub fn source(name: &str) -> String {
     format!("{}/../programs/hybrid/{name}", env!("CARGO_MANIFEST_DIR"))
