@@ -8,28 +8,28 @@
 //   operations. What an operation lacks of a, b and c is ignored. mov's code passes a for the core too: an immediate (li),
 //   the status register (rdflags).
 //
-//@ op 5'b00000 mov li rdflags
-//@ op 5'b00001 fabs
-//@ op 5'b00010 fneg
-//@ op 5'b00011 fsign
-//@ op 5'b00100 iand
-//@ op 5'b00101 ior
-//@ op 5'b00110 ixor
-//@ op 5'b01000 iadd
-//@ op 5'b01001 isub
-//@ op 5'b01100 ishr
-//@ op 5'b01101 ishl
-//@ op 5'b01110 isar
-//@ op 5'b10000 ieq
-//@ op 5'b10001 ilt
-//@ op 5'b10010 iltu
-//@ op 5'b10100 feq
-//@ op 5'b10101 flt
-//@ op 5'b10110 fle
-//@ op 5'b11000 fmin
-//@ op 5'b11001 fmax
-//@ op 5'b11010 fsat
-//@ op 5'b11011 sel
+//@ op 6'b000000 mov li rdflags
+//@ op 6'b000001 fabs
+//@ op 6'b000010 fneg
+//@ op 6'b000011 fsign
+//@ op 6'b000100 iand
+//@ op 6'b000101 ior
+//@ op 6'b000110 ixor
+//@ op 6'b101000 iadd
+//@ op 6'b001001 isub
+//@ op 6'b001100 ishr
+//@ op 6'b001101 ishl
+//@ op 6'b001110 isar
+//@ op 6'b010000 ieq
+//@ op 6'b010001 ilt
+//@ op 6'b010010 iltu
+//@ op 6'b010100 feq
+//@ op 6'b010101 flt
+//@ op 6'b010110 fle
+//@ op 6'b011000 fmin
+//@ op 6'b011001 fmax
+//@ op 6'b011010 fsat
+//@ op 6'b011011 sel
 //
 // Pipeline: one register, the result. Everything before it is one level of alternatives: the longest paths are a carry
 // chain followed by a choice, and the shifter.
@@ -39,7 +39,7 @@ module takt_alu #(
 ) (
     input  wire        clk,
     input  wire        in_valid,
-    input  wire [4:0]  op,
+    input  wire [5:0]  op,
     input  wire [31:0] a,
     input  wire [31:0] b,
     input  wire [31:0] c,
@@ -54,7 +54,7 @@ module takt_alu #(
         end
     endgenerate
 
-    // ---- groups of operations: op[4:2] names the group, op[1:0] the member
+    // ---- groups of operations: op[4:2] names the group, op[1:0] the member; op[5] the one that adds
 
     wire is_pass    = op[4:2] == 3'b000;
     wire is_logic   = op[4:2] == 3'b001;
@@ -67,14 +67,14 @@ module takt_alu #(
     wire is_sign    = is_pass & (op[1:0] == 2'b11);
     wire is_sel     = is_choice & (op[1:0] == 2'b11);
 
-    // ---- sum and difference. The difference of the low 31 bits also compares: magnitudes of binary32 numbers, and integers,
-    //      since in two's complement of like sign the low bits decide.
+    // ---- sum and difference on one carry chain, whose carry in comes from a place below the others. The difference of the low
+    //      31 bits also compares: magnitudes of binary32 numbers, and integers, since in two's complement of like sign the low
+    //      bits decide.
 
-    wire [31:0] sum = a + b;
-    wire [31:0] low_difference = {1'b0, a[30:0]} - {1'b0, b[30:0]};
-    wire        less       = low_difference[31];
-    wire [31:0] difference = {a[31] ^ b[31] ^ less, low_difference[30:0]};
-    wire [31:0] arithmetic = ({32{is_sum & ~op[0]}} & sum) | ({32{is_sum & op[0]}} & difference);
+    wire        minus      = ~op[5];
+    wire [32:0] low_sum    = {1'b0, a[30:0], 1'b1} + {1'b0, b[30:0] ^ {31{minus}}, minus};
+    wire        less       = ~low_sum[32];  // of the difference
+    wire [31:0] arithmetic = {a[31] ^ b[31] ^ minus ^ low_sum[32], low_sum[31:1]} & {32{is_sum}};
 
     // ---- shift: a rotation to the right, for a left shift by the negative of the count, and a mask for what came round. The
     //      steps begin with the count's low bit: each bit of the negative takes a little longer.

@@ -11,7 +11,7 @@ module takt_alu_late #(
 ) (
     input  wire        clk,
     input  wire        in_valid,
-    input  wire [4:0]  op,
+    input  wire [5:0]  op,
     input  wire [31:0] a,
     input  wire [31:0] b,
     input  wire [31:0] c,

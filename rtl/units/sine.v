@@ -1,4 +1,4 @@
-// takt_sine: sine and cosine of a binary32 number of radians, in fixed point, pipelined, on two multipliers.
+// takt_sine: sine and cosine of a binary32 number of radians, in fixed point, pipelined, on three multipliers.
 //
 // Contract
 //   An operation whose operand stands on the inputs in one cycle, with in_valid, has its result and flags on the outputs,
@@ -24,7 +24,7 @@
 //   7   coefficients         into the first multiplier: h, the place in the segment, and c1
 //   8   slope's product      h c1; c0 + c2 h^2, which comes from a table
 //   9   polynomial           V; into the second multiplier, with n
-//   10  product              of n and V; of their low parts in logic
+//   10  product              of n and V; that with the low bits of V in logic
 //   11  sums
 //   12  difference           n - n V
 //   13  rounded              the result
@@ -216,6 +216,8 @@ module takt_sine #(
     // V of a sine is less than 1/8.
     wire [35:0] high_high;
     takt_product #(.INPUT_REGS(1)) products (.clk(clk), .a(n[27:10]), .b(v[25:8]), .p(high_high));
+    wire [35:0] low_high;                       // the next 7 bits of n
+    takt_product #(.INPUT_REGS(1)) low_products (.clk(clk), .a({11'd0, n[9:3]}), .b({10'd0, v[25:18]}), .p(low_high));
 
     reg [27:0] n9;
     reg [25:0] v9;
@@ -228,12 +230,10 @@ module takt_sine #(
         {cosine9, negative9, refused9} <= {cosine8, negative8, refused8};
     end
 
-    // =============================================================== 10: the products with the low parts, row by row
+    // =============================================================== 10: products; that with the low 6 bits of V row by row
 
-    wire [7:0]  p = n9[27:20];                  // times the low 6 bits of V
-    wire [7:0]  q = v9[23:16];                  // times the next 7 bits of n
-    reg  [9:0]  high_low01, high_low23, high_low45, low_high01, low_high23, low_high45;
-    reg  [7:0]  low_high6;
+    wire [7:0]  p = n9[27:20];
+    reg  [9:0]  high_low01, high_low23, high_low45;
     reg  [27:0] n10;
     reg  [25:0] v10;
     reg  [7:0]  field10;
@@ -242,10 +242,6 @@ module takt_sine #(
         high_low01 <= {2'd0, p & {8{v9[0]}}} + {1'd0, p & {8{v9[1]}}, 1'd0};
         high_low23 <= {2'd0, p & {8{v9[2]}}} + {1'd0, p & {8{v9[3]}}, 1'd0};
         high_low45 <= {2'd0, p & {8{v9[4]}}} + {1'd0, p & {8{v9[5]}}, 1'd0};
-        low_high01 <= {2'd0, q & {8{n9[3]}}} + {1'd0, q & {8{n9[4]}}, 1'd0};
-        low_high23 <= {2'd0, q & {8{n9[5]}}} + {1'd0, q & {8{n9[6]}}, 1'd0};
-        low_high45 <= {2'd0, q & {8{n9[7]}}} + {1'd0, q & {8{n9[8]}}, 1'd0};
-        low_high6  <= q & {8{n9[9]}};
         {n10, v10, field10, cosine10, negative10, refused10} <= {n9, v9, field9, cosine9, negative9, refused9};
     end
 
@@ -261,7 +257,7 @@ module takt_sine #(
     always @(posedge clk) begin
         most11     <= {n10, 9'd0} - {1'b0, most};
         high_low11 <= {4'd0, high_low01} + {2'd0, high_low23, 2'd0} + {high_low45, 4'd0};
-        low_high11 <= {5'd0, low_high01} + {3'd0, low_high23, 2'd0} + {1'd0, low_high45, 4'd0} + {1'd0, low_high6, 6'd0};
+        low_high11 <= low_high[14:0];
         result12   <= most11 - {20'd0, least11 & {17{~cosine11}}};
         field12    <= field11;
         less12     <= field11 - 8'd1;
@@ -279,6 +275,6 @@ module takt_sine #(
         flags  <= {refused12, 2'b00};
     end
 
-    wire unused = &{1'b0, by163[13:0], slope_product[15:0], v[1:0], v9[15:6], n9[19:10], n9[2:0], high_high[1:0], result12[10:0]};
+    wire unused = &{1'b0, by163[13:0], slope_product[15:0], v[1:0], high_high[1:0], low_high[35:15], result12[10:0]};
 
 endmodule
