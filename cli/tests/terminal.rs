@@ -153,7 +153,7 @@ fn full_screen() {
         terminal.resize(rows, cols);
     }
     terminal.shows("in flight");
-    terminal.shows("cycle 41, period 0");
+    terminal.shows("cycle 46, period 0");
     terminal.press("q");
     terminal.ends();
     // The screen, the cursor, and the terminal's way with keys are as they were.

@@ -45,6 +45,7 @@ const COMMON: &[Fault] = &[
     ("takt_late", "working & ~age[INTERVAL-1]", "1'b0"),
     // Branches, calls, the tick.
     ("takt_sequencer", "x_operand == 32'd0 ? x_if_zero : x_if_nonzero", "x_if_zero"),
+    ("takt_sequencer", "x_if_zero | x_if_nonzero | wait_next", "wait_next"),
     ("takt_sequencer", "x_call & entries[4]", "1'b0"),
     ("takt_sequencer", "x_return & (entries == 5'd0)", "1'b0"),
     ("takt_sequencer", "x_address + 16'd1", "x_address + 16'd2"),

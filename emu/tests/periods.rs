@@ -84,21 +84,21 @@ fn regular_ticks_start_after_the_first_wait() {
 /// the others are lost.
 #[test]
 fn missed_deadlines_are_remembered_once() {
-    assert_eq!(T3.refill, 5, "the numbers below are worked out for this");
+    assert_eq!(T3.refill, 6, "the numbers below are worked out for this");
     let source = "wait 1\nnop\nnop\nnop\nnop\nnop\nnop\nnop\nnop\nnop\nwait 1";
     let mut emulator = Emulator::new(&program(&T3, source)).unwrap();
     emulator.set_tick_period(NonZeroU64::new(8));
-    // The first `wait` issues in cycle 5, the tick comes in 8, the first bundle of the period issues in 11.
+    // The first `wait` issues in cycle 6, the tick comes in 8, the first bundle of the period issues in 13.
     let report = emulator.run_period(&[]).unwrap();
-    assert_eq!((report.tick, report.start, report.wait, report.cycles), (8, 8, 20, 12));
+    assert_eq!((report.tick, report.start, report.wait, report.cycles), (8, 8, 22, 14));
     assert!(report.missed && report.lost == 0, "16 was too early and is remembered");
     let report = emulator.run_period(&[]).unwrap();
     // 24 is remembered, 32 is lost.
-    assert_eq!((report.tick, report.start, report.wait, report.cycles), (16, 20, 35, 15));
+    assert_eq!((report.tick, report.start, report.wait, report.cycles), (16, 22, 38, 16));
     assert_eq!((report.missed, report.lost), (true, 1));
     let report = emulator.run_period(&[]).unwrap();
     // 40 is remembered, 48 is lost.
-    assert_eq!((report.tick, report.start, report.wait), (24, 35, 50));
+    assert_eq!((report.tick, report.start, report.wait), (24, 38, 54));
     let statistics = emulator.statistics();
     assert_eq!((statistics.ticks, statistics.missed, statistics.lost), (6, 3, 2));
     assert!(emulator.deadline_missed());

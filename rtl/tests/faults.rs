@@ -60,7 +60,8 @@ const FAULTS: &[Fault] = &[
     ("alu", "(ordered & any_nan)", "(ordered & any_snan)"),
     ("alu", "(b_nan & ~is_sign)", "b_nan"),
     ("alu", "~(is_float & any_nan)", "1'b1"),
-    ("alu", "a[31] ^ b[31] ^ less", "a[31] ^ b[31]"),
+    ("alu", "^ minus ^ low_sum[32]", "^ minus"),
+    ("alu", "1'b1} + {1'b0, b[30:0]", "1'b0} + {1'b0, b[30:0]"),
     ("alu", "op[1] ? b[31] : a[31], b[30:0]}", "b[31], b[30:0]}"),
     ("alu_late", "localparam WAIT = LATENCY - 2", "localparam WAIT = LATENCY - 3"),
     // Ties of subnormal quotients, bits that the alignment shifts low, digits, the table, operations that mix, flags.
@@ -115,7 +116,7 @@ const FAULTS: &[Fault] = &[
     ("sine", "8'd115", "8'd116"),
     ("sine", "one ? result12[12] : result12[11]", "result12[11]"),
     ("sine", "h[16:11] ^ {6{h[17]}}", "h[16:11]"),
-    ("sine", "q & {8{n9[9]}}", "8'd0"),
+    ("sine", "{11'd0, n[9:3]}", "{12'd0, n[8:3]}"),
     ("sine", "& {17{~cosine11}}", ""),
     ("sine", "sign1    <= a[31] & ~op", "sign1    <= a[31]"),
     // The octant, the number of leading digits, the row, the divisor, special operands, subnormal results.

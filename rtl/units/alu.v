@@ -152,6 +152,8 @@ module takt_alu #(
     wire ordered   = is_float & (op[1:0] != 2'b00);
     wire invalid   = (quiet & any_snan) | (ordered & any_nan) | (is_sign & a_nan & ~a[22]);
 
+    wire unused = low_sum[0];
+
     always @(posedge clk) begin
         out_valid <= in_valid;
         flags     <= {invalid, 2'b00};
