@@ -20,7 +20,7 @@ const COMMON: &[Fault] = &[
     ("takt_add", "close & ~difference[24]", "close"),
     ("takt_multiply", "5'd23 - zeros1", "5'd22 - zeros1"),
     ("takt_convert", "x[31] & ~nan", "1'b0"),
-    ("takt_alu", "a[31] ^ b[31] ^ less", "a[31] ^ b[31]"),
+    ("takt_alu", "a[31] ^ b[31] ^ minus ^ low_sum[32]", "a[31] ^ b[31] ^ minus"),
     ("takt_sine", "quadrant3[1] ^ (quadrant3[0] & op3)", "quadrant3[1]"),
     // Waiting for operands: too short, in each of the ways in which a result is underway.
     ("takt_hazard", "r_later | r_on_issue", "r_later"),
