@@ -25,13 +25,13 @@ pub(crate) struct Arguments {
     #[arg(long)]
     machine: Option<String>,
     /// Cycles after reset for which the scoreboard's safety is proved.
-    #[arg(long, default_value_t = 10)]
+    #[arg(long, default_value_t = 11)]
     depth: u32,
 }
 
 impl Arguments {
     /// What runs with the tests: every machine, to a depth that takes seconds.
-    pub(crate) const SHARE: Arguments = Arguments { machine: None, depth: 8 };
+    pub(crate) const SHARE: Arguments = Arguments { machine: None, depth: 9 };
 }
 
 /// `cargo xtask formal`.
