@@ -15,7 +15,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_emu::Emulator;
 use takt_isa::program::Port;
-use takt_isa::{Machine, Program, T3X};
+use takt_isa::{Machine, Program, T3};
 use takt_programs::arm::{
     Arm as OnArm, CONFIGURATIONS, Configuration, FORWARD_EXAMPLE, ForwardResult, GOOD, INVERSE_EXAMPLE,
     InverseResult, Pose, RoundTrip, Sweep, forward, inverse, square, sweep,
@@ -29,7 +29,7 @@ use takt_programs::arm::{
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arm {
     /// The machine, one with arctangents.
-    #[arg(long, short, value_name = "MACHINE", default_value = T3X.name, value_parser = select::machine)]
+    #[arg(long, short, value_name = "MACHINE", default_value = T3.name, value_parser = select::machine)]
     machine: &'static Machine,
     /// Random poses.
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = select::count, allow_negative_numbers = true)]

@@ -3,7 +3,7 @@
 
 use takt_asm::{MemoryLoader, Options};
 use takt_emu::{Emulator, PeriodError};
-use takt_isa::{Program, T3X};
+use takt_isa::{Program, T3};
 use takt_programs::SOURCES;
 use takt_programs::arm::{
     Arm, Configuration, FORWARD_EXAMPLE, ForwardResult, GOOD, INVERSE_EXAMPLE, InverseResult, NO_ANGLE,
@@ -25,7 +25,7 @@ struct Ported {
 
 impl Ported {
     fn new(path: &str, inputs: &str, outputs: &str) -> Ported {
-        let options = Options { machine: &T3X, ..Options::default() };
+        let options = Options { machine: &T3, ..Options::default() };
         let assembled = takt_asm::assemble(path, &MemoryLoader::new(SOURCES), &options);
         let program: Program = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false))).program;
         let register = |ports: &[takt_isa::program::Port], name: &str| {

@@ -83,7 +83,11 @@ pub static T3: Machine = Machine {
     name: "t3",
     text: "The fast machine: three operations a cycle, everything pipelined.",
     slots: &[
-        Slot { name: "mul", bank: bank("m", 0, 256), units: &[MULTIPLY, DIVROOT, SINE] },
+        Slot {
+            name: "mul",
+            bank: bank("m", 0, 256),
+            units: &[MULTIPLY, DIVROOT, SINE, ARCTANGENT, ARCCOSINE],
+        },
         Slot { name: "add", bank: bank("a", 256, 256), units: &[ADD, CONVERT] },
         Slot { name: "aux", bank: bank("x", 512, 256), units: &[ALU, MEMORY, SEQUENCER] },
     ],
@@ -99,7 +103,7 @@ pub static T3: Machine = Machine {
 /// The small machine: one slot.
 pub static T1: Machine = Machine {
     name: "t1",
-    text: "The small machine: one operation a cycle, one register file, iterative division and square root.",
+    text: "The small machine: one operation a cycle, one register file, iterative division and square root; no arctangent or arccosine.",
     slots: &[Slot {
         name: "one",
         bank: bank("r", 0, 512),
@@ -114,24 +118,8 @@ pub static T1: Machine = Machine {
     resolve: 2,
 };
 
-/// The fast machine with arctangent and arccosine.
-pub static T3X: Machine = Machine {
-    name: "t3x",
-    text: "The fast machine with arctangent and arccosine, for the kinematics of arms.",
-    slots: &[
-        Slot {
-            name: "mul",
-            bank: bank("m", 0, 256),
-            units: &[MULTIPLY, DIVROOT, SINE, ARCTANGENT, ARCCOSINE],
-        },
-        T3.slots[1],
-        T3.slots[2],
-    ],
-    ..T3
-};
-
 /// Every machine; the first is the default.
-pub static MACHINES: &[&Machine] = &[&T3, &T1, &T3X];
+pub static MACHINES: &[&Machine] = &[&T3, &T1];
 
 impl Machine {
     /// The machine of this name.
