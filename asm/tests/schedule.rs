@@ -160,7 +160,7 @@ fn deadlines_are_met_or_refused() {
             agrees(report, &free.program, &text);
             // From far too early to what the scheduler does anyway.
             let freely = report.ports[0].2;
-            for _ in 0..3 {
+            for _ in 0..4 {
                 let limit = freely.saturating_sub(random.below(16) as u32).max(1);
                 let demand = format!(".deadline {} = {limit}", random.pick(&["oa", "oa", "om, oa"]));
                 match demanding(&text, &demand, machine) {
