@@ -15,7 +15,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_emu::Emulator;
 use takt_isa::program::Port;
-use takt_isa::{Machine, Program, T3};
+use takt_isa::{Function, Machine, Program, T3};
 use takt_programs::arm::{
     Arm as OnArm, CONFIGURATIONS, Configuration, FORWARD_EXAMPLE, ForwardResult, GOOD, INVERSE_EXAMPLE,
     InverseResult, Pose, RoundTrip, Sweep, forward, inverse, square, sweep,
@@ -205,6 +205,9 @@ pub(crate) fn run(arguments: &Arm, color: bool, out: &mut Out) -> Result<()> {
     files::check(&[], &writes)?;
 
     let machine = arguments.machine;
+    if machine.host(Function::Arctangent).is_none() {
+        bail!("{} has no arctangent, which the arm's programs need; {} has", machine.name, T3.name);
+    }
     let mut arm = OnEmulator::new(Load::new(machine, color))?;
     let mut table = arguments.csv.as_deref().map(Out::create).transpose()?;
     let mut picture = arguments.plot.as_deref().map(Out::create).transpose()?;

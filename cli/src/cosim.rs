@@ -3,7 +3,7 @@
 use crate::files::{self, Out};
 use crate::load::Load;
 use crate::output::{self, Failure};
-use crate::ports::Inputs;
+use crate::ports;
 use crate::select::{self, OptionalMachine};
 use anyhow::{Result, bail};
 use clap::Args;
@@ -28,7 +28,7 @@ pub(crate) struct Cosim {
     #[command(flatten)]
     machine: OptionalMachine,
     /// CSV with one named column for each input port and one row for each period; `-` is standard input.
-    #[arg(long, value_name = "CSV", requires = "file")]
+    #[arg(long, value_name = "CSV", requires = "file", conflicts_with_all = ["seed", "programs"])]
     inputs: Option<PathBuf>,
     /// Run at most this many periods [default: one for each row; without --inputs, 100].
     #[arg(long, value_name = "N", value_parser = select::count, requires = "file", allow_negative_numbers = true)]
@@ -80,23 +80,7 @@ fn model(machine: &'static Machine) -> Result<(Design, Model)> {
 /// A program from a file.
 fn one(arguments: &Cosim, file: &Path, color: bool, out: &mut Out) -> Result<()> {
     let program = Load::new(arguments.machine.machine, color).program(file)?;
-    let rows = match &arguments.inputs {
-        Some(path) => {
-            let mut inputs = Inputs::open(path, &program.inputs)?;
-            let (mut rows, mut values) = (Vec::new(), Vec::new());
-            while arguments.periods.is_none_or(|periods| (rows.len() as u64) < periods)
-                && inputs.next(&mut values)?
-            {
-                rows.push(values.clone());
-            }
-            rows
-        }
-        None => {
-            // What no row gives is zero: an input that was never written would be a fault.
-            let zero = program.inputs.iter().map(|port| (port.register, 0)).collect();
-            vec![zero; arguments.periods.unwrap_or(PERIODS) as usize]
-        }
-    };
+    let rows = ports::rows(arguments.inputs.as_deref(), arguments.periods, PERIODS, &program.inputs)?;
     let (design, model) = model(program.machine)?;
     let ran = run_rows(&program, &rows, model.start(&[])?);
     let result = match ran {
@@ -125,7 +109,9 @@ fn one(arguments: &Cosim, file: &Path, color: bool, out: &mut Out) -> Result<()>
         result.periods, program.machine.name, result.cycles, result.events
     )?;
     if let Some(stopped) = result.stopped {
-        writeln!(out, "  both sides stopped: {stopped}")?;
+        let who =
+            if result.alone { "the emulator, of what the circuit does not look at," } else { "both sides" };
+        writeln!(out, "  {who} stopped: {stopped}")?;
     }
     Ok(())
 }
@@ -135,6 +121,8 @@ struct Ran {
     cycles: u64,
     events: u64,
     stopped: Option<String>,
+    /// The circuit did not stop.
+    alone: bool,
 }
 
 fn run_rows(
@@ -156,7 +144,8 @@ fn run_rows(
     lockstep.finish()?;
     let halted = matches!(lockstep.emulator().status(), takt_emu::Status::Halted { .. });
     let stopped = lockstep.fault().map(ToString::to_string).or(halted.then(|| "halt".to_owned()));
-    let ran = Ran { periods, cycles: lockstep.emulator().now(), events: lockstep.compared(), stopped };
+    let alone = lockstep.fault().is_some_and(|fault| !takt_cosim::circuit_stops(fault));
+    let ran = Ran { periods, cycles: lockstep.emulator().now(), events: lockstep.compared(), stopped, alone };
     lockstep.into_simulation().finish();
     Ok(ran)
 }
@@ -208,12 +197,13 @@ fn many(arguments: &Cosim, out: &mut Out) -> Result<()> {
         coverage.cycles,
         coverage.events
     )?;
+    let faults: Vec<&str> = coverage.faults.iter().copied().collect();
     writeln!(
         out,
         "  {} instructions, {} pairs of which the second waited for the first; faults: {}",
         coverage.operations.len(),
         coverage.hazards.len(),
-        coverage.faults.iter().copied().collect::<Vec<_>>().join(", ")
+        if coverage.faults.is_empty() { "none".to_owned() } else { faults.join(", ") }
     )?;
     Ok(())
 }

@@ -83,6 +83,29 @@ pub(crate) struct Inputs {
     ports: Vec<(Port, usize)>,
 }
 
+/// Input values of each period, register and bits: the rows of a CSV, or zeros for `otherwise` periods; at most `periods`.
+pub(crate) fn rows(
+    inputs: Option<&Path>,
+    periods: Option<u64>,
+    otherwise: u64,
+    ports: &[Port],
+) -> Result<Vec<Vec<(u16, u32)>>> {
+    let Some(path) = inputs else {
+        // What no row gives is zero: an input that was never written would be a fault.
+        let zero = ports.iter().map(|port| (port.register, 0)).collect();
+        return Ok(vec![zero; periods.unwrap_or(otherwise) as usize]);
+    };
+    let mut inputs = Inputs::open(path, ports)?;
+    let (mut rows, mut values) = (Vec::new(), Vec::new());
+    while periods.is_none_or(|periods| (rows.len() as u64) < periods) && inputs.next(&mut values)? {
+        rows.push(values.clone());
+    }
+    if rows.is_empty() {
+        bail!("{} has a header and no rows: there is no period to run", inputs.name);
+    }
+    Ok(rows)
+}
+
 /// Bytes of one row; more is an error, so that a file without line ends, or with an open quote, cannot fill the memory.
 const ROW_LIMIT: usize = 1 << 20;
 

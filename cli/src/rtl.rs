@@ -3,8 +3,9 @@
 use crate::files::{self, Out};
 use crate::load::Load;
 use crate::output;
-use crate::select::OptionalMachine;
-use anyhow::{Context, Result};
+use crate::ports;
+use crate::select::{self, OptionalMachine};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::json;
 use std::io::Write;
@@ -14,8 +15,8 @@ use takt_rtl::{Library, bench, export};
 
 /// Write the circuit of a machine: a complete Verilog design, with a test bench.
 ///
-/// The folder then holds the core and its parts, one module per file; `<machine>.f`, the list of them for other tools; a top
-/// level for synthesis without a board; a test bench, which with --program runs that program.
+/// The folder then holds the core and its parts, one module per file; `takt_<machine>.f`, the list of them for other tools; a top
+/// level for synthesis without a board; a test bench, which with --program runs that program on the rows of --inputs.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Rtl {
@@ -27,6 +28,12 @@ pub(crate) struct Rtl {
     /// Source or image whose memory image the test bench loads; `-` is standard input.
     #[arg(long, value_name = "FILE")]
     program: Option<PathBuf>,
+    /// CSV with one named column for each input port and one row for each period of the test bench; `-` is standard input.
+    #[arg(long, value_name = "CSV", requires = "program")]
+    inputs: Option<PathBuf>,
+    /// Run at most this many periods in the test bench [default: one for each row; without --inputs, 3, with zeros].
+    #[arg(long, value_name = "N", value_parser = select::count, requires = "program", allow_negative_numbers = true)]
+    periods: Option<u64>,
     /// Print what was written as JSON.
     #[arg(long)]
     json: bool,
@@ -35,19 +42,39 @@ pub(crate) struct Rtl {
 const EXAMPLES: &str = "\
 Examples:
   takt rtl -o t3                                 the fast machine
-  takt rtl -o t1 --machine t1 --program prog.s   the small one, and a program for its test bench
+  takt rtl -o t1 --machine t1 --program prog.s --inputs in.csv   the small one, and what its test bench runs
   cd t1 && iverilog -g2005 -f takt_t1_bench.f -o bench && ./bench";
 
+/// Periods without `--inputs`.
+const PERIODS: u64 = 3;
+
 pub(crate) fn run(arguments: &Rtl, color: bool, out: &mut Out) -> Result<()> {
+    let reads = [("--program", &arguments.program), ("--inputs", &arguments.inputs)];
+    let reads: Vec<_> = reads.into_iter().filter_map(|(name, path)| Some((name, path.as_deref()?))).collect();
+    files::check(&reads, &[])?;
     let load = Load::new(arguments.machine.machine, color);
     let program = arguments.program.as_deref().map(|path| load.program(path)).transpose()?;
     let machine = match (&program, arguments.machine.machine) {
         (Some(program), _) => program.machine,
         (None, machine) => machine.unwrap_or(MACHINES[0]),
     };
+    let periods = match &program {
+        Some(program) => {
+            ports::rows(arguments.inputs.as_deref(), arguments.periods, PERIODS, &program.inputs)?
+        }
+        None => Vec::new(),
+    };
+    let stimuli = periods.iter().map(|inputs| inputs.len() + 1).sum::<usize>();
+    if stimuli > bench::STIMULI {
+        let most = bench::STIMULI / (periods[0].len() + 1);
+        bail!(
+            "{} periods are too many for the test bench, which takes {most}: --periods {most}",
+            periods.len()
+        );
+    }
     let design = export(machine, &Library::builtin())?;
     let mut written = Vec::new();
-    for file in bench::folder(&design, program.as_ref()) {
+    for file in bench::folder(&design, program.as_ref(), &periods) {
         write(&arguments.output, &file.name, &file.text)?;
         written.push(file.name);
     }

@@ -31,6 +31,31 @@ fn design_is_complete() {
 }
 
 #[test]
+fn test_bench_runs_the_rows() {
+    let folder = Folder::new();
+    folder.write("p.s", PROGRAM);
+    folder.write("in.csv", "in0\n1.5\n-2\n0.25\n");
+    let stimuli = |line: &str| {
+        folder.line(line).ok();
+        folder.read_text("out/inputs.hex").lines().skip(1).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let tick = "200000000000";
+    let two = stimuli("rtl -o out --program p.s --inputs in.csv --periods 2");
+    assert_eq!(two, ["10003fc00000", tick, "1000c0000000", tick]);
+    assert_eq!(stimuli("rtl -o out --program p.s"), ["100000000000", tick].repeat(3));
+    // What an earlier export ran is gone.
+    assert!(stimuli("rtl -o out").is_empty());
+    assert_eq!(folder.read_text("out/program.hex").lines().count(), 1);
+    let many = folder.line("rtl -o out --program p.s --periods 40000");
+    assert!(many.stderr.contains("--periods 32768"), "{}", many.stderr);
+    folder.write("none.csv", "in0\n");
+    for line in ["rtl -o out --program p.s --inputs none.csv", "cosim p.s --inputs none.csv"] {
+        let done = folder.line(line);
+        assert!(done.status == Some(1) && done.stderr.contains("no rows"), "{}", done.stderr);
+    }
+}
+
+#[test]
 fn circuit_and_emulator_agree() {
     let folder = Folder::new();
     folder.write("p.s", PROGRAM);

@@ -8,5 +8,5 @@ mod lockstep;
 mod model;
 pub mod random;
 
-pub use lockstep::{Difference, Lockstep, LockstepError};
+pub use lockstep::{Difference, Lockstep, LockstepError, circuit_stops};
 pub use model::{CircuitEvent, EventKind, Model, ModelError, Pin, Simulation, cache_folder};

@@ -329,6 +329,11 @@ fn show(program: &Program, event: &CircuitEvent) -> String {
     }
 }
 
+/// Whether the circuit stops at the fault too; it does not look at everything that the emulator refuses (`docs/timing.md`).
+pub fn circuit_stops(fault: &Fault) -> bool {
+    fault_code(&fault.kind).is_some()
+}
+
 /// The circuit's number for a fault; `None` for one that only the emulator knows.
 fn fault_code(kind: &FaultKind) -> Option<u16> {
     match kind {

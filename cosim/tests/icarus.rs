@@ -46,12 +46,7 @@ fn tracking_gives_the_same_outputs() {
 
     let folder = folder().join("icarus");
     let design = export(&T3, &Library::builtin()).expect("t3 has a circuit");
-    let mut files = bench::folder(&design, Some(&program));
-    files.push(takt_rtl::export::DesignFile {
-        name: "inputs.hex".to_owned(),
-        text: bench::stimuli(&T3, &periods),
-    });
-    for file in files {
+    for file in bench::folder(&design, Some(&program), &periods) {
         let path = folder.join(&file.name);
         fs::create_dir_all(path.parent().expect("a folder")).expect("the target folder can be written");
         fs::write(&path, &file.text).expect("the target folder can be written");

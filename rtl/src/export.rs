@@ -333,7 +333,7 @@ impl Plan {
         line!(v, "//");
         line!(
             v,
-            "// Contract: docs/hardware.md. Stages: fetch, decode (d_), match (m_), read (r_), issue (i_), execute (x_). A bundle issues in the"
+            "// Contract: docs/hardware.md in Takt's repository. Stages: fetch, decode (d_), match (m_), read (r_), issue (i_), execute (x_). A bundle issues in the"
         );
         line!(
             v,

@@ -18,7 +18,7 @@ fn folders(mut look: impl FnMut(&Path, &str)) {
         let design = export(machine, &Library::builtin()).expect("every machine has a circuit");
         let folder: PathBuf = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("export-{}", machine.name));
         let _ = fs::remove_dir_all(&folder);
-        for file in bench::folder(&design, None) {
+        for file in bench::folder(&design, None, &[]) {
             let path = folder.join(&file.name);
             fs::create_dir_all(path.parent().expect("a folder")).expect("the target folder can be written");
             fs::write(&path, &file.text).expect("the target folder can be written");
