@@ -107,7 +107,18 @@ pub static T1: Machine = Machine {
     slots: &[Slot {
         name: "one",
         bank: bank("r", 0, 512),
-        units: &[ADD, CONVERT, MULTIPLY, DIVIDE, ROOT, SINE, ALU_LATE, MEMORY, SEQUENCER],
+        // A sine at most every nine cycles: then what is underway needs as many places as the other units' latency.
+        units: &[
+            ADD,
+            CONVERT,
+            MULTIPLY,
+            DIVIDE,
+            ROOT,
+            Unit { interval: 9, ..SINE },
+            ALU_LATE,
+            MEMORY,
+            SEQUENCER,
+        ],
     }],
     inputs: bank("i", 768, 256),
     outputs_per_bank: 32,
