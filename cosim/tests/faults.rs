@@ -79,7 +79,7 @@ const OF_T1: &[Fault] = &[
     ("takt_alu_late", "waiting[36*WAIT-1 -: 36]", "(waiting[36*WAIT-1 -: 36] & ~36'd8)"),
     ("takt_divide", "a_signaling | b_signaling | undefined", "a_signaling | b_signaling"),
     ("takt_root", "sign_1 & is_zero", "1'b0"),
-    ("takt_t1", "one_underway[5] | i_one_control[ONE_RESULT_5]", "1'b0"),
+    ("takt_t1", "one_divide_at[13] | one_root_at[11] | one_sine_at[9] | i_one_control[ONE_RESULT_5]", "1'b0"),
 ];
 
 /// Random programs that a fault may pass before it counts as not found.
