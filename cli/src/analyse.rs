@@ -3,7 +3,7 @@
 use crate::files::{self, Out};
 use crate::load::Load;
 use crate::output;
-use crate::ports::Inputs;
+use crate::ports::{self, Rows};
 use crate::select::OptionalMachine;
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
@@ -90,17 +90,10 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
     Ok(())
 }
 
-/// Values of the input ports, for each period.
-type Rows = Vec<Vec<(u16, u32)>>;
-
 fn read_inputs(arguments: &Analyse, program: &Program) -> Result<Option<Rows>> {
     let Some(path) = &arguments.inputs else { return Ok(None) };
-    let mut inputs = Inputs::open(path, &program.inputs)?;
-    let (mut rows, mut row) = (Vec::new(), Vec::new());
     let wanted = arguments.periods.map_or(MOST_PERIODS, |wanted| wanted.max(1));
-    while (rows.len() as u64) < wanted && inputs.next(&mut row)? {
-        rows.push(row.clone());
-    }
+    let rows = ports::read_rows(path, &program.inputs, wanted)?;
     if rows.is_empty() || arguments.periods.is_some_and(|wanted| (rows.len() as u64) < wanted) {
         let plural = if rows.len() == 1 { "" } else { "s" };
         bail!("{} has {} row{plural}, so there is no such period", files::input_name(path), rows.len());

@@ -203,7 +203,7 @@ fn many(arguments: &Cosim, out: &mut Out) -> Result<()> {
         "  {} instructions, {} pairs of which the second waited for the first; faults: {}",
         coverage.operations.len(),
         coverage.hazards.len(),
-        if coverage.faults.is_empty() { "none".to_owned() } else { faults.join(", ") }
+        if faults.is_empty() { "none".to_owned() } else { faults.join(", ") }
     )?;
     Ok(())
 }

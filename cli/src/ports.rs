@@ -83,25 +83,41 @@ pub(crate) struct Inputs {
     ports: Vec<(Port, usize)>,
 }
 
-/// Input values of each period, register and bits: the rows of a CSV, or zeros for `otherwise` periods; at most `periods`.
+/// Values of the input ports, register and bits, for each period.
+pub(crate) type Rows = Vec<Vec<(u16, u32)>>;
+
+/// The rows of a CSV, at most so many; none if it has only a header.
+pub(crate) fn read_rows(path: &Path, ports: &[Port], most: u64) -> Result<Rows> {
+    let mut inputs = Inputs::open(path, ports)?;
+    let (mut rows, mut row) = (Vec::new(), Vec::new());
+    while (rows.len() as u64) < most && inputs.next(&mut row)? {
+        rows.push(row.clone());
+    }
+    Ok(rows)
+}
+
+/// Periods that [`rows`] makes up without a CSV.
+const MOST_PERIODS: u64 = 10_000_000;
+
+/// Inputs of each period: the rows of a CSV, or zeros for `otherwise` periods; at most `periods`.
 pub(crate) fn rows(
     inputs: Option<&Path>,
     periods: Option<u64>,
     otherwise: u64,
     ports: &[Port],
-) -> Result<Vec<Vec<(u16, u32)>>> {
+) -> Result<Rows> {
     let Some(path) = inputs else {
+        let periods = periods.unwrap_or(otherwise);
+        if periods > MOST_PERIODS {
+            bail!("{periods} periods: without --inputs there are at most {MOST_PERIODS}");
+        }
         // What no row gives is zero: an input that was never written would be a fault.
         let zero = ports.iter().map(|port| (port.register, 0)).collect();
-        return Ok(vec![zero; periods.unwrap_or(otherwise) as usize]);
+        return Ok(vec![zero; periods as usize]);
     };
-    let mut inputs = Inputs::open(path, ports)?;
-    let (mut rows, mut values) = (Vec::new(), Vec::new());
-    while periods.is_none_or(|periods| (rows.len() as u64) < periods) && inputs.next(&mut values)? {
-        rows.push(values.clone());
-    }
+    let rows = read_rows(path, ports, periods.unwrap_or(u64::MAX))?;
     if rows.is_empty() {
-        bail!("{} has a header and no rows: there is no period to run", inputs.name);
+        bail!("{} has a header and no rows: there is no period to run", files::input_name(path));
     }
     Ok(rows)
 }

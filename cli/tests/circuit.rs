@@ -48,6 +48,10 @@ fn test_bench_runs_the_rows() {
     assert_eq!(folder.read_text("out/program.hex").lines().count(), 1);
     let many = folder.line("rtl -o out --program p.s --periods 40000");
     assert!(many.stderr.contains("--periods 32768"), "{}", many.stderr);
+    for line in ["rtl -o out --program p.s --periods 1000000000000", "cosim p.s --periods 1000000000000"] {
+        let done = folder.line(line);
+        assert!(done.status == Some(1) && done.stderr.contains("at most 10000000"), "{}", done.stderr);
+    }
     folder.write("none.csv", "in0\n");
     for line in ["rtl -o out --program p.s --inputs none.csv", "cosim p.s --inputs none.csv"] {
         let done = folder.line(line);

@@ -8,7 +8,7 @@ use crate::controller::OnEmulator;
 use crate::files::{self, Given, Out};
 use crate::load::{Load, Loaded};
 use crate::output::{self, Failure};
-use crate::ports::Inputs;
+use crate::ports;
 use crate::run::tick;
 use crate::select::{self, OptionalMachine, PAPER_CLOCK};
 use crate::track::{self, period_cycles};
@@ -139,13 +139,9 @@ fn script(path: &Path) -> Result<(String, String)> {
 
 fn rows(path: &Path, loaded: &Loaded) -> Result<Arc<Rows>> {
     let name = files::input_name(path);
-    let mut inputs = Inputs::open(path, &loaded.program.inputs)?;
-    let (mut rows, mut row) = (Vec::new(), Vec::new());
-    while inputs.next(&mut row)? {
-        if rows.len() == ROWS {
-            bail!("{name} has more than {ROWS} rows");
-        }
-        rows.push(row.clone());
+    let rows = ports::read_rows(path, &loaded.program.inputs, ROWS as u64 + 1)?;
+    if rows.len() > ROWS {
+        bail!("{name} has more than {ROWS} rows");
     }
     if rows.is_empty() {
         bail!("{name} has a header and no row, so there is no period to run");
