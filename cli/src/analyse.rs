@@ -2,6 +2,7 @@
 
 use crate::files::{self, Out};
 use crate::load::Load;
+use crate::number;
 use crate::output;
 use crate::ports::{self, Rows};
 use crate::select::OptionalMachine;
@@ -34,7 +35,7 @@ pub(crate) struct Analyse {
     #[arg(long, value_name = "CSV")]
     inputs: Option<PathBuf>,
     /// Run so many periods and look at the last; 0 is what runs once [default: the rows of --inputs, else 2].
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = number::natural, allow_hyphen_values = true)]
     periods: Option<u64>,
     /// Write the picture of the pipeline as a page for a browser, which needs nothing else; `-` is standard output.
     #[arg(long, value_name = "OUT")]

@@ -19,6 +19,7 @@ mod load;
 mod machines;
 mod man;
 mod nan;
+mod number;
 mod output;
 mod plot;
 mod ports;

@@ -5,9 +5,10 @@ use crate::fault::explain;
 use crate::files::{self, Out};
 use crate::load::Load;
 use crate::nan::NanWrites;
+use crate::number;
 use crate::output::{self, Failure};
 use crate::ports::{self, Inputs};
-use crate::select::{self, OptionalMachine};
+use crate::select::OptionalMachine;
 use crate::trace::{Trace, TraceArguments};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
@@ -36,13 +37,13 @@ pub(crate) struct Run {
     #[arg(long, value_name = "CSV")]
     outputs: Option<PathBuf>,
     /// Run at most this many periods.
-    #[arg(long, value_name = "N", value_parser = select::count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
     periods: Option<u64>,
     /// Stop with an error after this many cycles [default: 1000000000 in any one period].
-    #[arg(long, value_name = "N", value_parser = select::count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
     max_cycles: Option<u64>,
     /// The tick comes every so many cycles, up to 100000000 [default: when the program is ready].
-    #[arg(long, value_name = "CYCLES", value_parser = tick, allow_negative_numbers = true)]
+    #[arg(long, value_name = "CYCLES", value_parser = number::tick, allow_hyphen_values = true)]
     tick: Option<NonZeroU64>,
     #[command(flatten)]
     trace: TraceArguments,
@@ -62,14 +63,6 @@ Examples:
   takt run prog.s --periods 3 --trace out.vcd     waveforms for GTKWave or Surfer
 
 `takt track --csv in.csv` records inputs of the tracking programs.";
-
-/// The longest time between ticks, cycles: well within [`PERIOD_LIMIT`].
-const LONGEST_TICK: u64 = 100_000_000;
-
-pub(crate) fn tick(text: &str) -> Result<NonZeroU64, String> {
-    let cycles = NonZeroU64::new(select::count(text)?).filter(|cycles| cycles.get() <= LONGEST_TICK);
-    cycles.ok_or_else(|| format!("more than {LONGEST_TICK}"))
-}
 
 /// Cycles in which a period ends, or nobody expects it to any more.
 pub(crate) const PERIOD_LIMIT: u64 = 1_000_000_000;

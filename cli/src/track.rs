@@ -5,6 +5,7 @@ use crate::controller::{Latency, OnEmulator, port_type};
 use crate::files::{self, Given, Out};
 use crate::load::{Load, Loaded};
 use crate::nan::NanWrites;
+use crate::number;
 use crate::plot::Plot;
 use crate::select::{self, OptionalMachine, suggest};
 use crate::{output, ports, report};
@@ -40,10 +41,10 @@ pub(crate) struct Track {
     #[arg(long, value_name = "FILE")]
     gcode: Option<PathBuf>,
     /// Stop after this many periods [default: the whole path].
-    #[arg(long, value_name = "N", value_parser = select::count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
     periods: Option<u64>,
     /// Clock in MHz, for cycles to time and for the deadline; the paper's is 125.
-    #[arg(long, value_name = "MHZ", default_value_t = select::PAPER_CLOCK, value_parser = select::clock, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MHZ", default_value_t = select::PAPER_CLOCK, value_parser = number::clock, allow_hyphen_values = true)]
     clock: f64,
     /// Write inputs, outputs, cycles and errors of every period as CSV, which `takt run --inputs` reads; `-` is standard
     /// output.

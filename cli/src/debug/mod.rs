@@ -7,10 +7,10 @@ mod screen;
 use crate::controller::OnEmulator;
 use crate::files::{self, Given, Out};
 use crate::load::{Load, Loaded};
+use crate::number;
 use crate::output::{self, Failure};
 use crate::ports;
-use crate::run::tick;
-use crate::select::{self, OptionalMachine, PAPER_CLOCK};
+use crate::select::{OptionalMachine, PAPER_CLOCK};
 use crate::track::{self, period_cycles};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
@@ -42,7 +42,7 @@ pub(crate) struct Debug {
     #[arg(long, value_name = "CSV", conflicts_with = "track")]
     inputs: Option<PathBuf>,
     /// The tick comes every so many cycles, up to 100000000 [default: when the program is ready].
-    #[arg(long, value_name = "CYCLES", value_parser = tick, allow_negative_numbers = true, conflicts_with = "track")]
+    #[arg(long, value_name = "CYCLES", value_parser = number::tick, allow_hyphen_values = true, conflicts_with = "track")]
     tick: Option<NonZeroU64>,
     /// Commands from a file; `-` is standard input.
     #[arg(long, value_name = "FILE", conflicts_with = "tui")]
@@ -58,7 +58,7 @@ pub(crate) struct Debug {
     #[arg(long, value_name = "FILE", requires = "track")]
     gcode: Option<PathBuf>,
     /// With --track: stop after this many periods [default: the whole path].
-    #[arg(long, value_name = "N", value_parser = select::count, requires = "track", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = number::count, requires = "track", allow_hyphen_values = true)]
     periods: Option<u64>,
 }
 
