@@ -96,7 +96,7 @@ impl Ported {
         }
         self.emulator.set_cycle_limit(self.emulator.now() + PERIOD_LIMIT);
         let report = self.emulator.run_period(&[]);
-        let report = report.map_err(|error| anyhow::anyhow!(explain(self.emulator.program(), &error)))?;
+        let report = report.map_err(|error| anyhow::anyhow!(explain(&error)))?;
         if !report.nan_writes.is_empty() {
             bail!("a NaN was written to an output port");
         }

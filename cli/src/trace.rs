@@ -7,7 +7,7 @@ use anyhow::{Result, anyhow};
 use clap::Args;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use takt_debug::trace::{Format, Options, Tracer};
+use takt_debug::trace::{Also, Format, Options, Tracer};
 use takt_emu::{Emulator, PeriodError, PeriodReport, Stop};
 
 #[derive(Args)]
@@ -81,12 +81,16 @@ impl TraceArguments {
 }
 
 impl Trace<'_> {
-    pub(crate) fn run_period(&mut self, emulator: &mut Emulator) -> Result<PeriodReport, PeriodError> {
-        self.tracer.run_period(emulator)
+    pub(crate) fn run_period(
+        &mut self,
+        emulator: &mut Emulator,
+        also: Also<'_>,
+    ) -> Result<PeriodReport, PeriodError> {
+        self.tracer.run_period(emulator, also)
     }
 
-    pub(crate) fn run(&mut self, emulator: &mut Emulator) -> Result<Stop, PeriodError> {
-        self.tracer.run(emulator)
+    pub(crate) fn run(&mut self, emulator: &mut Emulator, also: Also<'_>) -> Result<Stop, PeriodError> {
+        self.tracer.run(emulator, also)
     }
 
     pub(crate) fn has_failed(&self) -> bool {
