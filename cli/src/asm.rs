@@ -45,7 +45,7 @@ pub(crate) struct Asm {
     #[arg(long, value_enum, value_name = "WHEN", default_value_t = When::Source)]
     schedule: When,
     /// How long the scheduler searches, up to 100000; 0 is the first passes only.
-    #[arg(long, value_name = "N", default_value_t = DEFAULT_EFFORT, value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_EFFORT, value_parser = clap::value_parser!(u32).range(0..=100_000), allow_hyphen_values = true)]
     effort: u32,
     /// Check only; write no file.
     #[arg(long, conflicts_with_all = ["output", "listing", "symbols", "readmemh"])]

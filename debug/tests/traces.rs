@@ -70,7 +70,7 @@ fn traced(program: &Program, options: Options) -> (Vec<u8>, Summary) {
     let mut emulator = loaded(program, 1);
     let mut tracer = Tracer::new(&emulator, Box::new(disk.clone()), options).unwrap();
     for _ in 0..PERIODS {
-        if tracer.run_period(&mut emulator).is_err() {
+        if tracer.run_period(&mut emulator, None).is_err() {
             break;
         }
     }
@@ -217,7 +217,7 @@ fn a_full_disk() {
         let disk = Disk(Rc::default(), 1000);
         let mut tracer = Tracer::new(&emulator, Box::new(disk), options(format)).unwrap();
         // The run is not disturbed.
-        let report = tracer.run_period(&mut emulator).unwrap();
+        let report = tracer.run_period(&mut emulator, None).unwrap();
         assert_eq!(report, loaded(&program, 1).run_period(&[]).unwrap());
         assert_eq!(tracer.finish(&emulator).unwrap_err().kind(), io::ErrorKind::StorageFull);
     }

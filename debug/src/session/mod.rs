@@ -50,7 +50,7 @@ pub type Rows = Vec<Vec<(u16, u32)>>;
 /// What a session is about.
 #[derive(Clone, Default)]
 pub struct Options {
-    /// Values of input ports, register and bits, one row for each period; `None`: the inputs stay as they are.
+    /// Values of input ports, register and bits, one row for each period; `None`: they are 0, and stay as they are set.
     pub inputs: Option<Arc<Rows>>,
     /// Cycles between ticks; `None`: the tick comes when the program is ready.
     pub tick: Option<NonZeroU64>,
@@ -195,6 +195,10 @@ impl Session {
     pub fn new(program: &Program, options: Options) -> Result<Session, LoadError> {
         let mut emulator = Emulator::new(program)?;
         emulator.set_tick_period(options.tick);
+        for port in program.inputs.iter().filter(|_| options.inputs.is_none()) {
+            // The loader accepted the ports.
+            let _ = emulator.set_input_bits(port.register, 0);
+        }
         let core = Core { emulator, periods: 0, boundary: true, report: None, edits: 0 };
         let mut session = Session {
             options,
