@@ -52,7 +52,7 @@ pub struct Options {
     pub format: Format,
     /// The cycles that are traced.
     pub cycles: Range<Cycle>,
-    /// Names of signals, `*` standing for any characters; empty for all.
+    /// Names of signals, alone or with their groups as in `outputs.F1`, `*` standing for any characters; empty for all.
     pub signals: Vec<String>,
     /// Bytes, roughly: the cycle in which a trace has more is its last.
     pub limit: u64,
