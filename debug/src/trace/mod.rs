@@ -261,9 +261,3 @@ impl<'w> Tracer<'w> {
         Ok(self.summary)
     }
 }
-
-/// A NaN or an infinity has no number in JSON.
-fn number(value: f32) -> serde_json::Value {
-    serde_json::from_str::<serde_json::Number>(&format!("{value:?}"))
-        .map_or_else(|_| format!("{value:?}").into(), serde_json::Value::from)
-}
