@@ -3,26 +3,13 @@
 use crate::files;
 use crate::select::suggest;
 use anyhow::{Context, Result, anyhow, bail};
-use serde_json::Value;
 use std::io::{self, Read, Write};
 use std::path::Path;
 use takt_isa::Type;
 use takt_isa::program::Port;
 
-/// A value as CSV has it: the shortest decimal that reads back as the same bits, integers in decimal, bits in hexadecimal.
-pub(crate) fn format(ty: Type, bits: u32) -> String {
-    match ty {
-        Type::F => format!("{:?}", f32::from_bits(bits)),
-        Type::I => bits.cast_signed().to_string(),
-        Type::B => format!("0x{bits:08x}"),
-    }
-}
-
-/// A value as JSON has it: a number, or else what [`format`] makes of it.
-pub(crate) fn json(ty: Type, bits: u32) -> Value {
-    let text = format(ty, bits);
-    serde_json::from_str::<serde_json::Number>(&text).map_or_else(|_| Value::from(text), Value::from)
-}
+/// A value as CSV and as JSON have it.
+pub(crate) use takt_debug::value::{json, text as format};
 
 /// Writes a row of CSV. No field has a comma or a quote: they are names of ports, and numbers.
 pub(crate) fn write_row(out: &mut impl Write, fields: impl IntoIterator<Item = String>) -> io::Result<()> {

@@ -19,8 +19,8 @@ pub(crate) struct TraceArguments {
     /// Trace these cycles only; the last is left out, and either may be missing.
     #[arg(long, value_name = "A..B", value_parser = cycles, allow_hyphen_values = true, requires = "trace")]
     trace_cycles: Option<Range<u64>>,
-    /// Trace these signals only: names of ports and registers and of the signals in docs/traces.md; `*` stands for any
-    /// characters.
+    /// Trace these signals only: names of ports and registers, or names from docs/traces.md such as `outputs.*` and
+    /// `takt.stall.*`; `*` stands for any characters.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "trace")]
     trace_signals: Vec<String>,
     /// End the trace when it has so many MiB.

@@ -433,7 +433,8 @@ impl Session {
         let last = self.checkpoints.last().map_or(0, |checkpoint| checkpoint.emulator.now());
         // Before the last checkpoint there is none to make.
         let checkpoint = if self.cycle() < last { Cycle::MAX } else { last + self.interval };
-        let until = target.min(edit).min(checkpoint).min(self.cycle() + SLICE);
+        let begin = self.cycle();
+        let until = target.min(edit).min(checkpoint).min(begin + SLICE);
         let result = self.core.emulator.run_period_until(until);
         self.core.boundary = false;
         match result {
@@ -445,6 +446,8 @@ impl Session {
                 self.set_row();
             }
             Err(PeriodError::Fault(fault)) => return Err(Why::Fault(fault)),
+            // The position behind the last cycle is one of the run's: who goes on from there learns that it has halted.
+            Err(PeriodError::Halted) if self.cycle() > begin => {}
             // Nothing asks for ports by name.
             Err(PeriodError::Halted | PeriodError::Port(_)) => return Err(Why::Halted),
         }
@@ -691,8 +694,16 @@ impl Session {
         })
     }
 
-    /// Runs on until an expression holds (is not zero). Where it has no value it does not.
+    /// Runs on to the next position at which an expression holds (is not zero). Where it has no value it does not.
     pub fn run_until(&mut self, live: &Live) -> Why {
+        // What holds already may still hold in the next cycle, in which nothing need change that the search looks for.
+        if self.holds(live) {
+            match self.go_to(self.cycle() + 1) {
+                Why::Done if self.holds(live) => return Why::Holds,
+                Why::Done => {}
+                end => return end,
+            }
+        }
         let interest = Interest::value(live, self.program());
         self.forward(&interest, |session, _| session.holds(live).then_some(Why::Holds))
     }

@@ -52,7 +52,7 @@ pub struct Options {
     pub format: Format,
     /// The cycles that are traced.
     pub cycles: Range<Cycle>,
-    /// Names of signals, `*` standing for any characters; empty for all.
+    /// Names of signals, alone or with their groups as in `outputs.F1`, `*` standing for any characters; empty for all.
     pub signals: Vec<String>,
     /// Bytes, roughly: the cycle in which a trace has more is its last.
     pub limit: u64,
@@ -279,10 +279,4 @@ impl<'w> Tracer<'w> {
         }
         Ok(self.summary)
     }
-}
-
-/// A NaN or an infinity has no number in JSON.
-fn number(value: f32) -> serde_json::Value {
-    serde_json::from_str::<serde_json::Number>(&format!("{value:?}"))
-        .map_or_else(|_| format!("{value:?}").into(), serde_json::Value::from)
 }
