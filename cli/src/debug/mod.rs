@@ -10,7 +10,7 @@ use crate::load::{Load, Loaded};
 use crate::output::{self, Failure};
 use crate::ports;
 use crate::run::tick;
-use crate::select::{self, OptionalMachine, PAPER_CLOCK};
+use crate::select::{self, OptionalMachine, PAPER_CLOCK, SourceArguments};
 use crate::track::{self, period_cycles};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
@@ -38,6 +38,8 @@ pub(crate) struct Debug {
     file: Option<PathBuf>,
     #[command(flatten)]
     machine: OptionalMachine,
+    #[command(flatten)]
+    source: SourceArguments,
     /// CSV with one named column for each input port and one row for each period.
     #[arg(long, value_name = "CSV", conflicts_with = "track")]
     inputs: Option<PathBuf>,
@@ -98,7 +100,7 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
     }
 
     let control = Arc::new(Control::default());
-    let load = Load::new(arguments.machine.machine, color);
+    let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
     let session = if arguments.track {
         let path = arguments.file.as_deref().unwrap_or(Path::new("tracking"));
         let (name, loaded) = track::program(path, load)?;
