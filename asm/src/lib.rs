@@ -46,7 +46,7 @@ use takt_isa::{Machine, Program, T3};
 
 pub use diag::Diagnostic;
 pub use expression::Expression;
-pub use load::{FileLoader, LoadError, Loader, MemoryLoader};
+pub use load::{FileLoader, LoadError, Loader, MemoryLoader, Search};
 
 /// What the assembler is to do.
 #[derive(Clone, Copy, Debug)]

@@ -5,7 +5,7 @@ use crate::load::Load;
 use crate::number;
 use crate::output;
 use crate::ports::{self, Rows};
-use crate::select::OptionalMachine;
+use crate::select::{OptionalMachine, SourceArguments};
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use serde_json::{Value, json};
@@ -31,6 +31,8 @@ pub(crate) struct Analyse {
     file: PathBuf,
     #[command(flatten)]
     machine: OptionalMachine,
+    #[command(flatten)]
+    source: SourceArguments,
     /// CSV with one named column for each input port and one row for each period; `-` is standard input.
     #[arg(long, value_name = "CSV")]
     inputs: Option<PathBuf>,
@@ -67,7 +69,7 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
         writes.push(("--json", Path::new("-")));
     }
     files::check(&reads, &writes)?;
-    let load = Load::new(arguments.machine.machine, color);
+    let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
     let program = load.program(&arguments.file)?;
     let rows = read_inputs(arguments, &program)?;
     let (trace, period) = follow(arguments, &program, &rows)?;
@@ -153,7 +155,7 @@ fn faster(arguments: &Analyse, load: &Load, program: &Program, trace: &Trace, ro
     let source = source.and_then(|file| Load::source(file).ok());
     let anew = |what: &WhatIf| {
         let machine = Some(quicker(program.machine, what.unit));
-        let assembled = Load { machine, ..*load }.assemble(&arguments.file, source.clone()?).ok()?;
+        let assembled = Load { machine, ..load.clone() }.assemble(&arguments.file, source.clone()?).ok()?;
         Some(follow(arguments, &assembled.program, rows).ok()?.0.cycles)
     };
     trace.what_if(program).into_iter().map(|what| Faster { anew: anew(&what), what }).collect()

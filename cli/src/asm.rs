@@ -3,7 +3,7 @@
 use crate::files::{self, Given, Out};
 use crate::load::Load;
 use crate::output::{self, Failure};
-use crate::select::MachineArgument;
+use crate::select::{MachineArgument, SourceArguments};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
@@ -26,6 +26,8 @@ pub(crate) struct Asm {
     file: PathBuf,
     #[command(flatten)]
     machine: MachineArgument,
+    #[command(flatten)]
+    source: SourceArguments,
     /// Write the image here; `-` is standard output.
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -113,7 +115,11 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
     files::check(&[("FILE", &arguments.file)], &writes)?;
 
     let schedule = if arguments.optimise { Schedule::All } else { arguments.schedule.into() };
-    let load = Load { schedule, effort: arguments.effort, ..Load::new(arguments.machine.machine, color) };
+    let load = Load {
+        schedule,
+        effort: arguments.effort,
+        ..Load::new(arguments.machine.machine, color).with(&arguments.source)
+    };
     let result = load.assemble(&arguments.file, source);
     let assembled = match result {
         Err(errors) if arguments.json => {

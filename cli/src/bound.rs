@@ -4,7 +4,7 @@ use crate::files::{self, Out};
 use crate::load::Load;
 use crate::number::{self, Time};
 use crate::output::{self, Failure};
-use crate::select::{self, OptionalMachine};
+use crate::select::{self, OptionalMachine, SourceArguments};
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use serde_json::{Value, json};
@@ -25,6 +25,8 @@ pub(crate) struct Bound {
     file: PathBuf,
     #[command(flatten)]
     machine: OptionalMachine,
+    #[command(flatten)]
+    source: SourceArguments,
     /// Fail (status 1) unless every period ends before the next tick, this time after its own: `100us`, `0.1ms`, or a
     /// number of cycles.
     #[arg(long, value_name = "TIME", value_parser = number::time, allow_hyphen_values = true)]
@@ -57,7 +59,8 @@ impl Verdict {
 
 pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
     files::check(&[("FILE", &arguments.file)], &[])?;
-    let program = Load::new(arguments.machine.machine, color).program(&arguments.file)?;
+    let program =
+        Load::new(arguments.machine.machine, color).with(&arguments.source).program(&arguments.file)?;
     let bounds = takt_analysis::bound(&program).map_err(|error| anyhow!("no bound: {error}"))?;
     let verdict = match (arguments.deadline, bounds.worst_period()) {
         (None, _) => None,

@@ -5,7 +5,7 @@ use crate::load::Load;
 use crate::number;
 use crate::output::{self, Failure};
 use crate::ports;
-use crate::select::OptionalMachine;
+use crate::select::{OptionalMachine, SourceArguments};
 use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::{Value, json};
@@ -28,6 +28,8 @@ pub(crate) struct Cosim {
     file: Option<PathBuf>,
     #[command(flatten)]
     machine: OptionalMachine,
+    #[command(flatten)]
+    source: SourceArguments,
     /// CSV with one named column for each input port and one row for each period; `-` is standard input.
     #[arg(long, value_name = "CSV", requires = "file", conflicts_with_all = ["seed", "programs"])]
     inputs: Option<PathBuf>,
@@ -80,7 +82,7 @@ fn model(machine: &'static Machine) -> Result<(Design, Model)> {
 
 /// A program from a file.
 fn one(arguments: &Cosim, file: &Path, color: bool, out: &mut Out) -> Result<()> {
-    let program = Load::new(arguments.machine.machine, color).program(file)?;
+    let program = Load::new(arguments.machine.machine, color).with(&arguments.source).program(file)?;
     let rows = ports::rows(arguments.inputs.as_deref(), arguments.periods, PERIODS, &program.inputs)?;
     let (design, model) = model(program.machine)?;
     let ran = run_rows(&program, &rows, model.start(&[])?);

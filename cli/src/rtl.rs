@@ -5,7 +5,7 @@ use crate::load::Load;
 use crate::number;
 use crate::output;
 use crate::ports;
-use crate::select::OptionalMachine;
+use crate::select::{OptionalMachine, SourceArguments};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::json;
@@ -26,6 +26,8 @@ pub(crate) struct Rtl {
     output: PathBuf,
     #[command(flatten)]
     machine: OptionalMachine,
+    #[command(flatten)]
+    source: SourceArguments,
     /// Source or image whose memory image the test bench loads; `-` is standard input.
     #[arg(long, value_name = "FILE")]
     program: Option<PathBuf>,
@@ -53,7 +55,7 @@ pub(crate) fn run(arguments: &Rtl, color: bool, out: &mut Out) -> Result<()> {
     let reads = [("--program", &arguments.program), ("--inputs", &arguments.inputs)];
     let reads: Vec<_> = reads.into_iter().filter_map(|(name, path)| Some((name, path.as_deref()?))).collect();
     files::check(&reads, &[])?;
-    let load = Load::new(arguments.machine.machine, color);
+    let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
     let program = arguments.program.as_deref().map(|path| load.program(path)).transpose()?;
     let machine = match (&program, arguments.machine.machine) {
         (Some(program), _) => program.machine,

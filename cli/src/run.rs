@@ -9,7 +9,7 @@ use crate::nan::NanWrites;
 use crate::number;
 use crate::output::{self, Failure};
 use crate::ports::{self, Inputs};
-use crate::select::OptionalMachine;
+use crate::select::{OptionalMachine, SourceArguments};
 use crate::trace::{Trace, TraceArguments};
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
@@ -33,6 +33,8 @@ pub(crate) struct Run {
     file: PathBuf,
     #[command(flatten)]
     machine: OptionalMachine,
+    #[command(flatten)]
+    source: SourceArguments,
     /// CSV with one named column for each input port and one row for each period; `-` is standard input.
     #[arg(long, value_name = "CSV")]
     inputs: Option<PathBuf>,
@@ -99,7 +101,8 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
         .into());
     }
 
-    let program = Load::new(arguments.machine.machine, color).program(&arguments.file)?;
+    let program =
+        Load::new(arguments.machine.machine, color).with(&arguments.source).program(&arguments.file)?;
     let mut emulator = Emulator::new(&program)?;
     emulator.set_tick_period(arguments.tick);
     let mut trace_file = arguments.trace.create()?;

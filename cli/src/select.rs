@@ -1,6 +1,7 @@
 //! Options that several commands share, and did-you-mean.
 
 use clap::Args;
+use std::path::{Path, PathBuf};
 use takt_asm::diag::nearest;
 use takt_isa::{MACHINES, Machine, Op, ROWS, Row};
 
@@ -18,6 +19,23 @@ pub(crate) struct OptionalMachine {
     /// The machine, as `takt machines` lists them [default: the image's; t3 for a source].
     #[arg(long = "machine", short = 'm', value_name = "MACHINE", value_parser = machine)]
     pub(crate) machine: Option<&'static Machine>,
+}
+
+/// What every command takes that assembles a source.
+#[derive(Args, Clone, Default)]
+pub(crate) struct SourceArguments {
+    /// Look in this folder too for what a source includes; may be given several times.
+    #[arg(short = 'I', long = "include", value_name = "DIR", value_parser = folder)]
+    pub(crate) folders: Vec<PathBuf>,
+}
+
+/// A folder that is there, for clap.
+fn folder(path: &str) -> Result<PathBuf, String> {
+    match Path::new(path) {
+        path if path.is_dir() => Ok(path.to_owned()),
+        path if path.exists() => Err("it is a file, not a folder".to_owned()),
+        _ => Err("there is no such folder".to_owned()),
+    }
 }
 
 /// The machine of a name, for clap.

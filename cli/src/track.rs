@@ -8,7 +8,7 @@ use crate::load::{Load, Loaded};
 use crate::nan::NanWrites;
 use crate::number;
 use crate::plot::Plot;
-use crate::select::{self, OptionalMachine, suggest};
+use crate::select::{self, OptionalMachine, SourceArguments, suggest};
 use crate::{output, ports, report};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
@@ -38,6 +38,8 @@ pub(crate) struct Track {
     program: PathBuf,
     #[command(flatten)]
     machine: OptionalMachine,
+    #[command(flatten)]
+    source: SourceArguments,
     /// Tool path in G-code [default: the letters AGH]; `-` is standard input.
     #[arg(long, value_name = "FILE")]
     gcode: Option<PathBuf>,
@@ -140,7 +142,8 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
     files::check(&reads, &writes)?;
 
     let (path, trajectory) = trajectory(arguments.gcode.as_deref())?;
-    let (name, loaded) = program(&arguments.program, Load::new(arguments.machine.machine, color))?;
+    let (name, loaded) =
+        program(&arguments.program, Load::new(arguments.machine.machine, color).with(&arguments.source))?;
     let program = loaded.program;
     let periods = arguments.periods.unwrap_or(u64::MAX).min(trajectory.periods());
     let mut emulator = Emulator::new(&program)?;

@@ -9,7 +9,7 @@ use crate::load::{Load, Loaded};
 use crate::number;
 use crate::output::{self, Failure};
 use crate::ports;
-use crate::select::OptionalMachine;
+use crate::select::{OptionalMachine, SourceArguments};
 use crate::track::{ClosedLoopArguments, Recording};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
@@ -35,6 +35,8 @@ pub(crate) struct Debug {
     file: Option<PathBuf>,
     #[command(flatten)]
     machine: OptionalMachine,
+    #[command(flatten)]
+    source: SourceArguments,
     /// CSV with one named column for each input port and one row for each period [default: the ports are 0].
     #[arg(long, value_name = "CSV", conflicts_with = "track")]
     inputs: Option<PathBuf>,
@@ -87,7 +89,7 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
     }
 
     let control = Arc::new(Control::default());
-    let load = Load::new(arguments.machine.machine, color);
+    let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
     let session = if arguments.closed_loop.track {
         let recording = arguments.closed_loop.record(arguments.file.as_deref(), load, ROWS)?;
         in_recording(recording, &control, out)?
