@@ -10,7 +10,7 @@ use takt_emu::Emulator;
 use takt_isa::{MACHINES, Machine, Program, T3};
 
 fn program(text: &str, machine: &'static Machine, schedule: Schedule) -> Program {
-    let options = Options { machine, schedule, effort: 1 };
+    let options = Options { machine, schedule, effort: 0 };
     let assembled = assemble("random.s", &MemoryLoader::of("random.s", text), &options);
     assembled.unwrap_or_else(|errors| panic!("{text}\n{}", errors.render(false))).program
 }
@@ -64,7 +64,7 @@ fn run(program: &Program, seed: u64) -> (Vec<u32>, Vec<(String, Option<u32>)>, u
 #[test]
 fn memory_and_registers_are_those_of_the_source() {
     let (mut before, mut after) = (0, 0);
-    for seed in 0..if cfg!(debug_assertions) { 150 } else { 1000 } {
+    for seed in 0..if cfg!(debug_assertions) { 100 } else { 1000 } {
         let text = source(seed);
         for machine in MACHINES {
             let (memory, registers, plain) = run(&program(&text, machine, Schedule::None), seed);
@@ -84,7 +84,7 @@ fn a_cascade_of_biquads_is_as_short_as_its_chain() {
         common::assemble_file("kernels", "biquads.s", &T3).unwrap_or_else(|e| panic!("{}", e.render(false)));
     let block = assembled.blocks.iter().find(|block| block.label.as_deref() == Some("period"));
     let block = block.expect("the period is a block");
-    assert_eq!((block.cycles, block.bound.cycles()), (0, 0));
+    assert_eq!((block.cycles, block.bound.cycles()), (81, 81)); // 187 with every store and load in order
 }
 
 /// Cycles of a period of stores and loads, one after the other or not.
