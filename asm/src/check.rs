@@ -61,7 +61,7 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
         if complete && !opaque && !homes.quiet.contains(&RegisterId::new(index)) {
             never(context, ir, register, found, &uses);
         }
-        if complete {
+        if complete && !homes.set_once.contains(&RegisterId::new(index)) {
             state(context, ir, register, found);
         }
     }

@@ -96,8 +96,14 @@ fn word(ir: &Ir, operation: &Operation, slot: usize, placement: &Placement, sink
     }
 }
 
+/// Whether no packing of the operations fits the program memory.
+pub(crate) fn is_too_long(ir: &Ir) -> bool {
+    let words = (ir.machine.code_depth as usize).saturating_mul(ir.machine.slots.len());
+    ir.operations().filter(|operation| operation.slot.is_some()).count() > words
+}
+
 /// The memories of the machine hold only so much.
-fn limits(ir: &Ir, sink: &mut Sink) {
+pub(crate) fn limits(ir: &Ir, sink: &mut Sink) {
     let depth = ir.machine.code_depth as usize;
     if ir.bundles.len() > depth {
         let first = ir.bundles[depth].operations.first().map_or(Span::default(), |operation| operation.span);

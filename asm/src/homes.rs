@@ -69,9 +69,11 @@ pub(crate) struct Homeless {
 pub(crate) struct Homes {
     /// By register.
     pub(crate) of: Vec<Option<Home>>,
-    /// By run and register: whether the value that the run leaves may be read. For those that have a home.
+    /// For registers that have a home: by run, whether the value that the run leaves is wanted.
     pub(crate) live: Vec<(RegisterId, Vec<bool>)>,
     pub(crate) homeless: Vec<Homeless>,
+    /// Registers that the source writes in `.once`, if only to write them again before they are read.
+    pub(crate) set_once: HashSet<RegisterId>,
     /// Registers made for values that nothing need read.
     pub(crate) quiet: HashSet<RegisterId>,
     pub(crate) adjustments: Vec<Adjustment>,
@@ -90,7 +92,7 @@ impl Homes {
         found.map(|homeless| homeless.help.as_str())
     }
 
-    /// Whether what a run leaves in a register may be read after it.
+    /// Whether what a run leaves in a register may be read after it, or is shown by a port.
     pub(crate) fn is_live(&self, register: RegisterId, run: usize) -> bool {
         let found = self.live.binary_search_by_key(&register, |(register, _)| *register);
         found.map_or(true, |index| self.live[index].1[run])
@@ -131,8 +133,16 @@ pub(crate) fn choose(ir: &mut Ir) -> Homes {
         if ir.register(id).name.is_empty() {
             continue;
         }
-        let (reads, writes) = flow::uses(ir, &runs, id);
-        let live = flow.live_after(&reads, &writes);
+        let mut once = ir.bundles[..ir.period as usize].iter().flat_map(|bundle| &bundle.operations);
+        if once.any(|operation| operation.dest == Some(id)) {
+            homes.set_once.insert(id);
+        }
+        let live = if ir.register(id).kind == RegisterKind::Output {
+            vec![true; runs.len()]
+        } else {
+            let (reads, writes) = flow::uses(ir, &runs, id);
+            flow.live_after(&reads, &writes)
+        };
         let writes = coming_home(ir, &runs, &flow, id, &live);
         match best(ir, &flow, &writes, ir.register(id).pinned) {
             Some(slot) => {
@@ -169,15 +179,7 @@ fn coming_home(ir: &Ir, runs: &[Run], flow: &Flow, id: RegisterId, live: &[bool]
                 let constant = constant(ir, operation);
                 let initial = constant.is_some() && !used && !reads && !output && at < flow.once;
                 let copied = !fixed && branch_that_reads(ir, at).is_none();
-                writes.push(Write {
-                    bundle: at,
-                    number,
-                    slot,
-                    live: output || *live,
-                    constant,
-                    initial,
-                    copied,
-                });
+                writes.push(Write { bundle: at, number, slot, live: *live, constant, initial, copied });
             }
             used |= reads || operations.iter().any(|operation| operation.dest == Some(id));
         }

@@ -9,6 +9,7 @@
 //! `docs/language.md` is the contract of the language, `docs/image.md` that of the image. Nothing here prints, and nothing here
 //! touches the file system but [`load::FileLoader`]. No input makes the assembler panic; [`limits`] bounds what it takes.
 
+mod address;
 pub mod ast;
 mod blocks;
 mod check;
@@ -131,6 +132,11 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
     };
     ir.bundles.iter_mut().for_each(|bundle| bundle.scheduled = packs(bundle.scheduled));
     check::integers(&mut context, &ir);
+    // Of a program that cannot fit nothing else is worth its time.
+    if emit::is_too_long(&ir) {
+        emit::limits(&ir, &mut context.sink);
+        return Err(context.sink.finish(Arc::new(context.sources)));
+    }
     let mut homes = homes::choose(&mut ir);
     let values = values::split(&mut ir, &mut homes);
     copies::insert(&mut ir, &mut homes, &values);
