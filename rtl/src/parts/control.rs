@@ -8,6 +8,10 @@ use takt_isa::Effect;
 /// Where the control bits stand.
 pub(super) fn parameters(plan: &Plan, m: &mut Module) {
     m.banner("control bits of each slot, from its decoder");
+    m.comment(
+        "unit_<name>: a unit of the slot's row; result_<latency>: it writes a register; code: the unit's own, from the header of its \
+         file; the others: effects in the table of instructions.",
+    );
     m.blank();
     for slot in &plan.slots {
         for control in &slot.controls {
@@ -18,6 +22,7 @@ pub(super) fn parameters(plan: &Plan, m: &mut Module) {
 
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("from decode to issue");
+    m.comment("A bundle moves on with advance. The letters: d_ decode, m_ match, r_ read, i_ issue.");
     for slot in &plan.slots {
         m.blank();
         stages(slot, m);
@@ -27,6 +32,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
 fn stages(slot: &SlotPlan, m: &mut Module) {
     use Stage::{Decode, Issue, Match, Read};
     let constant = slot.constant_bits() > 0;
+    let address = slot.address_bits() > 0;
     let immediate = slot.has_effect(Effect::Immediate);
     m.regs([Match, Read, Issue].map(|stage| slot.control(stage)));
     m.regs([Match, Read, Issue].map(|stage| slot.illegal(stage)));
@@ -37,6 +43,8 @@ fn stages(slot: &SlotPlan, m: &mut Module) {
     }
     if constant {
         m.regs([slot.constant(Match)]);
+    }
+    if address {
         m.regs([Read, Issue].map(|stage| slot.constant(stage)));
     }
     if immediate {
@@ -63,8 +71,10 @@ fn stages(slot: &SlotPlan, m: &mut Module) {
         set(slot.dest(Issue), slot.dest(Read)),
     ]);
     if constant {
+        body.push(set(slot.constant(Match), slot.constant(Decode)));
+    }
+    if address {
         body.extend([
-            set(slot.constant(Match), slot.constant(Decode)),
             set(slot.constant(Read), slot.constant(Match).low(slot.constant(Read).width())),
             set(slot.constant(Issue), slot.constant(Read)),
         ]);

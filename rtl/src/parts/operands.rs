@@ -7,6 +7,10 @@ use takt_isa::Effect;
 
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("operands: banks, forwarding, hazards");
+    m.comment(
+        "Rule 2: a bundle waits while a register that it reads is pending. Each source has a copy of every bank, takes from the buses \
+         what these do not hold yet, and says whether it holds up the bundle in read, in issue.",
+    );
     m.blank();
     m.regs([net::STICKY]);
     m.wires([net::STICKY_NOW]);
@@ -45,9 +49,11 @@ fn source(plan: &Plan, slot: &SlotPlan, operand: usize, m: &mut Module) {
             .port("m_bank", slot.source_bank(Stage::Match, operand))
             .port("m_index", slot.source_index(Stage::Match, operand))
             .same([plan.underway(), plan.underway_index(), plan.writes(), plan.late(), plan.late_index()])
-            .same([Stage::Read, Stage::Issue].into_iter().flat_map(|stage| {
-                [plan.writes_at(stage), plan.early_at(stage), plan.dest_at(stage)]
-            }))
+            .same(
+                [Stage::Read, Stage::Issue]
+                    .into_iter()
+                    .flat_map(|stage| [plan.writes_at(stage), plan.early_at(stage), plan.dest_at(stage)]),
+            )
             .same([plan.result(), plan.was_result()])
             .port("input_write", net::INPUT1)
             .port("input_write_index", plan.input1_index())

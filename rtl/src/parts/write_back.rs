@@ -6,6 +6,10 @@ use crate::verilog::{Expr, Module, concat, decimal};
 
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("output and retire ports");
+    m.comment(format!(
+        "Row: outputs_per_bank {}: the last registers of each bank, whose indices are ones above the port's number.",
+        plan.machine.outputs_per_bank
+    ));
     m.blank();
     for slot in &plan.slots {
         let bank = slot.slot.bank;

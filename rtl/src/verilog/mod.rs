@@ -157,8 +157,8 @@ impl Statement {
 pub(crate) struct Instance {
     module: String,
     name: String,
-    parameters: Vec<(&'static str, u32)>,
-    ports: Vec<(String, Option<Expr>)>,
+    parameters: Vec<(&'static str, Expr)>,
+    ports: Vec<(String, Expr)>,
 }
 
 impl Instance {
@@ -167,18 +167,18 @@ impl Instance {
     }
 
     pub(crate) fn parameter(mut self, name: &'static str, value: u32) -> Instance {
-        self.parameters.push((name, value));
+        self.parameters.push((name, Expr::Literal(value.to_string())));
         self
     }
 
     pub(crate) fn port(mut self, name: impl Into<String>, value: impl Into<Expr>) -> Instance {
-        self.ports.push((name.into(), Some(value.into())));
+        self.ports.push((name.into(), value.into()));
         self
     }
 
     /// Ports that are connected to the nets of their names.
     pub(crate) fn same(mut self, nets: impl IntoIterator<Item = Net>) -> Instance {
-        self.ports.extend(nets.into_iter().map(|net| (net.name().to_owned(), Some(net.into()))));
+        self.ports.extend(nets.into_iter().map(|net| (net.name().to_owned(), net.into())));
         self
     }
 }
@@ -258,7 +258,9 @@ impl Module {
                 body.iter().for_each(|statement| statement.nets(&mut see));
             }
             Item::Instance(instance) => {
-                instance.ports.iter().filter_map(|port| port.1.as_ref()).for_each(|value| value.nets(&mut see));
+                let values = instance.parameters.iter().map(|(_, value)| value);
+                let values = values.chain(instance.ports.iter().map(|(_, value)| value));
+                values.for_each(|value| value.nets(&mut see));
             }
         }
         used.iter().for_each(|net| self.uses(net));
@@ -384,7 +386,9 @@ mod tests {
             &|m| m.define(Net::bit("x"), B.at(A)),
             &|m| m.clocked(vec![when(A, vec![set(B, B)])]),
             &|m| m.instance(Instance::new("other", "x").port("in", Expr::from(B).any_bit() & A)),
-            &|m| m.clocked(vec![Statement::Case { of: B.into(), arms: Vec::new(), default: vec![set(B, A)] }]),
+            &|m| {
+                m.clocked(vec![Statement::Case { of: B.into(), arms: Vec::new(), default: vec![set(B, A)] }])
+            },
         ];
         for add in uses {
             let mut module = module();
