@@ -3,7 +3,7 @@
 use crate::ast::Section;
 use crate::context::{Context, Integer, ScopeId};
 use crate::diag::{Diagnostic, Severity, nearest};
-use crate::homes::Homes;
+use crate::homes::{Homeless, Homes};
 use crate::ir::{Constant, Ir, Operation, Register, RegisterId, RegisterKind};
 use crate::source::Span;
 use takt_isa::{Field, Operand, Type};
@@ -43,14 +43,14 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
                 None => {
                     found.written = Some(((index, number), slot));
                     // Of one without a home that is the mistake.
-                    if homes.help(dest).is_none() {
+                    if homes.homeless(dest).is_none() {
                         reach(context, ir, operation, dest, slot);
                     }
                 }
                 // One report for each slot too many is enough.
                 Some((first, owner)) if owner != slot && found.conflicts & 1 << slot == 0 => {
                     found.conflicts |= 1 << slot;
-                    two_slots(context, ir, operation, (slot, owner), at(ir, first), homes.help(dest));
+                    two_slots(context, ir, operation, (slot, owner), at(ir, first), homes.homeless(dest));
                 }
                 Some(_) => {}
             }
@@ -145,7 +145,7 @@ fn two_slots(
     operation: &Operation,
     (slot, owner): (u8, u8),
     first: &Operation,
-    help: Option<&str>,
+    homeless: Option<&Homeless>,
 ) {
     let Some(dest) = operation.dest else { return };
     let slots = ir.machine.slots;
@@ -160,10 +160,13 @@ fn two_slots(
     let writes = |by: &takt_isa::Slot, operation: &Operation| {
         format!("`{}` is of slot `{}`, which writes bank {}", operation.row().mnemonic, by.name, by.bank.name)
     };
-    let error = Diagnostic::error("two-slots", span, message)
+    let mut error = Diagnostic::error("two-slots", span, message)
         .here(writes(slot, operation))
         .also(before, writes(owner, first))
-        .help(help.unwrap_or("use two registers"));
+        .help(homeless.map_or("use two registers", |homeless| &homeless.help));
+    if let Some((span, because)) = homeless.and_then(|homeless| homeless.because.as_ref()) {
+        error = error.also(*span, because);
+    }
     context.report(ScopeId(operation.expansion), error);
 }
 

@@ -3,7 +3,7 @@
 //! The stages, each a module:
 //!
 //! ```text
-//! text ─ lex ─ tokens ─ parse ─ ast ─ expand ─ flat list ─ resolve ─ ir ─ place ─ emit ─ Program ─ image
+//! text ─ lex ─ tokens ─ parse ─ ast ─ expand ─ flat list ─ resolve ─ ir ─ homes ─ schedule ─ place ─ emit ─ Program ─ image
 //! ```
 //!
 //! `docs/language.md` is the contract of the language, `docs/image.md` that of the image. Nothing here prints, and nothing here

@@ -153,10 +153,11 @@ impl Resolver<'_> {
                     self.context.report(item.at.scope, diagnostic);
                 }
             }
-        } else if let Some(diagnostic) = serialise::twice(&operations) {
-            let diagnostic = diagnostic(&self.context.registers, self.ir.machine);
-            self.context.report(item.at.scope, diagnostic);
         } else if self.check_slots(item.at, &operations).is_ok() {
+            if let Some(diagnostic) = serialise::twice(&operations) {
+                let diagnostic = diagnostic(&self.context.registers, self.ir.machine);
+                self.context.report(item.at.scope, diagnostic);
+            }
             self.ir.bundles.push(Bundle { operations, explicit, scheduled: item.scheduled });
         }
     }

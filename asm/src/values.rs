@@ -5,6 +5,7 @@
 //! that matters: where the scheduler may move the operations (the reuse of a name then orders nothing), and for names that
 //! operations of different slots write. Of these the last value, too, where it does not lie in the name's home.
 
+use crate::flow;
 use crate::homes::Homes;
 use crate::ir::{Ir, Operation, Register, RegisterId, RegisterKind};
 use takt_isa::Effect;
@@ -21,7 +22,8 @@ pub(crate) struct Run {
     pub(crate) scheduled: bool,
 }
 
-/// Cuts the program into runs: at labels and heads of loops, at the period's start, after redirections, around what must not move.
+/// Cuts the program into runs: at labels, at heads of loops and at bundles that are jumped to by number, at the period's start,
+/// after redirections, around what must not move.
 pub(crate) fn runs(ir: &Ir) -> Vec<Run> {
     let count = ir.bundles.len();
     let mut cut = vec![false; count + 1];
@@ -33,6 +35,11 @@ pub(crate) fn runs(ir: &Ir) -> Vec<Run> {
     }
     for bound in &ir.loop_bounds {
         cut[bound.position as usize] = true;
+    }
+    for address in ir.operations().filter_map(flow::number) {
+        if let Some(cut) = cut.get_mut(address as usize) {
+            *cut = true;
+        }
     }
     for (i, bundle) in ir.bundles.iter().enumerate() {
         // The status register sees every operation before and none after: a wall.

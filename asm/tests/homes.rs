@@ -277,13 +277,34 @@ fn mends_that_the_help_names_work() {
     good(&pinned.replace("a3", "x3"));
     // A branch that reads what its own bundle computes.
     let branch = program(".state s", "fadd s, s, x || bz s, over\n ld s, [n]");
-    assert_eq!(help(&branch), "write `bz` in a bundle of its own, after this one");
+    assert_eq!(help(&branch), "write `bz` as a bundle of its own");
     good(&branch.replace("|| bz", "\n bz"));
     // Bundles that must stay at their addresses.
     let numbers = program(".state s", "fadd s, s, x\n bz n, 5\n ld s, [n]");
-    assert_eq!(
-        help(&numbers),
-        "jump to labels instead of numbers, so that the assembler can add an operation that copies"
-    );
+    assert_eq!(help(&numbers), "jump to labels, so that the assembler can add an operation that copies");
     good(&numbers.replace(", 5", ", over"));
+}
+
+#[test]
+fn a_jump_to_a_number_is_a_way_in() {
+    // Bundle 2 reads what bundle 1 computed, or what it computed itself.
+    let text = ".input x, n:int\n.output F\n.reg t\n.once\n wait 1\n.period\n fmul t, x, x\n fadd t, t, 1.0\n mov F, t\n bnz n, 2\n wait 1\n";
+    let report = bad(text, &T3);
+    assert_eq!(report.messages()[0].code, "two-slots", "{}", report.render(false));
+    let labels = text.replace(" fadd", "again: fadd").replace("n, 2", "n, again");
+    let labels = labels.replace("wait 1", "wait period").replace(".period\n", ".period\nperiod:");
+    assert_eq!(good(&labels).adjustments.len(), 2);
+}
+
+#[test]
+fn two_values_of_a_branching_bundle() {
+    // Both are home before control leaves.
+    let text = ".input x, n:int\n.output F, G\n.state s, t\n.once\n mov s, x\n mov t, x\n wait period\n.period\nperiod: fadd s, s, x || fmul t, t, x || bz n, over\n mov F, s\nover: mov G, t\n wait period\n";
+    let (lines, assembled) = period(text);
+    let place = |what: &str| lines.iter().position(|line| line.contains(what)).expect(what);
+    assert!(place("mov s, s.1") < place("bz n") && place("mov t, t.1") < place("bz n"), "{lines:?}");
+    for seed in 0..4 {
+        let small = self::assembled(text, &T1, Schedule::None);
+        assert_eq!(run(&assembled.program, seed), run(&small.program, seed));
+    }
 }
