@@ -424,7 +424,7 @@ impl Analysis<'_> {
         if !worse.is_empty() {
             writeln!(
                 out,
-                "more as it is: the bundles are packed for today's latencies, and a result that comes sooner can be in the way of another"
+                "more as it is: in bundles packed for today's latencies, sooner results meet others"
             )?;
         }
         for what in worse {
@@ -434,10 +434,7 @@ impl Analysis<'_> {
         let worse = || self.faster.iter().filter_map(|faster| Some((faster, faster.anew.as_ref()?)));
         let worse = || worse().filter(|(_, anew)| anew.cycles > today);
         if worse().next().is_some() {
-            writeln!(
-                out,
-                "more anew: the search ended with a longer schedule, which proves nothing of the unit"
-            )?;
+            writeln!(out, "more anew: the search ended with a longer schedule, which proves nothing")?;
         }
         for (faster, anew) in worse() {
             writeln!(out, "  {:<16} none takes fewer than {}", self.unit(faster.what.unit), anew.least)?;

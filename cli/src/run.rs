@@ -69,7 +69,7 @@ Examples:
   takt run prog.s --inputs in.csv --stats         a period for each row; where did the cycles go?
   takt run prog.takt --inputs in.csv --outputs -  outputs and cycles of every period
   takt run prog.s --periods 3 --trace out.vcd     waveforms for GTKWave or Surfer
-  takt run prog.s --inputs in.csv --tick 12500 --deny missed,invalid     for CI: status 3 if one happens";
+  takt run prog.s --inputs in.csv --deny all      for CI: status 3 if a flag is raised, …";
 
 /// Cycles in which a period ends, or nobody expects it to any more.
 pub(crate) const PERIOD_LIMIT: u64 = 1_000_000_000;
