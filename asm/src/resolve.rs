@@ -38,6 +38,7 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
         data: Vec::new(),
         raw: Vec::new(),
         files: Vec::new(),
+        versions: Vec::new(),
     };
     let mut resolver =
         Resolver { context, flat, ir, slots, pool: HashMap::new(), own_files: Vec::new(), label: 0 };
@@ -59,6 +60,9 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
     ir.registers = std::mem::take(&mut context.registers);
     ir.labels = std::mem::take(&mut context.labels);
     ir.files = flat.files;
+    for (order, bundle) in (0..).zip(&mut ir.bundles) {
+        bundle.operations.iter_mut().for_each(|operation| operation.order = order);
+    }
     ir
 }
 
@@ -259,6 +263,7 @@ impl Resolver<'_> {
             location,
             span: written.span,
             expansion: at.scope.0,
+            order: 0,
             written: (at.ast, number),
         };
         let mut failed = false;
@@ -306,6 +311,7 @@ impl Resolver<'_> {
             location,
             span: written.span,
             expansion: at.scope.0,
+            order: 0,
             written: (at.ast, number),
         })
     }

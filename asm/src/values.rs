@@ -5,7 +5,7 @@
 //! that matters: where the scheduler may move the operations (the reuse of a name then orders nothing), and for names that
 //! operations of different slots write.
 
-use crate::ir::{Ir, Operation, Register, RegisterId, RegisterKind};
+use crate::ir::{Ir, Operation, Register, RegisterId, RegisterKind, Version};
 use takt_isa::Effect;
 use takt_isa::program::Space;
 
@@ -74,6 +74,8 @@ struct Name {
     made: u32,
     /// The register of its current value, if not itself.
     current: Option<RegisterId>,
+    /// The index of that value's [`Version`].
+    version: usize,
 }
 
 /// Splits names into values where that matters.
@@ -96,7 +98,7 @@ pub(crate) fn split(ir: &mut Ir) {
                 touched.push(index);
             }
         }
-        let Ir { bundles, registers, .. } = &mut *ir;
+        let Ir { bundles, registers, versions, .. } = &mut *ir;
         for bundle in &mut bundles[run.start..run.end] {
             // All operations of a bundle read before any writes.
             for operation in &mut bundle.operations {
@@ -110,6 +112,9 @@ pub(crate) fn split(ir: &mut Ir) {
                 let Some(dest) = operation.dest else { continue };
                 let Some(name) = names.get_mut(dest.index()).filter(|name| name.left > 0) else { continue };
                 name.left -= 1;
+                if name.current.is_some() {
+                    versions[name.version].through = operation.order;
+                }
                 if name.left == 0 {
                     name.current = None;
                     continue;
@@ -118,8 +123,11 @@ pub(crate) fn split(ir: &mut Ir) {
                 let original = &registers[dest.index()];
                 let fresh = Register { name: format!("{}.{}", original.name, name.made), ..original.clone() };
                 registers.push(fresh);
-                name.current = Some(RegisterId::new(registers.len() - 1));
-                operation.dest = name.current;
+                let register = RegisterId::new(registers.len() - 1);
+                name.version = versions.len();
+                let (after, through) = (operation.order, operation.order);
+                versions.push(Version { name: dest, register, after, through });
+                (name.current, operation.dest) = (Some(register), Some(register));
             }
         }
         for index in touched.drain(..) {
