@@ -13,7 +13,7 @@ use takt_isa::{Instruction, Program, ZERO};
 pub(crate) struct Emitted {
     pub(crate) program: Program,
     pub(crate) expanded: Vec<u32>,
-    /// For each bundle, the operation that gives it its source line: its order and its expansion.
+    /// For each word that has a source line, its operation's order and expansion.
     pub(crate) origins: Vec<Option<(u32, u32)>>,
 }
 
@@ -24,11 +24,10 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
     let mut code = vec![filler; ir.bundles.len() * slots];
     let mut lines = vec![None; ir.bundles.len() * slots];
     let mut expanded = Vec::new();
-    let mut origins = vec![None; ir.bundles.len()];
+    let mut origins = vec![None; ir.bundles.len() * slots];
     for (address, bundle) in ir.bundles.iter().enumerate() {
         let words = address * slots..(address + 1) * slots;
         let mut free = 0;
-        let mut first = slots;
         for operation in &bundle.operations {
             // What any slot takes goes to the first that no other operation of the bundle claims.
             let slot = match operation.slot {
@@ -47,10 +46,7 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
             }
             code[index] = word(ir, operation, slot, placement, sink);
             lines[index] = operation.location;
-            if operation.location.is_some() && slot < first {
-                first = slot;
-                origins[address] = Some((operation.order, operation.expansion));
-            }
+            origins[index] = operation.location.map(|_| (operation.order, operation.expansion));
             if operation.expansion != 0 {
                 expanded.push(index as u32);
             }

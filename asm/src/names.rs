@@ -2,15 +2,15 @@
 //! takes registers of their own, the scheduler moves what computes them, and a macro's names are other ones in each use.
 //!
 //! The order of the source is what says which value a name means: a line reads what the line before it in the source wrote,
-//! wherever the two ended up. So each bundle has the [`Position`] of the line that it shows, and each value the stretch of
-//! that order in which its name means it.
+//! wherever the two ended up. So each word has the [`Position`] of its line, and each value the stretch of that order in which
+//! its name means it.
 
-use crate::context::Context;
+use crate::context::{Context, ScopeId};
 use crate::emit::Emitted;
 use crate::expr::Value;
 use crate::ir::{Ir, RegisterId};
 use crate::place::Placement;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use takt_isa::Type;
 use takt_isa::timing::Address;
 
@@ -28,15 +28,24 @@ pub struct DebugInfo {
 /// What names stand for.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Names {
-    /// Of each bundle. Empty if nothing is known.
-    pub positions: Vec<Position>,
+    /// Of each word of the code that has a source line, parallel to it. Empty if nothing is known.
+    pub positions: Vec<Option<Position>>,
     /// Uses of macros. The first is none: the code outside of macros.
     pub scopes: Vec<Scope>,
     /// Names that stand for one register here and another there: all of its values for each.
     pub values: Vec<NamedValue>,
 }
 
-/// Where the line stands that a bundle shows: the line of its first operation that has one, or else of the bundle before.
+impl Names {
+    /// The position of the line that a bundle shows: of its first operation that has one, or else of a bundle before.
+    pub fn at_hand(&self, slots: usize, address: Address) -> Position {
+        let end = (address as usize + 1).saturating_mul(slots).min(self.positions.len());
+        let bundles = self.positions[..end].rchunks(slots.max(1));
+        bundles.flat_map(|words| words.iter().flatten()).next().copied().unwrap_or_default()
+    }
+}
+
+/// Where a line stands in the source written out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Position {
     /// Its place in the order of the source, macros and repetitions written out.
@@ -79,7 +88,7 @@ pub(crate) fn names(context: &Context, ir: &Ir, placement: &Placement, emitted: 
     Names { positions, scopes, values: values(ir, placement, emitted) }
 }
 
-fn positions(context: &Context, ir: &Ir, emitted: &Emitted) -> (Vec<Position>, Vec<Scope>) {
+fn positions(context: &Context, ir: &Ir, emitted: &Emitted) -> (Vec<Option<Position>>, Vec<Scope>) {
     let mut parameters: BTreeMap<u32, Vec<(String, String)>> = BTreeMap::new();
     for (&(scope, name), register) in &context.parameters {
         let register = &ir.register(*register).name;
@@ -90,24 +99,20 @@ fn positions(context: &Context, ir: &Ir, emitted: &Emitted) -> (Vec<Position>, V
     }
     let mut scopes = vec![Scope::default()];
     let mut numbers: HashMap<u32, u32> = HashMap::new();
-    let mut last = Position::default();
-    let mut position = |origin: &Option<(u32, u32)>| {
-        if let Some((order, expansion)) = *origin {
-            let owner = context.scope(crate::context::ScopeId(expansion)).owner;
-            let scope = match context.scope_name(owner) {
-                None => 0,
-                Some(name) => *numbers.entry(owner.0).or_insert_with(|| {
-                    let mut parameters = parameters.remove(&owner.0).unwrap_or_default();
-                    parameters.sort_unstable();
-                    scopes.push(Scope { name, parameters });
-                    scopes.len() as u32 - 1
-                }),
-            };
-            last = Position { order, scope };
-        }
-        last
+    let mut position = |(order, expansion): (u32, u32)| {
+        let owner = context.scope(ScopeId(expansion)).owner;
+        let scope = match context.scope_name(owner) {
+            None => 0,
+            Some(name) => *numbers.entry(owner.0).or_insert_with(|| {
+                let mut parameters = parameters.remove(&owner.0).unwrap_or_default();
+                parameters.sort_unstable();
+                scopes.push(Scope { name, parameters });
+                scopes.len() as u32 - 1
+            }),
+        };
+        Position { order, scope }
     };
-    let positions = emitted.origins.iter().map(&mut position).collect();
+    let positions = emitted.origins.iter().map(|origin| origin.map(&mut position)).collect();
     (positions, scopes)
 }
 
@@ -120,8 +125,7 @@ fn values(ir: &Ir, placement: &Placement, emitted: &Emitted) -> Vec<NamedValue> 
             .or_default()
             .push((version.register, Some((version.after, version.through))));
     }
-    let made: std::collections::HashSet<RegisterId> =
-        ir.versions.iter().map(|version| version.register).collect();
+    let made: HashSet<RegisterId> = ir.versions.iter().map(|version| version.register).collect();
     let shared = (0..ir.registers.len()).filter(|index| placement.shared[*index]).map(RegisterId::new);
     for id in shared.filter(|id| !made.contains(id)) {
         split.entry(id).or_default();

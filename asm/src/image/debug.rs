@@ -14,7 +14,7 @@ use takt_isa::{Program, ZERO};
 struct Debug {
     sources: Vec<Source>,
     constants: Vec<Constant>,
-    positions: Vec<(u32, u32)>,
+    positions: Vec<Option<(u32, u32)>>,
     scopes: Vec<Use>,
     values: Vec<Named>,
 }
@@ -82,7 +82,7 @@ pub(super) fn to_json(info: &DebugInfo) -> Vec<u8> {
     let debug = Debug {
         sources: sources.iter().map(source).collect(),
         constants: constants.iter().map(constant).collect(),
-        positions: names.positions.iter().map(|position| (position.order, position.scope)).collect(),
+        positions: names.positions.iter().map(|at| at.map(|at| (at.order, at.scope))).collect(),
         scopes: names.scopes.iter().map(scope).collect(),
         values: names.values.iter().map(value).collect(),
     };
@@ -115,7 +115,11 @@ pub(super) fn from_json(bytes: &[u8], program: &Program) -> Result<DebugInfo, Im
         Ok((name(constant.name)?, value))
     };
     let names = Names {
-        positions: debug.positions.iter().map(|&(order, scope)| Position { order, scope }).collect(),
+        positions: debug
+            .positions
+            .iter()
+            .map(|position| position.map(|(order, scope)| Position { order, scope }))
+            .collect(),
         scopes: debug.scopes.into_iter().map(|Use { name, parameters }| Scope { name, parameters }).collect(),
         values: debug
             .values
@@ -146,10 +150,12 @@ fn check(names: &Names, program: &Program) -> Result<(), ImageError> {
     };
     let Names { positions, scopes, values } = names;
     let bundles = program.bundles();
-    if !positions.is_empty() && positions.len() != bundles as usize {
-        return wrong(format!("positions of {} bundles, and there are {bundles}", positions.len()));
+    if !positions.is_empty() && positions.len() != program.code.len() {
+        return wrong(format!("{} positions for {} words", positions.len(), program.code.len()));
     }
-    if let Some(position) = positions.iter().find(|position| position.scope as usize >= scopes.len()) {
+    if let Some(position) =
+        positions.iter().flatten().find(|position| position.scope as usize >= scopes.len())
+    {
         return wrong(format!("there is no scope {}", position.scope));
     }
     for (number, scope) in scopes.iter().enumerate() {

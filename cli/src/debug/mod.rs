@@ -107,9 +107,10 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
         let path = arguments.file.as_deref().context("no file")?;
         let loaded = load.with_source(path)?;
         let inputs = arguments.inputs.as_deref().map(|path| rows(path, &loaded)).transpose()?;
-        let Loaded { program, constants, sources } = loaded;
-        let tick = arguments.tick;
-        Session::new(&program, Options { inputs, tick, constants, sources, control: Arc::clone(&control) })?
+        changed_sources(path, &loaded, color);
+        let Loaded { program, constants, sources, names } = loaded;
+        let (tick, control) = (arguments.tick, Arc::clone(&control));
+        Session::new(&program, Options { inputs, tick, constants, sources, names, control })?
     };
     let mut console = Console::new(session);
     if arguments.tui {
@@ -124,6 +125,22 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
         None => batch(&mut console, "standard input", &mut BufReader::new(std::io::stdin()), color, out)?,
     }
     Ok(())
+}
+
+/// Warns of sources that were changed since the image that is debugged was made of them. They are looked for where the
+/// assembler looks, from the image's folder on; one that is not there is no one's mistake, for the image has its text.
+fn changed_sources(path: &Path, loaded: &Loaded, color: bool) {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    for (name, text) in &loaded.sources {
+        let file = folder.join(name);
+        let Some(size) = file.metadata().ok().filter(|of| of.is_file()).map(|of| of.len()) else { continue };
+        let is_same = || std::fs::read(&file).is_ok_and(|now| now == text.as_bytes());
+        if size != text.len() as u64 || !is_same() {
+            let text =
+                format!("{name} has changed since {} was made; shown is what it was then", path.display());
+            output::warning(&text, color);
+        }
+    }
 }
 
 /// A script's name and text.
@@ -157,7 +174,7 @@ fn along_path(
     control: &Arc<Control>,
     out: &mut Out,
 ) -> Result<Session> {
-    let Loaded { program, constants, sources } = loaded;
+    let Loaded { program, constants, sources, names } = loaded;
     let (path, trajectory) = track::trajectory(arguments.gcode.as_deref())?;
     let periods = arguments.periods.unwrap_or(u64::MAX).min(trajectory.periods());
     if periods > ROWS as u64 {
@@ -183,8 +200,8 @@ fn along_path(
     }
     progress.finish_and_clear();
     let inputs = Some(Arc::new(rows));
-    let mut session =
-        Session::new(&program, Options { inputs, tick, constants, sources, control: Arc::clone(control) })?;
+    let control = Arc::clone(control);
+    let mut session = Session::new(&program, Options { inputs, tick, constants, sources, names, control })?;
     let (period, error, cutting) = worst;
     let doing = if cutting { "cutting" } else { "not cutting" };
     writeln!(

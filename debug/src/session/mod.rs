@@ -13,10 +13,12 @@
 
 mod expression;
 mod interest;
+mod meaning;
 mod number;
 mod stops;
 
 pub use expression::{Live, Place};
+pub use meaning::Life;
 pub use number::{Shown, UlpDistance, hex_float, ulp_distance};
 pub use stops::{Stop, Test, Where};
 
@@ -28,6 +30,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use stops::Watcher;
 use takt_asm::expr::Value;
+use takt_asm::names::Names;
 use takt_emu::{Emulator, Fault, LoadError, PeriodError, PeriodReport, Retire, Status, Upcoming};
 use takt_isa::program::Location;
 use takt_isa::timing::{Address, Cause, Cycle};
@@ -58,6 +61,8 @@ pub struct Options {
     pub constants: Vec<(String, Value)>,
     /// Sources, by the names that the program has for them.
     pub sources: Vec<(String, String)>,
+    /// What the source's names stand for.
+    pub names: Names,
     /// What is shared with whoever watches.
     pub control: Arc<Control>,
 }
@@ -154,10 +159,6 @@ struct Core {
 }
 
 impl Core {
-    fn machine(&self) -> Machine<'_> {
-        Machine { emulator: &self.emulator, periods: self.periods }
-    }
-
     fn checkpoint(&mut self) -> Core {
         let emulator = self.emulator.snapshot();
         Core { emulator, report: self.report.clone(), ..*self }
@@ -295,9 +296,14 @@ impl Session {
         }
     }
 
+    fn machine(&self) -> Machine<'_> {
+        let Core { emulator, periods, .. } = &self.core;
+        Machine { emulator, periods: *periods, names: &self.options.names }
+    }
+
     /// What a bundle that issued in the cycle to come would read from a register.
     pub fn register(&self, register: u16) -> Option<u32> {
-        self.core.machine().register(register)
+        self.machine().register(register)
     }
 
     /// Operations issued and not yet written back, in the order of their writebacks, each with the cycles to go: 1 for
@@ -318,7 +324,7 @@ impl Session {
         if text.trim().is_empty() {
             return Err("an expression is missing".to_owned());
         }
-        Live::parse(text.trim(), self.program(), &self.options.constants)
+        Live::parse(text.trim(), self.program(), &self.options.constants, &self.options.names)
     }
 
     /// The value of an expression.
@@ -326,7 +332,7 @@ impl Session {
     /// # Errors
     /// Why it has none.
     pub fn evaluate(&self, live: &Live) -> Result<Value, String> {
-        live.evaluate(&self.core.machine(), self.program())
+        live.evaluate(&self.machine(), self.program())
     }
 
     /// The register or data word that an expression is, if it is one, with the type that it is read as, and its bits.
@@ -335,7 +341,7 @@ impl Session {
     /// Why it has none.
     #[allow(clippy::type_complexity)]
     pub fn place(&self, live: &Live) -> Result<Option<(Place, Type, Option<u32>)>, String> {
-        let (machine, program) = (self.core.machine(), self.program());
+        let (machine, program) = (self.machine(), self.program());
         let Some((place, ty)) = live.place(&machine, program)? else { return Ok(None) };
         let bits = match place {
             Place::Register(register) => machine.register(register),
@@ -344,9 +350,30 @@ impl Session {
         Ok(Some((place, ty, bits)))
     }
 
+    /// The value's own name (`t.1`), if an expression is a name that stands for several, of which this is the one at hand.
+    pub fn label(&self, live: &Live) -> Option<String> {
+        live.label(&self.machine())
+    }
+
+    /// A bundle that is still to write a register although it comes before the line at hand in the source: what the register
+    /// holds is older than what that line would read.
+    pub fn writes_yet(&self, register: u16) -> Option<Address> {
+        self.machine().writes_yet(register)
+    }
+
+    /// The registers that an expression, if it is a name of any, may stand for, and where each lives.
+    pub fn lives(&self, live: &Live) -> Vec<Life> {
+        live.lives(&self.machine(), self.program())
+    }
+
+    /// Cycles until the result in flight to a register is there; `None` if none is.
+    pub fn arrives(&self, register: u16) -> Option<Cycle> {
+        self.machine().arrives(register)
+    }
+
     /// Names that begin like this.
     pub fn names(&self, beginning: &str) -> Vec<String> {
-        let names = expression::names(self.program(), &self.options.constants);
+        let names = expression::names(self.program(), &self.options.constants, &self.options.names);
         let found: BTreeSet<&str> = names.filter(|name| name.starts_with(beginning)).collect();
         found.into_iter().map(str::to_owned).collect()
     }
@@ -365,7 +392,7 @@ impl Session {
             }
             Place::Register(_) => {}
             Place::Word(_) => {
-                self.core.machine().read(place, self.program())?;
+                self.machine().read(place, self.program())?;
             }
         }
         let edit = Edit { cycle: self.cycle(), place, bits };
