@@ -111,6 +111,8 @@ pub(crate) struct Context {
     locals: HashMap<(u32, NameId), Binding>,
     pub(crate) constants: Vec<NamedConstant>,
     pub(crate) arguments: Vec<Argument>,
+    /// Parameters of macros' uses that stand for registers, as far as operations use them.
+    pub(crate) parameters: HashMap<(ScopeId, NameId), RegisterId>,
     pub(crate) registers: Vec<Register>,
     /// Registers with a given address.
     pub(crate) by_address: HashMap<u16, RegisterId>,
@@ -158,6 +160,7 @@ impl Context {
             locals: HashMap::new(),
             constants: Vec::new(),
             arguments: Vec::new(),
+            parameters: HashMap::new(),
             registers: vec![register],
             by_address: HashMap::from([(ZERO, RegisterId::ZERO)]),
             labels: Vec::new(),
@@ -326,10 +329,15 @@ impl Context {
     /// The text of a name declared in a scope, as the symbol map shows it: unique to a macro's use.
     pub(crate) fn full_name(&self, scope: ScopeId, name: NameId) -> String {
         let text = self.names.text(name);
+        self.scope_name(scope).map_or_else(|| text.to_owned(), |scope| format!("{scope}.{text}"))
+    }
+
+    /// What stands before the names that are declared in a scope: the macro and which of its uses; `None` outside of macros.
+    pub(crate) fn scope_name(&self, scope: ScopeId) -> Option<String> {
         let owner = self.scope(scope).owner;
         match self.scope(owner).kind {
-            ScopeKind::Macro(of, number) => format!("{}.{number}.{text}", self.names.text(of)),
-            _ => text.to_owned(),
+            ScopeKind::Macro(of, number) => Some(format!("{}.{number}", self.names.text(of))),
+            _ => None,
         }
     }
 

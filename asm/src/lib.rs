@@ -33,6 +33,7 @@ mod lex;
 pub mod limits;
 pub mod listing;
 pub mod load;
+pub mod names;
 mod operand;
 pub mod parse;
 pub mod place;
@@ -101,6 +102,20 @@ pub struct Assembled {
     pub adjustments: Vec<Adjustment>,
     /// Words that a macro, a repetition or the assembler itself made: indices into the program's code, ascending.
     pub expanded: Vec<u32>,
+    /// What the source's names stand for, bundle by bundle.
+    pub names: names::Names,
+}
+
+impl Assembled {
+    /// What a debugger wants to know of the program: for [`image::write_with`].
+    pub fn debug_info(&self) -> names::DebugInfo {
+        let files = self.sources.files().iter();
+        names::DebugInfo {
+            sources: files.map(|file| (file.name.to_string(), file.text.to_string())).collect(),
+            constants: self.constants.clone(),
+            names: self.names.clone(),
+        }
+    }
 }
 
 /// Assembles a program whose first source is at hand, as from standard input or an editor; what it includes is loaded.
@@ -141,8 +156,8 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
     let values = values::split(&mut ir, &mut homes);
     copies::insert(&mut ir, &mut homes, &values);
     check::check(&mut context, &ir, &homes);
-    let context::Context { mut sink, sources, constants, .. } = context;
-    let sources = Arc::new(sources);
+    let mut sink = std::mem::take(&mut context.sink);
+    let sources = Arc::new(std::mem::take(&mut context.sources));
     // What follows would only report what follows from the errors there are.
     if sink.errors > 0 {
         return Err(sink.finish(sources));
@@ -154,6 +169,7 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
     let adjustments = copies::report(&ir, homes);
     let placement = place::place(&ir, &mut sink);
     let emitted = emit::emit(&ir, &placement, &mut sink);
+    let names = names::names(&context, &ir, &placement, &emitted);
     let errors = sink.errors;
     let report = sink.finish(Arc::clone(&sources));
     if errors > 0 {
@@ -161,7 +177,7 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
     }
     debug_assert!(report.list.iter().all(|diagnostic| diagnostic.severity == Severity::Warning));
     let constants =
-        constants.into_iter().filter_map(|constant| Some((constant.name, constant.value?))).collect();
+        context.constants.into_iter().filter_map(|constant| Some((constant.name, constant.value?))).collect();
     Ok(Assembled {
         program: emitted.program,
         warnings: report,
@@ -171,5 +187,6 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
         timing,
         adjustments,
         expanded: emitted.expanded,
+        names,
     })
 }

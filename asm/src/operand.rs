@@ -69,15 +69,22 @@ impl Resolver<'_> {
 
     /// Follows parameters to the operand that was given for them, and what its name means if it is a name.
     fn meaning(&mut self, mut at: At, mut operand: Operand) -> Result<Meaning, Reported> {
+        let mut parameter = None;
         loop {
             let OperandKind::Name(name) = operand.kind else { return Ok((at, operand, None)) };
             let name = self.context.name(at, name, operand.span)?;
             match self.context.lookup(at.scope, name) {
                 // Arguments that are parameters themselves were replaced when the macro was used.
                 Binding::Argument(argument) => {
+                    parameter.get_or_insert((self.context.scope(at.scope).owner, name));
                     Argument { operand, at, .. } = self.context.arguments[argument as usize];
                 }
-                binding => return Ok((at, operand, Some((name, binding)))),
+                binding => {
+                    if let (Some(parameter), Binding::Register(register)) = (parameter, binding) {
+                        self.context.parameters.insert(parameter, register);
+                    }
+                    return Ok((at, operand, Some((name, binding))));
+                }
             }
         }
     }

@@ -38,6 +38,7 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
         data: Vec::new(),
         raw: Vec::new(),
         files: Vec::new(),
+        versions: Vec::new(),
     };
     let words = |data: &Data| match data {
         Data::Space(count) => *count,
@@ -64,6 +65,9 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
     ir.registers = std::mem::take(&mut context.registers);
     ir.labels = std::mem::take(&mut context.labels);
     ir.files = flat.files;
+    for (order, bundle) in (0..).zip(&mut ir.bundles) {
+        bundle.operations.iter_mut().for_each(|operation| operation.order = order);
+    }
     ir
 }
 
@@ -271,6 +275,7 @@ impl Resolver<'_> {
             span: written.span,
             expansion: at.scope.0,
             made: false,
+            order: 0,
             written: (at.ast, number),
         };
         let mut failed = false;
@@ -319,6 +324,7 @@ impl Resolver<'_> {
             span: written.span,
             expansion: at.scope.0,
             made: false,
+            order: 0,
             written: (at.ast, number),
         })
     }

@@ -7,7 +7,7 @@
 
 use crate::flow;
 use crate::homes::Homes;
-use crate::ir::{Ir, Operation, Register, RegisterId, RegisterKind};
+use crate::ir::{Ir, Operation, Register, RegisterId, RegisterKind, Version};
 use takt_isa::Effect;
 use takt_isa::program::Space;
 
@@ -82,6 +82,8 @@ struct Name {
     made: u32,
     /// The register of its current value, if not itself.
     current: Option<RegisterId>,
+    /// The index of that value's [`Version`].
+    version: usize,
 }
 
 /// A value that is to be copied to the register that it is a value of.
@@ -111,7 +113,9 @@ pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
                 touched.push(id.index());
             }
         }
-        let Ir { bundles, registers, .. } = &mut *ir;
+        let Ir { bundles, registers, versions, .. } = &mut *ir;
+        let last = bundles[run.start..run.end].iter().flat_map(|bundle| &bundle.operations);
+        let last = last.map(|operation| operation.order).max().unwrap_or(0);
         for (at, bundle) in (run.start..).zip(&mut bundles[run.start..run.end]) {
             // All operations of a bundle read before any writes.
             for operation in &mut bundle.operations {
@@ -125,6 +129,9 @@ pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
                 let Some(dest) = operation.dest else { continue };
                 let Some(name) = names.get_mut(dest.index()).filter(|name| name.left > 0) else { continue };
                 name.left -= 1;
+                if name.current.is_some() {
+                    versions[name.version].through = operation.order;
+                }
                 let original = &registers[dest.index()];
                 let home = homes.get(dest);
                 let is_home = home.is_none_or(|home| operation.slot == Some(home.slot));
@@ -147,6 +154,9 @@ pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
                     homes.quiet.insert(id);
                 }
                 registers.push(fresh);
+                name.version = versions.len();
+                let (after, through) = (operation.order, operation.order);
+                versions.push(Version { name: dest, register: id, after, through });
                 name.current = Some(id);
                 operation.dest = Some(id);
                 if settles && homes.is_live(dest, number) {
@@ -155,6 +165,10 @@ pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
             }
         }
         for index in touched.drain(..) {
+            // A value that is copied home is what the name means to the end of the run.
+            if names[index].current.is_some() {
+                versions[names[index].version].through = last;
+            }
             names[index] = Name { made: names[index].made, ..Name::default() };
         }
     }

@@ -49,6 +49,9 @@ pub(crate) struct Asm {
     /// How long the scheduler searches, up to 100000; 0 is the first passes only.
     #[arg(long, value_name = "N", default_value_t = DEFAULT_EFFORT, value_parser = clap::value_parser!(u32).range(0..=100_000), allow_hyphen_values = true)]
     effort: u32,
+    /// Leave out of the image what only a debugger reads: the sources, constants, what names stand for.
+    #[arg(long)]
+    strip: bool,
     /// Check only; write no file.
     #[arg(long, conflicts_with_all = ["output", "listing", "symbols", "readmemh"])]
     check: bool,
@@ -145,7 +148,8 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         }
     }
     if let Some(path) = &image_path {
-        files::write(path, &image::write(program))?;
+        let debug = (!arguments.strip).then(|| assembled.debug_info());
+        files::write(path, &image::write_with(program, debug.as_ref()))?;
     }
     if arguments.json {
         output::json(&result_json(&assembled, image_path.as_deref())?, out)?;

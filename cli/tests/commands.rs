@@ -231,9 +231,9 @@ table:  .float  0.5, 0.25, -1.75
     );
     assert_eq!((&json["periods"], &json["cycles"]["min"]), (&0.into(), &serde_json::Value::Null));
     for machine in ["t3", "t1"] {
-        folder.line(&format!("asm sum.s -m {machine}")).ok();
+        folder.line(&format!("asm sum.s -m {machine} --strip")).ok();
         folder.line("disasm sum.takt -o again.s").ok();
-        folder.line(&format!("asm again.s -m {machine} -o again.takt")).ok();
+        folder.line(&format!("asm again.s -m {machine} --strip -o again.takt")).ok();
         assert!(folder.read("again.takt") == folder.read("sum.takt"), "{machine}");
     }
 }

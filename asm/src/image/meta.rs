@@ -37,7 +37,7 @@ struct MetaPort {
 /// Types as the source writes them.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-enum MetaType {
+pub(super) enum MetaType {
     Float,
     Int,
     Bits,

@@ -5,10 +5,12 @@
 //! bounded by the size of the file. A program that was read is one that the assembler could have made, but that any word
 //! may stand in its code: the machine faults on those that are no instructions.
 
+mod debug;
 mod meta;
 mod validate;
 
 use crate::limits;
+use crate::names::DebugInfo;
 use meta::Meta;
 use object::elf;
 use object::read::elf::{FileHeader as _, SectionHeader as _, Sym as _};
@@ -31,6 +33,8 @@ const CONSTANTS: &str = ".takt.constants";
 const META: &str = ".takt.meta";
 /// There only if a loop has a bound.
 const LOOPS: &str = ".takt.loops";
+/// There unless the image is stripped: what only a debugger reads.
+const DEBUG: &str = ".takt.debug";
 
 /// Why a file is not an image that can be loaded.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
@@ -148,6 +152,9 @@ pub enum ImageError {
         /// What is wrong.
         reason: &'static str,
     },
+    /// What is there for a debugger does not fit the program.
+    #[error("the image's section `{DEBUG}` cannot be used: {0}")]
+    Debug(String),
     /// The source lines do not fit the code.
     #[error("the source lines do not fit the code: {0}")]
     Lines(String),
@@ -163,18 +170,28 @@ fn clean(name: &str) -> String {
     name.replace('\0', "")
 }
 
-/// The image of a program.
+/// The image of a program, without what only a debugger reads.
 pub fn write(program: &Program) -> Vec<u8> {
+    write_with(program, None)
+}
+
+/// The image of a program with what a debugger knows of it beyond the program.
+pub fn write_with(program: &Program, debug: Option<&DebugInfo>) -> Vec<u8> {
     let mut bytes = Vec::new();
     let names: Vec<String> = program.symbols.iter().map(|symbol| clean(&symbol.name)).collect();
     // Errors are those of sizes beyond 32 bits, which no program for a machine reaches.
-    match write_elf(program, &names, &mut bytes) {
+    match write_elf(program, debug, &names, &mut bytes) {
         Ok(()) => bytes,
         Err(_) => Vec::new(),
     }
 }
 
-fn write_elf(program: &Program, names: &[String], bytes: &mut Vec<u8>) -> Result<(), object::write::Error> {
+fn write_elf(
+    program: &Program,
+    debug: Option<&DebugInfo>,
+    names: &[String],
+    bytes: &mut Vec<u8>,
+) -> Result<(), object::write::Error> {
     let code: Vec<u8> = program.code.iter().flat_map(|word| word.to_le_bytes()).collect();
     let data: Vec<u8> = program.data.iter().flat_map(|word| word.to_le_bytes()).collect();
     let pair = |(first, second): (u32, u32)| {
@@ -187,6 +204,7 @@ fn write_elf(program: &Program, names: &[String], bytes: &mut Vec<u8>) -> Result
     let loops = program.loop_bounds.iter().map(|bound| (bound.address, bound.most));
     let loops: Vec<u8> = loops.flat_map(pair).collect();
     let meta = Meta::of(program).to_json();
+    let debug = debug.map(debug::to_json);
     // First everything is given its place, then everything is written there, in the same order.
     let mut writer = write::Writer::new(Endianness::Little, false, bytes);
     writer.reserve_file_header();
@@ -198,6 +216,9 @@ fn write_elf(program: &Program, names: &[String], bytes: &mut Vec<u8>) -> Result
     ];
     if !loops.is_empty() {
         contents.push((LOOPS, &loops[..], 4, elf::SectionFlags(0)));
+    }
+    if let Some(debug) = &debug {
+        contents.push((DEBUG, &debug[..], 1, elf::SectionFlags(0)));
     }
     writer.reserve_null_section_index();
     let mut place = |(name, content, align, flags): (&'static str, _, _, _)| {
@@ -280,6 +301,14 @@ fn write_elf(program: &Program, names: &[String], bytes: &mut Vec<u8>) -> Result
 /// # Errors
 /// The first defect that is found.
 pub fn read(bytes: &[u8]) -> Result<Program, ImageError> {
+    Ok(read_with(bytes)?.0)
+}
+
+/// The program of an image, and what it has for a debugger unless it is stripped.
+///
+/// # Errors
+/// The first defect that is found.
+pub fn read_with(bytes: &[u8]) -> Result<(Program, Option<DebugInfo>), ImageError> {
     if !is_image(bytes) {
         return Err(ImageError::NotElf);
     }
@@ -369,5 +398,7 @@ pub fn read(bytes: &[u8]) -> Result<Program, ImageError> {
     let bound = |&[address, most]: &[u32; 2]| LoopBound { address, most };
     program.loop_bounds = words(loops).as_chunks::<2>().0.iter().map(bound).collect();
     validate::program(&program)?;
-    Ok(program)
+    let debug = optional(DEBUG)?;
+    let debug = debug.map(|(_, debug)| debug::from_json(debug, &program)).transpose()?;
+    Ok((program, debug))
 }
