@@ -7,12 +7,13 @@ use crate::expand::{self, Data, Flat, Item, Timing};
 use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
 use crate::serialise;
 use crate::source::Span;
+use crate::types::Addresses;
 use smallvec::SmallVec;
 use std::collections::HashMap;
 use std::rc::Rc;
 use takt_isa::program::Location;
 use takt_isa::spec::instructions::Function;
-use takt_isa::{Op, ROWS};
+use takt_isa::{Op, ROWS, Type};
 
 /// The most cycles that a demand on ports can name: many times what a program memory holds.
 const MAX_CYCLES: u32 = 1 << 24;
@@ -39,8 +40,16 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
         raw: Vec::new(),
         files: Vec::new(),
     };
-    let mut resolver =
-        Resolver { context, flat, ir, slots, pool: HashMap::new(), own_files: Vec::new(), label: 0 };
+    let mut resolver = Resolver {
+        context,
+        flat,
+        ir,
+        slots,
+        pool: HashMap::new(),
+        own_files: Vec::new(),
+        label: 0,
+        cast: None,
+    };
     let once = std::mem::take(&mut resolver.flat.once);
     resolver.section(Section::Once, &once);
     resolver.ir.period = resolver.ir.bundles.len() as u32;
@@ -81,6 +90,8 @@ pub(crate) struct Resolver<'c> {
     own_files: Vec<Option<u32>>,
     /// Labels before this one have their position.
     label: usize,
+    /// The type that the operand at hand is taken as, if the source says so.
+    pub(crate) cast: Option<Type>,
 }
 
 impl Resolver<'_> {
@@ -316,12 +327,15 @@ impl Resolver<'_> {
                 Data::Space(count) => {
                     let length = self.ir.data.len() + count as usize;
                     self.ir.data.resize(length, 0);
+                    self.context.data_types.resize(length, Type::B);
                 }
                 Data::Value(at, value, ty) => {
+                    self.context.addresses = Addresses::default();
                     let word = self.context.value(at, value.id);
                     let word = word.and_then(|word| self.bits(at, word, ty, value.span));
                     // A word with a mistake keeps its place.
                     self.ir.data.push(word.unwrap_or(0));
+                    self.context.data_types.push(ty);
                 }
             }
         }
@@ -370,6 +384,7 @@ impl Resolver<'_> {
 
     fn presets(&mut self) {
         for preset in std::mem::take(&mut self.flat.presets) {
+            self.context.addresses = Addresses::default();
             let Ok(value) = self.context.value(preset.at, preset.value.id) else { continue };
             let Ok(bits) = self.bits(preset.at, value, preset.ty, preset.value.span) else { continue };
             let register = &mut self.context.registers[preset.register.index()];

@@ -49,11 +49,11 @@ fn with_meta(bytes: &[u8], change: impl Fn(&str) -> String) -> Vec<u8> {
 #[test]
 fn what_is_written_is_read() {
     let program = program();
-    let bytes = image::write(&program);
+    let bytes = image::write(&program).expect("an image holds it");
     assert!(image::is_image(&bytes));
     assert!(!image::is_image(b".period"));
     assert_eq!(image::read(&bytes).as_ref(), Ok(&program));
-    assert_eq!(bytes, image::write(&program), "equal programs give equal bytes");
+    assert_eq!(bytes, image::write(&program).expect("an image holds it"), "equal programs give equal bytes");
     // Wherever the bytes lie in memory.
     let mut moved = vec![0];
     moved.extend(&bytes);
@@ -62,7 +62,7 @@ fn what_is_written_is_read() {
 
 #[test]
 fn labels_are_symbols_that_other_tools_see() {
-    let bytes = image::write(&program());
+    let bytes = image::write(&program()).expect("an image holds it");
     let header = elf::FileHeader32::<LE>::parse(&bytes[..]).expect("it is an ELF file");
     let sections = header.sections(LE, &bytes[..]).expect("it has sections");
     let symbols = sections.symbols(LE, &bytes[..], elf::SHT_SYMTAB).expect("it has symbols");
@@ -74,12 +74,12 @@ fn labels_are_symbols_that_other_tools_see() {
 #[test]
 fn an_empty_program() {
     let program = common::good("").program;
-    assert_eq!(image::read(&image::write(&program)).as_ref(), Ok(&program));
+    assert_eq!(image::read(&image::write(&program).expect("an image holds it")).as_ref(), Ok(&program));
 }
 
 #[test]
 fn every_truncation_is_an_error() {
-    let bytes = image::write(&program());
+    let bytes = image::write(&program()).expect("an image holds it");
     for length in 0..bytes.len() {
         match image::read(&bytes[..length]) {
             Err(ImageError::NotElf) => assert!(length < 4),
@@ -91,7 +91,7 @@ fn every_truncation_is_an_error() {
 
 #[test]
 fn other_files_are_told_apart() {
-    let bytes = image::write(&program());
+    let bytes = image::write(&program()).expect("an image holds it");
     let changed = |at: usize, value: u8| {
         let mut bytes = bytes.clone();
         bytes[at] = value;
@@ -108,7 +108,7 @@ fn other_files_are_told_apart() {
 
 #[test]
 fn every_defect_has_its_error() {
-    let bytes = image::write(&program());
+    let bytes = image::write(&program()).expect("an image holds it");
     let meta = |from: &'static str, to: &'static str| {
         let error = image::read(&with_meta(&bytes, |meta| meta.replacen(from, to, 1)));
         error.expect_err("it is damaged")
@@ -177,7 +177,7 @@ fn every_defect_has_its_error() {
 fn bounds_of_loops() {
     let text = ".loop_bound 7\na: jmp a\n.loop_bound 4294967295\nb: jmp b\n halt\n";
     let program = common::good(text).program;
-    let bytes = image::write(&program);
+    let bytes = image::write(&program).expect("an image holds it");
     assert_eq!(image::read(&bytes).as_ref(), Ok(&program));
     let words = |words: [u32; 4]| {
         let mut bytes = bytes.clone();
@@ -191,7 +191,12 @@ fn bounds_of_loops() {
         assert!(matches!(words(wrong), Err(ImageError::Loop { .. })), "{wrong:?}");
     }
     // Without bounds there is no such section.
-    assert!(!image::write(&common::good("a: jmp a\n").program).windows(11).any(|w| w == b".takt.loops"));
+    assert!(
+        !image::write(&common::good("a: jmp a\n").program)
+            .expect("an image holds it")
+            .windows(11)
+            .any(|w| w == b".takt.loops")
+    );
 }
 
 #[test]
@@ -199,20 +204,27 @@ fn memories_that_overflow() {
     let mut program = program();
     let depth = program.machine.data_depth as usize;
     program.data = vec![0; depth + 1];
-    assert!(matches!(image::read(&image::write(&program)), Err(ImageError::MemorySize { .. })));
+    assert!(matches!(
+        image::read(&image::write(&program).expect("an image holds it")),
+        Err(ImageError::MemorySize { .. })
+    ));
     program.data.pop();
-    assert!(image::read(&image::write(&program)).is_ok());
+    assert!(image::read(&image::write(&program).expect("an image holds it")).is_ok());
     let words = program.machine.slots.len() * (program.machine.code_depth as usize + 1);
     program.code = vec![0; words];
     program.lines = vec![None; words];
-    assert!(matches!(image::read(&image::write(&program)), Err(ImageError::MemorySize { .. })));
+    assert!(matches!(
+        image::read(&image::write(&program).expect("an image holds it")),
+        Err(ImageError::MemorySize { .. })
+    ));
 }
 
 #[test]
 fn a_name_with_a_zero_byte_does_not_break_the_writer() {
     let mut program = program();
     program.symbols[0].name = "a\0b".to_owned();
-    let read = image::read(&image::write(&program)).expect("the zero byte is dropped");
+    let read =
+        image::read(&image::write(&program).expect("an image holds it")).expect("the zero byte is dropped");
     assert_eq!(read.symbols[0].name, "ab");
 }
 
@@ -227,14 +239,14 @@ proptest! {
 
     #[test]
     fn no_damage_makes_the_reader_panic(changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6)) {
-        let mut bytes = image::write(&program());
+        let mut bytes = image::write(&program()).expect("an image holds it");
         for (index, value) in changes {
             let at = index.index(bytes.len());
             bytes[at] = value;
         }
         if let Ok(program) = image::read(&bytes) {
             // What is accepted can be written and read again.
-            prop_assert_eq!(image::read(&image::write(&program)), Ok(program));
+            prop_assert_eq!(image::read(&image::write(&program).expect("an image holds it")), Ok(program));
         }
     }
 }

@@ -145,7 +145,7 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         }
     }
     if let Some(path) = &image_path {
-        files::write(path, &image::write(program))?;
+        files::write(path, &image::write(program)?)?;
     }
     if arguments.json {
         output::json(&result_json(&assembled, image_path.as_deref())?, out)?;

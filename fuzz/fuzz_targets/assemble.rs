@@ -15,13 +15,13 @@ fuzz_target!(|bytes: &[u8]| {
     match assemble("a.s", &loader, &options) {
         Err(diagnostics) => assert!(!diagnostics.render(false).is_empty()),
         Ok(assembled) => {
-            let bytes = image::write(&assembled.program);
+            let bytes = image::write(&assembled.program).expect("an image holds it");
             let program = image::read(&bytes).expect("an image that was written reads");
             assert_eq!(program, assembled.program);
             let text = disasm::disassemble(&program);
             let again = assemble("a.s", &MemoryLoader::of("a.s", text.as_str()), &options);
             let again = again.unwrap_or_else(|errors| panic!("{text}\n{}", errors.render(false)));
-            assert_eq!(image::write(&again.program), bytes, "{text}");
+            assert_eq!(image::write(&again.program).expect("an image holds it"), bytes, "{text}");
         }
     }
 });

@@ -148,6 +148,9 @@ pub enum ImageError {
         /// What is wrong.
         reason: &'static str,
     },
+    /// The format cannot hold it.
+    #[error("an image cannot hold this program: {0}")]
+    Unwritable(String),
     /// The source lines do not fit the code.
     #[error("the source lines do not fit the code: {0}")]
     Lines(String),
@@ -164,17 +167,32 @@ fn clean(name: &str) -> String {
 }
 
 /// The image of a program.
-pub fn write(program: &Program) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    let names: Vec<String> = program.symbols.iter().map(|symbol| clean(&symbol.name)).collect();
-    // Errors are those of sizes beyond 32 bits, which no program for a machine reaches.
-    match write_elf(program, &names, &mut bytes) {
-        Ok(()) => bytes,
-        Err(_) => Vec::new(),
-    }
+///
+/// # Errors
+/// If an image cannot hold it: its sizes go beyond 32 bits, or beyond what [`read`] takes. Nothing that the assembler makes does.
+pub fn write(program: &Program) -> Result<Vec<u8>, ImageError> {
+    within(program, LIMIT)
 }
 
-fn write_elf(program: &Program, names: &[String], bytes: &mut Vec<u8>) -> Result<(), object::write::Error> {
+/// The image of a program, if it has at most so many bytes.
+fn within(program: &Program, most: usize) -> Result<Vec<u8>, ImageError> {
+    let meta = Meta::of(program).to_json()?;
+    let mut bytes = Vec::new();
+    let names: Vec<String> = program.symbols.iter().map(|symbol| clean(&symbol.name)).collect();
+    write_elf(program, &names, &meta, &mut bytes)
+        .map_err(|error| ImageError::Unwritable(error.to_string()))?;
+    if bytes.len() > most {
+        return Err(ImageError::TooLarge { bytes: bytes.len() });
+    }
+    Ok(bytes)
+}
+
+fn write_elf(
+    program: &Program,
+    names: &[String],
+    meta: &[u8],
+    bytes: &mut Vec<u8>,
+) -> Result<(), object::write::Error> {
     let code: Vec<u8> = program.code.iter().flat_map(|word| word.to_le_bytes()).collect();
     let data: Vec<u8> = program.data.iter().flat_map(|word| word.to_le_bytes()).collect();
     let pair = |(first, second): (u32, u32)| {
@@ -186,7 +204,6 @@ fn write_elf(program: &Program, names: &[String], bytes: &mut Vec<u8>) -> Result
     let constants: Vec<u8> = constants.flat_map(pair).collect();
     let loops = program.loop_bounds.iter().map(|bound| (bound.address, bound.most));
     let loops: Vec<u8> = loops.flat_map(pair).collect();
-    let meta = Meta::of(program).to_json();
     // First everything is given its place, then everything is written there, in the same order.
     let mut writer = write::Writer::new(Endianness::Little, false, bytes);
     writer.reserve_file_header();
@@ -194,7 +211,7 @@ fn write_elf(program: &Program, names: &[String], bytes: &mut Vec<u8>) -> Result
         (CODE, &code[..], 8, elf::SHF_ALLOC | elf::SHF_EXECINSTR),
         (DATA, &data[..], 4, elf::SHF_ALLOC | elf::SHF_WRITE),
         (CONSTANTS, &constants[..], 4, elf::SHF_ALLOC),
-        (META, &meta[..], 1, elf::SectionFlags(0)),
+        (META, meta, 1, elf::SectionFlags(0)),
     ];
     if !loops.is_empty() {
         contents.push((LOOPS, &loops[..], 4, elf::SectionFlags(0)));
@@ -370,4 +387,22 @@ pub fn read(bytes: &[u8]) -> Result<Program, ImageError> {
     program.loop_bounds = words(loops).as_chunks::<2>().0.iter().map(bound).collect();
     validate::program(&program)?;
     Ok(program)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_image_that_could_not_be_read_is_not_written() {
+        let program = crate::assemble(
+            "a.s",
+            &crate::MemoryLoader::of("a.s", "here: jmp here\n"),
+            &crate::Options::default(),
+        );
+        let program = program.expect("it is right").program;
+        let bytes = write(&program).expect("it is small").len();
+        assert!(within(&program, bytes).is_ok());
+        assert_eq!(within(&program, bytes - 1), Err(ImageError::TooLarge { bytes }));
+    }
 }

@@ -9,3 +9,8 @@ period: .deadline y = 11
         fadd    x, a, b
         fadd    y, t, b
         wait    period
+.once
+        .deadline y = 30
+        fadd    x, a, b
+        fadd    y, a, b
+        wait    period
