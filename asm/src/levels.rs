@@ -6,7 +6,7 @@ use std::str::FromStr;
 /// Every warning: its name, and what it is about.
 pub const WARNINGS: &[(&str, &str)] = &[
     ("never-written", "a register with a place is read, and nothing writes it"),
-    ("no-wait", "`.period` has code that never comes to a `wait`"),
+    ("no-wait", "`.period` has code that never comes to a `wait` or `halt`"),
     ("target", "a jump leads past the program's end"),
     ("types", "a value is read as another type than it is"),
     ("underflow", "a constant rounds to zero"),

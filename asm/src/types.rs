@@ -519,7 +519,10 @@ fn wrong_source(
     let written = context.sources.text(place);
     let written = if written.contains('[') { &name } else { written };
     let declare = match source.origin {
-        Some(Origin { what: What::Declared, .. }) => {
+        // Not where another's value was passed on to it.
+        Some(Origin { what: What::Declared, span, .. })
+            if span == ir.register(operation.sources[which]).span =>
+        {
             format!("declare `{name}:{}` if it is {}, ", type_name(wanted), words(wanted))
         }
         _ => String::new(),

@@ -10,7 +10,8 @@ period: .deadline y = 11
         fadd    y, t, b
         wait    period
 .once
-        .deadline y = 30
+        .deadline x = 5         ; no order makes this one
+        .deadline y = 7         ; by another order
         fadd    x, a, b
         fadd    y, a, b
         wait    period

@@ -6,7 +6,7 @@
 period: fma     y, x, x, x
         fmadd   a, x, x, x
         imul    k, n, n
-        fgt     k, x, 1         // swapped
+        fgt     k, x, 1
         beq     n, period
         ile     k, n, 3
         fadd    y, x, 7 // 2
