@@ -127,6 +127,17 @@ pub enum OperandKind {
     Place(NameRef),
     /// `offset[register]`: an index into [`Ast::memories`].
     Memory(u32),
+    /// `register:type`: an index into [`Ast::casts`].
+    Cast(u32),
+}
+
+/// `register:type`: its bits are taken as another type.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Cast {
+    /// What stands before the colon.
+    pub operand: Operand,
+    /// The type's name.
+    pub ty: Name,
 }
 
 /// `offset[register]`.
@@ -382,6 +393,8 @@ pub struct Ast {
     pub nodes: Vec<Node>,
     /// Memory operands.
     pub memories: Vec<Memory>,
+    /// Operands with a type.
+    pub casts: Vec<Cast>,
     /// Name templates.
     pub templates: Vec<Template>,
     /// Directives.

@@ -3,7 +3,7 @@
 
 use crate::ast::*;
 use crate::context::{At, Binding, Context, Reported};
-use crate::diag::{Diagnostic, nearest};
+use crate::diag::Diagnostic;
 use crate::expand::{Data, Expander};
 use crate::ir::{Register, RegisterId, RegisterKind};
 use crate::limits;
@@ -55,29 +55,14 @@ impl Expander<'_> {
         let name = self.context.full_name(at.scope, id);
         self.context.registers.push(Register { name, kind, ty: Type::F, pinned: None, preset: None, span });
         if let Some(ty) = declaration.ty {
-            self.context.registers[register.index()].ty = self.register_type(at, ty)?;
+            self.context.registers[register.index()].ty = self.context.type_named(at, ty)?;
+            self.context.typed.insert(register);
         }
         if let Some(place) = declaration.place {
             let address = address(&mut self.context, at, place)?;
             self.pin(at, register, address, place.span)?;
         }
         Ok(())
-    }
-
-    fn register_type(&mut self, at: At, ty: Name) -> Result<Type, Reported> {
-        let text = self.context.sources.text(ty.span).to_owned();
-        match text.as_str() {
-            "float" => Ok(Type::F),
-            "int" => Ok(Type::I),
-            "bits" => Ok(Type::B),
-            _ => {
-                let meant = nearest(&text, ["float", "int", "bits"]);
-                let error = Diagnostic::error("type", ty.span, format!("`{text}` is not a type"))
-                    .note("types: float int bits")
-                    .did_you_mean(meant);
-                Err(self.context.report(at.scope, error))
-            }
-        }
     }
 
     fn pin(&mut self, at: At, register: RegisterId, address: u16, span: Span) -> Result<(), Reported> {

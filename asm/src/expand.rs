@@ -14,6 +14,7 @@ use crate::ir::{Label, LabelId};
 use crate::limits;
 use crate::load::{Loader, include_path};
 use crate::source::Span;
+use crate::types::Addresses;
 use std::collections::HashMap;
 use std::rc::Rc;
 use takt_isa::Type;
@@ -454,7 +455,9 @@ impl<'l> Expander<'l> {
             }
             DirectiveKind::Const(name, value) => {
                 let id = self.context.name(at, name.name, name.span)?;
+                self.context.addresses = Addresses::default();
                 let value = self.context.value(at, value.id).ok();
+                let addresses = self.context.addresses;
                 let number = self.context.constants.len() as u32;
                 self.context.declare(at, id, name.span, Binding::Constant(number))?;
                 let text = self.context.full_name(at.scope, id);
@@ -465,6 +468,7 @@ impl<'l> Expander<'l> {
                     span: name.span,
                     used: false,
                     watched,
+                    addresses,
                 });
             }
             DirectiveKind::Preset { register, placed, value } => {

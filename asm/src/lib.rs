@@ -29,6 +29,7 @@ mod homes;
 pub mod image;
 pub mod intern;
 pub mod ir;
+pub mod levels;
 mod lex;
 pub mod limits;
 pub mod listing;
@@ -41,10 +42,11 @@ pub mod resolve;
 pub mod schedule;
 mod serialise;
 pub mod source;
+mod types;
 mod unknown;
 mod values;
 
-use diag::{Diagnostics, Severity};
+use diag::Diagnostics;
 use source::Sources;
 use std::sync::Arc;
 use takt_isa::{Machine, Program, T3};
@@ -52,6 +54,7 @@ use takt_isa::{Machine, Program, T3};
 pub use diag::Diagnostic;
 pub use expression::Expression;
 pub use homes::{Adjustment, Made};
+pub use levels::Levels;
 pub use load::{FileLoader, LoadError, Loader, MemoryLoader, Search};
 
 /// What the assembler is to do.
@@ -63,6 +66,8 @@ pub struct Options {
     pub schedule: Schedule,
     /// How long it searches; 0 is one pass.
     pub effort: u32,
+    /// What becomes of warnings.
+    pub levels: Levels,
 }
 
 /// Which bundles the scheduler packs.
@@ -79,7 +84,12 @@ pub enum Schedule {
 
 impl Default for Options {
     fn default() -> Options {
-        Options { machine: &T3, schedule: Schedule::AsWritten, effort: schedule::DEFAULT_EFFORT }
+        Options {
+            machine: &T3,
+            schedule: Schedule::AsWritten,
+            effort: schedule::DEFAULT_EFFORT,
+            levels: Levels::default(),
+        }
     }
 }
 
@@ -137,7 +147,8 @@ pub fn assemble_bytes(
 /// # Errors
 /// Every error of the program, and its warnings.
 pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<Assembled, Diagnostics> {
-    let context = context::Context::new(options.machine);
+    let mut context = context::Context::new(options.machine);
+    context.sink.levels = options.levels;
     let (mut context, flat) = expand::Expander::new(context, loader).expand(path);
     let mut ir = resolve::resolve(&mut context, flat);
     let packs = |scheduled| match options.schedule {
@@ -146,7 +157,7 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
         Schedule::None => false,
     };
     ir.bundles.iter_mut().for_each(|bundle| bundle.scheduled = packs(bundle.scheduled));
-    check::integers(&mut context, &ir);
+    types::check(&mut context, &ir);
     // Of a program that cannot fit nothing else is worth its time.
     if emit::is_too_long(&ir) {
         emit::limits(&ir, &mut context.sink);
@@ -170,12 +181,10 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
     let placement = place::place(&ir, &mut sink);
     let emitted = emit::emit(&ir, &placement, &mut sink);
     let names = names::names(&context, &ir, &placement, &emitted);
-    let errors = sink.errors;
     let report = sink.finish(Arc::clone(&sources));
-    if errors > 0 {
+    if report.has_errors() {
         return Err(report);
     }
-    debug_assert!(report.list.iter().all(|diagnostic| diagnostic.severity == Severity::Warning));
     let constants =
         context.constants.into_iter().filter_map(|constant| Some((constant.name, constant.value?))).collect();
     Ok(Assembled {

@@ -7,12 +7,13 @@ use crate::expand::{self, Data, Flat, Item, Timing};
 use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
 use crate::serialise;
 use crate::source::Span;
+use crate::types::Addresses;
 use smallvec::SmallVec;
 use std::collections::HashMap;
 use std::rc::Rc;
 use takt_isa::program::Location;
 use takt_isa::spec::instructions::Function;
-use takt_isa::{Op, ROWS};
+use takt_isa::{Op, ROWS, Type};
 
 /// The most cycles that a demand on ports can name: many times what a program memory holds.
 const MAX_CYCLES: u32 = 1 << 24;
@@ -46,7 +47,8 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
     };
     let data_words = flat.data.iter().map(words).sum();
     let (pool, own_files) = (HashMap::new(), Vec::new());
-    let mut resolver = Resolver { context, flat, ir, slots, pool, own_files, label: 0, data_words };
+    let mut resolver =
+        Resolver { context, flat, ir, slots, pool, own_files, label: 0, data_words, cast: None };
     let once = std::mem::take(&mut resolver.flat.once);
     resolver.section(Section::Once, &once);
     resolver.ir.period = resolver.ir.bundles.len() as u32;
@@ -92,6 +94,8 @@ pub(crate) struct Resolver<'c> {
     label: usize,
     /// Words of data memory that the source declares.
     pub(crate) data_words: u32,
+    /// The type that the operand at hand is taken as, if the source says so.
+    pub(crate) cast: Option<Type>,
 }
 
 impl Resolver<'_> {
@@ -335,12 +339,15 @@ impl Resolver<'_> {
                 Data::Space(count) => {
                     let length = self.ir.data.len() + count as usize;
                     self.ir.data.resize(length, 0);
+                    self.context.data_types.resize(length, Type::B);
                 }
                 Data::Value(at, value, ty) => {
+                    self.context.addresses = Addresses::default();
                     let word = self.context.value(at, value.id);
                     let word = word.and_then(|word| self.bits(at, word, ty, value.span));
                     // A word with a mistake keeps its place.
                     self.ir.data.push(word.unwrap_or(0));
+                    self.context.data_types.push(ty);
                 }
             }
         }
@@ -390,6 +397,7 @@ impl Resolver<'_> {
     fn presets(&mut self) {
         for preset in std::mem::take(&mut self.flat.presets) {
             let found = self.preset_register(preset.at, preset.register, preset.placed);
+            self.context.addresses = Addresses::default();
             let Ok(value) = self.context.value(preset.at, preset.value.id) else { continue };
             // A named register has a type, a place has any.
             let Ok((register, ty)) = found else { continue };

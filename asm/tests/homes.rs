@@ -100,7 +100,7 @@ fn source(seed: u64) -> String {
 }
 
 fn assembled(text: &str, machine: &'static Machine, schedule: Schedule) -> Assembled {
-    let options = Options { machine, schedule, effort: 1 };
+    let options = Options { machine, schedule, effort: 1, ..Options::default() };
     let assembled = takt_asm::assemble("test.s", &MemoryLoader::of("test.s", text), &options);
     assembled.unwrap_or_else(|errors| panic!("{text}\n{}", errors.render(false)))
 }

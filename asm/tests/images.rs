@@ -50,11 +50,11 @@ fn with_meta(bytes: &[u8], change: impl Fn(&str) -> String) -> Vec<u8> {
 #[test]
 fn what_is_written_is_read() {
     let program = program();
-    let bytes = image::write(&program);
+    let bytes = image::write(&program).expect("an image holds it");
     assert!(image::is_image(&bytes));
     assert!(!image::is_image(b".period"));
     assert_eq!(image::read(&bytes).as_ref(), Ok(&program));
-    assert_eq!(bytes, image::write(&program), "equal programs give equal bytes");
+    assert_eq!(bytes, image::write(&program).expect("an image holds it"), "equal programs give equal bytes");
     // Wherever the bytes lie in memory.
     let mut moved = vec![0];
     moved.extend(&bytes);
@@ -63,7 +63,7 @@ fn what_is_written_is_read() {
 
 #[test]
 fn labels_are_symbols_that_other_tools_see() {
-    let bytes = image::write(&program());
+    let bytes = image::write(&program()).expect("an image holds it");
     let header = elf::FileHeader32::<LE>::parse(&bytes[..]).expect("it is an ELF file");
     let sections = header.sections(LE, &bytes[..]).expect("it has sections");
     let symbols = sections.symbols(LE, &bytes[..], elf::SHT_SYMTAB).expect("it has symbols");
@@ -75,12 +75,12 @@ fn labels_are_symbols_that_other_tools_see() {
 #[test]
 fn an_empty_program() {
     let program = common::good("").program;
-    assert_eq!(image::read(&image::write(&program)).as_ref(), Ok(&program));
+    assert_eq!(image::read(&image::write(&program).expect("an image holds it")).as_ref(), Ok(&program));
 }
 
 #[test]
 fn every_truncation_is_an_error() {
-    let bytes = image::write(&program());
+    let bytes = image::write(&program()).expect("an image holds it");
     for length in 0..bytes.len() {
         match image::read(&bytes[..length]) {
             Err(ImageError::NotElf) => assert!(length < 4),
@@ -92,7 +92,7 @@ fn every_truncation_is_an_error() {
 
 #[test]
 fn other_files_are_told_apart() {
-    let bytes = image::write(&program());
+    let bytes = image::write(&program()).expect("an image holds it");
     let changed = |at: usize, value: u8| {
         let mut bytes = bytes.clone();
         bytes[at] = value;
@@ -120,15 +120,23 @@ fn debugged() -> (Program, DebugInfo) {
 #[test]
 fn what_a_debugger_knows_is_read() {
     let (program, info) = debugged();
-    let bytes = image::write_with(&program, Some(&info));
+    let bytes = image::write_with(&program, Some(&info)).expect("an image holds it");
     let (read, debug) = image::read_with(&bytes).expect("it is an image");
     let debug = debug.expect("it is not stripped");
     assert_eq!((&read, &debug.names, &debug.sources), (&program, &info.names, &info.sources));
     // A NaN is not equal to itself.
     assert_eq!(format!("{:?}", debug.constants), format!("{:?}", info.constants));
     assert!(debug.constants.len() == 4 && debug.names.values.len() == 2 && debug.names.scopes.len() == 2);
-    assert_eq!(image::write_with(&program, Some(&info)), bytes, "equal programs give equal bytes");
-    assert_eq!(image::read_with(&image::write(&program)), Ok((program, None)), "stripped");
+    assert_eq!(
+        image::write_with(&program, Some(&info)).expect("an image holds it"),
+        bytes,
+        "equal programs give equal bytes"
+    );
+    assert_eq!(
+        image::read_with(&image::write(&program).expect("an image holds it")),
+        Ok((program, None)),
+        "stripped"
+    );
 }
 
 #[test]
@@ -153,10 +161,12 @@ fn what_a_debugger_knows_fits_the_program() {
     for (expected, change) in defects {
         let mut info = info.clone();
         change(&mut info);
-        let error = image::read(&image::write_with(&program, Some(&info))).expect_err(expected).to_string();
+        let error = image::read(&image::write_with(&program, Some(&info)).expect("an image holds it"))
+            .expect_err(expected)
+            .to_string();
         assert!(error.contains(expected), "{error} / {expected}");
     }
-    let bytes = image::write_with(&program, Some(&info));
+    let bytes = image::write_with(&program, Some(&info)).expect("an image holds it");
     let (offset, size) = section(&bytes, ".takt.debug");
     let text = String::from_utf8(bytes[offset..offset + size].to_vec()).expect("JSON is text");
     for (from, to) in
@@ -171,7 +181,7 @@ fn what_a_debugger_knows_fits_the_program() {
 
 #[test]
 fn every_defect_has_its_error() {
-    let bytes = image::write(&program());
+    let bytes = image::write(&program()).expect("an image holds it");
     let meta = |from: &'static str, to: &'static str| {
         let error = image::read(&with_meta(&bytes, |meta| meta.replacen(from, to, 1)));
         error.expect_err("it is damaged")
@@ -240,7 +250,7 @@ fn every_defect_has_its_error() {
 fn bounds_of_loops() {
     let text = ".loop_bound 7\na: jmp a\n.loop_bound 4294967295\nb: jmp b\n halt\n";
     let program = common::good(text).program;
-    let bytes = image::write(&program);
+    let bytes = image::write(&program).expect("an image holds it");
     assert_eq!(image::read(&bytes).as_ref(), Ok(&program));
     let words = |words: [u32; 4]| {
         let mut bytes = bytes.clone();
@@ -254,7 +264,12 @@ fn bounds_of_loops() {
         assert!(matches!(words(wrong), Err(ImageError::Loop { .. })), "{wrong:?}");
     }
     // Without bounds there is no such section.
-    assert!(!image::write(&common::good("a: jmp a\n").program).windows(11).any(|w| w == b".takt.loops"));
+    assert!(
+        !image::write(&common::good("a: jmp a\n").program)
+            .expect("an image holds it")
+            .windows(11)
+            .any(|w| w == b".takt.loops")
+    );
 }
 
 #[test]
@@ -262,20 +277,27 @@ fn memories_that_overflow() {
     let mut program = program();
     let depth = program.machine.data_depth as usize;
     program.data = vec![0; depth + 1];
-    assert!(matches!(image::read(&image::write(&program)), Err(ImageError::MemorySize { .. })));
+    assert!(matches!(
+        image::read(&image::write(&program).expect("an image holds it")),
+        Err(ImageError::MemorySize { .. })
+    ));
     program.data.pop();
-    assert!(image::read(&image::write(&program)).is_ok());
+    assert!(image::read(&image::write(&program).expect("an image holds it")).is_ok());
     let words = program.machine.slots.len() * (program.machine.code_depth as usize + 1);
     program.code = vec![0; words];
     program.lines = vec![None; words];
-    assert!(matches!(image::read(&image::write(&program)), Err(ImageError::MemorySize { .. })));
+    assert!(matches!(
+        image::read(&image::write(&program).expect("an image holds it")),
+        Err(ImageError::MemorySize { .. })
+    ));
 }
 
 #[test]
 fn a_name_with_a_zero_byte_does_not_break_the_writer() {
     let mut program = program();
     program.symbols[0].name = "a\0b".to_owned();
-    let read = image::read(&image::write(&program)).expect("the zero byte is dropped");
+    let read =
+        image::read(&image::write(&program).expect("an image holds it")).expect("the zero byte is dropped");
     assert_eq!(read.symbols[0].name, "ab");
 }
 
@@ -291,14 +313,15 @@ proptest! {
     #[test]
     fn no_damage_makes_the_reader_panic(changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6)) {
         let (program, info) = debugged();
-        let mut bytes = image::write_with(&program, Some(&info));
+        let mut bytes = image::write_with(&program, Some(&info)).expect("an image holds it");
         for (index, value) in changes {
             let at = index.index(bytes.len());
             bytes[at] = value;
         }
         if let Ok((program, debug)) = image::read_with(&bytes) {
             // What is accepted can be written and read again.
-            let (again, known) = image::read_with(&image::write_with(&program, debug.as_ref())).expect("it was read");
+            let again = image::write_with(&program, debug.as_ref()).expect("it was read");
+            let (again, known) = image::read_with(&again).expect("it was read");
             prop_assert_eq!(again, program);
             prop_assert_eq!(known.map(|known| known.names), debug.map(|debug| debug.names));
         }

@@ -93,7 +93,8 @@ fn inputs_follow_one_another_around_those_with_a_place() {
 
 #[test]
 fn unused_registers_take_no_place() {
-    let assembled = good(".reg a b c\n.output F\n.input x\n.period\n fadd b, x, 1\n fadd F, b, 1\n");
+    let assembled =
+        good(".reg a b c\n.output F\n.input x\n.period\np: fadd b, x, 1\n fadd F, b, 1\n wait p\n");
     let names: Vec<&str> = assembled.program.registers.iter().map(|port| port.name.as_str()).collect();
     assert_eq!(names, ["b"]);
     assert_eq!(assembled.warnings.list.len(), 2);

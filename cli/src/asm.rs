@@ -149,7 +149,7 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
     }
     if let Some(path) = &image_path {
         let debug = (!arguments.strip).then(|| assembled.debug_info());
-        files::write(path, &image::write_with(program, debug.as_ref()))?;
+        files::write(path, &image::write_with(program, debug.as_ref())?)?;
     }
     if arguments.json {
         output::json(&result_json(&assembled, image_path.as_deref())?, out)?;

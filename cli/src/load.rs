@@ -59,7 +59,12 @@ impl Load {
     }
 
     fn options(&self) -> Options {
-        Options { machine: self.machine.unwrap_or(MACHINES[0]), schedule: self.schedule, effort: self.effort }
+        Options {
+            machine: self.machine.unwrap_or(MACHINES[0]),
+            schedule: self.schedule,
+            effort: self.effort,
+            levels: self.source.warnings.iter().copied().collect(),
+        }
     }
 
     /// The text of a source.

@@ -115,7 +115,7 @@ fn scheduled_programs() {
             let text = source(seed);
             let mut outcomes = Vec::new();
             for schedule in [Schedule::None, Schedule::AsWritten] {
-                let options = Options { machine, schedule, effort: 1 };
+                let options = Options { machine, schedule, effort: 1, ..Options::default() };
                 let assembled =
                     takt_asm::assemble("random.s", &MemoryLoader::of("random.s", text.as_str()), &options);
                 let program =

@@ -21,7 +21,8 @@ fn assembled(source: &str, machine: &'static Machine) -> Assembled {
 
 /// A session on an image, with its inputs at 1, 2, …, for some periods.
 fn session(assembled: &Assembled, periods: usize) -> Session {
-    let bytes = image::write_with(&assembled.program, Some(&assembled.debug_info()));
+    let bytes =
+        image::write_with(&assembled.program, Some(&assembled.debug_info())).expect("an image holds it");
     let (program, debug) = image::read_with(&bytes).unwrap();
     let DebugInfo { sources, constants, names } = debug.unwrap();
     let ports = program.inputs.iter().zip(1u16..);

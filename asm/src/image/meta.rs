@@ -102,9 +102,8 @@ impl Meta {
         }
     }
 
-    pub(super) fn to_json(&self) -> Vec<u8> {
-        // Strings and numbers only: nothing that JSON cannot hold.
-        serde_json::to_vec(self).unwrap_or_default()
+    pub(super) fn to_json(&self) -> Result<Vec<u8>, ImageError> {
+        serde_json::to_vec(self).map_err(|error| ImageError::Unwritable(error.to_string()))
     }
 
     pub(super) fn from_json(bytes: &[u8]) -> Result<Meta, ImageError> {

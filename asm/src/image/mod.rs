@@ -155,6 +155,9 @@ pub enum ImageError {
     /// What is there for a debugger does not fit the program.
     #[error("the image's section `{DEBUG}` cannot be used: {0}")]
     Debug(String),
+    /// The format cannot hold it.
+    #[error("an image cannot hold this program: {0}")]
+    Unwritable(String),
     /// The source lines do not fit the code.
     #[error("the source lines do not fit the code: {0}")]
     Lines(String),
@@ -171,25 +174,40 @@ fn clean(name: &str) -> String {
 }
 
 /// The image of a program, without what only a debugger reads.
-pub fn write(program: &Program) -> Vec<u8> {
+///
+/// # Errors
+/// As [`write_with`].
+pub fn write(program: &Program) -> Result<Vec<u8>, ImageError> {
     write_with(program, None)
 }
 
 /// The image of a program with what a debugger knows of it beyond the program.
-pub fn write_with(program: &Program, debug: Option<&DebugInfo>) -> Vec<u8> {
+///
+/// # Errors
+/// If an image cannot hold it: its sizes go beyond 32 bits, or beyond what [`read`] takes. Nothing that the assembler makes does.
+pub fn write_with(program: &Program, debug: Option<&DebugInfo>) -> Result<Vec<u8>, ImageError> {
+    within(program, debug, LIMIT)
+}
+
+/// The image of a program, if it has at most so many bytes.
+fn within(program: &Program, debug: Option<&DebugInfo>, most: usize) -> Result<Vec<u8>, ImageError> {
+    let meta = Meta::of(program).to_json()?;
+    let debug = debug.map(debug::to_json).transpose()?;
     let mut bytes = Vec::new();
     let names: Vec<String> = program.symbols.iter().map(|symbol| clean(&symbol.name)).collect();
-    // Errors are those of sizes beyond 32 bits, which no program for a machine reaches.
-    match write_elf(program, debug, &names, &mut bytes) {
-        Ok(()) => bytes,
-        Err(_) => Vec::new(),
+    write_elf(program, &names, &meta, debug.as_deref(), &mut bytes)
+        .map_err(|error| ImageError::Unwritable(error.to_string()))?;
+    if bytes.len() > most {
+        return Err(ImageError::TooLarge { bytes: bytes.len() });
     }
+    Ok(bytes)
 }
 
 fn write_elf(
     program: &Program,
-    debug: Option<&DebugInfo>,
     names: &[String],
+    meta: &[u8],
+    debug: Option<&[u8]>,
     bytes: &mut Vec<u8>,
 ) -> Result<(), object::write::Error> {
     let code: Vec<u8> = program.code.iter().flat_map(|word| word.to_le_bytes()).collect();
@@ -203,8 +221,6 @@ fn write_elf(
     let constants: Vec<u8> = constants.flat_map(pair).collect();
     let loops = program.loop_bounds.iter().map(|bound| (bound.address, bound.most));
     let loops: Vec<u8> = loops.flat_map(pair).collect();
-    let meta = Meta::of(program).to_json();
-    let debug = debug.map(debug::to_json);
     // First everything is given its place, then everything is written there, in the same order.
     let mut writer = write::Writer::new(Endianness::Little, false, bytes);
     writer.reserve_file_header();
@@ -212,13 +228,13 @@ fn write_elf(
         (CODE, &code[..], 8, elf::SHF_ALLOC | elf::SHF_EXECINSTR),
         (DATA, &data[..], 4, elf::SHF_ALLOC | elf::SHF_WRITE),
         (CONSTANTS, &constants[..], 4, elf::SHF_ALLOC),
-        (META, &meta[..], 1, elf::SectionFlags(0)),
+        (META, meta, 1, elf::SectionFlags(0)),
     ];
     if !loops.is_empty() {
         contents.push((LOOPS, &loops[..], 4, elf::SectionFlags(0)));
     }
-    if let Some(debug) = &debug {
-        contents.push((DEBUG, &debug[..], 1, elf::SectionFlags(0)));
+    if let Some(debug) = debug {
+        contents.push((DEBUG, debug, 1, elf::SectionFlags(0)));
     }
     writer.reserve_null_section_index();
     let mut place = |(name, content, align, flags): (&'static str, _, _, _)| {
@@ -401,4 +417,22 @@ pub fn read_with(bytes: &[u8]) -> Result<(Program, Option<DebugInfo>), ImageErro
     let debug = optional(DEBUG)?;
     let debug = debug.map(|(_, debug)| debug::from_json(debug, &program)).transpose()?;
     Ok((program, debug))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_image_that_could_not_be_read_is_not_written() {
+        let program = crate::assemble(
+            "a.s",
+            &crate::MemoryLoader::of("a.s", "here: jmp here\n"),
+            &crate::Options::default(),
+        );
+        let program = program.expect("it is right").program;
+        let bytes = write(&program).expect("it is small").len();
+        assert!(within(&program, None, bytes).is_ok());
+        assert_eq!(within(&program, None, bytes - 1), Err(ImageError::TooLarge { bytes }));
+    }
 }
