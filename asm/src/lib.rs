@@ -13,6 +13,7 @@ pub mod ast;
 mod blocks;
 mod check;
 mod context;
+mod copies;
 mod declare;
 pub mod diag;
 pub mod disasm;
@@ -21,7 +22,9 @@ mod expand;
 pub mod expr;
 mod expression;
 mod files;
+mod flow;
 mod grammar;
+mod homes;
 pub mod image;
 pub mod intern;
 pub mod ir;
@@ -46,7 +49,8 @@ use takt_isa::{Machine, Program, T3};
 
 pub use diag::Diagnostic;
 pub use expression::Expression;
-pub use load::{FileLoader, LoadError, Loader, MemoryLoader};
+pub use homes::{Adjustment, Made};
+pub use load::{FileLoader, LoadError, Loader, MemoryLoader, Search};
 
 /// What the assembler is to do.
 #[derive(Clone, Copy, Debug)]
@@ -92,7 +96,9 @@ pub struct Assembled {
     pub blocks: Vec<schedule::BlockReport>,
     /// What is demanded of ports (`.deadline`, `.order`, `.late`) and how it is met.
     pub timing: Vec<schedule::TimingReport>,
-    /// Words that a macro or a repetition made: indices into the program's code, ascending.
+    /// What was done about registers that operations of several slots write.
+    pub adjustments: Vec<Adjustment>,
+    /// Words that a macro, a repetition or the assembler itself made: indices into the program's code, ascending.
     pub expanded: Vec<u32>,
 }
 
@@ -125,8 +131,10 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
     };
     ir.bundles.iter_mut().for_each(|bundle| bundle.scheduled = packs(bundle.scheduled));
     check::integers(&mut context, &ir);
-    values::split(&mut ir);
-    check::check(&mut context, &ir);
+    let mut homes = homes::choose(&mut ir);
+    let values = values::split(&mut ir, &mut homes);
+    copies::insert(&mut ir, &mut homes, &values);
+    check::check(&mut context, &ir, &homes);
     let context::Context { mut sink, sources, constants, .. } = context;
     let sources = Arc::new(sources);
     // What follows would only report what follows from the errors there are.
@@ -137,6 +145,7 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
     if sink.errors > 0 {
         return Err(sink.finish(sources));
     }
+    let adjustments = copies::report(&ir, homes);
     let placement = place::place(&ir, &mut sink);
     let emitted = emit::emit(&ir, &placement, &mut sink);
     let errors = sink.errors;
@@ -154,6 +163,7 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
         constants,
         blocks,
         timing,
+        adjustments,
         expanded: emitted.expanded,
     })
 }

@@ -259,6 +259,7 @@ impl Resolver<'_> {
             location,
             span: written.span,
             expansion: at.scope.0,
+            made: false,
             written: (at.ast, number),
         };
         let mut failed = false;
@@ -306,6 +307,7 @@ impl Resolver<'_> {
             location,
             span: written.span,
             expansion: at.scope.0,
+            made: false,
             written: (at.ast, number),
         })
     }
