@@ -121,7 +121,8 @@ impl fmt::Display for Limit {
 /// The limits that a module's text states by instances called `unsupported`.
 pub fn limits(text: &str) -> Vec<Limit> {
     let refusals = text.lines().filter_map(|line| line.trim().strip_suffix(" unsupported ();"));
-    let stated = refusals.filter_map(|name| name.split_once("_has_")).flat_map(|(_, said)| said.split("_and_"));
+    let stated =
+        refusals.filter_map(|name| name.split_once("_has_")).flat_map(|(_, said)| said.split("_and_"));
     stated
         .filter_map(|said| {
             let (quantity, values) = said.split_once('_')?;
@@ -315,7 +316,8 @@ mod tests {
     #[test]
     fn every_unit_states_its_limits() {
         let library = Library::builtin();
-        for unit in UNITS.iter().filter(|unit| Circuit::rows(unit).next().is_some() && unit.name != "memory") {
+        for unit in UNITS.iter().filter(|unit| Circuit::rows(unit).next().is_some() && unit.name != "memory")
+        {
             library.circuit(unit).unwrap_or_else(|error| panic!("{error}"));
             for latency in [0, 1, 63] {
                 let error = library.circuit(&Unit { latency, ..*unit }).expect_err("no such circuit");

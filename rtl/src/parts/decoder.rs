@@ -3,8 +3,8 @@
 use crate::plan::names::LETTERS;
 use crate::plan::{Plan, SlotPlan};
 use crate::verilog::{
-    Arm, Direction, Expr, Module, ModuleError, Net, Port, Statement, any, binary, concat, decimal, hexadecimal,
-    no, set, yes,
+    Arm, Direction, Expr, Module, ModuleError, Net, Port, Statement, any, binary, concat, decimal,
+    hexadecimal, no, set, yes,
 };
 use takt_isa::shape::{Field, OPCODE, Shape, WORD_BITS};
 use takt_isa::spec::machines::{Bank, ZERO};

@@ -45,9 +45,11 @@ fn source(plan: &Plan, slot: &SlotPlan, operand: usize, m: &mut Module) {
             .port("m_bank", slot.source_bank(Stage::Match, operand))
             .port("m_index", slot.source_index(Stage::Match, operand))
             .same([plan.underway(), plan.underway_index(), plan.writes(), plan.late(), plan.late_index()])
-            .same([Stage::Read, Stage::Issue].into_iter().flat_map(|stage| {
-                [plan.writes_at(stage), plan.early_at(stage), plan.dest_at(stage)]
-            }))
+            .same(
+                [Stage::Read, Stage::Issue]
+                    .into_iter()
+                    .flat_map(|stage| [plan.writes_at(stage), plan.early_at(stage), plan.dest_at(stage)]),
+            )
             .same([plan.result(), plan.was_result()])
             .port("input_write", net::INPUT1)
             .port("input_write_index", plan.input1_index())

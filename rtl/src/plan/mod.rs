@@ -66,7 +66,9 @@ pub enum PlanError {
         inputs: bool,
     },
     /// A unit is too fast for the circuit's scoreboard.
-    #[error("machine `{machine}`: slot `{slot}`: unit `{unit}` has latency {latency}; the circuit wants 2 at least")]
+    #[error(
+        "machine `{machine}`: slot `{slot}`: unit `{unit}` has latency {latency}; the circuit wants 2 at least"
+    )]
     Fast {
         /// The machine.
         machine: &'static str,
@@ -286,7 +288,14 @@ fn check_parts(machine: &'static Machine) -> Result<(), PlanError> {
         units.map(|unit| (format!("slot `{}`: the latency of unit `{}`", slot.name, unit.name), unit.latency))
     });
     let asked = [("refill", machine.refill), ("resolve", machine.resolve), ("stack", machine.stack_depth)]
-        .map(|(quantity, value)| ("takt_sequencer", quantity, format!("{quantity}{}", if quantity == "stack" { "_depth" } else { "" }), value))
+        .map(|(quantity, value)| {
+            (
+                "takt_sequencer",
+                quantity,
+                format!("{quantity}{}", if quantity == "stack" { "_depth" } else { "" }),
+                value,
+            )
+        })
         .into_iter()
         .chain(memory.map(|(what, latency)| ("takt_memory", "latency", what, latency)));
     for (part, quantity, what, value) in asked {

@@ -251,8 +251,9 @@ impl Expr {
             Expr::Literal(_) => {}
             Expr::Net { net, select } => {
                 see(net);
-                if let Some(Select::Bit(Place::Multiple(_, place)) | Select::Part(Place::Multiple(_, place), _)) =
-                    select
+                if let Some(
+                    Select::Bit(Place::Multiple(_, place)) | Select::Part(Place::Multiple(_, place), _),
+                ) = select
                 {
                     see(place);
                 }

@@ -258,7 +258,11 @@ impl Module {
                 body.iter().for_each(|statement| statement.nets(&mut see));
             }
             Item::Instance(instance) => {
-                instance.ports.iter().filter_map(|port| port.1.as_ref()).for_each(|value| value.nets(&mut see));
+                instance
+                    .ports
+                    .iter()
+                    .filter_map(|port| port.1.as_ref())
+                    .for_each(|value| value.nets(&mut see));
             }
         }
         used.iter().for_each(|net| self.uses(net));
@@ -384,7 +388,9 @@ mod tests {
             &|m| m.define(Net::bit("x"), B.at(A)),
             &|m| m.clocked(vec![when(A, vec![set(B, B)])]),
             &|m| m.instance(Instance::new("other", "x").port("in", Expr::from(B).any_bit() & A)),
-            &|m| m.clocked(vec![Statement::Case { of: B.into(), arms: Vec::new(), default: vec![set(B, A)] }]),
+            &|m| {
+                m.clocked(vec![Statement::Case { of: B.into(), arms: Vec::new(), default: vec![set(B, A)] }])
+            },
         ];
         for add in uses {
             let mut module = module();
