@@ -53,10 +53,15 @@ pub struct Design {
     pub synthesis: String,
     /// Modules that take the place of those of the same name on Lattice ECP5.
     pub ecp5: Vec<DesignFile>,
+    /// The core's parameter of that name: 0, or, for a program whose ports are latched, its
+    /// [`latched_inputs`](takt_isa::Program::latched_inputs). The files have 0 for their default.
+    pub latched: u16,
 }
 
 /// Cycles between a value on the input port and the first bundle that may read it, less 1.
 pub const INPUT_DELAY: u64 = 3;
+/// The same for latched ports, between a value on the input port and the first tick that takes it.
+pub const LATCHED_INPUT_DELAY: u64 = 2;
 /// Cycles between the tick on its pin and the cycle in which it is seen.
 pub const TICK_DELAY: u64 = 1;
 /// Cycles for which reset must be held, so that nothing is left of what was before.
@@ -170,7 +175,7 @@ pub fn export(machine: &'static Machine, library: &Library) -> Result<Design, Ex
     }
     let ecp5 =
         ECP5.iter().map(|&(name, text)| DesignFile { name: format!("ecp5/{name}"), text: text.to_owned() });
-    Ok(Design { machine, synthesis: plan.synthesis(&top), top, files, ecp5: ecp5.collect() })
+    Ok(Design { machine, synthesis: plan.synthesis(&top), top, files, ecp5: ecp5.collect(), latched: 0 })
 }
 
 macro_rules! line {
@@ -293,7 +298,10 @@ impl Plan {
             ("retire_register", 10 * slots),
             ("retire_value", 32 * slots),
             ("retire_flags", 3 * slots),
+            ("ended", 1),
+            ("read_value", 32),
         ];
+        ports.push(format!(".read_output({port_bits}'d0)"));
         for (port, width) in open {
             line!(v, "    wire [{}:0] unused_{port};", width - 1);
             ports.push(format!(".{port}(unused_{port})"));
@@ -348,7 +356,12 @@ impl Plan {
                 .join(", ")
         );
         line!(v);
-        line!(v, "module {top} (");
+        line!(v, "module {top} #(");
+        line!(
+            v,
+            "    parameter LATCHED = 0                  // 0, or how many input ports are latched, from port 0 on: a power of two; then outputs are, too"
+        );
+        line!(v, ") (");
         line!(v, "    input  wire        clk,");
         line!(
             v,
@@ -365,14 +378,15 @@ impl Plan {
         line!(v, "    input  wire [47:0] load_value,");
         line!(
             v,
-            "    // Input ports: written in cycle t, read by bundles that issue in t + {INPUT_DELAY} or later."
+            "    // Input ports: written in cycle t, read by bundles that issue in t + {INPUT_DELAY} or later. If latched, by those of the period"
         );
+        line!(v, "    // whose tick is high in t + 1 or later.");
         line!(v, "    input  wire        input_write,");
         line!(v, "    input  wire [{}:0]  input_index,", input_bits - 1);
         line!(v, "    input  wire [31:0] input_value,");
         line!(
             v,
-            "    // Output ports, the last {} registers of each bank: what is written, in the cycle of writeback.",
+            "    // Output ports, the last {} registers of each bank: what is written, in the cycle of writeback, latched or not.",
             machine.outputs_per_bank
         );
         for slot in &self.slots {
@@ -381,6 +395,16 @@ impl Plan {
             line!(v, "    output wire [{}:0]  output_{b}_index,", port_bits - 1);
             line!(v, "    output wire [31:0] output_{b}_value,");
         }
+        line!(
+            v,
+            "    // The ports by number, whichever bank has them, as the outside is to see them: if latched, as last published."
+        );
+        line!(v, "    input  wire [{}:0]  read_output,", port_bits - 1);
+        line!(v, "    output wire [31:0] read_value,");
+        line!(
+            v,
+            "    output wire        ended,              // a `wait` issued two cycles ago: read_value is of the period that it ended"
+        );
         line!(v, "    // The tick: high for one cycle, seen in the next one.");
         line!(v, "    input  wire        tick,");
         line!(v, "    output wire        waiting,");
@@ -536,6 +560,26 @@ impl Plan {
 
         // ---- Pipeline of control.
         line!(v, "\n    // ---- from decode to issue");
+        let mut sources: Vec<String> = Vec::new();
+        for (s, slot) in self.slots.iter().enumerate() {
+            sources.extend(["a", "b", "c"].iter().take(slot.sources).map(|letter| format!("{}_{letter}", n(s))));
+        }
+        let looked_up: Vec<String> =
+            sources.iter().map(|o| format!("d_{o}_index[{}:0]", input_bits - 1)).collect();
+        line!(v, "\n    wire inputs_open, inputs_taken, input1_place;\n    wire [{}:0] d_place;", sources.len() - 1);
+        line!(
+            v,
+            "    takt_places #(.PORTS(LATCHED), .INDEX({input_bits}), .WRITES(1), .READS({})) inputs (\n        .clk(clk), .flip(inputs_taken | rst), .open(inputs_open | rst), .drop(1'b0),\n        .write(input1), .write_index(input1_index[{}:0]), .write_place(input1_place),\n        .read_index({}), .read_place(d_place)\n    );",
+            sources.len(),
+            input_bits - 1,
+            concat(&looked_up)
+        );
+        line!(v, "    wire input1_now = input1 & (LATCHED == 0 | inputs_open | rst);");
+        line!(
+            v,
+            "    reg  [{}:0] m_place;\n    always @(posedge clk) if (advance) m_place <= d_place;",
+            sources.len() - 1
+        );
         for (s, slot) in self.slots.iter().enumerate() {
             let name = n(s);
             let width = slot.width();
@@ -793,9 +837,9 @@ impl Plan {
                 line!(v, "    wire [31:0] x_{o};\n    wire {o}_r_waits, {o}_i_waits;");
                 line!(
                     v,
-                    "    takt_source #(.SLOTS({slots}), .DEPTH({depth}), .LATE({late}), .INDEX({index})) {o} ("
+                    "    takt_source #(.SLOTS({slots}), .DEPTH({depth}), .LATE({late}), .INDEX({index}), .LATCHED(LATCHED)) {o} ("
                 );
-                line!(v, "        .clk(clk), .advance(advance), .m_bank(m_{o}_bank), .m_index(m_{o}_index),");
+                line!(v, "        .clk(clk), .advance(advance), .m_bank(m_{o}_bank), .m_index(m_{o}_index), .m_place(m_place[{}]),", sources.iter().position(|source| *source == o).unwrap_or(0));
                 line!(
                     v,
                     "        .underway(underway), .underway_index(underway_index), .writes(writes), .late(late), .late_index(late_index),"
@@ -807,7 +851,7 @@ impl Plan {
                 line!(v, "        .result(result), .was_result(was_result),");
                 line!(
                     v,
-                    "        .input_write(input1), .input_write_index(input1_index), .input_write_value(input1_value),"
+                    "        .input_write(input1), .input_write_place(input1_place), .input_now(input1_now), .input_write_index(input1_index), .input_write_value(input1_value),"
                 );
                 line!(v, "        .input_next_value(input2_value),");
                 line!(
@@ -980,7 +1024,7 @@ impl Plan {
         );
         line!(
             v,
-            "        .x_issued(x_issued), .x_address(x_address), .waiting(waiting), .missed(tick_missed), .lost(tick_lost),"
+            "        .x_issued(x_issued), .x_address(x_address), .waiting(waiting), .open(inputs_open), .ends(inputs_taken), .ended(ended), .missed(tick_missed), .lost(tick_lost),"
         );
         line!(
             v,
@@ -1128,6 +1172,15 @@ impl Plan {
                 bank.name
             );
         }
+        let banks =
+            |what: &str| vector(&|s| format!("output_{}_{what}", self.slots[s].slot.bank.name));
+        line!(
+            v,
+            "    takt_outputs #(.LATCHED(LATCHED), .BANKS({slots}), .INDEX({port_bits})) outputs (\n        .clk(clk), .rst(rst), .publish(ended), .write({}), .index({}),\n        .value({}), .number(read_output), .shown(read_value)\n    );",
+            banks("write"),
+            banks("index"),
+            banks("value")
+        );
         line!(v, "    assign retire         = {};", vector(&|s| format!("{}_writes & ~rst", n(s))));
         line!(v, "    assign retire_address = {};", vector(&|s| format!("{}_retire_address", n(s))));
         line!(
