@@ -74,7 +74,8 @@ impl Expander<'_> {
             let is_register = self.context.machine.register_address(self.context.names.text(id)).is_some();
             let binding = self.context.lookup(at.scope, id);
             // What is neither a register nor a number is taken for a register's name misspelt.
-            let is_number = matches!(binding, Binding::Constant(_) | Binding::Count(_) | Binding::Argument(_));
+            let is_number =
+                matches!(binding, Binding::Constant(_) | Binding::Count(_) | Binding::Argument(_));
             if is_register || !is_number {
                 let address = address(&mut self.context, at, name)?;
                 return self.pin(at, register, address, place.span);
@@ -91,9 +92,12 @@ impl Expander<'_> {
             RegisterKind::Input => ("input", machine.input_count()),
             RegisterKind::Output => ("output", machine.outputs_per_bank),
             _ => {
-                let error =
-                    Diagnostic::error("place", span, format!("`{number}` is no place: only ports have numbers"))
-                        .help(format!("a register's place is its name, as `@ {}3`", machine.slots[0].bank.name));
+                let error = Diagnostic::error(
+                    "place",
+                    span,
+                    format!("`{number}` is no place: only ports have numbers"),
+                )
+                .help(format!("a register's place is its name, as `@ {}3`", machine.slots[0].bank.name));
                 return Err(self.context.report(at.scope, error));
             }
         };

@@ -362,7 +362,8 @@ fn an_output_has_one_number() {
     };
     let expect = |text: &str, expected: &[(&str, u16)]| {
         for machine in [&T3, &T1] {
-            let expected: Vec<_> = expected.iter().map(|(name, number)| ((*name).to_owned(), *number)).collect();
+            let expected: Vec<_> =
+                expected.iter().map(|(name, number)| ((*name).to_owned(), *number)).collect();
             assert_eq!(numbers(text, machine), expected, "{}: {text}", machine.name);
         }
     };
@@ -392,7 +393,8 @@ fn an_output_has_one_number() {
 
 #[test]
 fn ports_may_be_latched() {
-    let latched = |text: &str| good(&format!(".input x\n.output F\n{text}.period\n fadd F, x, x\n")).program.latched;
+    let latched =
+        |text: &str| good(&format!(".input x\n.output F\n{text}.period\n fadd F, x, x\n")).program.latched;
     assert!(!latched("") && !latched(".ports direct\n"));
     assert!(latched(".ports latched\n") && latched(".ports latched\n.ports latched\n"));
 }

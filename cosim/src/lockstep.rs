@@ -190,10 +190,8 @@ impl Lockstep {
                     written.extend(machine.output_number(write.register).map(|number| (number, write.value)));
                 }
                 Event::Wait { cycle, .. } => {
-                    let published = std::mem::take(written).into_iter().map(|(register, value)| CircuitEvent {
-                        register,
-                        value,
-                        ..bare(EventKind::Publish, cycle)
+                    let published = std::mem::take(written).into_iter().map(|(register, value)| {
+                        CircuitEvent { register, value, ..bare(EventKind::Publish, cycle) }
                     });
                     expected.extend(published);
                 }

@@ -9,7 +9,7 @@ mod common;
 use common::folder;
 use takt_cosim::{LockstepError, Model, random};
 use takt_isa::{Machine, T1, T3};
-use takt_rtl::{Library, export};
+use takt_rtl::{Design, Library, export};
 
 /// A module, an expression that occurs once in it, and what takes its place.
 type Fault = (&'static str, &'static str, &'static str);
@@ -82,11 +82,27 @@ const OF_T1: &[Fault] = &[
     ("takt_t1", "one_divide_at[13] | one_root_at[11] | one_sine_at[9] | i_one_control[ONE_RESULT_5]", "1'b0"),
 ];
 
+/// In what takes and publishes latched ports, on t3, whose outputs are written by three slots.
+#[rustfmt::skip]
+const OF_LATCHED: &[Fault] = &[
+    ("takt_places", "flip ? shown ^ changed : shown", "shown"),
+    ("takt_places", "now[index[BITS-1:0]] ^ ~open", "~now[index[BITS-1:0]]"),
+    ("takt_places", "now[index[BITS-1:0]] ^ ~open", "now[index[BITS-1:0]]"),
+    ("takt_places", "{PORTS{~flip & ~drop}}", "{PORTS{1'b1}}"),
+    ("takt_places", "write[k] & ~open & (index >> BITS) == 0", "write[k] & (index >> BITS) == 0"),
+    ("takt_outputs", "of_number == j[OWNER-1:0]", "1'b0"),
+    ("takt_sequencer", "x_wait & ~fault", "x_wait & ~remembered & ~fault"),
+    ("takt_source", "advance ? m_place : r_place", "1'b0"),
+    ("takt_t3", "LATCHED == 0 | inputs_open | rst", "1'b1"),
+    ("takt_t3", "inputs_taken | rst", "rst"),
+];
+
 /// Random programs that a fault may pass before it counts as not found.
 const PROGRAMS: u64 = 1000;
 
-fn faults_are_found(machine: &'static Machine, faults: &[Fault]) {
-    let mut design = export(machine, &Library::builtin()).expect("every machine has a circuit");
+fn faults_are_found(machine: &'static Machine, latched: u16, faults: &[Fault]) {
+    let design = export(machine, &Library::builtin()).expect("every machine has a circuit");
+    let mut design = Design { latched, ..design };
     let top = design.top.clone();
     for (number, (module, from, to)) in faults.iter().enumerate() {
         let own = format!("{module}.v");
@@ -139,11 +155,16 @@ fn faults_are_found(machine: &'static Machine, faults: &[Fault]) {
 
 #[test]
 fn planted_faults_are_found_on_t3() {
-    faults_are_found(&T3, &[COMMON, OF_T3].concat());
+    faults_are_found(&T3, 0, &[COMMON, OF_T3].concat());
 }
 
 /// What t3 has not.
 #[test]
 fn planted_faults_are_found_on_t1() {
-    faults_are_found(&T1, OF_T1);
+    faults_are_found(&T1, 0, OF_T1);
+}
+
+#[test]
+fn planted_faults_in_latched_ports_are_found() {
+    faults_are_found(&T3, T3.inputs.depth, OF_LATCHED);
 }

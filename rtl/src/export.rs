@@ -562,11 +562,16 @@ impl Plan {
         line!(v, "\n    // ---- from decode to issue");
         let mut sources: Vec<String> = Vec::new();
         for (s, slot) in self.slots.iter().enumerate() {
-            sources.extend(["a", "b", "c"].iter().take(slot.sources).map(|letter| format!("{}_{letter}", n(s))));
+            sources
+                .extend(["a", "b", "c"].iter().take(slot.sources).map(|letter| format!("{}_{letter}", n(s))));
         }
         let looked_up: Vec<String> =
             sources.iter().map(|o| format!("d_{o}_index[{}:0]", input_bits - 1)).collect();
-        line!(v, "\n    wire inputs_open, inputs_taken, input1_place;\n    wire [{}:0] d_place;", sources.len() - 1);
+        line!(
+            v,
+            "\n    wire inputs_open, inputs_taken, input1_place;\n    wire [{}:0] d_place;",
+            sources.len() - 1
+        );
         line!(
             v,
             "    takt_places #(.PORTS(LATCHED), .INDEX({input_bits}), .WRITES(1), .READS({})) inputs (\n        .clk(clk), .flip(inputs_taken | rst), .open(inputs_open | rst), .drop(1'b0),\n        .write(input1), .write_index(input1_index[{}:0]), .write_place(input1_place),\n        .read_index({}), .read_place(d_place)\n    );",
@@ -839,7 +844,11 @@ impl Plan {
                     v,
                     "    takt_source #(.SLOTS({slots}), .DEPTH({depth}), .LATE({late}), .INDEX({index}), .LATCHED(LATCHED)) {o} ("
                 );
-                line!(v, "        .clk(clk), .advance(advance), .m_bank(m_{o}_bank), .m_index(m_{o}_index), .m_place(m_place[{}]),", sources.iter().position(|source| *source == o).unwrap_or(0));
+                line!(
+                    v,
+                    "        .clk(clk), .advance(advance), .m_bank(m_{o}_bank), .m_index(m_{o}_index), .m_place(m_place[{}]),",
+                    sources.iter().position(|source| *source == o).unwrap_or(0)
+                );
                 line!(
                     v,
                     "        .underway(underway), .underway_index(underway_index), .writes(writes), .late(late), .late_index(late_index),"
@@ -1172,8 +1181,7 @@ impl Plan {
                 bank.name
             );
         }
-        let banks =
-            |what: &str| vector(&|s| format!("output_{}_{what}", self.slots[s].slot.bank.name));
+        let banks = |what: &str| vector(&|s| format!("output_{}_{what}", self.slots[s].slot.bank.name));
         line!(
             v,
             "    takt_outputs #(.LATCHED(LATCHED), .BANKS({slots}), .INDEX({port_bits})) outputs (\n        .clk(clk), .rst(rst), .publish(ended), .write({}), .index({}),\n        .value({}), .number(read_output), .shown(read_value)\n    );",

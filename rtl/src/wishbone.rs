@@ -53,9 +53,19 @@ const STATUS: Register = Register {
         field("deadline_missed", 1, 1, "A tick came before its `wait`, since reset."),
         field("halted", 2, 1, "It has halted."),
         field("fault", 3, 1, "It has stopped with a fault, which the other fields describe."),
-        field("fault_kind", 4, 3, "1 illegal word, 2 data address, 3 return stack full, 4 return stack empty."),
+        field(
+            "fault_kind",
+            4,
+            3,
+            "1 illegal word, 2 data address, 3 return stack full, 4 return stack empty.",
+        ),
         field("fault_slot", 7, 3, "The slot of the fault."),
-        field("flags", 10, 3, "The sticky flags: invalid, divide by zero, overflow, the last in the lowest bit."),
+        field(
+            "flags",
+            10,
+            3,
+            "The sticky flags: invalid, divide by zero, overflow, the last in the lowest bit.",
+        ),
         field("fault_address", 16, 16, "The bundle of the fault."),
     ],
 };

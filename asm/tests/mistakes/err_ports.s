@@ -7,8 +7,6 @@
 .ports  held
 .once
         fadd    F, a, b || mov H, c
-        fmul    M, a, a || fmul @m233, a, a
-.output M @ 9
 .period
 .deadline F = 20
 .order  a, F
