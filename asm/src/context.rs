@@ -8,7 +8,7 @@ use crate::ir::{LabelId, Register, RegisterId, RegisterKind};
 use crate::limits;
 use crate::source::{Sources, Span};
 use crate::unknown::{Unknown, Wanted};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 use takt_isa::program::Space;
 use takt_isa::{Machine, Type, ZERO};
@@ -114,6 +114,8 @@ pub(crate) struct Context {
     pub(crate) registers: Vec<Register>,
     /// Registers with a given address.
     pub(crate) by_address: HashMap<u16, RegisterId>,
+    /// Outputs with a given number.
+    pub(crate) numbered: BTreeMap<u16, RegisterId>,
     /// Labels. While the source is read a code label's position counts the statements of its section.
     pub(crate) labels: Vec<crate::ir::Label>,
     /// The section of each label.
@@ -160,6 +162,7 @@ impl Context {
             arguments: Vec::new(),
             registers: vec![register],
             by_address: HashMap::from([(ZERO, RegisterId::ZERO)]),
+            numbered: BTreeMap::new(),
             labels: Vec::new(),
             label_sections: Vec::new(),
             macros: HashMap::new(),
