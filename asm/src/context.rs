@@ -9,7 +9,7 @@ use crate::limits;
 use crate::source::{Sources, Span};
 use crate::types::{Addresses, GivenTypes};
 use crate::unknown::{Unknown, Wanted};
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
 use takt_isa::program::Space;
 use takt_isa::{Machine, Type, ZERO};
@@ -110,6 +110,8 @@ pub(crate) struct Context {
     pub(crate) registers: Vec<Register>,
     /// Registers with a given address.
     pub(crate) by_address: HashMap<u16, RegisterId>,
+    /// Outputs with a given number.
+    pub(crate) numbered: BTreeMap<u16, RegisterId>,
     /// Labels. While the source is read a code label's position counts the statements of its section.
     pub(crate) labels: Vec<crate::ir::Label>,
     /// The section of each label.
@@ -163,6 +165,7 @@ impl Context {
             parameters: HashMap::new(),
             registers: vec![register],
             by_address: HashMap::from([(ZERO, RegisterId::ZERO)]),
+            numbered: BTreeMap::new(),
             labels: Vec::new(),
             label_sections: Vec::new(),
             macros: HashMap::new(),
