@@ -10,6 +10,7 @@ pub mod circuit;
 mod decode;
 pub mod export;
 mod files;
+pub mod header;
 pub mod synthesis;
 pub mod tables;
 pub mod wishbone;
