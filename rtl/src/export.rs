@@ -842,7 +842,7 @@ impl Plan {
                 line!(v, "    wire [31:0] x_{o};\n    wire {o}_r_waits, {o}_i_waits;");
                 line!(
                     v,
-                    "    takt_source #(.SLOTS({slots}), .DEPTH({depth}), .LATE({late}), .INDEX({index}), .LATCHED(LATCHED)) {o} ("
+                    "    takt_source #(.SLOTS({slots}), .DEPTH({depth}), .LATE({late}), .INDEX({index}), .LATCHED(LATCHED), .INPUTS({input_bits})) {o} ("
                 );
                 line!(
                     v,

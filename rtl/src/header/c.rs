@@ -42,7 +42,12 @@ pub(super) fn write(header: &Header) -> String {
         let _ = writeln!(text, "\n/* {title} ports. */");
         for port in ports {
             let what = format!("{} {}, {}", title.to_lowercase(), port.number, port.ty);
-            let name = define(&mut text, &format!("{kind}_{}", port.name), format!("0x{:04x}u", port.address), &what);
+            let name = define(
+                &mut text,
+                &format!("{kind}_{}", port.name),
+                format!("0x{:04x}u", port.address),
+                &what,
+            );
             places.push((port, name, kind == "IN"));
         }
     }
@@ -64,14 +69,22 @@ pub(super) fn write(header: &Header) -> String {
         };
         if *is_input {
             let name = functions.give(&format!("{p}_write_{}", port.name));
-            let bits = if convert { "    uint32_t bits;\n    memcpy(&bits, &value, sizeof bits);\n" } else { "    uint32_t bits = value;\n" };
+            let bits = if convert {
+                "    uint32_t bits;\n    memcpy(&bits, &value, sizeof bits);\n"
+            } else {
+                "    uint32_t bits = value;\n"
+            };
             let _ = writeln!(
                 text,
                 "static inline void {name}(volatile uint32_t *bus, {ty} value)\n{{\n{bits}    bus[{address}] = bits;\n}}"
             );
         } else {
             let name = functions.give(&format!("{p}_read_{}", port.name));
-            let value = if convert { format!("    {ty} value;\n    memcpy(&value, &bits, sizeof value);\n") } else { format!("    {ty} value = bits;\n") };
+            let value = if convert {
+                format!("    {ty} value;\n    memcpy(&value, &bits, sizeof value);\n")
+            } else {
+                format!("    {ty} value = bits;\n")
+            };
             let _ = writeln!(
                 text,
                 "static inline {ty} {name}(const volatile uint32_t *bus)\n{{\n    uint32_t bits = bus[{address}];\n{value}    return value;\n}}"
@@ -88,7 +101,12 @@ pub(super) fn write(header: &Header) -> String {
     );
     for record in &load.records {
         let place = u32::from(record.address) | u32::from(record.space) << 16 | u32::from(record.slot) << 18;
-        let _ = writeln!(text, "    {{ 0x{place:06x}u, 0x{:04x}u, 0x{:08x}u }},", record.value >> 32, record.value as u32);
+        let _ = writeln!(
+            text,
+            "    {{ 0x{place:06x}u, 0x{:04x}u, 0x{:08x}u }},",
+            record.value >> 32,
+            record.value as u32
+        );
     }
     if count == 0 {
         text.push_str("    { 0u, 0u, 0u },\n");

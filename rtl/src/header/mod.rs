@@ -172,22 +172,14 @@ impl Header {
             // A register that the loader sets to zero must be written: only the memories are cleared.
             record.value != 0 || matches!(record.space, Space::Register | Space::Input)
         });
-        let record = |LoadRecord { space, slot, address, value }| Record {
-            space: space as u8,
-            slot,
-            address,
-            value,
-        };
+        let record =
+            |LoadRecord { space, slot, address, value }| Record { space: space as u8, slot, address, value };
         let (cycles, no_bound) = match cycles {
             Ok(cycles) => (Some(cycles), None),
             Err(reason) => (None, Some(reason)),
         };
-        let field = |of: &wishbone::Field| BusField {
-            name: of.name,
-            low: of.low,
-            width: of.width,
-            text: of.text,
-        };
+        let field =
+            |of: &wishbone::Field| BusField { name: of.name, low: of.low, width: of.width, text: of.text };
         let register = |of: &wishbone::Register| BusRegister {
             name: of.name,
             address: of.address,
@@ -237,8 +229,16 @@ impl Header {
         let mut figures = Vec::new();
         for Cycles { name, once, cycles, missed, .. } in self.cycles.iter().flatten() {
             let what = if *once { "from reset to its `wait`" } else { "from the tick to its `wait`" };
-            figures.push((format!("{name}_best"), cycles.best, format!("Cycles of {name} at least, {what}.")));
-            figures.push((format!("{name}_worst"), cycles.worst, format!("Cycles of {name} at most, {what}.")));
+            figures.push((
+                format!("{name}_best"),
+                cycles.best,
+                format!("Cycles of {name} at least, {what}."),
+            ));
+            figures.push((
+                format!("{name}_worst"),
+                cycles.worst,
+                format!("Cycles of {name} at most, {what}."),
+            ));
             if let Some(missed) = missed {
                 let what = "after a tick that came too early";
                 figures.push((

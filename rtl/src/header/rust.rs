@@ -6,11 +6,11 @@ use std::fmt::Write as _;
 
 /// Words that are no names of constants.
 const KEYWORDS: &[&str] = &[
-    "_", "Self", "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate", "do",
-    "dyn", "else", "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl", "in", "let", "loop",
-    "macro", "match", "mod", "move", "mut", "override", "priv", "pub", "ref", "return", "self", "static", "struct",
-    "super", "trait", "true", "try", "type", "typeof", "unsafe", "unsized", "use", "virtual", "where", "while",
-    "yield",
+    "_", "Self", "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate",
+    "do", "dyn", "else", "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl", "in", "let",
+    "loop", "macro", "match", "mod", "move", "mut", "override", "priv", "pub", "ref", "return", "self",
+    "static", "struct", "super", "trait", "true", "try", "type", "typeof", "unsafe", "unsized", "use",
+    "virtual", "where", "while", "yield",
 ];
 
 /// A text as a literal.
@@ -75,7 +75,12 @@ pub mod register {
     );
     for register in &header.registers {
         let name = register.name.to_uppercase();
-        let _ = writeln!(text, "    /// {}\n    pub const {name}: u16 = 0x{:04x};", line(register.text), register.address);
+        let _ = writeln!(
+            text,
+            "    /// {}\n    pub const {name}: u16 = 0x{:04x};",
+            line(register.text),
+            register.address
+        );
         for field in &register.fields {
             let field_name = format!("{name}_{}", field.name.to_uppercase());
             let mask = ((1u64 << field.width) - 1) << field.low;
