@@ -16,7 +16,7 @@
 
 ; keep: the bits above the units' place; below: the bits below it. Both only for 1 ≤ |x| < 2²³, which `inner` says.
 .macro math.units x, a, inner, s
-.reg    e:int  off:int
+.reg    e:int off:int
         iand    a, x, 0x7fffffff
         ishr    e, x, 23
         iadd    s, e, 1                 ; exponent - 127, modulo 32: shifts look at no more
@@ -25,7 +25,7 @@
 .endm
 
 .macro trunc d, x
-.reg    a:int inner:int s:int  keep:bits whole:bits less:int sg:bits rest:bits
+.reg    a:int inner:int s:int keep:bits whole:bits less:int sg:bits rest:bits
         math.units x, a, inner, s
         isar    keep, 0xff800000, s
         iand    whole, x, keep
@@ -37,7 +37,8 @@
 
 ; Towards the infinity of the sign bit `side`: what lies beyond grows to the next integer.
 .macro math.toward d, x, side, one
-.reg    a:int inner:int s:int  keep:bits below:bits mine:int grow:bits whole:bits less:int sg:bits rest:bits y:bits some:int up:int
+.reg    a:int inner:int s:int keep:bits below:bits mine:int grow:bits whole:bits less:int sg:bits rest:bits y:bits
+.reg    some:int up:int
         math.units x, a, inner, s
         isar    keep, 0xff800000, s
         ishr    below, 0x7fffff, s
@@ -64,7 +65,7 @@
 
 ; Halves away from zero, as C's round().
 .macro round d, x
-.reg    a:int inner:int s:int  keep:bits half:bits whole:bits less:int sg:bits one:bits big:int rest:bits y:bits
+.reg    a:int inner:int s:int keep:bits half:bits whole:bits less:int sg:bits one:bits big:int rest:bits y:bits
         math.units x, a, inner, s
         isar    keep, 0xff800000, s
         ishr    half, 0x400000, s
@@ -96,7 +97,7 @@
 
 ; e^r - 1 - r for |r| ≤ ln(2)/2.
 .macro math.exp_tail q, r
-.reg    r2 p0 p1 p2 s0 s1 s2 s3 s4
+.reg    r2 p0 p1 p2 s0 s1 s2 s3
         fmul    r2, r, r
         fmul    s0, r, 0x1.55548cp-3
         fadd    p0, s0, 0x1.fffffcp-2
@@ -110,7 +111,7 @@
 .endm
 
 .macro exp d, x
-.reg    c t:bits n nh nl a r  hi h lo q v y:bits  k:int k1:int k2:int w:bits big:int f:bits
+.reg    c t:bits n nh nl a r hi h lo q v y:bits k:int k1:int k2:int w:bits big:int f:bits
         fsat    c, x, 104.0
         fmul    t, c, 1/log(2)
         fadd    t, t, math.shift
@@ -138,8 +139,8 @@
 .endm
 
 .macro log d, x
-.reg    up xs:bits sub:int off:int t:int eb:int m:bits ei:int e f  eh h l l1 el  f2 f4 hf f3 q  a0 a1 a2 a3 a4 s0 s1 s2 s3 s4 s5 s6 s7
-.reg    twice:bits num den z:bits isinf:int
+.reg    up xs:bits sub:int off:int t:int eb:int m:bits ei:int e f eh h l l1 el f2 f4 hf f3 q a0 a1 a2 a3 s0 s1 s2 s3
+.reg    s4 s5 s6 s7 twice:bits num den z:bits isinf:int
         itof    up, x                   ; of a subnormal: x·2^149
         iltu    sub, x, 0x00800000
         sel     xs, sub, up, x
@@ -170,17 +171,17 @@
         fsub    l1, l1, hf
         fmul    f4, f2, f2
         fmul    f3, f2, f
-        fmul    s0, f, L1
-        fadd    a0, s0, L0
-        fmul    s1, f, L3
-        fadd    a1, s1, L2
-        fmul    s2, f, L5
-        fadd    a2, s2, L4
-        fmul    s3, f, L7
-        fadd    a3, s3, L6
+        fmul    s0, f, -0x1.ffff02p-3
+        fadd    a0, s0, 0x1.555556p-2
+        fmul    s1, f, -0x1.559bb0p-3
+        fadd    a1, s1, 0x1.99985ep-3
+        fmul    s2, f, -0x1.f33a42p-4
+        fadd    a2, s2, 0x1.24d7b2p-3
+        fmul    s3, f, -0x1.07a414p-3
+        fadd    a3, s3, 0x1.bb4124p-4
         fmul    s4, f2, a1
         fadd    a0, a0, s4
-        fmul    s5, f2, L8
+        fmul    s5, f2, 0x1.e07c02p-4
         fadd    a3, a3, s5
         fmul    s6, f2, a3
         fadd    a2, a2, s6
@@ -190,15 +191,6 @@
         fadd    l1, l1, q
         fadd    d, h, l1
 .endm
-.const L0 = 0x1.555556p-2
-.const L1 = -0x1.ffff02p-3
-.const L2 = 0x1.99985ep-3
-.const L3 = -0x1.559bb0p-3
-.const L4 = 0x1.24d7b2p-3
-.const L5 = -0x1.f33a42p-4
-.const L6 = 0x1.bb4124p-4
-.const L7 = -0x1.07a414p-3
-.const L8 = 0x1.e07c02p-4
 
 ; ---- Tangent -------------------------------------------------------------------------------------------------------------------
 
@@ -211,7 +203,8 @@
 
 ; 2·tan(r/2) = w, then 2w/(2 - w²/2) or, beside an odd multiple of π/2, its inverse's opposite; all of it in two words each.
 .macro tan d, x
-.reg    a:int in:int xs:bits t:bits n odd:int y1 y2 w1 v u g0 g1 r nl z z2 p0 p1 p s0 s1 s2 q wh wl:bits g wz:bits wq w3 dw w2 w2h k2 V:bits vl v1 mu:bits ml:bits nh:bits nlo:bits dh:bits dl:bits inv m ta:bits zt:bits vt k e k1
+.reg    a:int in:int xs:bits t:bits n odd:int y1 y2 w1 v u g0 g1 r nl z z2 p0 p1 p s0 s1 s2 q wh wl:bits g wz:bits wq
+.reg    w3 dw w2 w2h k2 V:bits vl v1 mu:bits ml:bits nh:bits nlo:bits dh:bits dl:bits inv m ta:bits zt:bits vt k e k1
         iand    a, x, 0x7fffffff
         ilt     in, a, 0x43c90fdb       ; beyond 2π·64 (and for a NaN) the operand becomes an infinity, the rest is invalid
         sel     xs, in, x, inf
@@ -300,8 +293,9 @@
 .endm
 
 .macro asin d, x
-.reg    a:bits big:int sg:bits y y2 zb zs z S S0:bits Sh:bits dd den sl s:bits z2 p0 p1 p s0 s1 s2 s3
-        fabs    a, x
+.reg    a0:bits a:bits big:int sg:bits y y2 zb zs z S S0:bits Sh:bits dd den sl s:bits z2 p0 p1 p s0 s1 s2 s3
+        fabs    a0, x
+        fmin    a, a0, 2.0              ; what overflows nowhere, and has no arcsine either
         ilt     big, 0x3f000000, a
         iand    sg, x, math.sign
         fsub    y, 1.0, a
@@ -331,8 +325,9 @@
         math.complement d, x, big, sg, Sh, sl, s, p
 .endm
 
-.macro atan_poly d, x
-.reg    a:bits sg:bits A b1:int b2:int b3:int b4:int c:bits c1:bits c2:bits h1:bits h2:bits h3:bits hi:bits num num4 n0:bits ca den d0:bits t z z2 z4 e0 e1 e2 e3 e4 e5 p0 p1 p2 p Q u
+.macro math.atan d, x
+.reg    a:bits sg:bits A b1:int b2:int b3:int b4:int c:bits c1:bits c2:bits h1:bits h2:bits h3:bits hi:bits num num4
+.reg    n0:bits ca den d0:bits t z z2 e0 e1 e2 e3 e4 p1 p2 p Q u
         fabs    a, x
         iand    sg, x, math.sign
         fmin    A, a, 0x1p30
@@ -359,7 +354,6 @@
         fdiv    t, n0, d0
         fmul    z, t, t
         fmul    z2, z, z
-        fmul    z4, z2, z2
         fmul    e0, z, -0x1.555542p-2
         fmul    e1, z, -0x1.236f16p-3
         fadd    p1, e1, 0x1.998df8p-3
@@ -374,8 +368,19 @@
         fadd    d, hi, u
 .endm
 
+.macro atan d, x
+        .if has.fatan2
+        fatan2  d, x, 1.0
+        .else
+        math.atan d, x
+        .endif
+.endm
+
+; ---- Hyperbolic tangent --------------------------------------------------------------------------------------------------------
+
 .macro tanh d, x
-.reg    c a:bits big:int sg:bits a2 t:bits n nh b nl r hi:bits h lo q v:bits k:int H h1 Hl D num:bits base:bits corr z z2 z4 p1 p2 p Q s0 s1 s2 s3 s4 e0:bits e1:bits
+.reg    c a:bits big:int sg:bits a2 t:bits n nh b nl r hi:bits h lo q v:bits k:int H h1 Hl D num:bits base:bits corr z
+.reg    z2 p1 p2 p Q s0 s1 s2 s3 s4 e0:bits e1:bits
         fsat    c, x, 10.0              ; beyond 9.02 the result is 1
         iand    sg, x, math.sign
         fabs    a, c
@@ -408,7 +413,6 @@
         ; x + x³·P(x²)
         fmul    z, c, c
         fmul    z2, z, z
-        fmul    z4, z2, z2
         fmul    s0, z, -0x1.555536p-2
         fmul    s1, z, -0x1.b8fd62p-5
         fadd    p1, s1, 0x1.1109dcp-3
@@ -431,11 +435,13 @@
 ; ±2^(y·log2 |x|), the logarithm and its product in two words each. What is not computed so (zeros, infinities, NaNs, roots of
 ; negative numbers) comes with the exponent 0 out of the sign's quotient.
 .macro pow d, x, y
-.reg    ax:bits ay:bits sub:int up xs:bits off:int ti:int eb:int m:bits ei:int e k:int c u den v s sh:bits th:bits tl a0 a1 sl
-.reg    s2 s4 l0 l1 l2 r r0 ss sh2 T T0 th2:bits g0 g1 tl2 uu vv vv0 P ph:bits g2 pl zh z0 z1 zl dh dl b0 b1 b2 t1:bits c0 c1 c2 t2
-.reg    yc ys y1:bits yl f0 f1 pl2 ph2 P1 P2 t:bits n fr w0 tt:bits x0 x1 x2 x3 uz vz z zg w hi h lo q wv v0 yy:bits kk:int k1:int k2:int sc:bits f
-.reg    yneg:int xneg:int ye:int sft:int frac:int small:int whole:int huge:int bit:int nonint:int n1:int odd:int sg:bits s0:bits
-.reg    xzero:int xinf:int yinf:int xone:int above:int big:int mag:bits ends:int e1:int yi1:int notinf:int pole:int p1:int dom:int d1:int xnan:int ynan:int nan:int nv none:int still:int num:bits g:bits S y0:int xi:int one:int
+.reg    ax:bits ay:bits sub:int up xs:bits off:int ti:int eb:int m:bits ei:int e k:int c u den v s sh:bits th:bits tl
+.reg    a0 a1 sl s2 s4 l0 r r0 ss sh2 T T0 th2:bits g0 tl2 uu vv vv0 P ph:bits g2 pl zh z0 z1 zl dh dl b0 t1:bits c0
+.reg    t2 yc ys y1:bits yl f0 f1 pl2 ph2 P1 P2 t:bits n fr w0 tt:bits x0 x1 x2 uz vz z zg w hi h lo q wv v0 yy:bits
+.reg    kk:int k1:int k2:int sc:bits f yneg:int xneg:int ye:int sft:int frac:int small:int whole:int huge:int bit:int
+.reg    nonint:int n1:int odd:int sg:bits xzero:int xinf:int yinf:int xone:int above:int big:int mag:bits ends:int
+.reg    yi1:int notinf:int pole:int p1:int dom:int d1:int xnan:int ynan:int nan:int nv none:int still:int num:bits
+.reg    g:bits S y0:int xi:int one:int
         iand    ax, x, 0x7fffffff
         iand    ay, y, 0x7fffffff
         ; what y is: 0 in nonint for a whole number, 1 in odd
@@ -606,9 +612,9 @@
 
 ; x - trunc(x/y)·y, exactly, for |x| < 2^(11·steps)·|y|; beyond, NaN and invalid.
 .macro fmod_in d, x, y, steps
-.reg    ax:bits ay:bits xu yu xsub:int ysub:int xs:bits ys:bits xo:int yo:int ex:int ey:int D:int D0:int before:int far:int less:int
-.reg    r my:bits yh:bits yl inv s:int f:bits R Q t w hi lo neg:int r1 r2 e1:int e2:int f1:bits f2:bits o:bits sg:bits p:bits
-.reg    xbad:int ybad:int y0:int xnan:int ynan:int nan:int bad:int nv zn z zz res:bits
+.reg    ax:bits ay:bits xu yu xsub:int ysub:int xs:bits ys:bits xo:int yo:int ex:int ey:int D:int D0:int before:int
+.reg    less:int r:bits skip:int my:bits yh:bits yl inv s:int f:bits R Q t w hi lo neg:int r1 r2 e1:int e2:int f1:bits
+.reg    f2:bits o:bits sg:bits xbad:int y0:int xnan:int ynan:int nan:int bad:int nv zn z zz res:bits
         iand    ax, x, 0x7fffffff
         iand    ay, y, 0x7fffffff
         iand    sg, x, math.sign
@@ -649,9 +655,20 @@
         fmul    lo, Q, yl
         fsub    r, w, lo
         .endr
+        ; what has none
+        ilt     xbad, 0x7f7fffff, ax
+        ieq     y0, ay, zero
+        ilt     ynan, math.inf, ay
+        ilt     xnan, math.inf, ax
+        ior     nan, xnan, ynan
+        ior     bad, xbad, y0
+        ior     bad, bad, ynan
+        ior     bad, bad, D             ; digits left
+        ior     skip, bad, before
         fadd    r1, r, my
         ishr    neg, r, 31
         sel     r2, neg, r1, r
+        sel     r2, skip, zero, r2
         isub    ey, ey, 127
         isar    e1, ey, 1
         isub    e2, ey, e1
@@ -663,15 +680,7 @@
         fmul    o, r2, f2
         ior     o, o, sg
         sel     res, before, x, o
-        ; no remainder: infinity times zero
-        ilt     xbad, 0x7f7fffff, ax
-        ieq     y0, ay, zero
-        ilt     ynan, math.inf, ay
-        ilt     xnan, math.inf, ax
-        ior     nan, xnan, ynan
-        ior     bad, xbad, y0
-        ior     bad, bad, ynan
-        ior     bad, bad, D             ; digits left
+        ; infinity times zero, but for a NaN
         fmax    nv, x, y
         sel     zn, nan, nv, inf
         sel     zz, bad, zn, zero

@@ -28,4 +28,5 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("hybrid/robot.s", include_str!("../hybrid/robot.s")),
     ("hybrid/tracking.s", include_str!("../hybrid/tracking.s")),
     ("hybrid/tracking_literal.s", include_str!("../hybrid/tracking_literal.s")),
+    ("library/math.s", include_str!("../library/math.s")),
 ];
