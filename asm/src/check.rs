@@ -3,6 +3,7 @@
 use crate::ast::Section;
 use crate::context::{Context, Integer, ScopeId};
 use crate::diag::{Diagnostic, Severity, nearest};
+use crate::homes::Homes;
 use crate::ir::{Constant, Ir, Operation, Register, RegisterId, RegisterKind};
 use crate::source::Span;
 use takt_isa::{Field, Operand, Type};
@@ -23,8 +24,8 @@ struct Use {
     conflicts: u64,
 }
 
-/// Checks a resolved program.
-pub(crate) fn check(context: &mut Context, ir: &Ir) {
+/// Checks a resolved program, whose registers have their homes.
+pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
     // Operations with mistakes are not in the program: what then seems unused need not be.
     let complete = context.sink.errors == 0;
     let mut uses = vec![Use::default(); ir.registers.len()];
@@ -41,23 +42,26 @@ pub(crate) fn check(context: &mut Context, ir: &Ir) {
             match found.written {
                 None => {
                     found.written = Some(((index, number), slot));
-                    reach(context, ir, operation, dest, slot);
+                    // Of one without a home that is the mistake.
+                    if homes.help(dest).is_none() {
+                        reach(context, ir, operation, dest, slot);
+                    }
                 }
                 // One report for each slot too many is enough.
                 Some((first, owner)) if owner != slot && found.conflicts & 1 << slot == 0 => {
                     found.conflicts |= 1 << slot;
-                    two_slots(context, ir, operation, (slot, owner), at(ir, first));
+                    two_slots(context, ir, operation, (slot, owner), at(ir, first), homes.help(dest));
                 }
                 Some(_) => {}
             }
         }
     }
-    for (register, found) in ir.registers.iter().zip(&uses) {
+    for (index, (register, found)) in ir.registers.iter().zip(&uses).enumerate() {
         // A raw word may read and write anything.
-        if complete && !opaque {
+        if complete && !opaque && !homes.quiet.contains(&RegisterId::new(index)) {
             never(context, ir, register, found, &uses);
         }
-        if complete {
+        if complete && !homes.set_once.contains(&RegisterId::new(index)) {
             state(context, ir, register, found);
         }
     }
@@ -141,6 +145,7 @@ fn two_slots(
     operation: &Operation,
     (slot, owner): (u8, u8),
     first: &Operation,
+    help: Option<&str>,
 ) {
     let Some(dest) = operation.dest else { return };
     let slots = ir.machine.slots;
@@ -158,7 +163,7 @@ fn two_slots(
     let error = Diagnostic::error("two-slots", span, message)
         .here(writes(slot, operation))
         .also(before, writes(owner, first))
-        .help("use two registers");
+        .help(help.unwrap_or("use two registers"));
     context.report(ScopeId(operation.expansion), error);
 }
 

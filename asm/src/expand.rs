@@ -9,7 +9,7 @@ use crate::context::{
 };
 use crate::diag::Diagnostic;
 use crate::intern::NameId;
-use crate::ir::{Label, LabelId, RegisterId};
+use crate::ir::{Label, LabelId};
 use crate::limits;
 use crate::load::{Loader, include_path};
 use crate::source::Span;
@@ -50,10 +50,10 @@ pub(crate) struct LoopBound {
 /// A `.preset`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Preset {
-    pub(crate) register: RegisterId,
+    pub(crate) register: Name,
+    /// Whether `@` stands before it.
+    pub(crate) placed: bool,
     pub(crate) value: Expr,
-    /// What the value becomes: a named register has a type, a place has any.
-    pub(crate) ty: Type,
     pub(crate) at: At,
     pub(crate) span: Span,
 }
@@ -464,8 +464,9 @@ impl<'l> Expander<'l> {
                 });
             }
             DirectiveKind::Preset { register, placed, value } => {
-                let (register, ty) = self.preset_register(at, *register, *placed)?;
-                self.flat.presets.push(Preset { register, value: *value, ty, at, span });
+                // Registers may be declared further down.
+                let (register, placed, value) = (*register, *placed, *value);
+                self.flat.presets.push(Preset { register, placed, value, at, span });
             }
             DirectiveKind::Section(section) => self.section = *section,
             DirectiveKind::Float(values) => self.data(at, values, Type::F, span)?,

@@ -112,6 +112,8 @@ pub struct Operation {
     pub span: Span,
     /// Which use of a macro, or turn of a repetition, made it; 0 if it stands in the source as it is.
     pub expansion: u32,
+    /// Whether the assembler made it, for what stands at its place in the source.
+    pub made: bool,
     /// Where it is written: the tree, and the operation of the tree. For messages that point at an operand.
     pub(crate) written: (u32, u32),
 }

@@ -9,10 +9,12 @@
 //! `docs/language.md` is the contract of the language, `docs/image.md` that of the image. Nothing here prints, and nothing here
 //! touches the file system but [`load::FileLoader`]. No input makes the assembler panic; [`limits`] bounds what it takes.
 
+mod address;
 pub mod ast;
 mod blocks;
 mod check;
 mod context;
+mod copies;
 mod declare;
 pub mod diag;
 pub mod disasm;
@@ -21,7 +23,9 @@ mod expand;
 pub mod expr;
 mod expression;
 mod files;
+mod flow;
 mod grammar;
+mod homes;
 pub mod image;
 pub mod intern;
 pub mod ir;
@@ -46,6 +50,7 @@ use takt_isa::{Machine, Program, T3};
 
 pub use diag::Diagnostic;
 pub use expression::Expression;
+pub use homes::{Adjustment, Made};
 pub use load::{FileLoader, LoadError, Loader, MemoryLoader};
 
 /// What the assembler is to do.
@@ -92,7 +97,9 @@ pub struct Assembled {
     pub blocks: Vec<schedule::BlockReport>,
     /// What is demanded of ports (`.deadline`, `.order`, `.late`) and how it is met.
     pub timing: Vec<schedule::TimingReport>,
-    /// Words that a macro or a repetition made: indices into the program's code, ascending.
+    /// What was done about registers that operations of several slots write.
+    pub adjustments: Vec<Adjustment>,
+    /// Words that a macro, a repetition or the assembler itself made: indices into the program's code, ascending.
     pub expanded: Vec<u32>,
 }
 
@@ -125,8 +132,15 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
     };
     ir.bundles.iter_mut().for_each(|bundle| bundle.scheduled = packs(bundle.scheduled));
     check::integers(&mut context, &ir);
-    values::split(&mut ir);
-    check::check(&mut context, &ir);
+    // Of a program that cannot fit nothing else is worth its time.
+    if emit::is_too_long(&ir) {
+        emit::limits(&ir, &mut context.sink);
+        return Err(context.sink.finish(Arc::new(context.sources)));
+    }
+    let mut homes = homes::choose(&mut ir);
+    let values = values::split(&mut ir, &mut homes);
+    copies::insert(&mut ir, &mut homes, &values);
+    check::check(&mut context, &ir, &homes);
     let context::Context { mut sink, sources, constants, .. } = context;
     let sources = Arc::new(sources);
     // What follows would only report what follows from the errors there are.
@@ -137,6 +151,7 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
     if sink.errors > 0 {
         return Err(sink.finish(sources));
     }
+    let adjustments = copies::report(&ir, homes);
     let placement = place::place(&ir, &mut sink);
     let emitted = emit::emit(&ir, &placement, &mut sink);
     let errors = sink.errors;
@@ -154,6 +169,7 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
         constants,
         blocks,
         timing,
+        adjustments,
         expanded: emitted.expanded,
     })
 }

@@ -172,6 +172,47 @@ impl Resolver<'_> {
         Err(self.context.report(at.scope, error))
     }
 
+    /// The register that a `.preset` names, by its name or its place.
+    pub(crate) fn preset_register(
+        &mut self,
+        at: At,
+        name: Name,
+        placed: bool,
+    ) -> Result<(RegisterId, Type), Reported> {
+        let operand = Operand { kind: OperandKind::Name(name.name), span: name.span };
+        let (place, given, meaning) = if placed { (at, operand, None) } else { self.meaning(at, operand)? };
+        let (register, ty) = match (given.kind, meaning) {
+            (_, Some((_, Binding::Register(register)))) => {
+                (register, self.context.registers[register.index()].ty)
+            }
+            (OperandKind::Name(name) | OperandKind::Place(name), _) => {
+                if let Some((id, Binding::None)) = meaning
+                    && !self.looks_like_a_place(id)
+                {
+                    return Err(self.context.unknown(place.scope, id, given.span, Wanted::Dest));
+                }
+                let address = address(self.context, place, Name { name, span: given.span })?;
+                (register_at(self.context, address, given.span), Type::B)
+            }
+            _ => {
+                let error = Diagnostic::error("operand", given.span, "a register is needed here");
+                return Err(self.context.report(at.scope, error));
+            }
+        };
+        if register == RegisterId::ZERO {
+            let error = Diagnostic::error("place", given.span, "`zero` always reads as zero");
+            return Err(self.context.report(at.scope, error));
+        }
+        Ok((register, ty))
+    }
+
+    /// Whether a name is a bank's and a number.
+    fn looks_like_a_place(&self, name: NameId) -> bool {
+        let text = self.context.names.text(name);
+        let digits = text.trim_end_matches(|c: char| c.is_ascii_digit());
+        digits.len() < text.len() && self.ir.machine.banks().any(|bank| bank.name == digits)
+    }
+
     /// A register to read: a register as such, or the one that holds a constant.
     fn source(&mut self, at: At, operand: Operand, ty: Type) -> Result<RegisterId, Reported> {
         let (place, given, meaning) = self.meaning(at, operand)?;
@@ -336,7 +377,10 @@ impl Resolver<'_> {
             }
         };
         match self.field(at, value, Field::Offset, span, "an offset")? {
-            Constant::Value(offset) => Ok((offset, base)),
+            Constant::Value(offset) => {
+                self.check_address(at, (place, given), offset, base, span);
+                Ok((offset, base))
+            }
             _ => Err(Reported),
         }
     }

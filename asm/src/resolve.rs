@@ -39,8 +39,13 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
         raw: Vec::new(),
         files: Vec::new(),
     };
-    let mut resolver =
-        Resolver { context, flat, ir, slots, pool: HashMap::new(), own_files: Vec::new(), label: 0 };
+    let words = |data: &Data| match data {
+        Data::Space(count) => *count,
+        Data::Value(..) => 1,
+    };
+    let data_words = flat.data.iter().map(words).sum();
+    let (pool, own_files) = (HashMap::new(), Vec::new());
+    let mut resolver = Resolver { context, flat, ir, slots, pool, own_files, label: 0, data_words };
     let once = std::mem::take(&mut resolver.flat.once);
     resolver.section(Section::Once, &once);
     resolver.ir.period = resolver.ir.bundles.len() as u32;
@@ -81,6 +86,8 @@ pub(crate) struct Resolver<'c> {
     own_files: Vec<Option<u32>>,
     /// Labels before this one have their position.
     label: usize,
+    /// Words of data memory that the source declares.
+    pub(crate) data_words: u32,
 }
 
 impl Resolver<'_> {
@@ -146,6 +153,9 @@ impl Resolver<'_> {
                     self.context.report(item.at.scope, diagnostic);
                 }
             }
+        } else if let Some(diagnostic) = serialise::twice(&operations) {
+            let diagnostic = diagnostic(&self.context.registers, self.ir.machine);
+            self.context.report(item.at.scope, diagnostic);
         } else if self.check_slots(item.at, &operations).is_ok() {
             self.ir.bundles.push(Bundle { operations, explicit, scheduled: item.scheduled });
         }
@@ -259,6 +269,7 @@ impl Resolver<'_> {
             location,
             span: written.span,
             expansion: at.scope.0,
+            made: false,
             written: (at.ast, number),
         };
         let mut failed = false;
@@ -306,6 +317,7 @@ impl Resolver<'_> {
             location,
             span: written.span,
             expansion: at.scope.0,
+            made: false,
             written: (at.ast, number),
         })
     }
@@ -370,9 +382,12 @@ impl Resolver<'_> {
 
     fn presets(&mut self) {
         for preset in std::mem::take(&mut self.flat.presets) {
+            let found = self.preset_register(preset.at, preset.register, preset.placed);
             let Ok(value) = self.context.value(preset.at, preset.value.id) else { continue };
-            let Ok(bits) = self.bits(preset.at, value, preset.ty, preset.value.span) else { continue };
-            let register = &mut self.context.registers[preset.register.index()];
+            // A named register has a type, a place has any.
+            let Ok((register, ty)) = found else { continue };
+            let Ok(bits) = self.bits(preset.at, value, ty, preset.value.span) else { continue };
+            let register = &mut self.context.registers[register.index()];
             if register.preset.replace(bits).is_some() {
                 let error =
                     Diagnostic::error("declared-twice", preset.span, "this register is preset already");
