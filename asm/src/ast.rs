@@ -284,8 +284,8 @@ pub enum DirectiveKind {
     End(Directive),
     /// A `.macro`, `.rep` or `.if` that could not be read, and where it ends: what it encloses is passed over.
     Broken(Directive, u32),
-    /// `.include`.
-    Include(String),
+    /// `.include`, and whether the name stands in `<>`: in the library rather than beside this file.
+    Include(String, bool),
     /// `.loc`: one place for all that follows, or one for each operation of each bundle that follows.
     Loc(Vec<Loc>),
     /// `.error`.
@@ -358,7 +358,7 @@ directives! {
     Elif ".elif" "expression";
     Else ".else" "";
     EndIf ".endif" "";
-    Include ".include" "\"file\"";
+    Include ".include" "\"file\"|<file>";
     Loc ".loc" "\"file\" line";
     Error ".error" "\"text\"";
     Schedule ".schedule" "on|off";

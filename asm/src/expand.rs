@@ -8,6 +8,7 @@ use crate::context::{
     Argument, At, Binding, Context, NamedConstant, Reported, Scope, ScopeId, ScopeKind, space_of,
 };
 use crate::diag::Diagnostic;
+use crate::files::FileId;
 use crate::intern::NameId;
 use crate::ir::{Label, LabelId};
 use crate::limits;
@@ -143,8 +144,10 @@ pub(crate) struct Expander<'l> {
     loc: u32,
     pub(crate) data_words: usize,
     statements: usize,
-    /// Files read: by path, the tree and the index in the sources.
-    pub(crate) files: HashMap<String, (u32, usize)>,
+    /// Files read: the tree and the index in the sources.
+    pub(crate) files: HashMap<FileId, (u32, usize)>,
+    /// Which file each of the sources is.
+    pub(crate) origins: Vec<FileId>,
     /// Bytes of all files read.
     pub(crate) bytes: usize,
     /// Whether what follows is scheduled.
@@ -180,6 +183,7 @@ impl<'l> Expander<'l> {
             data_words: 0,
             statements: 0,
             files: HashMap::new(),
+            origins: Vec::new(),
             bytes: 0,
             include_depth: 0,
             includes: 0,
@@ -195,11 +199,11 @@ impl<'l> Expander<'l> {
             self.context.sink.push(Diagnostic::placeless("load", message));
             return (self.context, self.flat);
         };
-        match self.load(&path) {
+        match self.load(&FileId { place: None, path: path.clone() }) {
             Ok((ast, file)) => self.enter_file(ast, file),
-            Err(diagnostic) => {
-                let diagnostic = diagnostic(None);
-                self.context.sink.push(diagnostic);
+            Err(unread) => {
+                let message = format!("`{path}` cannot be read: {unread}");
+                self.context.sink.push(Diagnostic::placeless("load", message));
             }
         }
         while let Some(frame) = self.frames.last_mut() {
@@ -523,7 +527,7 @@ impl<'l> Expander<'l> {
             DirectiveKind::Elif(_, _, end) | DirectiveKind::Else(end) => self.jump(*end + 1),
             DirectiveKind::End(_) => {}
             DirectiveKind::Broken(_, end) => self.jump(*end + 1),
-            DirectiveKind::Include(path) => self.include(at, path, span)?,
+            DirectiveKind::Include(path, library) => self.include(at, path, *library, span)?,
             DirectiveKind::Loc(places) => self.set_loc(at, places)?,
             DirectiveKind::Schedule(word) => {
                 let name = self.context.name(at, word.name, word.span)?;

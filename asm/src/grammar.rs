@@ -97,11 +97,14 @@ impl Builder<'_> {
         NameRef::template(self.ast.templates.len() as u32 - 1)
     }
 
+    fn text_of(&self, span: Span) -> &str {
+        self.text.get((span.start - self.base) as usize..(span.end - self.base) as usize).unwrap_or("")
+    }
+
     /// The text between the quotes of a token, its escapes replaced.
     fn quoted(&self, span: Span) -> String {
-        let range = (span.start - self.base) as usize + 1..(span.end - self.base) as usize - 1;
         let mut text = String::new();
-        let mut characters = self.text.get(range).unwrap_or("").chars();
+        let mut characters = self.text_of(Span::new(span.start + 1, span.end - 1)).chars();
         while let Some(c) = characters.next() {
             text.push(match c {
                 '\\' => match characters.next() {
@@ -547,7 +550,24 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
         .ignore_then(name.clone())
         .then(parameters)
         .map(|(name, parameters)| DirectiveKind::Macro { name, parameters, end: 0 });
-    let include = is(Directive::Include).ignore_then(text()).map(DirectiveKind::Include);
+    // Whatever tokens a library file's name is made of: its text counts.
+    let library = select! {
+        token if !matches!(token, Token::Newline | Token::Operator(Operator::Gt)) => (),
+    }
+    .repeated()
+    .at_least(1)
+    .collect::<Vec<()>>()
+    .map_with(|_, e| {
+        let span = e.span();
+        (e.state() as &mut Builder<'a>).text_of(span).to_owned()
+    })
+    .delimited_by(
+        just(Token::Operator(Operator::Lt)).labelled("a library file in `<>`"),
+        just(Token::Operator(Operator::Gt)).labelled("`>`"),
+    );
+    let include = is(Directive::Include)
+        .ignore_then(text().map(|name| (name, false)).or(library.map(|name| (name, true))))
+        .map(|(name, library)| DirectiveKind::Include(name, library));
     let schedule = is(Directive::Schedule)
         .ignore_then(name.clone().labelled("`on` or `off`"))
         .map(DirectiveKind::Schedule);

@@ -51,7 +51,7 @@ use takt_isa::{Machine, Program, T3};
 pub use diag::Diagnostic;
 pub use expression::Expression;
 pub use homes::{Adjustment, Made};
-pub use load::{FileLoader, LoadError, Loader, MemoryLoader};
+pub use load::{FileLoader, LoadError, Loader, MemoryLoader, Search};
 
 /// What the assembler is to do.
 #[derive(Clone, Copy, Debug)]

@@ -42,6 +42,8 @@ pub const SHOWN: usize = 100;
 pub const QUOTED_BYTES: usize = 160;
 /// Names that are compared with a misspelt one.
 pub const CANDIDATES: usize = 1 << 14;
+/// Files of the library that an error lists.
+pub const LISTED: usize = 50;
 /// Bytes of an image.
 pub const IMAGE_BYTES: usize = 256 << 20;
 /// Characters of a misspelt name that is compared with others.

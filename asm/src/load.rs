@@ -32,6 +32,101 @@ pub trait Loader {
     /// # Errors
     /// If it cannot be had.
     fn load(&self, path: &str) -> Result<Vec<u8>, LoadError>;
+
+    /// Where `.include` looks beyond the project, in this order.
+    fn places(&self) -> &[Place] {
+        &[]
+    }
+}
+
+/// A place beyond the project where `.include` looks: a folder, or a library in memory.
+#[derive(Clone, Debug)]
+pub struct Place(PlaceKind);
+
+#[derive(Clone, Debug)]
+enum PlaceKind {
+    /// What stands before the path of a file in it, and the folder.
+    Folder(String, FileLoader),
+    Library(MemoryLoader),
+}
+
+impl Place {
+    /// Whether it is searched for `"name"` too, not only for `<name>`.
+    pub(crate) fn takes_quoted(&self) -> bool {
+        matches!(self.0, PlaceKind::Folder(..))
+    }
+
+    /// A file in it as diagnostics, listings and the debugger name it: unlike any path within the project.
+    pub(crate) fn name_of(&self, path: &str) -> String {
+        match &self.0 {
+            PlaceKind::Folder(prefix, _) => format!("{prefix}{path}"),
+            PlaceKind::Library(_) => format!("<{path}>"),
+        }
+    }
+
+    /// The names that can be asked for; of a folder, its own sources.
+    pub(crate) fn names(&self) -> Vec<String> {
+        match &self.0 {
+            PlaceKind::Folder(_, folder) => folder.names(),
+            PlaceKind::Library(files) => files.files.keys().cloned().collect(),
+        }
+    }
+}
+
+impl Loader for Place {
+    fn load(&self, path: &str) -> Result<Vec<u8>, LoadError> {
+        match &self.0 {
+            PlaceKind::Folder(_, folder) => folder.load(path),
+            PlaceKind::Library(files) => files.load(path),
+        }
+    }
+}
+
+/// The sources of a project, and the places beyond it where `.include` looks.
+#[derive(Clone, Debug)]
+pub struct Search<L> {
+    project: L,
+    places: Vec<Place>,
+}
+
+impl<L: Loader> Search<L> {
+    /// The sources of a project and no further place.
+    pub fn new(project: L) -> Search<L> {
+        Search { project, places: Vec::new() }
+    }
+
+    /// A folder, searched after the places there are for `"name"` and for `<name>`.
+    #[must_use]
+    pub fn folder(mut self, folder: impl Into<PathBuf>) -> Search<L> {
+        let folder = folder.into();
+        let mut prefix = folder.display().to_string();
+        // Paths within the project begin with a name: they remain another file's.
+        if matches!(folder.components().next(), Some(Component::Normal(_))) {
+            prefix.insert_str(0, "./");
+        }
+        if !prefix.ends_with('/') {
+            prefix.push('/');
+        }
+        self.places.push(Place(PlaceKind::Folder(prefix, FileLoader::new(folder))));
+        self
+    }
+
+    /// A library in memory, each file a name and its text, searched after the places there are for `<name>` only.
+    #[must_use]
+    pub fn library<'s>(mut self, files: impl IntoIterator<Item = &'s (&'s str, &'s str)>) -> Search<L> {
+        self.places.push(Place(PlaceKind::Library(MemoryLoader::new(files))));
+        self
+    }
+}
+
+impl<L: Loader> Loader for Search<L> {
+    fn load(&self, path: &str) -> Result<Vec<u8>, LoadError> {
+        self.project.load(path)
+    }
+
+    fn places(&self) -> &[Place] {
+        &self.places
+    }
 }
 
 /// Sources in memory, by path: embedded programs, editors, tests.
@@ -80,6 +175,10 @@ impl Loader for First<'_> {
     fn load(&self, path: &str) -> Result<Vec<u8>, LoadError> {
         if path == self.name { Ok(self.bytes.clone()) } else { self.rest.load(path) }
     }
+
+    fn places(&self) -> &[Place] {
+        self.rest.places()
+    }
 }
 
 /// Sources of a project folder. Nothing outside of it is read, whatever the path, and wherever a symbolic link points.
@@ -106,6 +205,16 @@ impl FileLoader {
             _ => Path::new("."),
         };
         Ok((FileLoader::new(folder), name.to_owned()))
+    }
+
+    /// The names of the sources that lie in the folder itself, in order.
+    fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(&self.root).into_iter().flatten().flatten();
+        let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+        let mut names: Vec<String> =
+            names.filter(|name| name.ends_with(".s")).take(limits::CANDIDATES).collect();
+        names.sort();
+        names
     }
 }
 

@@ -2,9 +2,10 @@
 
 use crate::files::{self, Out};
 use crate::load::Load;
+use crate::number;
 use crate::output;
 use crate::ports::{self, Rows};
-use crate::select::OptionalMachine;
+use crate::select::{OptionalMachine, SourceArguments};
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use serde_json::{Value, json};
@@ -30,11 +31,13 @@ pub(crate) struct Analyse {
     file: PathBuf,
     #[command(flatten)]
     machine: OptionalMachine,
+    #[command(flatten)]
+    source: SourceArguments,
     /// CSV with one named column for each input port and one row for each period; `-` is standard input.
     #[arg(long, value_name = "CSV")]
     inputs: Option<PathBuf>,
     /// Run so many periods and look at the last; 0 is what runs once [default: the rows of --inputs, else 2].
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = number::natural, allow_hyphen_values = true)]
     periods: Option<u64>,
     /// Write the picture of the pipeline as a page for a browser, which needs nothing else; `-` is standard output.
     #[arg(long, value_name = "OUT")]
@@ -49,9 +52,10 @@ Examples:
   takt analyse prog.s                     the second period: stalls, critical path, what a faster unit would bring
   takt analyse prog.s --html prog.html    the pipeline as a picture
   takt analyse prog.s --periods 0         what runs once
+  takt analyse prog.s --inputs in.csv     the last period of recorded inputs";
 
-`takt track --csv in.csv` records inputs of the tracking programs.";
-
+/// Periods without `--inputs`.
+const PERIODS: u64 = 2;
 /// Periods that are run at most on the way to the one to look at.
 const MOST_PERIODS: u64 = 1_000_000;
 /// Lines of each list of the text; --json has all.
@@ -65,13 +69,13 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
         writes.push(("--json", Path::new("-")));
     }
     files::check(&reads, &writes)?;
-    let load = Load::new(arguments.machine.machine, color);
+    let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
     let program = load.program(&arguments.file)?;
     let rows = read_inputs(arguments, &program)?;
-    let (trace, period) = follow(arguments, &program, rows.as_ref())?;
+    let (trace, period) = follow(arguments, &program, &rows)?;
     let analysis = Analysis {
         chain: trace.critical_path(&program),
-        faster: faster(arguments, &load, &program, &trace, rows.as_ref()),
+        faster: faster(arguments, &load, &program, &trace, &rows),
         program: &program,
         name: files::input_name(&arguments.file),
         period,
@@ -90,29 +94,32 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
     Ok(())
 }
 
-fn read_inputs(arguments: &Analyse, program: &Program) -> Result<Option<Rows>> {
-    let Some(path) = &arguments.inputs else { return Ok(None) };
-    let wanted = arguments.periods.map_or(MOST_PERIODS, |wanted| wanted.max(1));
-    let rows = ports::read_rows(path, &program.inputs, wanted)?;
-    if rows.is_empty() || arguments.periods.is_some_and(|wanted| (rows.len() as u64) < wanted) {
+/// The inputs of the periods up to the one to look at.
+fn read_inputs(arguments: &Analyse, program: &Program) -> Result<Rows> {
+    let wanted = arguments.periods;
+    if let Some(wanted) = wanted.filter(|wanted| *wanted > MOST_PERIODS) {
+        bail!("{wanted} periods: at most {MOST_PERIODS} are run on the way to the one to look at");
+    }
+    let path = arguments.inputs.as_deref();
+    // What runs once reads the first period's inputs.
+    let most = wanted.map(|wanted| wanted.max(1)).or(path.map(|_| MOST_PERIODS));
+    let rows = ports::rows(path, most, PERIODS, &program.inputs)?;
+    if let (Some(path), Some(wanted)) = (path, wanted)
+        && (rows.len() as u64) < wanted
+    {
         let plural = if rows.len() == 1 { "" } else { "s" };
         bail!("{} has {} row{plural}, so there is no such period", files::input_name(path), rows.len());
     }
-    Ok(Some(rows))
+    Ok(rows)
 }
 
 /// Runs the program and follows the last period asked for; its number, 0 being what runs once.
-fn follow(arguments: &Analyse, program: &Program, rows: Option<&Rows>) -> Result<(Trace, u64)> {
-    let wanted = arguments.periods.unwrap_or(rows.map_or(2, |rows| rows.len() as u64));
-    if wanted > MOST_PERIODS {
-        bail!("{wanted} periods: at most {MOST_PERIODS} are run on the way to the one to look at");
-    }
+fn follow(arguments: &Analyse, program: &Program, rows: &Rows) -> Result<(Trace, u64)> {
+    let wanted = arguments.periods.unwrap_or(rows.len() as u64);
     let mut emulator = Emulator::new(program)?;
     let set = |emulator: &mut Emulator, period: u64| -> Result<()> {
-        let row = rows.and_then(|rows| rows.get(period.saturating_sub(1) as usize));
-        for port in &program.inputs {
-            let set = row.and_then(|row| row.iter().find(|(register, _)| *register == port.register));
-            emulator.set_input_bits(port.register, set.map_or(0, |(_, bits)| *bits))?;
+        for &(register, bits) in rows.get(period.saturating_sub(1) as usize).into_iter().flatten() {
+            emulator.set_input_bits(register, bits)?;
         }
         emulator.set_cycle_limit(emulator.now() + crate::run::PERIOD_LIMIT);
         Ok(())
@@ -142,19 +149,13 @@ struct Faster {
     anew: Option<Cycle>,
 }
 
-fn faster(
-    arguments: &Analyse,
-    load: &Load,
-    program: &Program,
-    trace: &Trace,
-    rows: Option<&Rows>,
-) -> Vec<Faster> {
+fn faster(arguments: &Analyse, load: &Load, program: &Program, trace: &Trace, rows: &Rows) -> Vec<Faster> {
     // Standard input has been read; an image has no source.
     let source = Some(&arguments.file).filter(|file| !files::is_dash(file));
     let source = source.and_then(|file| Load::source(file).ok());
     let anew = |what: &WhatIf| {
         let machine = Some(quicker(program.machine, what.unit));
-        let assembled = Load { machine, ..*load }.assemble(&arguments.file, source.clone()?).ok()?;
+        let assembled = Load { machine, ..load.clone() }.assemble(&arguments.file, source.clone()?).ok()?;
         Some(follow(arguments, &assembled.program, rows).ok()?.0.cycles)
     };
     trace.what_if(program).into_iter().map(|what| Faster { anew: anew(&what), what }).collect()

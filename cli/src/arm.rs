@@ -3,6 +3,7 @@
 use crate::fault::explain;
 use crate::files::{self, Given, Out};
 use crate::load::Load;
+use crate::number;
 use crate::run::PERIOD_LIMIT;
 use crate::select;
 use crate::track::progress;
@@ -32,13 +33,13 @@ pub(crate) struct Arm {
     #[arg(long, short, value_name = "MACHINE", default_value = T3.name, value_parser = select::machine)]
     machine: &'static Machine,
     /// Random poses.
-    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = select::count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = number::count, allow_hyphen_values = true)]
     poses: u64,
     /// Seed of the random poses.
-    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    #[arg(long, value_name = "SEED", default_value_t = 1, value_parser = number::natural, allow_hyphen_values = true)]
     seed: u64,
     /// Clock in MHz, for cycles to time; the first paper's is 125.
-    #[arg(long, value_name = "MHZ", default_value_t = select::PAPER_CLOCK, value_parser = select::clock, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MHZ", default_value_t = select::PAPER_CLOCK, value_parser = number::clock, allow_hyphen_values = true)]
     clock: f64,
     /// Draw a square in space with the tool and write each period's joint angles as CSV; `-` is standard output.
     #[arg(long, value_name = "FILE")]
@@ -95,7 +96,7 @@ impl Ported {
         }
         self.emulator.set_cycle_limit(self.emulator.now() + PERIOD_LIMIT);
         let report = self.emulator.run_period(&[]);
-        let report = report.map_err(|error| anyhow::anyhow!(explain(self.emulator.program(), &error)))?;
+        let report = report.map_err(|error| anyhow::anyhow!(explain(&error)))?;
         if !report.nan_writes.is_empty() {
             bail!("a NaN was written to an output port");
         }

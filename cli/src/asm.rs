@@ -3,7 +3,7 @@
 use crate::files::{self, Given, Out};
 use crate::load::Load;
 use crate::output::{self, Failure};
-use crate::select::MachineArgument;
+use crate::select::{MachineArgument, SourceArguments};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
@@ -26,6 +26,8 @@ pub(crate) struct Asm {
     file: PathBuf,
     #[command(flatten)]
     machine: MachineArgument,
+    #[command(flatten)]
+    source: SourceArguments,
     /// Write the image here; `-` is standard output.
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -45,7 +47,7 @@ pub(crate) struct Asm {
     #[arg(long, value_enum, value_name = "WHEN", default_value_t = When::Source)]
     schedule: When,
     /// How long the scheduler searches, up to 100000; 0 is the first passes only.
-    #[arg(long, value_name = "N", default_value_t = DEFAULT_EFFORT, value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_EFFORT, value_parser = clap::value_parser!(u32).range(0..=100_000), allow_hyphen_values = true)]
     effort: u32,
     /// Check only; write no file.
     #[arg(long, conflicts_with_all = ["output", "listing", "symbols", "readmemh"])]
@@ -113,7 +115,11 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
     files::check(&[("FILE", &arguments.file)], &writes)?;
 
     let schedule = if arguments.optimise { Schedule::All } else { arguments.schedule.into() };
-    let load = Load { schedule, effort: arguments.effort, ..Load::new(arguments.machine.machine, color) };
+    let load = Load {
+        schedule,
+        effort: arguments.effort,
+        ..Load::new(arguments.machine.machine, color).with(&arguments.source)
+    };
     let result = load.assemble(&arguments.file, source);
     let assembled = match result {
         Err(errors) if arguments.json => {

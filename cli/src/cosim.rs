@@ -2,9 +2,10 @@
 
 use crate::files::{self, Out};
 use crate::load::Load;
+use crate::number;
 use crate::output::{self, Failure};
 use crate::ports;
-use crate::select::{self, OptionalMachine};
+use crate::select::{OptionalMachine, SourceArguments};
 use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::{Value, json};
@@ -27,17 +28,19 @@ pub(crate) struct Cosim {
     file: Option<PathBuf>,
     #[command(flatten)]
     machine: OptionalMachine,
+    #[command(flatten)]
+    source: SourceArguments,
     /// CSV with one named column for each input port and one row for each period; `-` is standard input.
     #[arg(long, value_name = "CSV", requires = "file", conflicts_with_all = ["seed", "programs"])]
     inputs: Option<PathBuf>,
     /// Run at most this many periods [default: one for each row; without --inputs, 100].
-    #[arg(long, value_name = "N", value_parser = select::count, requires = "file", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = number::count, requires = "file", allow_hyphen_values = true)]
     periods: Option<u64>,
     /// Run random programs, the first from this seed [default: 0].
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = number::natural, allow_hyphen_values = true)]
     seed: Option<u64>,
     /// Run so many random programs [default: 1].
-    #[arg(long, value_name = "N", value_parser = select::count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
     programs: Option<u64>,
     /// Where the waveform of a difference goes, as VCD.
     #[arg(long, value_name = "FILE", default_value = "cosim.vcd")]
@@ -79,7 +82,7 @@ fn model(machine: &'static Machine) -> Result<(Design, Model)> {
 
 /// A program from a file.
 fn one(arguments: &Cosim, file: &Path, color: bool, out: &mut Out) -> Result<()> {
-    let program = Load::new(arguments.machine.machine, color).program(file)?;
+    let program = Load::new(arguments.machine.machine, color).with(&arguments.source).program(file)?;
     let rows = ports::rows(arguments.inputs.as_deref(), arguments.periods, PERIODS, &program.inputs)?;
     let (design, model) = model(program.machine)?;
     let ran = run_rows(&program, &rows, model.start(&[])?);

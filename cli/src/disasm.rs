@@ -2,7 +2,7 @@
 
 use crate::files;
 use crate::load::Load;
-use crate::select::OptionalMachine;
+use crate::select::{OptionalMachine, SourceArguments};
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
@@ -15,6 +15,8 @@ pub(crate) struct Disasm {
     file: PathBuf,
     #[command(flatten)]
     machine: OptionalMachine,
+    #[command(flatten)]
+    source: SourceArguments,
     /// Write the source here.
     #[arg(long, short, value_name = "FILE", default_value = "-")]
     output: PathBuf,
@@ -22,6 +24,7 @@ pub(crate) struct Disasm {
 
 pub(crate) fn run(arguments: &Disasm, color: bool) -> Result<()> {
     files::check(&[("FILE", &arguments.file)], &[("--output", &arguments.output)])?;
-    let program = Load::new(arguments.machine.machine, color).program(&arguments.file)?;
+    let program =
+        Load::new(arguments.machine.machine, color).with(&arguments.source).program(&arguments.file)?;
     files::write(&arguments.output, takt_asm::disasm::disassemble(&program).as_bytes())
 }

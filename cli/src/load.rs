@@ -2,16 +2,17 @@
 
 use crate::files;
 use crate::output::{Failure, message};
+use crate::select::SourceArguments;
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
 use takt_asm::expr::Value;
 use takt_asm::limits::IMAGE_BYTES;
-use takt_asm::{Assembled, FileLoader, MemoryLoader, Options, Schedule, image};
+use takt_asm::{Assembled, FileLoader, Loader, MemoryLoader, Options, Schedule, Search, image};
 use takt_isa::{MACHINES, Machine, Program};
 
 /// How diagnostics are shown, and for which machine sources are assembled.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(crate) struct Load {
     /// The machine that the user asked for.
     pub(crate) machine: Option<&'static Machine>,
@@ -21,6 +22,8 @@ pub(crate) struct Load {
     pub(crate) schedule: Schedule,
     /// How long the scheduler searches.
     pub(crate) effort: u32,
+    /// What else the command line says about sources.
+    pub(crate) source: SourceArguments,
 }
 
 /// A program and, if it was assembled here, what is known of its source.
@@ -44,7 +47,13 @@ impl Load {
     /// With the scheduler as the source says.
     pub(crate) fn new(machine: impl Into<Option<&'static Machine>>, color: bool) -> Load {
         let Options { schedule, effort, .. } = Options::default();
-        Load { machine: machine.into(), color, schedule, effort }
+        Load { machine: machine.into(), color, schedule, effort, source: SourceArguments::default() }
+    }
+
+    /// With what the command line says about sources.
+    pub(crate) fn with(mut self, source: &SourceArguments) -> Load {
+        self.source = source.clone();
+        self
     }
 
     fn options(&self) -> Options {
@@ -86,10 +95,16 @@ impl Load {
         Ok(loaded)
     }
 
-    /// Assembles a source that was read from a file. What it includes is looked for beside it.
+    /// Where a program's sources come from: its project, the folders of the command line, and Takt's library.
+    fn sources<L: Loader>(&self, project: L) -> Search<L> {
+        let folders = self.source.folders.iter();
+        folders.fold(Search::new(project), Search::folder).library(takt_programs::LIBRARY)
+    }
+
+    /// Assembles a source that was read from a file. What it includes is looked for beside it, then as [`Load::sources`] says.
     pub(crate) fn assemble(&self, path: &Path, bytes: Vec<u8>) -> Result<Assembled, Diagnostics> {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        let loader = FileLoader::new(folder.map_or(PathBuf::from("."), Path::to_owned));
+        let loader = self.sources(FileLoader::new(folder.map_or(PathBuf::from("."), Path::to_owned)));
         let name = match path.file_name() {
             Some(name) if !files::is_dash(path) => name.to_string_lossy(),
             _ => "<stdin>".into(),
@@ -99,7 +114,7 @@ impl Load {
 
     /// Assembles one of the programs that come with Takt.
     pub(crate) fn builtin(&self, path: &str) -> Result<Loaded> {
-        let loader = MemoryLoader::new(takt_programs::SOURCES);
+        let loader = self.sources(MemoryLoader::new(takt_programs::SOURCES));
         Ok(self.finish(takt_asm::assemble(path, &loader, &self.options()))?.into())
     }
 

@@ -2,9 +2,10 @@
 
 use crate::files::{self, Out};
 use crate::load::Load;
+use crate::number;
 use crate::output;
 use crate::ports;
-use crate::select::{self, OptionalMachine};
+use crate::select::{OptionalMachine, SourceArguments};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::json;
@@ -25,6 +26,8 @@ pub(crate) struct Rtl {
     output: PathBuf,
     #[command(flatten)]
     machine: OptionalMachine,
+    #[command(flatten)]
+    source: SourceArguments,
     /// Source or image whose memory image the test bench loads; `-` is standard input.
     #[arg(long, value_name = "FILE")]
     program: Option<PathBuf>,
@@ -32,7 +35,7 @@ pub(crate) struct Rtl {
     #[arg(long, value_name = "CSV", requires = "program")]
     inputs: Option<PathBuf>,
     /// Run at most this many periods in the test bench [default: one for each row; without --inputs, 3, with zeros].
-    #[arg(long, value_name = "N", value_parser = select::count, requires = "program", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = number::count, requires = "program", allow_hyphen_values = true)]
     periods: Option<u64>,
     /// Print what was written as JSON.
     #[arg(long)]
@@ -52,7 +55,7 @@ pub(crate) fn run(arguments: &Rtl, color: bool, out: &mut Out) -> Result<()> {
     let reads = [("--program", &arguments.program), ("--inputs", &arguments.inputs)];
     let reads: Vec<_> = reads.into_iter().filter_map(|(name, path)| Some((name, path.as_deref()?))).collect();
     files::check(&reads, &[])?;
-    let load = Load::new(arguments.machine.machine, color);
+    let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
     let program = arguments.program.as_deref().map(|path| load.program(path)).transpose()?;
     let machine = match (&program, arguments.machine.machine) {
         (Some(program), _) => program.machine,

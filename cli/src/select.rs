@@ -1,6 +1,7 @@
 //! Options that several commands share, and did-you-mean.
 
 use clap::Args;
+use std::path::{Path, PathBuf};
 use takt_asm::diag::nearest;
 use takt_isa::{MACHINES, Machine, Op, ROWS, Row};
 
@@ -20,6 +21,23 @@ pub(crate) struct OptionalMachine {
     pub(crate) machine: Option<&'static Machine>,
 }
 
+/// What every command takes that assembles a source.
+#[derive(Args, Clone, Default)]
+pub(crate) struct SourceArguments {
+    /// Look in this folder too for what a source includes; may be given several times.
+    #[arg(short = 'I', long = "include", value_name = "DIR", value_parser = folder)]
+    pub(crate) folders: Vec<PathBuf>,
+}
+
+/// A folder that is there, for clap.
+fn folder(path: &str) -> Result<PathBuf, String> {
+    match Path::new(path) {
+        path if path.is_dir() => Ok(path.to_owned()),
+        path if path.exists() => Err("it is a file, not a folder".to_owned()),
+        _ => Err("there is no such folder".to_owned()),
+    }
+}
+
 /// The machine of a name, for clap.
 pub(crate) fn machine(name: &str) -> Result<&'static Machine, String> {
     Machine::from_name(name).ok_or_else(|| {
@@ -37,24 +55,8 @@ pub(crate) fn instruction(mnemonic: &str) -> Result<&'static Row, String> {
     })
 }
 
-/// A number of periods or cycles, for clap.
-pub(crate) fn count(text: &str) -> Result<u64, String> {
-    text.parse().ok().filter(|count| *count > 0).ok_or_else(|| "not a whole number of at least 1".to_owned())
-}
-
 /// The clock of the paper's FPGA3, MHz.
 pub(crate) const PAPER_CLOCK: f64 = 125.0;
-
-/// A clock in MHz, with or without the unit, for clap.
-pub(crate) fn clock(text: &str) -> Result<f64, String> {
-    let number = text.strip_suffix("MHz").unwrap_or(text);
-    let mhz: f64 = number.trim_end().parse().map_err(|_| "not a number".to_owned())?;
-    if (0.01..=100_000.0).contains(&mhz) {
-        Ok(mhz)
-    } else {
-        Err("not between 0.01 and 100000 MHz".to_owned())
-    }
-}
 
 /// `; did you mean …?` if one of the names is near.
 pub(crate) fn suggest<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) -> String {

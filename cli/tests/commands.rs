@@ -510,38 +510,77 @@ fn references() {
     }
 }
 
-/// Every option is explained, and nothing is wider than the terminal that is promised.
+/// Lines of help that introduce an option or an operand: its spelling, and whether a text explains it, beside or below it.
+fn explained(help: &str) -> BTreeMap<String, bool> {
+    let lines: Vec<&str> = help.lines().collect();
+    let begins = |line: &str, what: &[&str]| what.iter().any(|what| line.starts_with(what));
+    let indent = |line: &str| line.len() - line.trim_start().len();
+    let entries = lines
+        .iter()
+        .enumerate()
+        .filter(|(_, line)| matches!(indent(line), 2 | 6) && begins(line.trim_start(), &["-", "<", "["]));
+    let entry = |(i, line): (usize, &&str)| {
+        let (spelling, beside) = line.trim_start().split_once("  ").unwrap_or((line.trim_start(), ""));
+        let below = lines.get(i + 1).is_some_and(|next| indent(next) >= 10 && !next.trim().is_empty());
+        (spelling.to_owned(), below || !beside.trim().is_empty())
+    };
+    entries.map(entry).collect()
+}
+
+/// Options a text names, without what follows them: `--gcode`, `-m`.
+fn options(text: &str) -> Vec<&str> {
+    let words = text.split(|c: char| !(c.is_ascii_alphanumeric() || c == '-'));
+    words.filter(|word| word.starts_with('-') && word.trim_start_matches('-') != "").collect()
+}
+
+/// The commands that the help lists.
+fn commands(help: &str) -> Vec<&str> {
+    let list = help.split_once("\nCommands:\n").unwrap().1.split("\n\n").next().unwrap();
+    let names = list.lines().filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    names.map(|line| line.split_whitespace().next().unwrap()).filter(|name| *name != "help").collect()
+}
+
+/// Every command has help, long and short; each option and operand in it is explained; the examples use options there
+/// are; and nothing is wider than the terminal that is promised.
 #[test]
 fn help() {
     let folder = Folder::new();
-    let mut all = folder.line("--help").ok();
-    assert_eq!(folder.line("help").ok(), all);
-    for command in [
-        "track",
-        "arm",
-        "asm",
-        "disasm",
-        "run",
-        "eval",
-        "bound",
-        "analyse",
-        "debug",
-        "rtl",
-        "cosim",
-        "isa",
-        "machines",
-        "completions",
-        "man",
-    ] {
-        let text = folder.line(&format!("{command} --help")).ok();
-        assert!(folder.line(&format!("{command} -h")).ok().lines().count() <= text.lines().count());
-        all.push_str(&format!("\n$ takt {command} --help\n{text}"));
-    }
-    for line in all.lines() {
-        assert!(line.chars().count() <= 100, "{line}");
-    }
-    insta::assert_snapshot!("help", all);
+    let top = folder.line("--help").ok();
+    insta::assert_snapshot!("help", top);
+    assert_eq!(folder.line("help").ok(), top);
     assert_eq!(folder.line("--version").ok(), format!("takt {}\n", env!("CARGO_PKG_VERSION")));
+
+    let commands = commands(&top);
+    assert!(commands.contains(&"track") && commands.contains(&"man"), "{commands:?}");
+    let long = |command: &str| folder.line(&format!("{command} --help")).ok();
+    let texts: BTreeMap<&str, String> = commands.iter().map(|command| (*command, long(command))).collect();
+    for (command, text) in &texts {
+        assert!(text.starts_with(|c: char| c.is_ascii_uppercase()), "{command} says what it does: {text}");
+        assert!(text.contains(&format!("\nUsage: takt {command}")), "{text}");
+        let short = folder.line(&format!("{command} -h")).ok();
+        assert!(short.lines().count() <= text.lines().count(), "{command}");
+        let spelled = explained(text);
+        assert!(spelled.len() >= 2, "{command}: at least --color and --help: {spelled:?}");
+        for entry in spelled.iter().chain(&explained(&short)) {
+            assert!(*entry.1, "{command}: nothing explains {}", entry.0);
+        }
+        assert!(spelled.keys().eq(explained(&short).keys()), "{command}: -h and --help list the same");
+    }
+    for text in texts.values().chain([&top]) {
+        for line in text.lines() {
+            assert!(line.chars().count() <= 100, "{line}");
+        }
+        // What stands beside an example is a comment; a bar divides programs.
+        let programs = text.lines().filter_map(|line| line.trim().split("  ").next()?.split(" | ").into());
+        for example in programs.flatten().filter_map(|program| program.strip_prefix("takt ")) {
+            let command = example.split(' ').next().unwrap();
+            let known = explained(texts.get(command).unwrap_or_else(|| panic!("no command: takt {example}")));
+            let known: Vec<&str> = known.keys().flat_map(|spelling| options(spelling)).collect();
+            for option in options(example) {
+                assert!(known.contains(&option), "no {option}: takt {example}");
+            }
+        }
+    }
 }
 
 const WORDY: [&str; 9] = [

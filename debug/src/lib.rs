@@ -4,6 +4,8 @@ pub mod console;
 pub mod panes;
 pub mod session;
 pub mod trace;
+pub mod value;
+#[cfg(feature = "tui")]
 pub mod view;
 
 /// Whether a name matches a pattern, in which `*` stands for any characters.

@@ -1,4 +1,12 @@
-; Elementary functions for Takt, as macros.
+; Macros that any program may use: `.include <math.s>`.
+
+; y = x, held between low and high.
+.macro clamp y, x, low, high
+        fmax    y, x, low
+        fmin    y, y, high
+.endm
+
+; ---- Elementary functions: docs/library.md ----
 
 .const math.shift = 0x1.8p23            ; added to a number below 2²², it leaves the nearest integer in the low bits of the sum
 .const math.sign  = 0x80000000

@@ -28,5 +28,19 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("hybrid/robot.s", include_str!("../hybrid/robot.s")),
     ("hybrid/tracking.s", include_str!("../hybrid/tracking.s")),
     ("hybrid/tracking_literal.s", include_str!("../hybrid/tracking_literal.s")),
-    ("library/math.s", include_str!("../library/math.s")),
 ];
+
+/// The library, for `.include <name>`: name and text of every file in `library/`.
+pub const LIBRARY: &[(&str, &str)] = &[("math.s", include_str!("../library/math.s"))];
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn every_file_of_the_library_is_carried() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/library");
+        let entries = std::fs::read_dir(folder).expect("it is part of the crate");
+        let mut files: Vec<_> = entries.map(|entry| entry.expect("it can be read").file_name()).collect();
+        files.sort();
+        assert_eq!(files, super::LIBRARY.iter().map(|(name, _)| *name).collect::<Vec<_>>());
+    }
+}

@@ -50,7 +50,7 @@ pub type Rows = Vec<Vec<(u16, u32)>>;
 /// What a session is about.
 #[derive(Clone, Default)]
 pub struct Options {
-    /// Values of input ports, register and bits, one row for each period; `None`: the inputs stay as they are.
+    /// Values of input ports, register and bits, one row for each period; `None`: they are 0, and stay as they are set.
     pub inputs: Option<Arc<Rows>>,
     /// Cycles between ticks; `None`: the tick comes when the program is ready.
     pub tick: Option<NonZeroU64>,
@@ -195,6 +195,10 @@ impl Session {
     pub fn new(program: &Program, options: Options) -> Result<Session, LoadError> {
         let mut emulator = Emulator::new(program)?;
         emulator.set_tick_period(options.tick);
+        for port in program.inputs.iter().filter(|_| options.inputs.is_none()) {
+            // The loader accepted the ports.
+            let _ = emulator.set_input_bits(port.register, 0);
+        }
         let core = Core { emulator, periods: 0, boundary: true, report: None, edits: 0 };
         let mut session = Session {
             options,
@@ -429,7 +433,8 @@ impl Session {
         let last = self.checkpoints.last().map_or(0, |checkpoint| checkpoint.emulator.now());
         // Before the last checkpoint there is none to make.
         let checkpoint = if self.cycle() < last { Cycle::MAX } else { last + self.interval };
-        let until = target.min(edit).min(checkpoint).min(self.cycle() + SLICE);
+        let begin = self.cycle();
+        let until = target.min(edit).min(checkpoint).min(begin + SLICE);
         let result = self.core.emulator.run_period_until(until);
         self.core.boundary = false;
         match result {
@@ -441,6 +446,8 @@ impl Session {
                 self.set_row();
             }
             Err(PeriodError::Fault(fault)) => return Err(Why::Fault(fault)),
+            // The position behind the last cycle is one of the run's: who goes on from there learns that it has halted.
+            Err(PeriodError::Halted) if self.cycle() > begin => {}
             // Nothing asks for ports by name.
             Err(PeriodError::Halted | PeriodError::Port(_)) => return Err(Why::Halted),
         }
@@ -687,8 +694,16 @@ impl Session {
         })
     }
 
-    /// Runs on until an expression holds (is not zero). Where it has no value it does not.
+    /// Runs on to the next position at which an expression holds (is not zero). Where it has no value it does not.
     pub fn run_until(&mut self, live: &Live) -> Why {
+        // What holds already may still hold in the next cycle, in which nothing need change that the search looks for.
+        if self.holds(live) {
+            match self.go_to(self.cycle() + 1) {
+                Why::Done if self.holds(live) => return Why::Holds,
+                Why::Done => {}
+                end => return end,
+            }
+        }
         let interest = Interest::value(live, self.program());
         self.forward(&interest, |session, _| session.holds(live).then_some(Why::Holds))
     }

@@ -15,14 +15,14 @@ mod functions;
 mod measure;
 mod pairs;
 
-use takt_asm::{Assembled, MemoryLoader, Options};
+use takt_asm::{Assembled, MemoryLoader, Options, Search};
 use takt_isa::Machine;
-use takt_programs::SOURCES;
+use takt_programs::LIBRARY;
 
 /// A program that includes the library, assembled. Warnings are errors.
 fn assemble(machine: &'static Machine, text: &str) -> Assembled {
-    let mut loader = MemoryLoader::new(SOURCES);
-    loader.add("test.s", format!(".include \"library/math.s\"\n.schedule on\n{text}"));
+    let program = MemoryLoader::of("test.s", format!(".include <math.s>\n.schedule on\n{text}"));
+    let loader = Search::new(program).library(LIBRARY);
     let options = Options { machine, ..Options::default() };
     let assembled = takt_asm::assemble("test.s", &loader, &options);
     let assembled = assembled.unwrap_or_else(|errors| panic!("{text}{}", errors.render(false)));

@@ -1,9 +1,9 @@
-"""The polynomials of math.s: minimax in the sense of the relative error of the whole function, coefficients in binary32.
+"""The polynomials of library/math.s: minimax in the sense of the relative error of the whole function, coefficients in binary32.
 
 Prints, for each, its coefficients as hexadecimal floats and the error of the function in ulps of a result just below a
 power of two (2^-24 relative). Needs mpmath; takes about a minute.
 
-    python3 programs/library/minimax.py
+    python3 programs/scripts/minimax.py
 
 Remez's exchange on the weighted error; then the coefficients are rounded one after the other, from the lowest, and the rest are
 found anew each time, so that they make up for the rounding.
