@@ -54,7 +54,7 @@ period:
         mov     iq, q
 
 ; ---- PI in each axis, and what the other axis and the magnets induce ----------------------------------------------------------
-.reg    ed eq  pd pq  fd fq ff  vd vq
+.reg    ed eq  pd pq  fd fq  vd vq
         fsub    ed, id_ref, d
         fsub    eq, iq_ref, q
         fmul    pd, ed, KPd

@@ -2,11 +2,6 @@
 
 use std::path::Path;
 
-/// Whether to take the time for everything: `TAKT_FULL=1`.
-pub(crate) fn full() -> bool {
-    std::env::var_os("TAKT_FULL").is_some_and(|value| value == "1")
-}
-
 /// Compares a table in a document, between the line `<!-- table: NAME -->` and the next blank line, with what it ought to be;
 /// `TAKT_BLESS=1` writes it. The path is within the workspace.
 pub(crate) fn check_table(document: &str, name: &str, table: &str) {

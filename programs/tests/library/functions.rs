@@ -1,6 +1,6 @@
 //! The macros of one operand: what is known of each, and its measurement.
 
-use crate::measure::{Measured, check_emulator, every};
+use crate::measure::{Measured, check_emulator, every, full};
 use crate::one_use;
 use takt_isa::fp::Flags;
 use takt_isa::{MACHINES, Machine};
@@ -125,7 +125,7 @@ fn errors_are_those_documented() {
             let name = function.name;
             // The same operations compute it on every machine, but for what depends on what the machine has.
             let same = machine.name != MACHINES[0].name && name != "atan";
-            if crate::common::full() && same {
+            if full() && same {
                 continue;
             }
             let program = one_use(machine, &format!("{name} d, x"), 1, "clrflags").program;

@@ -1,7 +1,6 @@
 //! Errors in units in the last place, and the operands they are measured over.
 
 use crate::batch::{Batch, LANES};
-use crate::common::full;
 use std::thread;
 use takt_emu::Emulator;
 use takt_isa::Program;
@@ -30,6 +29,11 @@ impl Random {
         let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^ (z >> 31)
     }
+}
+
+/// Whether to take the time for everything: `TAKT_FULL=1`.
+pub(crate) fn full() -> bool {
+    std::env::var_os("TAKT_FULL").is_some_and(|value| value == "1")
 }
 
 /// What a measurement has found.

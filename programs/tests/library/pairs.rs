@@ -1,8 +1,7 @@
 //! The macros of two operands: powers, over random pairs and all pairs of notable operands, and the remainder, which is exact.
 
 use crate::batch::{Batch, LANES};
-use crate::common::full;
-use crate::measure::{Measured, Random, check_emulator, notable, parallel};
+use crate::measure::{Measured, Random, check_emulator, full, notable, parallel};
 use crate::one_use;
 use takt_isa::fp::{CANONICAL_NAN, Flags};
 use takt_isa::{MACHINES, T3};
