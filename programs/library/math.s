@@ -6,7 +6,8 @@
         fmin    y, y, high
 .endm
 
-; ---- Elementary functions: docs/library.md ----
+; ---- Elementary functions. Their errors are measured over every operand; what they cost, how they work and what they raise stands in
+;      docs/library.md. Names that begin with `math.` are not for use outside. ----
 
 .const math.shift = 0x1.8p23            ; added to a number below 2²², it leaves the nearest integer in the low bits of the sum
 .const math.sign  = 0x80000000
@@ -22,7 +23,8 @@
 
 ; ---- Rounding to integers ------------------------------------------------------------------------------------------------------
 
-; keep: the bits above the units' place; below: the bits below it. Both only for 1 ≤ |x| < 2²³, which `inner` says.
+; What the roundings share: the operand's magnitude, whether it has both a whole part and a fraction (1 ≤ |x| < 2²³), and by
+; how much to shift a mask of the fraction.
 .macro math.units x, a, inner, s
 .reg    e:int off:int
         iand    a, x, 0x7fffffff
@@ -32,6 +34,7 @@
         iltu    inner, off, 0x4b000000 - 0x3f800000
 .endm
 
+; d = x towards zero, exact.
 .macro trunc d, x
 .reg    a:int inner:int s:int keep:bits whole:bits less:int sg:bits rest:bits
         math.units x, a, inner, s
@@ -43,17 +46,18 @@
         sel     d, inner, whole, rest
 .endm
 
-; Towards the infinity of the sign bit `side`: what lies beyond grows to the next integer.
+; Towards the infinity of the sign bit `side`: on that side, what has a fraction grows to the next integer.
 .macro math.toward d, x, side, one
-.reg    a:int inner:int s:int keep:bits below:bits mine:int grow:bits whole:bits less:int sg:bits rest:bits y:bits
-.reg    some:int up:int
+.reg    xb:bits a:int inner:int s:int keep:bits below:bits mine:int grow:bits whole:bits less:int sg:bits rest:bits
+.reg    y:bits some:int up:int
         math.units x, a, inner, s
         isar    keep, 0xff800000, s
         ishr    below, 0x7fffff, s
         iand    sg, x, math.sign
         ieq     mine, sg, side
-        sel     grow, mine, below, zero
-        iadd    y, x, grow
+        sel     grow, mine, below, 0
+        ior     xb, a, sg
+        iadd    y, xb, grow
         iand    whole, y, keep
         ilt     some, zero, a
         iand    up, mine, some
@@ -63,23 +67,27 @@
         sel     d, inner, whole, rest
 .endm
 
+; d = the greatest integer not above x, exact.
 .macro floor d, x
         math.toward d, x, math.sign, -1.0
 .endm
 
+; d = the least integer not below x, exact.
 .macro ceil d, x
         math.toward d, x, 0, 1.0
 .endm
 
-; Halves away from zero, as C's round().
+; d = the nearest integer, halves away from zero, exact.
 .macro round d, x
-.reg    a:int inner:int s:int keep:bits half:bits whole:bits less:int sg:bits one:bits big:int rest:bits y:bits
+.reg    xb:bits a:int inner:int s:int keep:bits half:bits whole:bits less:int sg:bits one:bits big:int rest:bits
+.reg    y:bits
         math.units x, a, inner, s
         isar    keep, 0xff800000, s
         ishr    half, 0x400000, s
-        iadd    y, x, half
-        iand    whole, y, keep
         iand    sg, x, math.sign
+        ior     xb, a, sg
+        iadd    y, xb, half
+        iand    whole, y, keep
         ior     one, sg, bits(1.0)
         ilt     big, a, 0x3f000000
         sel     rest, big, sg, one
@@ -88,7 +96,7 @@
         sel     d, inner, whole, rest
 .endm
 
-; Halves to even, as the machine rounds.
+; d = the nearest integer, halves to even, as the machine rounds; exact.
 .macro rint d, x
 .reg    a:int sg:bits m y z w:bits whole:int
         iand    a, x, 0x7fffffff
@@ -103,7 +111,7 @@
 
 ; ---- Exponential and logarithm -------------------------------------------------------------------------------------------------
 
-; e^r - 1 - r for |r| ≤ ln(2)/2.
+; e^r - 1 - r, |r| ≤ ln(2)/2.
 .macro math.exp_tail q, r
 .reg    r2 p0 p1 p2 s0 s1 s2 s3
         fmul    r2, r, r
@@ -118,6 +126,7 @@
         fmul    q, p2, r2
 .endm
 
+; d = e^x, at most @exp@ ulp.
 .macro exp d, x
 .reg    c t:bits n nh nl a r hi h lo q v y:bits k:int k1:int k2:int w:bits big:int f:bits
         fsat    c, x, 104.0
@@ -140,18 +149,20 @@
         iand    k1, k1, 0xff800000
         isub    k2, k, k1
         iadd    w, k2, bits(1.0)
-        ieq     big, x, math.inf
+        feq     big, x, inf
         sel     f, big, x, w            ; infinity is no overflow
         iadd    y, y, k1
         fmul    d, y, f
 .endm
 
+; d = ln x, at most @log@ ulp.
 .macro log d, x
-.reg    up xs:bits sub:int off:int t:int eb:int m:bits ei:int e f eh h l l1 el f2 f4 hf f3 q a0 a1 a2 a3 s0 s1 s2 s3
-.reg    s4 s5 s6 s7 twice:bits num den z:bits isinf:int
-        itof    up, x                   ; of a subnormal: x·2^149
-        iltu    sub, x, 0x00800000
-        sel     xs, sub, up, x
+.reg    a:bits up xs:bits sub:int off:int t:int eb:int m:bits ei:int e f eh h l l1 el f2 f4 hf f3 q a0 a1 a2 a3 s0 s1
+.reg    s2 s3 s4 s5 s6 s7 num den z:bits isinf:int
+        iand    a, x, 0x7fffffff
+        itof    up, a                   ; of a subnormal: x·2^149
+        ilt     sub, a, 0x00800000
+        sel     xs, sub, up, a
         sel     off, sub, -149, 0
         isub    t, xs, 0x3f2aaaab       ; 2/3
         iand    eb, t, 0xff800000
@@ -166,11 +177,10 @@
         fsub    l1, f, l
         fmul    el, e, math.ln2l
         ; poles and what has no logarithm: -1/0, 0/0
-        ishl    twice, x, 1
-        sel     num, twice, zero, -1.0
+        sel     num, a, zero, -1.0
         fmax    den, x, zero
         fdiv    z, num, den
-        ieq     isinf, x, math.inf
+        feq     isinf, x, inf
         sel     z, isinf, x, z
         fadd    el, el, z
         fadd    l1, l1, el
@@ -202,6 +212,7 @@
 
 ; ---- Tangent -------------------------------------------------------------------------------------------------------------------
 
+; d = sin x / cos x, |x| ≤ 2π·64, at most @tan_quick@ ulp.
 .macro tan_quick d, x
 .reg    s c
         fsin    s, x
@@ -209,7 +220,9 @@
         fdiv    d, s, c
 .endm
 
-; 2·tan(r/2) = w, then 2w/(2 - w²/2) or, beside an odd multiple of π/2, its inverse's opposite; all of it in two words each.
+; d = tan x, |x| ≤ 2π·64, at most @tan@ ulp.
+;
+; 2·tan(r/2) = w, then w/(1 - w²/4) or, beside an odd multiple of π/2, its inverse's opposite; all in two words each.
 .macro tan d, x
 .reg    a:int in:int xs:bits t:bits n odd:int y1 y2 w1 v u g0 g1 r nl z z2 p0 p1 p s0 s1 s2 q wh wl:bits g wz:bits wq
 .reg    w3 dw w2 w2h k2 V:bits vl v1 mu:bits ml:bits nh:bits nlo:bits dh:bits dl:bits inv m ta:bits zt:bits vt k e k1
@@ -283,25 +296,10 @@
 
 ; ---- Arcsine and arctangent ----------------------------------------------------------------------------------------------------
 
-; ±(π/2 - S - sl - |s·p|), or x + s·p where `big` is 0: S is the sum's leading part, of 12 digits.
-.macro math.complement d, x, big, sg, S, sl, s, p
-.reg    h l l1 q u hx:bits lx:bits base corr
-        fsub    h, math.pi2h, S
-        fsub    l, math.pi2h, h
-        fsub    l, l, S
-        fadd    l, l, math.pi2l
-        fsub    l1, l, sl
-        ixor    hx, h, sg
-        ixor    lx, l1, sg
-        fmul    q, s, p
-        fsub    u, lx, q
-        sel     base, big, hx, x
-        sel     corr, big, u, q
-        fadd    d, base, corr
-.endm
-
+; d = arcsine of x, at most @asin@ ulp.
 .macro asin d, x
-.reg    a0:bits a:bits big:int sg:bits y y2 zb zs z S S0:bits Sh:bits dd den sl s:bits z2 p0 p1 p s0 s1 s2 s3
+.reg    h l l1 q u hx:bits lx:bits base:bits corr:bits a0:bits a:bits big:int sg:bits y y2 zb zs z S S0:bits Sh:bits
+.reg    dd den sl s:bits z2 p0 p1 p s0 s1 s2 s3
         fabs    a0, x
         fmin    a, a0, 2.0              ; what overflows nowhere, and has no arcsine either
         ilt     big, 0x3f000000, a
@@ -330,9 +328,22 @@
         fmul    s3, z2, p1
         fadd    p0, p0, s3
         fmul    p, p0, z
-        math.complement d, x, big, sg, Sh, sl, s, p
+        ; ±(π/2 - S - …), or x + x³·P(x²)
+        fsub    h, math.pi2h, Sh
+        fsub    l, math.pi2h, h
+        fsub    l, l, Sh
+        fadd    l, l, math.pi2l
+        fsub    l1, l, sl
+        ixor    hx, h, sg
+        ixor    lx, l1, sg
+        fmul    q, s, p
+        fsub    u, lx, q
+        sel     base, big, hx, x
+        sel     corr, big, u, q
+        fadd    d, base, corr
 .endm
 
+; The arctangent where the machine has none: atan(c) + atan((x - c)/(1 + c·x)).
 .macro math.atan d, x
 .reg    a:bits sg:bits A b1:int b2:int b3:int b4:int c:bits c1:bits c2:bits h1:bits h2:bits h3:bits hi:bits num num4
 .reg    n0:bits ca den d0:bits t z z2 e0 e1 e2 e3 e4 p1 p2 p Q u
@@ -376,6 +387,7 @@
         fadd    d, hi, u
 .endm
 
+; d = arctangent of x, at most @atan3@ ulp as an instruction, at most @atan1@ ulp without.
 .macro atan d, x
         .if has.fatan2
         fatan2  d, x, 1.0
@@ -386,6 +398,7 @@
 
 ; ---- Hyperbolic tangent --------------------------------------------------------------------------------------------------------
 
+; d = tanh x, at most @tanh@ ulp.
 .macro tanh d, x
 .reg    c a:bits big:int sg:bits a2 t:bits n nh b nl r hi:bits h lo q v:bits k:int H h1 Hl D num:bits base:bits corr z
 .reg    z2 p1 p2 p Q s0 s1 s2 s3 s4 e0:bits e1:bits
@@ -440,8 +453,10 @@
 
 ; ---- Powers --------------------------------------------------------------------------------------------------------------------
 
-; ±2^(y·log2 |x|), the logarithm and its product in two words each. What is not computed so (zeros, infinities, NaNs, roots of
-; negative numbers) comes with the exponent 0 out of the sign's quotient.
+; d = x^y, at most @pow@ ulp.
+;
+; ±2^(y·log2 |x|), logarithm and product in two words each. What is not computed so (zeros, infinities, NaNs, roots of negative
+; numbers) has the exponent 0 and comes out of the sign's quotient.
 .macro pow d, x, y
 .reg    ax:bits ay:bits sub:int up xs:bits off:int ti:int eb:int m:bits ei:int e k:int c u den v s sh:bits th:bits tl
 .reg    a0 a1 sl s2 s4 l0 r r0 ss sh2 T T0 th2:bits g0 tl2 uu vv vv0 P ph:bits g2 pl zh z0 z1 zl dh dl b0 t1:bits c0
@@ -490,7 +505,7 @@
         ior     nan, xnan, ynan
         fmax    nv, x, y
         ieq     y0, ay, zero
-        ieq     xi, x, bits(1.0)
+        feq     xi, x, 1.0
         ior     one, y0, xi
         sel     num, ends, mag, bits(1.0)
         sel     num, pole, bits(1.0), num
@@ -618,7 +633,7 @@
 
 ; ---- Remainder -----------------------------------------------------------------------------------------------------------------
 
-; x - trunc(x/y)·y, exactly, for |x| < 2^(11·steps)·|y|; beyond, NaN and invalid.
+; d = x - trunc(x/y)·y, exact for |x| < 2^(11·steps)·|y|; beyond, NaN and invalid.
 .macro fmod_in d, x, y, steps
 .reg    ax:bits ay:bits xu yu xsub:int ysub:int xs:bits ys:bits xo:int yo:int ex:int ey:int D:int D0:int before:int
 .reg    less:int r:bits skip:int my:bits yh:bits yl inv s:int f:bits R Q t w hi lo neg:int r1 r2 e1:int e2:int f1:bits
@@ -696,6 +711,7 @@
         sel     d, bad, z, res
 .endm
 
+; The same for every x and y; exact.
 .macro fmod d, x, y
         fmod_in d, x, y, 26
 .endm
