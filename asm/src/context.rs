@@ -12,7 +12,10 @@ use crate::unknown::{Unknown, Wanted};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
 use takt_isa::program::Space;
-use takt_isa::{Machine, Type, ZERO};
+use takt_isa::{Machine, Op, Type, ZERO};
+
+/// What stands before a mnemonic in the name of the constant that says whether the machine has the instruction.
+pub(crate) const HAS: &str = "has.";
 
 /// An expansion: what a use of a macro, or one turn of a repetition, adds to the names around it.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -65,6 +68,8 @@ pub(crate) enum Binding {
     Count(i64),
     /// `pi` and the like.
     Builtin(u32),
+    /// Whether the machine has the instruction that the name asks for.
+    Has(bool),
 }
 
 #[derive(Clone, Debug)]
@@ -250,10 +255,16 @@ impl Context {
         match self.globals.get(name.0 as usize) {
             Some(Binding::None) | None => match name.builtin() {
                 Some(builtin) => Binding::Builtin(builtin as u32),
-                None => Binding::None,
+                None => self.has(name).map_or(Binding::None, Binding::Has),
             },
             Some(binding) => *binding,
         }
+    }
+
+    /// Whether the machine has an instruction, where the name asks for that: `has.` and a mnemonic.
+    fn has(&self, name: NameId) -> Option<bool> {
+        let row = Op::from_mnemonic(self.names.text(name).strip_prefix(HAS)?)?.row();
+        Some(row.function == takt_isa::Function::Idle || self.machine.host(row.function).is_some())
     }
 
     /// Binds a name in a scope, without asking whether it is bound.
@@ -310,7 +321,7 @@ impl Context {
             Binding::Constant(id) => Some(self.constants[id as usize].span),
             Binding::Code(id) | Binding::Data(id) => Some(self.labels[id.0 as usize].span),
             Binding::Argument(id) => Some(self.arguments[id as usize].operand.span),
-            Binding::None | Binding::Count(_) | Binding::Builtin(_) => None,
+            Binding::None | Binding::Count(_) | Binding::Builtin(_) | Binding::Has(_) => None,
         }
     }
 
@@ -323,7 +334,7 @@ impl Context {
                 RegisterKind::Zero => "the register that always reads as zero",
                 _ => "a register",
             },
-            Binding::Constant(_) | Binding::Builtin(_) => "a constant",
+            Binding::Constant(_) | Binding::Builtin(_) | Binding::Has(_) => "a constant",
             Binding::Code(_) => "a code label",
             Binding::Data(_) => "a data label",
             Binding::Argument(_) => "a parameter",
@@ -516,6 +527,7 @@ impl Context {
         match self.lookup(scope, name) {
             Binding::Count(value) => Ok(Value::Int(value)),
             Binding::Builtin(builtin) => Ok(BUILTINS[builtin as usize].1),
+            Binding::Has(has) => Ok(Value::Int(has.into())),
             Binding::Constant(id) => {
                 let constant = &mut self.constants[id as usize];
                 constant.used = true;

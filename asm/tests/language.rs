@@ -399,3 +399,23 @@ fn ports_may_be_latched() {
     assert!(!latched("") && !latched(".ports direct\n"));
     assert!(latched(".ports latched\n") && latched(".ports latched\n.ports latched\n"));
 }
+
+#[test]
+fn a_name_asks_what_the_machine_has() {
+    // Machines differ in the instructions they execute: take whatever they do differ in from the tables.
+    let text = |mnemonic: &str| format!(".if has.{mnemonic}\n.data\n.word has.{mnemonic} + 1\n.endif\n");
+    let mut answers = [0; 2];
+    for machine in takt_isa::MACHINES {
+        for row in takt_isa::ROWS {
+            let assembled = common::assemble(&text(row.mnemonic), machine);
+            let data = assembled.unwrap_or_else(|report| panic!("{}", report.render(false))).program.data;
+            let idle = row.function == takt_isa::Function::Idle;
+            let has = idle || machine.host(row.function).is_some();
+            assert_eq!(data, if has { vec![2] } else { vec![] }, "{} on {}", row.mnemonic, machine.name);
+            answers[usize::from(has)] += 1;
+        }
+    }
+    assert!(answers.iter().all(|&count| count > 0), "some machine lacks something");
+    // A declaration of one's own comes first, as with `pi`.
+    assert_eq!(good(".const has.fadd = 7\n.data\n.word has.fadd\n").program.data, [7]);
+}
