@@ -10,7 +10,7 @@ use takt_emu::Emulator;
 use takt_isa::{MACHINES, Machine, Program, T3};
 
 fn program(text: &str, machine: &'static Machine, schedule: Schedule) -> Program {
-    let options = Options { machine, schedule, effort: 0 };
+    let options = Options { machine, schedule, effort: 0, ..Options::default() };
     let assembled = assemble("random.s", &MemoryLoader::of("random.s", text), &options);
     assembled.unwrap_or_else(|errors| panic!("{text}\n{}", errors.render(false))).program
 }
