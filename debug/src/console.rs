@@ -325,7 +325,7 @@ impl Console {
         let text = format!("break {arguments}");
         let id = self.session.add_stop(Stop::Break { at: at.clone(), condition, text });
         let at = match at {
-            Where::Bundles(bundles) => info::places(self.session.program(), bundles),
+            Where::Bundles(bundles) => info::places(self.session.program(), &bundles),
             Where::Cycle(cycle) => format!("cycle {cycle}"),
             Where::Period(period) => format!("period {period}"),
         };
