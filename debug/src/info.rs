@@ -1,9 +1,8 @@
 //! `info`: what a name stands for and where its values live, as text.
 
-use crate::session::{Life, Session};
+use crate::session::{Life, Session, Where};
 use std::fmt::Write as _;
 use takt_asm::expr::Value;
-use takt_isa::timing::Address;
 use takt_isa::{Program, Type};
 
 /// Bundles that are listed of those that write or read a register.
@@ -99,9 +98,17 @@ fn lifetime(program: &Program, life: &Life) -> String {
     format!("written in {}; read in {}", listed(written), listed(read))
 }
 
-/// The bundles at which a breakpoint stops: `3 places: bundle 12 (a.s:4), …`.
-pub(crate) fn places(program: &Program, bundles: &[Address]) -> String {
-    listed(bundles.iter().map(|address| program.bundle_text(*address)).collect())
+/// Where a breakpoint stops: `bundle 12 (a.s:4)`, or `3 places: …`.
+pub(crate) fn places(program: &Program, at: &Where) -> String {
+    match at {
+        Where::Bundle(address) => program.bundle_text(*address),
+        Where::Line(line, bundles) => {
+            let line = program.place_text(*line);
+            listed(bundles.iter().map(|address| format!("bundle {address} ({line})")).collect())
+        }
+        Where::Cycle(cycle) => format!("cycle {cycle}"),
+        Where::Period(period) => format!("period {period}"),
+    }
 }
 
 /// The first of some places, and how many there are.
