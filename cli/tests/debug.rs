@@ -32,7 +32,7 @@ fn the_source_of_an_image() {
     let listed = |image: &str| folder.fed(&format!("debug {image}"), b"break add\nc\nlist\np sum\n");
     let fresh = listed("sum.takt");
     assert!(
-        fresh.stderr.is_empty() && fresh.stdout.contains("\n>   11  add:    ld      x, table[i]\n"),
+        fresh.stderr.is_empty() && fresh.stdout.contains("\n>   12  add:    ld      x, table[i]\n"),
         "{fresh:?}"
     );
 

@@ -324,11 +324,7 @@ impl Console {
         let at = Where::parse(place, self.session.program())?;
         let text = format!("break {arguments}");
         let id = self.session.add_stop(Stop::Break { at: at.clone(), condition, text });
-        let at = match at {
-            Where::Bundles(bundles) => info::places(self.session.program(), bundles),
-            Where::Cycle(cycle) => format!("cycle {cycle}"),
-            Where::Period(period) => format!("period {period}"),
-        };
+        let at = info::places(self.session.program(), &at);
         Ok(format!("stop {id} at {at}\n"))
     }
 
@@ -369,7 +365,7 @@ impl Console {
 
     fn stops(&self) -> String {
         let places = |stop: &Stop| match stop {
-            Stop::Break { at: Where::Bundles(bundles), .. } if bundles.len() > 1 => {
+            Stop::Break { at: Where::Line(_, bundles), .. } if bundles.len() > 1 => {
                 format!("  ({} places)", bundles.len())
             }
             _ => String::new(),

@@ -1,9 +1,8 @@
 //! `info`: what a name stands for and where its values live, as text.
 
-use crate::session::{Life, Session};
+use crate::session::{Life, Session, Where};
 use std::fmt::Write as _;
 use takt_asm::expr::Value;
-use takt_isa::timing::Address;
 use takt_isa::{Program, Type};
 
 /// Bundles that are listed of those that write or read a register.
@@ -37,7 +36,9 @@ pub(crate) fn info(session: &Session, name: &str) -> Result<String, String> {
         let _ =
             writeln!(text, "{name} is {}, {}: {}", kind(program, only.register), place, type_name(only.ty));
     } else {
-        let _ = writeln!(text, "{name} stands for {} registers here and there; > is at hand", lives.len());
+        let at_hand = lives.iter().any(|life| life.at_hand);
+        let at_hand = if at_hand { "; > is at hand" } else { "; none is at hand" };
+        let _ = writeln!(text, "{name} stands for {} registers here and there{at_hand}", lives.len());
     }
     for life in &lives {
         let mark = if life.at_hand { '>' } else { ' ' };
@@ -69,39 +70,55 @@ const fn type_name(ty: Type) -> &'static str {
     }
 }
 
-/// Where a value is written and read.
+/// Where a value is written and read, each bundle with the line of the operation that does so.
 fn lifetime(program: &Program, life: &Life) -> String {
-    if let Some((first, last)) = life.bundles {
-        let first_text = program.bundle_text(first);
-        return match first == last {
-            true => format!("{first_text} writes it, nothing reads it"),
-            false => format!("{first_text} to {}", program.bundle_text(last)),
-        };
-    }
     let (mut written, mut read) = (Vec::new(), Vec::new());
-    for address in 0..program.bundles() {
+    let (first, last) = life.bundles.unwrap_or((0, program.bundles().saturating_sub(1)));
+    for address in first..=last {
         let Some(Ok(instructions)) = program.bundle(address) else { continue };
-        for (instruction, slot) in instructions.iter().zip(program.machine.slots) {
-            if instruction.writes(slot) == Some(life.register) {
-                written.push(address);
+        let slots = program.machine.slots;
+        for ((instruction, slot), number) in instructions.iter().zip(slots).zip(0..) {
+            let place = || {
+                let line = program.lines.get(address as usize * slots.len() + number).copied().flatten();
+                let line = line.map_or(String::new(), |line| format!(" ({})", program.place_text(line)));
+                format!("bundle {address}{line}")
+            };
+            // Where registers are shared, the bundle of a value's last use may write the next one.
+            let next = life.bundles.is_some() && address == last && address != first;
+            if instruction.writes(slot) == Some(life.register) && !next {
+                written.push(place());
             }
-            if instruction.reads().contains(&life.register) {
-                read.push(address);
+            // And that of its first write may read the one before.
+            let before = life.bundles.is_some() && address == first;
+            if instruction.reads().contains(&life.register) && !before {
+                read.push(place());
             }
         }
     }
-    format!("written in {}; read in {}", places(program, written), places(program, read))
+    format!("written in {}; read in {}", listed(written), listed(read))
 }
 
-/// The first of some bundles, and how many there are: `3 places: bundle 12 (a.s:4), …`.
-pub(crate) fn places(program: &Program, mut bundles: Vec<Address>) -> String {
-    bundles.dedup();
-    let shown = bundles.iter().take(LISTED).map(|address| program.bundle_text(*address));
-    let shown = shown.collect::<Vec<_>>().join(", ");
-    match bundles.len() {
+/// Where a breakpoint stops: `bundle 12 (a.s:4)`, or `3 places: …`.
+pub(crate) fn places(program: &Program, at: &Where) -> String {
+    match at {
+        Where::Bundle(address) => program.bundle_text(*address),
+        Where::Line(line, bundles) => {
+            let line = program.place_text(*line);
+            listed(bundles.iter().map(|address| format!("bundle {address} ({line})")).collect())
+        }
+        Where::Cycle(cycle) => format!("cycle {cycle}"),
+        Where::Period(period) => format!("period {period}"),
+    }
+}
+
+/// The first of some places, and how many there are.
+fn listed(mut places: Vec<String>) -> String {
+    places.dedup();
+    let shown = || places.iter().take(LISTED).map(String::as_str).collect::<Vec<_>>().join(", ");
+    match places.len() {
         0 => "no bundle".to_owned(),
-        1 => shown,
-        count if count > LISTED => format!("{count} places: {shown}, …"),
-        count => format!("{count} places: {shown}"),
+        1 => shown(),
+        count if count > LISTED => format!("{count} places: {}, …", shown()),
+        count => format!("{count} places: {}", shown()),
     }
 }

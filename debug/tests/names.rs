@@ -217,18 +217,34 @@ fn every_place_and_every_value() {
     assert!(console.execute("break :7").unwrap().starts_with("stop 1 at 3 places: bundle "));
     let mut stops = 0;
     while console.execute("continue").unwrap().starts_with("stop 1") {
-        let line = console.execute("list").unwrap();
-        assert!(console.execute("where").unwrap().contains("fadd "), "{line}");
+        // Whatever else is in the bundle, the line at hand is that of the breakpoint.
+        let place = console.execute("where").unwrap();
+        assert!(
+            place.contains("(a.s:7)") && place.contains("\n    7          fadd    own, own, by\n"),
+            "{place}"
+        );
+        let said = console.execute("print own").unwrap();
+        assert!(said.contains(".own.1 in m") && !said.contains("still"), "{said}");
         stops += 1;
     }
     assert_eq!(stops, 9, "three in each of two periods, and before the first tick");
+    console.execute("goto start").unwrap();
+    // So it is for its condition.
+    console.execute("delete").unwrap();
+    console.execute("break :7 if own == 4.0").unwrap();
+    let mut uses = vec![];
+    while console.execute("continue").unwrap().starts_with("stop 2") {
+        let said = console.execute("print own").unwrap();
+        uses.push(said.split_once('(').unwrap().1.split('.').nth(1).unwrap().to_owned());
+    }
+    assert_eq!(uses, ["3", "3", "3"], "b is 2: the use with b as parameter");
     console.execute("goto start").unwrap();
     console.execute("delete").unwrap();
     console.execute("watch t").unwrap();
     let mut seen = vec![];
     loop {
         let said = console.execute("continue").unwrap();
-        let Some(stop) = said.strip_prefix("stop 2: watch t ").and_then(|said| said.lines().next()) else {
+        let Some(stop) = said.strip_prefix("stop 3: watch t ").and_then(|said| said.lines().next()) else {
             break;
         };
         seen.push(stop.to_owned());

@@ -15,7 +15,7 @@ use takt_asm::diag::{Diagnostics, nearest};
 use takt_asm::expr::{BUILTINS, Value};
 use takt_asm::names::{Names, Position};
 use takt_emu::Emulator;
-use takt_isa::program::Space;
+use takt_isa::program::{Location, Space};
 use takt_isa::timing::{Address, Cycle};
 use takt_isa::{Program, Type};
 
@@ -78,6 +78,8 @@ pub(crate) struct Machine<'e> {
     pub(crate) emulator: &'e Emulator,
     pub(crate) periods: u64,
     pub(crate) names: &'e Names,
+    /// The line at hand, if it is not the one that the next bundle shows.
+    pub(crate) line: Option<Location>,
 }
 
 impl Machine<'_> {
@@ -93,7 +95,12 @@ impl Machine<'_> {
 
     /// The position of the source line at hand.
     pub(crate) fn at_hand(&self) -> Position {
-        self.names.at_hand(self.emulator.machine().slots.len(), self.emulator.next_address())
+        let (slots, next) = (self.emulator.machine().slots.len(), self.emulator.next_address());
+        let start = next as usize * slots;
+        let lines = self.emulator.program().lines.get(start..start + slots).unwrap_or_default();
+        let word = lines.iter().position(|line| line.is_some() && *line == self.line);
+        let position = word.and_then(|word| self.names.positions.get(start + word).copied().flatten());
+        position.unwrap_or_else(|| self.names.at_hand(slots, next))
     }
 
     /// A bundle that is still to write a register although it comes before the line at hand in the source: what is there now

@@ -45,7 +45,10 @@ impl Interest {
         let mut interest = Interest::default();
         for (_, stop) in stops {
             match stop {
-                Stop::Break { at: Where::Bundles(bundles), .. } => interest.bundles.extend(bundles),
+                Stop::Break { at: Where::Bundle(address), .. } => {
+                    interest.bundles.insert(*address);
+                }
+                Stop::Break { at: Where::Line(_, bundles), .. } => interest.bundles.extend(bundles),
                 Stop::Break { at: Where::Cycle(cycle), .. } => {
                     interest.cycles.insert(*cycle);
                 }

@@ -180,6 +180,8 @@ pub struct Session {
     edits: Vec<Edit>,
     stops: Vec<(u32, Stop)>,
     next_id: u32,
+    /// The line that a breakpoint stopped at, and the cycle.
+    line: Option<(Cycle, Location)>,
     /// Cycles for which a command may run.
     pub run_limit: Cycle,
 }
@@ -208,6 +210,7 @@ impl Session {
             edits: Vec::new(),
             stops: Vec::new(),
             next_id: 1,
+            line: None,
             run_limit: RUN_LIMIT,
         };
         session.set_row();
@@ -258,8 +261,11 @@ impl Session {
         }
     }
 
-    /// The source place of the bundle that issues next.
+    /// The source line at hand: the one that a breakpoint stopped at, or else that of the bundle that issues next.
     pub fn location(&self) -> Option<Location> {
+        if let Some(line) = self.machine().line {
+            return Some(line);
+        }
         let address = self.core.emulator.next_address();
         (address < self.program().bundles()).then(|| self.program().location(address)).flatten()
     }
@@ -301,7 +307,8 @@ impl Session {
 
     fn machine(&self) -> Machine<'_> {
         let Core { emulator, periods, .. } = &self.core;
-        Machine { emulator, periods: *periods, names: &self.options.names }
+        let line = self.line.filter(|(cycle, _)| *cycle == self.cycle()).map(|(_, line)| line);
+        Machine { emulator, periods: *periods, names: &self.options.names, line }
     }
 
     /// What a bundle that issued in the cycle to come would read from a register.

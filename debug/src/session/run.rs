@@ -1,11 +1,13 @@
 //! Going forth and back: to a cycle or a period, by steps, to where something is found.
 
+use super::expression::Machine;
 use super::interest::Interest;
-use super::stops::Watcher;
+use super::stops::{Stop, Watcher, Where};
 use super::{CHECKPOINTS, Core, Cycle, End, Live, SLICE, Session, Unit, WINDOW, Why};
 use std::sync::atomic::Ordering;
 use takt_emu::{PeriodError, Upcoming};
 use takt_isa::Effect;
+use takt_isa::program::Location;
 use takt_isa::timing::Address;
 
 impl Session {
@@ -282,16 +284,30 @@ impl Session {
     pub fn resume(&mut self) -> Why {
         let mut watcher = Watcher::new(self);
         let interest = Interest::stops(&self.stops, self.program());
-        self.forward(&interest, move |session, issuing| watcher.visit(session, issuing))
+        let why = self.forward(&interest, move |session, issuing| watcher.visit(session, issuing));
+        self.stopped(why)
+    }
+
+    /// Takes the line of the breakpoint that it stopped at for the line at hand.
+    fn stopped(&mut self, why: Why) -> Why {
+        let stop = match &why {
+            Why::Stop { id, .. } => self.stops.iter().find(|(known, _)| known == id),
+            _ => None,
+        };
+        if let Some((_, Stop::Break { at: Where::Line(line, _), .. })) = stop {
+            self.line = Some((self.cycle(), *line));
+        }
+        why
     }
 
     /// Runs back to the last breakpoint or watchpoint.
     pub fn resume_back(&mut self) -> Why {
         let interest = Interest::stops(&self.stops, self.program());
-        self.backward(&interest, |session| {
+        let why = self.backward(&interest, |session| {
             let mut watcher = Watcher::new(session);
             move |session: &Session, issuing| watcher.visit(session, issuing)
-        })
+        });
+        self.stopped(why)
     }
 
     /// Runs on to the next position at which an expression holds (is not zero). Where it has no value it does not.
@@ -306,6 +322,12 @@ impl Session {
         }
         let interest = Interest::value(live, self.program());
         self.forward(&interest, |session, _| session.holds(live).then_some(Why::Holds))
+    }
+
+    /// Whether an expression has a value other than zero where this line is at hand.
+    pub(super) fn holds_at(&self, line: Location, live: &Live) -> bool {
+        let machine = Machine { line: Some(line), ..self.machine() };
+        live.evaluate(&machine, self.program()).is_ok_and(|value| !value.is_zero())
     }
 
     /// Whether an expression has a value other than zero.

@@ -4,14 +4,17 @@ use super::expression::{self, Live};
 use super::{Session, Why};
 use takt_asm::expr::Value;
 use takt_isa::Program;
-use takt_isa::program::Space;
+use takt_isa::program::{Location, Space};
 use takt_isa::timing::{Address, Cycle};
 
 /// Where a breakpoint stops.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Where {
-    /// Where one of these bundles is about to issue: a line of a macro or a repetition has several.
-    Bundles(Vec<Address>),
+    /// Where this bundle is about to issue.
+    Bundle(Address),
+    /// Where a bundle with an operation of this line is about to issue; these have one. A line of a macro or a repetition has
+    /// several.
+    Line(Location, Vec<Address>),
     /// When so many cycles have passed.
     Cycle(Cycle),
     /// When so many periods have ended.
@@ -85,7 +88,7 @@ impl Where {
             };
         }
         if let Some((file, line)) = text.rsplit_once(':') {
-            return line_bundles(file, number(line, "line")?, program).map(Where::Bundles);
+            return line_bundles(file, number(line, "line")?, program);
         }
         if let Ok(number) = text.parse() {
             return bundle(number, program);
@@ -106,12 +109,12 @@ fn bundle(number: u64, program: &Program) -> Result<Where, String> {
     let bundles = program.bundles();
     let address = u32::try_from(number).ok().filter(|address| *address < bundles);
     address
-        .map(|address| Where::Bundles(vec![address]))
+        .map(Where::Bundle)
         .ok_or_else(|| format!("bundle {number}: the program has bundles 0 to {}", bundles - 1))
 }
 
 /// The bundles with an operation of a source line, ascending.
-fn line_bundles(file: &str, line: u64, program: &Program) -> Result<Vec<Address>, String> {
+fn line_bundles(file: &str, line: u64, program: &Program) -> Result<Where, String> {
     let names = || program.files.iter().map(String::as_str);
     let ends = |name: &str| name == file || name.rsplit('/').next() == Some(file);
     let file = if file.is_empty() { Some(0) } else { names().position(ends) };
@@ -125,11 +128,11 @@ fn line_bundles(file: &str, line: u64, program: &Program) -> Result<Vec<Address>
             .filter_map(|(i, location)| location.map(|location| ((i / slots) as u32, location)))
             .filter(|(_, location)| location.file as usize == file)
     };
-    let mut bundles: Vec<Address> =
-        places().filter(|(_, place)| u64::from(place.line) == line).map(|(address, _)| address).collect();
-    bundles.dedup();
-    if !bundles.is_empty() {
-        return Ok(bundles);
+    let mut of_line = places().filter(|(_, place)| u64::from(place.line) == line).peekable();
+    if let Some(&(_, place)) = of_line.peek() {
+        let mut bundles: Vec<Address> = of_line.map(|(address, _)| address).collect();
+        bundles.dedup();
+        return Ok(Where::Line(place, bundles));
     }
     let next = places().map(|(_, location)| location.line).filter(|next| u64::from(*next) > line).min();
     let next = next.map_or(String::new(), |next| format!("; the next line with one is {next}"));
@@ -170,13 +173,17 @@ impl Watcher {
             match stop {
                 Stop::Break { at, condition, text } => {
                     let here = match at {
-                        Where::Bundles(bundles) => issuing.is_some_and(|address| bundles.contains(&address)),
+                        Where::Bundle(address) => issuing == Some(*address),
+                        Where::Line(_, bundles) => issuing.is_some_and(|address| bundles.contains(&address)),
                         Where::Cycle(cycle) => session.cycle() == *cycle,
                         Where::Period(period) => session.core.boundary && session.period() == *period,
                     };
                     if here
                         && why.is_none()
-                        && condition.as_ref().is_none_or(|condition| session.holds(condition))
+                        && condition.as_ref().is_none_or(|condition| match at {
+                            Where::Line(line, _) => session.holds_at(*line, condition),
+                            _ => session.holds(condition),
+                        })
                     {
                         why = Some(Why::Stop { id: *id, text: text.clone(), change: None });
                     }
