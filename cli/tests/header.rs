@@ -38,7 +38,7 @@ fn write(language: &str, file: &str) -> Folder {
     assert!(done.ok().contains("assembled"));
     // To standard output, the same, and no image on the way.
     assert_eq!(folder.line(&format!("asm 2-pd*.s --header {language}")).ok(), folder.read_text(file));
-    assert!(!folder.path("2-pd*.takt").exists());
+    assert!(!folder.path().join("2-pd*.takt").exists());
     folder
 }
 
@@ -73,14 +73,12 @@ int main(void)
     let cc = |arguments: &[&str]| {
         let mut gcc = Command::new("cc");
         silent(
-            gcc.current_dir(folder.path("."))
-                .args(["-std=c99", "-Wall", "-Wextra", "-Werror"])
-                .args(arguments),
+            gcc.current_dir(folder.path()).args(["-std=c99", "-Wall", "-Wextra", "-Werror"]).args(arguments),
         );
     };
     cc(&["-c", "-x", "c", "pd.h", "-o", "alone.o"]);
     cc(&["main.c", "-o", "main"]);
-    silent(&mut Command::new(folder.path("main")));
+    silent(&mut Command::new(folder.path().join("main")));
 }
 
 #[test]
@@ -103,14 +101,7 @@ const _: () = {
     );
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let mut rustc = Command::new(rustc);
-    rustc.current_dir(folder.path(".")).args([
-        "--edition",
-        "2024",
-        "--crate-type",
-        "lib",
-        "--emit",
-        "metadata",
-    ]);
+    rustc.current_dir(folder.path()).args(["--edition", "2024", "--crate-type", "lib", "--emit", "metadata"]);
     silent(rustc.arg("lib.rs"));
 }
 
@@ -185,7 +176,7 @@ fn a_header_needs_no_bound_and_no_ports() {
     assert!(folder.read_text("p.c").contains("There are no bounds"));
     silent(
         Command::new("cc")
-            .current_dir(folder.path("."))
+            .current_dir(folder.path())
             .args(["-std=c99", "-Wall", "-Wextra", "-Werror", "-c", "p.c"]),
     );
     let done = folder.line("asm p.s --header-file p.h");
