@@ -86,7 +86,7 @@ fn without_verilator_its_package_is_named() {
 #[test]
 fn latched_ports_come_from_the_program() {
     let folder = Folder::new();
-    folder.write("p.s", &format!(".ports latched\n{PROGRAM}"));
+    folder.write("p.s", format!(".ports latched\n{PROGRAM}"));
     folder.write("in.csv", "in0\n1.5\n-2\n0.25\n");
     folder.line("rtl -o out --machine t1 --program p.s --inputs in.csv").ok();
     for file in ["takt_t1.v", "takt_t1_wishbone.v"] {
