@@ -73,9 +73,7 @@ int main(void)
     let cc = |arguments: &[&str]| {
         let mut gcc = Command::new("cc");
         silent(
-            gcc.current_dir(folder.path().join("."))
-                .args(["-std=c99", "-Wall", "-Wextra", "-Werror"])
-                .args(arguments),
+            gcc.current_dir(folder.path()).args(["-std=c99", "-Wall", "-Wextra", "-Werror"]).args(arguments),
         );
     };
     cc(&["-c", "-x", "c", "pd.h", "-o", "alone.o"]);
@@ -103,14 +101,7 @@ const _: () = {
     );
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let mut rustc = Command::new(rustc);
-    rustc.current_dir(folder.path().join(".")).args([
-        "--edition",
-        "2024",
-        "--crate-type",
-        "lib",
-        "--emit",
-        "metadata",
-    ]);
+    rustc.current_dir(folder.path()).args(["--edition", "2024", "--crate-type", "lib", "--emit", "metadata"]);
     silent(rustc.arg("lib.rs"));
 }
 
@@ -185,7 +176,7 @@ fn a_header_needs_no_bound_and_no_ports() {
     assert!(folder.read_text("p.c").contains("There are no bounds"));
     silent(
         Command::new("cc")
-            .current_dir(folder.path().join("."))
+            .current_dir(folder.path())
             .args(["-std=c99", "-Wall", "-Wextra", "-Werror", "-c", "p.c"]),
     );
     let done = folder.line("asm p.s --header-file p.h");
