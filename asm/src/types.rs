@@ -545,6 +545,14 @@ fn either(context: &mut Context, operation: &Operation, int: (usize, Typed), flo
     let help = help.unwrap_or_else(|| {
         format!("{}or write `{written}:bits` if its bits are meant", convert(Type::I, Type::F))
     });
+    // A flag that is kept in a state of no type.
+    let help = match float.1.origin {
+        Some(Origin { what: What::Declared, span, .. }) => {
+            let declared = context.sources.text(span);
+            format!("{help}, or declare `{declared}:int` if it is an integer")
+        }
+        _ => help,
+    };
     context.report(ScopeId(operation.expansion), warning.help(help));
 }
 
