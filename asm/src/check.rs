@@ -3,6 +3,7 @@
 use crate::ast::Section;
 use crate::context::{Context, ScopeId};
 use crate::diag::{Diagnostic, Severity, nearest};
+use crate::homes::{Homeless, Homes};
 use crate::ir::{Constant, Ir, Operation, Register, RegisterId, RegisterKind};
 use crate::source::Span;
 use takt_isa::program::Space;
@@ -24,8 +25,8 @@ struct Use {
     conflicts: u64,
 }
 
-/// Checks a resolved program.
-pub(crate) fn check(context: &mut Context, ir: &Ir) {
+/// Checks a resolved program, whose registers have their homes.
+pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
     // Operations with mistakes are not in the program: what then seems unused need not be.
     let complete = context.sink.errors == 0;
     let mut uses = vec![Use::default(); ir.registers.len()];
@@ -42,23 +43,29 @@ pub(crate) fn check(context: &mut Context, ir: &Ir) {
             match found.written {
                 None => {
                     found.written = Some(((index, number), slot));
-                    reach(context, ir, operation, dest, slot);
+                    // Of one without a home that is the mistake.
+                    if homes.homeless(dest).is_none() {
+                        reach(context, ir, operation, dest, slot);
+                    }
                 }
                 // One report for each slot too many is enough.
                 Some((first, owner)) if owner != slot && found.conflicts & 1 << slot == 0 => {
                     found.conflicts |= 1 << slot;
-                    two_slots(context, ir, operation, (slot, owner), at(ir, first));
+                    two_slots(context, ir, operation, (slot, owner), at(ir, first), homes.homeless(dest));
                 }
                 Some(_) => {}
             }
         }
     }
-    for (register, found) in ir.registers.iter().zip(&uses).filter(|_| complete) {
+    let found = |index: usize| (&ir.registers[index], &uses[index], RegisterId::new(index));
+    for (register, used, id) in (0..uses.len()).map(found).filter(|_| complete) {
         // A raw word may read and write anything.
-        if !opaque {
-            unwritten(context, ir, register, found, &uses);
+        if !opaque && !homes.quiet.contains(&id) {
+            unwritten(context, ir, register, used, &uses);
         }
-        state(context, ir, register, found);
+        if !homes.set_once.contains(&id) {
+            state(context, ir, register, used);
+        }
     }
     targets(context, ir);
     // What a mistake leaves unused is no mistake of its own.
@@ -67,7 +74,9 @@ pub(crate) fn check(context: &mut Context, ir: &Ir) {
     }
     if !opaque {
         no_wait(context, ir);
-        ir.registers.iter().zip(&uses).for_each(|(register, found)| unused(context, register, found));
+        for (register, used, _) in (0..uses.len()).map(found).filter(|(.., id)| !homes.quiet.contains(id)) {
+            unused(context, register, used);
+        }
     }
     for constant in &context.constants {
         if !constant.used && constant.watched && !constant.name.starts_with('_') {
@@ -117,6 +126,7 @@ fn two_slots(
     operation: &Operation,
     (slot, owner): (u8, u8),
     first: &Operation,
+    homeless: Option<&Homeless>,
 ) {
     let Some(dest) = operation.dest else { return };
     let slots = ir.machine.slots;
@@ -131,10 +141,13 @@ fn two_slots(
     let writes = |by: &takt_isa::Slot, operation: &Operation| {
         format!("`{}` is of slot `{}`, which writes bank {}", operation.row().mnemonic, by.name, by.bank.name)
     };
-    let error = Diagnostic::error("two-slots", span, message)
+    let mut error = Diagnostic::error("two-slots", span, message)
         .here(writes(slot, operation))
         .also(before, writes(owner, first))
-        .help("use two registers");
+        .help(homeless.map_or("use two registers", |homeless| &homeless.help));
+    if let Some((span, because)) = homeless.and_then(|homeless| homeless.because.as_ref()) {
+        error = error.also(*span, because);
+    }
     context.report(ScopeId(operation.expansion), error);
 }
 

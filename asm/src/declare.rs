@@ -99,30 +99,6 @@ impl Expander<'_> {
         self.context.registers[register.index()].pinned = Some(address);
         Ok(())
     }
-
-    /// The register that a `.preset` names, by its name or its place.
-    pub(crate) fn preset_register(
-        &mut self,
-        at: At,
-        name: Name,
-        placed: bool,
-    ) -> Result<(RegisterId, Type), Reported> {
-        let id = self.context.name(at, name.name, name.span)?;
-        if !placed && let Binding::Register(register) = self.context.lookup(at.scope, id) {
-            let Register { kind, ty, .. } = self.context.registers[register.index()];
-            if kind == RegisterKind::Zero {
-                let error = Diagnostic::error("place", name.span, "`zero` always reads as zero");
-                return Err(self.context.report(at.scope, error));
-            }
-            return Ok((register, ty));
-        }
-        let address = address(&mut self.context, at, name)?;
-        if address == ZERO {
-            let error = Diagnostic::error("place", name.span, "`zero` always reads as zero");
-            return Err(self.context.report(at.scope, error));
-        }
-        Ok((register_at(&mut self.context, address, name.span), Type::B))
-    }
 }
 
 /// The address of a register by its canonical name.

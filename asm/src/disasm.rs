@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use std::fmt::Write as _;
 use takt_isa::program::{Location, Port, Space};
 use takt_isa::spec::instructions::Function;
-use takt_isa::{Instruction, Op, Program, Type};
+use takt_isa::{Effect, Instruction, Op, Program, Type, ZERO};
 
 /// The source text of a program.
 ///
@@ -180,9 +180,13 @@ impl<'p> Writer<'p> {
         if function == Function::Idle || machine.host(function)?.0 != slot {
             return None;
         }
+        let is_access = matches!(instruction.effect(), Effect::Load | Effect::Store);
+        if is_access && instruction.sources[0] == ZERO && instruction.constant >= machine.data_depth {
+            return None;
+        }
         let register = |address: u16| match self.registers.get(&address) {
             Some(name) => (*name).to_owned(),
-            None if address == takt_isa::ZERO => self.place(address),
+            None if address == ZERO => self.place(address),
             None => format!("@{}", self.place(address)),
         };
         let target = |address: u32| match self.targets.get(&address) {

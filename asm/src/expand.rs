@@ -10,11 +10,10 @@ use crate::context::{
 use crate::diag::Diagnostic;
 use crate::files::FileId;
 use crate::intern::NameId;
-use crate::ir::{Label, LabelId, RegisterId};
+use crate::ir::{Label, LabelId};
 use crate::limits;
 use crate::load::{Loader, include_path};
 use crate::source::Span;
-use crate::types::Addresses;
 use std::collections::HashMap;
 use std::rc::Rc;
 use takt_isa::Type;
@@ -52,10 +51,10 @@ pub(crate) struct LoopBound {
 /// A `.preset`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Preset {
-    pub(crate) register: RegisterId,
+    pub(crate) register: Name,
+    /// Whether `@` stands before it.
+    pub(crate) placed: bool,
     pub(crate) value: Expr,
-    /// What the value becomes: a named register has a type, a place has any.
-    pub(crate) ty: Type,
     pub(crate) at: At,
     pub(crate) span: Span,
 }
@@ -455,9 +454,7 @@ impl<'l> Expander<'l> {
             }
             DirectiveKind::Const(name, value) => {
                 let id = self.context.name(at, name.name, name.span)?;
-                self.context.addresses = Addresses::default();
                 let value = self.context.value(at, value.id).ok();
-                let addresses = self.context.addresses;
                 let number = self.context.constants.len() as u32;
                 self.context.declare(at, id, name.span, Binding::Constant(number))?;
                 let text = self.context.full_name(at.scope, id);
@@ -468,12 +465,12 @@ impl<'l> Expander<'l> {
                     span: name.span,
                     used: false,
                     watched,
-                    addresses,
                 });
             }
             DirectiveKind::Preset { register, placed, value } => {
-                let (register, ty) = self.preset_register(at, *register, *placed)?;
-                self.flat.presets.push(Preset { register, value: *value, ty, at, span });
+                // Registers may be declared further down.
+                let (register, placed, value) = (*register, *placed, *value);
+                self.flat.presets.push(Preset { register, placed, value, at, span });
             }
             DirectiveKind::Section(section) => self.section = *section,
             DirectiveKind::Float(values) => self.data(at, values, Type::F, span)?,

@@ -112,6 +112,10 @@ pub struct Operation {
     pub span: Span,
     /// Which use of a macro, or turn of a repetition, made it; 0 if it stands in the source as it is.
     pub expansion: u32,
+    /// Whether the assembler made it, for what stands at its place in the source.
+    pub made: bool,
+    /// Its place in the order of the source: the index of its bundle before any was moved.
+    pub order: u32,
     /// Where it is written: the tree, and the operation of the tree. For messages that point at an operand.
     pub(crate) written: (u32, u32),
 }
@@ -214,6 +218,19 @@ pub enum DemandKind {
     Late(u32),
 }
 
+/// A value of a name that has a register of its own ([`values`](crate::values)).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Version {
+    /// The register that the source names.
+    pub(crate) name: RegisterId,
+    /// The value's own.
+    pub(crate) register: RegisterId,
+    /// The order of the operation that writes it: operations behind that one read it.
+    pub(crate) after: u32,
+    /// The order of the last operations that may read it: where the name is next written.
+    pub(crate) through: u32,
+}
+
 /// A program before registers have addresses.
 #[derive(Clone, Debug)]
 pub struct Ir {
@@ -237,6 +254,8 @@ pub struct Ir {
     pub raw: Vec<u64>,
     /// Source files that [`Operation::location`] names.
     pub files: Vec<String>,
+    /// Values with registers of their own, by [`Version::after`] for each name.
+    pub(crate) versions: Vec<Version>,
 }
 
 impl Ir {

@@ -3,16 +3,18 @@
 //! The stages, each a module:
 //!
 //! ```text
-//! text ─ lex ─ tokens ─ parse ─ ast ─ expand ─ flat list ─ resolve ─ ir ─ place ─ emit ─ Program ─ image
+//! text ─ lex ─ tokens ─ parse ─ ast ─ expand ─ flat list ─ resolve ─ ir ─ homes ─ schedule ─ place ─ emit ─ Program ─ image
 //! ```
 //!
 //! `docs/language.md` is the contract of the language, `docs/image.md` that of the image. Nothing here prints, and nothing here
 //! touches the file system but [`load::FileLoader`]. No input makes the assembler panic; [`limits`] bounds what it takes.
 
+mod address;
 pub mod ast;
 mod blocks;
 mod check;
 mod context;
+mod copies;
 mod declare;
 pub mod diag;
 pub mod disasm;
@@ -21,7 +23,9 @@ mod expand;
 pub mod expr;
 mod expression;
 mod files;
+mod flow;
 mod grammar;
+mod homes;
 pub mod image;
 pub mod intern;
 pub mod ir;
@@ -30,6 +34,7 @@ mod lex;
 pub mod limits;
 pub mod listing;
 pub mod load;
+pub mod names;
 mod operand;
 pub mod parse;
 pub mod place;
@@ -48,6 +53,7 @@ use takt_isa::{Machine, Program, T3};
 
 pub use diag::Diagnostic;
 pub use expression::Expression;
+pub use homes::{Adjustment, Made};
 pub use levels::Levels;
 pub use load::{FileLoader, LoadError, Loader, MemoryLoader, Search};
 
@@ -102,8 +108,24 @@ pub struct Assembled {
     pub blocks: Vec<schedule::BlockReport>,
     /// What is demanded of ports (`.deadline`, `.order`, `.late`) and how it is met.
     pub timing: Vec<schedule::TimingReport>,
-    /// Words that a macro or a repetition made: indices into the program's code, ascending.
+    /// What was done about registers that operations of several slots write.
+    pub adjustments: Vec<Adjustment>,
+    /// Words that a macro, a repetition or the assembler itself made: indices into the program's code, ascending.
     pub expanded: Vec<u32>,
+    /// What the source's names stand for, bundle by bundle.
+    pub names: names::Names,
+}
+
+impl Assembled {
+    /// What a debugger wants to know of the program: for [`image::write_with`].
+    pub fn debug_info(&self) -> names::DebugInfo {
+        let files = self.sources.files().iter();
+        names::DebugInfo {
+            sources: files.map(|file| (file.name.to_string(), file.text.to_string())).collect(),
+            constants: self.constants.clone(),
+            names: self.names.clone(),
+        }
+    }
 }
 
 /// Assembles a program whose first source is at hand, as from standard input or an editor; what it includes is loaded.
@@ -136,10 +158,17 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
     };
     ir.bundles.iter_mut().for_each(|bundle| bundle.scheduled = packs(bundle.scheduled));
     types::check(&mut context, &ir);
-    values::split(&mut ir);
-    check::check(&mut context, &ir);
-    let context::Context { mut sink, sources, constants, .. } = context;
-    let sources = Arc::new(sources);
+    // Of a program that cannot fit nothing else is worth its time.
+    if emit::is_too_long(&ir) {
+        emit::limits(&ir, &mut context.sink);
+        return Err(context.sink.finish(Arc::new(context.sources)));
+    }
+    let mut homes = homes::choose(&mut ir);
+    let values = values::split(&mut ir, &mut homes);
+    copies::insert(&mut ir, &mut homes, &values);
+    check::check(&mut context, &ir, &homes);
+    let mut sink = std::mem::take(&mut context.sink);
+    let sources = Arc::new(std::mem::take(&mut context.sources));
     // What follows would only report what follows from the errors there are.
     if sink.errors > 0 {
         return Err(sink.finish(sources));
@@ -148,14 +177,16 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
     if sink.errors > 0 {
         return Err(sink.finish(sources));
     }
+    let adjustments = copies::report(&ir, homes);
     let placement = place::place(&ir, &mut sink);
     let emitted = emit::emit(&ir, &placement, &mut sink);
+    let names = names::names(&context, &ir, &placement, &emitted);
     let report = sink.finish(Arc::clone(&sources));
     if report.has_errors() {
         return Err(report);
     }
     let constants =
-        constants.into_iter().filter_map(|constant| Some((constant.name, constant.value?))).collect();
+        context.constants.into_iter().filter_map(|constant| Some((constant.name, constant.value?))).collect();
     Ok(Assembled {
         program: emitted.program,
         warnings: report,
@@ -163,6 +194,8 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
         constants,
         blocks,
         timing,
+        adjustments,
         expanded: emitted.expanded,
+        names,
     })
 }

@@ -10,7 +10,7 @@ use takt_isa::program::{Location, Port, Space};
 use takt_isa::{Instruction, Program, Type};
 
 /// The listing of an assembled program: for each bundle its address, its words in the order of the slots, and the source
-/// lines that they come from. An operation that a macro or a repetition made is shown as what it became, behind a `+`.
+/// lines that they come from. An operation that a macro, a repetition or the assembler made is shown as what it became, behind a `+`.
 pub fn listing(assembled: &Assembled) -> String {
     let mut lister = Lister::new(assembled);
     lister.code();
@@ -186,7 +186,7 @@ impl<'a> Lister<'a> {
 }
 
 /// Bits as a number: as an integer if that is small, else as binary32.
-fn shown(bits: u32) -> String {
+pub(crate) fn shown(bits: u32) -> String {
     match bits as i32 {
         small @ -0xffff..=0xffff => small.to_string(),
         _ => format!("{:?}", f32::from_bits(bits)),

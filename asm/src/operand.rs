@@ -9,7 +9,7 @@ use crate::intern::NameId;
 use crate::ir::{Constant, Label, LabelId, Operation, Register, RegisterId, RegisterKind};
 use crate::resolve::Resolver;
 use crate::source::Span;
-use crate::types::{Addresses, Given, Kind, Part, What};
+use crate::types::{Given, Kind, Part, What};
 use crate::unknown::Wanted;
 use takt_isa::shape::Field;
 use takt_isa::{Effect, Operand as Place, ROWS, Row, Type};
@@ -65,7 +65,7 @@ impl Resolver<'_> {
                 let (offset, base) = self.memory(at, operand, row)?;
                 operation.constant = Constant::Value(offset);
                 operation.sources[0] = base;
-                if let Some(table) = self.context.addresses.one() {
+                if let Some(table) = self.table_of(at, operand.kind) {
                     self.context.given.insert(operation, Part::Table, Given::Table(table));
                 }
                 self.note_cast(operation, Part::Source(0));
@@ -83,14 +83,15 @@ impl Resolver<'_> {
 
     /// Notes the type of a constant where the instruction takes any.
     fn note_literal(&mut self, at: At, operand: Operand, operation: &Operation, part: Part) {
-        self.context.addresses = Addresses::default();
         let Ok(value) = self.operand_value(at, operand) else { return };
-        let given = Given::literal(value, self.context.addresses, operand.span);
+        let is_address = self.table_of(at, operand.kind).is_some();
+        let given = Given::literal(value, is_address, operand.span);
         self.context.given.insert(operation, part, given);
     }
 
     /// Follows parameters to the operand that was given for them, and what its name means if it is a name.
     fn meaning(&mut self, mut at: At, mut operand: Operand) -> Result<Meaning, Reported> {
+        let mut parameter = None;
         loop {
             if let OperandKind::Cast(cast) = operand.kind {
                 let Cast { operand: inner, ty } = self.context.asts[at.ast as usize].casts[cast as usize];
@@ -107,9 +108,15 @@ impl Resolver<'_> {
             match self.context.lookup(at.scope, name) {
                 // Arguments that are parameters themselves were replaced when the macro was used.
                 Binding::Argument(argument) => {
+                    parameter.get_or_insert((self.context.scope(at.scope).owner, name));
                     Argument { operand, at, .. } = self.context.arguments[argument as usize];
                 }
-                binding => return Ok((at, operand, Some((name, binding)))),
+                binding => {
+                    if let (Some(parameter), Binding::Register(register)) = (parameter, binding) {
+                        self.context.parameters.insert(parameter, register);
+                    }
+                    return Ok((at, operand, Some((name, binding))));
+                }
             }
         }
     }
@@ -204,6 +211,47 @@ impl Resolver<'_> {
         Err(self.context.report(at.scope, error))
     }
 
+    /// The register that a `.preset` names, by its name or its place.
+    pub(crate) fn preset_register(
+        &mut self,
+        at: At,
+        name: Name,
+        placed: bool,
+    ) -> Result<(RegisterId, Type), Reported> {
+        let operand = Operand { kind: OperandKind::Name(name.name), span: name.span };
+        let (place, given, meaning) = if placed { (at, operand, None) } else { self.meaning(at, operand)? };
+        let (register, ty) = match (given.kind, meaning) {
+            (_, Some((_, Binding::Register(register)))) => {
+                (register, self.context.registers[register.index()].ty)
+            }
+            (OperandKind::Name(name) | OperandKind::Place(name), _) => {
+                if let Some((id, Binding::None)) = meaning
+                    && !self.looks_like_a_place(id)
+                {
+                    return Err(self.context.unknown(place.scope, id, given.span, Wanted::Dest));
+                }
+                let address = address(self.context, place, Name { name, span: given.span })?;
+                (register_at(self.context, address, given.span), Type::B)
+            }
+            _ => {
+                let error = Diagnostic::error("operand", given.span, "a register is needed here");
+                return Err(self.context.report(at.scope, error));
+            }
+        };
+        if register == RegisterId::ZERO {
+            let error = Diagnostic::error("place", given.span, "`zero` always reads as zero");
+            return Err(self.context.report(at.scope, error));
+        }
+        Ok((register, ty))
+    }
+
+    /// Whether a name is a bank's and a number.
+    fn looks_like_a_place(&self, name: NameId) -> bool {
+        let text = self.context.names.text(name);
+        let digits = text.trim_end_matches(|c: char| c.is_ascii_digit());
+        digits.len() < text.len() && self.ir.machine.banks().any(|bank| bank.name == digits)
+    }
+
     /// A register to read: a register as such, or the one that holds a constant.
     fn source(&mut self, at: At, operand: Operand, ty: Type) -> Result<RegisterId, Reported> {
         let (place, given, meaning) = self.meaning(at, operand)?;
@@ -250,12 +298,12 @@ impl Resolver<'_> {
 
     /// The bits of a constant operand.
     fn constant(&mut self, at: At, operand: Operand, ty: Type) -> Result<u32, Reported> {
-        self.context.addresses = Addresses::default();
         let value = self.operand_value(at, operand)?;
-        self.bits(at, value, ty, operand.span)
+        self.bits(at, value, ty, operand)
     }
 
-    pub(crate) fn bits(&mut self, at: At, value: Value, ty: Type, span: Span) -> Result<u32, Reported> {
+    pub(crate) fn bits(&mut self, at: At, value: Value, ty: Type, operand: Operand) -> Result<u32, Reported> {
+        let span = operand.span;
         let bits = value.bits(ty).map_err(|fault| self.context.fault(at.scope, EvalError { span, fault }))?;
         if let Value::Real(real) = value
             && ty != Type::I
@@ -266,7 +314,9 @@ impl Resolver<'_> {
                 Diagnostic::warning("underflow", span, format!("{real:e} rounds to zero in binary32"));
             self.context.report(at.scope, warning);
         }
-        if let (Value::Int(_), Type::F, Some(label)) = (value, ty, self.context.addresses.one()) {
+        if let (Value::Int(_), Type::F) = (value, ty)
+            && let Some(label) = self.table_of(at, operand.kind)
+        {
             let Label { name, span: declared, .. } = &self.context.labels[label.0 as usize];
             let message = format!("the address of `{name}` is taken as a float");
             let warning =
@@ -349,15 +399,13 @@ impl Resolver<'_> {
         let (value, span, base) = match (given.kind, meaning) {
             (OperandKind::Memory(memory), _) => {
                 let Memory { offset, base } = self.context.asts[place.ast as usize].memories[memory as usize];
-                // The base first: the offset's label is asked for afterwards.
-                let base = self.source(place, base, row.source_type(0));
-                self.context.addresses = Addresses::default();
                 let value = match offset {
                     Some(offset) => self.context.integer(place, offset).inspect_err(|_| {
                         self.context.unknown_tables(offset.span);
                     }),
                     None => Ok(0),
                 };
+                let base = self.source(place, base, row.source_type(0));
                 (value?, offset.map_or(given.span, |offset| offset.span), base?)
             }
             (_, Some((name, binding @ (Binding::Register(_) | Binding::Code(_))))) => {
@@ -374,7 +422,6 @@ impl Resolver<'_> {
                 return Err(self.context.report(at.scope, error));
             }
             _ => {
-                self.context.addresses = Addresses::default();
                 let value = self.operand_value(place, given).inspect_err(|_| {
                     self.context.unknown_tables(given.span);
                 })?;
@@ -386,7 +433,10 @@ impl Resolver<'_> {
             }
         };
         match self.field(at, value, Field::Offset, span, "an offset")? {
-            Constant::Value(offset) => Ok((offset, base)),
+            Constant::Value(offset) => {
+                self.check_address(at, (place, given), offset, base, span);
+                Ok((offset, base))
+            }
             _ => Err(Reported),
         }
     }

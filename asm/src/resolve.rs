@@ -7,7 +7,6 @@ use crate::expand::{self, Data, Flat, Item, Timing};
 use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
 use crate::serialise;
 use crate::source::Span;
-use crate::types::Addresses;
 use smallvec::SmallVec;
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -39,17 +38,16 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
         data: Vec::new(),
         raw: Vec::new(),
         files: Vec::new(),
+        versions: Vec::new(),
     };
-    let mut resolver = Resolver {
-        context,
-        flat,
-        ir,
-        slots,
-        pool: HashMap::new(),
-        own_files: Vec::new(),
-        label: 0,
-        cast: None,
+    let words = |data: &Data| match data {
+        Data::Space(count) => *count,
+        Data::Value(..) => 1,
     };
+    let data_words = flat.data.iter().map(words).sum();
+    let (pool, own_files) = (HashMap::new(), Vec::new());
+    let mut resolver =
+        Resolver { context, flat, ir, slots, pool, own_files, label: 0, data_words, cast: None };
     let once = std::mem::take(&mut resolver.flat.once);
     resolver.section(Section::Once, &once);
     resolver.ir.period = resolver.ir.bundles.len() as u32;
@@ -68,6 +66,9 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
     ir.registers = std::mem::take(&mut context.registers);
     ir.labels = std::mem::take(&mut context.labels);
     ir.files = flat.files;
+    for (order, bundle) in (0..).zip(&mut ir.bundles) {
+        bundle.operations.iter_mut().for_each(|operation| operation.order = order);
+    }
     ir
 }
 
@@ -92,6 +93,8 @@ pub(crate) struct Resolver<'c> {
     label: usize,
     /// The type that the operand at hand is taken as, if the source says so.
     pub(crate) cast: Option<Type>,
+    /// Words of data memory that the source declares.
+    pub(crate) data_words: u32,
 }
 
 impl Resolver<'_> {
@@ -158,6 +161,10 @@ impl Resolver<'_> {
                 }
             }
         } else if self.check_slots(item.at, &operations).is_ok() {
+            if let Some(diagnostic) = serialise::twice(&operations) {
+                let diagnostic = diagnostic(&self.context.registers, self.ir.machine);
+                self.context.report(item.at.scope, diagnostic);
+            }
             self.ir.bundles.push(Bundle { operations, explicit, scheduled: item.scheduled });
         }
     }
@@ -270,6 +277,8 @@ impl Resolver<'_> {
             location,
             span: written.span,
             expansion: at.scope.0,
+            made: false,
+            order: 0,
             written: (at.ast, number),
         };
         let mut failed = false;
@@ -317,6 +326,8 @@ impl Resolver<'_> {
             location,
             span: written.span,
             expansion: at.scope.0,
+            made: false,
+            order: 0,
             written: (at.ast, number),
         })
     }
@@ -330,9 +341,8 @@ impl Resolver<'_> {
                     self.context.data_types.resize(length, Type::B);
                 }
                 Data::Value(at, value, ty) => {
-                    self.context.addresses = Addresses::default();
                     let word = self.context.value(at, value.id);
-                    let word = word.and_then(|word| self.bits(at, word, ty, value.span));
+                    let word = word.and_then(|word| self.bits(at, word, ty, value.into()));
                     // A word with a mistake keeps its place.
                     self.ir.data.push(word.unwrap_or(0));
                     self.context.data_types.push(ty);
@@ -384,10 +394,12 @@ impl Resolver<'_> {
 
     fn presets(&mut self) {
         for preset in std::mem::take(&mut self.flat.presets) {
-            self.context.addresses = Addresses::default();
+            let found = self.preset_register(preset.at, preset.register, preset.placed);
             let Ok(value) = self.context.value(preset.at, preset.value.id) else { continue };
-            let Ok(bits) = self.bits(preset.at, value, preset.ty, preset.value.span) else { continue };
-            let register = &mut self.context.registers[preset.register.index()];
+            // A named register has a type, a place has any.
+            let Ok((register, ty)) = found else { continue };
+            let Ok(bits) = self.bits(preset.at, value, ty, preset.value.into()) else { continue };
+            let register = &mut self.context.registers[register.index()];
             if register.preset.replace(bits).is_some() {
                 let error =
                     Diagnostic::error("declared-twice", preset.span, "this register is preset already");

@@ -3,9 +3,11 @@
 //! In `fmul t, a, b` and then `fadd t, t, c` the name `t` stands for two values, which on a machine with several banks even
 //! lie in different ones. Each value but the run's last, which may be read elsewhere, gets a register of its own wherever
 //! that matters: where the scheduler may move the operations (the reuse of a name then orders nothing), and for names that
-//! operations of different slots write.
+//! operations of different slots write. Of these the last value, too, where it does not lie in the name's home.
 
-use crate::ir::{Ir, Operation, Register, RegisterId, RegisterKind};
+use crate::flow;
+use crate::homes::Homes;
+use crate::ir::{Ir, Operation, Register, RegisterId, RegisterKind, Version};
 use takt_isa::Effect;
 use takt_isa::program::Space;
 
@@ -20,7 +22,8 @@ pub(crate) struct Run {
     pub(crate) scheduled: bool,
 }
 
-/// Cuts the program into runs: at labels and heads of loops, at the period's start, after redirections, around what must not move.
+/// Cuts the program into runs: at labels, at heads of loops and at bundles that are jumped to by number, at the period's start,
+/// after redirections, around what must not move.
 pub(crate) fn runs(ir: &Ir) -> Vec<Run> {
     let count = ir.bundles.len();
     let mut cut = vec![false; count + 1];
@@ -32,6 +35,11 @@ pub(crate) fn runs(ir: &Ir) -> Vec<Run> {
     }
     for bound in &ir.loop_bounds {
         cut[bound.position as usize] = true;
+    }
+    for address in ir.operations().filter_map(flow::number) {
+        if let Some(cut) = cut.get_mut(address as usize) {
+            *cut = true;
+        }
     }
     for (i, bundle) in ir.bundles.iter().enumerate() {
         // The status register sees every operation before and none after: a wall.
@@ -53,7 +61,7 @@ pub(crate) fn runs(ir: &Ir) -> Vec<Run> {
 }
 
 /// Registers that operations of different slots write, by index.
-fn contested(ir: &Ir) -> Vec<bool> {
+pub(crate) fn contested(ir: &Ir) -> Vec<bool> {
     let mut owner = vec![None; ir.registers.len()];
     let mut contested = vec![false; ir.registers.len()];
     for operation in ir.operations() {
@@ -74,30 +82,41 @@ struct Name {
     made: u32,
     /// The register of its current value, if not itself.
     current: Option<RegisterId>,
+    /// The index of that value's [`Version`].
+    version: usize,
 }
 
-/// Splits names into values where that matters.
-pub(crate) fn split(ir: &mut Ir) {
-    let contested = contested(ir);
-    if !contested.contains(&true) && !ir.bundles.iter().any(|bundle| bundle.scheduled) {
-        return;
+/// A value that is to be copied to the register that it is a value of.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Copy {
+    /// The bundle that computes it, and which of its operations.
+    pub(crate) at: (usize, usize),
+    /// The register that it lies in.
+    pub(crate) from: RegisterId,
+    /// The register that it goes to.
+    pub(crate) to: RegisterId,
+}
+
+/// Splits names into values where that matters. Returns the values that are still to be copied home, in order.
+pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
+    let mut copies = Vec::new();
+    if homes.of.iter().all(Option::is_none) && !ir.bundles.iter().any(|bundle| bundle.scheduled) {
+        return copies;
     }
     let mut names = vec![Name::default(); ir.registers.len()];
     let mut touched: Vec<usize> = Vec::new();
-    for run in runs(ir) {
+    for (number, run) in runs(ir).into_iter().enumerate() {
         for operation in ir.bundles[run.start..run.end].iter().flat_map(|bundle| &bundle.operations) {
-            let Some(index) = operation.dest.map(RegisterId::index) else { continue };
-            let register = &ir.registers[index];
-            let is_free = register.kind == RegisterKind::Plain
-                && register.pinned.is_none()
-                && register.preset.is_none();
-            if is_free && (run.scheduled || contested[index]) {
-                names[index].left += 1;
-                touched.push(index);
+            let Some(id) = operation.dest else { continue };
+            if homes.get(id).is_some() || (run.scheduled && is_free(ir.register(id))) {
+                names[id.index()].left += 1;
+                touched.push(id.index());
             }
         }
-        let Ir { bundles, registers, .. } = &mut *ir;
-        for bundle in &mut bundles[run.start..run.end] {
+        let Ir { bundles, registers, versions, .. } = &mut *ir;
+        let last = bundles[run.start..run.end].iter().flat_map(|bundle| &bundle.operations);
+        let last = last.map(|operation| operation.order).max().unwrap_or(0);
+        for (at, bundle) in (run.start..).zip(&mut bundles[run.start..run.end]) {
             // All operations of a bundle read before any writes.
             for operation in &mut bundle.operations {
                 let count = operation.row().shape.sources();
@@ -106,24 +125,57 @@ pub(crate) fn split(ir: &mut Ir) {
                     *source = names.get(source.index()).and_then(|name| name.current).unwrap_or(*source);
                 }
             }
-            for operation in &mut bundle.operations {
+            for (which, operation) in bundle.operations.iter_mut().enumerate() {
                 let Some(dest) = operation.dest else { continue };
                 let Some(name) = names.get_mut(dest.index()).filter(|name| name.left > 0) else { continue };
                 name.left -= 1;
-                if name.left == 0 {
+                if name.current.is_some() {
+                    versions[name.version].through = operation.order;
+                }
+                let original = &registers[dest.index()];
+                let home = homes.get(dest);
+                let is_home = home.is_none_or(|home| operation.slot == Some(home.slot));
+                // A port shows every value, another register the run's last.
+                let settles = name.left == 0 || original.kind == RegisterKind::Output;
+                if settles && is_home {
                     name.current = None;
                     continue;
                 }
                 name.made += 1;
-                let original = &registers[dest.index()];
-                let fresh = Register { name: format!("{}.{}", original.name, name.made), ..original.clone() };
+                let fresh = Register {
+                    name: format!("{}.{}", original.name, name.made),
+                    kind: RegisterKind::Plain,
+                    pinned: None,
+                    preset: None,
+                    ..original.clone()
+                };
+                let id = RegisterId::new(registers.len());
+                if home.is_some() && (settles || !is_free(original)) {
+                    homes.quiet.insert(id);
+                }
                 registers.push(fresh);
-                name.current = Some(RegisterId::new(registers.len() - 1));
-                operation.dest = name.current;
+                name.version = versions.len();
+                let (after, through) = (operation.order, operation.order);
+                versions.push(Version { name: dest, register: id, after, through });
+                name.current = Some(id);
+                operation.dest = Some(id);
+                if settles && homes.is_live(dest, number) {
+                    copies.push(Copy { at: (at, which), from: id, to: dest });
+                }
             }
         }
         for index in touched.drain(..) {
+            // A value that is copied home is what the name means to the end of the run.
+            if names[index].current.is_some() {
+                versions[names[index].version].through = last;
+            }
             names[index] = Name { made: names[index].made, ..Name::default() };
         }
     }
+    copies
+}
+
+/// Whether the register of a name may be any, and another for each value.
+fn is_free(register: &Register) -> bool {
+    register.kind == RegisterKind::Plain && register.pinned.is_none() && register.preset.is_none()
 }

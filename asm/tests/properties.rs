@@ -115,6 +115,11 @@ fn exercise(text: &str, machine: &'static Machine) -> Result<(), TestCaseError> 
         Ok(assembled) => {
             let _ = takt_asm::listing::listing(&assembled);
             let _ = assembled.warnings.render(true);
+            let debug = assembled.debug_info();
+            let read = image::read_with(
+                &image::write_with(&assembled.program, Some(&debug)).expect("an image holds it"),
+            );
+            prop_assert_eq!(read.map(|(_, read)| read.map(|read| read.names)), Ok(Some(debug.names)));
             round_trip(&assembled.program)
         }
         Err(report) => {

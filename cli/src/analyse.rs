@@ -2,6 +2,7 @@
 
 use crate::files::{self, Out};
 use crate::load::Load;
+use crate::number;
 use crate::output;
 use crate::ports::{self, Rows};
 use crate::select::{OptionalMachine, SourceArguments};
@@ -13,6 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_analysis::{Issued, Link, LinkKind, Trace, WhatIf};
+use takt_asm::schedule::BlockReport;
 use takt_emu::{Emulator, Status};
 use takt_isa::program::Location;
 use takt_isa::spec::instructions::Function;
@@ -36,7 +38,7 @@ pub(crate) struct Analyse {
     #[arg(long, value_name = "CSV")]
     inputs: Option<PathBuf>,
     /// Run so many periods and look at the last; 0 is what runs once [default: the rows of --inputs, else 2].
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = number::natural, allow_hyphen_values = true)]
     periods: Option<u64>,
     /// Write the picture of the pipeline as a page for a browser, which needs nothing else; `-` is standard output.
     #[arg(long, value_name = "OUT")]
@@ -51,9 +53,10 @@ Examples:
   takt analyse prog.s                     the second period: stalls, critical path, what a faster unit would bring
   takt analyse prog.s --html prog.html    the pipeline as a picture
   takt analyse prog.s --periods 0         what runs once
+  takt analyse prog.s --inputs in.csv     the last period of recorded inputs";
 
-`takt track --csv in.csv` records inputs of the tracking programs.";
-
+/// Periods without `--inputs`.
+const PERIODS: u64 = 2;
 /// Periods that are run at most on the way to the one to look at.
 const MOST_PERIODS: u64 = 1_000_000;
 /// Lines of each list of the text; --json has all.
@@ -70,10 +73,10 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
     let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
     let program = load.program(&arguments.file)?;
     let rows = read_inputs(arguments, &program)?;
-    let (trace, period) = follow(arguments, &program, rows.as_ref())?;
+    let (trace, period) = follow(arguments, &program, &rows)?;
     let analysis = Analysis {
         chain: trace.critical_path(&program),
-        faster: faster(arguments, &load, &program, &trace, rows.as_ref()),
+        faster: faster(arguments, &load, &program, &trace, &rows),
         program: &program,
         name: files::input_name(&arguments.file),
         period,
@@ -92,29 +95,32 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
     Ok(())
 }
 
-fn read_inputs(arguments: &Analyse, program: &Program) -> Result<Option<Rows>> {
-    let Some(path) = &arguments.inputs else { return Ok(None) };
-    let wanted = arguments.periods.map_or(MOST_PERIODS, |wanted| wanted.max(1));
-    let rows = ports::read_rows(path, &program.inputs, wanted)?;
-    if rows.is_empty() || arguments.periods.is_some_and(|wanted| (rows.len() as u64) < wanted) {
+/// The inputs of the periods up to the one to look at.
+fn read_inputs(arguments: &Analyse, program: &Program) -> Result<Rows> {
+    let wanted = arguments.periods;
+    if let Some(wanted) = wanted.filter(|wanted| *wanted > MOST_PERIODS) {
+        bail!("{wanted} periods: at most {MOST_PERIODS} are run on the way to the one to look at");
+    }
+    let path = arguments.inputs.as_deref();
+    // What runs once reads the first period's inputs.
+    let most = wanted.map(|wanted| wanted.max(1)).or(path.map(|_| MOST_PERIODS));
+    let rows = ports::rows(path, most, PERIODS, &program.inputs)?;
+    if let (Some(path), Some(wanted)) = (path, wanted)
+        && (rows.len() as u64) < wanted
+    {
         let plural = if rows.len() == 1 { "" } else { "s" };
         bail!("{} has {} row{plural}, so there is no such period", files::input_name(path), rows.len());
     }
-    Ok(Some(rows))
+    Ok(rows)
 }
 
 /// Runs the program and follows the last period asked for; its number, 0 being what runs once.
-fn follow(arguments: &Analyse, program: &Program, rows: Option<&Rows>) -> Result<(Trace, u64)> {
-    let wanted = arguments.periods.unwrap_or(rows.map_or(2, |rows| rows.len() as u64));
-    if wanted > MOST_PERIODS {
-        bail!("{wanted} periods: at most {MOST_PERIODS} are run on the way to the one to look at");
-    }
+fn follow(arguments: &Analyse, program: &Program, rows: &Rows) -> Result<(Trace, u64)> {
+    let wanted = arguments.periods.unwrap_or(rows.len() as u64);
     let mut emulator = Emulator::new(program)?;
     let set = |emulator: &mut Emulator, period: u64| -> Result<()> {
-        let row = rows.and_then(|rows| rows.get(period.saturating_sub(1) as usize));
-        for port in &program.inputs {
-            let set = row.and_then(|row| row.iter().find(|(register, _)| *register == port.register));
-            emulator.set_input_bits(port.register, set.map_or(0, |(_, bits)| *bits))?;
+        for &(register, bits) in rows.get(period.saturating_sub(1) as usize).into_iter().flatten() {
+            emulator.set_input_bits(register, bits)?;
         }
         emulator.set_cycle_limit(emulator.now() + crate::run::PERIOD_LIMIT);
         Ok(())
@@ -141,23 +147,28 @@ fn follow(arguments: &Analyse, program: &Program, rows: Option<&Rows>) -> Result
 /// What a faster unit would bring: to the program as it is, and assembled anew for a machine that has it.
 struct Faster {
     what: WhatIf,
-    anew: Option<Cycle>,
+    anew: Option<Anew>,
 }
 
-fn faster(
-    arguments: &Analyse,
-    load: &Load,
-    program: &Program,
-    trace: &Trace,
-    rows: Option<&Rows>,
-) -> Vec<Faster> {
+/// The program assembled for a machine with a faster unit.
+struct Anew {
+    cycles: Cycle,
+    /// What no schedule of its blocks can be shorter than.
+    least: Cycle,
+}
+
+fn faster(arguments: &Analyse, load: &Load, program: &Program, trace: &Trace, rows: &Rows) -> Vec<Faster> {
     // Standard input has been read; an image has no source.
     let source = Some(&arguments.file).filter(|file| !files::is_dash(file));
     let source = source.and_then(|file| Load::source(file).ok());
     let anew = |what: &WhatIf| {
         let machine = Some(quicker(program.machine, what.unit));
         let assembled = Load { machine, ..load.clone() }.assemble(&arguments.file, source.clone()?).ok()?;
-        Some(follow(arguments, &assembled.program, rows).ok()?.0.cycles)
+        let found = follow(arguments, &assembled.program, rows).ok()?.0;
+        let visits = |address| found.issues.iter().filter(|issue| issue.address == address).count() as Cycle;
+        let spare = |block: &BlockReport| Cycle::from(block.cycles.saturating_sub(block.bound.cycles()));
+        let spare: Cycle = assembled.blocks.iter().map(|block| visits(block.address) * spare(block)).sum();
+        Some(Anew { cycles: found.cycles, least: found.cycles.saturating_sub(spare) })
     };
     trace.what_if(program).into_iter().map(|what| Faster { anew: anew(&what), what }).collect()
 }
@@ -333,7 +344,16 @@ impl Analysis<'_> {
                 "from": link.from, "to": link.to, "cycles": link.cycles, "through": through, "register": register,
             })
         };
-        let faster = |Faster { what, anew }: &Faster| json!({ "unit": self.unit(what.unit), "as_it_is": what.cycles, "assembled_anew": anew });
+        let faster = |faster: &Faster| {
+            let anew = faster.anew.as_ref();
+            json!({
+                "unit": self.unit(faster.what.unit),
+                "as_it_is": faster.what.cycles,
+                "assembled_anew": anew.map(|anew| anew.cycles),
+                "least_anew": anew.map(|anew| anew.least),
+                "stalls": gained(&faster.what).map(|(kind, more)| (kind.to_owned(), json!(more))).collect::<Value>(),
+            })
+        };
         json!({
             "program": self.name,
             "machine": program.machine.name,
@@ -387,12 +407,43 @@ impl Analysis<'_> {
             writeln!(out, "  {:>5}  to cycle {:<5} {to}: {how}", link.cycles, self.cycle(link.to))?;
         }
 
+        self.faster_text(out)
+    }
+
+    /// What a faster unit would bring; where that is more cycles than today, why.
+    fn faster_text(&self, out: &mut Out) -> Result<()> {
+        let today = self.trace.cycles;
         writeln!(out, "\none cycle less in      as it is   assembled anew")?;
+        let gain = |new: Cycle| format!("{new} ({:+})", new.cast_signed() - today.cast_signed());
         for Faster { what, anew } in &self.faster {
-            let gain = |new: Cycle| format!("{new} ({:+})", new.cast_signed() - trace.cycles.cast_signed());
-            let anew = anew.map_or_else(|| "-".to_owned(), gain);
+            let anew = anew.as_ref().map_or_else(|| "-".to_owned(), |anew| gain(anew.cycles));
             writeln!(out, "  {:<16} {:>12} {anew:>16}", self.unit(what.unit), gain(what.cycles))?;
+        }
+        let worse: Vec<&WhatIf> =
+            self.faster.iter().map(|faster| &faster.what).filter(|what| what.cycles > today).collect();
+        if !worse.is_empty() {
+            writeln!(
+                out,
+                "more as it is: in bundles packed for today's latencies, sooner results meet others"
+            )?;
+        }
+        for what in worse {
+            let stalls: Vec<String> = gained(what).map(|(kind, more)| format!("{kind} {more:+}")).collect();
+            writeln!(out, "  {:<16} stalled cycles: {}", self.unit(what.unit), stalls.join(", "))?;
+        }
+        let worse = || self.faster.iter().filter_map(|faster| Some((faster, faster.anew.as_ref()?)));
+        let worse = || worse().filter(|(_, anew)| anew.cycles > today);
+        if worse().next().is_some() {
+            writeln!(out, "more anew: the search ended with a longer schedule, which proves nothing")?;
+        }
+        for (faster, anew) in worse() {
+            writeln!(out, "  {:<16} none takes fewer than {}", self.unit(faster.what.unit), anew.least)?;
         }
         Ok(())
     }
+}
+
+/// The stalls that a faster unit would add or take away, by kind.
+fn gained(what: &WhatIf) -> impl Iterator<Item = (&'static str, i64)> {
+    Cause::KINDS.into_iter().zip(what.stalls).filter(|(_, more)| *more != 0)
 }

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
 use takt_asm::ir::DemandKind;
 use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, TimingReport};
-use takt_asm::{Assembled, Schedule, image, listing};
+use takt_asm::{Adjustment, Assembled, Made, Schedule, image, listing};
 use takt_isa::Program;
 
 /// Assemble a source into an image.
@@ -47,8 +47,11 @@ pub(crate) struct Asm {
     #[arg(long, value_enum, value_name = "WHEN", default_value_t = When::Source)]
     schedule: When,
     /// How long the scheduler searches, up to 100000; 0 is the first passes only.
-    #[arg(long, value_name = "N", default_value_t = DEFAULT_EFFORT, value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_EFFORT, value_parser = clap::value_parser!(u32).range(0..=100_000), allow_hyphen_values = true)]
     effort: u32,
+    /// Leave out of the image what only a debugger reads: the sources, constants, what names stand for.
+    #[arg(long)]
+    strip: bool,
     /// Check only; write no file.
     #[arg(long, conflicts_with_all = ["output", "listing", "symbols", "readmemh"])]
     check: bool,
@@ -145,7 +148,8 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         }
     }
     if let Some(path) = &image_path {
-        files::write(path, &image::write(program)?)?;
+        let debug = (!arguments.strip).then(|| assembled.debug_info());
+        files::write(path, &image::write_with(program, debug.as_ref())?)?;
     }
     if arguments.json {
         output::json(&result_json(&assembled, image_path.as_deref())?, out)?;
@@ -162,6 +166,7 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         )?;
         write_blocks(&assembled, out)?;
         write_timing(&assembled, out)?;
+        write_adjustments(&assembled, out)?;
     }
     Ok(())
 }
@@ -199,6 +204,21 @@ fn write_timing(assembled: &Assembled, out: &mut Out) -> Result<()> {
         let ports = report.ports.iter().map(cycles).collect::<Vec<_>>().join(", ");
         let (demand, result) = timing_text(report);
         writeln!(out, "  {demand}: {result}; cycles: {ports}")?;
+    }
+    Ok(())
+}
+
+/// What became of operations whose slot does not write the bank that their register lies in.
+fn write_adjustments(assembled: &Assembled, out: &mut Out) -> Result<()> {
+    let adjustments = &assembled.adjustments;
+    let Some(longest) = adjustments.iter().map(|one| one.register.chars().count()).max() else {
+        return Ok(());
+    };
+    let width = longest.clamp(12, 40);
+    writeln!(out, "{:<1$} bank   written by several slots", "registers", width + 2)?;
+    for Adjustment { register, bank, mnemonic, location, made } in adjustments {
+        let place = location.map_or(String::new(), |at| format!("{}: ", assembled.program.place_text(at)));
+        writeln!(out, "  {register:<width$} {bank:<6} {place}`{mnemonic}` {made}")?;
     }
     Ok(())
 }
@@ -285,6 +305,23 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
             "ports": report.ports.iter().map(port).collect::<Vec<_>>(),
         })
     };
+    let adjustment = |one: &Adjustment| {
+        let (made, details) = match one.made {
+            Made::Preset(bits) => ("preset", json!({ "bits": bits })),
+            Made::Operation(mnemonic) => ("operation", json!({ "mnemonic": mnemonic })),
+            Made::Copy { address, alone, cycles } => {
+                ("copy", json!({ "address": address, "alone": alone, "cycles": cycles }))
+            }
+        };
+        json!({
+            "register": one.register,
+            "bank": one.bank,
+            "mnemonic": one.mnemonic,
+            "place": one.location.map(|at| program.place_text(at)),
+            "made": made,
+            "details": details,
+        })
+    };
     Ok(json!({
         "machine": program.machine.name,
         "image": image.map(|path| path.display().to_string()),
@@ -294,6 +331,7 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
         "data_words": program.data.len(),
         "blocks": assembled.blocks.iter().map(block).collect::<Vec<_>>(),
         "timing": assembled.timing.iter().map(timing).collect::<Vec<_>>(),
+        "adjustments": assembled.adjustments.iter().map(adjustment).collect::<Vec<_>>(),
         "messages": messages(&assembled.warnings)?,
     }))
 }

@@ -2,6 +2,7 @@
 
 use crate::files::{self, Out};
 use crate::load::Load;
+use crate::number::{self, Time};
 use crate::output::{self, Failure};
 use crate::select::{self, OptionalMachine, SourceArguments};
 use anyhow::{Result, anyhow, bail};
@@ -28,10 +29,10 @@ pub(crate) struct Bound {
     source: SourceArguments,
     /// Fail (status 1) unless every period ends before the next tick, this time after its own: `100us`, `0.1ms`, or a
     /// number of cycles.
-    #[arg(long, value_name = "TIME", value_parser = deadline, allow_negative_numbers = true)]
-    deadline: Option<Deadline>,
+    #[arg(long, value_name = "TIME", value_parser = number::time, allow_hyphen_values = true)]
+    deadline: Option<Time>,
     /// Clock in MHz, for a deadline in seconds and for cycles to time.
-    #[arg(long, value_name = "MHZ", default_value_t = select::PAPER_CLOCK, value_parser = select::clock, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MHZ", default_value_t = select::PAPER_CLOCK, value_parser = number::clock, allow_hyphen_values = true)]
     clock: f64,
     /// Print the result as JSON.
     #[arg(long)]
@@ -42,35 +43,6 @@ const EXAMPLES: &str = "\
 Examples:
   takt bound prog.s                                  best and worst of every section
   takt bound prog.s --deadline 100us --clock 125MHz  for CI: status 1 if a period can take longer";
-
-/// The time from one tick to the next.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Deadline {
-    Cycles(Cycle),
-    Seconds(f64),
-}
-
-fn deadline(text: &str) -> Result<Deadline, String> {
-    const UNITS: [(&str, f64); 5] = [("ns", 1e-9), ("us", 1e-6), ("µs", 1e-6), ("ms", 1e-3), ("s", 1.0)];
-    if let Ok(cycles) = select::count(text) {
-        return Ok(Deadline::Cycles(cycles));
-    }
-    let wrong = || "neither a time (`100us`, `0.1ms`) nor a number of cycles".to_owned();
-    let unit = UNITS.iter().find_map(|(unit, seconds)| Some((text.strip_suffix(unit)?, *seconds)));
-    let (number, scale) = unit.ok_or_else(wrong)?;
-    let seconds = number.trim_end().parse::<f64>().map_err(|_| wrong())? * scale;
-    if (1e-9..=1e6).contains(&seconds) { Ok(Deadline::Seconds(seconds)) } else { Err(wrong()) }
-}
-
-impl Deadline {
-    /// Whole cycles from tick to tick. A time that is a whole number of cycles but for rounding is that number.
-    fn cycles(self, clock: f64) -> Cycle {
-        match self {
-            Deadline::Cycles(cycles) => cycles,
-            Deadline::Seconds(seconds) => (seconds * clock * 1e6 + 1e-6).floor() as Cycle,
-        }
-    }
-}
 
 /// The deadline against the worst period.
 struct Verdict {

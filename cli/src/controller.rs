@@ -1,5 +1,6 @@
 //! A program on the emulator as the controller of the hybrid robot.
 
+use crate::deny::{Denials, Watch};
 use crate::fault::explain;
 use crate::run::PERIOD_LIMIT;
 use crate::select::suggest;
@@ -87,6 +88,7 @@ pub(crate) struct Detail {
 pub(crate) struct OnEmulator {
     emulator: Emulator,
     binding: Binding,
+    watch: Watch,
     /// Periods until the one that is looked at in detail, the last.
     until_detail: u64,
     /// The report of the last period.
@@ -96,9 +98,14 @@ pub(crate) struct OnEmulator {
 
 impl OnEmulator {
     /// A program that has the tracking algorithm's ports; period `detail`, from 0, is looked at in detail.
-    pub(crate) fn new(emulator: Emulator, detail: u64) -> Result<OnEmulator> {
+    pub(crate) fn new(emulator: Emulator, watch: Watch, detail: u64) -> Result<OnEmulator> {
         let binding = Binding::new(emulator.program())?;
-        Ok(OnEmulator { emulator, binding, until_detail: detail, report: None, detail: None })
+        Ok(OnEmulator { emulator, binding, watch, until_detail: detail, report: None, detail: None })
+    }
+
+    /// What was denied and happened.
+    pub(crate) fn denials(&self) -> Denials {
+        self.watch.end(&self.emulator)
     }
 
     /// The registers of the algorithm's inputs, in their order.
@@ -127,7 +134,7 @@ impl OnEmulator {
             Event::PortWrite(write) if forces.contains(&write.register) => written = Some(write.cycle),
             _ => {}
         };
-        let report = self.emulator.observed(&mut sink).run_period(&[])?;
+        let report = self.watch.run_period(&mut self.emulator, None, Some(&mut sink))?;
         let reads = || first_read.iter().copied().flatten();
         let latency = reads().min().zip(reads().max()).zip(written).map(|((first, last), written)| Latency {
             from_first_read: written.saturating_sub(first),
@@ -154,8 +161,12 @@ impl TrackingController for OnEmulator {
         }
         self.emulator.set_cycle_limit(self.emulator.now() + PERIOD_LIMIT);
         let is_last = self.until_detail == 0;
-        let report = if is_last { self.observed_period() } else { self.emulator.run_period(&[]) };
-        let report = report.map_err(|error| ControllerError(explain(self.emulator.program(), &error)))?;
+        let report = if is_last {
+            self.observed_period()
+        } else {
+            self.watch.run_period(&mut self.emulator, None, None)
+        };
+        let report = report.map_err(|error| ControllerError(explain(&error)))?;
         self.until_detail = self.until_detail.wrapping_sub(1);
         self.report = Some(report);
         let mut values = [0.0; OUTPUTS.len()];

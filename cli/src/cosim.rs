@@ -2,9 +2,10 @@
 
 use crate::files::{self, Out};
 use crate::load::Load;
+use crate::number;
 use crate::output::{self, Failure};
 use crate::ports;
-use crate::select::{self, OptionalMachine, SourceArguments};
+use crate::select::{OptionalMachine, SourceArguments};
 use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::{Value, json};
@@ -33,13 +34,13 @@ pub(crate) struct Cosim {
     #[arg(long, value_name = "CSV", requires = "file", conflicts_with_all = ["seed", "programs"])]
     inputs: Option<PathBuf>,
     /// Run at most this many periods [default: one for each row; without --inputs, 100].
-    #[arg(long, value_name = "N", value_parser = select::count, requires = "file", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = number::count, requires = "file", allow_hyphen_values = true)]
     periods: Option<u64>,
     /// Run random programs, the first from this seed [default: 0].
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = number::natural, allow_hyphen_values = true)]
     seed: Option<u64>,
     /// Run so many random programs [default: 1].
-    #[arg(long, value_name = "N", value_parser = select::count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
     programs: Option<u64>,
     /// Where the waveform of a difference goes, as VCD.
     #[arg(long, value_name = "FILE", default_value = "cosim.vcd")]

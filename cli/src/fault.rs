@@ -1,17 +1,11 @@
 //! Why a program stopped, with the mend where one is known.
 
 use takt_emu::{FaultKind, PeriodError};
-use takt_isa::Program;
 
 /// An error of the emulator for the user.
-pub(crate) fn explain(program: &Program, error: &PeriodError) -> String {
+pub(crate) fn explain(error: &PeriodError) -> String {
     let mend = match error {
         PeriodError::Fault(fault) => match fault.kind {
-            FaultKind::UnwrittenRegister { register, .. }
-                if program.inputs.iter().any(|port| port.register == register) =>
-            {
-                "it is an input port: give its values with --inputs"
-            }
             FaultKind::CycleLimit { .. } => {
                 "does the program come to its `wait` or `halt`? (`takt run --max-cycles` sets the limit)"
             }

@@ -12,6 +12,11 @@ pub(crate) fn is_dash(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
+/// Whether what is read there may only be on its way: standard input, a pipe. (Not a file, which is there whole.)
+pub(crate) fn is_live(path: &Path) -> bool {
+    is_dash(path) || fs::metadata(path).is_ok_and(|about| !about.is_file())
+}
+
 /// A file to read, as messages name it.
 pub(crate) fn input_name(path: &Path) -> String {
     if is_dash(path) { "standard input".to_owned() } else { path.display().to_string() }

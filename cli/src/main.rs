@@ -10,6 +10,7 @@ mod completions;
 mod controller;
 mod cosim;
 mod debug;
+mod deny;
 mod disasm;
 mod eval;
 mod fault;
@@ -19,6 +20,7 @@ mod load;
 mod machines;
 mod man;
 mod nan;
+mod number;
 mod output;
 mod plot;
 mod ports;
@@ -50,7 +52,8 @@ struct Arguments {
 
 const AFTER_HELP: &str = "\
 Results go to standard output, messages to standard error. \
-Exit status: 0 success, 1 an error in a file or while running, 2 an error in the command line.
+Exit status: 0 success; 1 an error in a file or while running, or what was to be shown does not hold (`bound --deadline`, \
+`cosim`, a `check` of `debug`); 2 an error in the command line; 3 something that --deny names happened in a run.
 
 Examples:
   takt track                         the main job: cycles, accuracy, tracking error
@@ -118,12 +121,18 @@ fn end(result: Result<()>, color: bool) -> ExitCode {
     if output::is_closed_pipe(&error) {
         return ExitCode::SUCCESS;
     }
-    match error.downcast_ref::<Failure>() {
+    let failure = error.downcast_ref::<Failure>();
+    match failure {
         Some(Failure::Reported) => {}
         Some(Failure::Diagnostics(text)) => output::message(text),
+        Some(Failure::Denied(messages)) => messages.iter().for_each(|text| output::error(text, color)),
         Some(Failure::Usage(_)) | None => output::error(&output::describe(&error), color),
     }
-    ExitCode::from(if matches!(error.downcast_ref(), Some(Failure::Usage(_))) { 2 } else { 1 })
+    ExitCode::from(match failure {
+        Some(Failure::Usage(_)) => 2,
+        Some(Failure::Denied(_)) => 3,
+        _ => 1,
+    })
 }
 
 fn main() -> ExitCode {

@@ -50,6 +50,14 @@ pub(crate) fn is_closed_pipe(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| cause.downcast_ref().is_some_and(is_pipe))
 }
 
+/// Whether writing failed because nobody reads any more, which ends the work and is no error.
+pub(crate) fn unless_closed(result: Result<()>) -> Result<bool> {
+    match result {
+        Err(error) if is_closed_pipe(&error) => Ok(true),
+        result => result.map(|()| false),
+    }
+}
+
 /// Failures that are not told like the others.
 #[derive(Debug)]
 pub(crate) enum Failure {
@@ -57,6 +65,8 @@ pub(crate) enum Failure {
     Diagnostics(String),
     /// Options that cannot be together: an error in the command line.
     Usage(String),
+    /// What --deny names has happened: a message for each.
+    Denied(Vec<String>),
     /// The result has told already.
     Reported,
 }
@@ -65,6 +75,7 @@ impl std::fmt::Display for Failure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Failure::Diagnostics(text) | Failure::Usage(text) => f.write_str(text),
+            Failure::Denied(messages) => f.write_str(&messages.join("\n")),
             Failure::Reported => Ok(()),
         }
     }

@@ -3,26 +3,13 @@
 use crate::files;
 use crate::select::suggest;
 use anyhow::{Context, Result, anyhow, bail};
-use serde_json::Value;
 use std::io::{self, Read, Write};
 use std::path::Path;
 use takt_isa::Type;
 use takt_isa::program::Port;
 
-/// A value as CSV has it: the shortest decimal that reads back as the same bits, integers in decimal, bits in hexadecimal.
-pub(crate) fn format(ty: Type, bits: u32) -> String {
-    match ty {
-        Type::F => format!("{:?}", f32::from_bits(bits)),
-        Type::I => bits.cast_signed().to_string(),
-        Type::B => format!("0x{bits:08x}"),
-    }
-}
-
-/// A value as JSON has it: a number, or else what [`format`] makes of it.
-pub(crate) fn json(ty: Type, bits: u32) -> Value {
-    let text = format(ty, bits);
-    serde_json::from_str::<serde_json::Number>(&text).map_or_else(|_| Value::from(text), Value::from)
-}
+/// A value as CSV and as JSON have it.
+pub(crate) use takt_debug::value::{json, text as format};
 
 /// Writes a row of CSV. No field has a comma or a quote: they are names of ports, and numbers.
 pub(crate) fn write_row(out: &mut impl Write, fields: impl IntoIterator<Item = String>) -> io::Result<()> {
@@ -72,8 +59,62 @@ fn shown(text: &str) -> String {
     start
 }
 
+/// Values of the input ports, register and bits.
+pub(crate) type Row = Vec<(u16, u32)>;
+/// Those of each period.
+pub(crate) type Rows = Vec<Row>;
+
+/// Inputs of one period after the other: the rows of a CSV, or zeros where there is none. Every command reads them here.
+pub(crate) enum Inputs {
+    /// All ports are 0, for as many periods as are asked for.
+    Zero(Row),
+    Table(Box<Table>),
+}
+
+impl Inputs {
+    /// Opens a file, `-` being standard input, and reads its header.
+    pub(crate) fn open(path: Option<&Path>, ports: &[Port]) -> Result<Inputs> {
+        match path {
+            Some(path) => Ok(Inputs::Table(Box::new(Table::open(path, ports)?))),
+            None => Ok(Inputs::Zero(ports.iter().map(|port| (port.register, 0)).collect())),
+        }
+    }
+
+    /// The inputs of the next period; `None` at the end of the file, which has a row at least.
+    pub(crate) fn next(&mut self) -> Result<Option<&Row>> {
+        match self {
+            Inputs::Zero(row) => Ok(Some(row)),
+            Inputs::Table(table) => table.next(),
+        }
+    }
+}
+
+/// Periods that [`rows`] makes up without a CSV.
+const MOST_PERIODS: u64 = 10_000_000;
+
+/// Inputs of each period, at most `periods`; without a CSV `otherwise` of them unless `periods` says how many.
+pub(crate) fn rows(
+    path: Option<&Path>,
+    periods: Option<u64>,
+    otherwise: u64,
+    ports: &[Port],
+) -> Result<Rows> {
+    let most = if path.is_some() { periods.unwrap_or(u64::MAX) } else { periods.unwrap_or(otherwise) };
+    if path.is_none() && most > MOST_PERIODS {
+        bail!("{most} periods: without --inputs there are at most {MOST_PERIODS}");
+    }
+    let mut inputs = Inputs::open(path, ports)?;
+    let mut rows = Rows::new();
+    while (rows.len() as u64) < most
+        && let Some(row) = inputs.next()?
+    {
+        rows.push(row.clone());
+    }
+    Ok(rows)
+}
+
 /// Rows of input values from a CSV with one named column for each input port; further columns are left alone.
-pub(crate) struct Inputs {
+pub(crate) struct Table {
     name: String,
     reader: csv::Reader<Rationed>,
     record: csv::StringRecord,
@@ -81,53 +122,16 @@ pub(crate) struct Inputs {
     width: usize,
     /// The ports, each with its column.
     ports: Vec<(Port, usize)>,
-}
-
-/// Values of the input ports, register and bits, for each period.
-pub(crate) type Rows = Vec<Vec<(u16, u32)>>;
-
-/// The rows of a CSV, at most so many; none if it has only a header.
-pub(crate) fn read_rows(path: &Path, ports: &[Port], most: u64) -> Result<Rows> {
-    let mut inputs = Inputs::open(path, ports)?;
-    let (mut rows, mut row) = (Vec::new(), Vec::new());
-    while (rows.len() as u64) < most && inputs.next(&mut row)? {
-        rows.push(row.clone());
-    }
-    Ok(rows)
-}
-
-/// Periods that [`rows`] makes up without a CSV.
-const MOST_PERIODS: u64 = 10_000_000;
-
-/// Inputs of each period: the rows of a CSV, or zeros for `otherwise` periods; at most `periods`.
-pub(crate) fn rows(
-    inputs: Option<&Path>,
-    periods: Option<u64>,
-    otherwise: u64,
-    ports: &[Port],
-) -> Result<Rows> {
-    let Some(path) = inputs else {
-        let periods = periods.unwrap_or(otherwise);
-        if periods > MOST_PERIODS {
-            bail!("{periods} periods: without --inputs there are at most {MOST_PERIODS}");
-        }
-        // What no row gives is zero: an input that was never written would be a fault.
-        let zero = ports.iter().map(|port| (port.register, 0)).collect();
-        return Ok(vec![zero; periods as usize]);
-    };
-    let rows = read_rows(path, ports, periods.unwrap_or(u64::MAX))?;
-    if rows.is_empty() {
-        bail!("{} has a header and no rows: there is no period to run", files::input_name(path));
-    }
-    Ok(rows)
+    row: Row,
+    /// Whether there was no row yet.
+    begins: bool,
 }
 
 /// Bytes of one row; more is an error, so that a file without line ends, or with an open quote, cannot fill the memory.
 const ROW_LIMIT: usize = 1 << 20;
 
-impl Inputs {
-    /// Opens a file, `-` being standard input, and reads the header.
-    pub(crate) fn open(path: &Path, ports: &[Port]) -> Result<Inputs> {
+impl Table {
+    fn open(path: &Path, ports: &[Port]) -> Result<Table> {
         let name = files::input_name(path);
         let source = Rationed { source: files::open(path)?, left: ROW_LIMIT };
         // Rows of another length are found here, with a better message.
@@ -153,30 +157,45 @@ impl Inputs {
             let near =
                 suggest(first, header.iter().filter(|title| ports.iter().all(|port| port.name != **title)));
             let ports = if missing.len() == 1 { "input port" } else { "input ports" };
-            bail!("{name}: no column for the {ports} {}{near}", missing.join(", "));
+            let separator = separator(&header);
+            bail!("{name}: no column for the {ports} {}{near}{separator}", missing.join(", "));
         }
-        Ok(Inputs { name, reader, record: csv::StringRecord::new(), width: header.len(), ports: found })
+        let (record, row) = (csv::StringRecord::new(), Row::new());
+        Ok(Table { name, reader, record, width: header.len(), ports: found, row, begins: true })
     }
 
-    /// Reads the next row into `values`, register and bits for each port; false at the end.
-    pub(crate) fn next(&mut self, values: &mut Vec<(u16, u32)>) -> Result<bool> {
+    fn next(&mut self) -> Result<Option<&Row>> {
         self.reader.get_mut().left = ROW_LIMIT;
         if !self.reader.read_record(&mut self.record).map_err(|error| explain(&self.name, error))? {
-            return Ok(false);
+            if self.begins {
+                bail!("{} has a header and no row, so there is no period to run", self.name);
+            }
+            return Ok(None);
         }
+        self.begins = false;
         let place = || format!("{}:{}", self.name, self.record.position().map_or(0, csv::Position::line));
         if self.record.len() != self.width {
-            bail!("{}: the row has {}, the header {}", place(), fields(self.record.len()), self.width);
+            let (width, separator) = (self.width, separator(&self.record));
+            bail!("{}: the row has {}, the header {width}{separator}", place(), fields(self.record.len()));
         }
-        values.clear();
+        self.row.clear();
         for (port, column) in &self.ports {
             let field = self.record.get(*column).context("a row without a field")?;
             let bits = parse(port.ty, field)
                 .map_err(|reason| anyhow!("{}: column {}: {reason}", place(), port.name))?;
-            values.push((port.register, bits));
+            self.row.push((port.register, bits));
         }
-        Ok(true)
+        Ok(Some(&self.row))
     }
+}
+
+/// What to say of a row that seems to be separated by something else than commas.
+fn separator(record: &csv::StringRecord) -> String {
+    let others = [(';', "`;`"), ('\t', "a tab"), ('|', "`|`")];
+    let found = others.iter().find(|(other, _)| record.iter().any(|field| field.contains(*other)));
+    found.map_or_else(String::new, |(_, name)| {
+        format!("; columns are separated by `,`, here there is {name} (and numbers have a decimal point)")
+    })
 }
 
 fn fields(count: usize) -> String {

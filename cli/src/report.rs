@@ -212,6 +212,7 @@ pub(crate) fn json(tracking: &Tracking) -> Value {
         "placed": crate::synthesis::placed(tracking.program.machine.name),
         "encoder_to_force_cycles": tracking.latency,
         "deadlines_missed": totals.missed,
+        "denied": tracking.denials.json,
         "operations": tracking.account.operations,
         "bundles": tracking.account.bundles,
         "max_error": by_name(|error| error.absolute),

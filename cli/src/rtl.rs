@@ -2,9 +2,10 @@
 
 use crate::files::{self, Out};
 use crate::load::Load;
+use crate::number;
 use crate::output;
 use crate::ports;
-use crate::select::{self, OptionalMachine, SourceArguments};
+use crate::select::{OptionalMachine, SourceArguments};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::json;
@@ -34,7 +35,7 @@ pub(crate) struct Rtl {
     #[arg(long, value_name = "CSV", requires = "program")]
     inputs: Option<PathBuf>,
     /// Run at most this many periods in the test bench [default: one for each row; without --inputs, 3, with zeros].
-    #[arg(long, value_name = "N", value_parser = select::count, requires = "program", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = number::count, requires = "program", allow_hyphen_values = true)]
     periods: Option<u64>,
     /// Print what was written as JSON.
     #[arg(long)]

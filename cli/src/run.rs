@@ -1,27 +1,31 @@
 //! `takt run`: a program on the emulator, with inputs and outputs as CSV.
 
 use crate::account::Account;
+use crate::deny::{Denials, DenyArguments, Watch};
 use crate::fault::explain;
 use crate::files::{self, Out};
 use crate::load::Load;
 use crate::nan::NanWrites;
+use crate::number;
 use crate::output::{self, Failure};
 use crate::ports::{self, Inputs};
-use crate::select::{self, OptionalMachine, SourceArguments};
+use crate::select::{OptionalMachine, SourceArguments};
 use crate::trace::{Trace, TraceArguments};
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use serde_json::{Value, json};
 use std::io::Write;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use takt_emu::{Emulator, Stop};
-use takt_isa::Program;
 
 /// Run a program, counting cycles.
 ///
 /// With --inputs, each row of the CSV is one period: its values are set on the input ports, the tick comes, and the program
-/// runs until its `wait`. Without, the program runs for --periods periods, or else until it halts.
+/// runs until its `wait`. Without, the input ports are 0, and the program runs for --periods periods, or else until it halts.
+///
+/// With `--inputs - --outputs -` each row is answered as it comes, before the next one is waited for, so that a simulator in any
+/// language closes the loop through two pipes (docs/plant.md).
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Run {
@@ -34,21 +38,24 @@ pub(crate) struct Run {
     /// CSV with one named column for each input port and one row for each period; `-` is standard input.
     #[arg(long, value_name = "CSV")]
     inputs: Option<PathBuf>,
-    /// Where the output ports go, as CSV, one row for each period, with a column `cycles`; `-` is standard output.
+    /// Where the output ports go, as CSV, one row for each period, with a column `cycles`; `-` is standard output, where
+    /// nothing else is written then.
     #[arg(long, value_name = "CSV")]
     outputs: Option<PathBuf>,
     /// Run at most this many periods.
-    #[arg(long, value_name = "N", value_parser = select::count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
     periods: Option<u64>,
     /// Stop with an error after this many cycles [default: 1000000000 in any one period].
-    #[arg(long, value_name = "N", value_parser = select::count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
     max_cycles: Option<u64>,
     /// The tick comes every so many cycles, up to 100000000 [default: when the program is ready].
-    #[arg(long, value_name = "CYCLES", value_parser = tick, allow_negative_numbers = true)]
+    #[arg(long, value_name = "CYCLES", value_parser = number::tick, allow_hyphen_values = true)]
     tick: Option<NonZeroU64>,
     #[command(flatten)]
     trace: TraceArguments,
-    /// Print where the cycles went.
+    #[command(flatten)]
+    deny: DenyArguments,
+    /// Print where the cycles went; on standard error with `--outputs -`.
     #[arg(long)]
     stats: bool,
     /// Print the result as JSON.
@@ -62,16 +69,7 @@ Examples:
   takt run prog.s --inputs in.csv --stats         a period for each row; where did the cycles go?
   takt run prog.takt --inputs in.csv --outputs -  outputs and cycles of every period
   takt run prog.s --periods 3 --trace out.vcd     waveforms for GTKWave or Surfer
-
-`takt track --csv in.csv` records inputs of the tracking programs.";
-
-/// The longest time between ticks, cycles: well within [`PERIOD_LIMIT`].
-const LONGEST_TICK: u64 = 100_000_000;
-
-pub(crate) fn tick(text: &str) -> Result<NonZeroU64, String> {
-    let cycles = NonZeroU64::new(select::count(text)?).filter(|cycles| cycles.get() <= LONGEST_TICK);
-    cycles.ok_or_else(|| format!("more than {LONGEST_TICK}"))
-}
+  takt run prog.s --inputs in.csv --deny all      for CI: status 3 if a flag is raised, …";
 
 /// Cycles in which a period ends, or nobody expects it to any more.
 pub(crate) const PERIOD_LIMIT: u64 = 1_000_000_000;
@@ -91,8 +89,8 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
     let mut writes = Vec::new();
     writes.extend(arguments.outputs.as_deref().map(|path| ("--outputs", path)));
     writes.extend(arguments.trace.given());
-    if arguments.json || arguments.stats {
-        writes.push((if arguments.json { "--json" } else { "--stats" }, Path::new("-")));
+    if arguments.json {
+        writes.push(("--json", Path::new("-")));
     }
     files::check(&reads, &writes)?;
     let has_periods = arguments.inputs.is_some() || arguments.periods.is_some();
@@ -107,80 +105,102 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
         Load::new(arguments.machine.machine, color).with(&arguments.source).program(&arguments.file)?;
     let mut emulator = Emulator::new(&program)?;
     emulator.set_tick_period(arguments.tick);
-    let mut nans = NanWrites::default();
     let mut trace_file = arguments.trace.create()?;
     let mut trace = trace_file.as_mut().map(|file| arguments.trace.begin(&emulator, file)).transpose()?;
+    let mut observers = Observers { nans: NanWrites::default(), watch: arguments.deny.watch() };
     let result = if has_periods {
-        run_periods(arguments, &program, &mut emulator, trace.as_mut(), &mut nans).map(Some)
+        run_periods(arguments, &mut emulator, trace.as_mut(), &mut observers).map(Some)
     } else {
-        let result = run_to_halt(arguments, &program, &mut emulator, trace.as_mut());
-        nans.add(&emulator.take_nan_writes());
-        result.map(|()| None)
+        run_to_halt(arguments, &mut emulator, trace.as_mut(), &mut observers).map(|()| None)
     };
+    let Observers { nans, watch } = observers;
     // What led to a fault is what a trace is for: it is kept.
     trace.map_or(Ok(()), |trace| trace.finish(&emulator, color))?;
     trace_file.map_or(Ok(()), Out::finish)?;
-    let periods = result?;
+    let denials = watch.end(&emulator);
+    let periods = match result {
+        // Who has stopped reading wants no summary; what happened until then counts.
+        Err(error) if output::is_closed_pipe(&error) => return denials.verdict(),
+        result => result?,
+    };
     let statistics = emulator.statistics();
     nans.warn(&program, statistics.nan_writes, color);
 
     let account = Account::of(&statistics);
+    let ran = Ran { arguments, emulator: &emulator, periods, account, denials };
     if arguments.json {
-        output::json(&result_json(arguments, &emulator, periods.as_ref(), &account), out)?;
+        output::json(&ran.json(), out)?;
     } else if !arguments.outputs.as_deref().is_some_and(files::is_dash) {
-        write_text(arguments, &emulator, periods.as_ref(), &account, out)?;
+        ran.text(out)?;
+    } else if arguments.stats {
+        let mut text = Vec::new();
+        ran.text(&mut text)?;
+        output::message(&String::from_utf8_lossy(&text));
     }
-    Ok(())
+    ran.denials.verdict()
+}
+
+/// Who looks on while the program runs.
+struct Observers {
+    nans: NanWrites,
+    watch: Watch,
 }
 
 fn run_to_halt(
     arguments: &Run,
-    program: &Program,
     emulator: &mut Emulator,
     trace: Option<&mut Trace<'_>>,
+    observers: &mut Observers,
 ) -> Result<()> {
+    set_inputs(emulator, &mut Inputs::open(None, &emulator.program().inputs)?)?;
     emulator.set_cycle_limit(arguments.max_cycles.unwrap_or(PERIOD_LIMIT));
-    let stop = match trace {
-        Some(trace) => trace.run(emulator),
-        None => emulator.run().map_err(Into::into),
-    };
-    match stop.map_err(|error| anyhow!(explain(program, &error)))? {
+    let stop = observers.watch.run(emulator, trace);
+    observers.nans.add(&emulator.take_nan_writes());
+    match stop.map_err(|error| anyhow!(explain(&error)))? {
         Stop::Idle => bail!("the program waits for the tick: give it periods with --inputs or --periods"),
         _ => Ok(()),
     }
 }
 
+/// Sets the input ports for the period to come; false if there is none.
+fn set_inputs(emulator: &mut Emulator, inputs: &mut Inputs) -> Result<bool> {
+    let Some(row) = inputs.next()? else { return Ok(false) };
+    for &(register, bits) in row {
+        emulator.set_input_bits(register, bits)?;
+    }
+    Ok(true)
+}
+
 fn run_periods(
     arguments: &Run,
-    program: &Program,
     emulator: &mut Emulator,
     mut trace: Option<&mut Trace<'_>>,
-    nans: &mut NanWrites,
+    observers: &mut Observers,
 ) -> Result<Periods> {
-    let mut inputs = arguments.inputs.as_ref().map(|path| Inputs::open(path, &program.inputs)).transpose()?;
+    let path = arguments.inputs.as_deref();
+    let live = path.is_some_and(files::is_live);
     let mut outputs = arguments.outputs.as_ref().map(|path| Out::create(path)).transpose()?;
-    if let Some(outputs) = &mut outputs {
-        let names = program.outputs.iter().map(|port| port.name.clone());
-        ports::write_row(outputs, names.chain(["cycles".to_owned()]))?;
+    let header = |emulator: &Emulator, outputs: &mut Option<Out>| -> Result<()> {
+        let names = emulator.program().outputs.iter().map(|port| port.name.clone());
+        let write = |outputs| ports::write_row(outputs, names.chain(["cycles".to_owned()]));
+        Ok(outputs.as_mut().map_or(Ok(()), write)?)
+    };
+    let flush = |outputs: &mut Option<Out>| outputs.as_mut().map_or(Ok(()), Out::flush);
+    if live {
+        // The other side may wait for it before it sends anything.
+        header(emulator, &mut outputs)?;
+        flush(&mut outputs)?;
+    }
+    let mut inputs = Inputs::open(path, &emulator.program().inputs)?;
+    if !live {
+        header(emulator, &mut outputs)?;
     }
     let mut periods = Periods { shortest: u64::MAX, ..Periods::default() };
-    let mut values = Vec::new();
-    while arguments.periods.is_none_or(|wanted| periods.count < wanted) {
-        if let Some(inputs) = &mut inputs {
-            if !inputs.next(&mut values)? {
-                break;
-            }
-            for &(register, bits) in &values {
-                emulator.set_input_bits(register, bits)?;
-            }
-        }
+    while arguments.periods.is_none_or(|wanted| periods.count < wanted) && set_inputs(emulator, &mut inputs)?
+    {
         emulator.set_cycle_limit(arguments.max_cycles.unwrap_or(emulator.now() + PERIOD_LIMIT));
-        let report = match &mut trace {
-            Some(trace) => trace.run_period(emulator),
-            None => emulator.run_period(&[]),
-        };
-        let report =
-            report.map_err(|error| anyhow!("period {}: {}", periods.count, explain(program, &error)))?;
+        let report = observers.watch.run_period(emulator, trace.as_deref_mut(), None);
+        let report = report.map_err(|error| anyhow!("period {}: {}", periods.count, explain(&error)))?;
         if trace.as_ref().is_some_and(|trace| trace.has_failed()) {
             break;
         }
@@ -188,17 +208,16 @@ fn run_periods(
         periods.shortest = periods.shortest.min(report.cycles);
         periods.longest = periods.longest.max(report.cycles);
         periods.missed += u64::from(report.missed) + report.lost;
-        nans.add(&report.nan_writes);
+        observers.nans.add(&report.nan_writes);
         if let Some(outputs) = &mut outputs {
-            let values = program.outputs.iter().map(|port| {
+            let values = emulator.program().outputs.iter().map(|port| {
                 emulator.register(port.register).map_or(String::new(), |bits| ports::format(port.ty, bits))
             });
             ports::write_row(outputs, values.chain([report.cycles.to_string()]))?;
         }
-    }
-    if periods.count == 0 {
-        let name = arguments.inputs.as_deref().map(files::input_name).context("no period")?;
-        bail!("{name} has a header and no row, so there is no period to run");
+        if live {
+            flush(&mut outputs)?;
+        }
     }
     outputs.map_or(Ok(()), Out::finish)?;
     Ok(periods)
@@ -215,60 +234,73 @@ fn outputs<'a, T>(
     })
 }
 
-fn result_json(arguments: &Run, emulator: &Emulator, periods: Option<&Periods>, account: &Account) -> Value {
-    json!({
-        "program": files::input_name(&arguments.file),
-        "machine": emulator.machine().name,
-        "periods": periods.map_or(0, |periods| periods.count),
-        "cycles": {
-            "min": periods.map(|periods| periods.shortest),
-            "max": periods.map(|periods| periods.longest),
-            "total": account.cycles,
-        },
-        "deadlines_missed": periods.map_or(0, |periods| periods.missed),
-        "nan_writes": emulator.statistics().nan_writes,
-        "flags": emulator.flags().to_string(),
-        "outputs": outputs(emulator, ports::json).collect::<std::collections::BTreeMap<_, _>>(),
-        "bundles": account.bundles,
-        "operations": account.operations,
-        "stalls": account.stalls_json(),
-    })
+/// What came of a run.
+struct Ran<'a> {
+    arguments: &'a Run,
+    emulator: &'a Emulator,
+    /// `None` if it ran to its `halt`.
+    periods: Option<Periods>,
+    account: Account,
+    denials: Denials,
 }
 
-fn write_text(
-    arguments: &Run,
-    emulator: &Emulator,
-    periods: Option<&Periods>,
-    account: &Account,
-    out: &mut Out,
-) -> Result<()> {
-    let (machine, cycles) = (emulator.machine().name, account.cycles);
-    match periods {
-        None => writeln!(out, "{cycles} cycles on {machine}")?,
-        Some(Periods { count, shortest, longest, missed }) => {
-            let periods = if *count == 1 { "period" } else { "periods" };
-            write!(out, "{count} {periods} on {machine}: {shortest} ")?;
-            if shortest != longest {
-                write!(out, "to {longest} ")?;
+impl Ran<'_> {
+    fn json(&self) -> Value {
+        let Ran { arguments, emulator, account, denials, .. } = self;
+        let periods = self.periods.as_ref();
+        json!({
+            "program": files::input_name(&arguments.file),
+            "machine": emulator.machine().name,
+            "periods": periods.map_or(0, |periods| periods.count),
+            "cycles": {
+                "min": periods.map(|periods| periods.shortest),
+                "max": periods.map(|periods| periods.longest),
+                "total": account.cycles,
+            },
+            "deadlines_missed": periods.map_or(0, |periods| periods.missed),
+            "nan_writes": emulator.statistics().nan_writes,
+            "flags": emulator.flags().to_string(),
+            "denied": denials.json,
+            "outputs": outputs(emulator, ports::json).collect::<std::collections::BTreeMap<_, _>>(),
+            "bundles": account.bundles,
+            "operations": account.operations,
+            "stalls": account.stalls_json(),
+        })
+    }
+
+    fn text(&self, out: &mut impl Write) -> Result<()> {
+        let Ran { arguments, emulator, account, .. } = self;
+        let (machine, cycles) = (emulator.machine().name, account.cycles);
+        match &self.periods {
+            None => writeln!(out, "{cycles} cycles on {machine}")?,
+            Some(Periods { count, shortest, longest, missed }) => {
+                let periods = if *count == 1 { "period" } else { "periods" };
+                write!(out, "{count} {periods} on {machine}: {shortest} ")?;
+                if shortest != longest {
+                    write!(out, "to {longest} ")?;
+                }
+                let each = if *count == 1 { "cycles" } else { "cycles each" };
+                writeln!(out, "{each}, {cycles} in all, {missed} deadlines missed")?;
             }
-            let each = if *count == 1 { "cycles" } else { "cycles each" };
-            writeln!(out, "{each}, {cycles} in all, {missed} deadlines missed")?;
         }
-    }
-    if arguments.outputs.is_none() {
-        for (name, value) in outputs(emulator, ports::format) {
-            writeln!(out, "  {name} = {}", value.as_deref().unwrap_or("(never written)"))?;
+        if arguments.inputs.is_none() && !emulator.program().inputs.is_empty() {
+            writeln!(out, "  without --inputs the input ports are 0")?;
         }
-    }
-    writeln!(out, "  exception flags: {}", emulator.flags())?;
-    if arguments.stats {
-        writeln!(out, "\ncycles, waiting for the tick left out:")?;
-        out.write_all(account.stall_table(emulator.program(), 10).as_bytes())?;
-        writeln!(out, "\noperations:")?;
-        for (mnemonic, count) in &account.operations {
-            writeln!(out, "  {mnemonic:<14} {count:>9}")?;
+        if arguments.outputs.is_none() {
+            for (name, value) in outputs(emulator, ports::format) {
+                writeln!(out, "  {name} = {}", value.as_deref().unwrap_or("(never written)"))?;
+            }
         }
-        writeln!(out, "  {:<14} {:>9}", "all", account.total_operations())?;
+        writeln!(out, "  exception flags: {}", emulator.flags())?;
+        if arguments.stats {
+            writeln!(out, "\ncycles, waiting for the tick left out:")?;
+            out.write_all(account.stall_table(emulator.program(), 10).as_bytes())?;
+            writeln!(out, "\noperations:")?;
+            for (mnemonic, count) in &account.operations {
+                writeln!(out, "  {mnemonic:<14} {count:>9}")?;
+            }
+            writeln!(out, "  {:<14} {:>9}", "all", account.total_operations())?;
+        }
+        Ok(())
     }
-    Ok(())
 }

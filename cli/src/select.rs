@@ -59,24 +59,8 @@ pub(crate) fn instruction(mnemonic: &str) -> Result<&'static Row, String> {
     })
 }
 
-/// A number of periods or cycles, for clap.
-pub(crate) fn count(text: &str) -> Result<u64, String> {
-    text.parse().ok().filter(|count| *count > 0).ok_or_else(|| "not a whole number of at least 1".to_owned())
-}
-
 /// The clock of the paper's FPGA3, MHz.
 pub(crate) const PAPER_CLOCK: f64 = 125.0;
-
-/// A clock in MHz, with or without the unit, for clap.
-pub(crate) fn clock(text: &str) -> Result<f64, String> {
-    let number = text.strip_suffix("MHz").unwrap_or(text);
-    let mhz: f64 = number.trim_end().parse().map_err(|_| "not a number".to_owned())?;
-    if (0.01..=100_000.0).contains(&mhz) {
-        Ok(mhz)
-    } else {
-        Err("not between 0.01 and 100000 MHz".to_owned())
-    }
-}
 
 /// `; did you mean …?` if one of the names is near.
 pub(crate) fn suggest<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) -> String {

@@ -1,13 +1,13 @@
 //! `takt run --trace`: what a run did, cycle by cycle, in a file for other tools.
 
 use crate::files::{Given, Out};
+use crate::number;
 use crate::output::{self, Failure};
-use crate::select;
 use anyhow::{Result, anyhow};
 use clap::Args;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use takt_debug::trace::{Format, Options, Tracer};
+use takt_debug::trace::{Also, Format, Options, Tracer};
 use takt_emu::{Emulator, PeriodError, PeriodReport, Stop};
 
 #[derive(Args)]
@@ -17,14 +17,14 @@ pub(crate) struct TraceArguments {
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
     /// Trace these cycles only; the last is left out, and either may be missing.
-    #[arg(long, value_name = "A..B", value_parser = cycles, requires = "trace")]
+    #[arg(long, value_name = "A..B", value_parser = cycles, allow_hyphen_values = true, requires = "trace")]
     trace_cycles: Option<Range<u64>>,
-    /// Trace these signals only: names of ports and registers and of the signals in docs/traces.md; `*` stands for any
-    /// characters.
+    /// Trace these signals only: names of ports and registers, or names from docs/traces.md such as `outputs.*` and
+    /// `takt.stall.*`; `*` stands for any characters.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "trace")]
     trace_signals: Vec<String>,
     /// End the trace when it has so many MiB.
-    #[arg(long, value_name = "MIB", default_value_t = 256, value_parser = select::count, requires = "trace", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MIB", default_value_t = 256, value_parser = number::count, requires = "trace", allow_hyphen_values = true)]
     trace_limit: u64,
 }
 
@@ -81,12 +81,16 @@ impl TraceArguments {
 }
 
 impl Trace<'_> {
-    pub(crate) fn run_period(&mut self, emulator: &mut Emulator) -> Result<PeriodReport, PeriodError> {
-        self.tracer.run_period(emulator)
+    pub(crate) fn run_period(
+        &mut self,
+        emulator: &mut Emulator,
+        also: Also<'_>,
+    ) -> Result<PeriodReport, PeriodError> {
+        self.tracer.run_period(emulator, also)
     }
 
-    pub(crate) fn run(&mut self, emulator: &mut Emulator) -> Result<Stop, PeriodError> {
-        self.tracer.run(emulator)
+    pub(crate) fn run(&mut self, emulator: &mut Emulator, also: Also<'_>) -> Result<Stop, PeriodError> {
+        self.tracer.run(emulator, also)
     }
 
     pub(crate) fn has_failed(&self) -> bool {

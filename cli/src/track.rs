@@ -2,9 +2,11 @@
 
 use crate::account::Account;
 use crate::controller::{Latency, OnEmulator, port_type};
+use crate::deny::{Denials, DenyArguments, Watch};
 use crate::files::{self, Given, Out};
 use crate::load::{Load, Loaded};
 use crate::nan::NanWrites;
+use crate::number;
 use crate::plot::Plot;
 use crate::select::{self, OptionalMachine, SourceArguments, suggest};
 use crate::{output, ports, report};
@@ -42,10 +44,10 @@ pub(crate) struct Track {
     #[arg(long, value_name = "FILE")]
     gcode: Option<PathBuf>,
     /// Stop after this many periods [default: the whole path].
-    #[arg(long, value_name = "N", value_parser = select::count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
     periods: Option<u64>,
     /// Clock in MHz, for cycles to time and for the deadline; the paper's is 125.
-    #[arg(long, value_name = "MHZ", default_value_t = select::PAPER_CLOCK, value_parser = select::clock, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MHZ", default_value_t = select::PAPER_CLOCK, value_parser = number::clock, allow_hyphen_values = true)]
     clock: f64,
     /// Write inputs, outputs, cycles and errors of every period as CSV, which `takt run --inputs` reads; `-` is standard
     /// output.
@@ -54,6 +56,8 @@ pub(crate) struct Track {
     /// Draw the tool path and the tracking error over time as SVG; `-` is standard output.
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
+    #[command(flatten)]
+    deny: DenyArguments,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -67,7 +71,8 @@ Examples:
   takt track                                     the letters AGH on t3, the fast machine
   takt track --machine t1 --plot agh.svg         on the small machine; draw path and error
   takt track --program mine.s --gcode part.ngc   your own controller, your own path
-  takt track --periods 1000 --csv path.csv       record inputs and outputs for `takt run`";
+  takt track --periods 1000 --csv path.csv       record inputs and outputs for `takt run`
+  takt track -q --deny all                       for CI: status 3 if a deadline is missed, …";
 
 /// Bytes of G-code; beyond, the longest path that can be driven would be made of moves of a micrometre.
 const GCODE_LIMIT: usize = 16 << 20;
@@ -92,6 +97,7 @@ pub(crate) struct Tracking {
     pub(crate) account: Account,
     /// Of the last period; `None` if it read no encoder or wrote no force.
     pub(crate) latency: Option<Latency>,
+    pub(crate) denials: Denials,
 }
 
 /// What is gathered over the periods.
@@ -142,8 +148,8 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
     let periods = arguments.periods.unwrap_or(u64::MAX).min(trajectory.periods());
     let mut emulator = Emulator::new(&program)?;
     emulator.set_tick_period(period_cycles(arguments.clock));
-    let mut closed_loop =
-        ClosedLoop::new(&trajectory, OnEmulator::new(emulator, periods - 1).with_context(|| name.clone())?);
+    let controller = OnEmulator::new(emulator, arguments.deny.watch(), periods - 1);
+    let mut closed_loop = ClosedLoop::new(&trajectory, controller.with_context(|| name.clone())?);
 
     // Opened before the work, so that a path that cannot be written is known at once.
     let mut table = arguments.csv.as_deref().map(Table::create).transpose()?;
@@ -152,13 +158,14 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
     let progress = progress(periods, "periods", arguments.quiet);
     let mut totals = Totals::new();
     let mut nans = NanWrites::default();
-    while totals.periods < periods {
+    let mut closed = false;
+    while !closed && totals.periods < periods {
         let record = closed_loop.next().context("the path ended early")?.with_context(|| path.clone())?;
         let report = closed_loop.controller().report.as_ref().context("a period has no report")?;
         totals.add(&record, report);
         nans.add(&report.nan_writes);
         if let Some(table) = &mut table {
-            table.add(&record, report.cycles)?;
+            closed = output::unless_closed(table.add(&record, report.cycles))?;
         }
         if let Some((_, plot)) = &mut drawing {
             plot.add(&record);
@@ -168,7 +175,12 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
         }
     }
     progress.finish_and_clear();
-    table.map_or(Ok(()), |Table(file)| file.finish())?;
+    closed |= output::unless_closed(table.map_or(Ok(()), |Table(file)| file.finish()))?;
+    let denials = closed_loop.controller().denials();
+    if closed {
+        // Who has stopped reading wants no tables; what happened until then counts.
+        return denials.verdict();
+    }
     if let Some((mut file, plot)) = drawing {
         file.write_all(plot.draw(&path)?.as_bytes())?;
         file.finish()?;
@@ -179,13 +191,78 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
     nans.warn(&program, nan_writes, color);
     let account = Account::between(&detail.before, &detail.after);
     let (clock, latency) = (arguments.clock, detail.latency);
-    let tracking = Tracking { name, program, path, clock, totals, nan_writes, account, latency };
+    let tracking = Tracking { name, program, path, clock, totals, nan_writes, account, latency, denials };
     if arguments.json {
         output::json(&report::json(&tracking), out)?;
     } else if !writes.iter().any(|(_, path)| files::is_dash(path)) {
         out.write_all(report::text(&tracking).as_bytes())?;
     }
-    Ok(())
+    tracking.denials.verdict()
+}
+
+/// A closed loop that is driven first, for a session in which its controller is looked at.
+#[derive(Args)]
+pub(crate) struct ClosedLoopArguments {
+    /// Run the program as the hybrid robot's controller along the tool path first, and begin in the period in which the
+    /// tracking error is largest.
+    #[arg(long)]
+    pub(crate) track: bool,
+    /// With --track: tool path in G-code [default: the letters AGH].
+    #[arg(long, value_name = "FILE", requires = "track")]
+    pub(crate) gcode: Option<PathBuf>,
+    /// With --track: stop after this many periods [default: the whole path].
+    #[arg(long, value_name = "N", value_parser = number::count, requires = "track", allow_hyphen_values = true)]
+    periods: Option<u64>,
+}
+
+/// What a program was given in a closed loop, and where to look.
+pub(crate) struct Recording {
+    pub(crate) loaded: Loaded,
+    pub(crate) inputs: ports::Rows,
+    pub(crate) tick: Option<NonZeroU64>,
+    /// The period that is worth a look.
+    pub(crate) period: u64,
+    /// Why it is, in a line.
+    pub(crate) why: String,
+}
+
+impl ClosedLoopArguments {
+    /// Drives the loop, of at most so many periods, with a program by name or from a file; without one, the loop's own.
+    pub(crate) fn record(&self, file: Option<&Path>, load: Load, most: usize) -> Result<Recording> {
+        let (name, loaded) = program(file.unwrap_or(Path::new("tracking")), load)?;
+        let (path, trajectory) = trajectory(self.gcode.as_deref())?;
+        let periods = self.periods.unwrap_or(u64::MAX).min(trajectory.periods());
+        if periods > most as u64 {
+            bail!("{path} has {periods} periods; a session holds {most} (see --periods)");
+        }
+        let tick = period_cycles(select::PAPER_CLOCK);
+        let mut emulator = Emulator::new(&loaded.program)?;
+        emulator.set_tick_period(tick);
+        let controller =
+            OnEmulator::new(emulator, Watch::idle(), periods - 1).with_context(|| name.clone())?;
+        let registers = controller.inputs();
+        let mut closed_loop = ClosedLoop::new(&trajectory, controller);
+        let (mut inputs, mut worst) = (Vec::new(), (0, -1.0, false));
+        let progress = progress(periods, "periods", false);
+        for _ in 0..periods {
+            let record = closed_loop.next().context("the path ended early")?.with_context(|| path.clone())?;
+            inputs.push(registers.iter().copied().zip(record.inputs.to_words()).collect::<Vec<_>>());
+            if record.tool_error > worst.1 {
+                worst = (record.period, record.tool_error, record.sample.cutting);
+            }
+            if record.period.is_multiple_of(4096) {
+                progress.set_position(record.period);
+            }
+        }
+        progress.finish_and_clear();
+        let (period, error, cutting) = worst;
+        let doing = if cutting { "cutting" } else { "not cutting" };
+        let why = format!(
+            "{name} along {path}, {periods} periods: the largest tracking error is {:.3} µm, in period {period} ({doing})",
+            error * 1e6
+        );
+        Ok(Recording { loaded, inputs, tick, period, why })
+    }
 }
 
 /// Every period as a row of CSV.

@@ -63,7 +63,7 @@ fn the_debugger_shows_the_text_of_library_and_folder() {
         assert_eq!(done.status, Some(0), "{}", done.stderr);
         done.stdout
     };
-    let text = debug(b"break <math.s>:5\ncontinue\nlist\n");
+    let text = debug(b"break math.s:5\ncontinue\nlist\n");
     assert!(text.contains(">    5          fmax    y, x, low"), "{text}");
     let text = debug(b"break ./lib/twice.s:2\ncontinue\nlist\n");
     assert!(text.contains(">    2          fadd    y, x, x"), "{text}");

@@ -7,10 +7,11 @@ mod random_source;
 
 use common::{assemble, drive, model};
 use random_source::{Random, source};
+use std::sync::OnceLock;
 use takt_asm::{MemoryLoader, Options, Schedule};
 use takt_cosim::{Lockstep, LockstepError, random};
 use takt_isa::timing::Cause;
-use takt_isa::{MACHINES, Machine, Program, ROWS};
+use takt_isa::{Bank, MACHINES, Machine, Program, ROWS, Slot, T3};
 
 /// `TAKT_PROGRAMS` random programs, 200 unless stated, from seed 0 on.
 #[test]
@@ -40,6 +41,45 @@ fn random_programs() {
         ["data address", "illegal word", "program counter", "return stack empty", "return stack full"]
     {
         assert!(faults.contains(fault), "no program had the fault: {fault}");
+    }
+}
+
+/// The circuit is what the row says, and not only for the table's rows: four slots, of which two have an adder and two an ALU; two
+/// slots with iterative units, of banks of different depths that leave gaps in the register space.
+#[test]
+fn rows_of_a_strangers() {
+    use takt_isa::spec::units::*;
+    let slot = |name, bank, base, depth, units| Slot { name, bank: Bank { name: bank, base, depth }, units };
+    static FOUR: OnceLock<Machine> = OnceLock::new();
+    static TWO: OnceLock<Machine> = OnceLock::new();
+    let four = FOUR.get_or_init(|| Machine {
+        name: "four",
+        slots: Vec::leak(vec![
+            slot("mul", "m", 0, 128, &[MULTIPLY, DIVROOT, ARCTANGENT]),
+            slot("add", "a", 128, 128, &[ADD, CONVERT]),
+            slot("sum", "b", 256, 128, &[ADD, ALU]),
+            slot("aux", "x", 384, 128, &[ALU, MEMORY, SEQUENCER]),
+        ]),
+        inputs: Bank { name: "i", base: 896, depth: 128 },
+        outputs_per_bank: 16,
+        ..T3
+    });
+    let two = TWO.get_or_init(|| Machine {
+        name: "two",
+        slots: Vec::leak(vec![
+            slot("mul", "m", 0, 256, &[MULTIPLY, DIVIDE, ROOT]),
+            slot("rest", "a", 256, 128, &[ADD, CONVERT, ALU_LATE, MEMORY, SEQUENCER]),
+        ]),
+        ..T3
+    });
+    for machine in [four, two] {
+        let mut simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        let mut coverage = random::Coverage::default();
+        for seed in 0..60 {
+            simulation = random::run(seed, machine, simulation, &mut coverage)
+                .unwrap_or_else(|error| panic!("{} seed {seed}: {error}", machine.name));
+        }
+        assert!(coverage.events > 10_000, "{}: only {} events", machine.name, coverage.events);
     }
 }
 

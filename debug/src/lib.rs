@@ -1,9 +1,12 @@
 //! What an engineer looks at a running program with: traces, and debug sessions. Plain data in and out; nothing here prints.
 
 pub mod console;
+mod info;
 pub mod panes;
 pub mod session;
 pub mod trace;
+pub mod value;
+#[cfg(feature = "tui")]
 pub mod view;
 
 /// Whether a name matches a pattern, in which `*` stands for any characters.

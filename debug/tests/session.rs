@@ -205,6 +205,35 @@ fn stops_forth_and_back() {
     }
 }
 
+/// The position behind the last cycle is one like any other: what issues with `halt` is seen there.
+#[test]
+fn the_last_position_counts() {
+    let source = ".output y\n nop\n fadd y, 3.5, 3.5 || halt\n";
+    for command in ["watch y", "until y == 7", "watch y > 6"] {
+        let mut console = console(source);
+        let said = console.execute(command).unwrap();
+        let said = if command.starts_with("until") { said } else { console.execute("continue").unwrap() };
+        assert!(
+            said.starts_with("stop 1: ") || said.starts_with("the expression holds"),
+            "{command}: {said}"
+        );
+        assert!(said.contains("halted at bundle 1"), "{command}: {said}");
+        let end = console.session.cycle();
+        assert!(console.execute("continue").unwrap().starts_with("the program has halted"));
+        assert_eq!(console.session.cycle(), end);
+    }
+}
+
+/// `until` goes to the next position at which its expression holds, also if it holds already.
+#[test]
+fn until_is_the_next_position() {
+    let mut console = console(SOURCE);
+    for expected in [1, 2, 3] {
+        console.execute("until 1").unwrap();
+        assert_eq!(console.session.cycle(), expected);
+    }
+}
+
 /// In random runs a breakpoint stops before each issue of its bundle, and a watchpoint at each change, and nowhere else.
 #[test]
 fn stops_are_complete() {
@@ -230,7 +259,7 @@ fn stops_are_complete() {
         let name = format!("@{}", program.machine.register_name(register).unwrap());
         let what = session.parse(&name).unwrap();
         for (stop, expected) in [
-            (Stop::Break { at: Where::Bundle(address), condition: None, text: String::new() }, issues),
+            (Stop::Break { at: Where::Bundles(vec![address]), condition: None, text: String::new() }, issues),
             (Stop::Watch { what: Box::new(what), test: Test::Changed, text: String::new() }, changes),
         ] {
             session.go_to(0);

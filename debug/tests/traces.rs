@@ -70,7 +70,7 @@ fn traced(program: &Program, options: Options) -> (Vec<u8>, Summary) {
     let mut emulator = loaded(program, 1);
     let mut tracer = Tracer::new(&emulator, Box::new(disk.clone()), options).unwrap();
     for _ in 0..PERIODS {
-        if tracer.run_period(&mut emulator).is_err() {
+        if tracer.run_period(&mut emulator, None).is_err() {
             break;
         }
     }
@@ -191,6 +191,10 @@ fn selected_signals() {
     let refused = |options| Tracer::new(&emulator, Box::new(Disk::new()), options).map(|_| ()).unwrap_err();
     let error = refused(Options { signals: signals(&["tua4"]), ..options.clone() });
     assert_eq!(error.to_string(), "no signal is named `tua4`; did you mean `tau4`?");
+    let error = refused(Options { signals: signals(&["stall.brunch"]), ..options.clone() });
+    assert_eq!(error.to_string(), "no signal is named `stall.brunch`; did you mean `stall.branch`?");
+    let log = Options { signals: signals(&["F*", "stall.*"]), format: Format::JsonLines, ..options.clone() };
+    assert_eq!(refused(log), SignalError::NoRegister("stall.*".to_owned()));
     assert_eq!(refused(Options { format: Format::Kanata, ..options }), SignalError::None);
 }
 
@@ -217,10 +221,63 @@ fn a_full_disk() {
         let disk = Disk(Rc::default(), 1000);
         let mut tracer = Tracer::new(&emulator, Box::new(disk), options(format)).unwrap();
         // The run is not disturbed.
-        let report = tracer.run_period(&mut emulator).unwrap();
+        let report = tracer.run_period(&mut emulator, None).unwrap();
         assert_eq!(report, loaded(&program, 1).run_period(&[]).unwrap());
         assert_eq!(tracer.finish(&emulator).unwrap_err().kind(), io::ErrorKind::StorageFull);
     }
+}
+
+/// The names that the documentation gives are names that can be selected: alone, with their group, with the whole path.
+#[test]
+fn signals_by_the_names_of_the_document() {
+    let text = include_str!("../../docs/traces.md");
+    let table = text.split("## Waveforms").nth(1).unwrap().split("\n## ").next().unwrap();
+    let cells = table.lines().filter_map(|line| line.strip_prefix('|')?.split('|').next());
+    let names: Vec<&str> = cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).collect();
+    assert!(names.len() >= 8 && names.iter().all(|name| name.starts_with("takt.")), "{names:?}");
+    let program = tracking(&T3);
+    let selected = |pattern: &str| {
+        let signals = vec![pattern.to_owned()];
+        let (bytes, _) = traced(&program, Options { signals, ..options(Format::Vcd) });
+        read_names(bytes)
+    };
+    let all = selected("*");
+    let mut covered = 0;
+    for name in names {
+        let head = name.trim_end_matches('*');
+        let meant: Vec<&String> = all.iter().filter(|path| path.starts_with(head)).collect();
+        assert!(!meant.is_empty(), "{name}");
+        covered += meant.len();
+        assert!(selected(name).iter().eq(meant.iter().copied()), "{name}");
+        assert!(
+            selected(&name["takt.".len()..]).iter().eq(meant.iter().copied()),
+            "{name} without the top group"
+        );
+    }
+    assert_eq!(covered, all.len(), "every signal is in the document");
+    let causes = table.split("charged to: `").nth(1).unwrap().split('`').next().unwrap();
+    let stalls: Vec<String> = causes.split(' ').map(|cause| format!("takt.stall.{cause}")).collect();
+    assert_eq!(selected("takt.stall.*"), stalls);
+    // A group is not what a name's beginning happens to match.
+    assert!(!selected("i*").iter().any(|path| path.starts_with("takt.inputs.") && !path.contains(".i")));
+    assert_eq!(selected("*.F1"), ["takt.outputs.F1"]);
+}
+
+/// The paths of a VCD's signals, in its order.
+fn read_names(bytes: Vec<u8>) -> Vec<String> {
+    let text = String::from_utf8(bytes).unwrap();
+    let mut scopes = Vec::new();
+    let mut names = Vec::new();
+    for line in text.lines().take_while(|line| !line.starts_with("$enddefinitions")) {
+        let words: Vec<&str> = line.split(' ').collect();
+        match words[0] {
+            "$scope" => scopes.push(words[2]),
+            "$upscope" => drop(scopes.pop()),
+            "$var" => names.push(format!("{}.{}", scopes.join("."), words[4])),
+            _ => {}
+        }
+    }
+    names
 }
 
 fn retires(program: &Program) -> Vec<Retire> {

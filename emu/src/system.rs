@@ -269,6 +269,14 @@ impl Emulator {
         self.ticks.next()
     }
 
+    /// While the program waits, the cycle of the tick that it waits for: the next one to come or, if none is, the one that
+    /// [`Emulator::run_period`] is going to ask for, as early as it can come with the front end refilled.
+    pub fn due_tick(&self) -> Option<Cycle> {
+        let Status::Waiting { since, .. } = self.status else { return None };
+        let earliest = || self.now.max(since + Cycle::from(self.code.machine.refill));
+        Some(self.ticks.next().unwrap_or_else(earliest))
+    }
+
     /// Whether a deadline was missed since reset: a tick came before the program waited.
     pub fn deadline_missed(&self) -> bool {
         self.ticks.missed > 0
@@ -371,10 +379,10 @@ impl Emulator {
         let goal = Goal { until, wait: true, ..self.goal() };
         self.report = None;
         loop {
-            if let Status::Waiting { since, .. } = self.status
-                && self.ticks.next().is_none()
+            if self.ticks.next().is_none()
+                && let Some(tick) = self.due_tick()
             {
-                self.tick_at(self.now.max(since + Cycle::from(self.code.machine.refill)));
+                self.tick_at(tick);
             }
             match self.drive(goal, sink)? {
                 Stop::Halted => return Err(PeriodError::Halted),

@@ -65,7 +65,7 @@ module takt_sequencer #(
             takt_sequencer_has_refill_6_and_resolve_2 unsupported ();
         end
         if (STACK != 16) begin : g_stack
-            takt_sequencer_has_a_stack_of_16 unsupported ();
+            takt_sequencer_has_stack_16 unsupported ();
         end
     endgenerate
 

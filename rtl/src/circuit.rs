@@ -14,6 +14,7 @@
 
 use crate::files;
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::Path;
 use std::{fs, io};
 use takt_isa::{Effect, Op, ROWS, Row, Unit};
@@ -55,8 +56,8 @@ pub struct Library {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum CircuitError {
     /// The unit has no file, or names one that is not there.
-    #[error("there is no circuit `{0}`")]
-    NoFile(String),
+    #[error("unit `{0}`: there is no circuit rtl/units/{1}: write it and list it in rtl/src/files.rs")]
+    NoFile(&'static str, String),
     /// A line that begins with `//@` cannot be read.
     #[error(
         "`{0}`: expected `//@ op <width>'b<bits> <mnemonic> …`, `//@ op - <mnemonic> …` or `//@ as <unit>`"
@@ -72,8 +73,68 @@ pub enum CircuitError {
     #[error("`{0}` has two codes")]
     Twice(&'static str),
     /// Instructions that the unit's row promises and the circuit lacks.
-    #[error("no circuit for {0}: the unit offers the function, but its Verilog file names no code")]
-    Missing(String),
+    #[error(
+        "no circuit for {1}: unit `{0}` offers the function, but its Verilog file names no code: a line `//@ op <code> {1}` in the \
+         header of rtl/units/{0}.v, and what it computes below"
+    )]
+    Missing(&'static str, String),
+    /// The row wants of the circuit what it refuses.
+    #[error("unit `{unit}` has {} {value}; rtl/units/{unit}.v wants {limit}", limit.quantity)]
+    Limit {
+        /// The unit.
+        unit: &'static str,
+        /// What its row says.
+        value: u32,
+        /// What the circuit can do.
+        limit: Limit,
+    },
+}
+
+/// What a circuit can do: a Verilog module refuses other parameters by instantiating a module that does not exist and whose name says
+/// why, such as `takt_divide_has_latency_18_and_interval_14`. This is the part of it that concerns one parameter.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Limit {
+    /// The parameter, in lower case: `latency`.
+    pub quantity: String,
+    /// The least value.
+    pub least: u32,
+    /// The greatest value; none for an interval, which may be longer.
+    pub most: Option<u32>,
+}
+
+impl Limit {
+    /// Whether a value is within the limit.
+    pub fn holds(&self, value: u32) -> bool {
+        self.least <= value && self.most.is_none_or(|most| value <= most)
+    }
+}
+
+impl fmt::Display for Limit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Limit { quantity, least, most } = self;
+        match most {
+            None => write!(f, "{quantity} {least} at least"),
+            Some(most) if most == least => write!(f, "{quantity} {least}"),
+            Some(most) if *most == least + 1 => write!(f, "{quantity} {least} or {most}"),
+            Some(most) => write!(f, "{quantity} {least} to {most}"),
+        }
+    }
+}
+
+/// The limits that a module's text states by instances called `unsupported`.
+pub fn limits(text: &str) -> Vec<Limit> {
+    let refusals = text.lines().filter_map(|line| line.trim().strip_suffix(" unsupported ();"));
+    let stated =
+        refusals.filter_map(|name| name.split_once("_has_")).flat_map(|(_, said)| said.split("_and_"));
+    stated
+        .filter_map(|said| {
+            let (quantity, values) = said.split_once('_')?;
+            let mut numbers = values.split(['_']).filter_map(|word| word.parse().ok());
+            let least = numbers.next()?;
+            let most = (quantity != "interval").then(|| numbers.next().unwrap_or(least));
+            Some(Limit { quantity: quantity.to_owned(), least, most })
+        })
+        .collect()
 }
 
 /// Whether the unit has something to compute for an instruction: all that write a register pass through their unit.
@@ -122,12 +183,13 @@ impl Library {
     /// # Errors
     /// If its file is not there, its header cannot be read or does not give exactly the unit's instructions.
     pub fn circuit(&self, unit: &Unit) -> Result<Circuit, CircuitError> {
+        let own = unit.name;
         let file = |unit: &str| {
             let name = format!("{unit}.v");
-            let text = self.text(&name).ok_or_else(|| CircuitError::NoFile(name.clone()))?;
+            let text = self.text(&name).ok_or_else(|| CircuitError::NoFile(own, name.clone()))?;
             Ok::<_, CircuitError>((name, text))
         };
-        let (own, text) = file(unit.name)?;
+        let (own_file, text) = file(own)?;
         let mut files = Vec::new();
         let inner = text.lines().find_map(|line| line.strip_prefix("//@ as "));
         let (op_bits, operations) = match inner {
@@ -138,7 +200,13 @@ impl Library {
                 codes(unit, text)?
             }
         };
-        files.push(own);
+        for (quantity, value) in [("latency", unit.latency), ("interval", unit.interval)] {
+            let broken = limits(text).into_iter().find(|l| l.quantity == quantity && !l.holds(value));
+            if let Some(limit) = broken {
+                return Err(CircuitError::Limit { unit: unit.name, value, limit });
+            }
+        }
+        files.push(own_file);
         let files = self.with_common(files);
         let operands =
             operations.iter().map(|operation| operand_ports(operation.op.row())).max().unwrap_or(0);
@@ -206,7 +274,7 @@ fn codes(unit: &Unit, text: &str) -> Result<(u32, Vec<Operation>), CircuitError>
         .map(|row| row.mnemonic)
         .collect();
     if !missing.is_empty() {
-        return Err(CircuitError::Missing(missing.join(", ")));
+        return Err(CircuitError::Missing(unit.name, missing.join(" ")));
     }
     operations.sort_by_key(|operation| operation.op);
     Ok((width.unwrap_or(0), operations))
@@ -231,6 +299,7 @@ fn code(word: &str) -> Option<(u32, u32)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use takt_isa::UNITS;
     use takt_isa::spec::units::{ADD, MULTIPLY};
 
     fn parse(unit: &Unit, source: &str) -> Result<Vec<(&'static str, u32)>, String> {
@@ -249,6 +318,31 @@ mod tests {
     }
 
     #[test]
+    fn every_unit_states_its_limits() {
+        let library = Library::builtin();
+        for unit in UNITS.iter().filter(|unit| Circuit::rows(unit).next().is_some() && unit.name != "memory")
+        {
+            library.circuit(unit).unwrap_or_else(|error| panic!("{error}"));
+            for latency in [0, 1, 63] {
+                let error = library.circuit(&Unit { latency, ..*unit }).expect_err("no such circuit");
+                assert!(error.to_string().contains(&format!("has latency {latency}; rtl/units/")), "{error}");
+            }
+        }
+        let message = |unit: Unit| library.circuit(&unit).expect_err("no such circuit").to_string();
+        use takt_isa::spec::units::{ALU_LATE, CONVERT, DIVIDE};
+        assert_eq!(
+            message(Unit { latency: 4, ..ADD }),
+            "unit `add` has latency 4; rtl/units/add.v wants latency 5"
+        );
+        assert_eq!(
+            message(Unit { interval: 13, ..DIVIDE }),
+            "unit `divide` has interval 13; rtl/units/divide.v wants interval 14 at least"
+        );
+        assert!(message(Unit { latency: 6, ..CONVERT }).ends_with("latency 4 or 5"));
+        assert!(message(Unit { latency: 2, ..ALU_LATE }).ends_with("latency 3 to 16"));
+    }
+
+    #[test]
     fn refused() {
         let message = |unit, source| parse(unit, source).unwrap_err();
         assert!(message(&ADD, "//@ op 1'b0 fadd").contains("no circuit for fsub"));
@@ -257,6 +351,6 @@ mod tests {
         assert!(message(&ADD, "//@ op 1'b0 fmul").contains("no instruction that the unit `add`"));
         assert!(message(&ADD, "//@ op 1'd0 fadd").contains("expected"));
         assert!(message(&MULTIPLY, "").contains("no circuit for fmul"));
-        assert!(message(&MULTIPLY, "//@ as fused").contains("no circuit `fused.v`"));
+        assert!(message(&MULTIPLY, "//@ as fused").contains("no circuit rtl/units/fused.v"));
     }
 }

@@ -5,20 +5,23 @@
 //! `docs/scheduling.md` says what that means for who writes a program.
 
 mod demand;
+mod memory;
 mod solve;
 
 pub use demand::TimingReport;
 pub use solve::Bound;
 
 use crate::diag::Sink;
-use crate::ir::{Bundle, Constant, Ir, Operation, RegisterId, RegisterKind};
+use crate::flow;
+use crate::ir::{Bundle, Ir, Operation, RegisterId, RegisterKind};
 use crate::values;
 use demand::Demands;
+use memory::Memory;
 use smallvec::{SmallVec, smallvec};
 use solve::{Edge, Part, Problem, Task};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use takt_isa::program::{Location, Space};
-use takt_isa::{Effect, Function, Machine, Operand};
+use takt_isa::{Effect, Function, Machine};
 
 /// How long the scheduler searches unless told otherwise.
 pub const DEFAULT_EFFORT: u32 = 20;
@@ -53,10 +56,11 @@ pub struct Report {
 
 /// Schedules every block of bundles that ask for it ([`Bundle::scheduled`]), and checks what is demanded of ports.
 pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
-    let fixed = jumps_to_numbers(ir);
+    let fixed = flow::jumps_to_numbers(ir);
     if fixed && ir.demands.is_empty() {
         return Report::default();
     }
+    let fixed_registers = memory::fixed(ir);
     let runs = values::runs(ir);
     let demands = demand::assign(ir, &runs, sink);
     let mut report = Report::default();
@@ -73,7 +77,7 @@ pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
             continue;
         }
         let demands = Demands::new(ir, old, demands);
-        let mut block = Block::new(ir, old, scheduled);
+        let mut block = Block::new(ir, &fixed_registers, old, scheduled);
         if !scheduled {
             let start = block.problem.as_written();
             report.timing.extend(demands.check(&block, &start, None, scheduled, sink));
@@ -111,12 +115,14 @@ pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
     report
 }
 
-/// Whether a target is a number: then every bundle must stay at its address.
-fn jumps_to_numbers(ir: &Ir) -> bool {
-    ir.operations().any(|operation| {
-        operation.row().shape.operands().contains(&Operand::Target)
-            && matches!(operation.constant, Constant::Value(_))
-    })
+/// The cycle in which each bundle of a straight run issues, if the run stays as it is written. The first is 0.
+pub(crate) fn as_written(ir: &Ir, bundles: &[Bundle]) -> Vec<u32> {
+    Block::new(ir, &memory::fixed(ir), bundles, false).problem.as_written()
+}
+
+/// Cycles from an operation's issue to the earliest one of an operation that reads its result.
+pub(crate) fn latency(machine: &Machine, operation: &Operation) -> u32 {
+    part(machine, operation).writes.unwrap_or(0)
 }
 
 fn label_at(ir: &Ir, position: u32) -> Option<String> {
@@ -146,9 +152,9 @@ fn part(machine: &Machine, operation: &Operation) -> Part {
 /// - A value is computed before it is read: by the unit's latency.
 /// - A register is read before it is overwritten: in the same cycle at the latest, for a bundle reads before it writes.
 /// - Values for one register, ports included, are written in the source's order: the earlier is written back when the later issues.
-/// - Loads and stores keep their order among each other, except loads among loads.
-/// - A load or store may fault, and what was on the output ports before must be the same: outputs written before it in the
-///   source issue before it, outputs written after it not before it.
+/// - Loads and stores that may touch the same word keep their order, except loads among loads.
+/// - A load or store whose address is not known may fault, and what was on the output ports before must be the same: outputs
+///   written before it in the source issue before it, outputs written after it not before it.
 /// - What redirects control comes last; what drains comes when all is written.
 struct Block {
     problem: Problem,
@@ -158,7 +164,8 @@ struct Block {
 
 impl Block {
     /// The problem of a run of bundles. Fillers, which a schedule has no use for, are tasks only where it is as written.
-    fn new(ir: &Ir, bundles: &[Bundle], scheduled: bool) -> Block {
+    /// `fixed` holds the bits of registers that never change ([`memory::fixed`]).
+    fn new(ir: &Ir, fixed: &[Option<u32>], bundles: &[Bundle], scheduled: bool) -> Block {
         let machine = ir.machine;
         let is_output = |id: RegisterId| ir.register(id).kind == RegisterKind::Output;
         let mut problem = Problem {
@@ -170,8 +177,10 @@ impl Block {
         // For each register: the task of its last value with that value's latency, and the tasks that read it since.
         let mut values: HashMap<RegisterId, (usize, u32)> = HashMap::new();
         let mut readers: HashMap<RegisterId, Vec<usize>> = HashMap::new();
-        let (mut store, mut loads): (Option<usize>, Vec<usize>) = (None, Vec::new());
-        let (mut access, mut outputs): (Option<usize>, Vec<usize>) = (None, Vec::new());
+        let mut memory = Memory::new(ir, fixed);
+        // Loads and stores that may fault; for each output port the task of its last write, and how many of those precede it.
+        let mut faults: Vec<usize> = Vec::new();
+        let mut outputs: BTreeMap<RegisterId, (usize, usize)> = BTreeMap::new();
         for (b, bundle) in bundles.iter().enumerate() {
             let effects = || bundle.operations.iter().map(|operation| operation.row().effect);
             if scheduled && !bundle.explicit && effects().all(|effect| effect == Effect::Nothing) {
@@ -192,6 +201,20 @@ impl Block {
                 }
                 readers.entry(*register).or_default().push(to);
             }
+            for access in
+                bundle.operations.iter().filter_map(|operation| memory.access(operation)).collect::<Vec<_>>()
+            {
+                for from in memory.follow(to, access) {
+                    after(from, 1);
+                }
+                if access.may_fault {
+                    for &(from, _) in outputs.values() {
+                        after(from, 1);
+                    }
+                    faults.push(to);
+                }
+            }
+            memory.write(&bundle.operations);
             let mut output = None;
             for (operation, part) in bundle.operations.iter().zip(&parts) {
                 let Some(dest) = operation.dest else { continue };
@@ -203,32 +226,12 @@ impl Block {
                 }
                 if is_output(dest) {
                     output = output.max(part.writes);
-                    if let Some(from) = access {
+                    // What precedes the port's write before this one precedes this one.
+                    let known = outputs.insert(dest, (to, faults.len())).map_or(0, |(_, known)| known);
+                    for &from in &faults[known..] {
                         after(from, 0);
                     }
-                    outputs.push(to);
                 }
-            }
-            for effect in effects() {
-                match effect {
-                    Effect::Load => {
-                        if let Some(from) = store {
-                            after(from, 1);
-                        }
-                        loads.push(to);
-                    }
-                    Effect::Store => {
-                        for from in loads.drain(..).chain(store) {
-                            after(from, 1);
-                        }
-                        store = Some(to);
-                    }
-                    _ => continue,
-                }
-                for from in outputs.drain(..) {
-                    after(from, 1);
-                }
-                access = Some(to);
             }
             if effects().any(Effect::redirects) {
                 let drains = effects().any(Effect::drains);

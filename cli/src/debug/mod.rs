@@ -4,14 +4,13 @@ mod history;
 mod prompt;
 mod screen;
 
-use crate::controller::OnEmulator;
 use crate::files::{self, Given, Out};
 use crate::load::{Load, Loaded};
+use crate::number;
 use crate::output::{self, Failure};
 use crate::ports;
-use crate::run::tick;
-use crate::select::{self, OptionalMachine, PAPER_CLOCK, SourceArguments};
-use crate::track::{self, period_cycles};
+use crate::select::{OptionalMachine, SourceArguments};
+use crate::track::{ClosedLoopArguments, Recording};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use indicatif::HumanCount;
@@ -23,8 +22,6 @@ use std::thread;
 use std::time::Duration;
 use takt_debug::console::{Console, first_mistake};
 use takt_debug::session::{Control, Options, Rows, Session, Unit, Why};
-use takt_emu::Emulator;
-use takt_programs::hybrid::closed_loop::ClosedLoop;
 
 /// Step through a program, forth and back, and look at everything.
 ///
@@ -40,11 +37,11 @@ pub(crate) struct Debug {
     machine: OptionalMachine,
     #[command(flatten)]
     source: SourceArguments,
-    /// CSV with one named column for each input port and one row for each period.
+    /// CSV with one named column for each input port and one row for each period [default: the ports are 0].
     #[arg(long, value_name = "CSV", conflicts_with = "track")]
     inputs: Option<PathBuf>,
     /// The tick comes every so many cycles, up to 100000000 [default: when the program is ready].
-    #[arg(long, value_name = "CYCLES", value_parser = tick, allow_negative_numbers = true, conflicts_with = "track")]
+    #[arg(long, value_name = "CYCLES", value_parser = number::tick, allow_hyphen_values = true, conflicts_with = "track")]
     tick: Option<NonZeroU64>,
     /// Commands from a file; `-` is standard input.
     #[arg(long, value_name = "FILE", conflicts_with = "tui")]
@@ -52,16 +49,8 @@ pub(crate) struct Debug {
     /// Full-screen: source, bundle, registers, operations in flight, stalls, ports, watches, and the same commands.
     #[arg(long)]
     tui: bool,
-    /// Run the program as the hybrid robot's controller along the tool path first, and begin in the period in which the
-    /// tracking error is largest.
-    #[arg(long)]
-    track: bool,
-    /// With --track: tool path in G-code [default: the letters AGH].
-    #[arg(long, value_name = "FILE", requires = "track")]
-    gcode: Option<PathBuf>,
-    /// With --track: stop after this many periods [default: the whole path].
-    #[arg(long, value_name = "N", value_parser = select::count, requires = "track", allow_negative_numbers = true)]
-    periods: Option<u64>,
+    #[command(flatten)]
+    closed_loop: ClosedLoopArguments,
 }
 
 const EXAMPLES: &str = "\
@@ -83,7 +72,7 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
     let mut reads: Vec<Given<'_>> = Vec::new();
     reads.extend(arguments.file.as_deref().map(|path| ("FILE", path)));
     reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
-    reads.extend(arguments.gcode.as_deref().map(|path| ("--gcode", path)));
+    reads.extend(arguments.closed_loop.gcode.as_deref().map(|path| ("--gcode", path)));
     reads.extend(arguments.script.as_deref().map(|path| ("--script", path)));
     files::check(&reads, &[])?;
     let reads_stdin = arguments.script.is_none();
@@ -101,17 +90,17 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
 
     let control = Arc::new(Control::default());
     let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
-    let session = if arguments.track {
-        let path = arguments.file.as_deref().unwrap_or(Path::new("tracking"));
-        let (name, loaded) = track::program(path, load)?;
-        along_path(arguments, &name, loaded, &control, out)?
+    let session = if arguments.closed_loop.track {
+        let recording = arguments.closed_loop.record(arguments.file.as_deref(), load, ROWS)?;
+        in_recording(recording, &control, out)?
     } else {
         let path = arguments.file.as_deref().context("no file")?;
         let loaded = load.with_source(path)?;
         let inputs = arguments.inputs.as_deref().map(|path| rows(path, &loaded)).transpose()?;
-        let Loaded { program, constants, sources } = loaded;
-        let tick = arguments.tick;
-        Session::new(&program, Options { inputs, tick, constants, sources, control: Arc::clone(&control) })?
+        changed_sources(path, &loaded, color);
+        let Loaded { program, constants, sources, names } = loaded;
+        let (tick, control) = (arguments.tick, Arc::clone(&control));
+        Session::new(&program, Options { inputs, tick, constants, sources, names, control })?
     };
     let mut console = Console::new(session);
     if arguments.tui {
@@ -128,6 +117,22 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
+/// Warns of sources that were changed since the image that is debugged was made of them. They are looked for where the
+/// assembler looks, from the image's folder on; one that is not there is no one's mistake, for the image has its text.
+fn changed_sources(path: &Path, loaded: &Loaded, color: bool) {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    for (name, text) in &loaded.sources {
+        let file = folder.join(name);
+        let Some(size) = file.metadata().ok().filter(|of| of.is_file()).map(|of| of.len()) else { continue };
+        let is_same = || std::fs::read(&file).is_ok_and(|now| now == text.as_bytes());
+        if size != text.len() as u64 || !is_same() {
+            let text =
+                format!("{name} has changed since {} was made; shown is what it was then", path.display());
+            output::warning(&text, color);
+        }
+    }
+}
+
 /// A script's name and text.
 fn script(path: &Path) -> Result<(String, String)> {
     let name = files::input_name(path);
@@ -140,60 +145,20 @@ fn script(path: &Path) -> Result<(String, String)> {
 }
 
 fn rows(path: &Path, loaded: &Loaded) -> Result<Arc<Rows>> {
-    let name = files::input_name(path);
-    let rows = ports::read_rows(path, &loaded.program.inputs, ROWS as u64 + 1)?;
+    let rows = ports::rows(Some(path), Some(ROWS as u64 + 1), 0, &loaded.program.inputs)?;
     if rows.len() > ROWS {
-        bail!("{name} has more than {ROWS} rows");
-    }
-    if rows.is_empty() {
-        bail!("{name} has a header and no row, so there is no period to run");
+        bail!("{} has more than {ROWS} rows", files::input_name(path));
     }
     Ok(Arc::new(rows))
 }
 
-/// A session on what the controller did along the tool path, where the tracking error is largest.
-fn along_path(
-    arguments: &Debug,
-    name: &str,
-    loaded: Loaded,
-    control: &Arc<Control>,
-    out: &mut Out,
-) -> Result<Session> {
-    let Loaded { program, constants, sources } = loaded;
-    let (path, trajectory) = track::trajectory(arguments.gcode.as_deref())?;
-    let periods = arguments.periods.unwrap_or(u64::MAX).min(trajectory.periods());
-    if periods > ROWS as u64 {
-        bail!("{path} has {periods} periods; a session holds {ROWS} (see --periods)");
-    }
-    let tick = period_cycles(PAPER_CLOCK);
-    let mut emulator = Emulator::new(&program)?;
-    emulator.set_tick_period(tick);
-    let controller = OnEmulator::new(emulator, periods - 1).with_context(|| name.to_owned())?;
-    let registers = controller.inputs();
-    let mut closed_loop = ClosedLoop::new(&trajectory, controller);
-    let (mut rows, mut worst) = (Vec::new(), (0, -1.0, false));
-    let progress = track::progress(periods, "periods", false);
-    for _ in 0..periods {
-        let record = closed_loop.next().context("the path ended early")?.with_context(|| path.clone())?;
-        rows.push(registers.iter().copied().zip(record.inputs.to_words()).collect::<Vec<_>>());
-        if record.tool_error > worst.1 {
-            worst = (record.period, record.tool_error, record.sample.cutting);
-        }
-        if record.period.is_multiple_of(4096) {
-            progress.set_position(record.period);
-        }
-    }
-    progress.finish_and_clear();
-    let inputs = Some(Arc::new(rows));
-    let mut session =
-        Session::new(&program, Options { inputs, tick, constants, sources, control: Arc::clone(control) })?;
-    let (period, error, cutting) = worst;
-    let doing = if cutting { "cutting" } else { "not cutting" };
-    writeln!(
-        out,
-        "{name} along {path}, {periods} periods: the largest tracking error is {:.3} µm, in period {period} ({doing})",
-        error * 1e6
-    )?;
+/// A session on what a program did in a closed loop, at the period that is worth a look.
+fn in_recording(recording: Recording, control: &Arc<Control>, out: &mut Out) -> Result<Session> {
+    let Recording { loaded, inputs, tick, period, why } = recording;
+    let Loaded { program, constants, sources, names } = loaded;
+    let (inputs, control) = (Some(Arc::new(inputs)), Arc::clone(control));
+    let mut session = Session::new(&program, Options { inputs, tick, constants, sources, names, control })?;
+    writeln!(out, "{why}")?;
     // To where the period's first bundle is about to issue.
     let why = match session.go_to_period(period) {
         Why::Done => session.step(Unit::Bundle),

@@ -5,7 +5,7 @@ use super::Live;
 use super::expression::Reads;
 use super::stops::{Stop, Test, Where};
 use std::collections::BTreeSet;
-use takt_emu::{Emulator, Status};
+use takt_emu::Emulator;
 use takt_isa::timing::{Address, Cycle};
 use takt_isa::{Effect, Program};
 
@@ -45,15 +45,13 @@ impl Interest {
         let mut interest = Interest::default();
         for (_, stop) in stops {
             match stop {
-                Stop::Break { at: Where::Bundle(address), .. } => {
-                    interest.bundles.insert(*address);
-                }
+                Stop::Break { at: Where::Bundles(bundles), .. } => interest.bundles.extend(bundles),
                 Stop::Break { at: Where::Cycle(cycle), .. } => {
                     interest.cycles.insert(*cycle);
                 }
                 Stop::Break { at: Where::Period(_), .. } => {}
                 Stop::Watch { what, test, .. } => {
-                    interest.add_value(what, program);
+                    what.each().iter().for_each(|what| interest.add_value(what, program));
                     if let Test::Equals(other) | Test::Above(other) = test {
                         interest.add_value(other, program);
                     }
@@ -89,19 +87,18 @@ impl Interest {
     /// The next position that matters but for the pauses, at `until` at the latest; `issuing` is about to issue.
     pub(super) fn next(&self, emulator: &Emulator, issuing: Option<Address>, until: Cycle) -> Cycle {
         let now = emulator.now();
-        let waits = matches!(emulator.status(), Status::Waiting { .. });
-        // While the program waits and nothing is on its way, nothing changes.
-        let idle = waits && emulator.underway().next().is_none();
+        // While the program waits and nothing is in flight, nothing changes until the tick.
+        let idle = emulator.due_tick().filter(|_| emulator.underway().next().is_none());
         let mut underway = emulator.underway().filter(|retire| retire.cycle > now);
         let each = self.clock
-            || self.every && !idle
+            || self.every && idle.is_none()
             || issuing.is_some_and(|address| self.bundles.contains(&address))
             || underway.any(|retire| self.bundles.contains(&retire.address));
         if each {
             return (now + 1).min(until);
         }
-        let tick = emulator.next_tick().filter(|_| idle && self.every);
+        let tick = idle.filter(|_| self.every).map(|tick| tick.max(now + 1));
         let cycle = self.cycles.range(now + 1..).next().copied();
-        [tick.map(|tick| tick.max(now + 1)), cycle, Some(until)].into_iter().flatten().min().unwrap_or(until)
+        [tick, cycle].into_iter().flatten().fold(until, Cycle::min)
     }
 }

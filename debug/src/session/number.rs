@@ -1,5 +1,6 @@
 //! Numbers as a debugger shows them.
 
+use crate::value;
 use takt_isa::Type;
 
 /// A value in every way in which it can be read.
@@ -21,11 +22,7 @@ impl Shown {
     /// The bits as a value of a type.
     pub fn new(ty: Type, bits: u32) -> Shown {
         let (float, integer) = (f32::from_bits(bits), bits.cast_signed());
-        let text = match ty {
-            Type::F => format!("{float:?}"),
-            Type::I => integer.to_string(),
-            Type::B => format!("0x{bits:08x}"),
-        };
+        let text = value::text(ty, bits);
         Shown { text, hex_float: hex_float(float), float, integer, bits }
     }
 

@@ -1,7 +1,8 @@
 //! The retire log: a JSON object a line for each completed operation and each event of the period.
 
 use super::signal::{Signal, Source};
-use super::{Record, Writer, number};
+use super::{Record, Writer};
+use crate::value;
 use serde::Serialize;
 use serde_json::Value;
 use std::io::{self, Write};
@@ -51,9 +52,8 @@ impl<'w> JsonLines<'w> {
             bits: (retire.register.is_some() || retire.memory.is_some())
                 .then(|| format!("0x{:08x}", retire.value)),
             value: retire.register.and_then(|_| match row.result_type() {
-                Type::F => Some(number(f32::from_bits(retire.value))),
-                Type::I => Some(retire.value.cast_signed().into()),
                 Type::B => None,
+                ty => Some(value::json(ty, retire.value)),
             }),
             memory: retire.memory,
             flags: (!retire.flags.is_empty()).then(|| retire.flags.to_string()),

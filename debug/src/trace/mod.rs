@@ -52,7 +52,7 @@ pub struct Options {
     pub format: Format,
     /// The cycles that are traced.
     pub cycles: Range<Cycle>,
-    /// Names of signals, `*` standing for any characters; empty for all.
+    /// Names of signals, alone or with their groups as in `outputs.F1`, `*` standing for any characters; empty for all.
     pub signals: Vec<String>,
     /// Bytes, roughly: the cycle in which a trace has more is its last.
     pub limit: u64,
@@ -106,6 +106,9 @@ pub struct Summary {
     pub cut: bool,
 }
 
+/// Somebody else who hears what happens.
+pub type Also<'a> = Option<&'a mut dyn FnMut(&Event)>;
+
 /// Runs an emulator and writes what it does.
 pub struct Tracer<'w> {
     options: Options,
@@ -137,13 +140,17 @@ impl<'w> Tracer<'w> {
         Ok(Tracer { options, bytes, target: Some(target), writer: None, summary, error: None })
     }
 
-    /// As [`Emulator::run_period`] with the inputs as they are.
+    /// As [`Emulator::run_period`] with the inputs as they are; `also` hears what happens, within the window or not.
     ///
     /// # Errors
     /// As there. Errors of writing are told by [`Tracer::finish`].
-    pub fn run_period(&mut self, emulator: &mut Emulator) -> Result<PeriodReport, PeriodError> {
+    pub fn run_period(
+        &mut self,
+        emulator: &mut Emulator,
+        mut also: Also<'_>,
+    ) -> Result<PeriodReport, PeriodError> {
         loop {
-            if let Some(report) = self.advance(emulator, |emulator, until, sink| match sink {
+            if let Some(report) = self.advance(emulator, &mut also, |emulator, until, sink| match sink {
                 Some(sink) => emulator.observed(sink).run_period_until(until),
                 None => emulator.run_period_until(until),
             })? {
@@ -152,14 +159,18 @@ impl<'w> Tracer<'w> {
         }
     }
 
-    /// As [`Emulator::run`].
+    /// As [`Emulator::run`]; `also` hears what happens, within the window or not.
     ///
     /// # Errors
     /// As there. Errors of writing are told by [`Tracer::finish`].
-    pub fn run(&mut self, emulator: &mut Emulator) -> Result<takt_emu::Stop, PeriodError> {
+    pub fn run(
+        &mut self,
+        emulator: &mut Emulator,
+        mut also: Also<'_>,
+    ) -> Result<takt_emu::Stop, PeriodError> {
         use takt_emu::Stop;
         loop {
-            let stop = self.advance(emulator, |emulator, until, sink| {
+            let stop = self.advance(emulator, &mut also, |emulator, until, sink| {
                 let stop = match sink {
                     Some(sink) => emulator.observed(sink).run_until(until)?,
                     None => emulator.run_until(until)?,
@@ -180,16 +191,18 @@ impl<'w> Tracer<'w> {
     fn advance<T>(
         &mut self,
         emulator: &mut Emulator,
+        also: &mut Also<'_>,
         run: impl FnOnce(&mut Emulator, Cycle, Option<&mut dyn FnMut(&Event)>) -> Result<Option<T>, PeriodError>,
     ) -> Result<Option<T>, PeriodError> {
         let now = emulator.now();
         let Range { start, end } = self.options.cycles;
-        if now < start {
-            return run(emulator, start, None);
-        }
         let over = now >= end || self.summary.cut || self.error.is_some();
-        if over {
-            return run(emulator, Cycle::MAX, None);
+        if now < start || over {
+            let until = if now < start { start } else { Cycle::MAX };
+            return match also {
+                Some(also) => run(emulator, until, Some(&mut |event| also(event))),
+                None => run(emulator, until, None),
+            };
         }
         if let Some(target) = self.target.take() {
             self.writer = self.begin(emulator, target);
@@ -202,7 +215,13 @@ impl<'w> Tracer<'w> {
             }
         };
         let mut events = Vec::new();
-        let result = run(emulator, now + 1, Some(&mut |event| events.push(event.clone())));
+        let mut sink = |event: &Event| {
+            events.push(event.clone());
+            if let Some(also) = also {
+                also(event);
+            }
+        };
+        let result = run(emulator, now + 1, Some(&mut sink));
         let passed = emulator.now() > now;
         let issued = upcoming.map(|upcoming| upcoming.address).filter(|_| passed && stall.is_none());
         let record = Record { cycle: now, issued, stall, events };
@@ -260,10 +279,4 @@ impl<'w> Tracer<'w> {
         }
         Ok(self.summary)
     }
-}
-
-/// A NaN or an infinity has no number in JSON.
-fn number(value: f32) -> serde_json::Value {
-    serde_json::from_str::<serde_json::Number>(&format!("{value:?}"))
-        .map_or_else(|_| format!("{value:?}").into(), serde_json::Value::from)
 }

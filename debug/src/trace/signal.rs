@@ -41,7 +41,28 @@ pub(super) enum SignalType {
     Bits(u32),
 }
 
+/// The group that all signals stand in.
+pub(super) const TOP: &str = "takt";
+
 impl Signal {
+    /// Its name with the groups that it stands in, as viewers show it.
+    fn path(&self) -> String {
+        let scope = self.scope.map_or(String::new(), |scope| format!("{scope}."));
+        format!("{TOP}.{scope}{}", self.name)
+    }
+
+    /// Whether a pattern means it: by its name, by its group and name, or by its whole path. A name may have points of its
+    /// own, and `*` before the first point stands for one group.
+    fn is(&self, pattern: &str) -> bool {
+        let grouped = |(group, name): (&str, &str)| {
+            self.scope.is_some_and(|scope| matches(group, scope)) && matches(name, &self.name)
+        };
+        matches(pattern, &self.name)
+            || pattern.split_once('.').is_some_and(grouped)
+            || pattern.strip_prefix(TOP).is_some_and(|rest| rest.starts_with('.'))
+                && matches(pattern, &self.path())
+    }
+
     /// Its value after a cycle: `None` while unknown.
     pub(super) fn value(&self, record: &super::Record, emulator: &Emulator) -> Option<u32> {
         use takt_emu::Event;
@@ -70,6 +91,9 @@ pub enum SignalError {
         /// What may be meant.
         near: Option<String>,
     },
+    /// A name that matches signals, but no register, and the format selects by registers.
+    #[error("`{0}` is no register: a retire log has the operations that write the registers selected")]
+    NoRegister(String),
     /// A format without signals.
     #[error("a Kanata trace shows operations; it has no signals to select")]
     None,
@@ -120,11 +144,21 @@ pub(super) fn select(
         return Err(SignalError::None);
     }
     for pattern in patterns {
-        if !signals.iter().any(|signal| matches(pattern, &signal.name)) {
-            let near = nearest(pattern, signals.iter().map(|signal| signal.name.as_str()));
+        let mut meant = signals.iter().filter(|signal| signal.is(pattern)).peekable();
+        if meant.peek().is_none() {
+            let paths: Vec<String> = signals.iter().map(Signal::path).collect();
+            // As much of the path as the pattern has.
+            let grouped =
+                |path: &'_ str| path.split_once('.').map_or(String::new(), |(_, rest)| rest.to_owned());
+            let groups: Vec<String> = paths.iter().map(|path| grouped(path)).collect();
+            let names = signals.iter().map(|signal| signal.name.as_str());
+            let near = nearest(pattern, names.chain(groups.iter().chain(&paths).map(String::as_str)));
             return Err(SignalError::Unknown { name: pattern.clone(), near });
         }
+        if format == Format::JsonLines && !meant.any(|signal| matches!(signal.source, Source::Register(_))) {
+            return Err(SignalError::NoRegister(pattern.clone()));
+        }
     }
-    let wanted = |signal: &Signal| patterns.iter().any(|pattern| matches(pattern, &signal.name));
+    let wanted = |signal: &Signal| patterns.iter().any(|pattern| signal.is(pattern));
     Ok(signals.into_iter().filter(wanted).collect())
 }

@@ -78,7 +78,7 @@ fn wave<'w>(file: Box<dyn File + 'w>, signals: Vec<Signal>) -> Box<dyn Writer + 
 /// Calls `signal` for each signal and `scope` where a group begins (with its name) and ends.
 fn hierarchy<E>(signals: &[Signal], mut visit: impl FnMut(Part<'_>) -> Result<(), E>) -> Result<(), E> {
     let mut inside = None;
-    visit(Part::Begin("takt"))?;
+    visit(Part::Begin(super::signal::TOP))?;
     for (i, signal) in signals.iter().enumerate() {
         if signal.scope != inside {
             if inside.is_some() {

@@ -152,6 +152,16 @@ impl Row {
         let skip = usize::from(self.shape.has_dest());
         self.types.get(skip + index).copied().unwrap_or(Type::B)
     }
+
+    /// Whether the instruction copies its source to its destination, bit for bit, and does nothing else. Told from its meaning:
+    /// it takes any 32 bits, and each of them comes through alone and is missing alone.
+    pub fn copies(&self) -> bool {
+        let of = |a| compute::<fp::Host>(self.op, a, 0, 0);
+        self.effect == Effect::Compute
+            && self.shape == Shape::Da
+            && self.types == [Type::B, Type::B]
+            && (0..32).flat_map(|bit| [1 << bit, !(1 << bit)]).all(|bits| of(bits) == Value::exact(bits))
+    }
 }
 
 const fn flag(condition: bool) -> Value {

@@ -78,8 +78,19 @@ const fn bank(name: &'static str, base: u16, depth: u16) -> Bank {
     Bank { name, base, depth }
 }
 
+/// One row after the other: a row that is no machine ([`Machine::error`]) does not compile.
+macro_rules! machines {
+    ($($(#[$text:meta])* $name:ident = $row:expr;)*) => {
+        $($(#[$text])* pub static $name: Machine = $row.checked();)*
+
+        /// Every machine; the first is the default.
+        pub static MACHINES: &[&Machine] = &[$(&$name),*];
+    };
+}
+
+machines! {
 /// The fast machine: three slots.
-pub static T3: Machine = Machine {
+T3 = Machine {
     name: "t3",
     text: "The fast machine: three operations a cycle, everything pipelined.",
     slots: &[
@@ -101,7 +112,7 @@ pub static T3: Machine = Machine {
 };
 
 /// The small machine: one slot.
-pub static T1: Machine = Machine {
+T1 = Machine {
     name: "t1",
     text: "The small machine: one operation a cycle, one register file, iterative division and square root; no arctangent or arccosine.",
     slots: &[Slot {
@@ -128,9 +139,7 @@ pub static T1: Machine = Machine {
     refill: 6,
     resolve: 2,
 };
-
-/// Every machine; the first is the default.
-pub static MACHINES: &[&Machine] = &[&T3, &T1];
+}
 
 impl Machine {
     /// The machine of this name.

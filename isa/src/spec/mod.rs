@@ -4,8 +4,11 @@
 //! - [`units`]: one row per circuit: what it computes, latency, initiation interval, pipeline cuts, RTL module;
 //! - [`machines`]: one row per machine: its issue slots, the units each slot hosts, its register banks and memories.
 //!
+//! [`check`] says why a row of the last is no machine.
+//!
 //! Encoder, decoder, disassembler, manual, timing model, assembler and emulator name no instruction.
 
+pub mod check;
 pub mod instructions;
 pub mod machines;
 pub mod units;

@@ -1,0 +1,270 @@
+//! `--deny`: what a run must be free of, and what it says if it was not.
+
+use crate::output::Failure;
+use crate::select::suggest;
+use crate::trace::Trace;
+use anyhow::Result;
+use clap::Args;
+use serde_json::{Value, json};
+use takt_debug::trace::Also;
+use takt_emu::{Emulator, Event, PeriodError, PeriodReport, Retire, Stop};
+use takt_isa::fp::{Flags, is_nan};
+use takt_isa::timing::{Address, Cycle};
+use takt_isa::{Program, Type};
+
+/// Something that can be denied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum What {
+    /// A tick that came before the `wait`, whether it was remembered or lost.
+    Missed,
+    /// An exception flag that was raised, whether or not it was cleared later.
+    Flag(Flags, &'static str),
+    /// A NaN that was written to an output port.
+    Nan,
+}
+
+impl What {
+    fn all() -> Vec<What> {
+        let flags = Flags::NAMES.into_iter().map(|(flag, name)| What::Flag(flag, name));
+        [What::Missed].into_iter().chain(flags).chain([What::Nan]).collect()
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            What::Missed => "missed",
+            What::Flag(_, name) => name,
+            What::Nan => "nan",
+        }
+    }
+
+    fn text(self) -> String {
+        match self {
+            What::Missed => "deadline missed".to_owned(),
+            What::Flag(_, name) => format!("{name} raised"),
+            What::Nan => "NaN written to an output port".to_owned(),
+        }
+    }
+}
+
+/// What one word of `--deny` stands for.
+#[derive(Clone, Debug)]
+struct Denied(Vec<What>);
+
+fn denied(text: &str) -> Result<Denied, String> {
+    let all = What::all();
+    if text == "all" {
+        return Ok(Denied(all));
+    }
+    if let Some(what) = all.iter().find(|what| what.name() == text) {
+        return Ok(Denied(vec![*what]));
+    }
+    let names: Vec<&str> = all.iter().map(|what| what.name()).chain(["all"]).collect();
+    let near = suggest(text, names.iter().copied());
+    Err(format!("nothing of this name can be denied{near} (there are: {})", names.join(", ")))
+}
+
+#[derive(Args)]
+pub(crate) struct DenyArguments {
+    /// For CI: end with status 3 if any of these happens in the run, and say what, when first and how often: `missed` (a
+    /// deadline), the exception flags `invalid`, `divide-by-zero` and `overflow`, `nan` (on an output port), or `all`. (A
+    /// fault always ends a run, with status 1.)
+    #[arg(long, value_name = "WHAT,…", value_delimiter = ',', value_parser = denied)]
+    deny: Vec<Denied>,
+}
+
+/// The first time that something happened.
+#[derive(Clone, Copy)]
+struct First {
+    /// The period, from 0; `None` in a run without periods.
+    period: Option<u64>,
+    cycle: Cycle,
+    /// The bundle that did it; for a missed deadline the one that had issued last.
+    address: Address,
+    /// The operation that did it, where it was one: its slot, and the register that it wrote.
+    operation: Option<(u8, Option<u16>)>,
+}
+
+/// How often something denied happened.
+#[derive(Clone)]
+struct Finding {
+    what: What,
+    count: u64,
+    first: Option<First>,
+}
+
+/// Observes a run for what is denied. If nothing is, the run is not observed and as fast as ever.
+#[derive(Clone)]
+pub(crate) struct Watch {
+    findings: Vec<Finding>,
+    /// The period underway.
+    period: Option<u64>,
+    /// The bundle that issued last.
+    at: Address,
+}
+
+impl DenyArguments {
+    pub(crate) fn watch(&self) -> Watch {
+        let denied = |what: &What| self.deny.iter().any(|words| words.0.contains(what));
+        let findings = What::all().into_iter().filter(denied);
+        Watch { findings: findings.map(Finding::none).collect(), ..Watch::idle() }
+    }
+}
+
+impl Finding {
+    fn none(what: What) -> Finding {
+        Finding { what, count: 0, first: None }
+    }
+
+    /// What did it, and where.
+    fn place(&self, first: &First, program: &Program) -> String {
+        let place = location(program, first).map_or_else(String::new, |place| format!(" ({place})"));
+        let bundle = format!("bundle {}{place}", first.address);
+        let Some((slot, register)) = first.operation else { return format!("after {bundle}") };
+        let instructions = program.bundle(first.address).and_then(Result::ok).unwrap_or_default();
+        let mnemonic = instructions.get(usize::from(slot)).map_or("?", |found| found.op.row().mnemonic);
+        match (self.what, register) {
+            (What::Nan, Some(register)) => {
+                format!("to {} by {mnemonic} in {bundle}", program.register_text(register))
+            }
+            _ => format!("by {mnemonic} in {bundle}"),
+        }
+    }
+
+    fn message(&self, first: &First, program: &Program) -> String {
+        let what = self.what.text();
+        let times = if self.count == 1 { "once,".to_owned() } else { format!("{} times, first", self.count) };
+        let period = first.period.map_or_else(String::new, |period| format!(" in period {period},"));
+        format!("denied: {what} {times}{period} cycle {}, {}", first.cycle, self.place(first, program))
+    }
+}
+
+/// `file:line` of the operation, or else of its bundle.
+fn location(program: &Program, first: &First) -> Option<String> {
+    let slots = program.machine.slots.len();
+    let word = first.operation.map(|(slot, _)| first.address as usize * slots + usize::from(slot));
+    let own = word.and_then(|word| *program.lines.get(word)?);
+    own.or_else(|| program.location(first.address)).map(|location| program.place_text(location))
+}
+
+impl Watch {
+    /// One that denies nothing.
+    pub(crate) fn idle() -> Watch {
+        Watch { findings: Vec::new(), period: None, at: 0 }
+    }
+
+    /// As [`Emulator::run_period`] with the inputs as they are, while `also` hears everything too. Every run that
+    /// --deny is for has its periods run here.
+    pub(crate) fn run_period(
+        &mut self,
+        emulator: &mut Emulator,
+        trace: Option<&mut Trace<'_>>,
+        mut also: Also<'_>,
+    ) -> Result<PeriodReport, PeriodError> {
+        self.period = Some(self.period.map_or(0, |period| period + 1));
+        let heard = also.is_some() || !self.findings.is_empty();
+        let mut sink = |event: &Event| {
+            self.hear(event);
+            if let Some(also) = &mut also {
+                also(event);
+            }
+        };
+        match trace {
+            Some(trace) => trace.run_period(emulator, heard.then_some(&mut sink)),
+            None if heard => emulator.observed(&mut sink).run_period(&[]),
+            None => emulator.run_period(&[]),
+        }
+    }
+
+    /// As [`Emulator::run`].
+    pub(crate) fn run(
+        &mut self,
+        emulator: &mut Emulator,
+        trace: Option<&mut Trace<'_>>,
+    ) -> Result<Stop, PeriodError> {
+        let heard = !self.findings.is_empty();
+        let mut sink = |event: &Event| self.hear(event);
+        match trace {
+            Some(trace) => trace.run(emulator, heard.then_some(&mut sink)),
+            None if heard => Ok(emulator.observed(&mut sink).run()?),
+            None => Ok(emulator.run()?),
+        }
+    }
+
+    fn hear(&mut self, event: &Event) {
+        match event {
+            Event::Issue { address, .. } => self.at = *address,
+            Event::DeadlineMissed { cycle } | Event::TickLost { cycle } => {
+                self.note(*cycle, self.at, None, |what| what == What::Missed);
+            }
+            Event::Retire(retire) if !retire.flags.is_empty() => self.raised(retire),
+            Event::PortWrite(write) if write.nan => {
+                let operation = Some((write.slot, Some(write.register)));
+                self.note(write.cycle, write.address, operation, |what| what == What::Nan);
+            }
+            _ => {}
+        }
+    }
+
+    fn raised(&mut self, retire: &Retire) {
+        let raised = |what| matches!(what, What::Flag(flag, _) if retire.flags.contains(flag));
+        self.note(retire.cycle, retire.address, Some((retire.slot, retire.register)), raised);
+    }
+
+    fn note(
+        &mut self,
+        cycle: Cycle,
+        address: Address,
+        operation: Option<(u8, Option<u16>)>,
+        happened: impl Fn(What) -> bool,
+    ) {
+        for finding in self.findings.iter_mut().filter(|finding| happened(finding.what)) {
+            finding.count += 1;
+            finding.first.get_or_insert(First { period: self.period, cycle, address, operation });
+        }
+    }
+
+    /// What was denied and happened, with what issued together with the last `wait` and is still underway.
+    pub(crate) fn end(&self, emulator: &Emulator) -> Denials {
+        let program = emulator.program();
+        let mut watch = self.clone();
+        let is_float =
+            |register| program.outputs.iter().any(|port| port.register == register && port.ty == Type::F);
+        for retire in emulator.underway() {
+            watch.raised(retire);
+            if is_nan(retire.value) && retire.register.is_some_and(is_float) {
+                let operation = Some((retire.slot, retire.register));
+                watch.note(retire.cycle, retire.address, operation, |what| what == What::Nan);
+            }
+        }
+        let found = || watch.findings.iter().filter_map(|finding| Some((finding, finding.first.as_ref()?)));
+        let json = |(finding, first): (&Finding, &First)| {
+            json!({
+                "what": finding.what.name(),
+                "count": finding.count,
+                "first": {
+                    "period": first.period,
+                    "cycle": first.cycle,
+                    "bundle": first.address,
+                    "place": location(program, first),
+                },
+            })
+        };
+        let message = |(finding, first): (&Finding, &First)| finding.message(first, program);
+        Denials { json: found().map(json).collect(), messages: found().map(message).collect() }
+    }
+}
+
+/// What --deny names and happened.
+pub(crate) struct Denials {
+    /// A list, for --json.
+    pub(crate) json: Value,
+    messages: Vec<String>,
+}
+
+impl Denials {
+    /// # Errors
+    /// If anything happened.
+    pub(crate) fn verdict(self) -> Result<()> {
+        if self.messages.is_empty() { Ok(()) } else { Err(Failure::Denied(self.messages).into()) }
+    }
+}

@@ -1,0 +1,218 @@
+//! Numbers on the command line, with and without a unit: one way to read them, and to say what is wrong with one.
+//!
+//! Options that take one allow a leading `-`, so that `--tick -5us` is a wrong number and not an unknown option.
+
+use std::num::NonZeroU64;
+use std::ops::RangeInclusive;
+
+/// The number at the beginning of a text, and what follows it. No word (`nan`, `inf`) is a number.
+fn split(text: &str) -> (&str, &str) {
+    let text = text.trim();
+    let sign = usize::from(text.starts_with(['+', '-']));
+    let is_number = |end: usize| text[..end].parse::<f64>().is_ok();
+    let is_digit = |c: char| c.is_ascii_digit() || ".eE+-".contains(c);
+    // The longest beginning that is one: the `e` of `5e3` belongs to it, that of `5em` does not.
+    let most = text.find(|c| !is_digit(c)).unwrap_or(text.len());
+    let end = (sign + 1..=most).rev().find(|&end| is_number(end)).unwrap_or(0);
+    (&text[..end], text[end..].trim_start())
+}
+
+/// A whole number in a range.
+fn whole(text: &str, range: RangeInclusive<u64>) -> Result<u64, String> {
+    let (number, rest) = split(text);
+    if number.is_empty() {
+        return Err("not a whole number".to_owned());
+    }
+    if !rest.is_empty() {
+        return Err(format!("a whole number is wanted, without a unit; `{rest}` follows it"));
+    }
+    let (first, last) = (range.start(), range.end());
+    match number.parse::<u64>() {
+        Ok(count) if range.contains(&count) => Ok(count),
+        Ok(count) if count < *first => Err(format!("less than {first}")),
+        Ok(_) => Err(format!("more than {last}")),
+        Err(_) if number.starts_with('-') => Err(format!("less than {first}")),
+        Err(_) if number.contains(|c: char| !c.is_ascii_digit() && c != '+') => {
+            Err("not a whole number in digits".to_owned())
+        }
+        Err(_) => Err(format!("more than {last}")),
+    }
+}
+
+/// A number of periods, cycles or the like, at least 1, for clap.
+pub(crate) fn count(text: &str) -> Result<u64, String> {
+    whole(text, 1..=u64::MAX)
+}
+
+/// A number that may be 0, for clap.
+pub(crate) fn natural(text: &str) -> Result<u64, String> {
+    whole(text, 0..=u64::MAX)
+}
+
+/// The longest time between ticks, cycles: well within [`crate::run::PERIOD_LIMIT`].
+const LONGEST_TICK: u64 = 100_000_000;
+
+/// Cycles from tick to tick, for clap.
+pub(crate) fn tick(text: &str) -> Result<NonZeroU64, String> {
+    NonZeroU64::new(whole(text, 1..=LONGEST_TICK)?).ok_or_else(|| "less than 1".to_owned())
+}
+
+/// Units of a quantity, each with its size in the first one's.
+type Units = &'static [(&'static str, f64)];
+const FREQUENCY: Units = &[("MHz", 1.0), ("Hz", 1e-6), ("kHz", 1e-3), ("GHz", 1e3)];
+const TIME: Units = &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("µs", 1e-6), ("ns", 1e-9)];
+
+/// A number with a unit, in the first of `units`; `bare` says whether that one may be left out.
+fn quantity(text: &str, units: Units, bare: bool, range: RangeInclusive<f64>) -> Result<f64, String> {
+    let base = units[0].0;
+    let names = || units.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+    let (number, unit) = split(text);
+    let value: f64 = number.parse().map_err(|_| "not a number".to_owned())?;
+    let scale = match units.iter().find(|(name, _)| *name == unit) {
+        Some((_, scale)) => *scale,
+        None if unit.is_empty() && bare => 1.0,
+        None if unit.is_empty() => return Err(format!("a unit is wanted: {}", names())),
+        None => return Err(format!("`{unit}` is none of the units {}", names())),
+    };
+    let value = value * scale;
+    if value <= 0.0 {
+        Err("not more than 0".to_owned())
+    } else if !range.contains(&value) {
+        Err(format!("not between {} and {} {base}", range.start(), range.end()))
+    } else {
+        Ok(value)
+    }
+}
+
+/// A clock in MHz; other units may be given, for clap.
+pub(crate) fn clock(text: &str) -> Result<f64, String> {
+    quantity(text, FREQUENCY, true, 0.01..=100_000.0)
+}
+
+/// A time: in cycles, or in seconds, which a clock makes cycles of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Time {
+    Cycles(u64),
+    Seconds(f64),
+}
+
+/// A time with its unit, or a number of cycles, for clap.
+pub(crate) fn time(text: &str) -> Result<Time, String> {
+    let (number, unit) = split(text);
+    if number.is_empty() {
+        return Err("neither a time (`100us`, `0.1ms`) nor a number of cycles".to_owned());
+    }
+    if unit.is_empty() {
+        count(text).map(Time::Cycles)
+    } else {
+        quantity(text, TIME, false, 1e-9..=1e6).map(Time::Seconds)
+    }
+}
+
+impl Time {
+    /// Whole cycles at a clock in MHz. A time that is a whole number of cycles but for rounding is that number.
+    pub(crate) fn cycles(self, clock: f64) -> u64 {
+        match self {
+            Time::Cycles(cycles) => cycles,
+            Time::Seconds(seconds) => (seconds * clock * 1e6 + 1e-6).floor() as u64,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_numbers() {
+        assert_eq!(count("1"), Ok(1));
+        assert_eq!(count(" +7 "), Ok(7));
+        assert_eq!(count("18446744073709551615"), Ok(u64::MAX));
+        assert_eq!(natural("0"), Ok(0));
+        assert_eq!(tick("100000000").map(NonZeroU64::get), Ok(LONGEST_TICK));
+        for (text, reason) in [
+            ("", "not a whole number"),
+            ("nan", "not a whole number"),
+            ("--json", "not a whole number"),
+            ("-", "not a whole number"),
+            ("0", "less than 1"),
+            ("-1", "less than 1"),
+            ("-0.5", "less than 1"),
+            ("1.5", "not a whole number in digits"),
+            ("1e3", "not a whole number in digits"),
+            ("18446744073709551616", "more than 18446744073709551615"),
+            ("100us", "a whole number is wanted, without a unit; `us` follows it"),
+            ("-100us", "a whole number is wanted, without a unit; `us` follows it"),
+            ("0x10", "a whole number is wanted, without a unit; `x10` follows it"),
+            ("1 000", "a whole number is wanted, without a unit; `000` follows it"),
+        ] {
+            assert_eq!(count(text), Err(reason.to_owned()), "{text:?}");
+        }
+        assert_eq!(tick("100000001"), Err("more than 100000000".to_owned()));
+        assert_eq!(natural("-1"), Err("less than 0".to_owned()));
+    }
+
+    #[test]
+    fn clocks() {
+        for (text, mhz) in
+            [("125", 125.0), ("125MHz", 125.0), ("1.5 GHz", 1500.0), ("20kHz", 0.02), ("1e3", 1e3)]
+        {
+            assert_eq!(clock(text), Ok(mhz), "{text}");
+        }
+        let units = "MHz, Hz, kHz, GHz";
+        let range = "not between 0.01 and 100000 MHz";
+        for (text, reason) in [
+            ("", "not a number"),
+            ("fast", "not a number"),
+            ("nan", "not a number"),
+            ("infMHz", "not a number"),
+            ("MHz", "not a number"),
+            ("0", "not more than 0"),
+            ("-5", "not more than 0"),
+            ("-5MHz", "not more than 0"),
+            ("-0", "not more than 0"),
+            ("1Hz", range),
+            ("1e400", range),
+            ("1e-400", "not more than 0"),
+            ("1000GHz", range),
+            ("5mhz", &format!("`mhz` is none of the units {units}")),
+            ("5 us", &format!("`us` is none of the units {units}")),
+        ] {
+            assert_eq!(clock(text), Err(reason.to_owned()), "{text:?}");
+        }
+    }
+
+    #[test]
+    fn times() {
+        let cycles = |text| time(text).map(|time| time.cycles(125.0));
+        for (text, expected) in [
+            ("12500", 12500),
+            ("100us", 12500),
+            ("100 µs", 12500),
+            ("0.1ms", 12500),
+            ("1e-4s", 12500),
+            ("8ns", 1),
+        ] {
+            assert_eq!(cycles(text), Ok(expected), "{text}");
+        }
+        let neither = "neither a time (`100us`, `0.1ms`) nor a number of cycles";
+        for (text, reason) in [
+            ("", neither),
+            ("nan", neither),
+            ("infs", neither),
+            ("us", neither),
+            ("--json", neither),
+            ("-5us", "not more than 0"),
+            ("0us", "not more than 0"),
+            ("0", "less than 1"),
+            ("-5", "less than 1"),
+            ("1.5", "not a whole number in digits"),
+            ("100kg", "`kg` is none of the units s, ms, us, µs, ns"),
+            ("100MHz", "`MHz` is none of the units s, ms, us, µs, ns"),
+            ("1e400s", "not between 0.000000001 and 1000000 s"),
+            ("0.1ns", "not between 0.000000001 and 1000000 s"),
+        ] {
+            assert_eq!(time(text).map(|_| ()), Err(reason.to_owned()), "{text:?}");
+        }
+    }
+}

@@ -1,0 +1,298 @@
+//! Where a session stops, against a recording of the emulator's events that shares nothing with the session's search.
+
+use std::num::NonZeroU64;
+use std::ops::RangeInclusive;
+use std::sync::Arc;
+use takt_debug::session::{Options, Rows, Session, Stop, Test, Unit, Why};
+use takt_emu::testing::{INPUTS, Options as ProgramOptions, Random, random_program};
+use takt_emu::{Emulator, Event, PeriodError};
+use takt_isa::program::Location;
+use takt_isa::timing::{Address, Cycle};
+use takt_isa::{Effect, Instruction, MACHINES, Program};
+
+/// Periods of a run.
+const PERIODS: u64 = 4;
+/// Positions that `until` is followed through.
+const HELD: usize = 150;
+
+/// A random program whose bundles have source lines. With `bare`, nothing issues together with a `wait`, so that nothing is
+/// in flight while the program waits.
+fn program(seed: u64, bare: bool) -> Program {
+    let machine = MACHINES[seed as usize % MACHINES.len()];
+    let mut program = random_program(seed, machine, ProgramOptions::TAME);
+    let slots = machine.slots.len();
+    let filler = Instruction::NOP.encode().unwrap();
+    let mut random = Random::new(seed);
+    for address in 0..program.bundles() as usize {
+        let words = address * slots..(address + 1) * slots;
+        let waits = |word: u64| Instruction::decode(word).unwrap().effect() == Effect::Wait;
+        if bare && program.code[words.clone()].iter().any(|word| waits(*word)) {
+            for word in &mut program.code[words.clone()] {
+                if !waits(*word) {
+                    *word = filler;
+                }
+            }
+        }
+        let line = Location { file: 0, line: 1 + address as u32 / 2 };
+        program.lines[words.start] = Some(line).filter(|_| !random.once_in(5));
+    }
+    program.files = vec!["a.s".to_owned()];
+    program
+}
+
+/// What a run did.
+struct Recording {
+    program: Program,
+    /// Bundles that issued, by cycle.
+    issues: Vec<(Cycle, Address)>,
+    /// Values that registers took, by the first position that shows them.
+    writes: Vec<(Cycle, u16, u32)>,
+    /// Values that data words took, likewise.
+    stores: Vec<(Cycle, u32, u32)>,
+    /// Cycles that passed.
+    end: Cycle,
+}
+
+impl Recording {
+    fn new(program: &Program, rows: &Rows, tick: Option<NonZeroU64>) -> Recording {
+        let mut emulator = Emulator::new(program).unwrap();
+        emulator.set_tick_period(tick);
+        let mut recording = Recording {
+            program: program.clone(),
+            issues: vec![],
+            writes: program.constants.iter().map(|&(register, bits)| (0, register, bits)).collect(),
+            stores: vec![],
+            end: 0,
+        };
+        for row in rows {
+            for &(register, bits) in row {
+                emulator.set_input_bits(register, bits).unwrap();
+                recording.writes.push((emulator.now(), register, bits));
+            }
+            let Recording { issues, writes, stores, .. } = &mut recording;
+            let mut sink = |event: &Event| match event {
+                Event::Issue { cycle, address } => issues.push((*cycle, *address)),
+                Event::Retire(retire) => {
+                    if let Some(register) = retire.register {
+                        writes.push((retire.cycle, register, retire.value));
+                    } else if let Some(word) = retire.memory {
+                        stores.push((retire.cycle + 1, word, retire.value));
+                    }
+                }
+                _ => {}
+            };
+            match emulator.observed(&mut sink).run_period(&[]) {
+                Ok(_) => {}
+                Err(PeriodError::Halted) => break,
+                Err(error) => panic!("{error}"),
+            }
+        }
+        recording.end = emulator.now();
+        // What is in flight at the end arrives after it; what `halt` leaves in flight is written at once.
+        let halted = matches!(emulator.status(), takt_emu::Status::Halted { .. });
+        for write in &mut recording.writes {
+            write.0 = write.0.min(if halted { recording.end } else { Cycle::MAX });
+        }
+        recording.writes.sort_by_key(|(cycle, ..)| *cycle);
+        recording
+    }
+
+    /// What a list of changes makes of a place, at each position.
+    fn history<K: PartialEq + Copy>(
+        &self,
+        changes: &[(Cycle, K, u32)],
+        place: K,
+        first: Option<u32>,
+    ) -> Vec<Option<u32>> {
+        let mut changes = changes.iter().filter(|(_, changed, _)| *changed == place).peekable();
+        let mut value = first;
+        let at = |position| {
+            while let Some((_, _, now)) = changes.next_if(|(cycle, ..)| *cycle <= position) {
+                value = Some(*now);
+            }
+            value
+        };
+        (0..=self.end).map(at).collect()
+    }
+
+    fn register(&self, register: u16) -> Vec<Option<u32>> {
+        self.history(&self.writes, register, None)
+    }
+
+    fn word(&self, word: u32) -> Vec<Option<u32>> {
+        self.history(&self.stores, word, self.program.data.get(word as usize).copied())
+    }
+
+    /// The bundle that issues next, at each position up to the last issue.
+    fn address(&self) -> Vec<Option<u32>> {
+        let mut issues = self.issues.iter().peekable();
+        let last = self.issues.last().unwrap().0;
+        let at = |position| {
+            while issues.next_if(|(cycle, _)| *cycle < position).is_some() {}
+            issues.peek().map(|(_, address)| *address)
+        };
+        (0..=last).map(at).collect()
+    }
+
+    /// Entries of the return stack, at each position.
+    fn depth(&self) -> Vec<Option<u32>> {
+        let (mut issues, mut depth) = (self.issues.iter().peekable(), 0);
+        let at = |position| {
+            while let Some((_, address)) = issues.next_if(|(cycle, _)| *cycle < position) {
+                for instruction in self.program.bundle(*address).unwrap().unwrap() {
+                    match instruction.effect() {
+                        Effect::Call => depth += 1,
+                        Effect::Return => depth -= 1,
+                        _ => {}
+                    }
+                }
+            }
+            Some(depth)
+        };
+        (0..=self.end).map(at).collect()
+    }
+
+    /// Positions at which a bundle of another line than the last one's is about to issue.
+    fn lines(&self) -> Vec<Cycle> {
+        let line = |address| self.program.location(address);
+        let begins = |i: &usize| {
+            let (now, before) =
+                (line(self.issues[*i].1), i.checked_sub(1).and_then(|i| line(self.issues[i].1)));
+            now.is_some() && now != before
+        };
+        (0..self.issues.len()).filter(begins).map(|i| self.issues[i].0).collect()
+    }
+}
+
+/// The runs that are tried: of each program with nothing and with results in flight while it waits; with the tick when the
+/// program is ready, one that comes too early at times, and one that lets it wait.
+fn runs(seeds: RangeInclusive<u64>) -> impl Iterator<Item = (String, Session, Recording)> {
+    let cases = seeds.flat_map(|seed| [true, false].map(|bare| (seed, bare)));
+    let cases = cases.flat_map(|(seed, bare)| [0, 211, 3001].map(|tick| (seed, bare, tick)));
+    cases.map(|(seed, bare, tick)| {
+        let (program, tick) = (program(seed, bare), NonZeroU64::new(tick));
+        let mut random = Random::new(seed);
+        let first = program.machine.inputs.base;
+        let mut row = || (0..INPUTS).map(|i| (first + i, random.word())).collect::<Vec<_>>();
+        let rows: Rows = (0..PERIODS).map(|_| row()).collect();
+        let recording = Recording::new(&program, &rows, tick);
+        let options = Options { inputs: Some(Arc::new(rows)), tick, ..Options::default() };
+        (
+            format!("seed {seed}, bare {bare}, tick {tick:?}"),
+            Session::new(&program, options).unwrap(),
+            recording,
+        )
+    })
+}
+
+/// Positions at which a command stops that is given again and again, up to the end of the run or the start.
+fn all(session: &mut Session, mut command: impl FnMut(&mut Session) -> Why) -> Vec<Cycle> {
+    let mut positions = vec![];
+    while matches!(command(session), Why::Done | Why::Stop { .. } | Why::Holds) {
+        positions.push(session.cycle());
+    }
+    positions
+}
+
+#[test]
+fn steps_are_all_issues() {
+    for (run, mut session, recording) in runs(0..=8) {
+        let issues: Vec<Cycle> = recording.issues.iter().map(|(cycle, _)| *cycle).collect();
+        for (unit, expected) in [(Unit::Bundle, issues), (Unit::Line, recording.lines())] {
+            session.go_to(0);
+            let forth = all(&mut session, |session| session.step(unit));
+            assert_eq!(forth, expected, "{run}, {unit:?}");
+            assert_eq!(session.go_to(recording.end), Why::Done, "{run}");
+            let mut back = all(&mut session, |session| session.step_back(unit));
+            back.reverse();
+            assert_eq!(back, expected, "{run}, {unit:?}, back");
+        }
+    }
+}
+
+#[test]
+fn calls_are_passed_over() {
+    let mut inside = 0;
+    for (run, mut session, recording) in runs(0..=8) {
+        let depth = recording.depth();
+        let depth = |cycle: Cycle| depth[cycle as usize].unwrap();
+        let issues = || recording.issues.iter().map(|(cycle, _)| *cycle);
+        let mut random = Random::new(recording.end);
+        for _ in 0..8 {
+            let from = Cycle::from(random.below(recording.end as u32));
+            let here = depth(from);
+            let over = issues().find(|cycle| *cycle > from && depth(*cycle) <= here);
+            session.go_to(from);
+            let stopped = session.step(Unit::Call) == Why::Done;
+            assert_eq!(over, stopped.then(|| session.cycle()), "{run}, call from {from}");
+            session.go_to(from);
+            let before = issues().rfind(|cycle| *cycle < from && depth(*cycle) <= here);
+            let stopped = session.step_back(Unit::Call) == Why::Done;
+            assert_eq!(before, stopped.then(|| session.cycle()), "{run}, back call from {from}");
+            if here > 0 {
+                inside += 1;
+                let out = issues().find(|cycle| *cycle > from && depth(*cycle) < here);
+                session.go_to(from);
+                let stopped = session.step(Unit::Out) == Why::Done;
+                assert_eq!(out, stopped.then(|| session.cycle()), "{run}, out from {from}");
+            }
+        }
+    }
+    assert!(inside > 10, "{inside}");
+}
+
+/// What is watched, its value at each position, and a value that it has.
+fn watched(recording: &Recording, random: &mut Random) -> Vec<(String, Vec<Option<u32>>)> {
+    let machine = recording.program.machine;
+    let name = |register| format!("@{}:bits", machine.register_name(register).unwrap());
+    let written: Vec<u16> = recording.writes.iter().map(|(_, register, _)| *register).collect();
+    let mut all: Vec<(String, Vec<Option<u32>>)> = (0..3)
+        .map(|_| written[random.below(written.len() as u32) as usize])
+        .chain([machine.inputs.base])
+        .map(|register| (name(register), recording.register(register)))
+        .collect();
+    if let Some((_, word, _)) = recording.stores.first() {
+        all.push((format!("[{word}]:bits"), recording.word(*word)));
+    }
+    all.push(("address".to_owned(), recording.address()));
+    all.push(("depth".to_owned(), recording.depth()));
+    all
+}
+
+#[test]
+fn watch_and_until_see_every_change() {
+    let mut seen = 0;
+    for (run, mut session, recording) in runs(16..=20) {
+        let mut random = Random::new(recording.end);
+        for (text, history) in watched(&recording, &mut random) {
+            let end = history.len() as Cycle - 1;
+            let within =
+                |positions: Vec<Cycle>| positions.into_iter().filter(|at| *at <= end).collect::<Vec<_>>();
+            let what = session.parse(&text).unwrap();
+            let changes: Vec<Cycle> =
+                (1..=end).filter(|at| history[*at as usize] != history[*at as usize - 1]).collect();
+            seen += changes.len();
+            session.go_to(0);
+            let stop = Stop::Watch { what: Box::new(what), test: Test::Changed, text: String::new() };
+            let id = session.add_stop(stop);
+            let forth = all(&mut session, Session::resume);
+            assert_eq!(within(forth), changes, "{run}, watch {text}");
+            let mut back = all(&mut session, Session::resume_back);
+            back.reverse();
+            assert_eq!(within(back), changes, "{run}, watch {text}, back");
+            session.remove_stop(id);
+
+            let Some(value) = history[random.below(end as u32 + 1) as usize] else { continue };
+            let live = session.parse(&format!("{text} == {value}")).unwrap();
+            let holds: Vec<Cycle> =
+                (1..=end).filter(|at| history[*at as usize] == Some(value)).take(HELD).collect();
+            session.go_to(0);
+            let found: Vec<Cycle> = holds
+                .iter()
+                .map_while(|_| (session.run_until(&live) == Why::Holds).then(|| session.cycle()))
+                .collect();
+            assert_eq!(found, holds, "{run}, until {text} == {value}");
+        }
+    }
+    assert!(seen > 500, "{seen}");
+}

@@ -1,0 +1,99 @@
+//! Control bits, and the stages through which they accompany a bundle from decode to issue.
+
+use crate::plan::names::net;
+use crate::plan::{ControlBit, Plan, SlotPlan, Stage};
+use crate::verilog::{Module, any, choose, decimal, set, when};
+use takt_isa::Effect;
+
+/// Where the control bits stand.
+pub(super) fn parameters(plan: &Plan, m: &mut Module) {
+    m.banner("control bits of each slot, from its decoder");
+    m.comment(
+        "unit_<name>: a unit of the slot's row; result_<latency>: it writes a register; code: the unit's own, from the header of its \
+         file; the others: effects in the table of instructions.",
+    );
+    m.blank();
+    for slot in &plan.slots {
+        for control in &slot.controls {
+            m.parameter(slot.parameter(control.bit), control.low);
+        }
+    }
+}
+
+pub(super) fn write(plan: &Plan, m: &mut Module) {
+    m.banner("from decode to issue");
+    m.comment("A bundle moves on with advance. The letters: d_ decode, m_ match, r_ read, i_ issue.");
+    for slot in &plan.slots {
+        m.blank();
+        stages(slot, m);
+    }
+}
+
+fn stages(slot: &SlotPlan, m: &mut Module) {
+    use Stage::{Decode, Issue, Match, Read};
+    let constant = slot.constant_bits() > 0;
+    let address = slot.address_bits() > 0;
+    let immediate = slot.has_effect(Effect::Immediate);
+    m.regs([Match, Read, Issue].map(|stage| slot.control(stage)));
+    m.regs([Match, Read, Issue].map(|stage| slot.illegal(stage)));
+    m.regs([Match, Read, Issue].map(|stage| slot.dest(stage)));
+    for operand in 0..slot.sources {
+        m.regs([slot.source_bank(Match, operand)]);
+        m.regs([slot.source_index(Match, operand)]);
+    }
+    if constant {
+        m.regs([slot.constant(Match)]);
+    }
+    if address {
+        m.regs([Read, Issue].map(|stage| slot.constant(stage)));
+    }
+    if immediate {
+        m.regs([slot.immediate(Match)]);
+        m.regs([slot.immediate(Read)]);
+    }
+    let mut body = vec![
+        set(slot.control(Match), slot.control(Decode)),
+        set(slot.illegal(Match), slot.illegal(Decode) | net::D_OUTSIDE),
+        set(slot.dest(Match), slot.dest(Decode)),
+    ];
+    for operand in 0..slot.sources {
+        body.push(set(slot.source_bank(Match, operand), slot.source_bank(Decode, operand)));
+        body.push(set(slot.source_index(Match, operand), slot.source_index(Decode, operand)));
+    }
+    let nothing = decimal(slot.width(), 0_u32);
+    body.extend([
+        set(slot.control(Read), choose(net::M_VALID, slot.control(Match), nothing))
+            .remark("what is no bundle does nothing"),
+        set(slot.control(Issue), slot.control(Read)),
+        set(slot.illegal(Read), slot.illegal(Match)),
+        set(slot.illegal(Issue), slot.illegal(Read)),
+        set(slot.dest(Read), slot.dest(Match)),
+        set(slot.dest(Issue), slot.dest(Read)),
+    ]);
+    if constant {
+        body.push(set(slot.constant(Match), slot.constant(Decode)));
+    }
+    if address {
+        body.extend([
+            set(slot.constant(Read), slot.constant(Match).low(slot.constant(Read).width())),
+            set(slot.constant(Issue), slot.constant(Read)),
+        ]);
+    }
+    if immediate {
+        body.extend([
+            set(slot.immediate(Match), slot.immediate(Decode)),
+            set(
+                slot.immediate(Read),
+                choose(slot.immediate(Match), slot.constant(Match), decimal(32, 0_u32)),
+            ),
+        ]);
+    }
+    m.clocked(vec![when(net::ADVANCE, body)]);
+    for stage in [Match, Read, Issue] {
+        let results = slot.latencies.iter().map(|&latency| slot.bit(stage, ControlBit::Result(latency)));
+        m.define(slot.writes_at(stage), any(results));
+    }
+    for stage in [Read, Issue] {
+        m.define(slot.early_at(stage), slot.bit(stage, ControlBit::Result(2)));
+    }
+}

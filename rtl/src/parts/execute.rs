@@ -1,0 +1,181 @@
+//! Execution: the sequencer, the data memory, the units.
+
+use crate::circuit::Circuit;
+use crate::plan::names::{LETTERS, net};
+use crate::plan::{ControlBit, Plan, SlotPlan, Stage};
+use crate::verilog::{Instance, Module, any, concat, decimal, gated, set};
+use takt_isa::{Effect, Function};
+
+pub(super) fn write(plan: &Plan, m: &mut Module) {
+    m.banner("execute: the sequencer and the data memory");
+    let machine = plan.machine;
+    m.comment(format!(
+        "Branches, wait and tick, faults: docs/timing.md, under these names. Row: refill {}, resolve {}, stack_depth {}; data_depth {}; \
+         the sequencer in slot `{}`, the data memory in slot `{}`.",
+        machine.refill,
+        machine.resolve,
+        machine.stack_depth,
+        machine.data_depth,
+        plan.control().name(),
+        plan.memory().name()
+    ));
+    m.blank();
+    m.wires([net::X_ISSUED]);
+    m.wires([net::X_ADDRESS]);
+    m.wires([net::X_ADDRESS_FAULT]);
+    sequencer(plan, m);
+    m.blank();
+    memory(plan, m);
+
+    m.banner("units");
+    m.comment(
+        "One drives its slot's bus in a cycle at most (rule 6): the others' share is 0. An operation that issues in cycle c stands on a \
+         unit's inputs in c + 1 and its result on the bus in c + latency.",
+    );
+    m.blank();
+    m.regs([net::LOADED_VALUE]);
+    m.clocked(vec![set(net::LOADED_VALUE, net::LOADS_VALUE.low(32))]);
+    for slot in &plan.slots {
+        m.blank();
+        units(plan, slot, m);
+    }
+}
+
+fn sequencer(plan: &Plan, m: &mut Module) {
+    let slot = plan.control();
+    let mut sequencer = Instance::new("takt_sequencer", "sequencer")
+        .parameter("PROGRAM", plan.code_bits)
+        .parameter("STACK", plan.machine.stack_depth)
+        .parameter("REFILL", plan.machine.refill)
+        .parameter("RESOLVE", plan.machine.resolve)
+        .parameter("SLOT", plan.control_slot as u32)
+        .parameter("MEMORY", plan.memory_slot as u32)
+        .parameter("SLOTS", plan.slots.len() as u32)
+        .same([net::CLK, net::RST, net::ADVANCE, net::ISSUE, net::REFUSED, plan.i_illegal()]);
+    for effect in [
+        Effect::Jump,
+        Effect::BranchZero,
+        Effect::BranchNonzero,
+        Effect::Call,
+        Effect::Return,
+        Effect::Wait,
+        Effect::Halt,
+    ] {
+        let bit = ControlBit::Effect(effect);
+        sequencer = sequencer.port(format!("{}_{bit}", Stage::Issue), slot.bit(Stage::Issue, bit));
+    }
+    m.instance(
+        sequencer
+            .port("i_target", slot.constant(Stage::Issue))
+            .port("x_operand", slot.operand(0))
+            .same([net::X_ADDRESS_FAULT])
+            .port("tick", net::TICKS)
+            .same([net::FLUSH, plan.fetch(), net::F_OUTSIDE, net::BLOCK, net::I_ADDRESS])
+            .same([net::X_ISSUED, net::X_ADDRESS, net::WAITING])
+            .port("missed", net::TICK_MISSED)
+            .port("lost", net::TICK_LOST)
+            .same([net::DEADLINE_MISSED, net::HALTED, net::FAULT, net::FAULT_KIND, net::FAULT_SLOT])
+            .same([net::FAULT_ADDRESS]),
+    );
+    m.regs([net::WAS_ISSUED]);
+    m.regs([net::WAS_ADDRESS]);
+    m.clocked(vec![set(net::WAS_ISSUED, net::X_ISSUED), set(net::WAS_ADDRESS, net::X_ADDRESS)]);
+    m.assign(net::ISSUED, net::WAS_ISSUED & !net::FAULT);
+    m.assign(net::ISSUED_ADDRESS, net::WAS_ADDRESS);
+}
+
+fn memory(plan: &Plan, m: &mut Module) {
+    let slot = plan.memory();
+    let takes = |effect| net::ISSUE & !net::FAULT & slot.bit(Stage::Issue, ControlBit::Effect(effect));
+    m.regs([net::X_LOAD, net::X_STORE]);
+    m.regs([net::X_OFFSET]);
+    m.clocked(vec![
+        set(net::X_LOAD, takes(Effect::Load)),
+        set(net::X_STORE, takes(Effect::Store)),
+        set(net::X_OFFSET, slot.constant(Stage::Issue).low(net::X_OFFSET.width())),
+    ]);
+    let unit = slot.slot.units.iter().find(|unit| unit.functions.contains(&Function::Memory));
+    m.wires([net::LOAD_VALID]);
+    m.wires([net::LOAD_RESULT]);
+    m.wires([plan.memory_address()]);
+    m.instance(
+        Instance::new("takt_memory", "memory")
+            .parameter("LATENCY", unit.map_or(0, |unit| unit.latency))
+            .parameter("DEPTH", plan.machine.data_depth)
+            .parameter("ADDRESS", plan.data_bits)
+            .same([net::CLK, net::RST])
+            .port("load_write", net::LOAD_DATA)
+            .port("load_address", net::LOADS_ADDRESS.low(plan.data_bits))
+            .port("load_value", net::LOADS_VALUE.low(32))
+            .same([net::X_LOAD, net::X_STORE])
+            .port("offset", net::X_OFFSET)
+            .port("a", slot.operand(0))
+            .port("b", slot.operand(1))
+            .port("cancel", net::FAULT)
+            .port("fault", net::X_ADDRESS_FAULT)
+            .port("out_valid", net::LOAD_VALID)
+            .port("result", net::LOAD_RESULT)
+            .port("write", net::STORED)
+            .port("address", plan.memory_address())
+            .port("value", net::STORED_VALUE),
+    );
+    let address = concat([plan.memory_address().into(), decimal(16 - plan.data_bits, 0_u32)]);
+    m.assign(net::STORED_ADDRESS, address);
+}
+
+/// A slot's units, and what drives its bus: one of them, the data memory, or the loader.
+fn units(plan: &Plan, slot: &SlotPlan, m: &mut Module) {
+    let units: Vec<_> = slot.circuits.iter().map(|circuit| &circuit.unit).collect();
+    let mut body = Vec::new();
+    m.regs(units.iter().map(|unit| slot.unit_starts(unit)));
+    for unit in &units {
+        let goes = net::ISSUE & slot.bit(Stage::Issue, ControlBit::Unit(unit.name));
+        body.push(set(slot.unit_starts(unit), goes));
+    }
+    if slot.has(ControlBit::Code) {
+        m.regs([slot.code()]);
+        let place = slot.parameter(ControlBit::Code);
+        body.push(set(slot.code(), slot.control(Stage::Issue).part(place, slot.code_bits())));
+    }
+    if !body.is_empty() {
+        m.clocked(body);
+    }
+    let (mut results, mut flags) = (Vec::new(), Vec::new());
+    for circuit in &slot.circuits {
+        let unit = &circuit.unit;
+        m.comment(format!("Row: `{}`, latency {}, interval {}.", unit.name, unit.latency, unit.interval));
+        m.wires([slot.unit_valid(unit)]);
+        m.wires([slot.unit_result(unit)]);
+        m.wires([slot.unit_flags(unit)]);
+        m.instance(instance(slot, circuit));
+        results.push(gated(32, slot.unit_valid(unit), slot.unit_result(unit)));
+        flags.push(gated(3, slot.unit_valid(unit), slot.unit_flags(unit)));
+    }
+    if slot.number as usize == plan.memory_slot {
+        results.push(gated(32, net::LOAD_VALID, net::LOAD_RESULT));
+    }
+    results.push(gated(32, slot.loaded(), net::LOADED_VALUE));
+    m.regs([slot.loaded()]);
+    m.clocked(vec![set(slot.loaded(), slot.load())]);
+    m.assign(slot.result(), any(results));
+    m.assign(slot.flags(), if flags.is_empty() { decimal(3, 0_u32) } else { any(flags) });
+}
+
+fn instance(slot: &SlotPlan, circuit: &Circuit) -> Instance {
+    let unit = &circuit.unit;
+    let mut instance = Instance::new(unit.rtl, slot.unit(unit));
+    for (name, value) in circuit.parameters() {
+        instance = instance.parameter(name, value);
+    }
+    instance = instance.same([net::CLK]).port("in_valid", slot.unit_starts(unit));
+    if circuit.op_bits > 0 {
+        instance = instance.port("op", slot.code().low(circuit.op_bits));
+    }
+    for (operand, letter) in LETTERS.iter().enumerate().take(circuit.operands) {
+        instance = instance.port(*letter, slot.operand(operand));
+    }
+    instance
+        .port("out_valid", slot.unit_valid(unit))
+        .port("result", slot.unit_result(unit))
+        .port("flags", slot.unit_flags(unit))
+}

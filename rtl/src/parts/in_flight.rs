@@ -1,0 +1,144 @@
+//! Results in flight: which register each slot's bus will write, and when; the buses.
+
+use crate::plan::names::net;
+use crate::plan::{ControlBit, LateUnit, Plan, SlotPlan, Stage};
+use crate::verilog::{Expr, Instance, Module, Net, any, concat, decimal, gated, no, set};
+
+pub(super) fn write(plan: &Plan, m: &mut Module) {
+    m.banner("results in flight, and the buses");
+    m.comment(
+        "Rules 2 to 6 look at what is in flight: each slot's results by the cycles to their writeback (place j: j cycles), and before \
+         these, units that work on one operation at a time.",
+    );
+    m.blank();
+    m.wires([net::I_ADDRESS]);
+    for slot in &plan.slots {
+        m.blank();
+        for late in &slot.late {
+            late_unit(slot, late, m);
+        }
+        places(slot, m);
+    }
+    m.blank();
+    together(plan, m);
+}
+
+/// A unit whose operation is in flight for longer than the slot's common places.
+fn late_unit(slot: &SlotPlan, late: &LateUnit, m: &mut Module) {
+    m.comment(format!(
+        "Row: `{}` in slot `{}`, latency {}, interval {}: {} cycles here, then in the slot's {} places.",
+        late.unit.name,
+        slot.name(),
+        late.unit.latency,
+        late.unit.interval,
+        late.beyond,
+        slot.depth
+    ));
+    m.wires([slot.late_at(late)]);
+    m.wires([slot.late_underway(late), slot.late_last(late), slot.late_busy(late)]);
+    m.wires([slot.late_index(late)]);
+    m.wires([slot.late_address(late)]);
+    m.unused(slot.late_unused(late), slot.late_at(late), Some("of which some bits are"));
+    let starts = slot.bit(Stage::Issue, ControlBit::Unit(late.unit.name));
+    m.instance(
+        Instance::new("takt_late", slot.late_instance(late))
+            .parameter("LATENCY", late.unit.latency)
+            .parameter("INTERVAL", late.unit.interval)
+            .parameter("DEPTH", slot.depth)
+            .parameter("INDEX", slot.dest(Stage::Issue).width())
+            .same([net::CLK, net::RST])
+            .port("cancel", net::FAULT)
+            .port("insert", net::ISSUE & starts)
+            .port("insert_index", slot.dest(Stage::Issue))
+            .port("insert_address", net::I_ADDRESS)
+            .port("at", slot.late_at(late))
+            .port("underway", slot.late_underway(late))
+            .port("index", slot.late_index(late))
+            .port("address", slot.late_address(late))
+            .port("last", slot.late_last(late))
+            .port("busy", slot.late_busy(late)),
+    );
+}
+
+/// The common places of a slot.
+fn places(slot: &SlotPlan, m: &mut Module) {
+    // At most one passes on to the last place in a cycle: they share the write port (rule 6).
+    let select = |what: &dyn Fn(&LateUnit) -> Net, width: u32| match slot.late.as_slice() {
+        [] => decimal(width, 0_u32),
+        [one] => what(one).into(),
+        several => any(several.iter().map(|late| gated(width, slot.late_last(late), what(late)))),
+    };
+    let index = slot.dest(Stage::Issue).width();
+    let latencies: Vec<_> = slot.latencies.iter().map(u32::to_string).collect();
+    m.comment(format!(
+        "Row: slot `{}`, bank `{}`: results of latency {}; {} places.",
+        slot.name(),
+        slot.slot.bank.name,
+        latencies.join(", "),
+        slot.depth
+    ));
+    let insert = (1..=slot.depth).map(|latency| {
+        let bit = ControlBit::Result(latency);
+        if slot.has(bit) { net::ISSUE & slot.bit(Stage::Issue, bit) } else { no() }
+    });
+    m.wires([slot.underway()]);
+    m.wires([slot.writes()]);
+    m.wires([slot.underway_index()]);
+    m.wires([slot.retire_address()]);
+    m.instance(
+        Instance::new("takt_underway", slot.results())
+            .parameter("DEPTH", slot.depth)
+            .parameter("INDEX", index)
+            .same([net::CLK, net::RST])
+            .port("cancel", net::FAULT)
+            .port("load", slot.load())
+            .port("load_index", net::LOADS_ADDRESS.low(index))
+            .port("insert", concat(insert))
+            .port("insert_index", slot.dest(Stage::Issue))
+            .port("insert_address", net::I_ADDRESS)
+            .port("late", any(slot.late.iter().map(|late| slot.late_last(late))))
+            .port("late_index", select(&|late| slot.late_index(late), index))
+            .port("late_address", select(&|late| slot.late_address(late), 16))
+            .port("writes", slot.writes())
+            .port("valid", slot.underway())
+            .port("index", slot.underway_index())
+            .port("address", slot.retire_address()),
+    );
+    m.wires([slot.result()]);
+    m.regs([slot.was_result()]);
+    m.clocked(vec![set(slot.was_result(), slot.result())]);
+    m.wires([slot.flags()]);
+}
+
+/// The same for all slots at once, as operands want it.
+fn together(plan: &Plan, m: &mut Module) {
+    m.comment(format!("The same for all slots, slot 0 first, each padded to {} places.", plan.depth));
+    let padded = |net: fn(&SlotPlan) -> Net, width: u32| {
+        let slots = plan.slots.iter().flat_map(move |slot| {
+            let missing = (plan.depth - slot.depth) * width;
+            let padding = (missing > 0).then(|| decimal(missing, 0_u32));
+            [Some(Expr::from(net(slot))), padding].into_iter().flatten()
+        });
+        Expr::Concat(slots.collect::<Vec<_>>().into_iter().rev().collect())
+    };
+    m.define(plan.underway(), padded(SlotPlan::underway, 1));
+    m.define(plan.underway_index(), padded(SlotPlan::underway_index, plan.index));
+    let lates = |net: fn(&SlotPlan, &LateUnit) -> Net, width: u32| {
+        let places = plan.slots.iter().flat_map(|slot| (0..plan.late as usize).map(move |k| (slot, k)));
+        let all: Vec<Expr> = places
+            .map(|(slot, k)| slot.late.get(k).map_or(decimal(width, 0_u32), |late| net(slot, late).into()))
+            .collect();
+        concat(all)
+    };
+    m.define(plan.late(), lates(SlotPlan::late_underway, 1));
+    m.define(plan.late_index(), lates(SlotPlan::late_index, plan.index));
+    for stage in [Stage::Read, Stage::Issue] {
+        m.define(plan.writes_at(stage), plan.each(|slot| slot.writes_at(stage)));
+        m.define(plan.early_at(stage), plan.each(|slot| slot.early_at(stage)));
+        m.define(plan.dest_at(stage), plan.each(|slot| slot.dest(stage)));
+    }
+    m.define(plan.result(), plan.each(SlotPlan::result));
+    m.define(plan.was_result(), plan.each(SlotPlan::was_result));
+    m.define(plan.writes(), plan.each(SlotPlan::writes));
+    m.define(net::NEW_FLAGS, any(plan.slots.iter().map(|slot| gated(3, slot.writes(), slot.flags()))));
+}

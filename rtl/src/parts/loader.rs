@@ -1,0 +1,54 @@
+//! What comes from outside: the loader's words, the input ports, the tick; registered once.
+
+use crate::plan::Plan;
+use crate::plan::names::net;
+use crate::verilog::{Expr, Module, concat, decimal, set};
+
+pub(super) fn write(plan: &Plan, m: &mut Module) {
+    m.banner("loader and input ports");
+    m.comment(format!(
+        "Row: inputs `{}`, at {}: {} ports in a bank as deep as the deepest, {} registers.",
+        plan.machine.inputs.name,
+        plan.machine.inputs.base,
+        plan.machine.inputs.depth,
+        1 << plan.index
+    ));
+    m.blank();
+    m.regs([net::LOADS]);
+    m.regs([net::LOADS_SPACE]);
+    m.regs([net::LOADS_SLOT]);
+    m.regs([net::LOADS_ADDRESS]);
+    m.regs([net::LOADS_VALUE]);
+    m.regs([net::INPUT1]);
+    m.regs([plan.input1_index()]);
+    m.regs([net::INPUT1_VALUE, net::INPUT2_VALUE]);
+    m.regs([net::TICKS]);
+    // Inputs lie where their addresses' low bits say, in a bank as deep as the deepest.
+    let base = u32::from(plan.machine.inputs.base) & ((1 << plan.index) - 1);
+    let missing = plan.index - plan.input_bits;
+    let index = match missing {
+        0 => Expr::from(plan.input_index()),
+        _ => concat([plan.input_index().into(), decimal(missing, base >> plan.input_bits)]),
+    };
+    m.clocked(vec![
+        set(net::LOADS, net::LOAD & net::RST),
+        set(net::LOADS_SPACE, net::LOAD_SPACE),
+        set(net::LOADS_SLOT, net::LOAD_SLOT),
+        set(net::LOADS_ADDRESS, net::LOAD_ADDRESS),
+        set(net::LOADS_VALUE, net::LOAD_VALUE),
+        set(net::INPUT1, net::INPUT_WRITE),
+        set(plan.input1_index(), index),
+        set(net::INPUT1_VALUE, net::INPUT_VALUE),
+        set(net::INPUT2_VALUE, net::INPUT1_VALUE),
+        set(net::TICKS, net::TICK & !net::RST),
+    ]);
+    let space = |space: u32| net::LOADS & Expr::from(net::LOADS_SPACE).is(decimal(2, space));
+    m.define(net::LOAD_DATA, space(1));
+    m.define(net::LOAD_REGISTER, space(2));
+    for slot in &plan.slots {
+        let bank = slot.slot.bank;
+        let log = bank.depth.trailing_zeros();
+        let within = net::LOADS_ADDRESS.slice(15, log).is(decimal(16 - log, bank.base >> log));
+        m.define(slot.load(), net::LOAD_REGISTER & within);
+    }
+}

@@ -1,0 +1,75 @@
+//! Source operands: copies of banks, forwarding, and whether a source is ready (rule 2).
+
+use crate::plan::names::net;
+use crate::plan::{ControlBit, Plan, SlotPlan, Stage};
+use crate::verilog::{Expr, Instance, Module, concat, decimal, gated, no};
+use takt_isa::Effect;
+
+pub(super) fn write(plan: &Plan, m: &mut Module) {
+    m.banner("operands: banks, forwarding, hazards");
+    m.comment(
+        "Rule 2: a bundle waits while a register that it reads is pending. Each source has a copy of every bank, takes from the buses \
+         what these do not hold yet, and says whether it holds up the bundle in read, in issue.",
+    );
+    m.blank();
+    m.regs([net::STICKY]);
+    m.wires([net::STICKY_NOW]);
+    for slot in &plan.slots {
+        for operand in 0..slot.sources {
+            m.blank();
+            source(plan, slot, operand, m);
+        }
+    }
+}
+
+fn source(plan: &Plan, slot: &SlotPlan, operand: usize, m: &mut Module) {
+    // The first operand's place is also that of an immediate and of the status register.
+    let constant = match operand {
+        0 if slot.has_effect(Effect::Immediate) => slot.immediate(Stage::Read).into(),
+        _ => decimal(32, 0_u32),
+    };
+    let reads_flags = ControlBit::Effect(Effect::ReadFlags);
+    let (reads_status, status) = match operand {
+        0 if slot.has(reads_flags) => {
+            let reads = slot.bit(Stage::Issue, reads_flags);
+            let flags = gated(3, reads.clone(), net::STICKY_NOW);
+            (reads, concat([decimal(2, 0_u32), flags, decimal(27, 0_u32)]))
+        }
+        _ => (no(), decimal(32, 0_u32)),
+    };
+    m.wires([slot.operand(operand)]);
+    m.wires([Stage::Read, Stage::Issue].map(|stage| slot.source_waits(stage, operand)));
+    m.instance(
+        Instance::new("takt_source", slot.source(operand))
+            .parameter("SLOTS", plan.slots.len() as u32)
+            .parameter("DEPTH", plan.depth)
+            .parameter("LATE", plan.late)
+            .parameter("INDEX", plan.index)
+            .same([net::CLK, net::ADVANCE])
+            .port("m_bank", slot.source_bank(Stage::Match, operand))
+            .port("m_index", slot.source_index(Stage::Match, operand))
+            .same([plan.underway(), plan.underway_index(), plan.writes(), plan.late(), plan.late_index()])
+            .same(
+                [Stage::Read, Stage::Issue]
+                    .into_iter()
+                    .flat_map(|stage| [plan.writes_at(stage), plan.early_at(stage), plan.dest_at(stage)]),
+            )
+            .same([plan.result(), plan.was_result()])
+            .port("input_write", net::INPUT1)
+            .port("input_write_index", plan.input1_index())
+            .port("input_write_value", net::INPUT1_VALUE)
+            .port("input_next_value", net::INPUT2_VALUE)
+            .port("r_constant", constant)
+            .port("i_reads_status", reads_status)
+            .port("i_status", status)
+            .port("r_waits", slot.source_waits(Stage::Read, operand))
+            .port("i_waits", slot.source_waits(Stage::Issue, operand))
+            .port("operand", slot.operand(operand)),
+    );
+}
+
+/// Of every source, whether it holds up the bundle in a stage.
+pub(super) fn waits(plan: &Plan, stage: Stage) -> Vec<Expr> {
+    let sources = plan.slots.iter().flat_map(|slot| (0..slot.sources).map(move |operand| (slot, operand)));
+    sources.map(|(slot, operand)| slot.source_waits(stage, operand).into()).collect()
+}

@@ -1,0 +1,83 @@
+//! The core's ports.
+
+use crate::export::{INPUT_DELAY, RESET_CYCLES};
+use crate::plan::Plan;
+use crate::plan::names::net;
+use crate::verilog::{Direction, Net, Port};
+
+/// The ports, in order. Those that serve verification only are marked.
+pub(super) fn ports(plan: &Plan) -> Vec<(Port, bool)> {
+    let machine = plan.machine;
+    let input = |net| Port::new(Direction::Input, net);
+    let output = |net| Port::new(Direction::Output, net);
+    let mut ports = vec![
+        input(net::CLK),
+        input(net::RST).remark(RESET),
+        input(net::LOAD).heading(
+            "Loader, in reset. space: 0 program memory (address of the bundle, slot), 1 data memory, 2 registers but the inputs.",
+        ),
+        input(net::LOAD_SPACE),
+        input(net::LOAD_SLOT),
+        input(net::LOAD_ADDRESS),
+        input(net::LOAD_VALUE),
+        input(net::INPUT_WRITE).heading(format!(
+            "Input ports: written in cycle t, read by bundles that issue in t + {INPUT_DELAY} or later."
+        )),
+        input(plan.input_index()),
+        input(net::INPUT_VALUE),
+    ];
+    for (s, slot) in machine.slots.iter().enumerate() {
+        let write = output(plan.output_write(&slot.bank));
+        ports.push(match s {
+            0 => write.heading(format!(
+                "Output ports, the last {} registers of each bank: what is written, in the cycle of writeback.",
+                machine.outputs_per_bank
+            )),
+            _ => write,
+        });
+        ports.push(output(plan.output_index(&slot.bank)));
+        ports.push(output(plan.output_value(&slot.bank)));
+    }
+    ports.extend([
+        input(net::TICK).heading("The tick: high for one cycle, seen in the next one."),
+        output(net::WAITING),
+        output(net::DEADLINE_MISSED).remark("sticky"),
+        output(net::TICK_MISSED).remark("in the cycle in which a tick is seen too early"),
+        output(net::TICK_LOST).remark("in the cycle in which a tick is lost"),
+        output(net::HALTED),
+        output(net::FAULT),
+        output(net::FAULT_KIND)
+            .remark("1 illegal word, 2 data address, 3 return stack full, 4 return stack empty"),
+        output(net::FAULT_SLOT),
+        output(net::FAULT_ADDRESS),
+    ]);
+    let verification = vec![
+        output(net::ISSUED).heading(
+            "For verification: a bundle two cycles after its issue, a store likewise, and each slot's writeback.",
+        ),
+        output(net::ISSUED_ADDRESS),
+        output(net::STORED),
+        output(net::STORED_ADDRESS),
+        output(net::STORED_VALUE),
+        output(plan.retire()),
+        output(plan.retire_address()),
+        output(plan.retire_register()),
+        output(plan.retire_value()),
+        output(plan.retire_flags()).remark("{invalid, divide by zero, overflow}"),
+    ];
+    let marked = |mark| move |port| (port, mark);
+    let status = [output(net::STATUS).remark("the sticky flags")];
+    let used = ports.into_iter().map(marked(false));
+    used.chain(verification.into_iter().map(marked(true))).chain(status.map(marked(false))).collect()
+}
+
+const RESET: &str = "synchronous; held for 64 cycles or more";
+const _: () = assert!(RESET_CYCLES == 64, "say so in the remark");
+
+/// The same, by name: what drives the core from outside and what it delivers, the clock and reset apart.
+pub(super) fn used(plan: &Plan, direction: Direction) -> impl Iterator<Item = Net> {
+    ports(plan).into_iter().filter_map(move |(port, verification)| {
+        let wanted = port.direction == direction && !verification;
+        (wanted && port.net != net::CLK && port.net != net::RST).then_some(port.net)
+    })
+}

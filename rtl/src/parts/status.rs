@@ -1,0 +1,25 @@
+//! The sticky flags.
+
+use crate::plan::names::net;
+use crate::plan::{ControlBit, Plan, Stage};
+use crate::verilog::{Module, any, choose, decimal, repeat, set};
+use takt_isa::Effect;
+
+pub(super) fn write(plan: &Plan, m: &mut Module) {
+    m.banner("the status register");
+    m.comment(
+        "docs/timing.md, Flags: what is raised joins in the cycle of writeback; what clears drains (rule 5), and does not concern its \
+         own bundle.",
+    );
+    m.blank();
+    let bit = ControlBit::Effect(Effect::ClearFlags);
+    let clears = plan.slots.iter().filter(|slot| slot.has(bit)).map(|slot| slot.bit(Stage::Issue, bit));
+    m.regs([net::X_CLEAR_FLAGS]);
+    let kept = net::STICKY & repeat(3, !net::X_CLEAR_FLAGS | net::FAULT);
+    m.assign(net::STICKY_NOW, kept | net::NEW_FLAGS);
+    m.assign(net::STATUS, net::STICKY_NOW);
+    m.clocked(vec![
+        set(net::X_CLEAR_FLAGS, net::ISSUE & !net::FAULT & any(clears)),
+        set(net::STICKY, choose(net::RST, decimal(3, 0_u32), net::STICKY_NOW)),
+    ]);
+}

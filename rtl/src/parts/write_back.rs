@@ -1,0 +1,31 @@
+//! Writeback, as it is seen from outside: output ports, and what verification compares.
+
+use crate::plan::names::net;
+use crate::plan::{Plan, SlotPlan};
+use crate::verilog::{Expr, Module, concat, decimal};
+
+pub(super) fn write(plan: &Plan, m: &mut Module) {
+    m.banner("output and retire ports");
+    m.comment(format!(
+        "Row: outputs_per_bank {}: the last registers of each bank, whose indices are ones above the port's number.",
+        plan.machine.outputs_per_bank
+    ));
+    m.blank();
+    for slot in &plan.slots {
+        let bank = slot.slot.bank;
+        let log = bank.depth.trailing_zeros();
+        let port = slot.underway_index().slice(log - 1, plan.port_bits).every_bit();
+        m.assign(plan.output_write(&bank), slot.writes() & port);
+        m.assign(plan.output_index(&bank), slot.underway_index().low(plan.port_bits));
+        m.assign(plan.output_value(&bank), slot.result());
+    }
+    m.assign(plan.retire(), plan.each(|slot| slot.writes() & !net::RST));
+    m.assign(plan.retire_address(), plan.each(SlotPlan::retire_address));
+    let register = |slot: &SlotPlan| {
+        let index = concat([slot.underway_index().low(plan.index), decimal(10 - plan.index, 0_u32)]);
+        decimal(10, slot.slot.bank.base) | index
+    };
+    m.assign(plan.retire_register(), plan.each(register));
+    m.assign(plan.retire_value(), Expr::from(plan.result()));
+    m.assign(plan.retire_flags(), plan.each(SlotPlan::flags));
+}

@@ -1,0 +1,441 @@
+//! Every name in a generated core, with its width: nets, registers, parameters, instances, modules.
+//!
+//! Names of a slot begin with the slot's, after the stage's letter where they belong to a stage: `r_mul_control`.
+
+pub mod decode;
+pub mod net;
+
+use super::{ControlBit, LateUnit, Plan, SlotPlan};
+use crate::verilog::{Expr, Net, no};
+use std::fmt;
+use takt_isa::{Bank, Unit};
+
+/// A stage of the pipeline ahead of execution, in which a bundle is accompanied by what its decoder said.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Words are decoded.
+    Decode,
+    /// Registers are compared with those in flight.
+    Match,
+    /// The banks deliver.
+    Read,
+    /// The bundle waits until it may issue.
+    Issue,
+}
+
+impl fmt::Display for Stage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Stage::Decode => "d",
+            Stage::Match => "m",
+            Stage::Read => "r",
+            Stage::Issue => "i",
+        })
+    }
+}
+
+/// Nets of the core that are no slot's and whose widths follow from the machine's row.
+impl Plan {
+    /// The core's module.
+    pub fn top(&self) -> String {
+        format!("takt_{}", self.machine.name)
+    }
+
+    /// The module for a synthesis without a board: the core between a shift register and a parity.
+    pub fn synthesis_top(&self) -> String {
+        super::synthesis_top(self.machine)
+    }
+
+    /// The module of a slot's decoder.
+    pub fn decoder(&self, slot: &SlotPlan) -> String {
+        format!("{}_decode_{}", self.top(), slot.name())
+    }
+
+    fn slot_count(&self) -> u32 {
+        self.slots.len() as u32
+    }
+
+    /// Port: which input port is written.
+    pub fn input_index(&self) -> Net {
+        Net::bus("input_index", self.input_bits)
+    }
+
+    /// The same as an index into the inputs' bank.
+    pub fn input1_index(&self) -> Net {
+        Net::bus("input1_index", self.index)
+    }
+
+    /// Port: a bank's output port is written.
+    pub fn output_write(&self, bank: &Bank) -> Net {
+        Net::named(format!("output_{}_write", bank.name))
+    }
+
+    /// Port: which one.
+    pub fn output_index(&self, bank: &Bank) -> Net {
+        Net::named(format!("output_{}_index", bank.name)).wide(self.port_bits)
+    }
+
+    /// Port: what it gets.
+    pub fn output_value(&self, bank: &Bank) -> Net {
+        Net::named(format!("output_{}_value", bank.name)).wide(32)
+    }
+
+    /// Port: which slots write a register.
+    pub fn retire(&self) -> Net {
+        Net::bus("retire", self.slot_count())
+    }
+
+    /// Port: the addresses of their bundles.
+    pub fn retire_address(&self) -> Net {
+        Net::bus("retire_address", 16 * self.slot_count())
+    }
+
+    /// Port: the registers.
+    pub fn retire_register(&self) -> Net {
+        Net::bus("retire_register", 10 * self.slot_count())
+    }
+
+    /// Port: the values.
+    pub fn retire_value(&self) -> Net {
+        Net::bus("retire_value", 32 * self.slot_count())
+    }
+
+    /// Port: the flags raised.
+    pub fn retire_flags(&self) -> Net {
+        Net::bus("retire_flags", 3 * self.slot_count())
+    }
+
+    /// The address that goes to the program memory.
+    pub fn fetch(&self) -> Net {
+        Net::bus("fetch", self.code_bits)
+    }
+
+    /// Where a word is stored, two cycles after issue.
+    pub fn memory_address(&self) -> Net {
+        Net::bus("memory_address", self.data_bits)
+    }
+
+    /// For each slot, the places of its results in flight.
+    pub fn underway(&self) -> Net {
+        Net::bus("underway", self.slot_count() * self.depth)
+    }
+
+    /// Their registers.
+    pub fn underway_index(&self) -> Net {
+        Net::bus("underway_index", self.slot_count() * self.depth * self.index)
+    }
+
+    /// For each slot, its units with a `takt_late`: whether they have a result in flight.
+    pub fn late(&self) -> Net {
+        Net::bus("late", self.slot_count() * self.late)
+    }
+
+    /// Their registers.
+    pub fn late_index(&self) -> Net {
+        Net::bus("late_index", self.slot_count() * self.late * self.index)
+    }
+
+    /// For each slot, whether the bundle writes a register.
+    pub fn writes_at(&self, stage: Stage) -> Net {
+        Net::named(format!("{stage}_writes")).wide(self.slot_count())
+    }
+
+    /// For each slot, whether it does so with a latency of 2.
+    pub fn early_at(&self, stage: Stage) -> Net {
+        Net::named(format!("{stage}_early")).wide(self.slot_count())
+    }
+
+    /// For each slot, the register.
+    pub fn dest_at(&self, stage: Stage) -> Net {
+        Net::named(format!("{stage}_dest")).wide(self.slot_count() * self.index)
+    }
+
+    /// For each slot, whether the word in issue is illegal.
+    pub fn i_illegal(&self) -> Net {
+        Net::bus("i_illegal", self.slot_count())
+    }
+
+    /// For each slot, what is on its bus.
+    pub fn result(&self) -> Net {
+        Net::bus("result", 32 * self.slot_count())
+    }
+
+    /// The same one cycle later.
+    pub fn was_result(&self) -> Net {
+        Net::bus("was_result", 32 * self.slot_count())
+    }
+
+    /// For each slot, whether it is written back.
+    pub fn writes(&self) -> Net {
+        Net::bus("writes", self.slot_count())
+    }
+}
+
+/// Nets of a slot.
+impl SlotPlan {
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        self.slot.name
+    }
+
+    /// The name of a source operand, `0` for a.
+    pub fn source(&self, operand: usize) -> String {
+        format!("{}_{}", self.name(), LETTERS[operand])
+    }
+
+    fn own(&self, what: &str) -> Net {
+        Net::named(format!("{}_{what}", self.name()))
+    }
+
+    fn staged(&self, stage: Stage, what: &str) -> Net {
+        Net::named(format!("{stage}_{}_{what}", self.name()))
+    }
+
+    /// The loader writes a register of the slot's bank.
+    pub fn load(&self) -> Net {
+        self.own("load")
+    }
+
+    /// The same one cycle later, when the value is on the bus.
+    pub fn loaded(&self) -> Net {
+        self.own("loaded")
+    }
+
+    /// The instance of its program memory.
+    pub fn program(&self) -> String {
+        self.own("program").to_string()
+    }
+
+    /// What the program memory delivers.
+    pub fn fetched(&self) -> Net {
+        self.own("fetched").wide(48)
+    }
+
+    /// The word in decode.
+    pub fn word(&self) -> Net {
+        self.staged(Stage::Decode, "word").wide(48)
+    }
+
+    /// The instance of its decoder.
+    pub fn decode(&self) -> String {
+        self.own("decode").to_string()
+    }
+
+    /// The position of a control bit.
+    pub fn parameter(&self, bit: ControlBit) -> Net {
+        Net::named(format!("{}_{bit}", self.name()).to_uppercase())
+    }
+
+    /// The control bits.
+    pub fn control(&self, stage: Stage) -> Net {
+        self.staged(stage, "control").wide(self.width())
+    }
+
+    /// A control bit; constant 0 if the slot has no such bit.
+    pub fn bit(&self, stage: Stage, bit: ControlBit) -> Expr {
+        if self.has(bit) { self.control(stage).at(self.parameter(bit)) } else { no() }
+    }
+
+    /// The word is illegal.
+    pub fn illegal(&self, stage: Stage) -> Net {
+        self.staged(stage, "illegal")
+    }
+
+    /// The register that is written: index into the bank.
+    pub fn dest(&self, stage: Stage) -> Net {
+        self.staged(stage, "dest").wide(self.index)
+    }
+
+    /// The bank of a source, one-hot: the slots', then the inputs.
+    pub fn source_bank(&self, stage: Stage, operand: usize) -> Net {
+        self.staged(stage, &format!("{}_bank", LETTERS[operand])).wide(self.slot_count + 1)
+    }
+
+    /// The index into that bank.
+    pub fn source_index(&self, stage: Stage, operand: usize) -> Net {
+        self.staged(stage, &format!("{}_index", LETTERS[operand])).wide(self.index)
+    }
+
+    /// Immediate, target or offset; in read and issue targets and offsets only.
+    pub fn constant(&self, stage: Stage) -> Net {
+        let bits = match stage {
+            Stage::Decode | Stage::Match => self.constant_bits(),
+            Stage::Read | Stage::Issue => self.address_bits(),
+        };
+        self.staged(stage, "constant").wide(bits)
+    }
+
+    /// The operation's operand is its immediate; in read, the immediate itself.
+    pub fn immediate(&self, stage: Stage) -> Net {
+        let net = self.staged(stage, "immediate");
+        if stage == Stage::Read { net.wide(32) } else { net }
+    }
+
+    /// The operation writes a register.
+    pub fn writes_at(&self, stage: Stage) -> Net {
+        self.staged(stage, "writes")
+    }
+
+    /// It does so with a latency of 2.
+    pub fn early_at(&self, stage: Stage) -> Net {
+        self.staged(stage, "early")
+    }
+
+    // ---- in flight
+
+    /// The instance that holds the results in flight.
+    pub fn results(&self) -> String {
+        self.own("results").to_string()
+    }
+
+    /// Bit j: a result is on the slot's bus j cycles from now.
+    pub fn underway(&self) -> Net {
+        self.own("underway").wide(self.depth)
+    }
+
+    /// Its register, for each place.
+    pub fn underway_index(&self) -> Net {
+        self.own("underway_index").wide(self.depth * self.index)
+    }
+
+    /// What is on the bus is written back.
+    pub fn writes(&self) -> Net {
+        self.own("writes")
+    }
+
+    /// The address of its bundle.
+    pub fn retire_address(&self) -> Net {
+        self.own("retire_address").wide(16)
+    }
+
+    /// The slot's bus.
+    pub fn result(&self) -> Net {
+        self.own("result").wide(32)
+    }
+
+    /// The same one cycle later.
+    pub fn was_result(&self) -> Net {
+        self.own("was_result").wide(32)
+    }
+
+    /// The flags raised by what is on the bus.
+    pub fn flags(&self) -> Net {
+        self.own("flags").wide(3)
+    }
+
+    fn of_unit(&self, unit: &Unit, what: &str) -> Net {
+        self.own(&format!("{}_{what}", unit.name))
+    }
+
+    /// The instance that keeps a late unit's result in flight.
+    pub fn late_instance(&self, late: &LateUnit) -> String {
+        self.of_unit(late.unit, "late").to_string()
+    }
+
+    /// Bit k: the unit's operation issued k cycles ago.
+    pub fn late_at(&self, late: &LateUnit) -> Net {
+        self.of_unit(late.unit, "at").range(late.beyond, 1)
+    }
+
+    /// Says of [`SlotPlan::late_at`] that not all of it is used.
+    pub fn late_unused(&self, late: &LateUnit) -> Net {
+        self.of_unit(late.unit, "unused")
+    }
+
+    /// The unit has a result in flight that the slot's common places do not have.
+    pub fn late_underway(&self, late: &LateUnit) -> Net {
+        self.of_unit(late.unit, "underway")
+    }
+
+    /// It passes on to them.
+    pub fn late_last(&self, late: &LateUnit) -> Net {
+        self.of_unit(late.unit, "last")
+    }
+
+    /// The unit would not accept an operation in the next cycle.
+    pub fn late_busy(&self, late: &LateUnit) -> Net {
+        self.of_unit(late.unit, "busy")
+    }
+
+    /// The register that it will write.
+    pub fn late_index(&self, late: &LateUnit) -> Net {
+        self.of_unit(late.unit, "index").wide(self.index)
+    }
+
+    /// The address of its bundle.
+    pub fn late_address(&self, late: &LateUnit) -> Net {
+        self.of_unit(late.unit, "address").wide(16)
+    }
+
+    // ---- operands and hazards
+
+    /// An operand in execute.
+    pub fn operand(&self, operand: usize) -> Net {
+        Net::named(format!("x_{}", self.source(operand))).wide(32)
+    }
+
+    /// A source is not ready (rule 2).
+    pub fn source_waits(&self, stage: Stage, operand: usize) -> Net {
+        Net::named(format!("{}_{stage}_waits", self.source(operand)))
+    }
+
+    /// The instance that watches the destination.
+    pub fn dest_instance(&self) -> String {
+        self.own("dest").to_string()
+    }
+
+    /// The destination is not ready (rule 3).
+    pub fn dest_waits(&self, stage: Stage) -> Net {
+        self.own(&format!("{stage}_waits"))
+    }
+
+    /// An output of [`SlotPlan::dest_instance`] that is for sources only.
+    pub fn dest_unused(&self, what: &str) -> Net {
+        self.own(&format!("unused_{what}"))
+    }
+
+    /// The unit is busy (rule 4).
+    pub fn unit_busy(&self, stage: Stage) -> Net {
+        self.own(&format!("{stage}_busy"))
+    }
+
+    /// The write port is taken (rule 6).
+    pub fn port_taken(&self, stage: Stage) -> Net {
+        self.own(&format!("{stage}_port"))
+    }
+
+    // ---- units
+
+    /// The instance of a unit.
+    pub fn unit(&self, unit: &Unit) -> String {
+        format!("{}_{}", self.name(), unit.name)
+    }
+
+    /// The unit gets an operation.
+    pub fn unit_starts(&self, unit: &Unit) -> Net {
+        Net::named(format!("x_{}", self.unit(unit)))
+    }
+
+    /// Which operation.
+    pub fn code(&self) -> Net {
+        Net::named(format!("x_{}_code", self.name())).wide(self.code_bits())
+    }
+
+    /// The unit's result is there.
+    pub fn unit_valid(&self, unit: &Unit) -> Net {
+        self.of_unit(unit, "valid")
+    }
+
+    /// The unit's result.
+    pub fn unit_result(&self, unit: &Unit) -> Net {
+        self.of_unit(unit, "result").wide(32)
+    }
+
+    /// The flags that it raises.
+    pub fn unit_flags(&self, unit: &Unit) -> Net {
+        self.of_unit(unit, "flags").wide(3)
+    }
+}
+
+/// Names of source operands.
+pub const LETTERS: [&str; 3] = ["a", "b", "c"];

@@ -1,0 +1,214 @@
+//! What the generator knows of a slot: its instructions, their control bits, its units' circuits, its results in flight.
+
+use super::LateUnit;
+use crate::circuit::Circuit;
+use std::fmt;
+use takt_isa::shape::Field;
+use takt_isa::spec::machines::Slot;
+use takt_isa::{Effect, Function, ROWS, Row};
+
+/// What a control bit, or a few, says of an operation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ControlBit {
+    /// It goes to the unit of this name.
+    Unit(&'static str),
+    /// It writes a register, with this latency.
+    Result(u32),
+    /// The unit's code for it.
+    Code,
+    /// It drains (rule 5).
+    Drains,
+    /// It has this effect.
+    Effect(Effect),
+}
+
+impl fmt::Display for ControlBit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ControlBit::Unit(name) => write!(f, "unit_{name}"),
+            ControlBit::Result(latency) => write!(f, "result_{latency}"),
+            ControlBit::Code => f.write_str("code"),
+            ControlBit::Drains => f.write_str("drains"),
+            ControlBit::Effect(effect) => f.write_str(match effect {
+                Effect::Compute => "compute",
+                Effect::Nothing => "nothing",
+                Effect::Immediate => "immediate",
+                Effect::Load => "load",
+                Effect::Store => "store",
+                Effect::Jump => "jump",
+                Effect::BranchZero => "branch_zero",
+                Effect::BranchNonzero => "branch_nonzero",
+                Effect::Call => "call",
+                Effect::Return => "return",
+                Effect::Wait => "wait",
+                Effect::Halt => "halt",
+                Effect::ReadFlags => "read_flags",
+                Effect::ClearFlags => "clear_flags",
+            }),
+        }
+    }
+}
+
+/// Where a control bit stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Control {
+    /// What it says.
+    pub bit: ControlBit,
+    /// Its lowest bit.
+    pub low: u32,
+    /// How many there are.
+    pub width: u32,
+}
+
+/// The plan of a slot.
+#[derive(Clone, Debug)]
+pub struct SlotPlan {
+    /// Its row.
+    pub slot: &'static Slot,
+    /// Its number in the bundle.
+    pub number: u32,
+    /// Circuits of the units that compute, in the order of the slot's units.
+    pub circuits: Vec<Circuit>,
+    /// Control bits, from bit 0 on.
+    pub controls: Vec<Control>,
+    /// Sources of the operation that has most.
+    pub sources: usize,
+    /// Latencies of results, ascending.
+    pub latencies: Vec<u32>,
+    /// Places of `takt_underway`: how many cycles ahead of its writeback a result in flight is known to it.
+    pub depth: u32,
+    /// Units that work on one operation at a time and have a `takt_late` each.
+    pub late: Vec<LateUnit>,
+    /// Instructions that may stand in the slot.
+    pub rows: Vec<&'static Row>,
+    /// Bits of an index into a bank, on this machine.
+    pub(super) index: u32,
+    /// Slots of the machine.
+    pub(super) slot_count: u32,
+}
+
+/// Whether an effect has a control bit: unless it is nothing but arithmetic.
+fn has_bit(effect: Effect) -> bool {
+    !matches!(effect, Effect::Compute | Effect::Nothing | Effect::Immediate)
+}
+
+impl SlotPlan {
+    pub(super) fn new(
+        slot: &'static Slot,
+        number: u32,
+        circuits: Vec<Circuit>,
+        depth: u32,
+        late: Vec<LateUnit>,
+    ) -> SlotPlan {
+        let rows: Vec<&Row> = ROWS
+            .iter()
+            .filter(|row| row.function == Function::Idle || slot.unit_for(row.function).is_some())
+            .collect();
+        let sources = rows.iter().map(|row| row.shape.sources()).max().unwrap_or(0);
+        let mut plan = SlotPlan {
+            slot,
+            number,
+            circuits,
+            controls: Vec::new(),
+            sources,
+            latencies: Vec::new(),
+            depth,
+            late,
+            rows,
+            index: 0,
+            slot_count: 0,
+        };
+        let dests = plan.rows.iter().filter(|row| row.shape.has_dest());
+        plan.latencies = dests.map(|row| plan.latency(row)).collect();
+        plan.latencies.sort_unstable();
+        plan.latencies.dedup();
+
+        let mut bits: Vec<(ControlBit, u32)> = Vec::new();
+        bits.extend(plan.circuits.iter().map(|circuit| (ControlBit::Unit(circuit.unit.name), 1)));
+        bits.extend(plan.latencies.iter().map(|&latency| (ControlBit::Result(latency), 1)));
+        let code = plan.circuits.iter().map(|circuit| circuit.op_bits).max().unwrap_or(0);
+        bits.extend((code > 0).then_some((ControlBit::Code, code)));
+        if plan.rows.iter().any(|row| row.effect.drains()) {
+            bits.push((ControlBit::Drains, 1));
+        }
+        for row in plan.rows.iter().filter(|row| has_bit(row.effect)) {
+            let bit = ControlBit::Effect(row.effect);
+            if bits.iter().all(|(other, _)| *other != bit) {
+                bits.push((bit, 1));
+            }
+        }
+        let mut low = 0;
+        for (bit, width) in bits {
+            plan.controls.push(Control { bit, low, width });
+            low += width;
+        }
+        plan
+    }
+
+    fn latency(&self, row: &Row) -> u32 {
+        self.slot.unit_for(row.function).map_or(0, |unit| self.slot.units[unit].latency)
+    }
+
+    /// Bits of control.
+    pub fn width(&self) -> u32 {
+        self.controls.last().map_or(0, |control| control.low + control.width)
+    }
+
+    fn find(&self, bit: ControlBit) -> Option<&Control> {
+        self.controls.iter().find(|control| control.bit == bit)
+    }
+
+    /// Whether the slot has a control bit.
+    pub fn has(&self, bit: ControlBit) -> bool {
+        self.find(bit).is_some()
+    }
+
+    /// Bits of the units' code; 0 if none needs one.
+    pub fn code_bits(&self) -> u32 {
+        self.find(ControlBit::Code).map_or(0, |control| control.width)
+    }
+
+    /// Whether an instruction of the slot has an effect.
+    pub fn has_effect(&self, effect: Effect) -> bool {
+        self.rows.iter().any(|row| row.effect == effect)
+    }
+
+    fn widest(&self, fields: &[Field]) -> u32 {
+        let used = self.rows.iter().flat_map(|row| row.shape.fields());
+        used.filter(|field| fields.contains(field)).map(|field| field.bits().width).max().unwrap_or(0)
+    }
+
+    /// Bits of constant: an immediate, or a target or offset, or none.
+    pub fn constant_bits(&self) -> u32 {
+        self.widest(&[Field::Immediate, Field::Target, Field::Offset])
+    }
+
+    /// Bits of those that are wanted in issue: a target or offset, or none.
+    pub fn address_bits(&self) -> u32 {
+        self.widest(&[Field::Target, Field::Offset])
+    }
+
+    /// The value of the control bits for an instruction.
+    pub fn control_of(&self, row: &Row) -> u64 {
+        let mut value = 0;
+        let mut put = |bit: ControlBit, bits: u64| {
+            value |= self.find(bit).map_or(0, |control| bits << control.low);
+        };
+        if row.shape.has_dest() {
+            put(ControlBit::Result(self.latency(row)), 1);
+        }
+        for circuit in &self.circuits {
+            if let Some(operation) = circuit.operations.iter().find(|operation| operation.op == row.op) {
+                put(ControlBit::Unit(circuit.unit.name), 1);
+                put(ControlBit::Code, operation.code.into());
+            }
+        }
+        if row.effect.drains() {
+            put(ControlBit::Drains, 1);
+        }
+        if has_bit(row.effect) {
+            put(ControlBit::Effect(row.effect), 1);
+        }
+        value
+    }
+}

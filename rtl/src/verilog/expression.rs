@@ -1,0 +1,409 @@
+//! Names and expressions of Verilog.
+
+use std::borrow::Cow;
+use std::fmt::{self, Write as _};
+use std::ops::{BitAnd, BitOr, BitXor, Not};
+
+/// Columns for what continues an expression.
+const LINE: usize = 118;
+
+/// A name that a module declares: a port, a wire, a register, a parameter. It is written as its name.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Net {
+    name: Cow<'static, str>,
+    /// Highest and lowest bit; a single bit without a range has none.
+    range: Option<(u32, u32)>,
+}
+
+impl Net {
+    /// A single bit.
+    pub const fn bit(name: &'static str) -> Net {
+        Net { name: Cow::Borrowed(name), range: None }
+    }
+
+    /// Bits `width - 1` to 0, of which there is one at least.
+    pub const fn bus(name: &'static str, width: u32) -> Net {
+        Net { name: Cow::Borrowed(name), range: Some((width.saturating_sub(1), 0)) }
+    }
+
+    /// As [`Net::bit`], with a name that is made.
+    pub fn named(name: String) -> Net {
+        Net { name: Cow::Owned(name), range: None }
+    }
+
+    /// The net with bits `width - 1` to 0.
+    pub fn wide(self, width: u32) -> Net {
+        self.range(width.saturating_sub(1), 0)
+    }
+
+    /// The net with bits `high` to `low`.
+    pub fn range(self, high: u32, low: u32) -> Net {
+        Net { range: Some((high, low)), ..self }
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Its width in bits.
+    pub fn width(&self) -> u32 {
+        self.range.map_or(1, |(high, low)| high - low + 1)
+    }
+
+    /// `[7:0] `, or nothing for a bit.
+    pub(super) fn range_text(&self) -> String {
+        self.range.map_or_else(String::new, |(high, low)| format!("[{high}:{low}] "))
+    }
+
+    fn select(&self, select: Select) -> Expr {
+        Expr::Net { net: self.clone(), select: Some(select) }
+    }
+
+    /// One of its bits.
+    pub fn at(&self, place: impl Into<Place>) -> Expr {
+        self.select(Select::Bit(place.into()))
+    }
+
+    /// Bits `high` to `low`.
+    pub fn slice(&self, high: u32, low: u32) -> Expr {
+        self.select(Select::Slice(high, low))
+    }
+
+    /// The lowest bits.
+    pub fn low(&self, width: u32) -> Expr {
+        self.slice(width.saturating_sub(1), 0)
+    }
+
+    /// `width` bits from a place upwards.
+    pub fn part(&self, place: impl Into<Place>, width: u32) -> Expr {
+        self.select(Select::Part(place.into(), width))
+    }
+}
+
+impl fmt::Display for Net {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.name)
+    }
+}
+
+/// Where in a net something stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A number.
+    Number(u32),
+    /// A parameter or a loop's variable, times a number.
+    Multiple(u32, Net),
+}
+
+impl From<u32> for Place {
+    fn from(number: u32) -> Place {
+        Place::Number(number)
+    }
+}
+
+impl From<Net> for Place {
+    fn from(net: Net) -> Place {
+        Place::Multiple(1, net)
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Place::Number(number) => write!(f, "{number}"),
+            Place::Multiple(1, net) => write!(f, "{net}"),
+            Place::Multiple(factor, net) => write!(f, "{factor}*{net}"),
+        }
+    }
+}
+
+/// The part of a net that an expression uses.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Select {
+    /// A bit.
+    Bit(Place),
+    /// Bits from the first number down to the second.
+    Slice(u32, u32),
+    /// So many bits from a place upwards.
+    Part(Place, u32),
+}
+
+/// An expression. Operators inside of operators stand in parentheses, whatever their precedence.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Expr {
+    /// A number with its width, as it is written.
+    Literal(String),
+    /// A net, or a part of it.
+    Net {
+        /// The net.
+        net: Net,
+        /// The part; all of it without.
+        select: Option<Select>,
+    },
+    /// `~x`.
+    Not(Box<Expr>),
+    /// `&x`, `|x`, `^x`: all bits of x.
+    Reduce(&'static str, Box<Expr>),
+    /// `x & y & z`; with a single term it is that term.
+    Chain(&'static str, Vec<Expr>),
+    /// `x == y`.
+    Compare(&'static str, Box<Expr>, Box<Expr>),
+    /// `x ? y : z`.
+    Choose(Box<[Expr; 3]>),
+    /// `{x, y}`, the most significant first; with a single term it is that term.
+    Concat(Vec<Expr>),
+    /// `{n{x}}`.
+    Repeat(u32, Box<Expr>),
+}
+
+/// A number in decimal.
+pub fn decimal(width: u32, value: impl Into<u64>) -> Expr {
+    Expr::Literal(format!("{width}'d{}", value.into()))
+}
+
+/// A number in hexadecimal, of all its digits.
+pub fn hexadecimal(width: u32, value: u64) -> Expr {
+    Expr::Literal(format!("{width}'h{value:0digits$x}", digits = width.div_ceil(4) as usize))
+}
+
+/// Fields in binary, the most significant first, each with its width, an underscore between them.
+pub fn binary(fields: &[(u32, u64)]) -> Expr {
+    let width: u32 = fields.iter().map(|(width, _)| width).sum();
+    let digits: Vec<_> =
+        fields.iter().map(|&(width, value)| format!("{value:0width$b}", width = width as usize)).collect();
+    Expr::Literal(format!("{width}'b{}", digits.join("_")))
+}
+
+/// A bit that is 0.
+pub fn no() -> Expr {
+    Expr::Literal("1'b0".to_owned())
+}
+
+/// A bit that is 1.
+pub fn yes() -> Expr {
+    Expr::Literal("1'b1".to_owned())
+}
+
+/// Whether any of the terms is 1.
+pub fn any<T: Into<Expr>>(terms: impl IntoIterator<Item = T>) -> Expr {
+    let terms: Vec<Expr> = terms.into_iter().map(Into::into).collect();
+    if terms.is_empty() { no() } else { Expr::Chain("|", terms) }
+}
+
+/// Terms one after the other, the least significant first.
+pub fn concat<T: Into<Expr>>(terms: impl IntoIterator<Item = T, IntoIter: DoubleEndedIterator>) -> Expr {
+    Expr::Concat(terms.into_iter().rev().map(Into::into).collect())
+}
+
+/// A bit or a few, so many times.
+pub fn repeat(times: u32, of: impl Into<Expr>) -> Expr {
+    Expr::Repeat(times, Box::new(of.into()))
+}
+
+/// `value`, where `valid`, a bit, is 1; else 0.
+pub fn gated(width: u32, valid: impl Into<Expr>, value: impl Into<Expr>) -> Expr {
+    repeat(width, valid) & value
+}
+
+/// `yes` where `condition` is 1, else `no`.
+pub fn choose(condition: impl Into<Expr>, yes: impl Into<Expr>, no: impl Into<Expr>) -> Expr {
+    Expr::Choose(Box::new([condition.into(), yes.into(), no.into()]))
+}
+
+impl Expr {
+    /// Whether any bit is 1.
+    pub fn any_bit(self) -> Expr {
+        Expr::Reduce("|", Box::new(self))
+    }
+
+    /// Whether every bit is 1.
+    pub fn every_bit(self) -> Expr {
+        Expr::Reduce("&", Box::new(self))
+    }
+
+    /// Whether an odd number of bits is 1.
+    pub fn parity(self) -> Expr {
+        Expr::Reduce("^", Box::new(self))
+    }
+
+    /// Whether it equals another one.
+    pub fn is(self, other: impl Into<Expr>) -> Expr {
+        Expr::Compare("==", Box::new(self), Box::new(other.into()))
+    }
+
+    /// Whether it differs from another one.
+    pub fn is_not(self, other: impl Into<Expr>) -> Expr {
+        Expr::Compare("!=", Box::new(self), Box::new(other.into()))
+    }
+
+    fn chain(self, operator: &'static str, other: Expr) -> Expr {
+        match self {
+            // `any` of one term stays a term of its own.
+            Expr::Chain(own, mut terms) if own == operator && terms.len() > 1 => {
+                terms.push(other);
+                Expr::Chain(own, terms)
+            }
+            first => Expr::Chain(operator, vec![first, other]),
+        }
+    }
+
+    /// Calls `see` with every net that the expression uses.
+    pub(super) fn nets<'a>(&'a self, see: &mut dyn FnMut(&'a Net)) {
+        match self {
+            Expr::Literal(_) => {}
+            Expr::Net { net, select } => {
+                see(net);
+                if let Some(
+                    Select::Bit(Place::Multiple(_, place)) | Select::Part(Place::Multiple(_, place), _),
+                ) = select
+                {
+                    see(place);
+                }
+            }
+            Expr::Not(of) | Expr::Reduce(_, of) | Expr::Repeat(_, of) => of.nets(see),
+            Expr::Chain(_, terms) | Expr::Concat(terms) => terms.iter().for_each(|term| term.nets(see)),
+            Expr::Compare(_, left, right) => {
+                left.nets(see);
+                right.nets(see);
+            }
+            Expr::Choose(parts) => parts.iter().for_each(|part| part.nets(see)),
+        }
+    }
+
+    /// As an operator's operand.
+    fn nested(&self) -> String {
+        match self {
+            Expr::Chain(_, terms) if terms.len() == 1 => terms[0].nested(),
+            Expr::Reduce(..) | Expr::Chain(..) | Expr::Compare(..) | Expr::Choose(_) => format!("({self})"),
+            _ => self.to_string(),
+        }
+    }
+
+    /// The expression, if it is longer than `room`, broken before its operators or after its commas, with `indent` before each
+    /// line but the first.
+    pub(super) fn broken(&self, room: usize, indent: &str) -> String {
+        let whole = self.to_string();
+        if whole.len() <= room {
+            return whole;
+        }
+        match self {
+            Expr::Chain(operator, terms) if terms.len() > 1 => {
+                let terms: Vec<_> = terms.iter().map(Expr::nested).collect();
+                // Names stand several in a line, anything longer alone.
+                let long = terms.iter().any(|term| term.contains(' '));
+                let mut text = String::new();
+                let mut left = if long { 0 } else { room };
+                for (i, term) in terms.iter().enumerate() {
+                    let piece = format!("{operator} {term}");
+                    let (breaks, piece) = match i {
+                        0 => (false, term.as_str()),
+                        _ => (left < piece.len() + 1, piece.as_str()),
+                    };
+                    if breaks {
+                        let _ = write!(text, "\n{indent}");
+                        left = if long { 0 } else { LINE.saturating_sub(indent.len()) };
+                    } else if i > 0 {
+                        text.push(' ');
+                    }
+                    text.push_str(piece);
+                    left = left.saturating_sub(piece.len() + 1);
+                }
+                text
+            }
+            Expr::Concat(terms) if terms.len() > 1 => {
+                let terms: Vec<_> = terms.iter().map(Expr::to_string).collect();
+                format!("{{{}}}", terms.join(&format!(",\n{indent}")))
+            }
+            Expr::Not(of) if matches!(**of, Expr::Chain(..)) => {
+                format!("~({})", of.broken(room.saturating_sub(3), indent))
+            }
+            _ => whole,
+        }
+    }
+}
+
+impl fmt::Display for Expr {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Expr::Literal(text) => f.write_str(text),
+            Expr::Net { net, select: None } => write!(f, "{net}"),
+            Expr::Net { net, select: Some(Select::Bit(place)) } => write!(f, "{net}[{place}]"),
+            Expr::Net { net, select: Some(Select::Slice(high, low)) } => write!(f, "{net}[{high}:{low}]"),
+            Expr::Net { net, select: Some(Select::Part(place, width)) } => {
+                write!(f, "{net}[{place} +: {width}]")
+            }
+            Expr::Not(of) => write!(f, "~{}", of.nested()),
+            Expr::Reduce(operator, of) => write!(f, "{operator}{}", of.nested()),
+            Expr::Chain(operator, terms) => match terms.as_slice() {
+                [one] => write!(f, "{one}"),
+                _ => {
+                    let terms: Vec<_> = terms.iter().map(Expr::nested).collect();
+                    f.write_str(&terms.join(&format!(" {operator} ")))
+                }
+            },
+            Expr::Compare(operator, left, right) => {
+                write!(f, "{} {operator} {}", left.nested(), right.nested())
+            }
+            Expr::Choose(parts) => {
+                let [condition, yes, no] = parts.each_ref();
+                write!(f, "{} ? {} : {}", condition.nested(), yes.nested(), no.nested())
+            }
+            Expr::Concat(terms) => match terms.as_slice() {
+                [one] => write!(f, "{one}"),
+                _ => {
+                    let terms: Vec<_> = terms.iter().map(Expr::to_string).collect();
+                    write!(f, "{{{}}}", terms.join(", "))
+                }
+            },
+            Expr::Repeat(times, of) => write!(f, "{{{times}{{{of}}}}}"),
+        }
+    }
+}
+
+impl From<Net> for Expr {
+    fn from(net: Net) -> Expr {
+        Expr::Net { net, select: None }
+    }
+}
+
+impl From<&Net> for Expr {
+    fn from(net: &Net) -> Expr {
+        net.clone().into()
+    }
+}
+
+macro_rules! operator {
+    ($trait:ident $method:ident $text:literal) => {
+        impl<R: Into<Expr>> $trait<R> for Expr {
+            type Output = Expr;
+            fn $method(self, other: R) -> Expr {
+                self.chain($text, other.into())
+            }
+        }
+        impl<R: Into<Expr>> $trait<R> for Net {
+            type Output = Expr;
+            fn $method(self, other: R) -> Expr {
+                Expr::from(self).chain($text, other.into())
+            }
+        }
+    };
+}
+
+operator!(BitAnd bitand "&");
+operator!(BitOr bitor "|");
+operator!(BitXor bitxor "^");
+
+impl Not for Expr {
+    type Output = Expr;
+    fn not(self) -> Expr {
+        Expr::Not(Box::new(self))
+    }
+}
+
+impl Not for Net {
+    type Output = Expr;
+    fn not(self) -> Expr {
+        !Expr::from(self)
+    }
+}

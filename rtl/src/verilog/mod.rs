@@ -1,0 +1,432 @@
+//! A Verilog module as data: ports, nets, assignments, always blocks, instances, and how they are written.
+//!
+//! A [`Module`] keeps its items in the order in which they are added, which is that of the file. Every name must be declared
+//! before it is used, and once: [`Module::finish`] refuses anything else. Expressions are [`Expr`], made of [`Net`]s, which carry
+//! their widths; Rust's operators `&`, `|`, `^`, `!` build them.
+
+mod expression;
+mod print;
+
+pub use expression::{
+    Expr, Net, Place, Select, any, binary, choose, concat, decimal, gated, hexadecimal, no, repeat, yes,
+};
+
+use std::collections::BTreeSet;
+use thiserror::Error;
+
+/// Why a module is none.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum ModuleError {
+    /// A name is used before it is declared, or never declared.
+    #[error("module {module}: `{name}` is used before it is declared")]
+    Undeclared {
+        /// The module.
+        module: String,
+        /// The name.
+        name: String,
+    },
+    /// A name is declared twice.
+    #[error(
+        "module {module}: `{name}` is declared twice: names of slots, banks and units must not make the name of something else"
+    )]
+    Twice {
+        /// The module.
+        module: String,
+        /// The name.
+        name: String,
+    },
+}
+
+/// Whether a port is driven from outside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// Driven from outside.
+    Input,
+    /// Driven by the module.
+    Output,
+    /// Driven by an always block of the module.
+    OutputRegister,
+}
+
+/// A port of a module.
+#[derive(Clone, Debug)]
+pub struct Port {
+    /// Its direction.
+    pub direction: Direction,
+    /// Its name and width.
+    pub net: Net,
+    /// Said on a line of its own before it.
+    pub heading: Option<String>,
+    /// Said behind it.
+    pub remark: Option<&'static str>,
+}
+
+impl Port {
+    /// A port without comments.
+    pub fn new(direction: Direction, net: Net) -> Port {
+        Port { direction, net, heading: None, remark: None }
+    }
+
+    /// The port with a line of comment before it.
+    pub fn heading(self, text: impl Into<String>) -> Port {
+        Port { heading: Some(text.into()), ..self }
+    }
+
+    /// The port with a comment behind it.
+    pub fn remark(self, text: &'static str) -> Port {
+        Port { remark: Some(text), ..self }
+    }
+}
+
+/// What drives a net, in its declaration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Wire,
+    Reg,
+    Integer,
+}
+
+/// A statement of an always block.
+#[derive(Clone, Debug)]
+pub(crate) enum Statement {
+    /// An assignment: at the clock's edge, or at once in a block without a clock.
+    Set { left: Expr, right: Expr, remark: Option<&'static str> },
+    /// Only if the condition is 1.
+    If { condition: Expr, body: Vec<Statement> },
+    /// For each value of the variable from 0 up to `count - 1`.
+    For { variable: Net, count: u32, body: Vec<Statement> },
+    /// The arm whose number `of` is; else the default.
+    Case { of: Expr, arms: Vec<Arm>, default: Vec<Statement> },
+}
+
+/// An arm of a case statement.
+#[derive(Clone, Debug)]
+pub(crate) struct Arm {
+    pub(crate) value: Expr,
+    pub(crate) body: Vec<Statement>,
+    pub(crate) remark: &'static str,
+}
+
+/// `left` becomes `right`.
+pub(crate) fn set(left: impl Into<Expr>, right: impl Into<Expr>) -> Statement {
+    Statement::Set { left: left.into(), right: right.into(), remark: None }
+}
+
+/// Statements that take place only if `condition` is 1.
+pub(crate) fn when(condition: impl Into<Expr>, body: Vec<Statement>) -> Statement {
+    Statement::If { condition: condition.into(), body }
+}
+
+impl Statement {
+    /// The assignment with a comment behind it.
+    pub(crate) fn remark(self, text: &'static str) -> Statement {
+        match self {
+            Statement::Set { left, right, .. } => Statement::Set { left, right, remark: Some(text) },
+            other => other,
+        }
+    }
+
+    fn nets<'a>(&'a self, see: &mut dyn FnMut(&'a Net)) {
+        match self {
+            Statement::Set { left, right, .. } => {
+                left.nets(see);
+                right.nets(see);
+            }
+            Statement::If { condition, body } => {
+                condition.nets(see);
+                body.iter().for_each(|statement| statement.nets(see));
+            }
+            Statement::For { variable, body, .. } => {
+                see(variable);
+                body.iter().for_each(|statement| statement.nets(see));
+            }
+            Statement::Case { of, arms, default } => {
+                of.nets(see);
+                for arm in arms {
+                    arm.value.nets(see);
+                    arm.body.iter().for_each(|statement| statement.nets(see));
+                }
+                default.iter().for_each(|statement| statement.nets(see));
+            }
+        }
+    }
+}
+
+/// An instance of another module.
+#[derive(Clone, Debug)]
+pub(crate) struct Instance {
+    module: String,
+    name: String,
+    parameters: Vec<(&'static str, Expr)>,
+    ports: Vec<(String, Expr)>,
+}
+
+impl Instance {
+    pub(crate) fn new(module: impl Into<String>, name: impl Into<String>) -> Instance {
+        Instance { module: module.into(), name: name.into(), parameters: Vec::new(), ports: Vec::new() }
+    }
+
+    pub(crate) fn parameter(mut self, name: &'static str, value: u32) -> Instance {
+        self.parameters.push((name, Expr::Literal(value.to_string())));
+        self
+    }
+
+    pub(crate) fn port(mut self, name: impl Into<String>, value: impl Into<Expr>) -> Instance {
+        self.ports.push((name.into(), value.into()));
+        self
+    }
+
+    /// Ports that are connected to the nets of their names.
+    pub(crate) fn same(mut self, nets: impl IntoIterator<Item = Net>) -> Instance {
+        self.ports.extend(nets.into_iter().map(|net| (net.name().to_owned(), net.into())));
+        self
+    }
+}
+
+/// An item of a module.
+#[derive(Clone, Debug)]
+enum Item {
+    Blank,
+    Comment(String),
+    Parameter { net: Net, value: u32 },
+    Nets { kind: Kind, nets: Vec<Net>, value: Option<Expr>, remark: Option<&'static str> },
+    Assign { left: Expr, right: Expr },
+    Always { clocked: bool, body: Vec<Statement> },
+    Instance(Instance),
+}
+
+/// A module under construction.
+#[derive(Clone, Debug)]
+pub(crate) struct Module {
+    name: String,
+    heading: Vec<String>,
+    ports: Vec<Port>,
+    items: Vec<Item>,
+    declared: BTreeSet<String>,
+    error: Option<ModuleError>,
+}
+
+/// The name of the clock in every module.
+pub(crate) const CLK: Net = Net::bit("clk");
+
+impl Module {
+    /// A module with its ports; `heading` is what the file begins with.
+    pub(crate) fn new(name: &str, heading: Vec<String>, ports: Vec<Port>) -> Module {
+        let mut module = Module {
+            name: name.to_owned(),
+            heading,
+            ports: Vec::new(),
+            items: Vec::new(),
+            declared: BTreeSet::new(),
+            error: None,
+        };
+        for port in &ports {
+            module.declare(&port.net);
+        }
+        module.ports = ports;
+        module
+    }
+
+    fn declare(&mut self, net: &Net) {
+        if !self.declared.insert(net.name().to_owned()) {
+            let (module, name) = (self.name.clone(), net.name().to_owned());
+            self.error.get_or_insert(ModuleError::Twice { module, name });
+        }
+    }
+
+    fn uses(&mut self, net: &Net) {
+        if !self.declared.contains(net.name()) {
+            let (module, name) = (self.name.clone(), net.name().to_owned());
+            self.error.get_or_insert(ModuleError::Undeclared { module, name });
+        }
+    }
+
+    fn check(&mut self, item: &Item) {
+        let mut used: Vec<Net> = Vec::new();
+        let mut see = |net: &Net| used.push(net.clone());
+        match item {
+            Item::Blank | Item::Comment(_) | Item::Parameter { .. } => {}
+            Item::Nets { value, .. } => value.iter().for_each(|value| value.nets(&mut see)),
+            Item::Assign { left, right } => {
+                left.nets(&mut see);
+                right.nets(&mut see);
+            }
+            Item::Always { clocked, body } => {
+                if *clocked {
+                    see(&CLK);
+                }
+                body.iter().for_each(|statement| statement.nets(&mut see));
+            }
+            Item::Instance(instance) => {
+                let values = instance.parameters.iter().map(|(_, value)| value);
+                let values = values.chain(instance.ports.iter().map(|(_, value)| value));
+                values.for_each(|value| value.nets(&mut see));
+            }
+        }
+        used.iter().for_each(|net| self.uses(net));
+        match item {
+            Item::Parameter { net, .. } => self.declare(net),
+            Item::Nets { nets, .. } => nets.iter().for_each(|net| self.declare(net)),
+            Item::Instance(instance) => self.declare(&Net::named(instance.name.clone())),
+            _ => {}
+        }
+    }
+
+    fn add(&mut self, item: Item) {
+        self.check(&item);
+        self.items.push(item);
+    }
+
+    pub(crate) fn blank(&mut self) {
+        self.add(Item::Blank);
+    }
+
+    /// A line of comment.
+    pub(crate) fn comment(&mut self, text: impl Into<String>) {
+        self.add(Item::Comment(text.into()));
+    }
+
+    /// Begins a part.
+    pub(crate) fn banner(&mut self, text: &str) {
+        self.blank();
+        self.comment(format!("---- {text}"));
+    }
+
+    /// A `localparam`.
+    pub(crate) fn parameter(&mut self, net: Net, value: u32) {
+        self.add(Item::Parameter { net, value });
+    }
+
+    fn nets(&mut self, kind: Kind, nets: impl IntoIterator<Item = Net>) {
+        let nets: Vec<Net> = nets.into_iter().collect();
+        // A declaration has one range.
+        for same in nets.chunk_by(|a, b| a.range_text() == b.range_text()) {
+            self.add(Item::Nets { kind, nets: same.to_vec(), value: None, remark: None });
+        }
+    }
+
+    pub(crate) fn wires(&mut self, nets: impl IntoIterator<Item = Net>) {
+        self.nets(Kind::Wire, nets);
+    }
+
+    pub(crate) fn regs(&mut self, nets: impl IntoIterator<Item = Net>) {
+        self.nets(Kind::Reg, nets);
+    }
+
+    /// A register with a comment behind it.
+    pub(crate) fn reg(&mut self, net: Net, remark: &'static str) {
+        self.add(Item::Nets { kind: Kind::Reg, nets: vec![net], value: None, remark: Some(remark) });
+    }
+
+    pub(crate) fn integer(&mut self, net: Net) {
+        self.nets(Kind::Integer, [net]);
+    }
+
+    /// A wire and what it is.
+    pub(crate) fn define(&mut self, net: Net, value: impl Into<Expr>) {
+        self.add(Item::Nets { kind: Kind::Wire, nets: vec![net], value: Some(value.into()), remark: None });
+    }
+
+    /// Takes note that bits of a net may be unused, for tools that complain.
+    pub(crate) fn unused(&mut self, net: Net, value: impl Into<Expr>, remark: Option<&'static str>) {
+        let value = Some(concat([value.into(), no()]).every_bit());
+        self.add(Item::Nets { kind: Kind::Wire, nets: vec![net], value, remark });
+    }
+
+    pub(crate) fn assign(&mut self, left: impl Into<Expr>, right: impl Into<Expr>) {
+        self.add(Item::Assign { left: left.into(), right: right.into() });
+    }
+
+    /// What happens at the clock's edge.
+    pub(crate) fn clocked(&mut self, body: Vec<Statement>) {
+        self.add(Item::Always { clocked: true, body });
+    }
+
+    /// What follows at once.
+    pub(crate) fn combinational(&mut self, body: Vec<Statement>) {
+        self.add(Item::Always { clocked: false, body });
+    }
+
+    pub(crate) fn instance(&mut self, instance: Instance) {
+        self.add(Item::Instance(instance));
+    }
+
+    /// The text of the module.
+    ///
+    /// # Errors
+    /// If a name is declared twice, or used and not declared before.
+    pub(crate) fn finish(self) -> Result<String, ModuleError> {
+        match self.error {
+            Some(error) => Err(error),
+            None => Ok(print::module(&self)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const A: Net = Net::bit("a");
+    const B: Net = Net::bus("b", 4);
+
+    fn module() -> Module {
+        Module::new("test", vec!["A test.".to_owned()], vec![Port::new(Direction::Input, CLK)])
+    }
+
+    #[test]
+    fn names_are_declared_before_use() {
+        let mut early = module();
+        early.assign(A, no());
+        early.wires([A]);
+        let error = ModuleError::Undeclared { module: "test".to_owned(), name: "a".to_owned() };
+        assert_eq!(early.finish(), Err(error.clone()));
+        // Wherever the name stands: in an index, a condition, a port.
+        let uses: [&dyn Fn(&mut Module); 4] = [
+            &|m| m.define(Net::bit("x"), B.at(A)),
+            &|m| m.clocked(vec![when(A, vec![set(B, B)])]),
+            &|m| m.instance(Instance::new("other", "x").port("in", Expr::from(B).any_bit() & A)),
+            &|m| {
+                m.clocked(vec![Statement::Case { of: B.into(), arms: Vec::new(), default: vec![set(B, A)] }])
+            },
+        ];
+        for add in uses {
+            let mut module = module();
+            module.regs([B]);
+            add(&mut module);
+            assert_eq!(module.finish(), Err(error.clone()));
+        }
+    }
+
+    #[test]
+    fn names_are_declared_once() {
+        let twice: [&dyn Fn(&mut Module); 4] = [
+            &|m| m.wires([A, A]),
+            &|m| m.wires([CLK]),
+            &|m| m.instance(Instance::new("other", "clk")),
+            &|m| m.parameter(CLK, 1),
+        ];
+        for add in twice {
+            let mut module = module();
+            add(&mut module);
+            let error = module.finish().expect_err("twice");
+            assert!(error.to_string().contains("is declared twice"), "{error}");
+        }
+    }
+
+    #[test]
+    fn operators_in_operators_have_parentheses() {
+        let [x, y, z] = ["x", "y", "z"].map(Net::bit);
+        let text = |expr: Expr| expr.to_string();
+        assert_eq!(text(x.clone() & y.clone() & z.clone()), "x & y & z");
+        assert_eq!(text((x.clone() & y.clone()) | z.clone()), "(x & y) | z");
+        assert_eq!(text(!(x.clone() | y.clone()) & z.clone()), "~(x | y) & z");
+        assert_eq!(text(x.clone() | Expr::from(B).any_bit()), "x | (|b)");
+        assert_eq!(text(choose(x.clone(), y.clone() ^ z, B.slice(2, 1))), "x ? (y ^ z) : b[2:1]");
+        assert_eq!(text(concat([Expr::from(x), repeat(3, y)])), "{{3{y}}, x}");
+        assert_eq!(text(any([B.part(4, 2)])), "b[4 +: 2]");
+        assert_eq!(text(any(Vec::<Expr>::new())), "1'b0");
+        assert_eq!(text(binary(&[(1, 1), (3, 2)])), "4'b1_010");
+        assert_eq!(text(hexadecimal(41, 0xfff)), "41'h00000000fff");
+    }
+}
