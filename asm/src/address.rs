@@ -49,8 +49,7 @@ impl Resolver<'_> {
             self.context.report(at.scope, error);
             return;
         }
-        let mut nodes = NODES;
-        if let Origin::Label(label) = self.origin(written.0, written.1.kind, &mut nodes) {
+        if let Some(label) = self.table_of(written.0, written.1.kind) {
             self.check_table(at, label, word, span);
         }
     }
@@ -91,6 +90,14 @@ impl Resolver<'_> {
             }
         }
         self.context.report(at.scope, error);
+    }
+
+    /// The label whose address an operand is, plus or minus a number: the table that it lies in.
+    pub(crate) fn table_of(&mut self, at: At, kind: OperandKind) -> Option<LabelId> {
+        match self.origin(at, kind, &mut NODES.clone()) {
+            Origin::Label(label) => Some(label),
+            Origin::Number | Origin::Other => None,
+        }
     }
 
     /// The table that an operand names.

@@ -116,6 +116,12 @@ pub struct Operand {
     pub span: Span,
 }
 
+impl From<Expr> for Operand {
+    fn from(Expr { id, span }: Expr) -> Operand {
+        Operand { kind: OperandKind::Expr(id), span }
+    }
+}
+
 /// What an operand looks like.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum OperandKind {

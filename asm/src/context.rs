@@ -7,7 +7,7 @@ use crate::intern::{Interner, NameId};
 use crate::ir::{LabelId, Register, RegisterId, RegisterKind};
 use crate::limits;
 use crate::source::{Sources, Span};
-use crate::types::{Addresses, GivenTypes};
+use crate::types::GivenTypes;
 use crate::unknown::{Unknown, Wanted};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
@@ -81,8 +81,6 @@ pub(crate) struct NamedConstant {
     pub(crate) used: bool,
     /// Whether that it is never used is worth a warning.
     pub(crate) watched: bool,
-    /// What it is computed from.
-    pub(crate) addresses: Addresses,
 }
 
 /// An argument of a macro's use.
@@ -90,8 +88,8 @@ pub(crate) struct NamedConstant {
 pub(crate) struct Argument {
     pub(crate) operand: Operand,
     pub(crate) at: At,
-    /// Its value, once computed: parameters passed on and on are computed once. And what it is computed from.
-    pub(crate) value: Option<(Value, Addresses)>,
+    /// Its value, once computed: parameters passed on and on are computed once.
+    pub(crate) value: Option<Value>,
 }
 
 /// The mistake is in the report.
@@ -129,8 +127,6 @@ pub(crate) struct Context {
     pub(crate) typed: HashSet<RegisterId>,
     /// The types of the words of data memory.
     pub(crate) data_types: Vec<Type>,
-    /// The data labels met in evaluating an expression.
-    pub(crate) addresses: Addresses,
     /// Unknown names beyond those that are kept.
     pub(crate) more_unknown: usize,
     /// Arguments and templates under evaluation, one within the other.
@@ -178,7 +174,6 @@ impl Context {
             given: GivenTypes::default(),
             typed: HashSet::new(),
             data_types: Vec::new(),
-            addresses: Addresses::default(),
             more_unknown: 0,
             depth: 0,
         };
@@ -531,13 +526,9 @@ impl Context {
             Binding::Constant(id) => {
                 let constant = &mut self.constants[id as usize];
                 constant.used = true;
-                self.addresses += constant.addresses;
                 constant.value.ok_or(Reported)
             }
-            Binding::Data(id) => {
-                self.addresses += Addresses::of(id);
-                Ok(Value::Int(self.labels[id.0 as usize].position.into()))
-            }
+            Binding::Data(id) => Ok(Value::Int(self.labels[id.0 as usize].position.into())),
             Binding::Argument(id) => self.argument_value(id, span),
             Binding::None => Err(self.unknown(scope, name, span, Wanted::Value)),
             binding => {
@@ -560,11 +551,9 @@ impl Context {
 
     fn argument_value(&mut self, id: u32, span: Span) -> Result<Value, Reported> {
         let Argument { operand, at, value } = self.arguments[id as usize];
-        if let Some((value, addresses)) = value {
-            self.addresses += addresses;
+        if let Some(value) = value {
             return Ok(value);
         }
-        let before = std::mem::take(&mut self.addresses);
         let value = match operand.kind {
             OperandKind::Expr(expr) => self.nested(at, span, |context| context.value(at, expr))?,
             OperandKind::Name(name) => self.nested(at, span, |context| {
@@ -577,8 +566,7 @@ impl Context {
                 return Err(self.report(at.scope, error));
             }
         };
-        self.arguments[id as usize].value = Some((value, self.addresses));
-        self.addresses += before;
+        self.arguments[id as usize].value = Some(value);
         Ok(value)
     }
 }

@@ -14,7 +14,6 @@ use crate::ir::{Label, LabelId};
 use crate::limits;
 use crate::load::{Loader, include_path};
 use crate::source::Span;
-use crate::types::Addresses;
 use std::collections::HashMap;
 use std::rc::Rc;
 use takt_isa::Type;
@@ -458,9 +457,7 @@ impl<'l> Expander<'l> {
             }
             DirectiveKind::Const(name, value) => {
                 let id = self.context.name(at, name.name, name.span)?;
-                self.context.addresses = Addresses::default();
                 let value = self.context.value(at, value.id).ok();
-                let addresses = self.context.addresses;
                 let number = self.context.constants.len() as u32;
                 self.context.declare(at, id, name.span, Binding::Constant(number))?;
                 let text = self.context.full_name(at.scope, id);
@@ -471,7 +468,6 @@ impl<'l> Expander<'l> {
                     span: name.span,
                     used: false,
                     watched,
-                    addresses,
                 });
             }
             DirectiveKind::Preset { register, placed, value } => {

@@ -7,6 +7,7 @@ use std::str::FromStr;
 pub const WARNINGS: &[(&str, &str)] = &[
     ("never-written", "a register with a place is read, and nothing writes it"),
     ("no-wait", "`.period` has code that never comes to a `wait` or `halt`"),
+    ("table", "an address lies in another table than the one that it names"),
     ("target", "a jump leads past the program's end"),
     ("types", "a value is read as another type than it is"),
     ("underflow", "a constant rounds to zero"),

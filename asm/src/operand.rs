@@ -9,7 +9,7 @@ use crate::intern::NameId;
 use crate::ir::{Constant, Label, LabelId, Operation, Register, RegisterId, RegisterKind};
 use crate::resolve::Resolver;
 use crate::source::Span;
-use crate::types::{Addresses, Given, Kind, Part, What};
+use crate::types::{Given, Kind, Part, What};
 use crate::unknown::Wanted;
 use takt_isa::shape::Field;
 use takt_isa::{Effect, Operand as Place, ROWS, Row, Type};
@@ -65,7 +65,7 @@ impl Resolver<'_> {
                 let (offset, base) = self.memory(at, operand, row)?;
                 operation.constant = Constant::Value(offset);
                 operation.sources[0] = base;
-                if let Some(table) = self.context.addresses.one() {
+                if let Some(table) = self.table_of(at, operand.kind) {
                     self.context.given.insert(operation, Part::Table, Given::Table(table));
                 }
                 self.note_cast(operation, Part::Source(0));
@@ -83,9 +83,9 @@ impl Resolver<'_> {
 
     /// Notes the type of a constant where the instruction takes any.
     fn note_literal(&mut self, at: At, operand: Operand, operation: &Operation, part: Part) {
-        self.context.addresses = Addresses::default();
         let Ok(value) = self.operand_value(at, operand) else { return };
-        let given = Given::literal(value, self.context.addresses, operand.span);
+        let is_address = self.table_of(at, operand.kind).is_some();
+        let given = Given::literal(value, is_address, operand.span);
         self.context.given.insert(operation, part, given);
     }
 
@@ -298,12 +298,12 @@ impl Resolver<'_> {
 
     /// The bits of a constant operand.
     fn constant(&mut self, at: At, operand: Operand, ty: Type) -> Result<u32, Reported> {
-        self.context.addresses = Addresses::default();
         let value = self.operand_value(at, operand)?;
-        self.bits(at, value, ty, operand.span)
+        self.bits(at, value, ty, operand)
     }
 
-    pub(crate) fn bits(&mut self, at: At, value: Value, ty: Type, span: Span) -> Result<u32, Reported> {
+    pub(crate) fn bits(&mut self, at: At, value: Value, ty: Type, operand: Operand) -> Result<u32, Reported> {
+        let span = operand.span;
         let bits = value.bits(ty).map_err(|fault| self.context.fault(at.scope, EvalError { span, fault }))?;
         if let Value::Real(real) = value
             && ty != Type::I
@@ -314,7 +314,9 @@ impl Resolver<'_> {
                 Diagnostic::warning("underflow", span, format!("{real:e} rounds to zero in binary32"));
             self.context.report(at.scope, warning);
         }
-        if let (Value::Int(_), Type::F, Some(label)) = (value, ty, self.context.addresses.one()) {
+        if let (Value::Int(_), Type::F) = (value, ty)
+            && let Some(label) = self.table_of(at, operand.kind)
+        {
             let Label { name, span: declared, .. } = &self.context.labels[label.0 as usize];
             let message = format!("the address of `{name}` is taken as a float");
             let warning =
@@ -397,15 +399,13 @@ impl Resolver<'_> {
         let (value, span, base) = match (given.kind, meaning) {
             (OperandKind::Memory(memory), _) => {
                 let Memory { offset, base } = self.context.asts[place.ast as usize].memories[memory as usize];
-                // The base first: the offset's label is asked for afterwards.
-                let base = self.source(place, base, row.source_type(0));
-                self.context.addresses = Addresses::default();
                 let value = match offset {
                     Some(offset) => self.context.integer(place, offset).inspect_err(|_| {
                         self.context.unknown_tables(offset.span);
                     }),
                     None => Ok(0),
                 };
+                let base = self.source(place, base, row.source_type(0));
                 (value?, offset.map_or(given.span, |offset| offset.span), base?)
             }
             (_, Some((name, binding @ (Binding::Register(_) | Binding::Code(_))))) => {
@@ -422,7 +422,6 @@ impl Resolver<'_> {
                 return Err(self.context.report(at.scope, error));
             }
             _ => {
-                self.context.addresses = Addresses::default();
                 let value = self.operand_value(place, given).inspect_err(|_| {
                     self.context.unknown_tables(given.span);
                 })?;

@@ -7,7 +7,6 @@ use crate::expand::{self, Data, Flat, Item, Timing};
 use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
 use crate::serialise;
 use crate::source::Span;
-use crate::types::Addresses;
 use smallvec::SmallVec;
 use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
@@ -95,10 +94,10 @@ pub(crate) struct Resolver<'c> {
     own_files: Vec<Option<u32>>,
     /// Labels before this one have their position.
     label: usize,
-    /// Words of data memory that the source declares.
-    pub(crate) data_words: u32,
     /// The type that the operand at hand is taken as, if the source says so.
     pub(crate) cast: Option<Type>,
+    /// Words of data memory that the source declares.
+    pub(crate) data_words: u32,
 }
 
 impl Resolver<'_> {
@@ -345,9 +344,8 @@ impl Resolver<'_> {
                     self.context.data_types.resize(length, Type::B);
                 }
                 Data::Value(at, value, ty) => {
-                    self.context.addresses = Addresses::default();
                     let word = self.context.value(at, value.id);
-                    let word = word.and_then(|word| self.bits(at, word, ty, value.span));
+                    let word = word.and_then(|word| self.bits(at, word, ty, value.into()));
                     // A word with a mistake keeps its place.
                     self.ir.data.push(word.unwrap_or(0));
                     self.context.data_types.push(ty);
@@ -423,11 +421,10 @@ impl Resolver<'_> {
     fn presets(&mut self) {
         for preset in std::mem::take(&mut self.flat.presets) {
             let found = self.preset_register(preset.at, preset.register, preset.placed);
-            self.context.addresses = Addresses::default();
             let Ok(value) = self.context.value(preset.at, preset.value.id) else { continue };
             // A named register has a type, a place has any.
             let Ok((register, ty)) = found else { continue };
-            let Ok(bits) = self.bits(preset.at, value, ty, preset.value.span) else { continue };
+            let Ok(bits) = self.bits(preset.at, value, ty, preset.value.into()) else { continue };
             let register = &mut self.context.registers[register.index()];
             if register.preset.replace(bits).is_some() {
                 let error =

@@ -14,35 +14,9 @@ use crate::source::Span;
 use crate::values;
 use smallvec::SmallVec;
 use std::collections::HashMap;
-use std::ops::AddAssign;
 use takt_isa::program::Space;
 use takt_isa::spec::instructions::compute;
 use takt_isa::{Effect, ROWS, Row, Type};
-
-/// The data labels met in evaluating an expression: one alone makes an address, two a distance.
-#[derive(Clone, Copy, Default, Debug)]
-pub(crate) struct Addresses {
-    count: u32,
-    last: Option<LabelId>,
-}
-
-impl Addresses {
-    pub(crate) fn of(label: LabelId) -> Addresses {
-        Addresses { count: 1, last: Some(label) }
-    }
-
-    /// The label, if the expression is an address.
-    pub(crate) fn one(self) -> Option<LabelId> {
-        self.last.filter(|_| self.count == 1)
-    }
-}
-
-impl AddAssign for Addresses {
-    fn add_assign(&mut self, other: Addresses) {
-        self.count = self.count.saturating_add(other.count);
-        self.last = other.last.or(self.last);
-    }
-}
 
 /// What is known of a value's type.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -106,10 +80,10 @@ pub(crate) enum Given {
 }
 
 impl Given {
-    /// A constant where any bits are taken.
-    pub(crate) fn literal(value: Value, addresses: Addresses, span: Span) -> Given {
+    /// A constant where any bits are taken, and whether it is an address.
+    pub(crate) fn literal(value: Value, is_address: bool, span: Span) -> Given {
         let (kind, what) = match value {
-            Value::Int(_) if addresses.one().is_some() => (Kind::Int, What::Address),
+            Value::Int(_) if is_address => (Kind::Int, What::Address),
             // The pattern of an ordinary number, as `bits(0.5)` gives it, may be either.
             Value::Int(int) => {
                 let bits = f32::from_bits(int as u32);
@@ -545,6 +519,14 @@ fn either(context: &mut Context, operation: &Operation, int: (usize, Typed), flo
     let help = help.unwrap_or_else(|| {
         format!("{}or write `{written}:bits` if its bits are meant", convert(Type::I, Type::F))
     });
+    // A flag that is kept in a state of no type.
+    let help = match float.1.origin {
+        Some(Origin { what: What::Declared, span, .. }) => {
+            let declared = context.sources.text(span);
+            format!("{help}, or declare `{declared}:int` if it is an integer")
+        }
+        _ => help,
+    };
     context.report(ScopeId(operation.expansion), warning.help(help));
 }
 

@@ -106,8 +106,8 @@ impl Meta {
         }
     }
 
-    pub(super) fn to_json(&self) -> Result<Vec<u8>, ImageError> {
-        serde_json::to_vec(self).map_err(|error| ImageError::Unwritable(error.to_string()))
+    pub(super) fn to_json(&self) -> serde_json::Result<Vec<u8>> {
+        serde_json::to_vec(self)
     }
 
     pub(super) fn from_json(bytes: &[u8]) -> Result<Meta, ImageError> {

@@ -11,7 +11,7 @@ period: .deadline y = 11
         wait    period
 .once
         .deadline x = 5         ; no order makes this one
-        .deadline y = 7         ; by another order
+        .deadline y = 6         ; by another order
         fadd    x, a, b
         fadd    y, a, b
         wait    period

@@ -116,7 +116,10 @@ fn bundle(number: u64, program: &Program) -> Result<Where, String> {
 /// The bundles with an operation of a source line, ascending.
 fn line_bundles(file: &str, line: u64, program: &Program) -> Result<Where, String> {
     let names = || program.files.iter().map(String::as_str);
-    let ends = |name: &str| name == file || name.rsplit('/').next() == Some(file);
+    // A file by its name alone, whichever folder or library it is of.
+    let alone =
+        |name: &str| name.trim_start_matches('<').trim_end_matches('>').rsplit('/').next() == Some(file);
+    let ends = |name: &str| name == file || alone(name);
     let file = if file.is_empty() { Some(0) } else { names().position(ends) };
     let Some(file) = file else {
         return Err(format!("no such source (sources: {})", names().collect::<Vec<_>>().join(" ")));
