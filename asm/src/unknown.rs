@@ -2,7 +2,7 @@
 //! part of [`context`](crate::context).
 
 use crate::ast::Ast;
-use crate::context::{HAS, Binding, Context, Reported, ScopeId};
+use crate::context::{Binding, Context, HAS, Reported, ScopeId};
 use crate::diag::{Diagnostic, Severity, nearest};
 use crate::intern::NameId;
 use crate::ir::RegisterKind;

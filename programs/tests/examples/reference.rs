@@ -85,7 +85,8 @@ impl Reference for Biquads {
         for (i, past) in self.past.iter_mut().enumerate() {
             // (1 + z⁻¹)²·K² / ((1 + K/Q + K²) + 2·(K² - 1)·z⁻¹ + (1 - K/Q + K²)·z⁻²)
             let inverse_q = 2.0 * (PI * (2.0 * i as f64 + 1.0) / 16.0).cos();
-            let (a0, a1, a2) = (1.0 + k * inverse_q + k * k, 2.0 * (k * k - 1.0), 1.0 - k * inverse_q + k * k);
+            let (a0, a1, a2) =
+                (1.0 + k * inverse_q + k * k, 2.0 * (k * k - 1.0), 1.0 - k * inverse_q + k * k);
             let [x1, x2, y1, y2] = *past;
             let y = (k * k * (x + 2.0 * x1 + x2) - a1 * y1 - a2 * y2) / a0;
             *past = [x, x1, y, y1];
@@ -133,8 +134,9 @@ impl Reference for Kalman {
         let s = [[p[0][0] + 0.04, p[0][1]], [p[1][0], p[1][1] + 0.04]];
         let determinant = s[0][0] * s[1][1] - s[0][1] * s[1][0];
         let inverse = [[s[1][1], -s[0][1]], [-s[1][0], s[0][0]]].map(|row| row.map(|v| v / determinant));
-        let gain: [[f64; 2]; 4] =
-            std::array::from_fn(|i| std::array::from_fn(|j| p[i][0] * inverse[0][j] + p[i][1] * inverse[1][j]));
+        let gain: [[f64; 2]; 4] = std::array::from_fn(|i| {
+            std::array::from_fn(|j| p[i][0] * inverse[0][j] + p[i][1] * inverse[1][j])
+        });
         for i in 0..4 {
             self.state[i] = state[i] + (0..2).map(|k| gain[i][k] * (inputs[k] - state[k])).sum::<f64>();
         }

@@ -53,7 +53,10 @@ fn the_documented_cost_is_what_it_costs() {
         let (before, _) = source.split_once(&format!("\n.macro {name} ")).expect("it is there");
         let comment = before.rsplit("\n\n").next().unwrap_or(before);
         let figure = if error == 0.0 { "exact".to_owned() } else { format!("{error} ulp") };
-        assert!(comment.to_lowercase().contains(&figure), "{name}: the comment does not say {figure}: {comment}");
+        assert!(
+            comment.to_lowercase().contains(&figure),
+            "{name}: the comment does not say {figure}: {comment}"
+        );
     };
     for machine in MACHINES {
         functions(machine).iter().for_each(|function| states(function.name, function.error));
@@ -87,7 +90,11 @@ fn the_documented_cost_is_what_it_costs() {
         let mut errors: Vec<String> = MACHINES
             .iter()
             .flat_map(|machine| functions(machine).into_iter().filter(|function| function.name == name))
-            .map(|function| if function.error == 0.0 { "exact".to_owned() } else { format!("{}", function.error) })
+            .map(
+                |function| {
+                    if function.error == 0.0 { "exact".to_owned() } else { format!("{}", function.error) }
+                },
+            )
             .collect();
         errors.dedup();
         errors.join(", ")
