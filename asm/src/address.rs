@@ -105,6 +105,10 @@ impl Resolver<'_> {
                     None => Origin::Number,
                 }
             }
+            OperandKind::Cast(cast) => {
+                let inner = self.context.asts[at.ast as usize].casts[cast as usize].operand;
+                self.origin(at, inner.kind, nodes)
+            }
             OperandKind::Place(_) => Origin::Other,
         }
     }

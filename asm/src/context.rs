@@ -7,8 +7,9 @@ use crate::intern::{Interner, NameId};
 use crate::ir::{LabelId, Register, RegisterId, RegisterKind};
 use crate::limits;
 use crate::source::{Sources, Span};
+use crate::types::{Addresses, GivenTypes};
 use crate::unknown::{Unknown, Wanted};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
 use takt_isa::program::Space;
 use takt_isa::{Machine, Op, Type, ZERO};
@@ -80,6 +81,8 @@ pub(crate) struct NamedConstant {
     pub(crate) used: bool,
     /// Whether that it is never used is worth a warning.
     pub(crate) watched: bool,
+    /// What it is computed from.
+    pub(crate) addresses: Addresses,
 }
 
 /// An argument of a macro's use.
@@ -87,17 +90,8 @@ pub(crate) struct NamedConstant {
 pub(crate) struct Argument {
     pub(crate) operand: Operand,
     pub(crate) at: At,
-    /// Its value, once computed: parameters passed on and on are computed once.
-    pub(crate) value: Option<Value>,
-}
-
-/// An integer constant that an operation which takes any bits brings to a register.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Integer {
-    pub(crate) value: i64,
-    pub(crate) to: RegisterId,
-    pub(crate) scope: ScopeId,
-    pub(crate) span: Span,
+    /// Its value, once computed: parameters passed on and on are computed once. And what it is computed from.
+    pub(crate) value: Option<(Value, Addresses)>,
 }
 
 /// The mistake is in the report.
@@ -116,17 +110,27 @@ pub(crate) struct Context {
     locals: HashMap<(u32, NameId), Binding>,
     pub(crate) constants: Vec<NamedConstant>,
     pub(crate) arguments: Vec<Argument>,
+    /// Parameters of macros' uses that stand for registers, as far as operations use them.
+    pub(crate) parameters: HashMap<(ScopeId, NameId), RegisterId>,
     pub(crate) registers: Vec<Register>,
     /// Registers with a given address.
     pub(crate) by_address: HashMap<u16, RegisterId>,
+    /// Outputs with a given number.
+    pub(crate) numbered: BTreeMap<u16, RegisterId>,
     /// Labels. While the source is read a code label's position counts the statements of its section.
     pub(crate) labels: Vec<crate::ir::Label>,
     /// The section of each label.
     pub(crate) label_sections: Vec<Section>,
     pub(crate) macros: HashMap<NameId, crate::expand::MacroDefinition>,
     pub(crate) unknown: Vec<Unknown>,
-    /// Integers in the place of an operand of any type, and the registers that they reach.
-    pub(crate) integers: Vec<Integer>,
+    /// What the source says of the types of operands that the instruction leaves open.
+    pub(crate) given: GivenTypes,
+    /// Registers that are declared with a type, rather than as floats by default.
+    pub(crate) typed: HashSet<RegisterId>,
+    /// The types of the words of data memory.
+    pub(crate) data_types: Vec<Type>,
+    /// The data labels met in evaluating an expression.
+    pub(crate) addresses: Addresses,
     /// Unknown names beyond those that are kept.
     pub(crate) more_unknown: usize,
     /// Arguments and templates under evaluation, one within the other.
@@ -163,13 +167,18 @@ impl Context {
             locals: HashMap::new(),
             constants: Vec::new(),
             arguments: Vec::new(),
+            parameters: HashMap::new(),
             registers: vec![register],
             by_address: HashMap::from([(ZERO, RegisterId::ZERO)]),
+            numbered: BTreeMap::new(),
             labels: Vec::new(),
             label_sections: Vec::new(),
             macros: HashMap::new(),
             unknown: Vec::new(),
-            integers: Vec::new(),
+            given: GivenTypes::default(),
+            typed: HashSet::new(),
+            data_types: Vec::new(),
+            addresses: Addresses::default(),
             more_unknown: 0,
             depth: 0,
         };
@@ -337,10 +346,15 @@ impl Context {
     /// The text of a name declared in a scope, as the symbol map shows it: unique to a macro's use.
     pub(crate) fn full_name(&self, scope: ScopeId, name: NameId) -> String {
         let text = self.names.text(name);
+        self.scope_name(scope).map_or_else(|| text.to_owned(), |scope| format!("{scope}.{text}"))
+    }
+
+    /// What stands before the names that are declared in a scope: the macro and which of its uses; `None` outside of macros.
+    pub(crate) fn scope_name(&self, scope: ScopeId) -> Option<String> {
         let owner = self.scope(scope).owner;
         match self.scope(owner).kind {
-            ScopeKind::Macro(of, number) => format!("{}.{number}.{text}", self.names.text(of)),
-            _ => text.to_owned(),
+            ScopeKind::Macro(of, number) => Some(format!("{}.{number}", self.names.text(of))),
+            _ => None,
         }
     }
 
@@ -447,6 +461,19 @@ impl Context {
         }
     }
 
+    /// The type of a name.
+    pub(crate) fn type_named(&mut self, at: At, ty: Name) -> Result<Type, Reported> {
+        let text = self.sources.text(ty.span).to_owned();
+        let types = [Type::F, Type::I, Type::B];
+        if let Some(ty) = types.into_iter().find(|ty| type_name(*ty) == text) {
+            return Ok(ty);
+        }
+        let error = Diagnostic::error("type", ty.span, format!("`{text}` is not a type"))
+            .note(format!("types: {}", types.map(type_name).join(" ")))
+            .did_you_mean(nearest(&text, types.map(type_name)));
+        Err(self.report(at.scope, error))
+    }
+
     /// Reports why an expression has no value.
     pub(crate) fn fault(&mut self, scope: ScopeId, EvalError { span, fault }: EvalError) -> Reported {
         let help = match &fault {
@@ -504,9 +531,13 @@ impl Context {
             Binding::Constant(id) => {
                 let constant = &mut self.constants[id as usize];
                 constant.used = true;
+                self.addresses += constant.addresses;
                 constant.value.ok_or(Reported)
             }
-            Binding::Data(id) => Ok(Value::Int(self.labels[id.0 as usize].position.into())),
+            Binding::Data(id) => {
+                self.addresses += Addresses::of(id);
+                Ok(Value::Int(self.labels[id.0 as usize].position.into()))
+            }
             Binding::Argument(id) => self.argument_value(id, span),
             Binding::None => Err(self.unknown(scope, name, span, Wanted::Value)),
             binding => {
@@ -529,22 +560,25 @@ impl Context {
 
     fn argument_value(&mut self, id: u32, span: Span) -> Result<Value, Reported> {
         let Argument { operand, at, value } = self.arguments[id as usize];
-        if let Some(value) = value {
+        if let Some((value, addresses)) = value {
+            self.addresses += addresses;
             return Ok(value);
         }
+        let before = std::mem::take(&mut self.addresses);
         let value = match operand.kind {
             OperandKind::Expr(expr) => self.nested(at, span, |context| context.value(at, expr))?,
             OperandKind::Name(name) => self.nested(at, span, |context| {
                 let name = context.name(at, name, operand.span)?;
                 context.name_value(at.scope, name, operand.span)
             })?,
-            OperandKind::Place(_) | OperandKind::Memory(_) => {
+            OperandKind::Place(_) | OperandKind::Memory(_) | OperandKind::Cast(_) => {
                 let error = Diagnostic::error("not-a-value", span, "a value is needed here")
                     .also(operand.span, "the argument is an operand without one");
                 return Err(self.report(at.scope, error));
             }
         };
-        self.arguments[id as usize].value = Some(value);
+        self.arguments[id as usize].value = Some((value, self.addresses));
+        self.addresses += before;
         Ok(value)
     }
 }
@@ -567,6 +601,15 @@ impl expr::Names for Environment<'_> {
             span,
             fault: Fault::UnknownFunction(self.context.names.text(name).to_owned()),
         })
+    }
+}
+
+/// A type as the source writes it.
+pub(crate) const fn type_name(ty: Type) -> &'static str {
+    match ty {
+        Type::F => "float",
+        Type::I => "int",
+        Type::B => "bits",
     }
 }
 

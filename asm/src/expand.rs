@@ -14,6 +14,7 @@ use crate::ir::{Label, LabelId};
 use crate::limits;
 use crate::load::{Loader, include_path};
 use crate::source::Span;
+use crate::types::Addresses;
 use std::collections::HashMap;
 use std::rc::Rc;
 use takt_isa::Type;
@@ -76,6 +77,8 @@ pub(crate) struct Flat {
     pub(crate) presets: Vec<Preset>,
     pub(crate) loop_bounds: Vec<LoopBound>,
     pub(crate) timing: Vec<Timing>,
+    /// What `.ports` says, `latched` or not, and where.
+    pub(crate) ports: Option<(bool, Span)>,
     /// What each `.loc` says; the first is none at all.
     pub(crate) locs: Vec<Vec<Option<(u32, u32)>>>,
     /// Files that `.loc` names, in order, then those whose own lines are code.
@@ -168,6 +171,7 @@ impl<'l> Expander<'l> {
             presets: Vec::new(),
             loop_bounds: Vec::new(),
             timing: Vec::new(),
+            ports: None,
             locs: vec![Vec::new()],
             files: Vec::new(),
             file_numbers: HashMap::new(),
@@ -454,7 +458,9 @@ impl<'l> Expander<'l> {
             }
             DirectiveKind::Const(name, value) => {
                 let id = self.context.name(at, name.name, name.span)?;
+                self.context.addresses = Addresses::default();
                 let value = self.context.value(at, value.id).ok();
+                let addresses = self.context.addresses;
                 let number = self.context.constants.len() as u32;
                 self.context.declare(at, id, name.span, Binding::Constant(number))?;
                 let text = self.context.full_name(at.scope, id);
@@ -465,6 +471,7 @@ impl<'l> Expander<'l> {
                     span: name.span,
                     used: false,
                     watched,
+                    addresses,
                 });
             }
             DirectiveKind::Preset { register, placed, value } => {
@@ -540,6 +547,7 @@ impl<'l> Expander<'l> {
                     }
                 }
             }
+            DirectiveKind::Ports(word) => self.ports(at, *word)?,
             DirectiveKind::LoopBound(most) => self.loop_bound(at, *most, span)?,
             DirectiveKind::Deadline(..) | DirectiveKind::Order(_) | DirectiveKind::Late(..) => {
                 if self.section == Section::Data {

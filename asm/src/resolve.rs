@@ -7,12 +7,13 @@ use crate::expand::{self, Data, Flat, Item, Timing};
 use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
 use crate::serialise;
 use crate::source::Span;
+use crate::types::Addresses;
 use smallvec::SmallVec;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 use takt_isa::program::Location;
 use takt_isa::spec::instructions::Function;
-use takt_isa::{Op, ROWS};
+use takt_isa::{Op, ROWS, Type};
 
 /// The most cycles that a demand on ports can name: many times what a program memory holds.
 const MAX_CYCLES: u32 = 1 << 24;
@@ -35,9 +36,12 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
         labels: Vec::new(),
         loop_bounds: Vec::new(),
         demands: Vec::new(),
+        latched: flat.ports.is_some_and(|(latched, _)| latched),
+        numbers: BTreeMap::new(),
         data: Vec::new(),
         raw: Vec::new(),
         files: Vec::new(),
+        versions: Vec::new(),
     };
     let words = |data: &Data| match data {
         Data::Space(count) => *count,
@@ -45,7 +49,8 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
     };
     let data_words = flat.data.iter().map(words).sum();
     let (pool, own_files) = (HashMap::new(), Vec::new());
-    let mut resolver = Resolver { context, flat, ir, slots, pool, own_files, label: 0, data_words };
+    let mut resolver =
+        Resolver { context, flat, ir, slots, pool, own_files, label: 0, data_words, cast: None };
     let once = std::mem::take(&mut resolver.flat.once);
     resolver.section(Section::Once, &once);
     resolver.ir.period = resolver.ir.bundles.len() as u32;
@@ -62,8 +67,12 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
     let Resolver { mut ir, flat, .. } = resolver;
     context.report_unknown();
     ir.registers = std::mem::take(&mut context.registers);
+    ir.numbers = std::mem::take(&mut context.numbered);
     ir.labels = std::mem::take(&mut context.labels);
     ir.files = flat.files;
+    for (order, bundle) in (0..).zip(&mut ir.bundles) {
+        bundle.operations.iter_mut().for_each(|operation| operation.order = order);
+    }
     ir
 }
 
@@ -88,6 +97,8 @@ pub(crate) struct Resolver<'c> {
     label: usize,
     /// Words of data memory that the source declares.
     pub(crate) data_words: u32,
+    /// The type that the operand at hand is taken as, if the source says so.
+    pub(crate) cast: Option<Type>,
 }
 
 impl Resolver<'_> {
@@ -153,10 +164,11 @@ impl Resolver<'_> {
                     self.context.report(item.at.scope, diagnostic);
                 }
             }
-        } else if let Some(diagnostic) = serialise::twice(&operations) {
-            let diagnostic = diagnostic(&self.context.registers, self.ir.machine);
-            self.context.report(item.at.scope, diagnostic);
         } else if self.check_slots(item.at, &operations).is_ok() {
+            if let Some(diagnostic) = serialise::twice(&operations) {
+                let diagnostic = diagnostic(&self.context.registers, self.ir.machine);
+                self.context.report(item.at.scope, diagnostic);
+            }
             self.ir.bundles.push(Bundle { operations, explicit, scheduled: item.scheduled });
         }
     }
@@ -270,6 +282,7 @@ impl Resolver<'_> {
             span: written.span,
             expansion: at.scope.0,
             made: false,
+            order: 0,
             written: (at.ast, number),
         };
         let mut failed = false;
@@ -318,6 +331,7 @@ impl Resolver<'_> {
             span: written.span,
             expansion: at.scope.0,
             made: false,
+            order: 0,
             written: (at.ast, number),
         })
     }
@@ -328,12 +342,15 @@ impl Resolver<'_> {
                 Data::Space(count) => {
                     let length = self.ir.data.len() + count as usize;
                     self.ir.data.resize(length, 0);
+                    self.context.data_types.resize(length, Type::B);
                 }
                 Data::Value(at, value, ty) => {
+                    self.context.addresses = Addresses::default();
                     let word = self.context.value(at, value.id);
                     let word = word.and_then(|word| self.bits(at, word, ty, value.span));
                     // A word with a mistake keeps its place.
                     self.ir.data.push(word.unwrap_or(0));
+                    self.context.data_types.push(ty);
                 }
             }
         }
@@ -365,6 +382,9 @@ impl Resolver<'_> {
             }
             _ => return Err(Reported),
         };
+        if let Some((true, latched)) = self.flat.ports {
+            return Err(self.unlatched(at, kind, *span, latched));
+        }
         let mut ports: Vec<(RegisterId, Span)> = Vec::with_capacity(names.len());
         for name in names {
             let port = self.port(at, *name, wanted)?;
@@ -380,9 +400,30 @@ impl Resolver<'_> {
         Ok(Demand { kind, ports, period: timing.section == Section::Period, span: *span })
     }
 
+    /// The ports of a program whose ports are latched have no times of their own.
+    fn unlatched(&mut self, at: At, kind: DemandKind, span: Span, latched: Span) -> Reported {
+        let (message, help) = match kind {
+            DemandKind::Deadline(_) => (
+                "a deadline for outputs that are published together, at the `wait`",
+                "bound the period instead: `takt bound --deadline`",
+            ),
+            DemandKind::Order => (
+                "an order of ports that are taken together, at the tick, or published together, at the `wait`",
+                "leave it out",
+            ),
+            DemandKind::Late(_) => (
+                "inputs that are to be read late are taken at the tick, whenever they are read",
+                "leave it out, or have `.ports direct`",
+            ),
+        };
+        let error = Diagnostic::error("ports", span, message).also(latched, "for here it says so").help(help);
+        self.context.report(at.scope, error)
+    }
+
     fn presets(&mut self) {
         for preset in std::mem::take(&mut self.flat.presets) {
             let found = self.preset_register(preset.at, preset.register, preset.placed);
+            self.context.addresses = Addresses::default();
             let Ok(value) = self.context.value(preset.at, preset.value.id) else { continue };
             // A named register has a type, a place has any.
             let Ok((register, ty)) = found else { continue };

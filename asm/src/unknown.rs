@@ -22,6 +22,8 @@ pub(crate) enum Wanted {
     Target,
     /// A value.
     Value,
+    /// A place in data memory.
+    Table,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -46,6 +48,16 @@ impl Context {
             self.more_unknown += 1;
         }
         Reported
+    }
+
+    /// Says that unknown names within a place of the source were to be tables in data memory.
+    pub(crate) fn unknown_tables(&mut self, within: Span) {
+        for unknown in self.unknown.iter_mut().rev() {
+            if unknown.span.start < within.start || unknown.span.end > within.end {
+                return;
+            }
+            unknown.wanted = Wanted::Table;
+        }
     }
 
     /// Reports the unknown names.
@@ -89,6 +101,9 @@ impl Context {
                         error.help(format!("put the label `{text}:` before the bundle to continue at"))
                     }
                     Wanted::Value => error.help(format!("define it with `.const {text} = …`")),
+                    Wanted::Table => error.help(format!(
+                        "put it into data memory: `.data`, then `{text}: .float …`, `.word …` or `.space …`"
+                    )),
                 },
             };
             self.report(scope, error);
@@ -108,7 +123,9 @@ impl Context {
             (Wanted::Source, Binding::Code(_)) => false,
             (Wanted::Source, _) => true,
             (Wanted::Target, binding) => matches!(binding, Binding::Code(_)),
-            (Wanted::Value, binding) => !matches!(binding, Binding::Register(_) | Binding::Code(_)),
+            (Wanted::Value | Wanted::Table, binding) => {
+                !matches!(binding, Binding::Register(_) | Binding::Code(_))
+            }
         };
         let names = (0..self.names.len() as u32).map(NameId);
         let candidates = names.filter(|name| {

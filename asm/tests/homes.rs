@@ -9,10 +9,11 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use takt_asm::{Assembled, Made, MemoryLoader, Options, Schedule, listing};
 use takt_emu::{Emulator, Event};
-use takt_isa::{MACHINES, Machine, Program, T1, T3};
+use takt_isa::{MACHINES, Machine, Program, ROWS, T1, T3};
 
 /// Instructions of each slot of t3, with two sources.
-const MNEMONICS: [&[&str]; 3] = [&["fmul"], &["fadd", "fsub"], &["fmax", "ixor", "fsat", "ior"]];
+const MNEMONICS: [&[&str]; 3] =
+    [&["fmul", "fmul", "fdiv"], &["fadd", "fsub"], &["fmax", "ixor", "fsat", "ior"]];
 
 /// A program whose states, temporary names and ports are written from all slots, in straight code, branches, a loop and a subroutine.
 fn source(seed: u64) -> String {
@@ -100,7 +101,7 @@ fn source(seed: u64) -> String {
 }
 
 fn assembled(text: &str, machine: &'static Machine, schedule: Schedule) -> Assembled {
-    let options = Options { machine, schedule, effort: 1 };
+    let options = Options { machine, schedule, effort: 1, ..Options::default() };
     let assembled = takt_asm::assemble("test.s", &MemoryLoader::of("test.s", text), &options);
     assembled.unwrap_or_else(|errors| panic!("{text}\n{}", errors.render(false)))
 }
@@ -162,6 +163,12 @@ fn period(text: &str) -> (Vec<String>, Assembled) {
     let start =
         assembled.program.sections.iter().find(|section| section.name == "period").expect("it has one").start;
     (bundles(&assembled)[start as usize..].to_vec(), assembled)
+}
+
+#[test]
+fn what_copies_bits_is_told_from_the_table() {
+    let copies: Vec<&str> = ROWS.iter().filter(|row| row.copies()).map(|row| row.mnemonic).collect();
+    assert_eq!(copies, ["mov"]);
 }
 
 #[test]
@@ -255,7 +262,12 @@ fn a_value_that_nothing_reads_again_is_not_copied() {
 
 #[test]
 fn a_port_shows_every_value_in_order() {
-    let text = ".input x\n.output F\n.period\nperiod: fdiv F, x, 3.0\n fadd F, x, 1.0\n mov F, x\n fmul F, x, 2.0\n wait period\n";
+    // The quotient is there long after the sum, and would find a free slot then.
+    let text = format!(
+        ".input x\n.output F\n.period\nperiod: fdiv F, x, 3.0\n fadd F, x, 1.0\n{} mov F, x\n fmul F, x, 2.0\n wait period\n",
+        " nop\n".repeat(14)
+    );
+    let text = text.as_str();
     let seen = |machine, schedule| run(&assembled(text, machine, schedule).program, 3).0;
     for schedule in [Schedule::None, Schedule::All] {
         assert_eq!(seen(&T3, schedule), seen(&T1, schedule));
@@ -277,13 +289,34 @@ fn mends_that_the_help_names_work() {
     good(&pinned.replace("a3", "x3"));
     // A branch that reads what its own bundle computes.
     let branch = program(".state s", "fadd s, s, x || bz s, over\n ld s, [n]");
-    assert_eq!(help(&branch), "write `bz` in a bundle of its own, after this one");
+    assert_eq!(help(&branch), "write `bz` as a bundle of its own");
     good(&branch.replace("|| bz", "\n bz"));
     // Bundles that must stay at their addresses.
     let numbers = program(".state s", "fadd s, s, x\n bz n, 5\n ld s, [n]");
-    assert_eq!(
-        help(&numbers),
-        "jump to labels instead of numbers, so that the assembler can add an operation that copies"
-    );
+    assert_eq!(help(&numbers), "jump to labels, so that the assembler can add an operation that copies");
     good(&numbers.replace(", 5", ", over"));
+}
+
+#[test]
+fn a_jump_to_a_number_is_a_way_in() {
+    // Bundle 2 reads what bundle 1 computed, or what it computed itself.
+    let text = ".input x, n:int\n.output F\n.reg t\n.once\n wait 1\n.period\n fmul t, x, x\n fadd t, t, 1.0\n mov F, t\n bnz n, 2\n wait 1\n";
+    let report = bad(text, &T3);
+    assert_eq!(report.messages()[0].code, "two-slots", "{}", report.render(false));
+    let labels = text.replace(" fadd", "again: fadd").replace("n, 2", "n, again");
+    let labels = labels.replace("wait 1", "wait period").replace(".period\n", ".period\nperiod:");
+    assert_eq!(good(&labels).adjustments.len(), 2);
+}
+
+#[test]
+fn two_values_of_a_branching_bundle() {
+    // Both are home before control leaves.
+    let text = ".input x, n:int\n.output F, G\n.state s, t\n.once\n mov s, x\n mov t, x\n wait period\n.period\nperiod: fadd s, s, x || fmul t, t, x || bz n, over\n mov F, s\nover: mov G, t\n wait period\n";
+    let (lines, assembled) = period(text);
+    let place = |what: &str| lines.iter().position(|line| line.contains(what)).expect(what);
+    assert!(place("mov s, s.1") < place("bz n") && place("mov t, t.1") < place("bz n"), "{lines:?}");
+    for seed in 0..4 {
+        let small = self::assembled(text, &T1, Schedule::None);
+        assert_eq!(run(&assembled.program, seed), run(&small.program, seed));
+    }
 }

@@ -272,10 +272,11 @@ pub(crate) fn lines(session: &Session, file: u32, range: RangeInclusive<u32>) ->
     let stops: Vec<_> = session
         .stops()
         .iter()
-        .filter_map(|(_, stop)| match stop {
-            Stop::Break { at: Where::Bundle(address), .. } => program.location(*address),
-            _ => None,
+        .flat_map(|(_, stop)| match stop {
+            Stop::Break { at: Where::Bundles(bundles), .. } => &bundles[..],
+            _ => &[],
         })
+        .filter_map(|address| program.location(*address))
         .collect();
     let numbered = (1u32..).zip(session.source(file)?.lines());
     let near = numbered.skip_while(|(number, _)| number < range.start());

@@ -259,7 +259,7 @@ fn stops_are_complete() {
         let name = format!("@{}", program.machine.register_name(register).unwrap());
         let what = session.parse(&name).unwrap();
         for (stop, expected) in [
-            (Stop::Break { at: Where::Bundle(address), condition: None, text: String::new() }, issues),
+            (Stop::Break { at: Where::Bundles(vec![address]), condition: None, text: String::new() }, issues),
             (Stop::Watch { what: Box::new(what), test: Test::Changed, text: String::new() }, changes),
         ] {
             session.go_to(0);

@@ -66,7 +66,9 @@ pub enum PlanError {
         inputs: bool,
     },
     /// A unit is too fast for the circuit's scoreboard.
-    #[error("machine `{machine}`: slot `{slot}`: unit `{unit}` has latency {latency}; the circuit wants 2 at least")]
+    #[error(
+        "machine `{machine}`: slot `{slot}`: unit `{unit}` has latency {latency}; the circuit wants 2 at least"
+    )]
     Fast {
         /// The machine.
         machine: &'static str,
@@ -222,6 +224,11 @@ impl Plan {
         self.slots.iter().find(|slot| slot.name() == name)
     }
 
+    /// Every source operand: its slot, and its number there.
+    pub fn sources(&self) -> impl Iterator<Item = (&SlotPlan, usize)> {
+        self.slots.iter().flat_map(|slot| (0..slot.sources).map(move |operand| (slot, operand)))
+    }
+
     /// The slot that hosts the sequencer.
     pub fn control(&self) -> &SlotPlan {
         &self.slots[self.control_slot]
@@ -286,7 +293,14 @@ fn check_parts(machine: &'static Machine) -> Result<(), PlanError> {
         units.map(|unit| (format!("slot `{}`: the latency of unit `{}`", slot.name, unit.name), unit.latency))
     });
     let asked = [("refill", machine.refill), ("resolve", machine.resolve), ("stack", machine.stack_depth)]
-        .map(|(quantity, value)| ("takt_sequencer", quantity, format!("{quantity}{}", if quantity == "stack" { "_depth" } else { "" }), value))
+        .map(|(quantity, value)| {
+            (
+                "takt_sequencer",
+                quantity,
+                format!("{quantity}{}", if quantity == "stack" { "_depth" } else { "" }),
+                value,
+            )
+        })
         .into_iter()
         .chain(memory.map(|(what, latency)| ("takt_memory", "latency", what, latency)));
     for (part, quantity, what, value) in asked {
