@@ -126,7 +126,7 @@
         fmul    q, p2, r2
 .endm
 
-; d = e^x, at most @exp@ ulp.
+; d = e^x, at most 0.81123 ulp.
 .macro exp d, x
 .reg    c t:bits n nh nl a r hi h lo q v y:bits k:int k1:int k2:int w:bits big:int f:bits
         fsat    c, x, 104.0
@@ -155,7 +155,7 @@
         fmul    d, y, f
 .endm
 
-; d = ln x, at most @log@ ulp.
+; d = ln x, at most 0.81752 ulp.
 .macro log d, x
 .reg    a:bits up xs:bits sub:int off:int t:int eb:int m:bits ei:int e f eh h l l1 el f2 f4 hf f3 q a0 a1 a2 a3 s0 s1
 .reg    s2 s3 s4 s5 s6 s7 num den z:bits isinf:int
@@ -212,7 +212,7 @@
 
 ; ---- Tangent -------------------------------------------------------------------------------------------------------------------
 
-; d = sin x / cos x, |x| ≤ 2π·64, at most @tan_quick@ ulp.
+; d = sin x / cos x, |x| ≤ 2π·64, at most 2.16531 ulp.
 .macro tan_quick d, x
 .reg    s c
         fsin    s, x
@@ -220,7 +220,7 @@
         fdiv    d, s, c
 .endm
 
-; d = tan x, |x| ≤ 2π·64, at most @tan@ ulp.
+; d = tan x, |x| ≤ 2π·64, at most 0.89898 ulp.
 ;
 ; 2·tan(r/2) = w, then w/(1 - w²/4) or, beside an odd multiple of π/2, its inverse's opposite; all in two words each.
 .macro tan d, x
@@ -296,7 +296,7 @@
 
 ; ---- Arcsine and arctangent ----------------------------------------------------------------------------------------------------
 
-; d = arcsine of x, at most @asin@ ulp.
+; d = arcsine of x, at most 0.72224 ulp.
 .macro asin d, x
 .reg    h l l1 q u hx:bits lx:bits base:bits corr:bits a0:bits a:bits big:int sg:bits y y2 zb zs z S S0:bits Sh:bits
 .reg    dd den sl s:bits z2 p0 p1 p s0 s1 s2 s3
@@ -387,7 +387,7 @@
         fadd    d, hi, u
 .endm
 
-; d = arctangent of x, at most @atan3@ ulp as an instruction, at most @atan1@ ulp without.
+; d = arctangent of x, at most 0.75 ulp as an instruction, at most 0.88751 ulp without.
 .macro atan d, x
         .if has.fatan2
         fatan2  d, x, 1.0
@@ -398,7 +398,7 @@
 
 ; ---- Hyperbolic tangent --------------------------------------------------------------------------------------------------------
 
-; d = tanh x, at most @tanh@ ulp.
+; d = tanh x, at most 0.98208 ulp.
 .macro tanh d, x
 .reg    c a:bits big:int sg:bits a2 t:bits n nh b nl r hi:bits h lo q v:bits k:int H h1 Hl D num:bits base:bits corr z
 .reg    z2 p1 p2 p Q s0 s1 s2 s3 s4 e0:bits e1:bits
@@ -453,7 +453,7 @@
 
 ; ---- Powers --------------------------------------------------------------------------------------------------------------------
 
-; d = x^y, at most @pow@ ulp.
+; d = x^y, at most 0.80832 ulp.
 ;
 ; ±2^(y·log2 |x|), logarithm and product in two words each. What is not computed so (zeros, infinities, NaNs, roots of negative
 ; numbers) has the exponent 0 and comes out of the sign's quotient.

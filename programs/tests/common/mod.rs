@@ -9,7 +9,11 @@ pub(crate) fn check_table(document: &str, name: &str, table: &str) {
     let text = std::fs::read_to_string(&path).expect("the document is there");
     let marker = format!("<!-- table: {name} -->\n");
     let (before, after) = text.split_once(&marker).unwrap_or_else(|| panic!("{document}: no {marker}"));
-    let (old, rest) = after.split_once("\n\n").unwrap_or((after, ""));
+    // Where nothing stands yet, the blank line follows at once.
+    let (old, rest) = match after.strip_prefix('\n') {
+        Some(rest) => ("", rest),
+        None => after.split_once("\n\n").unwrap_or((after, "")),
+    };
     if old == table.trim_end() {
         return;
     }

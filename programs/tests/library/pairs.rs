@@ -7,11 +7,13 @@ use takt_isa::fp::{CANONICAL_NAN, Flags};
 use takt_isa::{MACHINES, T3};
 
 /// The largest error of `pow`, ulp, over [`FULL_PAIRS`] random pairs and those of notable operands.
-pub(crate) const POW_ERROR: f64 = 0.9;
+pub(crate) const POW_ERROR: f64 = 0.80832;
 /// Random pairs with `TAKT_FULL=1`.
-const FULL_PAIRS: u64 = 1_000_000_000;
+const FULL_PAIRS: u64 = 100_000_000;
 /// Random pairs else.
 const PAIRS: u64 = 1_000_000;
+/// Pairs from one seed: what is drawn does not depend on how many cores share the work.
+const CHUNK: u64 = 1 << 14;
 /// Steps of the remainder whose domain is small, and the quotient that they allow, 2^22.
 const STEPS: u32 = 2;
 
@@ -31,10 +33,12 @@ fn measure(
 ) -> Measured {
     let batch = Batch::new(program);
     let special: Vec<[u32; 2]> = notable().flat_map(|x| notable().map(move |y| [x, y])).collect();
-    let pieces = parallel(count, |range| {
+    let pieces = parallel(count.div_ceil(CHUNK), |range| {
         let (mut batch, mut measured) = (batch.clone(), Measured::default());
-        let mut random = Random(range.start + 1);
-        let drawn = range.clone().map(|index| draw(index, &mut random));
+        let drawn = range.flat_map(|chunk| {
+            let mut random = Random(chunk);
+            (0..CHUNK).map(move |index| draw(index, &mut random))
+        });
         let mut pairs = special.iter().copied().chain(drawn).peekable();
         while let Some(&first) = pairs.peek() {
             let mut columns = [[0; LANES]; 2];
@@ -109,7 +113,7 @@ fn powers_are_within_the_documented_error() {
         }
         let count = if full() { FULL_PAIRS } else { PAIRS };
         let measured = measure(&program, count, draw_power, take_power);
-        assert_eq!(measured.check(&format!("pow on {}", machine.name), POW_ERROR), None);
+        assert_eq!(measured.check(&format!("pow on {}", machine.name), POW_ERROR, true), None);
     }
 }
 
@@ -160,12 +164,12 @@ fn remainders_are_exact() {
         let measured = measure(&program, count, draw_remainder, |measured, pair, result, flags| {
             take_remainder(measured, pair, result, flags, f64::INFINITY);
         });
-        assert_eq!(measured.check(&format!("fmod on {}", machine.name), 0.0), None);
+        assert_eq!(measured.check(&format!("fmod on {}", machine.name), 0.0, true), None);
         let program = one_use(machine, &format!("fmod_in d, x, y, {STEPS}"), 2, "clrflags").program;
         check_emulator(&program, 2);
         let measured = measure(&program, count, draw_remainder, |measured, pair, result, flags| {
             take_remainder(measured, pair, result, flags, f64::from(11 * STEPS));
         });
-        assert_eq!(measured.check(&format!("fmod_in on {}", machine.name), 0.0), None);
+        assert_eq!(measured.check(&format!("fmod_in on {}", machine.name), 0.0, true), None);
     }
 }
