@@ -173,9 +173,8 @@ impl Reference for Lu {
             }
             for i in (0..4).filter(|&i| i != k) {
                 let factor = rows[i][k] / rows[k][k];
-                for j in k..5 {
-                    rows[i][j] -= factor * rows[k][j];
-                }
+                let pivot = rows[k].clone();
+                rows[i].iter_mut().zip(&pivot).for_each(|(value, pivot)| *value -= factor * pivot);
             }
         }
         self.last = std::array::from_fn(|i| rows[i][4] / rows[i][i]);

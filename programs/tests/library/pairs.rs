@@ -42,9 +42,9 @@ fn measure(
         let mut pairs = special.iter().copied().chain(drawn).peekable();
         while let Some(&first) = pairs.peek() {
             let mut columns = [[0; LANES]; 2];
-            for lane in 0..LANES {
-                let pair = pairs.next().unwrap_or(first);
-                (columns[0][lane], columns[1][lane]) = (pair[0], pair[1]);
+            let [xs, ys] = &mut columns;
+            for (x, y) in xs.iter_mut().zip(ys) {
+                [*x, *y] = pairs.next().unwrap_or(first);
             }
             let results = *batch.run(&columns);
             for lane in 0..LANES {
