@@ -17,7 +17,8 @@ module takt_source #(
     parameter DEPTH = 10,
     parameter LATE  = 1,
     parameter INDEX = 8,
-    parameter LATCHED = 0
+    parameter LATCHED = 0,
+    parameter INPUTS  = 8   // bits of an input port's number
 ) (
     input  wire                         clk,
     input  wire                         advance,
@@ -100,9 +101,9 @@ module takt_source #(
         end else begin : g_latched_inputs
             reg r_place;
             always @(posedge clk) if (advance) r_place <= m_place;
-            takt_bank #(.INDEX(INDEX + 1)) inputs (
-                .clk(clk), .write(input_write), .write_index({input_write_place, input_write_index}), .write_value(input_write_value),
-                .read_index({advance ? m_place : r_place, read_index}), .show(next_copy[SLOTS]), .value(copy[32*SLOTS +: 32])
+            takt_bank #(.INDEX(INPUTS + 1)) inputs (
+                .clk(clk), .write(input_write), .write_index({input_write_place, input_write_index[INPUTS-1:0]}), .write_value(input_write_value),
+                .read_index({advance ? m_place : r_place, read_index[INPUTS-1:0]}), .show(next_copy[SLOTS]), .value(copy[32*SLOTS +: 32])
             );
         end
         for (s = 0; s < SLOTS; s = s + 1) begin : g_slot

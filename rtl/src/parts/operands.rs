@@ -45,6 +45,7 @@ fn source(plan: &Plan, slot: &SlotPlan, operand: usize, number: u32, m: &mut Mod
             .parameter("LATE", plan.late)
             .parameter("INDEX", plan.index)
             .parameter_as("LATCHED", &net::LATCHED)
+            .parameter("INPUTS", plan.input_bits)
             .same([net::CLK, net::ADVANCE])
             .port("m_bank", slot.source_bank(Stage::Match, operand))
             .port("m_index", slot.source_index(Stage::Match, operand))
