@@ -112,7 +112,11 @@ impl Resolver<'_> {
                     None => Origin::Number,
                 }
             }
-            OperandKind::Place(_) | OperandKind::Cast(_) => Origin::Other,
+            OperandKind::Cast(cast) => {
+                let inner = self.context.asts[at.ast as usize].casts[cast as usize].operand;
+                self.origin(at, inner.kind, nodes)
+            }
+            OperandKind::Place(_) => Origin::Other,
         }
     }
 

@@ -212,8 +212,8 @@ pub struct Declaration {
     pub name: Name,
     /// What follows its colon.
     pub ty: Option<Name>,
-    /// What follows its `@`.
-    pub place: Option<Name>,
+    /// What follows its `@`: a name, of a register, or the number of a port.
+    pub place: Option<Expr>,
 }
 
 /// A section of the program.
@@ -309,6 +309,8 @@ pub enum DirectiveKind {
     Error(String),
     /// `.schedule` and `on` or `off`.
     Schedule(Name),
+    /// `.ports` and `latched` or `direct`.
+    Ports(Name),
     /// `.loop_bound`.
     LoopBound(Expr),
     /// `.deadline`, the ports, and the cycle.
@@ -379,6 +381,7 @@ directives! {
     Loc ".loc" "\"file\" line";
     Error ".error" "\"text\"";
     Schedule ".schedule" "on|off";
+    Ports ".ports" "latched|direct";
     LoopBound ".loop_bound" "turns";
     Deadline ".deadline" "port, port = cycle";
     Order ".order" "port, port, …";

@@ -57,14 +57,14 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
             }
         }
     }
-    let found = |index: usize| (&ir.registers[index], &uses[index], RegisterId::new(index));
-    for (register, used, id) in (0..uses.len()).map(found).filter(|_| complete) {
+    let is_quiet = |index: usize| homes.quiet.contains(&RegisterId::new(index));
+    for (index, (register, found)) in ir.registers.iter().zip(&uses).enumerate().filter(|_| complete) {
         // A raw word may read and write anything.
-        if !opaque && !homes.quiet.contains(&id) {
-            unwritten(context, ir, register, used, &uses);
+        if !opaque && !is_quiet(index) {
+            unwritten(context, ir, register, found, &uses);
         }
-        if !homes.set_once.contains(&id) {
-            state(context, ir, register, used);
+        if !homes.set_once.contains(&RegisterId::new(index)) {
+            state(context, ir, register, found);
         }
     }
     targets(context, ir);
@@ -74,9 +74,8 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
     }
     if !opaque {
         no_wait(context, ir);
-        for (register, used, _) in (0..uses.len()).map(found).filter(|(.., id)| !homes.quiet.contains(id)) {
-            unused(context, register, used);
-        }
+        let watched = ir.registers.iter().zip(&uses).enumerate().filter(|(index, _)| !is_quiet(*index));
+        watched.for_each(|(_, (register, found))| unused(context, register, found));
     }
     for constant in &context.constants {
         if !constant.used && constant.watched && !constant.name.starts_with('_') {

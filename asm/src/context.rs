@@ -9,10 +9,13 @@ use crate::limits;
 use crate::source::{Sources, Span};
 use crate::types::GivenTypes;
 use crate::unknown::{Unknown, Wanted};
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
 use takt_isa::program::Space;
-use takt_isa::{Machine, Type, ZERO};
+use takt_isa::{Machine, Op, Type, ZERO};
+
+/// What stands before a mnemonic in the name of the constant that says whether the machine has the instruction.
+pub(crate) const HAS: &str = "has.";
 
 /// An expansion: what a use of a macro, or one turn of a repetition, adds to the names around it.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -65,6 +68,8 @@ pub(crate) enum Binding {
     Count(i64),
     /// `pi` and the like.
     Builtin(u32),
+    /// Whether the machine has the instruction that the name asks for.
+    Has(bool),
 }
 
 #[derive(Clone, Debug)]
@@ -108,6 +113,8 @@ pub(crate) struct Context {
     pub(crate) registers: Vec<Register>,
     /// Registers with a given address.
     pub(crate) by_address: HashMap<u16, RegisterId>,
+    /// Outputs with a given number.
+    pub(crate) numbered: BTreeMap<u16, RegisterId>,
     /// Labels. While the source is read a code label's position counts the statements of its section.
     pub(crate) labels: Vec<crate::ir::Label>,
     /// The section of each label.
@@ -159,6 +166,7 @@ impl Context {
             parameters: HashMap::new(),
             registers: vec![register],
             by_address: HashMap::from([(ZERO, RegisterId::ZERO)]),
+            numbered: BTreeMap::new(),
             labels: Vec::new(),
             label_sections: Vec::new(),
             macros: HashMap::new(),
@@ -242,10 +250,16 @@ impl Context {
         match self.globals.get(name.0 as usize) {
             Some(Binding::None) | None => match name.builtin() {
                 Some(builtin) => Binding::Builtin(builtin as u32),
-                None => Binding::None,
+                None => self.has(name).map_or(Binding::None, Binding::Has),
             },
             Some(binding) => *binding,
         }
+    }
+
+    /// Whether the machine has an instruction, where the name asks for that: `has.` and a mnemonic.
+    fn has(&self, name: NameId) -> Option<bool> {
+        let row = Op::from_mnemonic(self.names.text(name).strip_prefix(HAS)?)?.row();
+        Some(row.function == takt_isa::Function::Idle || self.machine.host(row.function).is_some())
     }
 
     /// Binds a name in a scope, without asking whether it is bound.
@@ -302,7 +316,7 @@ impl Context {
             Binding::Constant(id) => Some(self.constants[id as usize].span),
             Binding::Code(id) | Binding::Data(id) => Some(self.labels[id.0 as usize].span),
             Binding::Argument(id) => Some(self.arguments[id as usize].operand.span),
-            Binding::None | Binding::Count(_) | Binding::Builtin(_) => None,
+            Binding::None | Binding::Count(_) | Binding::Builtin(_) | Binding::Has(_) => None,
         }
     }
 
@@ -315,7 +329,7 @@ impl Context {
                 RegisterKind::Zero => "the register that always reads as zero",
                 _ => "a register",
             },
-            Binding::Constant(_) | Binding::Builtin(_) => "a constant",
+            Binding::Constant(_) | Binding::Builtin(_) | Binding::Has(_) => "a constant",
             Binding::Code(_) => "a code label",
             Binding::Data(_) => "a data label",
             Binding::Argument(_) => "a parameter",
@@ -508,6 +522,7 @@ impl Context {
         match self.lookup(scope, name) {
             Binding::Count(value) => Ok(Value::Int(value)),
             Binding::Builtin(builtin) => Ok(BUILTINS[builtin as usize].1),
+            Binding::Has(has) => Ok(Value::Int(has.into())),
             Binding::Constant(id) => {
                 let constant = &mut self.constants[id as usize];
                 constant.used = true;

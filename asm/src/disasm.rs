@@ -67,7 +67,10 @@ impl<'p> Writer<'p> {
     }
 
     fn declarations(&mut self) {
-        let Program { inputs, outputs, registers, constants, files, .. } = self.program;
+        let Program { inputs, outputs, registers, constants, files, latched, .. } = self.program;
+        if *latched {
+            self.line(format_args!(".ports  latched"));
+        }
         for (directive, ports) in [(".input", inputs), (".output", outputs), (".reg", registers)] {
             for Port { name, register, ty } in ports {
                 let ty = match ty {

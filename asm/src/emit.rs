@@ -61,6 +61,7 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
         constants: constants(ir, placement),
         inputs: ports(ir, placement, |kind| kind == RegisterKind::Input),
         outputs: ports(ir, placement, |kind| kind == RegisterKind::Output),
+        latched: ir.latched,
         registers: ports(ir, placement, |kind| matches!(kind, RegisterKind::Plain | RegisterKind::State)),
         symbols: symbols(ir),
         sections: sections(ir),

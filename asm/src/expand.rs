@@ -76,6 +76,8 @@ pub(crate) struct Flat {
     pub(crate) presets: Vec<Preset>,
     pub(crate) loop_bounds: Vec<LoopBound>,
     pub(crate) timing: Vec<Timing>,
+    /// What `.ports` says, `latched` or not, and where.
+    pub(crate) ports: Option<(bool, Span)>,
     /// What each `.loc` says; the first is none at all.
     pub(crate) locs: Vec<Vec<Option<(u32, u32)>>>,
     /// Files that `.loc` names, in order, then those whose own lines are code.
@@ -168,6 +170,7 @@ impl<'l> Expander<'l> {
             presets: Vec::new(),
             loop_bounds: Vec::new(),
             timing: Vec::new(),
+            ports: None,
             locs: vec![Vec::new()],
             files: Vec::new(),
             file_numbers: HashMap::new(),
@@ -540,6 +543,7 @@ impl<'l> Expander<'l> {
                     }
                 }
             }
+            DirectiveKind::Ports(word) => self.ports(at, *word)?,
             DirectiveKind::LoopBound(most) => self.loop_bound(at, *most, span)?,
             DirectiveKind::Deadline(..) | DirectiveKind::Order(_) | DirectiveKind::Late(..) => {
                 if self.section == Section::Data {

@@ -528,7 +528,10 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
         .clone()
         .then(just(Token::Colon).labelled("`:`").ignore_then(name.clone().labelled("a type")).or_not())
         .then(
-            just(Token::At).labelled("`@`").ignore_then(name.clone().labelled("a register's place")).or_not(),
+            just(Token::At)
+                .labelled("`@`")
+                .ignore_then(expr.clone().labelled("a register's place or a port's number"))
+                .or_not(),
         )
         .map(|((name, ty), place)| Declaration { name, ty, place });
     // Separated by blanks or commas.
@@ -587,6 +590,9 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
     let schedule = is(Directive::Schedule)
         .ignore_then(name.clone().labelled("`on` or `off`"))
         .map(DirectiveKind::Schedule);
+    let latched = is(Directive::Ports)
+        .ignore_then(name.clone().labelled("`latched` or `direct`"))
+        .map(DirectiveKind::Ports);
     let loop_bound = is(Directive::LoopBound).ignore_then(expr.clone()).map(DirectiveKind::LoopBound);
     let ports = || {
         let more = comma().or_not().ignore_then(name.clone()).repeated().collect::<Vec<_>>();
@@ -615,7 +621,7 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
         .map(DirectiveKind::Loc);
     choice((
         bare, declare, float, word, constant, preset, space, branch, elif, rep, macro_, include, error, loc,
-        schedule, loop_bound, deadline, order, late,
+        schedule, latched, loop_bound, deadline, order, late,
     ))
     .map_with(|kind, e| Body::Directive(kind, e.span()))
 }

@@ -55,11 +55,14 @@ impl std::fmt::Display for Made {
             Made::Preset(bits) => write!(f, "loaded with the program, {}", listing::shown(*bits)),
             Made::Operation(mnemonic) => write!(f, "becomes `{mnemonic}`"),
             Made::Copy { address, alone, cycles } => {
-                let place = if *alone { "a bundle more" } else { "a free slot" };
-                write!(f, "copied in bundle {address}, {place}")?;
+                match alone {
+                    true => write!(f, "copied in a bundle of its own, {address}")?,
+                    false => write!(f, "copied in a free slot of bundle {address}")?,
+                }
                 match cycles {
-                    Some(1) => write!(f, ", 1 cycle"),
-                    Some(cycles) => write!(f, ", {cycles} cycles"),
+                    Some(0) => write!(f, ": no cycle"),
+                    Some(1) => write!(f, ": 1 cycle"),
+                    Some(cycles) => write!(f, ": {cycles} cycles"),
                     None => Ok(()),
                 }
             }

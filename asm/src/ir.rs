@@ -14,6 +14,7 @@
 
 use crate::source::Span;
 use smallvec::SmallVec;
+use std::collections::BTreeMap;
 use std::num::NonZeroU32;
 use takt_isa::program::{Location, Space};
 use takt_isa::{Machine, Op, Row, Type};
@@ -248,6 +249,10 @@ pub struct Ir {
     pub loop_bounds: Vec<LoopBound>,
     /// What is demanded of ports, in the order of the source.
     pub demands: Vec<Demand>,
+    /// Whether inputs are taken together at the tick, outputs published together at `wait`.
+    pub latched: bool,
+    /// Outputs whose number the source gives, by number: `@ 3`, or that of the register it names.
+    pub numbers: BTreeMap<u16, RegisterId>,
     /// Data memory.
     pub data: Vec<u32>,
     /// Words given bit by bit.

@@ -228,6 +228,9 @@ pub struct Register {
     pub place: String,
     /// Its address.
     pub address: u16,
+    /// Of a port: its number.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub number: Option<u16>,
     /// How its bits are shown.
     #[serde(rename = "type")]
     pub ty: Type,
@@ -255,6 +258,7 @@ pub fn symbol_map(assembled: &Assembled) -> SymbolMap {
             name: port.name.clone(),
             place: machine.register_name(port.register).unwrap_or_default(),
             address: port.register,
+            number: machine.input_number(port.register).or_else(|| machine.output_number(port.register)),
             ty: port.ty,
         };
         ports.iter().map(register).collect()
@@ -289,6 +293,7 @@ impl std::fmt::Display for SymbolMap {
                     Type::I => "int",
                     Type::B => "bits",
                 };
+                let what = register.number.map_or(what.to_owned(), |number| format!("{what} {number}"));
                 writeln!(f, "{what:<10}{:<width$}{:<5} {ty}", register.name, register.place)?;
             }
         }

@@ -8,7 +8,7 @@ use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, 
 use crate::serialise;
 use crate::source::Span;
 use smallvec::SmallVec;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 use takt_isa::program::Location;
 use takt_isa::spec::instructions::Function;
@@ -35,6 +35,8 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
         labels: Vec::new(),
         loop_bounds: Vec::new(),
         demands: Vec::new(),
+        latched: flat.ports.is_some_and(|(latched, _)| latched),
+        numbers: BTreeMap::new(),
         data: Vec::new(),
         raw: Vec::new(),
         files: Vec::new(),
@@ -64,6 +66,7 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
     let Resolver { mut ir, flat, .. } = resolver;
     context.report_unknown();
     ir.registers = std::mem::take(&mut context.registers);
+    ir.numbers = std::mem::take(&mut context.numbered);
     ir.labels = std::mem::take(&mut context.labels);
     ir.files = flat.files;
     for (order, bundle) in (0..).zip(&mut ir.bundles) {
@@ -91,10 +94,10 @@ pub(crate) struct Resolver<'c> {
     own_files: Vec<Option<u32>>,
     /// Labels before this one have their position.
     label: usize,
-    /// The type that the operand at hand is taken as, if the source says so.
-    pub(crate) cast: Option<Type>,
     /// Words of data memory that the source declares.
     pub(crate) data_words: u32,
+    /// The type that the operand at hand is taken as, if the source says so.
+    pub(crate) cast: Option<Type>,
 }
 
 impl Resolver<'_> {
@@ -377,6 +380,9 @@ impl Resolver<'_> {
             }
             _ => return Err(Reported),
         };
+        if let Some((true, latched)) = self.flat.ports {
+            return Err(self.unlatched(at, kind, *span, latched));
+        }
         let mut ports: Vec<(RegisterId, Span)> = Vec::with_capacity(names.len());
         for name in names {
             let port = self.port(at, *name, wanted)?;
@@ -390,6 +396,26 @@ impl Resolver<'_> {
             ports.push((port, name.span));
         }
         Ok(Demand { kind, ports, period: timing.section == Section::Period, span: *span })
+    }
+
+    /// The ports of a program whose ports are latched have no times of their own.
+    fn unlatched(&mut self, at: At, kind: DemandKind, span: Span, latched: Span) -> Reported {
+        let (message, help) = match kind {
+            DemandKind::Deadline(_) => (
+                "a deadline for outputs that are published together, at the `wait`",
+                "bound the period instead: `takt bound --deadline`",
+            ),
+            DemandKind::Order => (
+                "an order of ports that are taken together, at the tick, or published together, at the `wait`",
+                "leave it out",
+            ),
+            DemandKind::Late(_) => (
+                "inputs that are to be read late are taken at the tick, whenever they are read",
+                "leave it out, or have `.ports direct`",
+            ),
+        };
+        let error = Diagnostic::error("ports", span, message).also(latched, "for here it says so").help(help);
+        self.context.report(at.scope, error)
     }
 
     fn presets(&mut self) {

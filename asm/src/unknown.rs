@@ -2,13 +2,14 @@
 //! part of [`context`](crate::context).
 
 use crate::ast::Ast;
-use crate::context::{Binding, Context, Reported, ScopeId};
+use crate::context::{Binding, Context, HAS, Reported, ScopeId};
 use crate::diag::{Diagnostic, Severity, nearest};
 use crate::intern::NameId;
 use crate::ir::RegisterKind;
 use crate::limits;
 use crate::source::Span;
 use std::rc::Rc;
+use takt_isa::ROWS;
 
 /// What a name was needed for when it was not found.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -79,6 +80,13 @@ impl Context {
             }
             let error = Diagnostic::error("unknown-name", span, format!("`{text}` is not declared"));
             let error = match self.similar(scope, &text, wanted) {
+                _ if text.starts_with(HAS) => {
+                    let mnemonics = ROWS.iter().map(|row| row.mnemonic);
+                    let meant = nearest(&text[HAS.len()..], mnemonics);
+                    error
+                        .note(format!("`{HAS}` and an instruction is 1 or 0: whether the machine has it"))
+                        .did_you_mean(meant.map(|mnemonic| format!("{HAS}{mnemonic}")))
+                }
                 Some(meant) => error.did_you_mean(Some(meant)),
                 None if self.machine.register_address(&text).is_some() => {
                     error.help(format!("write `@{text}` for the register at that place"))

@@ -45,8 +45,11 @@ fn source(seed: u64) -> String {
     text
 }
 
+/// The memory, what each name holds, and cycles.
+type Left = (Vec<u32>, Vec<(String, Option<u32>)>, u64);
+
 /// The memory, what each name that outlives the period holds, and the cycles, after some periods.
-fn run(program: &Program, seed: u64) -> (Vec<u32>, Vec<(String, Option<u32>)>, u64) {
+fn run(program: &Program, seed: u64) -> Left {
     let random = &mut Random(seed + 5);
     let mut emulator = Emulator::new(program).expect("it fits");
     let mut cycles = 0;

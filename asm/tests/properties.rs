@@ -188,6 +188,7 @@ prop_compose! {
         loops in prop::collection::btree_map(0..30u32, 1..=u32::MAX, 0..4),
         lines in prop::collection::vec(prop::option::of((any::<prop::sample::Index>(), 1..9u32)), 30),
         machine in Just(machine),
+        latched in any::<bool>(),
     ) -> Program {
         let slots = machine.slots.len();
         let code: Vec<u64> = code[..code.len() / slots * slots].to_vec();
@@ -195,6 +196,7 @@ prop_compose! {
         let once = once.min(bundles) as u32;
         let types = [Type::F, Type::I, Type::B];
         let (mut inputs, mut outputs, mut registers) = (Vec::new(), Vec::new(), Vec::new());
+        let mut numbers = std::collections::HashSet::new();
         for (register, ty) in ports {
             if machine.register_name(register).is_none() {
                 continue;
@@ -204,6 +206,10 @@ prop_compose! {
                 register if machine.is_output(register) => &mut outputs,
                 _ => &mut registers,
             };
+            let number = machine.output_number(register);
+            if number.is_some() && !numbers.insert(number) {
+                continue;
+            }
             // Names that look like places, but of other registers.
             let name = if register % 3 == 0 { format!("m{register}") } else { format!("r.{register}_") };
             list.insert(0, Port { name, register, ty: types[ty] });
@@ -229,6 +235,7 @@ prop_compose! {
             constants: constants.into_iter().filter(|(register, _)| machine.register_name(*register).is_some()).collect(),
             inputs,
             outputs,
+            latched,
             registers,
             symbols,
             sections: sections

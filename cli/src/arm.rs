@@ -103,7 +103,7 @@ impl Ported {
             bail!("a NaN was written to an output port");
         }
         let value =
-            |register: &u16| self.emulator.register(*register).context("an output port was not written");
+            |register: &u16| self.emulator.output_bits(*register).context("an output port was not written");
         Ok((self.outputs.iter().map(value).collect::<Result<_>>()?, report.cycles))
     }
 }

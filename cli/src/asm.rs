@@ -14,6 +14,7 @@ use takt_asm::ir::DemandKind;
 use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, TimingReport};
 use takt_asm::{Adjustment, Assembled, Made, Schedule, image, listing};
 use takt_isa::Program;
+use takt_rtl::header::{Cycles, Header, Language, Span};
 
 /// Assemble a source into an image.
 ///
@@ -40,6 +41,12 @@ pub(crate) struct Asm {
     /// Write `$readmemh` memories into this folder: code of each slot, constants of each bank, data.
     #[arg(long, value_name = "FOLDER")]
     readmemh: Option<PathBuf>,
+    /// Write what a host must know of the program, in this language: ports and their bus addresses, what the loader writes, cycles.
+    #[arg(long, value_enum, value_name = "LANGUAGE")]
+    header: Option<HeaderLanguage>,
+    /// Write the header here; `-` is standard output.
+    #[arg(long, value_name = "FILE", default_value = "-", requires = "header")]
+    header_file: PathBuf,
     /// Schedule everything: the same as --schedule on.
     #[arg(short = 'O', conflicts_with = "schedule")]
     optimise: bool,
@@ -53,7 +60,7 @@ pub(crate) struct Asm {
     #[arg(long)]
     strip: bool,
     /// Check only; write no file.
-    #[arg(long, conflicts_with_all = ["output", "listing", "symbols", "readmemh"])]
+    #[arg(long, conflicts_with_all = ["output", "listing", "symbols", "readmemh", "header"])]
     check: bool,
     /// Print the result, errors and warnings as JSON on standard output.
     #[arg(long)]
@@ -65,7 +72,32 @@ Examples:
   takt asm prog.s                       prog.s into prog.takt
   takt asm prog.s -m t1 -o small.takt   the same source for the small machine
   takt asm prog.s --listing -           which bundle came from which lines
+  takt asm prog.s --header c --header-file prog.h   ports, loader and cycles for a host in C
   takt asm prog.s --check --json        errors and warnings for an editor";
+
+/// A host's language.
+#[derive(Clone, Copy, ValueEnum)]
+enum HeaderLanguage {
+    /// C99: addresses, functions for each port, a loader.
+    C,
+    /// A Rust module without the standard library.
+    Rust,
+    /// JSON, as docs/headers.md says.
+    Json,
+    /// CMSIS-SVD: the bus slave with the program's ports.
+    Svd,
+}
+
+impl From<HeaderLanguage> for Language {
+    fn from(language: HeaderLanguage) -> Language {
+        match language {
+            HeaderLanguage::C => Language::C,
+            HeaderLanguage::Rust => Language::Rust,
+            HeaderLanguage::Json => Language::Json,
+            HeaderLanguage::Svd => Language::Svd,
+        }
+    }
+}
 
 /// Which bundles to schedule.
 #[derive(Clone, Copy, ValueEnum)]
@@ -91,7 +123,10 @@ impl From<When> for Schedule {
 impl Asm {
     /// Where the image goes, if anywhere.
     fn image_path(&self) -> Result<Option<PathBuf>> {
-        let others = self.listing.is_some() || self.symbols.is_some() || self.readmemh.is_some();
+        let others = self.listing.is_some()
+            || self.symbols.is_some()
+            || self.readmemh.is_some()
+            || self.header.is_some();
         match &self.output {
             Some(path) => Ok(Some(path.clone())),
             None if others || self.check => Ok(None),
@@ -112,6 +147,9 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
             .into_iter()
             .filter_map(|(option, path)| Some((option, path.as_deref()?)))
             .collect();
+    if arguments.header.is_some() {
+        writes.push(("--header", &arguments.header_file));
+    }
     if arguments.json {
         writes.push(("--json", Path::new("-")));
     }
@@ -147,6 +185,10 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
             files::write(&folder.join(name), text.as_bytes())?;
         }
     }
+    if let Some(language) = arguments.header {
+        let text = header(program, &arguments.file).text(language.into());
+        files::write(&arguments.header_file, text.as_bytes())?;
+    }
     if let Some(path) = &image_path {
         let debug = (!arguments.strip).then(|| assembled.debug_info());
         files::write(path, &image::write_with(program, debug.as_ref())?)?;
@@ -169,6 +211,24 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         write_adjustments(&assembled, out)?;
     }
     Ok(())
+}
+
+/// What a host must know of a program, named after its source.
+fn header(program: &Program, source: &Path) -> Header {
+    let stem = source.file_stem().filter(|_| !files::is_dash(source));
+    let name = stem.map_or_else(|| "program".into(), |stem| stem.to_string_lossy());
+    let span = |span: takt_analysis::Span| Span { best: span.best, worst: span.worst };
+    let cycles = takt_analysis::bound(program).map(|bounds| {
+        let section = |section: &takt_analysis::SectionBounds| Cycles {
+            name: section.name.clone(),
+            address: section.address,
+            once: section.once,
+            cycles: span(if section.once { section.cycles } else { section.in_time }),
+            missed: (!section.once).then_some(span(section.missed)),
+        };
+        bounds.sections.iter().map(section).collect()
+    });
+    Header::new(program, &name, cycles.map_err(|error| error.to_string()))
 }
 
 /// What the scheduler made of each block, beside its bound.

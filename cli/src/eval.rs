@@ -1,11 +1,12 @@
 //! `takt eval`: one operation on operands from standard input, in TestFloat's line format.
 
 use crate::files::Out;
+use crate::output::Failure;
 use crate::select::{self, MachineArgument};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use std::io::{ErrorKind, Read, Write};
-use takt_isa::fp::{Host, Reference, Value};
+use takt_isa::fp::{HAS_SOFTFLOAT, Host, Reference, Value};
 use takt_isa::{Effect, Row, compute};
 
 /// Evaluate an operation on operands read from standard input.
@@ -22,7 +23,7 @@ pub(crate) struct Eval {
     operation: &'static Row,
     #[command(flatten)]
     machine: MachineArgument,
-    /// Compute with Berkeley SoftFloat, the definition, in place of the emulator's arithmetic.
+    /// Compute with Berkeley SoftFloat, the definition, in place of the emulator's arithmetic (x86-64 Linux only).
     #[arg(long)]
     reference: bool,
 }
@@ -44,6 +45,11 @@ pub(crate) fn run(arguments: &Eval, out: &mut Out) -> Result<()> {
     }
     if machine.host(row.function).is_none() {
         bail!("machine {} has no unit for `{}`", machine.name, row.mnemonic);
+    }
+    if arguments.reference && !HAS_SOFTFLOAT {
+        let text = "--reference needs Berkeley SoftFloat, which is built on x86-64 Linux with glibc only; \
+                    without --reference the same bits are computed with the host's arithmetic";
+        return Err(Failure::Usage(text.to_owned()).into());
     }
     let evaluate = if arguments.reference { compute::<Reference> } else { compute::<Host> };
     stream(row, |[a, b, c]| evaluate(row.op, a, b, c), out)

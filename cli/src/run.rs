@@ -211,7 +211,7 @@ fn run_periods(
         observers.nans.add(&report.nan_writes);
         if let Some(outputs) = &mut outputs {
             let values = emulator.program().outputs.iter().map(|port| {
-                emulator.register(port.register).map_or(String::new(), |bits| ports::format(port.ty, bits))
+                emulator.output_bits(port.register).map_or(String::new(), |bits| ports::format(port.ty, bits))
             });
             ports::write_row(outputs, values.chain([report.cycles.to_string()]))?;
         }
@@ -230,7 +230,7 @@ fn outputs<'a, T>(
 ) -> impl Iterator<Item = (&'a str, Option<T>)> {
     let ports = emulator.program().outputs.iter();
     ports.map(move |port| {
-        (port.name.as_str(), emulator.register(port.register).map(|bits| show(port.ty, bits)))
+        (port.name.as_str(), emulator.output_bits(port.register).map(|bits| show(port.ty, bits)))
     })
 }
 

@@ -11,8 +11,8 @@ use takt_cosim::{LockstepError, Model, random};
 use takt_isa::{Machine, Shape, T1, T3};
 use takt_rtl::plan::names::{decode, net};
 use takt_rtl::plan::{ControlBit, Plan, Stage};
-use takt_rtl::verilog::{Expr, any, repeat};
-use takt_rtl::{Library, export};
+use takt_rtl::verilog::{Expr, any, number, repeat};
+use takt_rtl::{Design, Library, export};
 
 /// A module, an expression that occurs once in it, and what takes its place.
 type Fault = (&'static str, &'static str, &'static str);
@@ -110,11 +110,39 @@ fn generated_for_t1(plan: &Plan) -> Vec<MadeFault> {
     vec![(plan.top(), any(taken).to_string(), "1'b0".to_owned())]
 }
 
+/// Likewise for t3 with latched ports.
+fn generated_for_latched(plan: &Plan) -> Vec<MadeFault> {
+    let direct = Expr::from(&net::LATCHED).is(number(0));
+    vec![
+        (plan.top(), (direct | net::INPUTS_OPEN | net::RST).to_string(), "1'b1".to_owned()),
+        (plan.top(), (net::INPUTS_TAKEN | net::RST).to_string(), net::RST.to_string()),
+    ]
+}
+
+/// In what takes and publishes latched ports, on t3, whose outputs are written by three slots.
+#[rustfmt::skip]
+const OF_LATCHED: &[Fault] = &[
+    ("takt_places", "flip ? shown ^ changed : shown", "shown"),
+    ("takt_places", "now[index[BITS-1:0]] ^ ~open", "~now[index[BITS-1:0]]"),
+    ("takt_places", "now[index[BITS-1:0]] ^ ~open", "now[index[BITS-1:0]]"),
+    ("takt_places", "{PORTS{~flip & ~drop}}", "{PORTS{1'b1}}"),
+    ("takt_places", "write[k] & ~open & (index >> BITS) == 0", "write[k] & (index >> BITS) == 0"),
+    ("takt_outputs", "of_number == j[OWNER-1:0]", "1'b0"),
+    ("takt_sequencer", "x_wait & ~fault", "x_wait & ~remembered & ~fault"),
+    ("takt_source", "advance ? m_place : r_place", "1'b0"),
+];
+
 /// Random programs that a fault may pass before it counts as not found.
 const PROGRAMS: u64 = 1000;
 
-fn faults_are_found(machine: &'static Machine, faults: &[Fault], generated: fn(&Plan) -> Vec<MadeFault>) {
-    let mut design = export(machine, &Library::builtin()).expect("every machine has a circuit");
+fn faults_are_found(
+    machine: &'static Machine,
+    latched: u16,
+    faults: &[Fault],
+    generated: fn(&Plan) -> Vec<MadeFault>,
+) {
+    let design = export(machine, &Library::builtin()).expect("every machine has a circuit");
+    let mut design = Design { latched, ..design };
     let top = design.top.clone();
     let made = generated(&design.plan);
     let made = made.iter().map(|(module, from, to)| (module.as_str(), from.as_str(), to.as_str()));
@@ -170,11 +198,16 @@ fn faults_are_found(machine: &'static Machine, faults: &[Fault], generated: fn(&
 
 #[test]
 fn planted_faults_are_found_on_t3() {
-    faults_are_found(&T3, &[COMMON, OF_T3].concat(), generated_for_t3);
+    faults_are_found(&T3, 0, &[COMMON, OF_T3].concat(), generated_for_t3);
 }
 
 /// What t3 has not.
 #[test]
 fn planted_faults_are_found_on_t1() {
-    faults_are_found(&T1, OF_T1, generated_for_t1);
+    faults_are_found(&T1, 0, OF_T1, generated_for_t1);
+}
+
+#[test]
+fn planted_faults_in_latched_ports_are_found() {
+    faults_are_found(&T3, T3.inputs.depth, OF_LATCHED, generated_for_latched);
 }

@@ -1,5 +1,11 @@
 //! The host's arithmetic against Berkeley SoftFloat: results and flags of every operation with two operands.
-#![cfg(feature = "softfloat")]
+#![cfg(all(
+    feature = "softfloat",
+    target_arch = "x86_64",
+    target_os = "linux",
+    target_env = "gnu",
+    target_pointer_width = "64"
+))]
 
 #[allow(dead_code, reason = "each test uses a part of it")]
 mod fp_common;

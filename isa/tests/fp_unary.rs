@@ -1,6 +1,12 @@
 //! The host's arithmetic against Berkeley SoftFloat, operations with one operand: a sample of 1.5·10⁷ operands, or all
 //! 2³² with `TAKT_FULL=1`.
-#![cfg(feature = "softfloat")]
+#![cfg(all(
+    feature = "softfloat",
+    target_arch = "x86_64",
+    target_os = "linux",
+    target_env = "gnu",
+    target_pointer_width = "64"
+))]
 
 #[allow(dead_code, reason = "each test uses a part of it")]
 mod fp_common;

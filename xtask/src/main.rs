@@ -3,6 +3,7 @@
 
 mod docs;
 mod formal;
+mod reach;
 mod synth;
 mod venv;
 
@@ -42,6 +43,8 @@ enum Task {
     Synth(synth::Arguments),
     /// Prove for every program, up to a stated number of cycles, that the core keeps the rules of issue, and that its decoders are total.
     Formal(formal::Arguments),
+    /// Compile for aarch64 Linux, macOS, Windows and wasm32, and run the core crates' tests on aarch64 (installs what it lacks).
+    Reach(reach::Arguments),
     /// Fuzz the assembler and the image loader, one after the other (installs cargo-fuzz if it is not there).
     Fuzz {
         /// Minutes for each target.
@@ -57,6 +60,7 @@ fn main() -> Result<()> {
         Task::Lint => lint(),
         Task::Formal(arguments) => formal::formal(&arguments),
         Task::Synth(arguments) => synth::synth(&arguments),
+        Task::Reach(arguments) => reach::reach(&arguments),
         Task::Fuzz { minutes } => fuzz(minutes),
     }
 }
@@ -81,9 +85,6 @@ fn cargo() -> Command {
     command.current_dir(root());
     command
 }
-
-/// How tests are built.
-const PROFILE: &str = "tests";
 
 fn works(program: &str, argument: &str) -> bool {
     Command::new(program).arg(argument).output().is_ok_and(|output| output.status.success())
@@ -128,7 +129,7 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
         formal::formal(&formal::Arguments::SHARE)?;
     }
     let mut tests = cargo();
-    tests.args(["test", "--workspace", "--no-fail-fast", "--profile", PROFILE]).args(rest);
+    tests.args(["test", "--workspace", "--no-fail-fast", "--release"]).args(rest);
     if full {
         tests.env("TAKT_FULL", "1");
     }
@@ -137,21 +138,11 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
 
 fn lint() -> Result<()> {
     run(cargo().args(["fmt", "--all", "--check"]))?;
-    run(cargo().args([
-        "clippy",
-        "--workspace",
-        "--all-targets",
-        "--profile",
-        PROFILE,
-        "--",
-        "-D",
-        "warnings",
-    ]))?;
+    run(cargo().args(["clippy", "--workspace", "--all-targets", "--release", "--", "-D", "warnings"]))?;
     // isa, asm and emu stand without C: SoftFloat is a feature.
     run(cargo().args([
         "check",
-        "--profile",
-        PROFILE,
+        "--release",
         "--no-default-features",
         "-p",
         "takt-isa",

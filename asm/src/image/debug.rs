@@ -60,7 +60,7 @@ struct Named {
     bundles: Option<(u32, u32)>,
 }
 
-pub(super) fn to_json(info: &DebugInfo) -> serde_json::Result<Vec<u8>> {
+pub(super) fn to_json(info: &DebugInfo) -> Result<Vec<u8>, ImageError> {
     let DebugInfo { sources, constants, names } = info;
     let source = |(name, text): &(String, String)| Source { name: name.clone(), text: text.clone() };
     let constant = |(name, value): &(String, Value)| Constant {
@@ -86,7 +86,7 @@ pub(super) fn to_json(info: &DebugInfo) -> serde_json::Result<Vec<u8>> {
         scopes: names.scopes.iter().map(scope).collect(),
         values: names.values.iter().map(value).collect(),
     };
-    serde_json::to_vec(&debug)
+    serde_json::to_vec(&debug).map_err(|error| ImageError::Unwritable(error.to_string()))
 }
 
 pub(super) fn from_json(bytes: &[u8], program: &Program) -> Result<DebugInfo, ImageError> {

@@ -152,12 +152,12 @@ pub enum ImageError {
         /// What is wrong.
         reason: &'static str,
     },
-    /// The format cannot hold it.
-    #[error("an image cannot hold this program: {0}")]
-    Unwritable(String),
     /// What is there for a debugger does not fit the program.
     #[error("the image's section `{DEBUG}` cannot be used: {0}")]
     Debug(String),
+    /// The format cannot hold it.
+    #[error("an image cannot hold this program: {0}")]
+    Unwritable(String),
     /// The source lines do not fit the code.
     #[error("the source lines do not fit the code: {0}")]
     Lines(String),
@@ -184,20 +184,19 @@ pub fn write(program: &Program) -> Result<Vec<u8>, ImageError> {
 /// The image of a program with what a debugger knows of it beyond the program.
 ///
 /// # Errors
-/// If an image cannot hold it: its sizes go beyond 32 bits, or beyond what [`read`] takes.
+/// If an image cannot hold it: its sizes go beyond 32 bits, or beyond what [`read`] takes. Nothing that the assembler makes does.
 pub fn write_with(program: &Program, debug: Option<&DebugInfo>) -> Result<Vec<u8>, ImageError> {
     within(program, debug, LIMIT)
 }
 
 /// The image of a program, if it has at most so many bytes.
 fn within(program: &Program, debug: Option<&DebugInfo>, most: usize) -> Result<Vec<u8>, ImageError> {
-    let unwritable = |error: String| ImageError::Unwritable(error);
-    let meta = Meta::of(program).to_json().map_err(|error| unwritable(error.to_string()))?;
-    let debug = debug.map(debug::to_json).transpose().map_err(|error| unwritable(error.to_string()))?;
+    let meta = Meta::of(program).to_json()?;
+    let debug = debug.map(debug::to_json).transpose()?;
     let mut bytes = Vec::new();
     let names: Vec<String> = program.symbols.iter().map(|symbol| clean(&symbol.name)).collect();
-    write_elf(program, (&meta, debug.as_deref()), &names, &mut bytes)
-        .map_err(|error| unwritable(error.to_string()))?;
+    write_elf(program, &names, &meta, debug.as_deref(), &mut bytes)
+        .map_err(|error| ImageError::Unwritable(error.to_string()))?;
     if bytes.len() > most {
         return Err(ImageError::TooLarge { bytes: bytes.len() });
     }
@@ -206,8 +205,9 @@ fn within(program: &Program, debug: Option<&DebugInfo>, most: usize) -> Result<V
 
 fn write_elf(
     program: &Program,
-    (meta, debug): (&[u8], Option<&[u8]>),
     names: &[String],
+    meta: &[u8],
+    debug: Option<&[u8]>,
     bytes: &mut Vec<u8>,
 ) -> Result<(), object::write::Error> {
     let code: Vec<u8> = program.code.iter().flat_map(|word| word.to_le_bytes()).collect();

@@ -105,8 +105,15 @@ fn ports(program: &Program) -> Result<(), ImageError> {
     for port in &program.inputs {
         check("input", port, machine.is_input(port.register))?;
     }
+    let mut numbers = HashSet::new();
     for port in &program.outputs {
-        check("output", port, machine.is_output(port.register))?;
+        let number = machine.output_number(port.register);
+        check("output", port, number.is_some())?;
+        if !numbers.insert(number) {
+            let (what, address) = (format!("output `{}`", port.name), port.register.into());
+            let reason = "another output has the same number, in another bank: assemble its source anew";
+            return Err(ImageError::Register { what, address, reason });
+        }
     }
     for port in &program.registers {
         let plain = !machine.is_input(port.register) && !machine.is_output(port.register);

@@ -35,12 +35,14 @@ impl Past {
     }
 
     /// Adds a command to them.
+    #[cfg(feature = "tui")]
     pub(super) fn add(&mut self, line: &str) {
         let _ = self.history.add(line);
         append(&mut self.history, self.file.as_deref());
     }
 
     /// The command so many back, 1 being the last.
+    #[cfg(feature = "tui")]
     pub(super) fn back(&self, distance: usize) -> Option<String> {
         use rustyline::history::SearchDirection::Forward;
         let index = self.history.len().checked_sub(distance)?;

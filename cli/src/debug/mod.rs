@@ -2,6 +2,7 @@
 
 mod history;
 mod prompt;
+#[cfg(feature = "tui")]
 mod screen;
 
 use crate::files::{self, Given, Out};
@@ -83,6 +84,10 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
     // A mistake in a script is found before the program runs.
     let script = arguments.script.as_deref().map(script).transpose()?;
 
+    if arguments.tui && !cfg!(feature = "tui") {
+        let text = "--tui is not in this build of takt; `cargo build --release --features tui` has it";
+        return Err(Failure::Usage(text.to_owned()).into());
+    }
     if arguments.tui && !(std::io::stdin().is_terminal() && std::io::stdout().is_terminal()) {
         let text = "--tui wants a terminal as standard input and output; without one, commands come from --script or standard input";
         return Err(Failure::Usage(text.to_owned()).into());
@@ -103,6 +108,7 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
         Session::new(&program, Options { inputs, tick, constants, sources, names, control })?
     };
     let mut console = Console::new(session);
+    #[cfg(feature = "tui")]
     if arguments.tui {
         out.flush()?;
         return screen::run(&mut console, &control);

@@ -24,18 +24,16 @@ pub use number::{Shown, UlpDistance, hex_float, ulp_distance};
 pub use stops::{Stop, Test, Where};
 
 use expression::Machine;
-use interest::Interest;
 use std::collections::BTreeSet;
 use std::num::NonZeroU64;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use stops::Watcher;
 use takt_asm::expr::Value;
 use takt_asm::names::Names;
-use takt_emu::{Emulator, Fault, LoadError, PeriodError, PeriodReport, Retire, Status, Upcoming};
+use takt_emu::{Emulator, Fault, LoadError, PeriodReport, Retire, Status};
 use takt_isa::program::Location;
 use takt_isa::timing::{Address, Cause, Cycle};
-use takt_isa::{Effect, Program, Type, ZERO};
+use takt_isa::{Program, Type, ZERO};
 
 /// Checkpoints that are kept. At 10⁸ cycles they are at most 2¹⁹ cycles apart.
 pub const CHECKPOINTS: usize = 512;

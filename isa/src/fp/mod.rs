@@ -13,7 +13,7 @@
 //!
 //! | | what it is | role |
 //! |---|---|---|
-//! | `SoftFloat` | Berkeley SoftFloat 3 (feature `softfloat`) | the definition, named [`Reference`] |
+//! | `SoftFloat` | Berkeley SoftFloat 3 (feature `softfloat`, on x86-64 Linux with glibc) | the definition, named [`Reference`] |
 //! | [`Host`] | the host's binary32, NaN made canonical, flags derived from the operands | what the emulator runs |
 //!
 //! `isa/tests/fp_host.rs` shows that the two agree. The remaining functions ([`minimum`], [`maximum`], [`saturate`],
@@ -28,8 +28,29 @@ pub mod atan;
 mod host;
 mod kernels;
 pub mod sin;
-#[cfg(feature = "softfloat")]
+// Where `third_party/c99` fits and softfloat-sys has rules to build its C. The condition stands in Cargo.toml too.
+#[cfg(all(
+    feature = "softfloat",
+    target_arch = "x86_64",
+    target_os = "linux",
+    target_env = "gnu",
+    target_pointer_width = "64"
+))]
 mod softfloat;
+/// Without Berkeley SoftFloat, the host's arithmetic stands in: the tests hold the two identical.
+#[cfg(not(all(
+    feature = "softfloat",
+    target_arch = "x86_64",
+    target_os = "linux",
+    target_env = "gnu",
+    target_pointer_width = "64"
+)))]
+mod softfloat {
+    /// The implementation of [`Arithmetic`](super::Arithmetic) that stands in for Berkeley SoftFloat, which this build leaves out.
+    pub type Reference = super::Host;
+    /// Whether [`Reference`] is Berkeley SoftFloat.
+    pub const HAS_SOFTFLOAT: bool = false;
+}
 pub mod tables;
 
 pub use acos::{ACOS_MAX_ULP, acos};
@@ -37,15 +58,7 @@ pub use atan::{ATAN2_MAX_ULP, atan2};
 pub use host::Host;
 pub use kernels::{abs, maximum, minimum, neg, saturate, sign};
 pub use sin::{COS_MAX_ULP, SIN_IDENTITY, SIN_LIMIT, SIN_MAX_ULP, cos, sin};
-#[cfg(feature = "softfloat")]
-pub use softfloat::SoftFloat;
-
-/// The implementation of [`Arithmetic`] that defines the machine: Berkeley SoftFloat.
-#[cfg(feature = "softfloat")]
-pub type Reference = SoftFloat;
-/// The implementation of [`Arithmetic`] that stands in for Berkeley SoftFloat, which this build leaves out.
-#[cfg(not(feature = "softfloat"))]
-pub type Reference = Host;
+pub use softfloat::*;
 
 /// The one NaN that arithmetic produces: quiet, positive, no payload.
 pub const CANONICAL_NAN: u32 = 0x7fc0_0000;

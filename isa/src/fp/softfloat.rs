@@ -11,6 +11,11 @@ use super::{Arithmetic, Flags, Value};
 #[derive(Clone, Copy, Debug)]
 pub struct SoftFloat;
 
+/// The implementation of [`Arithmetic`] that defines the machine: Berkeley SoftFloat.
+pub type Reference = SoftFloat;
+/// Whether [`Reference`] is Berkeley SoftFloat.
+pub const HAS_SOFTFLOAT: bool = true;
+
 /// Runs one operation with the library's (thread-local) flags cleared before and read after.
 #[inline]
 fn flagged(operation: impl FnOnce() -> u32) -> Value {

@@ -2,7 +2,7 @@
 
 use crate::plan::names::net;
 use crate::plan::{ControlBit, Plan, SlotPlan, Stage};
-use crate::verilog::{Module, any, choose, decimal, set, when};
+use crate::verilog::{Expr, Instance, Module, any, choose, concat, decimal, no, number, set, when};
 use takt_isa::Effect;
 
 /// Where the control bits stand.
@@ -23,10 +23,43 @@ pub(super) fn parameters(plan: &Plan, m: &mut Module) {
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("from decode to issue");
     m.comment("A bundle moves on with advance. The letters: d_ decode, m_ match, r_ read, i_ issue.");
+    m.blank();
+    places(plan, m);
     for slot in &plan.slots {
         m.blank();
         stages(slot, m);
     }
+}
+
+/// Which place of a latched input port each source reads.
+fn places(plan: &Plan, m: &mut Module) {
+    let (bits, [decode, matched]) =
+        (plan.input_bits, [Stage::Decode, Stage::Match].map(|stage| plan.place(stage)));
+    let indices: Vec<_> =
+        plan.sources().map(|(slot, operand)| slot.source_index(Stage::Decode, operand).low(bits)).collect();
+    m.comment("docs/timing.md, latched ports: two places each, which change sides at the end of a period.");
+    m.wires([net::INPUTS_OPEN, net::INPUTS_TAKEN, net::INPUT1_PLACE]);
+    m.wires([decode.clone()]);
+    m.instance(
+        Instance::new("takt_places", "inputs")
+            .parameter_as("PORTS", &net::LATCHED)
+            .parameter("INDEX", bits)
+            .parameter("WRITES", 1)
+            .parameter("READS", decode.width())
+            .same([net::CLK])
+            .port("flip", net::INPUTS_TAKEN | net::RST)
+            .port("open", net::INPUTS_OPEN | net::RST)
+            .port("drop", no())
+            .port("write", net::INPUT1)
+            .port("write_index", plan.input1_index().low(bits))
+            .port("write_place", net::INPUT1_PLACE)
+            .port("read_index", concat(indices))
+            .port("read_place", decode.clone()),
+    );
+    let direct = Expr::from(&net::LATCHED).is(number(0));
+    m.define(net::INPUT1_NOW, net::INPUT1 & (direct | net::INPUTS_OPEN | net::RST));
+    m.regs([matched.clone()]);
+    m.clocked(vec![when(net::ADVANCE, vec![set(matched, decode)])]);
 }
 
 fn stages(slot: &SlotPlan, m: &mut Module) {

@@ -13,8 +13,9 @@ mod status;
 mod synthesis;
 mod write_back;
 
+use crate::plan::names::net;
 use crate::plan::{Plan, SlotPlan};
-use crate::verilog::{Expr, Module, ModuleError, concat};
+use crate::verilog::{Expr, Module, ModuleError, Parameter, concat};
 
 impl Plan {
     /// The same of every slot, slot 0 lowest.
@@ -27,6 +28,13 @@ impl Plan {
 pub(crate) fn core(plan: &Plan) -> Result<String, ModuleError> {
     let ports = ports::ports(plan).into_iter().map(|(port, _)| port).collect();
     let mut m = Module::new(&plan.top(), heading(plan), ports);
+    m.takes(Parameter {
+        net: net::LATCHED.clone(),
+        value: 0,
+        heading:
+            "0, or how many input ports are latched, from port 0 on: a power of two; then outputs are, too"
+                .to_owned(),
+    });
     control::parameters(plan, &mut m);
     loader::write(plan, &mut m);
     fetch::write(plan, &mut m);

@@ -80,6 +80,16 @@ impl Plan {
         Net::named(format!("output_{}_value", bank.name)).wide(32)
     }
 
+    /// Port: the number of the output port that the outside wants to see.
+    pub fn read_output(&self) -> Net {
+        Net::bus("read_output", self.port_bits)
+    }
+
+    /// For each source of [`Plan::sources`], which place of a latched input port it reads, if it reads one.
+    pub fn place(&self, stage: Stage) -> Net {
+        Net::named(format!("{stage}_place")).wide(self.sources().count() as u32)
+    }
+
     /// Port: which slots write a register.
     pub fn retire(&self) -> Net {
         Net::bus("retire", self.slot_count())

@@ -162,6 +162,11 @@ pub fn decimal(width: u32, value: impl Into<u64>) -> Expr {
     Expr::Literal(format!("{width}'d{}", value.into()))
 }
 
+/// A number without a width, as parameters are.
+pub fn number(value: u32) -> Expr {
+    Expr::Literal(value.to_string())
+}
+
 /// A number in hexadecimal, of all its digits.
 pub fn hexadecimal(width: u32, value: u64) -> Expr {
     Expr::Literal(format!("{width}'h{value:0digits$x}", digits = width.div_ceil(4) as usize))

@@ -11,7 +11,17 @@ pub(super) fn module(module: &Module) -> String {
     for line in &module.heading {
         comment(&mut v, "", line);
     }
-    let _ = writeln!(v, "\nmodule {} (", module.name);
+    let _ = write!(v, "\nmodule {} ", module.name);
+    if !module.parameters.is_empty() {
+        v.push_str("#(\n");
+        for (i, parameter) in module.parameters.iter().enumerate() {
+            let comma = if i + 1 < module.parameters.len() { "," } else { "" };
+            comment(&mut v, "    ", &parameter.heading);
+            let _ = writeln!(v, "    parameter {} = {}{comma}", parameter.net, parameter.value);
+        }
+        v.push_str(") ");
+    }
+    v.push_str("(\n");
     ports(&mut v, &module.ports);
     v.push_str(");\n\n");
     let mut blank = true;

@@ -6,6 +6,12 @@
 #![no_std]
 #![allow(non_camel_case_types)]
 
+// musl's 32-bit ones are 32 bits wide, as are those of macOS and Windows: wrong widths here would be undefined behaviour there.
+#[cfg(not(all(target_arch = "x86_64", target_os = "linux", target_env = "gnu", target_pointer_width = "64")))]
+compile_error!(
+    "these widths are those of x86-64 Linux with glibc; on other targets leave takt-isa's SoftFloat out, or use the published c99 crate"
+);
+
 /// `int_fast32_t`.
 pub type int_fast32_t = i64;
 /// `int_fast64_t`.

@@ -10,6 +10,9 @@ macro_rules! nets {
     (@ $net:literal $width:literal) => { Net::bus($net, $width) };
 }
 
+/// Parameter: how many input ports are latched.
+pub static LATCHED: Net = Net::bit("LATCHED");
+
 nets! {
     // ---- ports
     /// The clock.
@@ -30,6 +33,10 @@ nets! {
     INPUT_WRITE "input_write";
     /// What it gets.
     INPUT_VALUE "input_value" 32;
+    /// An output port, by number, as the outside is to see it.
+    READ_VALUE "read_value" 32;
+    /// A `wait` issued two cycles ago.
+    ENDED "ended";
     /// The tick.
     TICK "tick";
     /// The program waits for it.
@@ -86,6 +93,14 @@ nets! {
     INPUT1_VALUE "input1_value" 32;
     /// The same one cycle later.
     INPUT2_VALUE "input2_value" 32;
+    /// To which of the port's two places it goes.
+    INPUT1_PLACE "input1_place";
+    /// Bundles read it from now on.
+    INPUT1_NOW "input1_now";
+    /// What is written to input ports is read from now on, latched or not.
+    INPUTS_OPEN "inputs_open";
+    /// What was written to latched input ports is read from now on.
+    INPUTS_TAKEN "inputs_taken";
     /// The tick, seen.
     TICKS "ticks";
 

@@ -1,0 +1,117 @@
+//! Targets other than x86-64 Linux: the tests of the core crates on aarch64 Linux, in qemu, and compilation for the rest.
+
+use crate::{apt_install, cargo, run, works};
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use std::path::Path;
+use std::process::Command;
+
+/// Which of it.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Only compile, also for aarch64 Linux: no test runs, and neither qemu nor a cross linker is needed.
+    #[arg(long)]
+    check: bool,
+    /// Packages whose tests run on aarch64.
+    #[arg(long, value_name = "PACKAGE", num_args = 1.., default_values = TESTED)]
+    packages: Vec<String>,
+}
+
+/// A target, and what is compiled for it.
+struct Target {
+    triple: &'static str,
+    packages: &'static [&'static str],
+}
+
+/// The command and with it everything it is made of.
+const WHOLE: &[&str] = &["takt"];
+/// What needs no operating system.
+const LIBRARIES: &[&str] =
+    &["takt-isa", "takt-asm", "takt-emu", "takt-analysis", "takt-debug", "takt-programs", "takt-rtl"];
+
+const TARGETS: [Target; 4] = [
+    Target { triple: "aarch64-apple-darwin", packages: WHOLE },
+    Target { triple: "x86_64-pc-windows-msvc", packages: WHOLE },
+    Target { triple: "wasm32-unknown-unknown", packages: LIBRARIES },
+    Target { triple: AARCH64, packages: WHOLE },
+];
+
+const AARCH64: &str = "aarch64-unknown-linux-gnu";
+/// The crates whose results must be the same bits on every host.
+const TESTED: [&str; 3] = ["takt-isa", "takt-asm", "takt-emu"];
+/// Of the random operands of a release test run; qemu takes about fifty times as long for each.
+const SCALE: &str = "0.002";
+
+/// Where the standard libraries of the targets come from.
+enum Toolchain {
+    /// rustup has them, compiled.
+    Rustup,
+    /// Debian's compiler builds them from its source.
+    Debian,
+}
+
+const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
+const DEBIAN_SOURCE: &str = "/usr/lib/rustlib/src/rust/library/std";
+
+impl Toolchain {
+    fn find() -> Result<Toolchain> {
+        let mut rustup = Command::new("rustup");
+        rustup.args(["target", "add"]).args(TARGETS.iter().map(|target| target.triple));
+        if run(&mut rustup).is_ok() {
+            return Ok(Toolchain::Rustup);
+        }
+        eprintln!("rustup cannot add the targets: Debian's compiler builds their standard libraries");
+        if !works(DEBIAN_RUSTC, "--version") || !Path::new(DEBIAN_SOURCE).exists() {
+            apt_install(&["rustc-web", "rust-web-src"])?;
+        }
+        if !Path::new(DEBIAN_SOURCE).exists() {
+            bail!("{DEBIAN_SOURCE} is missing, although rust-web-src is installed");
+        }
+        Ok(Toolchain::Debian)
+    }
+
+    /// Cargo with a subcommand for a target.
+    fn cargo(&self, subcommand: &str, triple: &str) -> Command {
+        let mut command = cargo();
+        command.args([subcommand, "--target", triple, "--target-dir", "target/reach"]);
+        // What is only checked need not be fast; the standard library is compiled all the same.
+        command.env("CARGO_PROFILE_DEV_OPT_LEVEL", "0").env("CARGO_PROFILE_DEV_DEBUG", "0");
+        command.env("CARGO_PROFILE_TEST_DEBUG", "0");
+        if let Toolchain::Debian = self {
+            // Building the standard library is unstable; the second variable admits it on the stable compiler.
+            command.env("RUSTC", DEBIAN_RUSTC).env("RUSTC_BOOTSTRAP", "1");
+            command.arg("-Zbuild-std=std,panic_abort");
+        }
+        command
+    }
+}
+
+pub(crate) fn reach(arguments: &Arguments) -> Result<()> {
+    let toolchain = Toolchain::find()?;
+    for Target { triple, packages } in TARGETS {
+        let packages = packages.iter().flat_map(|package| ["-p", package]);
+        let mut check = toolchain.cargo("check", triple);
+        if triple == AARCH64 && !arguments.check {
+            // The tests' profile: one standard library for both.
+            check.args(["--profile", "test"]);
+        }
+        run(check.args(packages)).with_context(|| triple.to_owned())?;
+    }
+    if arguments.check {
+        return Ok(());
+    }
+    let mut tests = toolchain.cargo("test", AARCH64);
+    tests.arg("--no-fail-fast").args(arguments.packages.iter().flat_map(|package| ["-p", package]));
+    tests.env("TAKT_TEST_SCALE", SCALE);
+    if std::env::consts::ARCH != "aarch64" {
+        const LINKER: &str = "aarch64-linux-gnu-gcc";
+        const QEMU: &str = "qemu-aarch64";
+        if !works(LINKER, "--version") || !works(QEMU, "--version") {
+            apt_install(&["gcc-aarch64-linux-gnu", "libc6-dev-arm64-cross", "qemu-user"])?;
+        }
+        tests.env("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER", LINKER);
+        let runner = format!("{QEMU} -L /usr/aarch64-linux-gnu");
+        tests.env("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER", runner);
+    }
+    run(&mut tests)
+}
