@@ -118,7 +118,8 @@ fn positions(context: &Context, ir: &Ir, emitted: &Emitted) -> (Vec<Option<Posit
 
 fn values(ir: &Ir, placement: &Placement, emitted: &Emitted) -> Vec<NamedValue> {
     // By the register that the source names: the values with registers of their own.
-    let mut split: BTreeMap<RegisterId, Vec<(RegisterId, Option<(u32, u32)>)>> = BTreeMap::new();
+    type Values = Vec<(RegisterId, Option<(u32, u32)>)>;
+    let mut split: BTreeMap<RegisterId, Values> = BTreeMap::new();
     for version in &ir.versions {
         split
             .entry(version.name)

@@ -120,7 +120,7 @@ fn a_value_that_is_gone_has_no_value() {
     let reasons = ["is not computed yet: bundle", "is gone: its register", "is in flight: it arrives in"];
     let (mut there, mut not) = (0, BTreeSet::<&str>::new());
     while session.step(Unit::Bundle) == Why::Done {
-        if session.cycle() % 37 != 0 {
+        if !session.cycle().is_multiple_of(37) {
             continue;
         }
         let mut holders = BTreeSet::new();
