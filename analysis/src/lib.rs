@@ -12,4 +12,4 @@ mod trace;
 
 pub use bound::{Bounds, SectionBounds, Span, bound};
 pub use error::{BoundError, Refusal};
-pub use trace::{Issued, Link, LinkKind, MAX_ISSUES, Trace, TraceError, WhatIf, trace};
+pub use trace::{Issued, Link, LinkKind, MAX_ISSUES, Stalls, Trace, TraceError, WhatIf, trace};

@@ -145,7 +145,12 @@ pub struct WhatIf {
     pub unit: Option<(u8, u8)>,
     /// Cycles that the trace would then take.
     pub cycles: Cycle,
+    /// How many more cycles would be stalled, by kind of cause ([`Cause::KINDS`]), the front end left out: why more cycles, if they are more.
+    pub stalls: Stalls,
 }
+
+/// Stalled cycles by kind of cause.
+pub type Stalls = [i64; Cause::KINDS.len()];
 
 /// An operation as the rules see it.
 struct Part {
@@ -224,25 +229,31 @@ impl Trace {
             .collect();
         used.sort_unstable();
         used.dedup();
+        let (_, today) = self.replay(program, |bundle| bundle, 0);
+        let what = |unit, (cycles, stalls): (Cycle, Stalls)| WhatIf {
+            unit,
+            cycles,
+            stalls: std::array::from_fn(|kind| stalls[kind] - today[kind]),
+        };
         let faster = used.into_iter().filter_map(|(slot, unit)| {
             let row = &machine.slots[usize::from(slot)].units[usize::from(unit)];
             // Less than a cycle is no latency; a unit that writes nothing has none.
             (row.latency > 1).then_some(())?;
             let interval = row.interval.saturating_sub(1).max(1);
             let change = |bundle: Bundle| bundle.with_unit(slot, unit, row.latency - 1, interval);
-            Some(WhatIf { unit: Some((slot, unit)), cycles: self.replay(program, change, 0) })
+            Some(what(Some((slot, unit)), self.replay(program, change, 0)))
         });
-        let front = WhatIf { unit: None, cycles: self.replay(program, |bundle| bundle, 1) };
+        let front = what(None, self.replay(program, |bundle| bundle, 1));
         faster.chain([front].into_iter().filter(|_| machine.refill > 0)).collect()
     }
 
     /// The rules applied anew to the bundles as they are: [`Trace::cycles`] again, unless the emulator has another idea of the rules.
     pub fn replayed(&self, program: &Program) -> Cycle {
-        self.replay(program, |bundle| bundle, 0)
+        self.replay(program, |bundle| bundle, 0).0
     }
 
-    /// The cycles of the trace, the rules applied anew to changed bundles, with so many cycles of refill fewer.
-    fn replay(&self, program: &Program, change: impl Fn(Bundle) -> Bundle, sooner: Cycle) -> Cycle {
+    /// The cycles of the trace and what they were stalled for, the rules applied anew to changed bundles, with so many cycles of refill fewer.
+    fn replay(&self, program: &Program, change: impl Fn(Bundle) -> Bundle, sooner: Cycle) -> (Cycle, Stalls) {
         let bundle = |address| {
             let instructions = program.bundle(address).and_then(Result::ok).unwrap_or_default();
             change(Bundle::new(program.machine, &instructions))
@@ -251,7 +262,8 @@ impl Trace {
         if let Some((address, cycle)) = self.before {
             scoreboard.issue(&bundle(address), address, cycle);
         }
-        let Some(first) = self.issues.first() else { return 0 };
+        let mut stalls = Stalls::default();
+        let Some(first) = self.issues.first() else { return (0, stalls) };
         let redirects = 1 + Cycle::from(program.machine.refill);
         let held: Cycle = first.stalls.iter().map(|(_, cycles)| Cycle::from(*cycles)).sum();
         let branch: Cycle = first
@@ -267,10 +279,14 @@ impl Trace {
                 let less = if issue.distance == redirects { sooner } else { 0 };
                 delivered = last + issue.distance - less;
             }
-            last = scoreboard.issue(&bundle(issue.address), issue.address, delivered).cycle;
+            let issued = scoreboard.issue(&bundle(issue.address), issue.address, delivered);
+            for &(cause, cycles) in issued.stalls() {
+                stalls[cause.kind()] += i64::from(cycles);
+            }
+            last = issued.cycle;
         }
         let end = self.issues.last().map_or(0, |issue| issue.cycle);
-        (self.cycles + last).saturating_sub(end)
+        ((self.cycles + last).saturating_sub(end), stalls)
     }
 }
 

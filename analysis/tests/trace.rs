@@ -4,7 +4,7 @@ use takt_analysis::{Trace, trace};
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_emu::Emulator;
 use takt_emu::testing::{self, INPUTS, Random, random_program};
-use takt_isa::timing::Cycle;
+use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{MACHINES, Program};
 
 /// What must hold of every trace.
@@ -61,6 +61,13 @@ fn the_tracking_program_waits_for_its_units() {
         for what in period.what_if(&program) {
             // A faster unit may cost cycles: its results meet others at the write port.
             assert!(what.cycles.abs_diff(period.cycles) < 60, "{what:?} {}", period.cycles);
+            // The cycles that it costs are stalls, and it is said which: nothing else but the front end stands still.
+            let more: i64 = what.stalls.iter().sum();
+            if what.unit.is_some() {
+                assert_eq!(period.cycles.cast_signed() + more, what.cycles.cast_signed(), "{what:?}");
+            }
+            let write_port = what.stalls[Cause::KINDS.iter().position(|kind| *kind == "write port").unwrap()];
+            assert!(what.cycles <= period.cycles || write_port > 0, "{what:?}");
         }
     }
 }

@@ -116,6 +116,12 @@ pub struct Operand {
     pub span: Span,
 }
 
+impl From<Expr> for Operand {
+    fn from(Expr { id, span }: Expr) -> Operand {
+        Operand { kind: OperandKind::Expr(id), span }
+    }
+}
+
 /// What an operand looks like.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum OperandKind {
@@ -127,6 +133,17 @@ pub enum OperandKind {
     Place(NameRef),
     /// `offset[register]`: an index into [`Ast::memories`].
     Memory(u32),
+    /// `register:type`: an index into [`Ast::casts`].
+    Cast(u32),
+}
+
+/// `register:type`: its bits are taken as another type.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Cast {
+    /// What stands before the colon.
+    pub operand: Operand,
+    /// The type's name.
+    pub ty: Name,
 }
 
 /// `offset[register]`.
@@ -195,8 +212,8 @@ pub struct Declaration {
     pub name: Name,
     /// What follows its colon.
     pub ty: Option<Name>,
-    /// What follows its `@`.
-    pub place: Option<Name>,
+    /// What follows its `@`: a name, of a register, or the number of a port.
+    pub place: Option<Expr>,
 }
 
 /// A section of the program.
@@ -292,6 +309,8 @@ pub enum DirectiveKind {
     Error(String),
     /// `.schedule` and `on` or `off`.
     Schedule(Name),
+    /// `.ports` and `latched` or `direct`.
+    Ports(Name),
     /// `.loop_bound`.
     LoopBound(Expr),
     /// `.deadline`, the ports, and the cycle.
@@ -362,6 +381,7 @@ directives! {
     Loc ".loc" "\"file\" line";
     Error ".error" "\"text\"";
     Schedule ".schedule" "on|off";
+    Ports ".ports" "latched|direct";
     LoopBound ".loop_bound" "turns";
     Deadline ".deadline" "port, port = cycle";
     Order ".order" "port, port, …";
@@ -382,6 +402,8 @@ pub struct Ast {
     pub nodes: Vec<Node>,
     /// Memory operands.
     pub memories: Vec<Memory>,
+    /// Operands with a type.
+    pub casts: Vec<Cast>,
     /// Name templates.
     pub templates: Vec<Template>,
     /// Directives.

@@ -1,12 +1,13 @@
 //! What a program must keep to beyond each line's own rules: who writes a register, and whether anyone does.
 
 use crate::ast::Section;
-use crate::context::{Context, Integer, ScopeId};
+use crate::context::{Context, ScopeId};
 use crate::diag::{Diagnostic, Severity, nearest};
-use crate::homes::Homes;
+use crate::homes::{Homeless, Homes};
 use crate::ir::{Constant, Ir, Operation, Register, RegisterId, RegisterKind};
 use crate::source::Span;
-use takt_isa::{Field, Operand, Type};
+use takt_isa::program::Space;
+use takt_isa::{Effect, Field, Operand, ROWS};
 
 /// An operation's place in the program: its bundle, and its index there.
 type Where = (u32, u32);
@@ -43,30 +44,42 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
                 None => {
                     found.written = Some(((index, number), slot));
                     // Of one without a home that is the mistake.
-                    if homes.help(dest).is_none() {
+                    if homes.homeless(dest).is_none() {
                         reach(context, ir, operation, dest, slot);
                     }
                 }
                 // One report for each slot too many is enough.
                 Some((first, owner)) if owner != slot && found.conflicts & 1 << slot == 0 => {
                     found.conflicts |= 1 << slot;
-                    two_slots(context, ir, operation, (slot, owner), at(ir, first), homes.help(dest));
+                    two_slots(context, ir, operation, (slot, owner), at(ir, first), homes.homeless(dest));
                 }
                 Some(_) => {}
             }
         }
     }
-    for (index, (register, found)) in ir.registers.iter().zip(&uses).enumerate() {
+    let found = |index: usize| (&ir.registers[index], &uses[index], RegisterId::new(index));
+    for (register, used, id) in (0..uses.len()).map(found).filter(|_| complete) {
         // A raw word may read and write anything.
-        if complete && !opaque && !homes.quiet.contains(&RegisterId::new(index)) {
-            never(context, ir, register, found, &uses);
+        if !opaque && !homes.quiet.contains(&id) {
+            unwritten(context, ir, register, used, &uses);
         }
-        if complete {
-            state(context, ir, register, found);
+        if !homes.set_once.contains(&id) {
+            state(context, ir, register, used);
+        }
+    }
+    targets(context, ir);
+    // What a mistake leaves unused is no mistake of its own.
+    if context.sink.errors > 0 {
+        return;
+    }
+    if !opaque {
+        no_wait(context, ir);
+        for (register, used, _) in (0..uses.len()).map(found).filter(|(.., id)| !homes.quiet.contains(id)) {
+            unused(context, register, used);
         }
     }
     for constant in &context.constants {
-        if complete && !constant.used && constant.watched && !constant.name.starts_with('_') {
+        if !constant.used && constant.watched && !constant.name.starts_with('_') {
             context.sink.add(Severity::Warning, "unused", constant.span, || {
                 Diagnostic::warning(
                     "unused",
@@ -75,38 +88,6 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
                 )
             });
         }
-    }
-    targets(context, ir);
-}
-
-/// Warns of integers that are read as floats, as where `mov x, 1` means 1.0: 1 is the bits of 1.4e-45.
-pub(crate) fn integers(context: &mut Context, ir: &Ir) {
-    let suspects = std::mem::take(&mut context.integers);
-    if suspects.is_empty() {
-        return;
-    }
-    let mut as_float: Vec<bool> =
-        ir.registers.iter().map(|register| register.kind == RegisterKind::Output).collect();
-    for operation in ir.operations() {
-        for (index, source) in operation.reads().iter().enumerate() {
-            as_float[source.index()] |= operation.row().source_type(index) == Type::F;
-        }
-    }
-    for Integer { value, to, scope, span } in suspects {
-        let bits = f32::from_bits(value as u32);
-        // The pattern of an ordinary number, as `bits(0.5)` gives it, is meant.
-        if !as_float[to.index()] || !(bits.is_subnormal() || bits.is_nan()) {
-            continue;
-        }
-        let register = ir.register(to);
-        let name = text(ir, register);
-        let what = if register.kind == RegisterKind::Output { "is" } else { "is read as" };
-        let message = format!("the integer {value} goes to `{name}`, which {what} a float");
-        let warning = Diagnostic::warning("integer-in-float", span, message)
-            .also(register.span, "declared here")
-            .note(format!("as binary32 its bits are {bits:e}"))
-            .help(format!("write `{value}.0`, or declare `{name}:int` if it is an integer"));
-        context.report(scope, warning);
     }
 }
 
@@ -126,11 +107,11 @@ fn operand(context: &Context, operation: &Operation, wanted: impl Fn(&Operand) -
     written().unwrap_or(operation.span)
 }
 
-fn dest_span(context: &Context, operation: &Operation) -> Span {
+pub(crate) fn dest_span(context: &Context, operation: &Operation) -> Span {
     operand(context, operation, |operand| *operand == Operand::Dest)
 }
 
-fn source_span(context: &Context, operation: &Operation, which: usize) -> Span {
+pub(crate) fn source_span(context: &Context, operation: &Operation, which: usize) -> Span {
     operand(context, operation, |operand| match operand {
         Operand::Source(source) => *source == which,
         Operand::Memory => which == 0,
@@ -145,7 +126,7 @@ fn two_slots(
     operation: &Operation,
     (slot, owner): (u8, u8),
     first: &Operation,
-    help: Option<&str>,
+    homeless: Option<&Homeless>,
 ) {
     let Some(dest) = operation.dest else { return };
     let slots = ir.machine.slots;
@@ -160,10 +141,13 @@ fn two_slots(
     let writes = |by: &takt_isa::Slot, operation: &Operation| {
         format!("`{}` is of slot `{}`, which writes bank {}", operation.row().mnemonic, by.name, by.bank.name)
     };
-    let error = Diagnostic::error("two-slots", span, message)
+    let mut error = Diagnostic::error("two-slots", span, message)
         .here(writes(slot, operation))
         .also(before, writes(owner, first))
-        .help(help.unwrap_or("use two registers"));
+        .help(homeless.map_or("use two registers", |homeless| &homeless.help));
+    if let Some((span, because)) = homeless.and_then(|homeless| homeless.because.as_ref()) {
+        error = error.also(*span, because);
+    }
     context.report(ScopeId(operation.expansion), error);
 }
 
@@ -186,7 +170,7 @@ fn reach(context: &mut Context, ir: &Ir, operation: &Operation, dest: RegisterId
     context.report(ScopeId(operation.expansion), error.help(help));
 }
 
-fn text(ir: &Ir, register: &Register) -> String {
+pub(crate) fn text(ir: &Ir, register: &Register) -> String {
     if !register.name.is_empty() {
         return register.name.clone();
     }
@@ -194,18 +178,17 @@ fn text(ir: &Ir, register: &Register) -> String {
     format!("@{place}")
 }
 
-/// Registers that are never used, never written or never read.
-fn never(context: &mut Context, ir: &Ir, register: &Register, found: &Use, uses: &[Use]) {
+/// Registers that are never used, outputs that are never written, and what is written and never read.
+fn unused(context: &mut Context, register: &Register, found: &Use) {
     let name = &register.name;
-    let (read, written) = (found.read.is_some(), found.written.is_some() || register.preset.is_some());
+    let (read, written) = (found.read.is_some(), is_written(register, found));
     let message = match register.kind {
         RegisterKind::Zero | RegisterKind::Constant(_) => return,
         RegisterKind::Input if !read => format!("input `{name}` is never read"),
         RegisterKind::Output if !written => format!("output `{name}` is never written"),
         RegisterKind::Input | RegisterKind::Output => return,
         RegisterKind::Plain | RegisterKind::State => match (read, written) {
-            (true, true) => return,
-            (true, false) => return unwritten(context, ir, register, found, uses),
+            (true, _) => return,
             (false, false) => format!("register `{name}` is never used"),
             (false, true) => format!("register `{name}` is written and never read"),
         },
@@ -217,9 +200,17 @@ fn never(context: &mut Context, ir: &Ir, register: &Register, found: &Use, uses:
     }
 }
 
+/// Whether a register gets a value: from an operation or the loader.
+fn is_written(register: &Register, found: &Use) -> bool {
+    found.written.is_some() || register.preset.is_some()
+}
+
 /// A register that is read and that nothing writes. By giving it a place, one says that one knows.
 fn unwritten(context: &mut Context, ir: &Ir, register: &Register, found: &Use, uses: &[Use]) {
-    let Some((place, which)) = found.read else { return };
+    let is_register = matches!(register.kind, RegisterKind::Plain | RegisterKind::State);
+    let Some((place, which)) = found.read.filter(|_| is_register && !is_written(register, found)) else {
+        return;
+    };
     if register.pinned.is_some_and(|address| ir.machine.is_input(address)) {
         return;
     }
@@ -261,16 +252,21 @@ fn state(context: &mut Context, ir: &Ir, register: &Register, found: &Use) {
     context.sink.push(error);
 }
 
+/// The bundle that an operation may continue at.
+fn target(ir: &Ir, operation: &Operation) -> Option<u32> {
+    let target = match operation.constant {
+        Constant::Value(target) => target,
+        Constant::Code(label) => ir.labels[label.0 as usize].position,
+        Constant::None | Constant::Raw(_) => return None,
+    };
+    operation.row().shape.fields().contains(&Field::Target).then_some(target)
+}
+
 /// Targets where there is no bundle.
 fn targets(context: &mut Context, ir: &Ir) {
     let end = ir.bundles.len() as u32;
     for operation in ir.operations() {
-        let target = match operation.constant {
-            Constant::Value(target) => target,
-            Constant::Code(label) => ir.labels[label.0 as usize].position,
-            Constant::None | Constant::Raw(_) => continue,
-        };
-        if target >= end && operation.row().shape.fields().contains(&Field::Target) {
+        if target(ir, operation).is_some_and(|target| target >= end) {
             let span = operand(context, operation, |operand| *operand == Operand::Target);
             let message = "this continues past the end of the program";
             let warning =
@@ -278,4 +274,39 @@ fn targets(context: &mut Context, ir: &Ir) {
             context.report(ScopeId(operation.expansion), warning);
         }
     }
+}
+
+/// A period that never comes to a `wait` has no end.
+fn no_wait(context: &mut Context, ir: &Ir) {
+    let ends = |operation: &Operation| matches!(operation.row().effect, Effect::Wait | Effect::Halt);
+    let mut seen = vec![false; ir.bundles.len()];
+    let mut reached = vec![ir.period];
+    while let Some(index) = reached.pop() {
+        let Some(bundle) = ir.bundles.get(index as usize) else { continue };
+        if std::mem::replace(&mut seen[index as usize], true) {
+            continue;
+        }
+        if bundle.operations.iter().any(ends) {
+            return;
+        }
+        // A call comes back.
+        let goes_on = |operation: &Operation| {
+            operation.row().effect.falls_through() || operation.row().effect == Effect::Call
+        };
+        if bundle.operations.iter().all(goes_on) {
+            reached.push(index + 1);
+        }
+        reached.extend(bundle.operations.iter().filter_map(|operation| target(ir, operation)));
+    }
+    let Some(first) = ir.bundles.get(ir.period as usize).and_then(|bundle| bundle.operations.first()) else {
+        return;
+    };
+    let wait = ROWS.iter().find(|row| row.effect == Effect::Wait).map_or("", |row| row.mnemonic);
+    let start = ir.labels.iter().find(|label| label.space == Space::Code && label.position == ir.period);
+    let start = start.map_or("LABEL", |label| &label.name);
+    let warning = Diagnostic::warning("no-wait", first.span, format!("`.period` never comes to a `{wait}`"))
+        .here("it begins here")
+        .note("a period ends where the machine waits for the tick; without it, periods have no cycles and no outputs")
+        .help(format!("end it with `{wait} {start}`"));
+    context.report(ScopeId(first.expansion), warning);
 }

@@ -7,11 +7,15 @@ use crate::intern::{Interner, NameId};
 use crate::ir::{LabelId, Register, RegisterId, RegisterKind};
 use crate::limits;
 use crate::source::{Sources, Span};
+use crate::types::GivenTypes;
 use crate::unknown::{Unknown, Wanted};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
 use takt_isa::program::Space;
-use takt_isa::{Machine, Type, ZERO};
+use takt_isa::{Machine, Op, Type, ZERO};
+
+/// What stands before a mnemonic in the name of the constant that says whether the machine has the instruction.
+pub(crate) const HAS: &str = "has.";
 
 /// An expansion: what a use of a macro, or one turn of a repetition, adds to the names around it.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -64,6 +68,8 @@ pub(crate) enum Binding {
     Count(i64),
     /// `pi` and the like.
     Builtin(u32),
+    /// Whether the machine has the instruction that the name asks for.
+    Has(bool),
 }
 
 #[derive(Clone, Debug)]
@@ -86,15 +92,6 @@ pub(crate) struct Argument {
     pub(crate) value: Option<Value>,
 }
 
-/// An integer constant that an operation which takes any bits brings to a register.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Integer {
-    pub(crate) value: i64,
-    pub(crate) to: RegisterId,
-    pub(crate) scope: ScopeId,
-    pub(crate) span: Span,
-}
-
 /// The mistake is in the report.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Reported;
@@ -111,17 +108,25 @@ pub(crate) struct Context {
     locals: HashMap<(u32, NameId), Binding>,
     pub(crate) constants: Vec<NamedConstant>,
     pub(crate) arguments: Vec<Argument>,
+    /// Parameters of macros' uses that stand for registers, as far as operations use them.
+    pub(crate) parameters: HashMap<(ScopeId, NameId), RegisterId>,
     pub(crate) registers: Vec<Register>,
     /// Registers with a given address.
     pub(crate) by_address: HashMap<u16, RegisterId>,
+    /// Outputs with a given number.
+    pub(crate) numbered: BTreeMap<u16, RegisterId>,
     /// Labels. While the source is read a code label's position counts the statements of its section.
     pub(crate) labels: Vec<crate::ir::Label>,
     /// The section of each label.
     pub(crate) label_sections: Vec<Section>,
     pub(crate) macros: HashMap<NameId, crate::expand::MacroDefinition>,
     pub(crate) unknown: Vec<Unknown>,
-    /// Integers in the place of an operand of any type, and the registers that they reach.
-    pub(crate) integers: Vec<Integer>,
+    /// What the source says of the types of operands that the instruction leaves open.
+    pub(crate) given: GivenTypes,
+    /// Registers that are declared with a type, rather than as floats by default.
+    pub(crate) typed: HashSet<RegisterId>,
+    /// The types of the words of data memory.
+    pub(crate) data_types: Vec<Type>,
     /// Unknown names beyond those that are kept.
     pub(crate) more_unknown: usize,
     /// Arguments and templates under evaluation, one within the other.
@@ -158,13 +163,17 @@ impl Context {
             locals: HashMap::new(),
             constants: Vec::new(),
             arguments: Vec::new(),
+            parameters: HashMap::new(),
             registers: vec![register],
             by_address: HashMap::from([(ZERO, RegisterId::ZERO)]),
+            numbered: BTreeMap::new(),
             labels: Vec::new(),
             label_sections: Vec::new(),
             macros: HashMap::new(),
             unknown: Vec::new(),
-            integers: Vec::new(),
+            given: GivenTypes::default(),
+            typed: HashSet::new(),
+            data_types: Vec::new(),
             more_unknown: 0,
             depth: 0,
         };
@@ -241,10 +250,16 @@ impl Context {
         match self.globals.get(name.0 as usize) {
             Some(Binding::None) | None => match name.builtin() {
                 Some(builtin) => Binding::Builtin(builtin as u32),
-                None => Binding::None,
+                None => self.has(name).map_or(Binding::None, Binding::Has),
             },
             Some(binding) => *binding,
         }
+    }
+
+    /// Whether the machine has an instruction, where the name asks for that: `has.` and a mnemonic.
+    fn has(&self, name: NameId) -> Option<bool> {
+        let row = Op::from_mnemonic(self.names.text(name).strip_prefix(HAS)?)?.row();
+        Some(row.function == takt_isa::Function::Idle || self.machine.host(row.function).is_some())
     }
 
     /// Binds a name in a scope, without asking whether it is bound.
@@ -301,7 +316,7 @@ impl Context {
             Binding::Constant(id) => Some(self.constants[id as usize].span),
             Binding::Code(id) | Binding::Data(id) => Some(self.labels[id.0 as usize].span),
             Binding::Argument(id) => Some(self.arguments[id as usize].operand.span),
-            Binding::None | Binding::Count(_) | Binding::Builtin(_) => None,
+            Binding::None | Binding::Count(_) | Binding::Builtin(_) | Binding::Has(_) => None,
         }
     }
 
@@ -314,7 +329,7 @@ impl Context {
                 RegisterKind::Zero => "the register that always reads as zero",
                 _ => "a register",
             },
-            Binding::Constant(_) | Binding::Builtin(_) => "a constant",
+            Binding::Constant(_) | Binding::Builtin(_) | Binding::Has(_) => "a constant",
             Binding::Code(_) => "a code label",
             Binding::Data(_) => "a data label",
             Binding::Argument(_) => "a parameter",
@@ -326,10 +341,15 @@ impl Context {
     /// The text of a name declared in a scope, as the symbol map shows it: unique to a macro's use.
     pub(crate) fn full_name(&self, scope: ScopeId, name: NameId) -> String {
         let text = self.names.text(name);
+        self.scope_name(scope).map_or_else(|| text.to_owned(), |scope| format!("{scope}.{text}"))
+    }
+
+    /// What stands before the names that are declared in a scope: the macro and which of its uses; `None` outside of macros.
+    pub(crate) fn scope_name(&self, scope: ScopeId) -> Option<String> {
         let owner = self.scope(scope).owner;
         match self.scope(owner).kind {
-            ScopeKind::Macro(of, number) => format!("{}.{number}.{text}", self.names.text(of)),
-            _ => text.to_owned(),
+            ScopeKind::Macro(of, number) => Some(format!("{}.{number}", self.names.text(of))),
+            _ => None,
         }
     }
 
@@ -436,6 +456,19 @@ impl Context {
         }
     }
 
+    /// The type of a name.
+    pub(crate) fn type_named(&mut self, at: At, ty: Name) -> Result<Type, Reported> {
+        let text = self.sources.text(ty.span).to_owned();
+        let types = [Type::F, Type::I, Type::B];
+        if let Some(ty) = types.into_iter().find(|ty| type_name(*ty) == text) {
+            return Ok(ty);
+        }
+        let error = Diagnostic::error("type", ty.span, format!("`{text}` is not a type"))
+            .note(format!("types: {}", types.map(type_name).join(" ")))
+            .did_you_mean(nearest(&text, types.map(type_name)));
+        Err(self.report(at.scope, error))
+    }
+
     /// Reports why an expression has no value.
     pub(crate) fn fault(&mut self, scope: ScopeId, EvalError { span, fault }: EvalError) -> Reported {
         let help = match &fault {
@@ -489,6 +522,7 @@ impl Context {
         match self.lookup(scope, name) {
             Binding::Count(value) => Ok(Value::Int(value)),
             Binding::Builtin(builtin) => Ok(BUILTINS[builtin as usize].1),
+            Binding::Has(has) => Ok(Value::Int(has.into())),
             Binding::Constant(id) => {
                 let constant = &mut self.constants[id as usize];
                 constant.used = true;
@@ -526,7 +560,7 @@ impl Context {
                 let name = context.name(at, name, operand.span)?;
                 context.name_value(at.scope, name, operand.span)
             })?,
-            OperandKind::Place(_) | OperandKind::Memory(_) => {
+            OperandKind::Place(_) | OperandKind::Memory(_) | OperandKind::Cast(_) => {
                 let error = Diagnostic::error("not-a-value", span, "a value is needed here")
                     .also(operand.span, "the argument is an operand without one");
                 return Err(self.report(at.scope, error));
@@ -555,6 +589,15 @@ impl expr::Names for Environment<'_> {
             span,
             fault: Fault::UnknownFunction(self.context.names.text(name).to_owned()),
         })
+    }
+}
+
+/// A type as the source writes it.
+pub(crate) const fn type_name(ty: Type) -> &'static str {
+    match ty {
+        Type::F => "float",
+        Type::I => "int",
+        Type::B => "bits",
     }
 }
 

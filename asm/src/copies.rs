@@ -109,8 +109,11 @@ fn put(
     let length = |places: &[Place]| issue(places).last().copied().unwrap_or(0);
     let before = if run.scheduled { 0 } else { length(places) };
     let writer = places.iter().position(|place| place.origin == Some(copy.at.0))?;
-    let is_late = |place: &Place| place.origin.is_some_and(|origin| origin >= limit);
-    let mut end = places.iter().position(is_late).unwrap_or(places.len());
+    let is_late = |place: &Place| {
+        place.origin.is_some_and(|origin| origin >= limit)
+            || place.bundle.operations.iter().any(Operation::redirects)
+    };
+    let mut end = (writer + 1..places.len()).find(|&at| is_late(&places[at])).unwrap_or(places.len());
     // A redirection is issued after the copy.
     let bundle = &mut places[writer].bundle;
     if bundle.operations.iter().any(Operation::redirects) {

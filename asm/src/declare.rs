@@ -3,7 +3,7 @@
 
 use crate::ast::*;
 use crate::context::{At, Binding, Context, Reported};
-use crate::diag::{Diagnostic, nearest};
+use crate::diag::Diagnostic;
 use crate::expand::{Data, Expander};
 use crate::ir::{Register, RegisterId, RegisterKind};
 use crate::limits;
@@ -55,27 +55,98 @@ impl Expander<'_> {
         let name = self.context.full_name(at.scope, id);
         self.context.registers.push(Register { name, kind, ty: Type::F, pinned: None, preset: None, span });
         if let Some(ty) = declaration.ty {
-            self.context.registers[register.index()].ty = self.register_type(at, ty)?;
+            self.context.registers[register.index()].ty = self.context.type_named(at, ty)?;
+            self.context.typed.insert(register);
         }
-        if let Some(place) = declaration.place {
-            let address = address(&mut self.context, at, place)?;
-            self.pin(at, register, address, place.span)?;
+        match declaration.place {
+            Some(place) => self.place(at, register, place),
+            None => Ok(()),
         }
+    }
+
+    /// What follows the `@` of a declaration: a register's canonical name, or a port's number.
+    fn place(&mut self, at: At, register: RegisterId, place: Expr) -> Result<(), Reported> {
+        let name = match self.context.asts[at.ast as usize].nodes[place.id.range()] {
+            [Node { kind: NodeKind::Name(name), span }] => Some(Name { name, span }),
+            _ => None,
+        };
+        if let Some(name) = name {
+            let id = self.context.name(at, name.name, name.span)?;
+            let is_register = self.context.machine.register_address(self.context.names.text(id)).is_some();
+            let binding = self.context.lookup(at.scope, id);
+            // What is neither a register nor a number is taken for a register's name misspelt.
+            let is_number =
+                matches!(binding, Binding::Constant(_) | Binding::Count(_) | Binding::Argument(_));
+            if is_register || !is_number {
+                let address = address(&mut self.context, at, name)?;
+                return self.pin(at, register, address, place.span);
+            }
+        }
+        let number = self.context.integer(at, place)?;
+        self.number(at, register, number, place.span)
+    }
+
+    /// Gives a port its number.
+    fn number(&mut self, at: At, register: RegisterId, number: i64, span: Span) -> Result<(), Reported> {
+        let machine = self.context.machine;
+        let (what, count) = match self.context.registers[register.index()].kind {
+            RegisterKind::Input => ("input", machine.input_count()),
+            RegisterKind::Output => ("output", machine.outputs_per_bank),
+            _ => {
+                let error = Diagnostic::error(
+                    "place",
+                    span,
+                    format!("`{number}` is no place: only ports have numbers"),
+                )
+                .help(format!("a register's place is its name, as `@ {}3`", machine.slots[0].bank.name));
+                return Err(self.context.report(at.scope, error));
+            }
+        };
+        let Some(number) = u16::try_from(number).ok().filter(|number| *number < count) else {
+            let message = format!("{} has no {what} {number}", machine.name);
+            let error = Diagnostic::error("place", span, message)
+                .note(format!("{what}s have the numbers 0 to {}", count - 1));
+            return Err(self.context.report(at.scope, error));
+        };
+        if what == "input" {
+            return self.pin(at, register, machine.inputs.base + number, span);
+        }
+        self.take_number(at, register, number, span)
+    }
+
+    /// Takes the number of an output port for it.
+    fn take_number(&mut self, at: At, register: RegisterId, number: u16, span: Span) -> Result<(), Reported> {
+        if let Some(other) = self.context.numbered.get(&number) {
+            let Register { name, span: first, .. } = &self.context.registers[other.index()];
+            let error = Diagnostic::error("place", span, format!("output {number} is taken"))
+                .also(*first, format!("by `{name}`"))
+                .note("an output has one number, whichever slot writes it");
+            return Err(self.context.report(at.scope, error));
+        }
+        self.context.numbered.insert(number, register);
         Ok(())
     }
 
-    fn register_type(&mut self, at: At, ty: Name) -> Result<Type, Reported> {
-        let text = self.context.sources.text(ty.span).to_owned();
-        match text.as_str() {
-            "float" => Ok(Type::F),
-            "int" => Ok(Type::I),
-            "bits" => Ok(Type::B),
-            _ => {
-                let meant = nearest(&text, ["float", "int", "bits"]);
-                let error = Diagnostic::error("type", ty.span, format!("`{text}` is not a type"))
-                    .note("types: float int bits")
-                    .did_you_mean(meant);
+    /// `.ports`: whether they are latched.
+    pub(crate) fn ports(&mut self, at: At, word: Name) -> Result<(), Reported> {
+        let name = self.context.name(at, word.name, word.span)?;
+        let latched = match self.context.names.text(name) {
+            "latched" => true,
+            "direct" => false,
+            other => {
+                let message = format!("`.ports` is `latched` or `direct`, not `{other}`");
+                return Err(self.context.error(at.scope, "ports", word.span, message));
+            }
+        };
+        match self.flat.ports {
+            Some((before, first)) if before != latched => {
+                let error = Diagnostic::error("ports", word.span, "ports are latched or direct, all of them")
+                    .also(first, "said otherwise here");
                 Err(self.context.report(at.scope, error))
+            }
+            _ => {
+                self.flat.ports.get_or_insert((latched, word.span));
+                Ok(())
             }
         }
     }
@@ -110,33 +181,12 @@ impl Expander<'_> {
                 .also(first, format!("by `{what}`"));
             return Err(self.context.report(at.scope, error));
         }
+        if let Some(number) = machine.output_number(address) {
+            self.take_number(at, register, number, span)?;
+        }
         self.context.by_address.insert(address, register);
         self.context.registers[register.index()].pinned = Some(address);
         Ok(())
-    }
-
-    /// The register that a `.preset` names, by its name or its place.
-    pub(crate) fn preset_register(
-        &mut self,
-        at: At,
-        name: Name,
-        placed: bool,
-    ) -> Result<(RegisterId, Type), Reported> {
-        let id = self.context.name(at, name.name, name.span)?;
-        if !placed && let Binding::Register(register) = self.context.lookup(at.scope, id) {
-            let Register { kind, ty, .. } = self.context.registers[register.index()];
-            if kind == RegisterKind::Zero {
-                let error = Diagnostic::error("place", name.span, "`zero` always reads as zero");
-                return Err(self.context.report(at.scope, error));
-            }
-            return Ok((register, ty));
-        }
-        let address = address(&mut self.context, at, name)?;
-        if address == ZERO {
-            let error = Diagnostic::error("place", name.span, "`zero` always reads as zero");
-            return Err(self.context.report(at.scope, error));
-        }
-        Ok((register_at(&mut self.context, address, name.span), Type::B))
     }
 }
 
@@ -184,6 +234,6 @@ fn ports_text(machine: &Machine) -> String {
         })
         .collect();
     let inputs = machine.inputs;
-    let last = inputs.depth - 1 - u16::from(inputs.contains(ZERO));
+    let last = machine.input_count() - 1;
     format!("inputs: {0}0…{0}{last}; outputs: {1}", inputs.name, outputs.join(", "))
 }

@@ -3,6 +3,7 @@
 //! Nothing here prints. [`Diagnostics::render`] makes the text for a terminal, with or without colour;
 //! [`Diagnostics::messages`] makes plain data for serde.
 
+use crate::levels::{Level, Levels, WARNINGS};
 use crate::limits;
 use crate::source::{Lines, Sources, Span};
 use codespan_reporting::diagnostic as codespan;
@@ -65,6 +66,8 @@ impl Diagnostic {
     }
 
     /// A warning at a place.
+    ///
+    /// `code` is one of [`WARNINGS`].
     pub fn warning(code: &'static str, span: Span, message: impl Into<String>) -> Diagnostic {
         Diagnostic { severity: Severity::Warning, ..Diagnostic::error(code, span, message) }
     }
@@ -125,16 +128,13 @@ pub struct Sink {
     pub errors: usize,
     /// Warnings met, those not kept included.
     pub warnings: usize,
+    /// What becomes of warnings. One that is an error becomes it in the end, so that it hides no other.
+    pub levels: Levels,
+    /// Of the warnings those that are errors.
+    denied: usize,
 }
 
 impl Sink {
-    /// Takes its help from the last diagnostic.
-    pub(crate) fn drop_help(&mut self) {
-        if let Some(last) = self.kept.last_mut() {
-            last.help = None;
-        }
-    }
-
     /// Whether a further diagnostic of this severity would be kept: if not, its text need not be made.
     pub fn keeps(&self, severity: Severity) -> bool {
         match severity {
@@ -155,6 +155,14 @@ impl Sink {
         if self.seen.contains(&(code, span)) {
             return;
         }
+        if severity == Severity::Warning {
+            debug_assert!(WARNINGS.iter().any(|warning| warning.0 == code), "{code} is in the table");
+            match self.levels.of(code) {
+                Level::Allow => return,
+                Level::Warn => {}
+                Level::Error => self.denied += 1,
+            }
+        }
         if self.keeps(severity) {
             self.seen.insert((code, span));
             self.kept.push(make());
@@ -173,9 +181,14 @@ impl Sink {
     /// The report, in the order of the sources.
     pub fn finish(mut self, sources: Arc<Sources>) -> Diagnostics {
         self.kept.sort_by_key(Diagnostic::span);
+        for diagnostic in &mut self.kept {
+            if diagnostic.severity == Severity::Warning && self.levels.of(diagnostic.code) == Level::Error {
+                diagnostic.severity = Severity::Error;
+            }
+        }
         let shown = |severity| self.kept.iter().filter(|d| d.severity == severity).count();
-        let more_errors = self.errors - shown(Severity::Error);
-        let more_warnings = self.warnings - shown(Severity::Warning);
+        let more_errors = self.errors + self.denied - shown(Severity::Error);
+        let more_warnings = self.warnings - self.denied - shown(Severity::Warning);
         Diagnostics { sources, list: self.kept, more_errors, more_warnings }
     }
 }

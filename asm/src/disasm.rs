@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use std::fmt::Write as _;
 use takt_isa::program::{Location, Port, Space};
 use takt_isa::spec::instructions::Function;
-use takt_isa::{Instruction, Op, Program, Type};
+use takt_isa::{Effect, Instruction, Op, Program, Type, ZERO};
 
 /// The source text of a program.
 ///
@@ -67,7 +67,10 @@ impl<'p> Writer<'p> {
     }
 
     fn declarations(&mut self) {
-        let Program { inputs, outputs, registers, constants, files, .. } = self.program;
+        let Program { inputs, outputs, registers, constants, files, latched, .. } = self.program;
+        if *latched {
+            self.line(format_args!(".ports  latched"));
+        }
         for (directive, ports) in [(".input", inputs), (".output", outputs), (".reg", registers)] {
             for Port { name, register, ty } in ports {
                 let ty = match ty {
@@ -180,9 +183,13 @@ impl<'p> Writer<'p> {
         if function == Function::Idle || machine.host(function)?.0 != slot {
             return None;
         }
+        let is_access = matches!(instruction.effect(), Effect::Load | Effect::Store);
+        if is_access && instruction.sources[0] == ZERO && instruction.constant >= machine.data_depth {
+            return None;
+        }
         let register = |address: u16| match self.registers.get(&address) {
             Some(name) => (*name).to_owned(),
-            None if address == takt_isa::ZERO => self.place(address),
+            None if address == ZERO => self.place(address),
             None => format!("@{}", self.place(address)),
         };
         let target = |address: u32| match self.targets.get(&address) {

@@ -13,6 +13,8 @@ use takt_isa::{Instruction, Program, ZERO};
 pub(crate) struct Emitted {
     pub(crate) program: Program,
     pub(crate) expanded: Vec<u32>,
+    /// For each word that has a source line, its operation's order and expansion.
+    pub(crate) origins: Vec<Option<(u32, u32)>>,
 }
 
 /// Writes the program.
@@ -22,6 +24,7 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
     let mut code = vec![filler; ir.bundles.len() * slots];
     let mut lines = vec![None; ir.bundles.len() * slots];
     let mut expanded = Vec::new();
+    let mut origins = vec![None; ir.bundles.len() * slots];
     for (address, bundle) in ir.bundles.iter().enumerate() {
         let words = address * slots..(address + 1) * slots;
         let mut free = 0;
@@ -43,6 +46,7 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
             }
             code[index] = word(ir, operation, slot, placement, sink);
             lines[index] = operation.location;
+            origins[index] = operation.location.map(|_| (operation.order, operation.expansion));
             if operation.expansion != 0 || operation.made {
                 expanded.push(index as u32);
             }
@@ -57,6 +61,7 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
         constants: constants(ir, placement),
         inputs: ports(ir, placement, |kind| kind == RegisterKind::Input),
         outputs: ports(ir, placement, |kind| kind == RegisterKind::Output),
+        latched: ir.latched,
         registers: ports(ir, placement, |kind| matches!(kind, RegisterKind::Plain | RegisterKind::State)),
         symbols: symbols(ir),
         sections: sections(ir),
@@ -65,7 +70,7 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
         lines,
     };
     distinguish(&mut program);
-    Emitted { program, expanded }
+    Emitted { program, expanded, origins }
 }
 
 fn word(ir: &Ir, operation: &Operation, slot: usize, placement: &Placement, sink: &mut Sink) -> u64 {
@@ -96,8 +101,14 @@ fn word(ir: &Ir, operation: &Operation, slot: usize, placement: &Placement, sink
     }
 }
 
+/// Whether no packing of the operations fits the program memory.
+pub(crate) fn is_too_long(ir: &Ir) -> bool {
+    let words = (ir.machine.code_depth as usize).saturating_mul(ir.machine.slots.len());
+    ir.operations().filter(|operation| operation.slot.is_some()).count() > words
+}
+
 /// The memories of the machine hold only so much.
-fn limits(ir: &Ir, sink: &mut Sink) {
+pub(crate) fn limits(ir: &Ir, sink: &mut Sink) {
     let depth = ir.machine.code_depth as usize;
     if ir.bundles.len() > depth {
         let first = ir.bundles[depth].operations.first().map_or(Span::default(), |operation| operation.span);

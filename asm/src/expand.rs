@@ -10,7 +10,7 @@ use crate::context::{
 use crate::diag::Diagnostic;
 use crate::files::FileId;
 use crate::intern::NameId;
-use crate::ir::{Label, LabelId, RegisterId};
+use crate::ir::{Label, LabelId};
 use crate::limits;
 use crate::load::{Loader, include_path};
 use crate::source::Span;
@@ -51,10 +51,10 @@ pub(crate) struct LoopBound {
 /// A `.preset`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Preset {
-    pub(crate) register: RegisterId,
+    pub(crate) register: Name,
+    /// Whether `@` stands before it.
+    pub(crate) placed: bool,
     pub(crate) value: Expr,
-    /// What the value becomes: a named register has a type, a place has any.
-    pub(crate) ty: Type,
     pub(crate) at: At,
     pub(crate) span: Span,
 }
@@ -76,6 +76,8 @@ pub(crate) struct Flat {
     pub(crate) presets: Vec<Preset>,
     pub(crate) loop_bounds: Vec<LoopBound>,
     pub(crate) timing: Vec<Timing>,
+    /// What `.ports` says, `latched` or not, and where.
+    pub(crate) ports: Option<(bool, Span)>,
     /// What each `.loc` says; the first is none at all.
     pub(crate) locs: Vec<Vec<Option<(u32, u32)>>>,
     /// Files that `.loc` names, in order, then those whose own lines are code.
@@ -168,6 +170,7 @@ impl<'l> Expander<'l> {
             presets: Vec::new(),
             loop_bounds: Vec::new(),
             timing: Vec::new(),
+            ports: None,
             locs: vec![Vec::new()],
             files: Vec::new(),
             file_numbers: HashMap::new(),
@@ -468,8 +471,9 @@ impl<'l> Expander<'l> {
                 });
             }
             DirectiveKind::Preset { register, placed, value } => {
-                let (register, ty) = self.preset_register(at, *register, *placed)?;
-                self.flat.presets.push(Preset { register, value: *value, ty, at, span });
+                // Registers may be declared further down.
+                let (register, placed, value) = (*register, *placed, *value);
+                self.flat.presets.push(Preset { register, placed, value, at, span });
             }
             DirectiveKind::Section(section) => self.section = *section,
             DirectiveKind::Float(values) => self.data(at, values, Type::F, span)?,
@@ -539,6 +543,7 @@ impl<'l> Expander<'l> {
                     }
                 }
             }
+            DirectiveKind::Ports(word) => self.ports(at, *word)?,
             DirectiveKind::LoopBound(most) => self.loop_bound(at, *most, span)?,
             DirectiveKind::Deadline(..) | DirectiveKind::Order(_) | DirectiveKind::Late(..) => {
                 if self.section == Section::Data {

@@ -28,7 +28,12 @@ pub(crate) struct Flow {
 
 /// Whether a target is a number: then every bundle must stay at its address.
 pub(crate) fn jumps_to_numbers(ir: &Ir) -> bool {
-    ir.operations().any(|operation| target(operation).is_some_and(|target| target.is_err()))
+    ir.operations().any(|operation| number(operation).is_some())
+}
+
+/// The bundle that an operation may continue at, if the source gives it as a number.
+pub(crate) fn number(operation: &Operation) -> Option<u32> {
+    target(operation)?.err()
 }
 
 /// The bundle that an operation may continue at: by its label, or else by number.

@@ -36,6 +36,7 @@ pub(crate) struct Mark {
     operands: u32,
     operations: u32,
     memories: u32,
+    casts: u32,
     templates: u32,
 }
 
@@ -47,6 +48,7 @@ impl Builder<'_> {
             operands: self.ast.operands.len() as u32,
             operations: self.ast.operations.len() as u32,
             memories: self.ast.memories.len() as u32,
+            casts: self.ast.casts.len() as u32,
             templates: self.ast.templates.len() as u32,
         }
     }
@@ -57,6 +59,7 @@ impl Builder<'_> {
         self.ast.operands.truncate(mark.operands as usize);
         self.ast.operations.truncate(mark.operations as usize);
         self.ast.memories.truncate(mark.memories as usize);
+        self.ast.casts.truncate(mark.casts as usize);
         self.ast.templates.truncate(mark.templates as usize);
     }
 
@@ -398,7 +401,18 @@ pub(crate) fn line<'t, 'a: 't, E: LineError<'t>>(
         let builder: &mut Builder<'a> = e.state();
         builder.expression_operand(first, span)
     }));
+    let ty = just(Token::Colon).labelled("`:`").ignore_then(name.clone().labelled("a type")).or_not().boxed();
+    let cast = |(operand, ty): (Operand, Option<Name>),
+                e: &mut MapExtra<'t, '_, Tokens<'t>, Extra<'a, E>>| {
+        let Some(ty) = ty else { return operand };
+        let span = e.span();
+        let casts = &mut e.state().ast.casts;
+        casts.push(Cast { operand, ty });
+        Operand { kind: OperandKind::Cast(casts.len() as u32 - 1), span }
+    };
     let brackets = base
+        .then(ty.clone())
+        .map_with(cast)
         .labelled("a register")
         .delimited_by(just(Token::BracketOpen), just(Token::BracketClose).labelled("`]`"))
         .boxed();
@@ -427,6 +441,8 @@ pub(crate) fn line<'t, 'a: 't, E: LineError<'t>>(
         Operand { kind: OperandKind::Memory(builder.ast.memories.len() as u32 - 1), span }
     });
     let operand = choice((place.clone(), memory_alone, memory_or_expression))
+        .then(ty)
+        .map_with(cast)
         .map_with(|operand, e| (e.state() as &mut Builder<'a>).ast.operands.push(operand))
         .labelled("an operand")
         .boxed();
@@ -512,7 +528,10 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
         .clone()
         .then(just(Token::Colon).labelled("`:`").ignore_then(name.clone().labelled("a type")).or_not())
         .then(
-            just(Token::At).labelled("`@`").ignore_then(name.clone().labelled("a register's place")).or_not(),
+            just(Token::At)
+                .labelled("`@`")
+                .ignore_then(expr.clone().labelled("a register's place or a port's number"))
+                .or_not(),
         )
         .map(|((name, ty), place)| Declaration { name, ty, place });
     // Separated by blanks or commas.
@@ -571,6 +590,9 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
     let schedule = is(Directive::Schedule)
         .ignore_then(name.clone().labelled("`on` or `off`"))
         .map(DirectiveKind::Schedule);
+    let latched = is(Directive::Ports)
+        .ignore_then(name.clone().labelled("`latched` or `direct`"))
+        .map(DirectiveKind::Ports);
     let loop_bound = is(Directive::LoopBound).ignore_then(expr.clone()).map(DirectiveKind::LoopBound);
     let ports = || {
         let more = comma().or_not().ignore_then(name.clone()).repeated().collect::<Vec<_>>();
@@ -599,7 +621,7 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
         .map(DirectiveKind::Loc);
     choice((
         bare, declare, float, word, constant, preset, space, branch, elif, rep, macro_, include, error, loc,
-        schedule, loop_bound, deadline, order, late,
+        schedule, latched, loop_bound, deadline, order, late,
     ))
     .map_with(|kind, e| Body::Directive(kind, e.span()))
 }

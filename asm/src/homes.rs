@@ -8,6 +8,7 @@
 
 use crate::flow::{self, Flow};
 use crate::ir::{Constant, Ir, Operation, Register, RegisterId, RegisterKind};
+use crate::listing;
 use crate::source::Span;
 use crate::values::{self, Run};
 use std::collections::HashSet;
@@ -48,6 +49,27 @@ pub enum Made {
     },
 }
 
+impl std::fmt::Display for Made {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Made::Preset(bits) => write!(f, "loaded with the program, {}", listing::shown(*bits)),
+            Made::Operation(mnemonic) => write!(f, "becomes `{mnemonic}`"),
+            Made::Copy { address, alone, cycles } => {
+                match alone {
+                    true => write!(f, "copied in a bundle of its own, {address}")?,
+                    false => write!(f, "copied in a free slot of bundle {address}")?,
+                }
+                match cycles {
+                    Some(0) => write!(f, ": no cycle"),
+                    Some(1) => write!(f, ": 1 cycle"),
+                    Some(cycles) => write!(f, ": {cycles} cycles"),
+                    None => Ok(()),
+                }
+            }
+        }
+    }
+}
+
 /// The home of a register, for those that need to be given one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Home {
@@ -62,6 +84,8 @@ pub(crate) struct Home {
 pub(crate) struct Homeless {
     pub(crate) register: RegisterId,
     pub(crate) help: String,
+    /// What stands in the way, and where.
+    pub(crate) because: Option<(Span, String)>,
 }
 
 /// What is known of the homes of a program's registers.
@@ -69,9 +93,11 @@ pub(crate) struct Homeless {
 pub(crate) struct Homes {
     /// By register.
     pub(crate) of: Vec<Option<Home>>,
-    /// By run and register: whether the value that the run leaves may be read. For those that have a home.
+    /// For registers that have a home: by run, whether the value that the run leaves is wanted.
     pub(crate) live: Vec<(RegisterId, Vec<bool>)>,
     pub(crate) homeless: Vec<Homeless>,
+    /// Registers that the source writes in `.once`, if only to write them again before they are read.
+    pub(crate) set_once: HashSet<RegisterId>,
     /// Registers made for values that nothing need read.
     pub(crate) quiet: HashSet<RegisterId>,
     pub(crate) adjustments: Vec<Adjustment>,
@@ -84,13 +110,12 @@ impl Homes {
         self.of.get(register.index()).copied().flatten()
     }
 
-    /// What to do about a register that has no home.
-    pub(crate) fn help(&self, register: RegisterId) -> Option<&str> {
-        let found = self.homeless.iter().find(|homeless| homeless.register == register);
-        found.map(|homeless| homeless.help.as_str())
+    /// What there is to say of a register that has no home.
+    pub(crate) fn homeless(&self, register: RegisterId) -> Option<&Homeless> {
+        self.homeless.iter().find(|homeless| homeless.register == register)
     }
 
-    /// Whether what a run leaves in a register may be read after it.
+    /// Whether what a run leaves in a register may be read after it, or is shown by a port.
     pub(crate) fn is_live(&self, register: RegisterId, run: usize) -> bool {
         let found = self.live.binary_search_by_key(&register, |(register, _)| *register);
         found.map_or(true, |index| self.live[index].1[run])
@@ -131,8 +156,16 @@ pub(crate) fn choose(ir: &mut Ir) -> Homes {
         if ir.register(id).name.is_empty() {
             continue;
         }
-        let (reads, writes) = flow::uses(ir, &runs, id);
-        let live = flow.live_after(&reads, &writes);
+        let mut once = ir.bundles[..ir.period as usize].iter().flat_map(|bundle| &bundle.operations);
+        if once.any(|operation| operation.dest == Some(id)) {
+            homes.set_once.insert(id);
+        }
+        let live = if ir.register(id).kind == RegisterKind::Output {
+            vec![true; runs.len()]
+        } else {
+            let (reads, writes) = flow::uses(ir, &runs, id);
+            flow.live_after(&reads, &writes)
+        };
         let writes = coming_home(ir, &runs, &flow, id, &live);
         match best(ir, &flow, &writes, ir.register(id).pinned) {
             Some(slot) => {
@@ -144,8 +177,7 @@ pub(crate) fn choose(ir: &mut Ir) -> Homes {
                 }
             }
             None => {
-                let help = help(ir, &flow, id, &writes);
-                homes.homeless.push(Homeless { register: id, help });
+                homes.homeless.push(homeless(ir, &flow, id, &writes));
             }
         }
     }
@@ -169,15 +201,7 @@ fn coming_home(ir: &Ir, runs: &[Run], flow: &Flow, id: RegisterId, live: &[bool]
                 let constant = constant(ir, operation);
                 let initial = constant.is_some() && !used && !reads && !output && at < flow.once;
                 let copied = !fixed && branch_that_reads(ir, at).is_none();
-                writes.push(Write {
-                    bundle: at,
-                    number,
-                    slot,
-                    live: output || *live,
-                    constant,
-                    initial,
-                    copied,
-                });
+                writes.push(Write { bundle: at, number, slot, live: *live, constant, initial, copied });
             }
             used |= reads || operations.iter().any(|operation| operation.dest == Some(id));
         }
@@ -351,21 +375,28 @@ fn holding(ir: &mut Ir, bits: u32, span: Span) -> RegisterId {
     RegisterId::new(index)
 }
 
-/// What to do about a register that has no home.
-fn help(ir: &Ir, flow: &Flow, id: RegisterId, writes: &[Write]) -> String {
-    let register = ir.register(id);
-    if register.pinned.is_some()
+/// Why a register has no home, and what to do.
+fn homeless(ir: &Ir, flow: &Flow, register: RegisterId, writes: &[Write]) -> Homeless {
+    let found = ir.register(register);
+    let because_of = |help: String, because| Homeless { register, help, because };
+    if found.pinned.is_some()
         && let Some(slot) = best(ir, flow, writes, None)
     {
         let bank = ir.machine.slots[usize::from(slot)].bank.name;
-        return format!("leave its place to the assembler, or place it in bank {bank}");
+        let help = format!("leave its place to the assembler, or place it in bank {bank}");
+        return because_of(help, Some((found.span, "placed here".to_owned())));
     }
-    if flow::jumps_to_numbers(ir) {
-        return "jump to labels instead of numbers, so that the assembler can add an operation that copies"
-            .to_owned();
+    if let Some(jump) = ir.operations().find(|operation| flow::number(operation).is_some()) {
+        let help = "jump to labels, so that the assembler can add an operation that copies";
+        let because = "this counts on every bundle's address".to_owned();
+        return because_of(help.to_owned(), Some((jump.span, because)));
     }
     match writes.iter().find_map(|write| branch_that_reads(ir, write.bundle)) {
-        Some(branch) => format!("write `{}` in a bundle of its own, after this one", branch.row().mnemonic),
-        None => "use two registers".to_owned(),
+        Some(branch) => {
+            let name = branch.row().mnemonic;
+            let because = format!("`{name}` reads what its own bundle writes: no copy can come between");
+            because_of(format!("write `{name}` as a bundle of its own"), Some((branch.span, because)))
+        }
+        None => because_of("use two registers".to_owned(), None),
     }
 }

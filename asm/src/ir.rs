@@ -14,6 +14,7 @@
 
 use crate::source::Span;
 use smallvec::SmallVec;
+use std::collections::BTreeMap;
 use std::num::NonZeroU32;
 use takt_isa::program::{Location, Space};
 use takt_isa::{Machine, Op, Row, Type};
@@ -114,6 +115,8 @@ pub struct Operation {
     pub expansion: u32,
     /// Whether the assembler made it, for what stands at its place in the source.
     pub made: bool,
+    /// Its place in the order of the source: the index of its bundle before any was moved.
+    pub order: u32,
     /// Where it is written: the tree, and the operation of the tree. For messages that point at an operand.
     pub(crate) written: (u32, u32),
 }
@@ -216,6 +219,19 @@ pub enum DemandKind {
     Late(u32),
 }
 
+/// A value of a name that has a register of its own ([`values`](crate::values)).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Version {
+    /// The register that the source names.
+    pub(crate) name: RegisterId,
+    /// The value's own.
+    pub(crate) register: RegisterId,
+    /// The order of the operation that writes it: operations behind that one read it.
+    pub(crate) after: u32,
+    /// The order of the last operations that may read it: where the name is next written.
+    pub(crate) through: u32,
+}
+
 /// A program before registers have addresses.
 #[derive(Clone, Debug)]
 pub struct Ir {
@@ -233,12 +249,18 @@ pub struct Ir {
     pub loop_bounds: Vec<LoopBound>,
     /// What is demanded of ports, in the order of the source.
     pub demands: Vec<Demand>,
+    /// Whether inputs are taken together at the tick, outputs published together at `wait`.
+    pub latched: bool,
+    /// Outputs whose number the source gives, by number: `@ 3`, or that of the register it names.
+    pub numbers: BTreeMap<u16, RegisterId>,
     /// Data memory.
     pub data: Vec<u32>,
     /// Words given bit by bit.
     pub raw: Vec<u64>,
     /// Source files that [`Operation::location`] names.
     pub files: Vec<String>,
+    /// Values with registers of their own, by [`Version::after`] for each name.
+    pub(crate) versions: Vec<Version>,
 }
 
 impl Ir {

@@ -91,6 +91,9 @@ enum Raw {
     Mul,
     #[token("/")]
     Div,
+    // A comment elsewhere: with the rest of the line, which is then no further mistake.
+    #[regex(r"//[^\n]*", allow_greedy = true)]
+    Slashes,
     #[token("%")]
     Rem,
     #[token("~")]
@@ -282,6 +285,7 @@ enum TokenError {
     Unknown,
     TooLarge,
     NotNumber,
+    Slashes,
     OpenText,
     LongName,
 }
@@ -306,6 +310,11 @@ impl TokenError {
                 .help("write a real number: with a decimal point or an exponent"),
             TokenError::NotNumber => error(format!("`{shown}` is not a number"))
                 .help("a name begins with a letter or `_`; a number is like 12, 1_000, 0x1f, 0b101, 0.25e-6 or 0x1.8p-3"),
+            TokenError::Slashes => {
+                let span = Span::new(span.start, span.start + 2);
+                Diagnostic::error("token", span, "`//` is not part of the language")
+                    .help("a comment begins with `;`; of integers, `floor(a/b)` is the quotient rounded down")
+            }
             TokenError::OpenText => error("this text has no closing `\"`".into()).help("close it on the same line"),
             TokenError::LongName => error(format!("a name of {} characters", text.len()))
                 .help(format!("a name has at most {}", limits::NAME_BYTES)),
@@ -334,6 +343,7 @@ fn token(raw: Raw, text: &str, nesting: &mut usize, names: &mut Interner) -> Res
         Raw::Real => Token::Real(real(text)),
         Raw::HexReal => Token::Real(hex_real(text).ok_or(TokenError::NotNumber)?),
         Raw::NotNumber => return Err(TokenError::NotNumber),
+        Raw::Slashes => return Err(TokenError::Slashes),
         Raw::Text => Token::Text,
         Raw::OpenText => return Err(TokenError::OpenText),
         Raw::Comma => Token::Comma,

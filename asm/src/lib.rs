@@ -3,12 +3,13 @@
 //! The stages, each a module:
 //!
 //! ```text
-//! text ─ lex ─ tokens ─ parse ─ ast ─ expand ─ flat list ─ resolve ─ ir ─ place ─ emit ─ Program ─ image
+//! text ─ lex ─ tokens ─ parse ─ ast ─ expand ─ flat list ─ resolve ─ ir ─ homes ─ schedule ─ place ─ emit ─ Program ─ image
 //! ```
 //!
 //! `docs/language.md` is the contract of the language, `docs/image.md` that of the image. Nothing here prints, and nothing here
 //! touches the file system but [`load::FileLoader`]. No input makes the assembler panic; [`limits`] bounds what it takes.
 
+mod address;
 pub mod ast;
 mod blocks;
 mod check;
@@ -28,10 +29,12 @@ mod homes;
 pub mod image;
 pub mod intern;
 pub mod ir;
+pub mod levels;
 mod lex;
 pub mod limits;
 pub mod listing;
 pub mod load;
+pub mod names;
 mod operand;
 pub mod parse;
 pub mod place;
@@ -39,10 +42,11 @@ pub mod resolve;
 pub mod schedule;
 mod serialise;
 pub mod source;
+mod types;
 mod unknown;
 mod values;
 
-use diag::{Diagnostics, Severity};
+use diag::Diagnostics;
 use source::Sources;
 use std::sync::Arc;
 use takt_isa::{Machine, Program, T3};
@@ -50,6 +54,7 @@ use takt_isa::{Machine, Program, T3};
 pub use diag::Diagnostic;
 pub use expression::Expression;
 pub use homes::{Adjustment, Made};
+pub use levels::Levels;
 pub use load::{FileLoader, LoadError, Loader, MemoryLoader, Search};
 
 /// What the assembler is to do.
@@ -61,6 +66,8 @@ pub struct Options {
     pub schedule: Schedule,
     /// How long it searches; 0 is one pass.
     pub effort: u32,
+    /// What becomes of warnings.
+    pub levels: Levels,
 }
 
 /// Which bundles the scheduler packs.
@@ -77,7 +84,12 @@ pub enum Schedule {
 
 impl Default for Options {
     fn default() -> Options {
-        Options { machine: &T3, schedule: Schedule::AsWritten, effort: schedule::DEFAULT_EFFORT }
+        Options {
+            machine: &T3,
+            schedule: Schedule::AsWritten,
+            effort: schedule::DEFAULT_EFFORT,
+            levels: Levels::default(),
+        }
     }
 }
 
@@ -100,6 +112,20 @@ pub struct Assembled {
     pub adjustments: Vec<Adjustment>,
     /// Words that a macro, a repetition or the assembler itself made: indices into the program's code, ascending.
     pub expanded: Vec<u32>,
+    /// What the source's names stand for, bundle by bundle.
+    pub names: names::Names,
+}
+
+impl Assembled {
+    /// What a debugger wants to know of the program: for [`image::write_with`].
+    pub fn debug_info(&self) -> names::DebugInfo {
+        let files = self.sources.files().iter();
+        names::DebugInfo {
+            sources: files.map(|file| (file.name.to_string(), file.text.to_string())).collect(),
+            constants: self.constants.clone(),
+            names: self.names.clone(),
+        }
+    }
 }
 
 /// Assembles a program whose first source is at hand, as from standard input or an editor; what it includes is loaded.
@@ -121,7 +147,8 @@ pub fn assemble_bytes(
 /// # Errors
 /// Every error of the program, and its warnings.
 pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<Assembled, Diagnostics> {
-    let context = context::Context::new(options.machine);
+    let mut context = context::Context::new(options.machine);
+    context.sink.levels = options.levels;
     let (mut context, flat) = expand::Expander::new(context, loader).expand(path);
     let mut ir = resolve::resolve(&mut context, flat);
     let packs = |scheduled| match options.schedule {
@@ -130,13 +157,18 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
         Schedule::None => false,
     };
     ir.bundles.iter_mut().for_each(|bundle| bundle.scheduled = packs(bundle.scheduled));
-    check::integers(&mut context, &ir);
+    types::check(&mut context, &ir);
+    // Of a program that cannot fit nothing else is worth its time.
+    if emit::is_too_long(&ir) {
+        emit::limits(&ir, &mut context.sink);
+        return Err(context.sink.finish(Arc::new(context.sources)));
+    }
     let mut homes = homes::choose(&mut ir);
     let values = values::split(&mut ir, &mut homes);
     copies::insert(&mut ir, &mut homes, &values);
     check::check(&mut context, &ir, &homes);
-    let context::Context { mut sink, sources, constants, .. } = context;
-    let sources = Arc::new(sources);
+    let mut sink = std::mem::take(&mut context.sink);
+    let sources = Arc::new(std::mem::take(&mut context.sources));
     // What follows would only report what follows from the errors there are.
     if sink.errors > 0 {
         return Err(sink.finish(sources));
@@ -148,14 +180,13 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
     let adjustments = copies::report(&ir, homes);
     let placement = place::place(&ir, &mut sink);
     let emitted = emit::emit(&ir, &placement, &mut sink);
-    let errors = sink.errors;
+    let names = names::names(&context, &ir, &placement, &emitted);
     let report = sink.finish(Arc::clone(&sources));
-    if errors > 0 {
+    if report.has_errors() {
         return Err(report);
     }
-    debug_assert!(report.list.iter().all(|diagnostic| diagnostic.severity == Severity::Warning));
     let constants =
-        constants.into_iter().filter_map(|constant| Some((constant.name, constant.value?))).collect();
+        context.constants.into_iter().filter_map(|constant| Some((constant.name, constant.value?))).collect();
     Ok(Assembled {
         program: emitted.program,
         warnings: report,
@@ -165,5 +196,6 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
         timing,
         adjustments,
         expanded: emitted.expanded,
+        names,
     })
 }

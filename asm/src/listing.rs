@@ -10,7 +10,7 @@ use takt_isa::program::{Location, Port, Space};
 use takt_isa::{Instruction, Program, Type};
 
 /// The listing of an assembled program: for each bundle its address, its words in the order of the slots, and the source
-/// lines that they come from. An operation that a macro or a repetition made is shown as what it became, behind a `+`.
+/// lines that they come from. An operation that a macro, a repetition or the assembler made is shown as what it became, behind a `+`.
 pub fn listing(assembled: &Assembled) -> String {
     let mut lister = Lister::new(assembled);
     lister.code();
@@ -186,7 +186,7 @@ impl<'a> Lister<'a> {
 }
 
 /// Bits as a number: as an integer if that is small, else as binary32.
-fn shown(bits: u32) -> String {
+pub(crate) fn shown(bits: u32) -> String {
     match bits as i32 {
         small @ -0xffff..=0xffff => small.to_string(),
         _ => format!("{:?}", f32::from_bits(bits)),
@@ -228,6 +228,9 @@ pub struct Register {
     pub place: String,
     /// Its address.
     pub address: u16,
+    /// Of a port: its number.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub number: Option<u16>,
     /// How its bits are shown.
     #[serde(rename = "type")]
     pub ty: Type,
@@ -255,6 +258,7 @@ pub fn symbol_map(assembled: &Assembled) -> SymbolMap {
             name: port.name.clone(),
             place: machine.register_name(port.register).unwrap_or_default(),
             address: port.register,
+            number: machine.input_number(port.register).or_else(|| machine.output_number(port.register)),
             ty: port.ty,
         };
         ports.iter().map(register).collect()
@@ -289,6 +293,7 @@ impl std::fmt::Display for SymbolMap {
                     Type::I => "int",
                     Type::B => "bits",
                 };
+                let what = register.number.map_or(what.to_owned(), |number| format!("{what} {number}"));
                 writeln!(f, "{what:<10}{:<width$}{:<5} {ty}", register.name, register.place)?;
             }
         }

@@ -1,17 +1,18 @@
 //! Operands to registers, labels and numbers: the part of [`resolve`](crate::resolve) that looks at one operand.
 
 use crate::ast::*;
-use crate::context::{Argument, At, Binding, Integer, Reported};
+use crate::context::{Argument, At, Binding, Reported};
 use crate::declare::{address, register_at};
 use crate::diag::{Diagnostic, nearest};
 use crate::expr::{EvalError, Value};
 use crate::intern::NameId;
-use crate::ir::{Constant, LabelId, Operation, Register, RegisterId, RegisterKind};
+use crate::ir::{Constant, Label, LabelId, Operation, Register, RegisterId, RegisterKind};
 use crate::resolve::Resolver;
 use crate::source::Span;
+use crate::types::{Given, Kind, Part, What};
 use crate::unknown::Wanted;
 use takt_isa::shape::Field;
-use takt_isa::{Operand as Place, ROWS, Row, Type};
+use takt_isa::{Effect, Operand as Place, ROWS, Row, Type};
 
 /// An operand and where it stands, parameters replaced by what was given for them; and what its name means, if it is one.
 type Meaning = (At, Operand, Option<(NameId, Binding)>);
@@ -25,26 +26,38 @@ impl Resolver<'_> {
         operand: Operand,
         operation: &mut Operation,
     ) -> Result<(), Reported> {
+        self.cast = None;
         match place {
-            Place::Dest => operation.dest = Some(self.dest(at, operand)?),
+            Place::Dest => {
+                operation.dest = Some(self.dest(at, operand)?);
+                self.note_cast(operation, Part::Dest);
+            }
             Place::Source(index) => {
                 let source = self.source(at, operand, row.source_type(index))?;
                 operation.sources[index] = source;
                 let is_constant =
                     matches!(self.context.registers[source.index()].kind, RegisterKind::Constant(_));
                 if is_constant && row.source_type(index) == Type::B {
-                    self.note_integer(at, row, operand, operation.dest);
+                    self.note_literal(at, operand, operation, Part::Source(index as u8));
                 }
+                self.note_cast(operation, Part::Source(index as u8));
             }
             Place::Immediate => {
                 operation.constant = match self.code_label(at, operand)? {
                     Some(label) => Constant::Code(label),
                     None => Constant::Value(self.constant(at, operand, row.result_type())?),
                 };
-                if operation.constant != Constant::Value(0)
-                    && !matches!(operation.constant, Constant::Code(_))
-                {
-                    self.note_integer(at, row, operand, operation.dest);
+                match operation.constant {
+                    Constant::Code(_) => {
+                        let given =
+                            Given::Literal { kind: Kind::Int, what: What::Address, span: operand.span };
+                        self.context.given.insert(operation, Part::Immediate, given);
+                    }
+                    Constant::Value(0) => {}
+                    _ if row.result_type() == Type::B => {
+                        self.note_literal(at, operand, operation, Part::Immediate);
+                    }
+                    _ => {}
                 }
             }
             Place::Target => operation.constant = self.target(at, operand)?,
@@ -52,32 +65,58 @@ impl Resolver<'_> {
                 let (offset, base) = self.memory(at, operand, row)?;
                 operation.constant = Constant::Value(offset);
                 operation.sources[0] = base;
+                if let Some(table) = self.table_of(at, operand.kind) {
+                    self.context.given.insert(operation, Part::Table, Given::Table(table));
+                }
+                self.note_cast(operation, Part::Source(0));
             }
         }
         Ok(())
     }
 
-    /// Notes an integer that an operation brings to a register whatever its type. Most are well there: `check` tells.
-    fn note_integer(&mut self, at: At, row: &Row, operand: Operand, dest: Option<RegisterId>) {
-        if let Some(to) = dest.filter(|_| row.result_type() == Type::B)
-            && self.context.registers[to.index()].ty == Type::F
-            && let Ok(Value::Int(value)) = self.operand_value(at, operand)
-        {
-            self.context.integers.push(Integer { value, to, scope: at.scope, span: operand.span });
+    /// Notes the type that the operand just read is taken as.
+    fn note_cast(&mut self, operation: &Operation, part: Part) {
+        if let Some(ty) = self.cast {
+            self.context.given.insert(operation, part, Given::Cast(ty));
         }
+    }
+
+    /// Notes the type of a constant where the instruction takes any.
+    fn note_literal(&mut self, at: At, operand: Operand, operation: &Operation, part: Part) {
+        let Ok(value) = self.operand_value(at, operand) else { return };
+        let is_address = self.table_of(at, operand.kind).is_some();
+        let given = Given::literal(value, is_address, operand.span);
+        self.context.given.insert(operation, part, given);
     }
 
     /// Follows parameters to the operand that was given for them, and what its name means if it is a name.
     fn meaning(&mut self, mut at: At, mut operand: Operand) -> Result<Meaning, Reported> {
+        let mut parameter = None;
         loop {
+            if let OperandKind::Cast(cast) = operand.kind {
+                let Cast { operand: inner, ty } = self.context.asts[at.ast as usize].casts[cast as usize];
+                let ty = self.context.type_named(at, ty)?;
+                if !matches!(inner.kind, OperandKind::Name(_) | OperandKind::Place(_)) {
+                    let error = Diagnostic::error("type", operand.span, "only a register is taken as a type");
+                    return Err(self.context.report(at.scope, error));
+                }
+                self.cast.get_or_insert(ty);
+                operand = inner;
+            }
             let OperandKind::Name(name) = operand.kind else { return Ok((at, operand, None)) };
             let name = self.context.name(at, name, operand.span)?;
             match self.context.lookup(at.scope, name) {
                 // Arguments that are parameters themselves were replaced when the macro was used.
                 Binding::Argument(argument) => {
+                    parameter.get_or_insert((self.context.scope(at.scope).owner, name));
                     Argument { operand, at, .. } = self.context.arguments[argument as usize];
                 }
-                binding => return Ok((at, operand, Some((name, binding)))),
+                binding => {
+                    if let (Some(parameter), Binding::Register(register)) = (parameter, binding) {
+                        self.context.parameters.insert(parameter, register);
+                    }
+                    return Ok((at, operand, Some((name, binding))));
+                }
             }
         }
     }
@@ -172,6 +211,47 @@ impl Resolver<'_> {
         Err(self.context.report(at.scope, error))
     }
 
+    /// The register that a `.preset` names, by its name or its place.
+    pub(crate) fn preset_register(
+        &mut self,
+        at: At,
+        name: Name,
+        placed: bool,
+    ) -> Result<(RegisterId, Type), Reported> {
+        let operand = Operand { kind: OperandKind::Name(name.name), span: name.span };
+        let (place, given, meaning) = if placed { (at, operand, None) } else { self.meaning(at, operand)? };
+        let (register, ty) = match (given.kind, meaning) {
+            (_, Some((_, Binding::Register(register)))) => {
+                (register, self.context.registers[register.index()].ty)
+            }
+            (OperandKind::Name(name) | OperandKind::Place(name), _) => {
+                if let Some((id, Binding::None)) = meaning
+                    && !self.looks_like_a_place(id)
+                {
+                    return Err(self.context.unknown(place.scope, id, given.span, Wanted::Dest));
+                }
+                let address = address(self.context, place, Name { name, span: given.span })?;
+                (register_at(self.context, address, given.span), Type::B)
+            }
+            _ => {
+                let error = Diagnostic::error("operand", given.span, "a register is needed here");
+                return Err(self.context.report(at.scope, error));
+            }
+        };
+        if register == RegisterId::ZERO {
+            let error = Diagnostic::error("place", given.span, "`zero` always reads as zero");
+            return Err(self.context.report(at.scope, error));
+        }
+        Ok((register, ty))
+    }
+
+    /// Whether a name is a bank's and a number.
+    fn looks_like_a_place(&self, name: NameId) -> bool {
+        let text = self.context.names.text(name);
+        let digits = text.trim_end_matches(|c: char| c.is_ascii_digit());
+        digits.len() < text.len() && self.ir.machine.banks().any(|bank| bank.name == digits)
+    }
+
     /// A register to read: a register as such, or the one that holds a constant.
     fn source(&mut self, at: At, operand: Operand, ty: Type) -> Result<RegisterId, Reported> {
         let (place, given, meaning) = self.meaning(at, operand)?;
@@ -219,10 +299,11 @@ impl Resolver<'_> {
     /// The bits of a constant operand.
     fn constant(&mut self, at: At, operand: Operand, ty: Type) -> Result<u32, Reported> {
         let value = self.operand_value(at, operand)?;
-        self.bits(at, value, ty, operand.span)
+        self.bits(at, value, ty, operand)
     }
 
-    pub(crate) fn bits(&mut self, at: At, value: Value, ty: Type, span: Span) -> Result<u32, Reported> {
+    pub(crate) fn bits(&mut self, at: At, value: Value, ty: Type, operand: Operand) -> Result<u32, Reported> {
+        let span = operand.span;
         let bits = value.bits(ty).map_err(|fault| self.context.fault(at.scope, EvalError { span, fault }))?;
         if let Value::Real(real) = value
             && ty != Type::I
@@ -231,6 +312,18 @@ impl Resolver<'_> {
         {
             let warning =
                 Diagnostic::warning("underflow", span, format!("{real:e} rounds to zero in binary32"));
+            self.context.report(at.scope, warning);
+        }
+        if let (Value::Int(_), Type::F) = (value, ty)
+            && let Some(label) = self.table_of(at, operand.kind)
+        {
+            let Label { name, span: declared, .. } = &self.context.labels[label.0 as usize];
+            let message = format!("the address of `{name}` is taken as a float");
+            let warning =
+                Diagnostic::warning("types", span, message).also(*declared, "declared here").help(format!(
+                    "load the word there with `{}`, or write `float(…)` if the address is meant",
+                    loading()
+                ));
             self.context.report(at.scope, warning);
         }
         Ok(bits)
@@ -307,7 +400,9 @@ impl Resolver<'_> {
             (OperandKind::Memory(memory), _) => {
                 let Memory { offset, base } = self.context.asts[place.ast as usize].memories[memory as usize];
                 let value = match offset {
-                    Some(offset) => self.context.integer(place, offset),
+                    Some(offset) => self.context.integer(place, offset).inspect_err(|_| {
+                        self.context.unknown_tables(offset.span);
+                    }),
                     None => Ok(0),
                 };
                 let base = self.source(place, base, row.source_type(0));
@@ -327,7 +422,9 @@ impl Resolver<'_> {
                 return Err(self.context.report(at.scope, error));
             }
             _ => {
-                let value = self.operand_value(place, given)?;
+                let value = self.operand_value(place, given).inspect_err(|_| {
+                    self.context.unknown_tables(given.span);
+                })?;
                 let value = value.integer().map_err(|fault| {
                     let span = given.span;
                     self.context.fault(at.scope, EvalError { span, fault })
@@ -336,7 +433,10 @@ impl Resolver<'_> {
             }
         };
         match self.field(at, value, Field::Offset, span, "an offset")? {
-            Constant::Value(offset) => Ok((offset, base)),
+            Constant::Value(offset) => {
+                self.check_address(at, (place, given), offset, base, span);
+                Ok((offset, base))
+            }
             _ => Err(Reported),
         }
     }
@@ -404,6 +504,8 @@ impl Resolver<'_> {
         );
         let error = if Directive::ALL.iter().any(|known| known.name() == directive) {
             error.did_you_mean(Some(directive))
+        } else if let Some(help) = absent(&text.to_ascii_lowercase()) {
+            error.help(help)
         } else {
             let macros: Vec<&str> =
                 self.context.macros.keys().map(|name| self.context.names.text(*name)).collect();
@@ -414,6 +516,33 @@ impl Resolver<'_> {
         };
         self.context.report(at.scope, error)
     }
+}
+
+/// The instruction that loads a word.
+fn loading() -> &'static str {
+    ROWS.iter().find(|row| row.effect == Effect::Load).map_or("", |row| row.mnemonic)
+}
+
+/// What other processors have and Takt has not, though an instruction of a like name may do something else.
+fn absent(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "fma" | "fmadd" | "fmac" | "fmla" | "fnma" | "fms" | "fmsub" | "mac" | "madd" => {
+            "there is no fused operation: `fmul`, then `fadd` or `fsub`"
+        }
+        "imul" | "idiv" | "imod" | "irem" | "imin" | "imax" | "iabs" | "ineg" => {
+            "of integers there are sums, shifts, logic and comparisons: `itof` converts, and `ishl` multiplies by a power of two"
+        }
+        "fgt" | "fge" | "fcmp" => "swap the operands of `flt` or `fle`",
+        "igt" | "igtu" | "ige" | "ile" => {
+            "`ilt` with its operands swapped, or with its result tested by `bz`"
+        }
+        "fne" | "ine" => "test the result of `feq` or `ieq` with `bz`",
+        "beq" | "bne" | "blt" | "bgt" | "ble" | "bge" => {
+            "compare with `ieq`, `ilt`, `feq` or `flt`, then `bnz` or `bz`"
+        }
+        "not" | "inot" => "`ixor` with -1",
+        _ => return None,
+    })
 }
 
 /// What users of other assemblers may write.
@@ -447,4 +576,20 @@ fn alias(name: &str) -> Option<&'static str> {
         "return" => "ret",
         _ => return None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Advice that names what there is not would be worse than none.
+    #[test]
+    fn advice_names_instructions() {
+        let known = |name: &str| ROWS.iter().any(|row| row.mnemonic == name);
+        for name in ["fma", "imul", "fgt", "igt", "fne", "beq", "not"] {
+            assert!(!known(name));
+            let help = absent(name).expect("there is advice");
+            assert!(help.split('`').skip(1).step_by(2).all(known), "{help}");
+        }
+    }
 }

@@ -48,7 +48,8 @@ pub(crate) fn parse_expression(
     names: &mut Interner,
     sink: &mut Sink,
 ) -> Option<(Ast, ExprId)> {
-    // As the value of a constant, an expression reads like any other.
+    // As the value of a constant, an expression reads like any other. The directive before it takes no room in the text:
+    // messages know by that that nobody wrote it.
     let mut ast = Ast::default();
     let mut lexer = Lexer::new(&source.text, source.base);
     let mut chunk = Chunk::default();
@@ -72,11 +73,7 @@ pub(crate) fn parse_expression(
             let id = value.id;
             Some((ast, id))
         }
-        _ => {
-            // It would tell how a constant is written.
-            sink.drop_help();
-            None
-        }
+        _ => None,
     }
 }
 
@@ -305,13 +302,14 @@ fn describe<'s>(
     };
     expected.sort();
     expected.dedup();
-    // After a name a call or an index might always follow: no news where something else is missing.
+    // After a name a call, an index or a type might always follow: no news where something else is missing.
     if expected.len() > 1 {
-        expected.retain(|expected| expected != "`(`" && expected != "`[`");
+        expected.retain(|expected| !["`(`", "`[`", "`:`"].contains(&expected.as_str()));
     }
     let previous = at.checked_sub(1).map(|before| tokens[before].0);
+    let is_alone = matches!(tokens[0], (Token::Directive(_), span) if span.start == span.end);
     let directive = tokens.iter().find_map(|(token, _)| match token {
-        Token::Directive(directive) => Some(*directive),
+        Token::Directive(directive) if !is_alone => Some(*directive),
         _ => None,
     });
     let diagnostic = Diagnostic::error("syntax", span, "");
@@ -354,30 +352,35 @@ fn describe<'s>(
             format!("{shown} cannot stand in a bundle"),
             Some("a directive has a line of its own: does the line above end in `||`?".to_owned()),
         ),
-        (_, Token::Directive(inner)) if at > 0 && inner != Directive::Raw => (
+        (_, Token::Directive(inner)) if at > 0 && !is_alone && inner != Directive::Raw => (
             format!("{shown} in the middle of a line"),
             Some("a directive begins its line; only a label may stand before it".to_owned()),
         ),
-        (Some(Token::Name(_) | Token::End(_)), Token::Assign) if directive.is_none() => (
+        (Some(Token::Name(_) | Token::End(_)), Token::Assign) if directive.is_none() && !is_alone => (
             "a constant is defined by a directive".to_owned(),
             Some(format!(
                 "write `.const {}`",
                 text(tokens[0].1.to(tokens[tokens.len().saturating_sub(2)].1))
             )),
         ),
-        (_, Token::Name(name)) if operand(previous) && name.op().is_some() && directive.is_none() => (
-            format!("{shown} begins another operation"),
-            Some(
-                "operations of one bundle are separated by `||`, others stand on lines of their own"
-                    .to_owned(),
-            ),
-        ),
+        (_, Token::Name(name))
+            if operand(previous) && name.op().is_some() && directive.is_none() && !is_alone =>
+        {
+            (
+                format!("{shown} begins another operation"),
+                Some(
+                    "operations of one bundle are separated by `||`, others stand on lines of their own"
+                        .to_owned(),
+                ),
+            )
+        }
         (_, Token::Name(_) | Token::Int(_) | Token::Real(_)) if operand(previous) && at > 1 => (
             format!("{shown} follows an operand"),
-            Some(match directive {
-                Some(directive) => format!("write `{} {}`", directive.name(), directive.operands()),
-                None => "operands are separated by `,`: is one missing?".to_owned(),
-            }),
+            match directive {
+                Some(directive) => Some(format!("write `{} {}`", directive.name(), directive.operands())),
+                None if is_alone => None,
+                None => Some("operands are separated by `,`: is one missing?".to_owned()),
+            },
         ),
         (Some(Token::Comma), Token::Newline | Token::Comma) => {
             ("an operand is missing after `,`".to_owned(), None)

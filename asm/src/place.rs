@@ -1,16 +1,17 @@
 //! Registers to places.
 //!
 //! A register lies in the bank of the slot whose operations write it; one that nothing writes, a constant above all, lies
-//! in the bank with most room. Outputs lie in a bank's output window, inputs in the input bank. Within a bank registers
-//! follow one another in the order of their declaration, around those that the source has placed.
+//! in the bank with most room. Within a bank registers follow one another in the order of their declaration, around those
+//! that the source has placed. Inputs lie in the input bank. An output has a number, which the source gives or which is the
+//! first that is free, and lies at that place of the output window of the bank of the slot that writes it.
 //!
 //! A register that only one straight run of bundles uses, and writes before it reads, is needed from its first write to its
 //! last use: it takes a register that is free for so long. While there are enough, each gets one of its own.
 
 use crate::diag::{Diagnostic, Sink};
-use crate::ir::{Ir, Register, RegisterKind};
+use crate::ir::{Ir, Register, RegisterId, RegisterKind};
 use crate::values;
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::{BTreeSet, HashMap, VecDeque};
 use takt_isa::spec::machines::REGISTER_SPACE;
 use takt_isa::{Bank, ZERO};
 
@@ -34,7 +35,6 @@ impl Window {
     fn of(bank: &Bank, kind: RegisterKind, outputs: u16) -> Window {
         let split = bank.base + bank.depth - outputs.min(bank.depth);
         match kind {
-            RegisterKind::Output => Window { first: split, end: bank.base + bank.depth },
             RegisterKind::Input => Window { first: bank.base, end: (bank.base + bank.depth).min(ZERO) },
             _ => Window { first: bank.base, end: split },
         }
@@ -79,6 +79,7 @@ pub fn place(ir: &Ir, sink: &mut Sink) -> Placement {
     for address in addresses.iter().flatten() {
         space.taken[*address as usize] = true;
     }
+    outputs(ir, &writer, &mut space, &mut addresses, sink);
     let ranges = ranges(ir);
     let is_local = |index: usize| ranges[index].is_some() && addresses[index].is_none();
     // The most registers that short-lived values want in each bank: room that constants leave if they can.
@@ -95,10 +96,10 @@ pub fn place(ir: &Ir, sink: &mut Sink) -> Placement {
     };
     let wanted = (0..ir.registers.len()).filter(|index| {
         let register = &ir.registers[*index];
-        let port = matches!(register.kind, RegisterKind::Input | RegisterKind::Output);
         addresses[*index].is_none()
             && ranges[*index].is_none()
-            && (used[*index] || port || register.preset.is_some())
+            && register.kind != RegisterKind::Output
+            && (used[*index] || register.kind == RegisterKind::Input || register.preset.is_some())
     });
     let (constants, registers): (Vec<usize>, Vec<usize>) = wanted.partition(is_constant);
     let mut missing: Vec<(usize, Option<u8>)> = Vec::new();
@@ -129,6 +130,58 @@ pub fn place(ir: &Ir, sink: &mut Sink) -> Placement {
     let shared = share(ir, &locals, &ranges, &writer, &mut space, &mut addresses, &mut missing);
     report(ir, &writer, &missing, &homeless, &addresses, sink);
     Placement { addresses, shared }
+}
+
+/// Gives every output its place.
+fn outputs(
+    ir: &Ir,
+    writer: &[Option<u8>],
+    space: &mut Space,
+    addresses: &mut [Option<u16>],
+    sink: &mut Sink,
+) {
+    let machine = ir.machine;
+    let count = machine.outputs_per_bank;
+    let given: HashMap<RegisterId, u16> = ir.numbers.iter().map(|(number, id)| (*id, *number)).collect();
+    // What the source writes at an output's place without a name has its number.
+    let unnamed = |number| {
+        let mut places = (0..machine.slots.len()).map(|slot| machine.output_register(slot, number));
+        places.any(|place| space.taken[usize::from(place)])
+    };
+    let mut free: VecDeque<u16> =
+        (0..count).filter(|number| !ir.numbers.contains_key(number) && !unnamed(*number)).collect();
+    let all = || (0..ir.registers.len()).filter(|index| ir.registers[*index].kind == RegisterKind::Output);
+    let mut missing = Vec::new();
+    for index in all() {
+        if addresses[index].is_some() {
+            continue;
+        }
+        let register = &ir.registers[index];
+        let Some(number) = given.get(&RegisterId::new(index)).copied().or_else(|| free.pop_front()) else {
+            missing.push(index);
+            continue;
+        };
+        let place = machine.output_register(usize::from(writer[index].unwrap_or(0)), number);
+        if space.taken[usize::from(place)] {
+            let name = machine.register_name(place).unwrap_or_default();
+            let message = format!("output {number}, `{}`, lies at `{name}`, which is taken", register.name);
+            let error = Diagnostic::error("place", register.span, message)
+                .note(format!("the source names `@{name}` elsewhere"))
+                .help("give it another number, or say its name there");
+            sink.push(error);
+            continue;
+        }
+        space.taken[usize::from(place)] = true;
+        addresses[index] = Some(place);
+    }
+    if let Some(first) = missing.first() {
+        let names: Vec<&str> = missing.iter().map(|index| ir.registers[*index].name.as_str()).collect();
+        let message = format!("{} output ports are needed, and {} has {count}", all().count(), machine.name);
+        let error = Diagnostic::error("bank-full", ir.registers[*first].span, message)
+            .here("no number is left for this one")
+            .note(format!("no number for: {}", few(&names)));
+        sink.push(error);
+    }
 }
 
 /// For each register that one run of bundles writes before it reads, and no other uses: the bundles of its first write and
@@ -234,10 +287,7 @@ fn report(
     let mut rest: Vec<&(usize, Option<u8>)> = missing.iter().collect();
     while let Some(&&(first, slot)) = rest.first() {
         let kind = ir.registers[first].kind;
-        let output = kind == RegisterKind::Output;
-        let same = |(index, other): &(usize, Option<u8>)| {
-            *other == slot && (ir.registers[*index].kind == RegisterKind::Output) == output
-        };
+        let same = |(_, other): &(usize, Option<u8>)| *other == slot;
         let names: Vec<&str> = rest
             .iter()
             .filter(|entry| same(entry))
@@ -252,7 +302,6 @@ fn report(
         let needed = addresses.iter().filter(|address| inside(address)).count() + names.len();
         let what = match kind {
             RegisterKind::Input => "input ports".to_owned(),
-            RegisterKind::Output => format!("output ports in bank {}", bank.name),
             _ => format!("registers in bank {}", bank.name),
         };
         let mut error = Diagnostic::error(

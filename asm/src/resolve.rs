@@ -8,11 +8,11 @@ use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, 
 use crate::serialise;
 use crate::source::Span;
 use smallvec::SmallVec;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 use takt_isa::program::Location;
 use takt_isa::spec::instructions::Function;
-use takt_isa::{Op, ROWS};
+use takt_isa::{Op, ROWS, Type};
 
 /// The most cycles that a demand on ports can name: many times what a program memory holds.
 const MAX_CYCLES: u32 = 1 << 24;
@@ -35,12 +35,21 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
         labels: Vec::new(),
         loop_bounds: Vec::new(),
         demands: Vec::new(),
+        latched: flat.ports.is_some_and(|(latched, _)| latched),
+        numbers: BTreeMap::new(),
         data: Vec::new(),
         raw: Vec::new(),
         files: Vec::new(),
+        versions: Vec::new(),
     };
+    let words = |data: &Data| match data {
+        Data::Space(count) => *count,
+        Data::Value(..) => 1,
+    };
+    let data_words = flat.data.iter().map(words).sum();
+    let (pool, own_files) = (HashMap::new(), Vec::new());
     let mut resolver =
-        Resolver { context, flat, ir, slots, pool: HashMap::new(), own_files: Vec::new(), label: 0 };
+        Resolver { context, flat, ir, slots, pool, own_files, label: 0, data_words, cast: None };
     let once = std::mem::take(&mut resolver.flat.once);
     resolver.section(Section::Once, &once);
     resolver.ir.period = resolver.ir.bundles.len() as u32;
@@ -57,8 +66,12 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
     let Resolver { mut ir, flat, .. } = resolver;
     context.report_unknown();
     ir.registers = std::mem::take(&mut context.registers);
+    ir.numbers = std::mem::take(&mut context.numbered);
     ir.labels = std::mem::take(&mut context.labels);
     ir.files = flat.files;
+    for (order, bundle) in (0..).zip(&mut ir.bundles) {
+        bundle.operations.iter_mut().for_each(|operation| operation.order = order);
+    }
     ir
 }
 
@@ -81,6 +94,10 @@ pub(crate) struct Resolver<'c> {
     own_files: Vec<Option<u32>>,
     /// Labels before this one have their position.
     label: usize,
+    /// The type that the operand at hand is taken as, if the source says so.
+    pub(crate) cast: Option<Type>,
+    /// Words of data memory that the source declares.
+    pub(crate) data_words: u32,
 }
 
 impl Resolver<'_> {
@@ -147,6 +164,10 @@ impl Resolver<'_> {
                 }
             }
         } else if self.check_slots(item.at, &operations).is_ok() {
+            if let Some(diagnostic) = serialise::twice(&operations) {
+                let diagnostic = diagnostic(&self.context.registers, self.ir.machine);
+                self.context.report(item.at.scope, diagnostic);
+            }
             self.ir.bundles.push(Bundle { operations, explicit, scheduled: item.scheduled });
         }
     }
@@ -260,6 +281,7 @@ impl Resolver<'_> {
             span: written.span,
             expansion: at.scope.0,
             made: false,
+            order: 0,
             written: (at.ast, number),
         };
         let mut failed = false;
@@ -308,6 +330,7 @@ impl Resolver<'_> {
             span: written.span,
             expansion: at.scope.0,
             made: false,
+            order: 0,
             written: (at.ast, number),
         })
     }
@@ -318,12 +341,14 @@ impl Resolver<'_> {
                 Data::Space(count) => {
                     let length = self.ir.data.len() + count as usize;
                     self.ir.data.resize(length, 0);
+                    self.context.data_types.resize(length, Type::B);
                 }
                 Data::Value(at, value, ty) => {
                     let word = self.context.value(at, value.id);
-                    let word = word.and_then(|word| self.bits(at, word, ty, value.span));
+                    let word = word.and_then(|word| self.bits(at, word, ty, value.into()));
                     // A word with a mistake keeps its place.
                     self.ir.data.push(word.unwrap_or(0));
+                    self.context.data_types.push(ty);
                 }
             }
         }
@@ -355,6 +380,9 @@ impl Resolver<'_> {
             }
             _ => return Err(Reported),
         };
+        if let Some((true, latched)) = self.flat.ports {
+            return Err(self.unlatched(at, kind, *span, latched));
+        }
         let mut ports: Vec<(RegisterId, Span)> = Vec::with_capacity(names.len());
         for name in names {
             let port = self.port(at, *name, wanted)?;
@@ -370,11 +398,34 @@ impl Resolver<'_> {
         Ok(Demand { kind, ports, period: timing.section == Section::Period, span: *span })
     }
 
+    /// The ports of a program whose ports are latched have no times of their own.
+    fn unlatched(&mut self, at: At, kind: DemandKind, span: Span, latched: Span) -> Reported {
+        let (message, help) = match kind {
+            DemandKind::Deadline(_) => (
+                "a deadline for outputs that are published together, at the `wait`",
+                "bound the period instead: `takt bound --deadline`",
+            ),
+            DemandKind::Order => (
+                "an order of ports that are taken together, at the tick, or published together, at the `wait`",
+                "leave it out",
+            ),
+            DemandKind::Late(_) => (
+                "inputs that are to be read late are taken at the tick, whenever they are read",
+                "leave it out, or have `.ports direct`",
+            ),
+        };
+        let error = Diagnostic::error("ports", span, message).also(latched, "for here it says so").help(help);
+        self.context.report(at.scope, error)
+    }
+
     fn presets(&mut self) {
         for preset in std::mem::take(&mut self.flat.presets) {
+            let found = self.preset_register(preset.at, preset.register, preset.placed);
             let Ok(value) = self.context.value(preset.at, preset.value.id) else { continue };
-            let Ok(bits) = self.bits(preset.at, value, preset.ty, preset.value.span) else { continue };
-            let register = &mut self.context.registers[preset.register.index()];
+            // A named register has a type, a place has any.
+            let Ok((register, ty)) = found else { continue };
+            let Ok(bits) = self.bits(preset.at, value, ty, preset.value.into()) else { continue };
+            let register = &mut self.context.registers[register.index()];
             if register.preset.replace(bits).is_some() {
                 let error =
                     Diagnostic::error("declared-twice", preset.span, "this register is preset already");

@@ -8,17 +8,25 @@ use takt_isa::spec::instructions::Effect;
 /// What makes the diagnostic, once it is known to be wanted.
 pub(crate) type Explain<'o> = Box<dyn FnOnce(&[Register], &Machine) -> Diagnostic + 'o>;
 
-/// An order of a bundle's operations that means, one after another, what they mean together: all read before any writes.
-pub(crate) fn order(operations: &[Operation]) -> Result<Vec<usize>, Explain<'_>> {
+/// Why a bundle has no meaning: two of its operations write one register.
+pub(crate) fn twice(operations: &[Operation]) -> Option<Explain<'_>> {
     for (index, operation) in operations.iter().enumerate() {
         let Some(dest) = operation.dest else { continue };
         if let Some(first) = operations[..index].iter().find(|before| before.dest == Some(dest)) {
-            return Err(Box::new(move |registers, machine| {
+            return Some(Box::new(move |registers, machine| {
                 let message =
                     format!("two operations of the bundle write `{}`", text(registers, machine, dest));
                 Diagnostic::error("bundle-order", operation.span, message).also(first.span, "the other")
             }));
         }
+    }
+    None
+}
+
+/// An order of a bundle's operations that means, one after another, what they mean together: all read before any writes.
+pub(crate) fn order(operations: &[Operation]) -> Result<Vec<usize>, Explain<'_>> {
+    if let Some(explain) = twice(operations) {
+        return Err(explain);
     }
     if let Some(raw) = operations.iter().find(|operation| matches!(operation.constant, Constant::Raw(_)))
         && operations.len() > 1

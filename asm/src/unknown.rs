@@ -2,13 +2,14 @@
 //! part of [`context`](crate::context).
 
 use crate::ast::Ast;
-use crate::context::{Binding, Context, Reported, ScopeId};
+use crate::context::{Binding, Context, HAS, Reported, ScopeId};
 use crate::diag::{Diagnostic, Severity, nearest};
 use crate::intern::NameId;
 use crate::ir::RegisterKind;
 use crate::limits;
 use crate::source::Span;
 use std::rc::Rc;
+use takt_isa::ROWS;
 
 /// What a name was needed for when it was not found.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -21,6 +22,8 @@ pub(crate) enum Wanted {
     Target,
     /// A value.
     Value,
+    /// A place in data memory.
+    Table,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -47,6 +50,16 @@ impl Context {
         Reported
     }
 
+    /// Says that unknown names within a place of the source were to be tables in data memory.
+    pub(crate) fn unknown_tables(&mut self, within: Span) {
+        for unknown in self.unknown.iter_mut().rev() {
+            if unknown.span.start < within.start || unknown.span.end > within.end {
+                return;
+            }
+            unknown.wanted = Wanted::Table;
+        }
+    }
+
     /// Reports the unknown names.
     pub(crate) fn report_unknown(&mut self) {
         for Unknown { name, span, scope, wanted } in std::mem::take(&mut self.unknown) {
@@ -67,6 +80,13 @@ impl Context {
             }
             let error = Diagnostic::error("unknown-name", span, format!("`{text}` is not declared"));
             let error = match self.similar(scope, &text, wanted) {
+                _ if text.starts_with(HAS) => {
+                    let mnemonics = ROWS.iter().map(|row| row.mnemonic);
+                    let meant = nearest(&text[HAS.len()..], mnemonics);
+                    error
+                        .note(format!("`{HAS}` and an instruction is 1 or 0: whether the machine has it"))
+                        .did_you_mean(meant.map(|mnemonic| format!("{HAS}{mnemonic}")))
+                }
                 Some(meant) => error.did_you_mean(Some(meant)),
                 None if self.machine.register_address(&text).is_some() => {
                     error.help(format!("write `@{text}` for the register at that place"))
@@ -81,6 +101,9 @@ impl Context {
                         error.help(format!("put the label `{text}:` before the bundle to continue at"))
                     }
                     Wanted::Value => error.help(format!("define it with `.const {text} = …`")),
+                    Wanted::Table => error.help(format!(
+                        "put it into data memory: `.data`, then `{text}: .float …`, `.word …` or `.space …`"
+                    )),
                 },
             };
             self.report(scope, error);
@@ -100,7 +123,9 @@ impl Context {
             (Wanted::Source, Binding::Code(_)) => false,
             (Wanted::Source, _) => true,
             (Wanted::Target, binding) => matches!(binding, Binding::Code(_)),
-            (Wanted::Value, binding) => !matches!(binding, Binding::Register(_) | Binding::Code(_)),
+            (Wanted::Value | Wanted::Table, binding) => {
+                !matches!(binding, Binding::Register(_) | Binding::Code(_))
+            }
         };
         let names = (0..self.names.len() as u32).map(NameId);
         let candidates = names.filter(|name| {

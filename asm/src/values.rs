@@ -5,8 +5,9 @@
 //! that matters: where the scheduler may move the operations (the reuse of a name then orders nothing), and for names that
 //! operations of different slots write. Of these the last value, too, where it does not lie in the name's home.
 
+use crate::flow;
 use crate::homes::Homes;
-use crate::ir::{Ir, Operation, Register, RegisterId, RegisterKind};
+use crate::ir::{Ir, Operation, Register, RegisterId, RegisterKind, Version};
 use takt_isa::Effect;
 use takt_isa::program::Space;
 
@@ -21,7 +22,8 @@ pub(crate) struct Run {
     pub(crate) scheduled: bool,
 }
 
-/// Cuts the program into runs: at labels and heads of loops, at the period's start, after redirections, around what must not move.
+/// Cuts the program into runs: at labels, at heads of loops and at bundles that are jumped to by number, at the period's start,
+/// after redirections, around what must not move.
 pub(crate) fn runs(ir: &Ir) -> Vec<Run> {
     let count = ir.bundles.len();
     let mut cut = vec![false; count + 1];
@@ -33,6 +35,11 @@ pub(crate) fn runs(ir: &Ir) -> Vec<Run> {
     }
     for bound in &ir.loop_bounds {
         cut[bound.position as usize] = true;
+    }
+    for address in ir.operations().filter_map(flow::number) {
+        if let Some(cut) = cut.get_mut(address as usize) {
+            *cut = true;
+        }
     }
     for (i, bundle) in ir.bundles.iter().enumerate() {
         // The status register sees every operation before and none after: a wall.
@@ -75,6 +82,8 @@ struct Name {
     made: u32,
     /// The register of its current value, if not itself.
     current: Option<RegisterId>,
+    /// The index of that value's [`Version`].
+    version: usize,
 }
 
 /// A value that is to be copied to the register that it is a value of.
@@ -104,7 +113,9 @@ pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
                 touched.push(id.index());
             }
         }
-        let Ir { bundles, registers, .. } = &mut *ir;
+        let Ir { bundles, registers, versions, .. } = &mut *ir;
+        let last = bundles[run.start..run.end].iter().flat_map(|bundle| &bundle.operations);
+        let last = last.map(|operation| operation.order).max().unwrap_or(0);
         for (at, bundle) in (run.start..).zip(&mut bundles[run.start..run.end]) {
             // All operations of a bundle read before any writes.
             for operation in &mut bundle.operations {
@@ -118,6 +129,9 @@ pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
                 let Some(dest) = operation.dest else { continue };
                 let Some(name) = names.get_mut(dest.index()).filter(|name| name.left > 0) else { continue };
                 name.left -= 1;
+                if name.current.is_some() {
+                    versions[name.version].through = operation.order;
+                }
                 let original = &registers[dest.index()];
                 let home = homes.get(dest);
                 let is_home = home.is_none_or(|home| operation.slot == Some(home.slot));
@@ -140,6 +154,9 @@ pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
                     homes.quiet.insert(id);
                 }
                 registers.push(fresh);
+                name.version = versions.len();
+                let (after, through) = (operation.order, operation.order);
+                versions.push(Version { name: dest, register: id, after, through });
                 name.current = Some(id);
                 operation.dest = Some(id);
                 if settles && homes.is_live(dest, number) {
@@ -148,6 +165,10 @@ pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
             }
         }
         for index in touched.drain(..) {
+            // A value that is copied home is what the name means to the end of the run.
+            if names[index].current.is_some() {
+                versions[names[index].version].through = last;
+            }
             names[index] = Name { made: names[index].made, ..Name::default() };
         }
     }

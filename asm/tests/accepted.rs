@@ -15,6 +15,8 @@ fn listings() {
             Ok(assembled) => assembled,
             Err(report) => panic!("{}", report.render(false)),
         };
+        let types = assembled.warnings.list.iter().filter(|warning| warning.code == "types").count();
+        assert_eq!(types, 0, "{}", assembled.warnings.render(false));
         let text = format!("{}\n{}", listing::listing(&assembled), listing::symbol_map(&assembled));
         insta::assert_snapshot!(name.trim_end_matches(".s"), text);
     }
@@ -35,14 +37,18 @@ fn image_and_disassembly_give_the_program_again() {
     for (name, _) in common::sources("accepted", "ok_") {
         for machine in MACHINES {
             let Ok(assembled) = common::assemble_file("accepted", &name, machine) else { continue };
+            let debug = assembled.debug_info();
             let program = assembled.program;
-            let bytes = image::write(&program);
+            let carried =
+                image::read_with(&image::write_with(&program, Some(&debug)).expect("an image holds it"));
+            assert_eq!(carried, Ok((program.clone(), Some(debug))), "{name}");
+            let bytes = image::write(&program).expect("an image holds it");
             assert_eq!(image::read(&bytes).as_ref(), Ok(&program), "{name}");
             let text = disasm::disassemble(&program);
             match common::assemble(&text, machine) {
                 Ok(again) => {
                     assert_eq!(again.program, program, "{name}:\n{text}");
-                    assert_eq!(image::write(&again.program), bytes, "{name}");
+                    assert_eq!(image::write(&again.program).expect("an image holds it"), bytes, "{name}");
                 }
                 Err(report) => panic!("{name}:\n{text}\n{}", report.render(false)),
             }

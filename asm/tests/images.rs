@@ -6,6 +6,7 @@ use object::read::elf::{FileHeader as _, SectionHeader as _};
 use object::{LittleEndian as LE, elf};
 use proptest::prelude::*;
 use takt_asm::image::{self, ImageError};
+use takt_asm::names::{DebugInfo, Position};
 use takt_isa::Program;
 
 fn program() -> Program {
@@ -49,11 +50,11 @@ fn with_meta(bytes: &[u8], change: impl Fn(&str) -> String) -> Vec<u8> {
 #[test]
 fn what_is_written_is_read() {
     let program = program();
-    let bytes = image::write(&program);
+    let bytes = image::write(&program).expect("an image holds it");
     assert!(image::is_image(&bytes));
     assert!(!image::is_image(b".period"));
     assert_eq!(image::read(&bytes).as_ref(), Ok(&program));
-    assert_eq!(bytes, image::write(&program), "equal programs give equal bytes");
+    assert_eq!(bytes, image::write(&program).expect("an image holds it"), "equal programs give equal bytes");
     // Wherever the bytes lie in memory.
     let mut moved = vec![0];
     moved.extend(&bytes);
@@ -62,7 +63,7 @@ fn what_is_written_is_read() {
 
 #[test]
 fn labels_are_symbols_that_other_tools_see() {
-    let bytes = image::write(&program());
+    let bytes = image::write(&program()).expect("an image holds it");
     let header = elf::FileHeader32::<LE>::parse(&bytes[..]).expect("it is an ELF file");
     let sections = header.sections(LE, &bytes[..]).expect("it has sections");
     let symbols = sections.symbols(LE, &bytes[..], elf::SHT_SYMTAB).expect("it has symbols");
@@ -74,12 +75,12 @@ fn labels_are_symbols_that_other_tools_see() {
 #[test]
 fn an_empty_program() {
     let program = common::good("").program;
-    assert_eq!(image::read(&image::write(&program)).as_ref(), Ok(&program));
+    assert_eq!(image::read(&image::write(&program).expect("an image holds it")).as_ref(), Ok(&program));
 }
 
 #[test]
 fn every_truncation_is_an_error() {
-    let bytes = image::write(&program());
+    let bytes = image::write(&program()).expect("an image holds it");
     for length in 0..bytes.len() {
         match image::read(&bytes[..length]) {
             Err(ImageError::NotElf) => assert!(length < 4),
@@ -91,7 +92,7 @@ fn every_truncation_is_an_error() {
 
 #[test]
 fn other_files_are_told_apart() {
-    let bytes = image::write(&program());
+    let bytes = image::write(&program()).expect("an image holds it");
     let changed = |at: usize, value: u8| {
         let mut bytes = bytes.clone();
         bytes[at] = value;
@@ -106,9 +107,81 @@ fn other_files_are_told_apart() {
     assert!(matches!(changed(32, 0xff), ImageError::Damaged(_)), "section headers elsewhere");
 }
 
+/// A program with all that a debugger may know: a macro's names, a name of several values, constants of every kind.
+fn debugged() -> (Program, DebugInfo) {
+    let assembled = common::good(
+        ".const big = inf\n.const odd = nan\n.const n = -3\n.const h = 0.1\n.input x\n.output F\n.reg t\n\
+         .macro m to, by\n.reg own\n fmul own, by, by\n fadd to, own, h\n.endm\n.period\n.schedule on\n\
+         p: fadd t, x, x\n fmul t, t, t\n m F, t\n.schedule off\n wait p\n",
+    );
+    (assembled.program.clone(), assembled.debug_info())
+}
+
+#[test]
+fn what_a_debugger_knows_is_read() {
+    let (program, info) = debugged();
+    let bytes = image::write_with(&program, Some(&info)).expect("an image holds it");
+    let (read, debug) = image::read_with(&bytes).expect("it is an image");
+    let debug = debug.expect("it is not stripped");
+    assert_eq!((&read, &debug.names, &debug.sources), (&program, &info.names, &info.sources));
+    // A NaN is not equal to itself.
+    assert_eq!(format!("{:?}", debug.constants), format!("{:?}", info.constants));
+    assert!(debug.constants.len() == 4 && debug.names.values.len() == 2 && debug.names.scopes.len() == 2);
+    assert_eq!(
+        image::write_with(&program, Some(&info)).expect("an image holds it"),
+        bytes,
+        "equal programs give equal bytes"
+    );
+    assert_eq!(
+        image::read_with(&image::write(&program).expect("an image holds it")),
+        Ok((program, None)),
+        "stripped"
+    );
+}
+
+#[test]
+fn what_a_debugger_knows_fits_the_program() {
+    let (program, info) = debugged();
+    type Change = fn(&mut DebugInfo);
+    let defects: [(&str, Change); 13] = [
+        ("`1x` is not a name", |info| info.constants[0].0 = "1x".to_owned()),
+        ("`` is not a name", |info| info.sources[0].0.clear()),
+        ("two things are named `test.s`", |info| info.sources.extend(info.sources.clone())),
+        ("1 positions for", |info| info.names.positions.truncate(1)),
+        ("there is no scope 7", |info| info.names.positions[0] = Some(Position { order: 0, scope: 7 })),
+        ("the first scope is that outside of macros", |info| info.names.scopes[0].name = "m".to_owned()),
+        ("`m 1` is not a name", |info| info.names.scopes[1].name = "m 1".to_owned()),
+        ("`?` is not a name", |info| info.names.scopes[1].parameters[0].1 = "?".to_owned()),
+        ("`t!` is not a name", |info| info.names.values[0].label = "t!".to_owned()),
+        ("`` is not a name", |info| info.names.values[0].name.clear()),
+        ("register address 1023", |info| info.names.values[0].register = 1023),
+        ("is read from 5 to 4", |info| info.names.values[0].orders = Some((5, 4))),
+        ("lives in bundles 2 to 99", |info| info.names.values[0].bundles = Some((2, 99))),
+    ];
+    for (expected, change) in defects {
+        let mut info = info.clone();
+        change(&mut info);
+        let error = image::read(&image::write_with(&program, Some(&info)).expect("an image holds it"))
+            .expect_err(expected)
+            .to_string();
+        assert!(error.contains(expected), "{error} / {expected}");
+    }
+    let bytes = image::write_with(&program, Some(&info)).expect("an image holds it");
+    let (offset, size) = section(&bytes, ".takt.debug");
+    let text = String::from_utf8(bytes[offset..offset + size].to_vec()).expect("JSON is text");
+    for (from, to) in
+        [(":-3", ":-x"), ("\"0.1\"", "\"0,1\""), ("sources", "sauces"), ("positions\":[", "positions\":{")]
+    {
+        let at = text.find(from).expect("it is there");
+        let mut bytes = bytes.clone();
+        bytes[offset + at..offset + at + to.len()].copy_from_slice(to.as_bytes());
+        assert!(matches!(image::read(&bytes), Err(ImageError::Debug(_))), "{to}");
+    }
+}
+
 #[test]
 fn every_defect_has_its_error() {
-    let bytes = image::write(&program());
+    let bytes = image::write(&program()).expect("an image holds it");
     let meta = |from: &'static str, to: &'static str| {
         let error = image::read(&with_meta(&bytes, |meta| meta.replacen(from, to, 1)));
         error.expect_err("it is damaged")
@@ -177,7 +250,7 @@ fn every_defect_has_its_error() {
 fn bounds_of_loops() {
     let text = ".loop_bound 7\na: jmp a\n.loop_bound 4294967295\nb: jmp b\n halt\n";
     let program = common::good(text).program;
-    let bytes = image::write(&program);
+    let bytes = image::write(&program).expect("an image holds it");
     assert_eq!(image::read(&bytes).as_ref(), Ok(&program));
     let words = |words: [u32; 4]| {
         let mut bytes = bytes.clone();
@@ -191,7 +264,12 @@ fn bounds_of_loops() {
         assert!(matches!(words(wrong), Err(ImageError::Loop { .. })), "{wrong:?}");
     }
     // Without bounds there is no such section.
-    assert!(!image::write(&common::good("a: jmp a\n").program).windows(11).any(|w| w == b".takt.loops"));
+    assert!(
+        !image::write(&common::good("a: jmp a\n").program)
+            .expect("an image holds it")
+            .windows(11)
+            .any(|w| w == b".takt.loops")
+    );
 }
 
 #[test]
@@ -199,20 +277,27 @@ fn memories_that_overflow() {
     let mut program = program();
     let depth = program.machine.data_depth as usize;
     program.data = vec![0; depth + 1];
-    assert!(matches!(image::read(&image::write(&program)), Err(ImageError::MemorySize { .. })));
+    assert!(matches!(
+        image::read(&image::write(&program).expect("an image holds it")),
+        Err(ImageError::MemorySize { .. })
+    ));
     program.data.pop();
-    assert!(image::read(&image::write(&program)).is_ok());
+    assert!(image::read(&image::write(&program).expect("an image holds it")).is_ok());
     let words = program.machine.slots.len() * (program.machine.code_depth as usize + 1);
     program.code = vec![0; words];
     program.lines = vec![None; words];
-    assert!(matches!(image::read(&image::write(&program)), Err(ImageError::MemorySize { .. })));
+    assert!(matches!(
+        image::read(&image::write(&program).expect("an image holds it")),
+        Err(ImageError::MemorySize { .. })
+    ));
 }
 
 #[test]
 fn a_name_with_a_zero_byte_does_not_break_the_writer() {
     let mut program = program();
     program.symbols[0].name = "a\0b".to_owned();
-    let read = image::read(&image::write(&program)).expect("the zero byte is dropped");
+    let read =
+        image::read(&image::write(&program).expect("an image holds it")).expect("the zero byte is dropped");
     assert_eq!(read.symbols[0].name, "ab");
 }
 
@@ -227,14 +312,17 @@ proptest! {
 
     #[test]
     fn no_damage_makes_the_reader_panic(changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6)) {
-        let mut bytes = image::write(&program());
+        let (program, info) = debugged();
+        let mut bytes = image::write_with(&program, Some(&info)).expect("an image holds it");
         for (index, value) in changes {
             let at = index.index(bytes.len());
             bytes[at] = value;
         }
-        if let Ok(program) = image::read(&bytes) {
+        if let Ok((program, debug)) = image::read_with(&bytes) {
             // What is accepted can be written and read again.
-            prop_assert_eq!(image::read(&image::write(&program)), Ok(program));
+            let (again, known) = image::read_with(&image::write_with(&program, debug.as_ref()).expect("an image holds it")).expect("it was read");
+            prop_assert_eq!(again, program);
+            prop_assert_eq!(known.map(|known| known.names), debug.map(|debug| debug.names));
         }
     }
 }

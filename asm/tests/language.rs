@@ -74,7 +74,7 @@ fn registers_lie_in_the_bank_of_their_slot() {
             program.registers.iter().chain(&program.outputs).find(|port| port.name == name).expect(name);
         T3.register_name(port.register).expect("it is in a bank")
     };
-    assert_eq!(["F", "G", "H"].map(place), ["m224", "a224", "x224"]);
+    assert_eq!(["F", "G", "H"].map(place), ["m224", "a225", "x226"]);
     assert_eq!(["a", "b", "c"].map(|name| place(name).chars().next()), [Some('m'), Some('a'), Some('x')]);
 }
 
@@ -93,7 +93,8 @@ fn inputs_follow_one_another_around_those_with_a_place() {
 
 #[test]
 fn unused_registers_take_no_place() {
-    let assembled = good(".reg a b c\n.output F\n.input x\n.period\n fadd b, x, 1\n fadd F, b, 1\n");
+    let assembled =
+        good(".reg a b c\n.output F\n.input x\n.period\np: fadd b, x, 1\n fadd F, b, 1\n wait p\n");
     let names: Vec<&str> = assembled.program.registers.iter().map(|port| port.name.as_str()).collect();
     assert_eq!(names, ["b"]);
     assert_eq!(assembled.warnings.list.len(), 2);
@@ -344,4 +345,77 @@ fn expressions_that_are_none() {
     assert!(fault("1 + missing").contains("`missing` is not known"));
     assert!(fault("frob(1)").contains("`frob` is not a function"));
     assert!(fault("1/0").contains("division by zero"));
+}
+
+/// An output's number is its place among the outputs, or what the source says; the slot that writes it only chooses the bank.
+#[test]
+fn an_output_has_one_number() {
+    let numbers = |text: &str, machine: &'static takt_isa::Machine| -> Vec<(String, u16)> {
+        let options = takt_asm::Options { machine, ..takt_asm::Options::default() };
+        let assembled = takt_asm::assemble("a.s", &takt_asm::MemoryLoader::of("a.s", text), &options);
+        let program = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false))).program;
+        let number = |register| {
+            let machine = program.machine;
+            machine.output_number(register).or(machine.input_number(register)).expect("a port")
+        };
+        let ports = program.inputs.iter().chain(&program.outputs);
+        ports.map(|port| (port.name.clone(), number(port.register))).collect()
+    };
+    let expect = |text: &str, expected: &[(&str, u16)]| {
+        for machine in [&T3, &T1] {
+            let expected: Vec<_> =
+                expected.iter().map(|(name, number)| ((*name).to_owned(), *number)).collect();
+            assert_eq!(numbers(text, machine), expected, "{}: {text}", machine.name);
+        }
+    };
+    let ports = ".input x, y\n.output F, G, H\n.period\n";
+    let all = [("x", 0), ("y", 1), ("F", 0), ("G", 1), ("H", 2)];
+    // Whichever slot writes it, and in whichever order.
+    expect(&format!("{ports} fmul F, x, y\n fadd G, x, y\n mov H, x\n"), &all);
+    expect(&format!("{ports} mov G, x\n fmul H, x, y\n fmul F, x, y\n"), &all);
+    // Given numbers, as expressions too, and the rest around them.
+    expect(
+        ".const K = 3\n.input x @ 1, y, z @ K, w\n.rep i, 1, 2\n.output F{i} @ i*2-2, G{i} @ i\n.endr\n.output H, J @ 31\n.period\n".replace("G{i} @ i\n", "G{i} @ i + 10\n").as_str(),
+        &[("x", 1), ("y", 0), ("z", 3), ("w", 2), ("F1", 0), ("G1", 11), ("F2", 2), ("G2", 12), ("H", 1), ("J", 31)],
+    );
+    // A register's place has its number; what has no name takes it too.
+    let text = ".input x\n.output F @ x230, G, H\n.period\n mov F, x\n fadd @a224, x, x\n fmul G, x, x\n";
+    assert_eq!(numbers(text, &T3)[1..], [("F".to_owned(), 6), ("G".to_owned(), 1), ("H".to_owned(), 2)]);
+    // As many as there are, and not one more.
+    let ports = |kind: &str, count: u16| (0..count).map(|i| format!(".{kind} p{i}\n")).collect::<String>();
+    for (kind, most) in [("output", 32), ("input", 255)] {
+        let all = numbers(&format!("{}.period\n nop\n", ports(kind, most)), &T3);
+        assert!(all.iter().map(|(_, number)| *number).eq(0..most));
+        let errors = bad(&format!("{}.period\n nop\n", ports(kind, most + 1)), &T3);
+        let message = format!("{} {kind} ports are needed, and t3 has {most}", most + 1);
+        assert!(errors.render(false).contains(&message), "{}", errors.render(false));
+    }
+}
+
+#[test]
+fn ports_may_be_latched() {
+    let latched =
+        |text: &str| good(&format!(".input x\n.output F\n{text}.period\n fadd F, x, x\n")).program.latched;
+    assert!(!latched("") && !latched(".ports direct\n"));
+    assert!(latched(".ports latched\n") && latched(".ports latched\n.ports latched\n"));
+}
+
+#[test]
+fn a_name_asks_what_the_machine_has() {
+    // Machines differ in the instructions they execute: take whatever they do differ in from the tables.
+    let text = |mnemonic: &str| format!(".if has.{mnemonic}\n.data\n.word has.{mnemonic} + 1\n.endif\n");
+    let mut answers = [0; 2];
+    for machine in takt_isa::MACHINES {
+        for row in takt_isa::ROWS {
+            let assembled = common::assemble(&text(row.mnemonic), machine);
+            let data = assembled.unwrap_or_else(|report| panic!("{}", report.render(false))).program.data;
+            let idle = row.function == takt_isa::Function::Idle;
+            let has = idle || machine.host(row.function).is_some();
+            assert_eq!(data, if has { vec![2] } else { vec![] }, "{} on {}", row.mnemonic, machine.name);
+            answers[usize::from(has)] += 1;
+        }
+    }
+    assert!(answers.iter().all(|&count| count > 0), "some machine lacks something");
+    // A declaration of one's own comes first, as with `pi`.
+    assert_eq!(good(".const has.fadd = 7\n.data\n.word has.fadd\n").program.data, [7]);
 }

@@ -2,7 +2,9 @@
 
 mod common;
 
-use takt_asm::diag::Severity;
+use takt_asm::diag::{Diagnostics, Severity};
+use takt_asm::levels::{WARNINGS, Wish};
+use takt_asm::{MemoryLoader, Options};
 
 #[test]
 fn every_mistake_is_explained() {
@@ -36,6 +38,45 @@ fn warnings_do_not_stop() {
         };
         assert!(!assembled.warnings.has_errors());
         insta::assert_snapshot!(name.trim_end_matches(".s"), assembled.warnings.render(false));
+    }
+}
+
+/// What becomes of warnings is the caller's choice; how many there are is not.
+#[test]
+fn warnings_can_be_errors_or_nothing() {
+    let text = "; machine t3\n.input x, n:int\n.output F\n.reg a\n.once\n wait p\n.period\np: fadd F, x, n\n wait p\n";
+    let assemble = |wishes: &[&str]| {
+        let levels = wishes.iter().map(|wish| wish.parse::<Wish>().expect("it is one")).collect();
+        let options = Options { levels, ..common::options(&takt_isa::T3) };
+        takt_asm::assemble("test.s", &MemoryLoader::of("test.s", text), &options)
+    };
+    let codes = |report: &Diagnostics| {
+        report.list.iter().map(|d| (d.severity, d.code)).collect::<Vec<(Severity, &str)>>()
+    };
+    use Severity::{Error, Warning};
+    let warned = |wishes: &[&str]| codes(&assemble(wishes).expect("there are warnings only").warnings);
+    let failed = |wishes: &[&str]| codes(&assemble(wishes).expect_err("a warning is an error"));
+    assert_eq!(warned(&[]), [(Warning, "unused"), (Warning, "types")]);
+    assert_eq!(warned(&["allow=types"]), [(Warning, "unused")]);
+    assert_eq!(failed(&["error"]), [(Error, "unused"), (Error, "types")]);
+    assert_eq!(failed(&["error=types"]), [(Warning, "unused"), (Error, "types")]);
+    assert_eq!(failed(&["error", "allow=unused"]), [(Error, "types")]);
+    assert_eq!(warned(&["error", "allow=unused", "allow=types"]), []);
+    // Beyond those that are shown they are counted as what they are.
+    let many = format!("{text}.reg {}\n", (0..150).map(|i| format!("r{i} ")).collect::<String>());
+    let levels = ["error=unused".parse::<Wish>().expect("it is one")].into_iter().collect();
+    let options = Options { levels, ..common::options(&takt_isa::T3) };
+    let report = takt_asm::assemble("test.s", &MemoryLoader::of("test.s", many), &options);
+    let report = report.expect_err("a warning is an error");
+    assert_eq!((report.list.len(), report.more_errors, report.more_warnings), (100, 52, 0));
+}
+
+/// The list of warnings and the manual's table.
+#[test]
+fn the_documentation_lists_every_warning() {
+    let document = include_str!("../../docs/language.md");
+    for (name, about) in WARNINGS {
+        assert!(document.contains(&format!("| `{name}` | {about}")), "{name}");
     }
 }
 

@@ -115,6 +115,11 @@ fn exercise(text: &str, machine: &'static Machine) -> Result<(), TestCaseError> 
         Ok(assembled) => {
             let _ = takt_asm::listing::listing(&assembled);
             let _ = assembled.warnings.render(true);
+            let debug = assembled.debug_info();
+            let read = image::read_with(
+                &image::write_with(&assembled.program, Some(&debug)).expect("an image holds it"),
+            );
+            prop_assert_eq!(read.map(|(_, read)| read.map(|read| read.names)), Ok(Some(debug.names)));
             round_trip(&assembled.program)
         }
         Err(report) => {
@@ -128,14 +133,14 @@ fn exercise(text: &str, machine: &'static Machine) -> Result<(), TestCaseError> 
 
 /// Program to text to program, and to image and back.
 fn round_trip(program: &Program) -> Result<(), TestCaseError> {
-    let bytes = image::write(program);
+    let bytes = image::write(program).expect("an image holds it");
     let read = image::read(&bytes);
     prop_assert_eq!(read.as_ref(), Ok(program));
     let text = disasm::disassemble(program);
     match common::assemble(&text, program.machine) {
         Ok(again) => {
             prop_assert_eq!(&again.program, program, "{}", text);
-            prop_assert_eq!(image::write(&again.program), bytes);
+            prop_assert_eq!(image::write(&again.program).expect("an image holds it"), bytes);
             Ok(())
         }
         Err(report) => Err(TestCaseError::fail(format!("{}\n{text}", report.render(false)))),
@@ -183,6 +188,7 @@ prop_compose! {
         loops in prop::collection::btree_map(0..30u32, 1..=u32::MAX, 0..4),
         lines in prop::collection::vec(prop::option::of((any::<prop::sample::Index>(), 1..9u32)), 30),
         machine in Just(machine),
+        latched in any::<bool>(),
     ) -> Program {
         let slots = machine.slots.len();
         let code: Vec<u64> = code[..code.len() / slots * slots].to_vec();
@@ -190,6 +196,7 @@ prop_compose! {
         let once = once.min(bundles) as u32;
         let types = [Type::F, Type::I, Type::B];
         let (mut inputs, mut outputs, mut registers) = (Vec::new(), Vec::new(), Vec::new());
+        let mut numbers = std::collections::HashSet::new();
         for (register, ty) in ports {
             if machine.register_name(register).is_none() {
                 continue;
@@ -199,6 +206,10 @@ prop_compose! {
                 register if machine.is_output(register) => &mut outputs,
                 _ => &mut registers,
             };
+            let number = machine.output_number(register);
+            if number.is_some() && !numbers.insert(number) {
+                continue;
+            }
             // Names that look like places, but of other registers.
             let name = if register % 3 == 0 { format!("m{register}") } else { format!("r.{register}_") };
             list.insert(0, Port { name, register, ty: types[ty] });
@@ -224,6 +235,7 @@ prop_compose! {
             constants: constants.into_iter().filter(|(register, _)| machine.register_name(*register).is_some()).collect(),
             inputs,
             outputs,
+            latched,
             registers,
             symbols,
             sections: sections

@@ -14,7 +14,7 @@ use takt_emu::{Emulator, Event};
 use takt_isa::{MACHINES, Machine, Program};
 
 fn program(text: &str, machine: &'static Machine, schedule: Schedule, effort: u32) -> Program {
-    let options = Options { machine, schedule, effort };
+    let options = Options { machine, schedule, effort, ..Options::default() };
     let assembled = assemble("random.s", &MemoryLoader::of("random.s", text), &options);
     assembled.unwrap_or_else(|errors| panic!("{text}\n{}", errors.render(false))).program
 }
@@ -72,7 +72,10 @@ fn scheduled_programs_compute_the_same() {
 fn the_same_source_gives_the_same_image() {
     for seed in 0..20 {
         let text = source(seed).replace("period:\n", ".late in0, in1 = 3\nperiod:\n");
-        let image = || takt_asm::image::write(&program(&text, MACHINES[0], Schedule::AsWritten, 3));
+        let image = || {
+            takt_asm::image::write(&program(&text, MACHINES[0], Schedule::AsWritten, 3))
+                .expect("an image holds it")
+        };
         assert_eq!(image(), image());
     }
 }

@@ -14,6 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_analysis::{Issued, Link, LinkKind, Trace, WhatIf};
+use takt_asm::schedule::BlockReport;
 use takt_emu::{Emulator, Status};
 use takt_isa::program::Location;
 use takt_isa::spec::instructions::Function;
@@ -146,7 +147,14 @@ fn follow(arguments: &Analyse, program: &Program, rows: &Rows) -> Result<(Trace,
 /// What a faster unit would bring: to the program as it is, and assembled anew for a machine that has it.
 struct Faster {
     what: WhatIf,
-    anew: Option<Cycle>,
+    anew: Option<Anew>,
+}
+
+/// The program assembled for a machine with a faster unit.
+struct Anew {
+    cycles: Cycle,
+    /// What no schedule of its blocks can be shorter than.
+    least: Cycle,
 }
 
 fn faster(arguments: &Analyse, load: &Load, program: &Program, trace: &Trace, rows: &Rows) -> Vec<Faster> {
@@ -156,7 +164,11 @@ fn faster(arguments: &Analyse, load: &Load, program: &Program, trace: &Trace, ro
     let anew = |what: &WhatIf| {
         let machine = Some(quicker(program.machine, what.unit));
         let assembled = Load { machine, ..load.clone() }.assemble(&arguments.file, source.clone()?).ok()?;
-        Some(follow(arguments, &assembled.program, rows).ok()?.0.cycles)
+        let found = follow(arguments, &assembled.program, rows).ok()?.0;
+        let visits = |address| found.issues.iter().filter(|issue| issue.address == address).count() as Cycle;
+        let spare = |block: &BlockReport| Cycle::from(block.cycles.saturating_sub(block.bound.cycles()));
+        let spare: Cycle = assembled.blocks.iter().map(|block| visits(block.address) * spare(block)).sum();
+        Some(Anew { cycles: found.cycles, least: found.cycles.saturating_sub(spare) })
     };
     trace.what_if(program).into_iter().map(|what| Faster { anew: anew(&what), what }).collect()
 }
@@ -332,7 +344,16 @@ impl Analysis<'_> {
                 "from": link.from, "to": link.to, "cycles": link.cycles, "through": through, "register": register,
             })
         };
-        let faster = |Faster { what, anew }: &Faster| json!({ "unit": self.unit(what.unit), "as_it_is": what.cycles, "assembled_anew": anew });
+        let faster = |faster: &Faster| {
+            let anew = faster.anew.as_ref();
+            json!({
+                "unit": self.unit(faster.what.unit),
+                "as_it_is": faster.what.cycles,
+                "assembled_anew": anew.map(|anew| anew.cycles),
+                "least_anew": anew.map(|anew| anew.least),
+                "stalls": gained(&faster.what).map(|(kind, more)| (kind.to_owned(), json!(more))).collect::<Value>(),
+            })
+        };
         json!({
             "program": self.name,
             "machine": program.machine.name,
@@ -386,12 +407,43 @@ impl Analysis<'_> {
             writeln!(out, "  {:>5}  to cycle {:<5} {to}: {how}", link.cycles, self.cycle(link.to))?;
         }
 
+        self.faster_text(out)
+    }
+
+    /// What a faster unit would bring; where that is more cycles than today, why.
+    fn faster_text(&self, out: &mut Out) -> Result<()> {
+        let today = self.trace.cycles;
         writeln!(out, "\none cycle less in      as it is   assembled anew")?;
+        let gain = |new: Cycle| format!("{new} ({:+})", new.cast_signed() - today.cast_signed());
         for Faster { what, anew } in &self.faster {
-            let gain = |new: Cycle| format!("{new} ({:+})", new.cast_signed() - trace.cycles.cast_signed());
-            let anew = anew.map_or_else(|| "-".to_owned(), gain);
+            let anew = anew.as_ref().map_or_else(|| "-".to_owned(), |anew| gain(anew.cycles));
             writeln!(out, "  {:<16} {:>12} {anew:>16}", self.unit(what.unit), gain(what.cycles))?;
+        }
+        let worse: Vec<&WhatIf> =
+            self.faster.iter().map(|faster| &faster.what).filter(|what| what.cycles > today).collect();
+        if !worse.is_empty() {
+            writeln!(
+                out,
+                "more as it is: in bundles packed for today's latencies, sooner results meet others"
+            )?;
+        }
+        for what in worse {
+            let stalls: Vec<String> = gained(what).map(|(kind, more)| format!("{kind} {more:+}")).collect();
+            writeln!(out, "  {:<16} stalled cycles: {}", self.unit(what.unit), stalls.join(", "))?;
+        }
+        let worse = || self.faster.iter().filter_map(|faster| Some((faster, faster.anew.as_ref()?)));
+        let worse = || worse().filter(|(_, anew)| anew.cycles > today);
+        if worse().next().is_some() {
+            writeln!(out, "more anew: the search ended with a longer schedule, which proves nothing")?;
+        }
+        for (faster, anew) in worse() {
+            writeln!(out, "  {:<16} none takes fewer than {}", self.unit(faster.what.unit), anew.least)?;
         }
         Ok(())
     }
+}
+
+/// The stalls that a faster unit would add or take away, by kind.
+fn gained(what: &WhatIf) -> impl Iterator<Item = (&'static str, i64)> {
+    Cause::KINDS.into_iter().zip(what.stalls).filter(|(_, more)| *more != 0)
 }

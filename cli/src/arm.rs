@@ -4,10 +4,11 @@ use crate::fault::explain;
 use crate::files::{self, Given, Out};
 use crate::load::Load;
 use crate::number;
+use crate::plot::ArmPlot;
 use crate::run::PERIOD_LIMIT;
 use crate::select;
 use crate::track::progress;
-use crate::{output, plot, ports};
+use crate::{output, ports};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::{Value, json};
@@ -44,7 +45,8 @@ pub(crate) struct Arm {
     /// Draw a square in space with the tool and write each period's joint angles as CSV; `-` is standard output.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Draw the joint angles along that square over time as SVG; `-` is standard output.
+    /// Draw that square in space, as the joint angles bring the tool along it, and the angles over time, as SVG; `-` is
+    /// standard output.
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     /// Print the result as JSON.
@@ -101,7 +103,7 @@ impl Ported {
             bail!("a NaN was written to an output port");
         }
         let value =
-            |register: &u16| self.emulator.register(*register).context("an output port was not written");
+            |register: &u16| self.emulator.output_bits(*register).context("an output port was not written");
         Ok((self.outputs.iter().map(value).collect::<Result<_>>()?, report.cycles))
     }
 }
@@ -172,15 +174,18 @@ fn narrow_pose(pose: &Pose<f64>) -> Pose<f32> {
     Pose { position: narrow(pose.position), orientation: narrow(pose.orientation) }
 }
 
-/// The tool along the square: joint angles of every period, and how far the tool was from the square, mm.
+/// The tool along the square, by the joint angles that the program found.
 struct Drawn {
     joints: Vec<[f32; 6]>,
+    /// Where these angles bring the tool, mm.
+    tool: Vec<[f64; 3]>,
+    /// How far it was from the square at most, mm.
     deviation: f64,
 }
 
 fn draw_square(arm: &mut OnEmulator) -> Result<Drawn> {
     let tool = narrow(square::TOOL);
-    let mut drawn = Drawn { joints: Vec::new(), deviation: 0.0 };
+    let mut drawn = Drawn { joints: Vec::new(), tool: Vec::new(), deviation: 0.0 };
     for period in 0..=square::PERIODS {
         let pose = square::square(period);
         let found = arm.inverse(&narrow_pose(&pose), tool, square::CONFIGURATION)?;
@@ -191,6 +196,7 @@ fn draw_square(arm: &mut OnEmulator) -> Result<Drawn> {
         let off = (0..3).map(|i| (reached.position[i] - pose.position[i]).powi(2)).sum::<f64>().sqrt();
         drawn.deviation = drawn.deviation.max(off);
         drawn.joints.push(found.joints);
+        drawn.tool.push(reached.position);
     }
     Ok(drawn)
 }
@@ -224,7 +230,9 @@ pub(crate) fn run(arguments: &Arm, color: bool, out: &mut Out) -> Result<()> {
         }
     }
     if let (Some(file), Some(drawn)) = (&mut picture, &drawn) {
-        file.write_all(plot::joints(&drawn.joints, square::PERIOD)?.as_bytes())?;
+        let plot = ArmPlot { tool: &drawn.tool, joints: &drawn.joints, period: square::PERIOD };
+        let title = format!("The tool along a square of {} mm in space", square::SIDE);
+        file.write_all(plot.draw(&title)?.as_bytes())?;
     }
     for file in [table, picture].into_iter().flatten() {
         file.finish()?;

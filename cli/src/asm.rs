@@ -12,8 +12,9 @@ use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
 use takt_asm::ir::DemandKind;
 use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, TimingReport};
-use takt_asm::{Assembled, Schedule, image, listing};
+use takt_asm::{Adjustment, Assembled, Made, Schedule, image, listing};
 use takt_isa::Program;
+use takt_rtl::header::{Cycles, Header, Language, Span};
 
 /// Assemble a source into an image.
 ///
@@ -40,6 +41,12 @@ pub(crate) struct Asm {
     /// Write `$readmemh` memories into this folder: code of each slot, constants of each bank, data.
     #[arg(long, value_name = "FOLDER")]
     readmemh: Option<PathBuf>,
+    /// Write what a host must know of the program, in this language: ports and their bus addresses, what the loader writes, cycles.
+    #[arg(long, value_enum, value_name = "LANGUAGE")]
+    header: Option<HeaderLanguage>,
+    /// Write the header here; `-` is standard output.
+    #[arg(long, value_name = "FILE", default_value = "-", requires = "header")]
+    header_file: PathBuf,
     /// Schedule everything: the same as --schedule on.
     #[arg(short = 'O', conflicts_with = "schedule")]
     optimise: bool,
@@ -49,8 +56,11 @@ pub(crate) struct Asm {
     /// How long the scheduler searches, up to 100000; 0 is the first passes only.
     #[arg(long, value_name = "N", default_value_t = DEFAULT_EFFORT, value_parser = clap::value_parser!(u32).range(0..=100_000), allow_hyphen_values = true)]
     effort: u32,
+    /// Leave out of the image what only a debugger reads: the sources, constants, what names stand for.
+    #[arg(long)]
+    strip: bool,
     /// Check only; write no file.
-    #[arg(long, conflicts_with_all = ["output", "listing", "symbols", "readmemh"])]
+    #[arg(long, conflicts_with_all = ["output", "listing", "symbols", "readmemh", "header"])]
     check: bool,
     /// Print the result, errors and warnings as JSON on standard output.
     #[arg(long)]
@@ -62,7 +72,32 @@ Examples:
   takt asm prog.s                       prog.s into prog.takt
   takt asm prog.s -m t1 -o small.takt   the same source for the small machine
   takt asm prog.s --listing -           which bundle came from which lines
+  takt asm prog.s --header c --header-file prog.h   ports, loader and cycles for a host in C
   takt asm prog.s --check --json        errors and warnings for an editor";
+
+/// A host's language.
+#[derive(Clone, Copy, ValueEnum)]
+enum HeaderLanguage {
+    /// C99: addresses, functions for each port, a loader.
+    C,
+    /// A Rust module without the standard library.
+    Rust,
+    /// JSON, as docs/headers.md says.
+    Json,
+    /// CMSIS-SVD: the bus slave with the program's ports.
+    Svd,
+}
+
+impl From<HeaderLanguage> for Language {
+    fn from(language: HeaderLanguage) -> Language {
+        match language {
+            HeaderLanguage::C => Language::C,
+            HeaderLanguage::Rust => Language::Rust,
+            HeaderLanguage::Json => Language::Json,
+            HeaderLanguage::Svd => Language::Svd,
+        }
+    }
+}
 
 /// Which bundles to schedule.
 #[derive(Clone, Copy, ValueEnum)]
@@ -88,7 +123,10 @@ impl From<When> for Schedule {
 impl Asm {
     /// Where the image goes, if anywhere.
     fn image_path(&self) -> Result<Option<PathBuf>> {
-        let others = self.listing.is_some() || self.symbols.is_some() || self.readmemh.is_some();
+        let others = self.listing.is_some()
+            || self.symbols.is_some()
+            || self.readmemh.is_some()
+            || self.header.is_some();
         match &self.output {
             Some(path) => Ok(Some(path.clone())),
             None if others || self.check => Ok(None),
@@ -109,6 +147,9 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
             .into_iter()
             .filter_map(|(option, path)| Some((option, path.as_deref()?)))
             .collect();
+    if arguments.header.is_some() {
+        writes.push(("--header", &arguments.header_file));
+    }
     if arguments.json {
         writes.push(("--json", Path::new("-")));
     }
@@ -144,8 +185,13 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
             files::write(&folder.join(name), text.as_bytes())?;
         }
     }
+    if let Some(language) = arguments.header {
+        let text = header(program, &arguments.file).text(language.into());
+        files::write(&arguments.header_file, text.as_bytes())?;
+    }
     if let Some(path) = &image_path {
-        files::write(path, &image::write(program))?;
+        let debug = (!arguments.strip).then(|| assembled.debug_info());
+        files::write(path, &image::write_with(program, debug.as_ref())?)?;
     }
     if arguments.json {
         output::json(&result_json(&assembled, image_path.as_deref())?, out)?;
@@ -162,8 +208,27 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         )?;
         write_blocks(&assembled, out)?;
         write_timing(&assembled, out)?;
+        write_adjustments(&assembled, out)?;
     }
     Ok(())
+}
+
+/// What a host must know of a program, named after its source.
+fn header(program: &Program, source: &Path) -> Header {
+    let stem = source.file_stem().filter(|_| !files::is_dash(source));
+    let name = stem.map_or_else(|| "program".into(), |stem| stem.to_string_lossy());
+    let span = |span: takt_analysis::Span| Span { best: span.best, worst: span.worst };
+    let cycles = takt_analysis::bound(program).map(|bounds| {
+        let section = |section: &takt_analysis::SectionBounds| Cycles {
+            name: section.name.clone(),
+            address: section.address,
+            once: section.once,
+            cycles: span(if section.once { section.cycles } else { section.in_time }),
+            missed: (!section.once).then_some(span(section.missed)),
+        };
+        bounds.sections.iter().map(section).collect()
+    });
+    Header::new(program, &name, cycles.map_err(|error| error.to_string()))
 }
 
 /// What the scheduler made of each block, beside its bound.
@@ -199,6 +264,21 @@ fn write_timing(assembled: &Assembled, out: &mut Out) -> Result<()> {
         let ports = report.ports.iter().map(cycles).collect::<Vec<_>>().join(", ");
         let (demand, result) = timing_text(report);
         writeln!(out, "  {demand}: {result}; cycles: {ports}")?;
+    }
+    Ok(())
+}
+
+/// What became of operations whose slot does not write the bank that their register lies in.
+fn write_adjustments(assembled: &Assembled, out: &mut Out) -> Result<()> {
+    let adjustments = &assembled.adjustments;
+    let Some(longest) = adjustments.iter().map(|one| one.register.chars().count()).max() else {
+        return Ok(());
+    };
+    let width = longest.clamp(12, 40);
+    writeln!(out, "{:<1$} bank   written by several slots", "registers", width + 2)?;
+    for Adjustment { register, bank, mnemonic, location, made } in adjustments {
+        let place = location.map_or(String::new(), |at| format!("{}: ", assembled.program.place_text(at)));
+        writeln!(out, "  {register:<width$} {bank:<6} {place}`{mnemonic}` {made}")?;
     }
     Ok(())
 }
@@ -285,6 +365,23 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
             "ports": report.ports.iter().map(port).collect::<Vec<_>>(),
         })
     };
+    let adjustment = |one: &Adjustment| {
+        let (made, details) = match one.made {
+            Made::Preset(bits) => ("preset", json!({ "bits": bits })),
+            Made::Operation(mnemonic) => ("operation", json!({ "mnemonic": mnemonic })),
+            Made::Copy { address, alone, cycles } => {
+                ("copy", json!({ "address": address, "alone": alone, "cycles": cycles }))
+            }
+        };
+        json!({
+            "register": one.register,
+            "bank": one.bank,
+            "mnemonic": one.mnemonic,
+            "place": one.location.map(|at| program.place_text(at)),
+            "made": made,
+            "details": details,
+        })
+    };
     Ok(json!({
         "machine": program.machine.name,
         "image": image.map(|path| path.display().to_string()),
@@ -294,6 +391,7 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
         "data_words": program.data.len(),
         "blocks": assembled.blocks.iter().map(block).collect::<Vec<_>>(),
         "timing": assembled.timing.iter().map(timing).collect::<Vec<_>>(),
+        "adjustments": assembled.adjustments.iter().map(adjustment).collect::<Vec<_>>(),
         "messages": messages(&assembled.warnings)?,
     }))
 }

@@ -171,7 +171,7 @@ impl TrackingController for OnEmulator {
         self.report = Some(report);
         let mut values = [0.0; OUTPUTS.len()];
         for ((value, register), port) in values.iter_mut().zip(&self.binding.outputs).zip(&OUTPUTS) {
-            let bits = self.emulator.register(*register);
+            let bits = self.emulator.output_bits(*register);
             let unwritten =
                 || ControllerError(format!("the program has not written output port `{}`", port.name));
             let bits = bits.ok_or_else(unwritten)?;

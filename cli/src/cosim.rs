@@ -42,6 +42,9 @@ pub(crate) struct Cosim {
     /// Run so many random programs [default: 1].
     #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
     programs: Option<u64>,
+    /// Random programs with latched ports. (A program from a file has what it says.)
+    #[arg(long, conflicts_with = "file")]
+    latched: bool,
     /// Where the waveform of a difference goes, as VCD.
     #[arg(long, value_name = "FILE", default_value = "cosim.vcd")]
     waveform: PathBuf,
@@ -74,8 +77,8 @@ pub(crate) fn run(arguments: &Cosim, color: bool, out: &mut Out) -> Result<()> {
     }
 }
 
-fn model(machine: &'static Machine) -> Result<(Design, Model)> {
-    let design = export(machine, &Library::builtin())?;
+fn model(machine: &'static Machine, latched: u16) -> Result<(Design, Model)> {
+    let design = Design { latched, ..export(machine, &Library::builtin())? };
     let model = Model::build(&design, &cache_folder(), false)?;
     Ok((design, model))
 }
@@ -84,7 +87,7 @@ fn model(machine: &'static Machine) -> Result<(Design, Model)> {
 fn one(arguments: &Cosim, file: &Path, color: bool, out: &mut Out) -> Result<()> {
     let program = Load::new(arguments.machine.machine, color).with(&arguments.source).program(file)?;
     let rows = ports::rows(arguments.inputs.as_deref(), arguments.periods, PERIODS, &program.inputs)?;
-    let (design, model) = model(program.machine)?;
+    let (design, model) = model(program.machine, program.latched_inputs())?;
     let ran = run_rows(&program, &rows, model.start(&[])?);
     let result = match ran {
         Ok(result) => result,
@@ -159,7 +162,7 @@ fn many(arguments: &Cosim, out: &mut Out) -> Result<()> {
     let first = arguments.seed.unwrap_or(0);
     let count = arguments.programs.unwrap_or(1);
     let Some(end) = first.checked_add(count) else { bail!("seeds end at {}", u64::MAX) };
-    let (design, model) = model(machine)?;
+    let (design, model) = model(machine, if arguments.latched { machine.inputs.depth } else { 0 })?;
     let mut simulation = model.start(&[])?;
     let mut coverage = random::Coverage::default();
     for seed in first..end {

@@ -7,7 +7,7 @@ use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
 
-/// Turn an image back into source, which assembles to the same image.
+/// Turn an image back into source, which assembles to the same program.
 #[derive(Args)]
 #[command(after_help = "Example:\n  takt disasm prog.takt -o prog.s")]
 pub(crate) struct Disasm {

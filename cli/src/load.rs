@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
 use takt_asm::expr::Value;
 use takt_asm::limits::IMAGE_BYTES;
+use takt_asm::names::{DebugInfo, Names};
 use takt_asm::{Assembled, FileLoader, Loader, MemoryLoader, Options, Schedule, Search, image};
 use takt_isa::{MACHINES, Machine, Program};
 
@@ -33,13 +34,14 @@ pub(crate) struct Loaded {
     pub(crate) constants: Vec<(String, Value)>,
     /// Texts, by the names that the program has for them.
     pub(crate) sources: Vec<(String, String)>,
+    /// What names stand for.
+    pub(crate) names: Names,
 }
 
 impl From<Assembled> for Loaded {
     fn from(assembled: Assembled) -> Loaded {
-        let files = assembled.sources.files().iter();
-        let sources = files.map(|file| (file.name.to_string(), file.text.to_string())).collect();
-        Loaded { program: assembled.program, constants: assembled.constants, sources }
+        let DebugInfo { sources, constants, names } = assembled.debug_info();
+        Loaded { program: assembled.program, constants, sources, names }
     }
 }
 
@@ -57,7 +59,12 @@ impl Load {
     }
 
     fn options(&self) -> Options {
-        Options { machine: self.machine.unwrap_or(MACHINES[0]), schedule: self.schedule, effort: self.effort }
+        Options {
+            machine: self.machine.unwrap_or(MACHINES[0]),
+            schedule: self.schedule,
+            effort: self.effort,
+            levels: self.source.warnings.iter().copied().collect(),
+        }
     }
 
     /// The text of a source.
@@ -79,9 +86,10 @@ impl Load {
         let bytes = files::read(path, IMAGE_BYTES)?;
         let name = files::input_name(path);
         let loaded = if image::is_image(&bytes) {
-            let program =
-                image::read(&bytes).with_context(|| format!("{name} is not an image that can run"))?;
-            Loaded { program, constants: Vec::new(), sources: Vec::new() }
+            let (program, debug) =
+                image::read_with(&bytes).with_context(|| format!("{name} is not an image that can run"))?;
+            let DebugInfo { sources, constants, names } = debug.unwrap_or_default();
+            Loaded { program, constants, sources, names }
         } else {
             self.finish(self.assemble(path, bytes))?.into()
         };

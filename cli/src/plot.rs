@@ -1,4 +1,4 @@
-//! Pictures as SVG: the tool path and the tracking error over time; an arm's joint angles over time.
+//! Pictures as SVG: the tool path and the tracking error over time; an arm's tool in space, and its joint angles over time.
 
 use anyhow::{Result, anyhow};
 use plotters::coord::Shift;
@@ -25,8 +25,11 @@ const JOINT_COLORS: [RGBColor; 6] = [
     RGBColor(0x7a, 0x3c, 0xa0),
     RGBColor(0x40, 0x40, 0x40),
 ];
-/// Height of the picture of an arm's joints.
-const JOINTS_HEIGHT: u32 = 500;
+/// Heights of the pictures of an arm's tool and of its joints.
+const SPACE_HEIGHT: u32 = 620;
+const JOINTS_HEIGHT: u32 = 400;
+/// The shadow of the tool's path.
+const SHADOW: RGBColor = RGBColor(0xe2, 0xe4, 0xe8);
 /// The paper's requirement on the tool, µm.
 const REQUIRED: f64 = 10.0;
 
@@ -177,33 +180,107 @@ impl Plot {
     }
 }
 
-/// Joint angles, degrees, over time; `period` in seconds.
-pub(crate) fn joints(joints: &[[f32; 6]], period: f64) -> Result<String> {
-    let mut svg = String::new();
-    draw_joints(joints, period, &mut svg).map_err(|error| anyhow!("cannot draw: {error}"))?;
-    Ok(in_pixels(&svg, SIZE, JOINTS_HEIGHT))
+/// An arm's way: the tool's positions, mm, and the joint angles, degrees, of every period, which is in seconds.
+pub(crate) struct ArmPlot<'a> {
+    pub(crate) tool: &'a [[f64; 3]],
+    pub(crate) joints: &'a [[f32; 6]],
+    pub(crate) period: f64,
 }
 
-fn draw_joints(joints: &[[f32; 6]], period: f64, svg: &mut String) -> Outcome<()> {
-    let root = SVGBackend::with_string(svg, (px(SIZE), px(JOINTS_HEIGHT))).into_drawing_area();
-    root.fill(&WHITE)?;
-    let names = ["θ1", "θ2", "θ3", "θ4", "θ5", "θ6"];
-    let styles = JOINT_COLORS.map(|color| color.stroke_width(px(2)));
-    let lines: Vec<_> = names.into_iter().zip(styles).collect();
-    let area = headed(&root, "Joint angles, the tool along a square in space", &lines)?;
-    let angles = || joints.iter().flatten().copied().map(f64::from);
-    let (low, high) = (angles().fold(f64::MAX, f64::min) - 10.0, angles().fold(f64::MIN, f64::max) + 10.0);
-    let end = joints.len().saturating_sub(1) as f64 * period;
-    let mut chart = chart(&area).build_cartesian_2d(0.0..end, low..high)?;
-    mesh(&mut chart, "time, s", "angle, degrees")?;
-    let every = joints.len().div_ceil(POINTS as usize).max(1);
-    for (joint, (_, style)) in lines.into_iter().enumerate() {
-        let point = |(index, angles): (usize, &[f32; 6])| (index as f64 * period, f64::from(angles[joint]));
-        // Corners, at quarters of the way, fall on points of the curve.
-        chart.draw_series(LineSeries::new(joints.iter().enumerate().step_by(every).map(point), style))?;
+impl ArmPlot<'_> {
+    /// The picture: the tool's path in space, under it the joint angles over time.
+    pub(crate) fn draw(&self, title: &str) -> Result<String> {
+        let mut svg = String::new();
+        self.draw_into(title, &mut svg).map_err(|error| anyhow!("cannot draw: {error}"))?;
+        Ok(in_pixels(&svg, SIZE, SPACE_HEIGHT + JOINTS_HEIGHT))
     }
-    root.present()?;
-    Ok(())
+
+    fn draw_into(&self, title: &str, svg: &mut String) -> Outcome<()> {
+        let size = (px(SIZE), px(SPACE_HEIGHT + JOINTS_HEIGHT));
+        let root = SVGBackend::with_string(svg, size).into_drawing_area();
+        root.fill(&WHITE)?;
+        let (upper, lower) = root.split_vertically(px(SPACE_HEIGHT));
+        self.draw_space(title, &upper)?;
+        self.draw_joints(&lower)?;
+        root.present()?;
+        Ok(())
+    }
+
+    fn draw_space(&self, title: &str, area: &Area<'_>) -> Outcome<()> {
+        let (path, shadow) = (CUT.stroke_width(px(2)), SHADOW.filled());
+        let area = headed(area, title, &[("tool", path), ("its shadow from above", shadow)])?;
+        // One scale for all axes, so that what is square looks like it.
+        let extent = |axis: usize| {
+            let values = self.tool.iter().map(|position| position[axis]);
+            values.fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)))
+        };
+        let extents = [0, 1, 2].map(extent);
+        let half = extents.iter().map(|(low, high)| (high - low) / 2.0).fold(1.0, f64::max) * 1.15;
+        let [x, y, z] = extents.map(|(low, high)| {
+            let centre = (low + high) / 2.0;
+            centre - half..centre + half
+        });
+        let floor = z.start;
+        // In plotters' space the second axis is up.
+        let at = |x: f64, y: f64, z: f64| (y, z, x);
+        let mut chart = ChartBuilder::on(&area).margin(px(4)).margin_bottom(px(24)).build_cartesian_3d(
+            y.start..y.end,
+            z.start..z.end,
+            x.start..x.end,
+        )?;
+        chart.with_projection(|mut projection| {
+            // From the side to which the square leans, so that one sees into it.
+            (projection.pitch, projection.yaw, projection.scale) = (0.5, -2.5, 0.86);
+            projection.into_matrix()
+        });
+        let label = |value: &f64| format!("{value:.0}");
+        chart
+            .configure_axes()
+            .light_grid_style(TRANSPARENT)
+            .bold_grid_style(BLACK.mix(0.15).stroke_width(px(1)))
+            .axis_panel_style(TRANSPARENT)
+            .label_style(font(12))
+            .tick_size(px(4))
+            .x_formatter(&label)
+            .y_formatter(&label)
+            .z_formatter(&label)
+            .draw()?;
+        let names = [
+            ("x, mm", at((x.start + x.end) / 2.0, y.start - 0.42 * half, floor)),
+            ("y, mm", at(x.start - 0.42 * half, (y.start + y.end) / 2.0, floor)),
+            ("z, mm", at(x.start, y.end + 0.5 * half, (z.start + z.end) / 2.0)),
+        ];
+        let names = names.map(|(name, point)| Text::new(name.to_owned(), point, font(14)));
+        chart.draw_series(names)?;
+        let every = self.tool.len().div_ceil(POINTS as usize).max(1);
+        let points = || self.tool.iter().step_by(every);
+        let below: Vec<_> = points().map(|&[x, y, _]| at(x, y, floor)).collect();
+        chart.draw_series([Polygon::new(below, shadow)])?;
+        chart.draw_series(LineSeries::new(points().map(|&[x, y, z]| at(x, y, z)), path))?;
+        Ok(())
+    }
+
+    fn draw_joints(&self, area: &Area<'_>) -> Outcome<()> {
+        let names = ["θ1", "θ2", "θ3", "θ4", "θ5", "θ6"];
+        let styles = JOINT_COLORS.map(|color| color.stroke_width(px(2)));
+        let lines: Vec<_> = names.into_iter().zip(styles).collect();
+        let area = headed(area, "Joint angles on the way", &lines)?;
+        let angles = || self.joints.iter().flatten().copied().map(f64::from);
+        let (low, high) =
+            (angles().fold(f64::MAX, f64::min) - 10.0, angles().fold(f64::MIN, f64::max) + 10.0);
+        let end = self.joints.len().saturating_sub(1) as f64 * self.period;
+        let mut chart = chart(&area).build_cartesian_2d(0.0..end, low..high)?;
+        mesh(&mut chart, "time, s", "angle, degrees")?;
+        let every = self.joints.len().div_ceil(POINTS as usize).max(1);
+        for (joint, (_, style)) in lines.into_iter().enumerate() {
+            let point =
+                |(index, angles): (usize, &[f32; 6])| (index as f64 * self.period, f64::from(angles[joint]));
+            // Corners, at quarters of the way, fall on points of the curve.
+            let points = self.joints.iter().enumerate().step_by(every).map(point);
+            chart.draw_series(LineSeries::new(points, style))?;
+        }
+        Ok(())
+    }
 }
 
 /// The picture, drawn in fine units, with its size in pixels.

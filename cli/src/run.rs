@@ -69,7 +69,7 @@ Examples:
   takt run prog.s --inputs in.csv --stats         a period for each row; where did the cycles go?
   takt run prog.takt --inputs in.csv --outputs -  outputs and cycles of every period
   takt run prog.s --periods 3 --trace out.vcd     waveforms for GTKWave or Surfer
-  takt run prog.s --inputs in.csv --tick 12500 --deny missed,invalid     for CI: status 3 if one happens";
+  takt run prog.s --inputs in.csv --deny all      for CI: status 3 if a flag is raised, …";
 
 /// Cycles in which a period ends, or nobody expects it to any more.
 pub(crate) const PERIOD_LIMIT: u64 = 1_000_000_000;
@@ -211,7 +211,7 @@ fn run_periods(
         observers.nans.add(&report.nan_writes);
         if let Some(outputs) = &mut outputs {
             let values = emulator.program().outputs.iter().map(|port| {
-                emulator.register(port.register).map_or(String::new(), |bits| ports::format(port.ty, bits))
+                emulator.output_bits(port.register).map_or(String::new(), |bits| ports::format(port.ty, bits))
             });
             ports::write_row(outputs, values.chain([report.cycles.to_string()]))?;
         }
@@ -230,7 +230,7 @@ fn outputs<'a, T>(
 ) -> impl Iterator<Item = (&'a str, Option<T>)> {
     let ports = emulator.program().outputs.iter();
     ports.map(move |port| {
-        (port.name.as_str(), emulator.register(port.register).map(|bits| show(port.ty, bits)))
+        (port.name.as_str(), emulator.output_bits(port.register).map(|bits| show(port.ty, bits)))
     })
 }
 

@@ -3,6 +3,7 @@
 use clap::Args;
 use std::path::{Path, PathBuf};
 use takt_asm::diag::nearest;
+use takt_asm::levels::Wish;
 use takt_isa::{MACHINES, Machine, Op, ROWS, Row};
 
 /// `--machine`.
@@ -27,6 +28,9 @@ pub(crate) struct SourceArguments {
     /// Look in this folder too for what a source includes; may be given several times.
     #[arg(short = 'I', long = "include", value_name = "DIR", value_parser = folder)]
     pub(crate) folders: Vec<PathBuf>,
+    /// Make the assembler's warnings errors: `error`, or one by name, `error=NAME`; `allow=NAME` leaves it out.
+    #[arg(short = 'W', long = "warnings", value_name = "LEVEL")]
+    pub(crate) warnings: Vec<Wish>,
 }
 
 /// A folder that is there, for clap.

@@ -72,7 +72,7 @@ Examples:
   takt track --machine t1 --plot agh.svg         on the small machine; draw path and error
   takt track --program mine.s --gcode part.ngc   your own controller, your own path
   takt track --periods 1000 --csv path.csv       record inputs and outputs for `takt run`
-  takt track -q --deny all                       for CI: status 3 if a deadline is missed, a flag raised, …";
+  takt track -q --deny all                       for CI: status 3 if a deadline is missed, …";
 
 /// Bytes of G-code; beyond, the longest path that can be driven would be made of moves of a micrometre.
 const GCODE_LIMIT: usize = 16 << 20;

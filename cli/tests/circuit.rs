@@ -55,7 +55,7 @@ fn test_bench_runs_the_rows() {
     folder.write("none.csv", "in0\n");
     for line in ["rtl -o out --program p.s --inputs none.csv", "cosim p.s --inputs none.csv"] {
         let done = folder.line(line);
-        assert!(done.status == Some(1) && done.stderr.contains("no rows"), "{}", done.stderr);
+        assert!(done.status == Some(1) && done.stderr.contains("a header and no row, so"), "{}", done.stderr);
     }
 }
 
@@ -80,4 +80,21 @@ fn without_verilator_its_package_is_named() {
     let done = Done::of(command);
     assert_eq!(done.status, Some(1));
     assert!(done.stderr.contains("apt-get install verilator"), "{}", done.stderr);
+}
+
+/// The circuit is built as the program has its ports.
+#[test]
+fn latched_ports_come_from_the_program() {
+    let folder = Folder::new();
+    folder.write("p.s", format!(".ports latched\n{PROGRAM}"));
+    folder.write("in.csv", "in0\n1.5\n-2\n0.25\n");
+    folder.line("rtl -o out --machine t1 --program p.s --inputs in.csv").ok();
+    for file in ["takt_t1.v", "takt_t1_wishbone.v"] {
+        let text = folder.read_text(&format!("out/{file}"));
+        assert!(text.contains("parameter LATCHED = 2 ") || text.contains("parameter LATCHED = 2,"), "{file}");
+    }
+    folder.line("rtl -o out --machine t1").ok();
+    assert!(folder.read_text("out/takt_t1.v").contains("parameter LATCHED = 0 "));
+    let text = cosim(&folder, "cosim p.s --machine t1 --inputs in.csv").ok();
+    assert!(text.contains("3 periods on t1") && text.contains("no difference"), "{text}");
 }

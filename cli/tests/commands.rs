@@ -94,7 +94,30 @@ fn the_arm_draws_a_square() {
     }
     assert!((number("y", 2000) - number("y", 1000) - 200.0).abs() < 1e-3);
     let svg = folder.read_text("s.svg");
-    assert!(svg.starts_with("<svg") && svg.matches("<polyline").count() >= 6 && svg.contains("θ6"));
+    assert!(svg.starts_with("<svg") && svg.matches("<polyline").count() >= 7 && svg.contains("θ6"));
+    // The tool's path, of all lines the one that comes back to where it began: seen from afar, a square is a parallelogram.
+    let points = |line: &str| -> Vec<(f64, f64)> {
+        let points = line.split("points=\"").nth(1).unwrap().split('"').next().unwrap().split_whitespace();
+        let point = |point: &str| {
+            let (x, y) = point.split_once(',').unwrap();
+            (x.parse().unwrap(), y.parse().unwrap())
+        };
+        points.map(point).collect()
+    };
+    let lines = svg.lines().filter(|line| line.starts_with("<polyline")).map(points);
+    let closed: Vec<_> = lines.filter(|line| line.len() > 100 && line.first() == line.last()).collect();
+    let [square] = &closed[..] else { panic!("{} closed lines", closed.len()) };
+    let corner = |quarter: usize| square[quarter * (square.len() - 1) / 4];
+    let [a, b, c, d] = [0, 1, 2, 3].map(corner);
+    assert!(
+        (a.0 + c.0 - b.0 - d.0).abs() < 10.0 && (a.1 + c.1 - b.1 - d.1).abs() < 10.0,
+        "{a:?} {b:?} {c:?} {d:?}"
+    );
+    let area = (c.0 - a.0) * (d.1 - b.1) - (d.0 - b.0) * (c.1 - a.1);
+    assert!(area.abs() > 1e6, "not from the side: {area}");
+    for text in ["The tool along a square of 200 mm in space", "x, mm", "y, mm", "z, mm", "Joint angles"] {
+        assert!(svg.contains(text), "{text}");
+    }
     assert_eq!(folder.line("arm --poses 1 --plot -").ok(), svg);
 }
 
@@ -168,8 +191,10 @@ fn images_run_like_their_sources() {
             assert!(stats.starts_with("50 periods on "), "{stats}");
 
             folder.line("disasm image -o again.s").ok();
-            folder.line(&format!("asm again.s -m {machine} -o again")).ok();
-            assert!(folder.read("again") == image, "{program} on {machine}");
+            folder.line(&format!("asm again.s -m {machine} --strip -o again")).ok();
+            folder.line(&format!("asm {source} -m {machine} --strip -o stripped")).ok();
+            assert!(folder.read("again") == folder.read("stripped"), "{program} on {machine}");
+            assert_eq!(folder.line("run stripped --inputs rec.csv --stats").ok(), stats);
         }
     }
 }
@@ -209,9 +234,9 @@ table:  .float  0.5, 0.25, -1.75
     );
     assert_eq!((&json["periods"], &json["cycles"]["min"]), (&0.into(), &serde_json::Value::Null));
     for machine in ["t3", "t1"] {
-        folder.line(&format!("asm sum.s -m {machine}")).ok();
+        folder.line(&format!("asm sum.s -m {machine} --strip")).ok();
         folder.line("disasm sum.takt -o again.s").ok();
-        folder.line(&format!("asm again.s -m {machine} -o again.takt")).ok();
+        folder.line(&format!("asm again.s -m {machine} --strip -o again.takt")).ok();
         assert!(folder.read("again.takt") == folder.read("sum.takt"), "{machine}");
     }
 }
@@ -249,6 +274,17 @@ fn where_the_cycles_of_a_period_go() {
         assert_eq!(json["cycles"], run["cycles"][cycles], "{periods}");
         assert_eq!(json["one_cycle_less"][0]["assembled_anew"], serde_json::Value::Null);
     }
+    // What would take more cycles is said to, and why: every cycle more is a stall of some kind.
+    let json: serde_json::Value = serde_json::from_str(&folder.line("analyse small --json").ok()).unwrap();
+    let less = json["one_cycle_less"].as_array().unwrap();
+    let cycles = |value: &serde_json::Value| value.as_i64().unwrap();
+    let worse = less.iter().filter(|unit| cycles(&unit["as_it_is"]) > cycles(&json["cycles"]));
+    let told = worse.map(|unit| {
+        let stalls: i64 = unit["stalls"].as_object().unwrap().values().map(cycles).sum();
+        assert_eq!(cycles(&unit["as_it_is"]) - cycles(&json["cycles"]), stalls, "{unit}");
+        assert!(cycles(&unit["stalls"]["write port"]) > 0, "{unit}");
+    });
+    assert!(told.count() > 2);
     // From standard input to standard output.
     let page = folder.fed("analyse - --html -", &folder.read("image")).ok();
     assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n"));
@@ -409,6 +445,28 @@ fn long_tables() {
     // Fewer, if fewer are asked for.
     let text = folder.fed("run sum.s --inputs - --outputs - --periods 3", table.as_bytes()).ok();
     assert_eq!(columns(&text)["k"], ["1", "2", "3"]);
+}
+
+/// Input ports that nobody gives a value are 0, whoever runs the program.
+#[test]
+fn without_inputs_the_ports_are_zero() {
+    let folder = Folder::new();
+    folder.write("law.s", ".input a, n:int\n.output F, k:int\n.once\n iadd k, n, 7\n wait p\n.period\np: fadd F, a, 1.0\n iadd k, n, 2\n wait p\n");
+    let text = folder.line("run law.s --periods 2").ok();
+    assert!(text.contains("without --inputs the input ports are 0\n  F = 1.0\n  k = 2\n"), "{text}");
+    folder.line("run law.s --periods 2 --outputs zero.csv").ok();
+    folder.write("in.csv", "a,n\n0,0\n0,0\n");
+    folder.line("run law.s --inputs in.csv --outputs given.csv").ok();
+    assert_eq!(folder.read_text("zero.csv"), folder.read_text("given.csv"));
+    assert_eq!(
+        folder.line("analyse law.s --json").ok(),
+        folder.line("analyse law.s --inputs in.csv --json").ok()
+    );
+    let debug = folder.fed("debug law.s", b"goto period 1\nprint F, k, a\n").ok();
+    assert!(debug.contains("F = 1.0") && debug.contains("k = 2"), "{debug}");
+    // Where there are no periods, too.
+    folder.write("once.s", ".input a\n.output F\n fadd F, a, 1.0\n halt\n");
+    assert!(folder.line("run once.s").ok().contains("F = 1.0"));
 }
 
 #[test]

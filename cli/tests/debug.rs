@@ -13,12 +13,45 @@ fn a_script() {
         "# what the program is to do\nbreak add if i == 2\nwatch sum\ncontinue\ncontinue\nstops\nflight\nprint sum, i, table[i], @m0\n\
          list\nstep out\nback line\nreverse\ndelete\ndisplay sum\nuntil count == 3\ncheck sum == -1.0\nulp sum, -1.0000001\nregisters *\nports\nmemory table 3\nstalls\nhelp until\n",
     );
-    insta::assert_snapshot!("script", folder.line("debug sum.s --script good.txt").ok());
+    let said = folder.line("debug sum.s --script good.txt").ok();
+    insta::assert_snapshot!("script", &said);
     let script = folder.read("good.txt");
     assert_eq!(folder.fed("debug sum.s", &script).ok(), folder.fed("debug sum.s --script -", &script).ok());
-    // An image has no source text, and all else.
+    // An image has all that its source has.
     folder.line("asm sum.s -o sum.takt").ok();
-    assert!(folder.fed("debug sum.takt", b"break add\nc\np sum\n").ok().contains("sum = 0.0 "));
+    assert_eq!(folder.line("debug sum.takt --script good.txt").ok(), said);
+}
+
+/// An image carries its source: it is what was assembled, whatever has become of the file, unless it is stripped.
+#[test]
+fn the_source_of_an_image() {
+    let folder = Folder::new();
+    folder.write("sum.s", SUM);
+    folder.line("asm sum.s").ok();
+    folder.line("asm sum.s --strip -o bare.takt").ok();
+    let listed = |image: &str| folder.fed(&format!("debug {image}"), b"break add\nc\nlist\np sum\n");
+    let fresh = listed("sum.takt");
+    assert!(
+        fresh.stderr.is_empty() && fresh.stdout.contains("\n>   12  add:    ld      x, table[i]\n"),
+        "{fresh:?}"
+    );
+
+    let bare = listed("bare.takt");
+    assert_eq!(bare.status, Some(1));
+    let message = "error: standard input:3: the program carries no source of sum.s: an image does unless it is assembled with --strip\n";
+    assert_eq!(bare.stderr, message);
+    assert!(bare.stdout.contains("sum = 0.0 "), "the rest is there: {}", bare.stdout);
+
+    folder.write("sum.s", &SUM.replace("table[i]", "table[0]"));
+    let stale = listed("sum.takt");
+    assert_eq!((stale.status, &stale.stdout), (Some(0), &fresh.stdout));
+    assert_eq!(
+        stale.stderr,
+        "warning: sum.s has changed since sum.takt was made; shown is what it was then\n"
+    );
+    std::fs::remove_file(folder.path().join("sum.s")).unwrap();
+    let moved = listed("sum.takt");
+    assert_eq!((moved.status, moved.stdout, moved.stderr), (Some(0), fresh.stdout, fresh.stderr));
 }
 
 #[test]

@@ -19,7 +19,7 @@ period: fadd F, a, a
 /// A folder with sources and tables, good and bad.
 fn workshop() -> Folder {
     let folder = Folder::new();
-    let files: [(&str, &[u8]); 33] = [
+    let files: [(&str, &[u8]); 36] = [
         ("pd.s", PD.as_bytes()),
         ("empty.s", b""),
         ("comment.s", b"; nothing yet\n"),
@@ -49,6 +49,9 @@ fn workshop() -> Folder {
         ("blank.csv", b"a,n\n,1\n"),
         ("fraction.csv", b"a,n\n1,1.5\n"),
         ("wide.csv", b"a,n\n1,4294967296\n"),
+        ("semicolon.csv", b"a;n\n1,5;2\n"),
+        ("mixed.csv", b"a,n\n1;2\n"),
+        ("tab.csv", b"a\tn\n1\t2\n"),
         ("header.csv", b"a,n\n"),
         ("empty.csv", b""),
         ("latin.csv", b"a,n,caf\xe9\n1,2,3\n"),
@@ -146,7 +149,6 @@ fn programs_that_go_wrong() {
             "run spins.s",
             "run unwritten.s",
             "run pd.s",
-            "run pd.s --periods 2",
             "run halts.s --inputs ok.csv",
         ],
     );
@@ -180,8 +182,12 @@ fn programs_that_cannot_be_bounded() {
             "bound unwritten.s --deadline 100us",
             "bound pd.s --deadline 100kg",
             "bound pd.s --deadline 0",
-            "bound pd.s --deadline -1us",
-            "bound pd.s --deadline 100us --clock 125kHz",
+            "bound pd.s --deadline -5us",
+            "bound pd.s --deadline 0us",
+            "bound pd.s --deadline nan",
+            "bound pd.s --deadline 1e400s",
+            "bound pd.s --deadline --json",
+            "bound pd.s --deadline 100us --clock 125kg",
             "bound garbage",
             "bound pd.takt --machine t1",
         ],
@@ -228,12 +234,35 @@ fn controllers_that_go_wrong() {
 #[test]
 fn tables_of_inputs() {
     let tables = [
-        "nowhere", "missing", "none", "twice", "short", "long", "nan", "inf", "large", "text", "blank",
-        "fraction", "wide", "header", "empty", "latin",
+        "nowhere",
+        "missing",
+        "none",
+        "twice",
+        "short",
+        "long",
+        "nan",
+        "inf",
+        "large",
+        "text",
+        "blank",
+        "fraction",
+        "wide",
+        "header",
+        "empty",
+        "latin",
+        "semicolon",
+        "mixed",
+        "tab",
     ];
     let lines: Vec<String> = tables.iter().map(|table| format!("run pd.s --inputs {table}.csv")).collect();
     let mut lines: Vec<&str> = lines.iter().map(String::as_str).collect();
     lines.push("run pd.s --inputs folder");
+    // Whoever reads it.
+    lines.extend([
+        "analyse pd.s --inputs semicolon.csv",
+        "debug pd.s --inputs header.csv",
+        "rtl -o x --program pd.s --inputs header.csv",
+    ]);
     check("tables", &lines);
 }
 
@@ -266,13 +295,20 @@ fn command_lines() {
             "run pd.s --max-cycles 0",
             "run pd.s --tick 0",
             "run pd.s --tick 1e3",
+            "run pd.s --tick -5us",
+            "run pd.s --tick 100us",
+            "run pd.s --periods 99999999999999999999",
+            "run pd.s --periods 2 --deny mised",
+            "run pd.s --trace x.vcd --trace-cycles -5..10",
+            "analyse pd.s --periods -1",
+            "cosim --seed -1",
+            "arm --seed 1.5",
             "run pd.s --tick 1000000000",
             "run pd.s --outputs out.csv",
             "run - --inputs -",
             "run pd.s --inputs ok.csv --outputs ok.csv",
             "run pd.s --inputs ok.csv --outputs folder/../ok.csv",
             "run pd.s --inputs ok.csv --outputs - --json",
-            "run pd.s --inputs ok.csv --outputs - --stats",
             "track --periods 0",
             "track --clock 0",
             "track --clock -5",

@@ -8,6 +8,9 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::num::NonZeroU64;
 use std::path::PathBuf;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::mpsc;
+use std::thread;
+use std::time::Duration;
 use takt_asm::{FileLoader, Options};
 use takt_emu::{Emulator, Number};
 
@@ -55,8 +58,12 @@ fn controller() -> impl FnMut(i32) -> f64 {
 
 #[test]
 fn the_example_converges_and_equals_a_loop_without_pipes() {
-    let mut command = Command::new("python3");
-    command.arg(example().join("plant.py")).arg(env!("CARGO_BIN_EXE_takt"));
+    // Where no answer comes both sides wait for ever.
+    let mut command = Command::new("timeout");
+    command
+        .args([&PATIENCE.as_secs().to_string(), "python3"])
+        .arg(example().join("plant.py"))
+        .arg(env!("CARGO_BIN_EXE_takt"));
     let text = Done::of(command).ok();
     let mut lines = text.lines();
     assert_eq!(lines.next(), Some("time,angle,current"));
@@ -88,6 +95,9 @@ period: fdiv F, 1.0, a
         wait period
 ";
 
+/// After which what hangs is taken to hang.
+const PATIENCE: Duration = Duration::from_secs(60);
+
 /// `takt run` underway.
 struct Running {
     child: Child,
@@ -109,10 +119,20 @@ impl Running {
         self.stdin.as_mut().unwrap().write_all(text.as_bytes()).unwrap();
     }
 
-    /// The next line; if none comes, the test hangs.
+    /// The next line, which must not need more input to come.
     fn line(&mut self) -> String {
-        let mut line = String::new();
-        self.stdout.as_mut().unwrap().read_line(&mut line).unwrap();
+        let mut stdout = self.stdout.take().unwrap();
+        let (sender, answer) = mpsc::channel();
+        thread::spawn(move || {
+            let mut line = String::new();
+            stdout.read_line(&mut line).unwrap();
+            sender.send((line, stdout))
+        });
+        let Ok((line, stdout)) = answer.recv_timeout(PATIENCE) else {
+            self.child.kill().unwrap();
+            panic!("there is no answer")
+        };
+        self.stdout = Some(stdout);
         line
     }
 

@@ -8,7 +8,7 @@
 //   kind, cycle, address, slot, register, value, flags, 0
 // Cycle 0 is the first after reset.
 //
-// ports.h, which is generated, gives SLOTS, RESET_CYCLES and the output ports by slot.
+// ports.h, which is generated, gives SLOTS, RESET_CYCLES, OUTPUTS, LATCHED and the output ports by slot.
 
 #include "Vcore.h"
 #include "verilated.h"
@@ -21,7 +21,7 @@
 #include <cstdlib>
 #include <vector>
 
-enum Kind { ISSUE, STORE, RETIRE, PORT, MISSED, LOST, HALT, FAULT };
+enum Kind { ISSUE, STORE, RETIRE, PORT, MISSED, LOST, HALT, FAULT, PUBLISH };
 
 struct Event {
     uint32_t kind, cycle, address, slot, reg, value, flags, zero;
@@ -44,6 +44,9 @@ static Vcore *core;
 static int64_t cycle;
 static std::vector<Event> events;
 static bool was_halted, was_fault;
+// Of each output port: whether it was written since the last `wait`, and ever before that, and what it showed then.
+static bool written[OUTPUTS], known[OUTPUTS];
+static uint32_t shown[OUTPUTS];
 static uint32_t trace_first = 1, trace_last = 0;
 #ifdef TRACE
 static VerilatedVcdC *waveform;
@@ -63,7 +66,31 @@ static void dump(int edge) {
 #endif
 }
 
+static uint32_t read_output(unsigned number) {
+    core->read_output = number;
+    core->eval();
+    return core->read_value;
+}
+
+// What the outside sees: after a `wait`, all that was written; if ports are latched, nothing else in between.
+static void observe_outputs() {
+    if (core->ended) {
+        for (unsigned n = 0; n < OUTPUTS; n++) {
+            if (!written[n] && !known[n]) continue;
+            uint32_t value = read_output(n);
+            if (written[n] || value != shown[n]) event(PUBLISH, cycle - 2, 0, 0, n, value, 0);
+            shown[n] = value;
+            known[n] = true;
+            written[n] = false;
+        }
+    } else if (LATCHED) {
+        unsigned n = cycle % OUTPUTS;
+        if (known[n] && read_output(n) != shown[n]) event(PUBLISH, cycle, 0, 0, n, core->read_value, 0);
+    }
+}
+
 static void observe() {
+    observe_outputs();
     if (core->issued) event(ISSUE, cycle - 2, core->issued_address, 0, 0, 0, 0);
     if (core->stored) event(STORE, cycle - 2, core->stored_address, 0, 0, core->stored_value, 0);
     for (unsigned s = 0; s < SLOTS; s++) {
@@ -74,6 +101,7 @@ static void observe() {
     }
     outputs([](unsigned slot, bool write, uint32_t reg, uint32_t value) {
         if (write) event(PORT, cycle, 0, slot, reg, value, 0);
+        if (write) written[reg % OUTPUTS] = true;
     });
     if (core->tick_missed) event(MISSED, cycle, 0, 0, 0, 0, 0);
     if (core->tick_lost) event(LOST, cycle, 0, 0, 0, 0, 0);
@@ -133,6 +161,7 @@ static void load() {
     cycle = 0;
     events.clear();
     was_halted = was_fault = false;
+    for (unsigned n = 0; n < OUTPUTS; n++) written[n] = known[n] = false;
 }
 
 static void run() {

@@ -1,12 +1,13 @@
 //! A program on both sides.
 
 use crate::model::{CircuitEvent, EventKind, ModelError, Pin, Simulation};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use takt_emu::{Emulator, Event, Fault, FaultKind, LoadError, PortWrite, Status, Stop};
 use takt_isa::Program;
 use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::Cycle;
-use takt_rtl::export::{INPUT_DELAY, TICK_DELAY};
+use takt_rtl::export::{INPUT_DELAY, LATCHED_INPUT_DELAY, TICK_DELAY};
 use thiserror::Error;
 
 /// The circuit tells of an event at most so many cycles after it.
@@ -21,6 +22,14 @@ pub enum LockstepError {
     /// The simulation does not run.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// The circuit's ports are not the program's.
+    #[error("the program's ports are {}, and the circuit was built with {circuit} latched inputs, where it wants {program}", if *.program > 0 { "latched" } else { "not latched" })]
+    Ports {
+        /// Latched inputs that the program wants.
+        program: u16,
+        /// Those of the circuit.
+        circuit: u16,
+    },
     /// The two sides differ.
     #[error(transparent)]
     Difference(#[from] Box<Difference>),
@@ -63,6 +72,10 @@ pub struct Lockstep {
     simulated: Cycle,
     compared: u64,
     stopped: Option<Fault>,
+    /// What was written to output ports since the last `wait`, by number.
+    written: BTreeMap<u16, u32>,
+    /// Cycles between an input on its pin and the cycle in which the emulator is given it.
+    input_delay: Cycle,
 }
 
 impl Lockstep {
@@ -75,6 +88,10 @@ impl Lockstep {
         mut simulation: Simulation,
         inputs: &[(u16, u32)],
     ) -> Result<Lockstep, LockstepError> {
+        let (wanted, circuit) = (program.latched_inputs(), simulation.latched());
+        if wanted > circuit || (wanted == 0) != (circuit == 0) {
+            return Err(LockstepError::Ports { program: wanted, circuit });
+        }
         let mut emulator = Emulator::new(program)?;
         for &(register, bits) in inputs {
             // A register that is no input is refused by both sides alike.
@@ -91,6 +108,8 @@ impl Lockstep {
             simulated: 0,
             compared: 0,
             stopped: None,
+            written: BTreeMap::new(),
+            input_delay: if program.latched { LATCHED_INPUT_DELAY } else { INPUT_DELAY },
         })
     }
 
@@ -121,16 +140,17 @@ impl Lockstep {
         }
     }
 
-    /// Sets an input port, by its register: bundles that issue from now on see the value. Inputs that are set at the same
+    /// Sets an input port, by its register: bundles that issue from now on see the value; if ports are latched, those of the
+    /// period whose tick comes from now on. Inputs that are set at the same
     /// time reach the circuit one a cycle; returns the cycle in which this one does.
     pub fn set_input(&mut self, register: u16, bits: u32) -> Cycle {
         let index = register.wrapping_sub(self.emulator.machine().inputs.base);
-        let pin = self.emulator.now().saturating_sub(INPUT_DELAY).max(self.free_pin);
+        let pin = self.emulator.now().saturating_sub(self.input_delay).max(self.free_pin);
         if self.emulator.set_input_bits(register, bits).is_ok() {
             self.free_pin = pin + 1;
             self.pins.push((pin, Pin::Input { index, value: bits }));
         }
-        pin + INPUT_DELAY
+        pin + self.input_delay
     }
 
     /// Lets the emulator run until `cycle` cycles have passed; false if it stopped before.
@@ -161,8 +181,23 @@ impl Lockstep {
         &mut self,
         run: impl FnOnce(&mut takt_emu::Observed<'_>) -> Result<Stop, Fault>,
     ) -> Option<Stop> {
-        let expected = &mut self.expected;
-        let mut sink = |event: &Event| expected.extend(expect(event));
+        let machine = self.emulator.machine();
+        let (expected, written) = (&mut self.expected, &mut self.written);
+        let mut sink = |event: &Event| {
+            expected.extend(expect(event));
+            match *event {
+                Event::PortWrite(write) => {
+                    written.extend(machine.output_number(write.register).map(|number| (number, write.value)));
+                }
+                Event::Wait { cycle, .. } => {
+                    let published = std::mem::take(written).into_iter().map(|(register, value)| {
+                        CircuitEvent { register, value, ..bare(EventKind::Publish, cycle) }
+                    });
+                    expected.extend(published);
+                }
+                _ => {}
+            }
+        };
         match run(&mut self.emulator.observed(&mut sink)) {
             Ok(stop) => Some(stop),
             Err(fault) => {
@@ -263,7 +298,10 @@ impl Lockstep {
         let program = self.emulator.program();
         let mut instruction = String::new();
         if let Some(event) = event
-            && !matches!(event.kind, EventKind::Store | EventKind::Port | EventKind::Missed | EventKind::Lost)
+            && !matches!(
+                event.kind,
+                EventKind::Store | EventKind::Port | EventKind::Missed | EventKind::Lost | EventKind::Publish
+            )
         {
             let slot = (event.kind == EventKind::Retire).then_some(event.slot);
             instruction = describe(program, event.address, slot);
@@ -313,6 +351,7 @@ fn show(program: &Program, event: &CircuitEvent) -> String {
             event.address
         ),
         EventKind::Port => format!("output port {} takes 0x{:08x}", name(), event.value),
+        EventKind::Publish => format!("output {} is published as 0x{:08x}", event.register, event.value),
         EventKind::Missed => "the deadline is missed".to_owned(),
         EventKind::Lost => "the tick is lost".to_owned(),
         EventKind::Halt => "halts".to_owned(),
@@ -347,10 +386,13 @@ fn fault_code(kind: &FaultKind) -> Option<u16> {
     }
 }
 
+/// An event of which only kind and cycle are known.
+fn bare(kind: EventKind, cycle: Cycle) -> CircuitEvent {
+    CircuitEvent { cycle, kind, slot: 0, address: 0, register: 0, value: 0, flags: 0 }
+}
+
 /// What the circuit is expected to show of an event of the emulator.
 fn expect(event: &Event) -> Option<CircuitEvent> {
-    let bare =
-        |kind, cycle| CircuitEvent { cycle, kind, slot: 0, address: 0, register: 0, value: 0, flags: 0 };
     Some(match *event {
         Event::Issue { cycle, address } => CircuitEvent { address, ..bare(EventKind::Issue, cycle) },
         Event::Retire(retire) => match (retire.register, retire.memory) {

@@ -59,6 +59,7 @@ fn file_error(path: &Path) -> impl FnOnce(std::io::Error) -> ModelError {
 #[derive(Clone, Debug)]
 pub struct Model {
     program: PathBuf,
+    latched: u16,
 }
 
 /// Where compiled designs are kept: `takt` in the user's cache folder.
@@ -87,9 +88,11 @@ fn run(tool: &'static str, package: &'static str, command: &mut Command) -> Resu
 fn ports(design: &Design) -> String {
     let slots = design.machine.slots;
     let mut text = format!(
-        "#define SLOTS {}\n#define RESET_CYCLES {RESET_CYCLES}\nextern Vcore *the_core();\n\
+        "#define SLOTS {}\n#define RESET_CYCLES {RESET_CYCLES}\n#define OUTPUTS {}\n#define LATCHED {}\nextern Vcore *the_core();\n\
          template <class F> static void outputs_of(Vcore *core, F f) {{\n",
-        slots.len()
+        slots.len(),
+        design.machine.outputs_per_bank,
+        design.latched
     );
     for (s, slot) in slots.iter().enumerate() {
         let (b, first) = (slot.bank.name, slot.bank.base + slot.bank.depth - design.machine.outputs_per_bank);
@@ -120,13 +123,13 @@ impl Model {
         let name = format!("{}-{:016x}", design.top, hasher.finish());
         let program = folder.join(&name);
         if program.exists() {
-            return Ok(Model { program });
+            return Ok(Model { program, latched: design.latched });
         }
         let work = folder.join(format!("{name}.{}.partial", std::process::id()));
         let compiled = compile(design, &ports, &work, trace)
             .and_then(|built| fs::rename(built, &program).map_err(file_error(&program)));
         let _ = fs::remove_dir_all(&work);
-        compiled.map(|()| Model { program })
+        compiled.map(|()| Model { program, latched: design.latched })
     }
 
     /// Starts a simulation. A model that can trace writes its waveform to the first argument; others are Verilog's plusargs.
@@ -142,7 +145,7 @@ impl Model {
             .spawn()
             .map_err(file_error(&self.program))?;
         let (stdin, stdout) = (process.stdin.take(), process.stdout.take());
-        Ok(Simulation { process, stdin, stdout })
+        Ok(Simulation { process, stdin, stdout, latched: self.latched })
     }
 }
 
@@ -164,6 +167,7 @@ fn compile(design: &Design, ports: &str, work: &Path, trace: bool) -> Result<Pat
     let mut command = Command::new("verilator");
     command.args(["--cc", "--exe", "--build", "-O3", "--x-assign", "unique", "--x-initial", "unique"]);
     command.args(["--prefix", "Vcore", "--top-module", &design.top, "-o", "simulation"]);
+    command.arg(format!("-GLATCHED={}", design.latched));
     command.args(["-CFLAGS", "-O1 -std=gnu++17", "-MAKEFLAGS", "OPT_FAST=-O1 OPT_SLOW=-O0 OPT_GLOBAL=-O1"]);
     if trace {
         command.args(["--trace", "-CFLAGS", "-DTRACE"]);
@@ -185,7 +189,7 @@ pub struct CircuitEvent {
     pub slot: u8,
     /// The bundle; of a store, the data word.
     pub address: u32,
-    /// The register that is written; of a fault, its kind.
+    /// The register that is written; of a fault, its kind; of an output that is published, its number.
     pub register: u16,
     /// The value that is written.
     pub value: u32,
@@ -212,9 +216,11 @@ pub enum EventKind {
     Halt,
     /// A fault.
     Fault,
+    /// A `wait` issues, and what was written to an output port since the last one is what the outside sees there.
+    Publish,
 }
 
-const KINDS: [EventKind; 8] = [
+const KINDS: [EventKind; 9] = [
     EventKind::Issue,
     EventKind::Store,
     EventKind::Retire,
@@ -223,6 +229,7 @@ const KINDS: [EventKind; 8] = [
     EventKind::Lost,
     EventKind::Halt,
     EventKind::Fault,
+    EventKind::Publish,
 ];
 
 /// What stands on a pin in a cycle.
@@ -245,9 +252,15 @@ pub struct Simulation {
     process: Child,
     stdin: Option<ChildStdin>,
     stdout: Option<ChildStdout>,
+    latched: u16,
 }
 
 impl Simulation {
+    /// The input ports of this circuit that are latched; 0 if its ports are not.
+    pub fn latched(&self) -> u16 {
+        self.latched
+    }
+
     fn send(&mut self, words: &[u32]) -> Result<(), ModelError> {
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
         let sent = self.stdin.as_mut().map(|stdin| stdin.write_all(&bytes).and_then(|()| stdin.flush()));

@@ -41,7 +41,8 @@ pub fn program(seed: u64, machine: &'static Machine) -> Program {
     program
 }
 
-/// Runs the program of a seed on both sides and adds to the coverage. The simulation comes back.
+/// Runs the program of a seed on both sides and adds to the coverage, with ports as the circuit has them: to be latched, all
+/// of its inputs must be. The simulation comes back.
 ///
 /// # Errors
 /// A difference, or a simulation that ended.
@@ -51,7 +52,7 @@ pub fn run(
     simulation: Simulation,
     coverage: &mut Coverage,
 ) -> Result<Simulation, LockstepError> {
-    let program = program(seed, machine);
+    let program = Program { latched: simulation.latched() > 0, ..program(seed, machine) };
     let mut random = Random::new(!seed);
     let port = |random: &mut Random| machine.inputs.base + random.below(INPUTS.into()) as u16;
     let first: Vec<(u16, u32)> = (0..INPUTS).map(|i| (machine.inputs.base + i, random.word())).collect();

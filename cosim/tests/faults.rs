@@ -8,8 +8,11 @@ mod common;
 
 use common::folder;
 use takt_cosim::{LockstepError, Model, random};
-use takt_isa::{Machine, T1, T3};
-use takt_rtl::{Library, export};
+use takt_isa::{Machine, Shape, T1, T3};
+use takt_rtl::plan::names::{decode, net};
+use takt_rtl::plan::{ControlBit, Plan, Stage};
+use takt_rtl::verilog::{Expr, any, number, repeat};
+use takt_rtl::{Design, Library, export};
 
 /// A module, an expression that occurs once in it, and what takes its place.
 type Fault = (&'static str, &'static str, &'static str);
@@ -58,7 +61,7 @@ const COMMON: &[Fault] = &[
     ("takt_memory", "x_store & ~fault & ~cancel", "x_store & ~cancel"),
 ];
 
-/// In the generated part of t3, and in its own units.
+/// In the modules of which t3 is made, and in its own units.
 #[rustfmt::skip]
 const OF_T3: &[Fault] = &[
     ("takt_divroot", "a_sign_1 & ~a_zero & ~a_nan", "a_sign_1 & ~a_nan"),
@@ -66,11 +69,6 @@ const OF_T3: &[Fault] = &[
     ("takt_arccosine", "negative_19 ? HALF_TURN - shifted : shifted", "shifted"),
     ("takt_hazard", "(|r_at2) | r_on_issue_early", "|r_at2"),
     ("takt_hazard", "m_at2 | (m_on_issue & i_early)", "m_at2"),
-    ("takt_t3", "pending | (|i_writes)", "pending"),
-    ("takt_t3", "sticky & {3{~x_clear_flags | fault}}", "sticky"),
-    ("takt_t3", "(r_mul_control[MUL_RESULT_5] & (mul_underway[6]))", "1'b0"),
-    ("takt_t3", "d_mul_illegal | d_outside", "d_mul_illegal"),
-    ("takt_t3_decode_mul", "|(word[40:0] & 41'h00000000fff)", "1'b0"),
 ];
 
 /// Likewise of t1.
@@ -79,15 +77,76 @@ const OF_T1: &[Fault] = &[
     ("takt_alu_late", "waiting[36*WAIT-1 -: 36]", "(waiting[36*WAIT-1 -: 36] & ~36'd8)"),
     ("takt_divide", "a_signaling | b_signaling | undefined", "a_signaling | b_signaling"),
     ("takt_root", "sign_1 & is_zero", "1'b0"),
-    ("takt_t1", "one_divide_at[13] | one_root_at[11] | one_sine_at[9] | i_one_control[ONE_RESULT_5]", "1'b0"),
+];
+
+/// A fault whose text is made.
+type MadeFault = (String, String, String);
+
+/// In what is generated for t3, in the names of its plan.
+fn generated_for_t3(plan: &Plan) -> Vec<MadeFault> {
+    let (core, mul) = (plan.top(), plan.slot("mul").expect("t3's slot"));
+    let writes = Expr::from(plan.writes_at(Stage::Issue)).any_bit();
+    let kept = |kept: Expr| (net::STICKY & kept).to_string();
+    // The product's write port is taken by the quotient.
+    let product = mul.bit(Stage::Read, ControlBit::Result(5)) & any(mul.booked(6));
+    vec![
+        (core.clone(), (net::PENDING | writes).to_string(), net::PENDING.to_string()),
+        (core.clone(), kept(repeat(3, !net::X_CLEAR_FLAGS | net::FAULT)), net::STICKY.to_string()),
+        (core.clone(), format!("({product})"), "1'b0".to_owned()),
+        (
+            core,
+            (mul.illegal(Stage::Decode) | net::D_OUTSIDE).to_string(),
+            mul.illegal(Stage::Decode).to_string(),
+        ),
+        (plan.decoder(mul), decode::is_stray(Shape::Dab).to_string(), "1'b0".to_owned()),
+    ]
+}
+
+/// Likewise for t1: the write port that iterative units take.
+fn generated_for_t1(plan: &Plan) -> Vec<MadeFault> {
+    let one = plan.slot("one").expect("t1's slot");
+    let mut taken = one.booked(5);
+    taken.push(one.bit(Stage::Issue, ControlBit::Result(5)));
+    vec![(plan.top(), any(taken).to_string(), "1'b0".to_owned())]
+}
+
+/// Likewise for t3 with latched ports.
+fn generated_for_latched(plan: &Plan) -> Vec<MadeFault> {
+    let direct = Expr::from(&net::LATCHED).is(number(0));
+    vec![
+        (plan.top(), (direct | net::INPUTS_OPEN | net::RST).to_string(), "1'b1".to_owned()),
+        (plan.top(), (net::INPUTS_TAKEN | net::RST).to_string(), net::RST.to_string()),
+    ]
+}
+
+/// In what takes and publishes latched ports, on t3, whose outputs are written by three slots.
+#[rustfmt::skip]
+const OF_LATCHED: &[Fault] = &[
+    ("takt_places", "flip ? shown ^ changed : shown", "shown"),
+    ("takt_places", "now[index[BITS-1:0]] ^ ~open", "~now[index[BITS-1:0]]"),
+    ("takt_places", "now[index[BITS-1:0]] ^ ~open", "now[index[BITS-1:0]]"),
+    ("takt_places", "{PORTS{~flip & ~drop}}", "{PORTS{1'b1}}"),
+    ("takt_places", "write[k] & ~open & (index >> BITS) == 0", "write[k] & (index >> BITS) == 0"),
+    ("takt_outputs", "of_number == j[OWNER-1:0]", "1'b0"),
+    ("takt_sequencer", "x_wait & ~fault", "x_wait & ~remembered & ~fault"),
+    ("takt_source", "advance ? m_place : r_place", "1'b0"),
 ];
 
 /// Random programs that a fault may pass before it counts as not found.
 const PROGRAMS: u64 = 1000;
 
-fn faults_are_found(machine: &'static Machine, faults: &[Fault]) {
-    let mut design = export(machine, &Library::builtin()).expect("every machine has a circuit");
+fn faults_are_found(
+    machine: &'static Machine,
+    latched: u16,
+    faults: &[Fault],
+    generated: fn(&Plan) -> Vec<MadeFault>,
+) {
+    let design = export(machine, &Library::builtin()).expect("every machine has a circuit");
+    let mut design = Design { latched, ..design };
     let top = design.top.clone();
+    let made = generated(&design.plan);
+    let made = made.iter().map(|(module, from, to)| (module.as_str(), from.as_str(), to.as_str()));
+    let faults: Vec<(&str, &str, &str)> = faults.iter().copied().chain(made).collect();
     for (number, (module, from, to)) in faults.iter().enumerate() {
         let own = format!("{module}.v");
         let file = design.files.iter_mut().find(|file| file.name.rsplit('/').next() == Some(&own));
@@ -139,11 +198,16 @@ fn faults_are_found(machine: &'static Machine, faults: &[Fault]) {
 
 #[test]
 fn planted_faults_are_found_on_t3() {
-    faults_are_found(&T3, &[COMMON, OF_T3].concat());
+    faults_are_found(&T3, 0, &[COMMON, OF_T3].concat(), generated_for_t3);
 }
 
 /// What t3 has not.
 #[test]
 fn planted_faults_are_found_on_t1() {
-    faults_are_found(&T1, OF_T1);
+    faults_are_found(&T1, 0, OF_T1, generated_for_t1);
+}
+
+#[test]
+fn planted_faults_in_latched_ports_are_found() {
+    faults_are_found(&T3, T3.inputs.depth, OF_LATCHED, generated_for_latched);
 }

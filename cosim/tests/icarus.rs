@@ -3,12 +3,13 @@
 mod common;
 
 use common::{assemble, drive, folder};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 use takt_emu::{Emulator, Event};
-use takt_isa::T3;
-use takt_rtl::{Library, bench, export};
+use takt_isa::{Program, T3};
+use takt_rtl::{Design, Library, bench, export};
 
 const PERIODS: usize = 4;
 
@@ -22,8 +23,17 @@ fn run(folder: &Path, program: &str, arguments: &[&str]) -> String {
 
 #[test]
 fn tracking_gives_the_same_outputs() {
-    let program = assemble(&T3, "hybrid/tracking.s");
-    // On the emulator: inputs of each period, and what went out, register and value, with the cycles until the period's end.
+    tracking(false);
+}
+
+#[test]
+fn latched_outputs_come_together() {
+    tracking(true);
+}
+
+fn tracking(latched: bool) {
+    let program = Program { latched, ..assemble(&T3, "hybrid/tracking.s") };
+    // On the emulator: inputs of each period, and what went out, number and value, with the cycles until the period's end.
     let mut emulator = Emulator::new(&program).expect("it fits");
     let mut periods = Vec::new();
     let mut expected = Vec::new();
@@ -38,14 +48,27 @@ fn tracking_gives_the_same_outputs() {
             emulator.set_input_bits(register, bits).expect("an input");
         }
         let report = emulator.observed(&mut sink).run_period(&[])?;
-        expected.extend(writes.iter().map(|write| (report.wait - write.cycle, write.register, write.value)));
+        let number = |register| T3.output_number(register).expect("an output");
+        let first = expected.len();
+        if latched {
+            // Only the last value of each, in the order of their numbers.
+            let last: BTreeMap<u16, u32> =
+                writes.iter().map(|write| (number(write.register), write.value)).collect();
+            expected.extend(last.into_iter().map(|(number, value)| (0, number, value)));
+        } else {
+            expected.extend(
+                writes.iter().map(|write| (report.wait - write.cycle, number(write.register), write.value)),
+            );
+        }
+        assert!(expected.len() > first);
         periods.push(inputs.to_vec());
         Ok(writes.iter().map(|write| (write.register, write.value)).collect())
     });
     assert!(expected.len() >= 20 * PERIODS, "{} values", expected.len());
 
-    let folder = folder().join("icarus");
+    let folder = folder().join(if latched { "icarus-latched" } else { "icarus" });
     let design = export(&T3, &Library::builtin()).expect("t3 has a circuit");
+    let design = Design { latched: program.latched_inputs(), ..design };
     for file in bench::folder(&design, Some(&program), &periods) {
         let path = folder.join(&file.name);
         fs::create_dir_all(path.parent().expect("a folder")).expect("the target folder can be written");

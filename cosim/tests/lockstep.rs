@@ -5,12 +5,13 @@ mod common;
 #[path = "../../asm/tests/random_source/mod.rs"]
 mod random_source;
 
-use common::{assemble, drive, model};
+use common::{assemble, drive, latched_model, model};
 use random_source::{Random, source};
+use std::sync::OnceLock;
 use takt_asm::{MemoryLoader, Options, Schedule};
 use takt_cosim::{Lockstep, LockstepError, random};
 use takt_isa::timing::Cause;
-use takt_isa::{MACHINES, Machine, Program, ROWS};
+use takt_isa::{Bank, MACHINES, Machine, Program, ROWS, Slot, T1, T3};
 
 /// `TAKT_PROGRAMS` random programs, 200 unless stated, from seed 0 on.
 #[test]
@@ -43,16 +44,84 @@ fn random_programs() {
     }
 }
 
+/// The circuit is what the row says, and not only for the table's rows: four slots, of which two have an adder and two an ALU; two
+/// slots with iterative units, of banks of different depths that leave gaps in the register space.
+#[test]
+fn rows_of_a_strangers() {
+    use takt_isa::spec::units::*;
+    let slot = |name, bank, base, depth, units| Slot { name, bank: Bank { name: bank, base, depth }, units };
+    static FOUR: OnceLock<Machine> = OnceLock::new();
+    static TWO: OnceLock<Machine> = OnceLock::new();
+    let four = FOUR.get_or_init(|| Machine {
+        name: "four",
+        slots: Vec::leak(vec![
+            slot("mul", "m", 0, 128, &[MULTIPLY, DIVROOT, ARCTANGENT]),
+            slot("add", "a", 128, 128, &[ADD, CONVERT]),
+            slot("sum", "b", 256, 128, &[ADD, ALU]),
+            slot("aux", "x", 384, 128, &[ALU, MEMORY, SEQUENCER]),
+        ]),
+        inputs: Bank { name: "i", base: 896, depth: 128 },
+        outputs_per_bank: 16,
+        ..T3
+    });
+    let two = TWO.get_or_init(|| Machine {
+        name: "two",
+        slots: Vec::leak(vec![
+            slot("mul", "m", 0, 256, &[MULTIPLY, DIVIDE, ROOT]),
+            slot("rest", "a", 256, 128, &[ADD, CONVERT, ALU_LATE, MEMORY, SEQUENCER]),
+        ]),
+        ..T3
+    });
+    for machine in [four, two] {
+        let mut simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        let mut coverage = random::Coverage::default();
+        for seed in 0..60 {
+            simulation = random::run(seed, machine, simulation, &mut coverage)
+                .unwrap_or_else(|error| panic!("{} seed {seed}: {error}", machine.name));
+        }
+        assert!(coverage.events > 10_000, "{}: only {} events", machine.name, coverage.events);
+    }
+}
+
+/// The same with latched ports, half as many.
+#[test]
+fn random_programs_with_latched_ports() {
+    let count: u64 = std::env::var("TAKT_PROGRAMS").map_or(200, |text| text.parse().expect("a number")) / 2;
+    for machine in MACHINES {
+        let model = latched_model(machine, machine.inputs.depth);
+        let mut simulation = model.start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        let mut coverage = random::Coverage::default();
+        for seed in 0..count {
+            simulation = random::run(seed, machine, simulation, &mut coverage)
+                .unwrap_or_else(|error| panic!("{} seed {seed}: {error}", machine.name));
+        }
+        assert!(coverage.missed > count, "{}: {} deadlines missed", machine.name, coverage.missed);
+    }
+}
+
+/// A circuit is for direct ports or for latched ones, and for so many of them.
+#[test]
+fn ports_of_program_and_circuit_must_agree() {
+    let program = assemble(&T1, "hybrid/tracking.s");
+    let latched = Program { latched: true, ..program.clone() };
+    assert!(latched.latched_inputs() >= 16, "{} inputs are latched", latched.latched_inputs());
+    for (program, ports) in [(&program, T1.inputs.depth), (&latched, 0), (&latched, 2)] {
+        let simulation = latched_model(&T1, ports).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        assert!(matches!(Lockstep::new(program, simulation, &[]), Err(LockstepError::Ports { .. })));
+    }
+}
+
 /// A tracking program in closed loop with the robot, a number of periods.
-fn tracking(machine: &'static Machine, source: &str, periods: usize) {
-    let program: Program = assemble(machine, source);
-    let simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+fn tracking(machine: &'static Machine, source: &str, latched: bool, periods: usize) {
+    let program = Program { latched, ..assemble(machine, source) };
+    let model = latched_model(machine, program.latched_inputs());
+    let simulation = model.start(&[]).unwrap_or_else(|error| panic!("{error}"));
     let mut lockstep = Lockstep::new(&program, simulation, &[]).unwrap_or_else(|error| panic!("{error}"));
     drive(&program, periods, |inputs| -> Result<_, LockstepError> {
         assert!(lockstep.run_period(inputs), "{:?}", lockstep.emulator().status());
         lockstep.compare()?;
         let ports = program.outputs.iter().map(|port| port.register);
-        Ok(ports.filter_map(|port| Some((port, lockstep.emulator().register(port)?))).collect())
+        Ok(ports.filter_map(|port| Some((port, lockstep.emulator().output_bits(port)?))).collect())
     });
     lockstep.finish().unwrap_or_else(|error| panic!("{}: {source}: {error}", machine.name));
     assert!(lockstep.compared() > 300 * periods as u64, "only {} events", lockstep.compared());
@@ -61,8 +130,9 @@ fn tracking(machine: &'static Machine, source: &str, periods: usize) {
 #[test]
 fn tracking_programs() {
     for machine in MACHINES {
-        tracking(machine, "hybrid/tracking.s", 100);
-        tracking(machine, "hybrid/tracking_literal.s", 20);
+        tracking(machine, "hybrid/tracking.s", false, 100);
+        tracking(machine, "hybrid/tracking_literal.s", false, 20);
+        tracking(machine, "hybrid/tracking.s", true, 20);
     }
 }
 
@@ -75,7 +145,7 @@ fn scheduled_programs() {
             let text = source(seed);
             let mut outcomes = Vec::new();
             for schedule in [Schedule::None, Schedule::AsWritten] {
-                let options = Options { machine, schedule, effort: 1 };
+                let options = Options { machine, schedule, effort: 1, ..Options::default() };
                 let assembled =
                     takt_asm::assemble("random.s", &MemoryLoader::of("random.s", text.as_str()), &options);
                 let program =

@@ -1,8 +1,9 @@
 //! Commands in, text out: what a prompt, a script and the command line of a full-screen view share. One table gives
 //! dispatch, help and completion.
 
+use crate::info;
 use crate::panes::{self, Flying, Kind, Panes};
-use crate::session::{Live, Session, Shown, Stop, Test, Unit, Where, Why, hex_float, ulp_distance};
+use crate::session::{Live, Place, Session, Shown, Stop, Test, Unit, Where, Why, hex_float, ulp_distance};
 use std::fmt::Write as _;
 use takt_asm::diag::nearest;
 use takt_asm::expr::Value;
@@ -52,6 +53,7 @@ commands! {
     "delete" "d" "[N]" Completion::None, Console::delete, "Remove a breakpoint or watchpoint, or all.";
     "stops" "" "" Completion::None, |c, _| Ok(c.stops()), "List breakpoints and watchpoints.";
     "print" "p" "EXPR, …" Completion::Names, Console::print, "Print values: as float, hexadecimal float, integer, bits. `x:int` reads x as an integer.";
+    "info" "i" "NAME" Completion::Names, Console::info, "What a name stands for: its registers, the bundles that write and read them, and which is at hand (`>`).";
     "set" "" "PLACE = EXPR" Completion::Names, Console::set, "Set a register, port or data word (`table[3]`). What was run beyond this position is forgotten.";
     "ulp" "" "EXPR, EXPR" Completion::Names, Console::ulp, "The distance of two values in units in the last place of the second.";
     "check" "" "EXPR" Completion::Names, Console::check, "Fail if an expression is zero: a script then ends with exit status 1.";
@@ -320,12 +322,9 @@ impl Console {
             None => (arguments, None),
         };
         let at = Where::parse(place, self.session.program())?;
-        let id = self.session.add_stop(Stop::Break { at, condition, text: format!("break {arguments}") });
-        let at = match at {
-            Where::Bundle(address) => self.session.program().bundle_text(address),
-            Where::Cycle(cycle) => format!("cycle {cycle}"),
-            Where::Period(period) => format!("period {period}"),
-        };
+        let text = format!("break {arguments}");
+        let id = self.session.add_stop(Stop::Break { at: at.clone(), condition, text });
+        let at = info::places(self.session.program(), &at);
         Ok(format!("stop {id} at {at}\n"))
     }
 
@@ -342,6 +341,7 @@ impl Console {
             (arguments, Test::Changed)
         };
         let what = self.session.parse(what)?;
+        what.variants()?;
         let now = self.short(&what);
         let id = self.session.add_stop(Stop::Watch {
             what: Box::new(what),
@@ -364,7 +364,14 @@ impl Console {
     }
 
     fn stops(&self) -> String {
-        self.session.stops().iter().map(|(id, stop)| format!("{id:>3}  {}\n", stop.text())).collect()
+        let places = |stop: &Stop| match stop {
+            Stop::Break { at: Where::Line(_, bundles), .. } if bundles.len() > 1 => {
+                format!("  ({} places)", bundles.len())
+            }
+            _ => String::new(),
+        };
+        let row = |(id, stop): &(u32, Stop)| format!("{id:>3}  {}{}\n", stop.text(), places(stop));
+        self.session.stops().iter().map(row).collect()
     }
 
     // ---- Values.
@@ -374,14 +381,45 @@ impl Console {
         for part in parts(arguments) {
             let live = self.session.parse(part)?;
             let _ = match self.session.place(&live)? {
-                Some((_, ty, Some(bits))) => {
-                    writeln!(text, "{} = {}", live.text(), Shown::every_way(ty, bits))
+                Some((place, ty, Some(bits))) => {
+                    let note = self.note(&live, place);
+                    writeln!(text, "{} = {}{note}", live.text(), Shown::every_way(ty, bits))
                 }
-                Some((.., None)) => writeln!(text, "{} = (never written)", live.text()),
+                Some((place, _, None)) => {
+                    writeln!(text, "{} = (never written){}", live.text(), self.note(&live, place))
+                }
                 None => writeln!(text, "{} = {}", live.text(), number(self.session.evaluate(&live)?)),
             };
         }
         Ok(text)
+    }
+
+    /// Which value of a name it is that is shown, and whether another one is on its way to its register.
+    fn note(&self, live: &Live, place: Place) -> String {
+        let mut notes = Vec::new();
+        if let Some(label) = self.session.label(live) {
+            let at = match place {
+                Place::Register(register) => self.session.program().machine.register_name(register),
+                Place::Word(_) => None,
+            };
+            notes.push(format!("{label} in {}", at.unwrap_or_default()));
+        }
+        if let Place::Register(register) = place
+            && let Some(left) = self.session.arrives(register)
+        {
+            let cycles = if left == 1 { "cycle" } else { "cycles" };
+            notes.push(format!("a new value is in flight, {left} {cycles} to go"));
+        } else if let Place::Register(register) = place
+            && let Some(bundle) = self.session.writes_yet(register)
+        {
+            let bundle = self.session.program().bundle_text(bundle);
+            notes.push(format!("{bundle} is still to compute the one that this line would read"));
+        }
+        if notes.is_empty() { String::new() } else { format!("  ({})", notes.join("; ")) }
+    }
+
+    fn info(&mut self, arguments: &str) -> Result<String, String> {
+        info::info(&self.session, arguments)
     }
 
     fn set(&mut self, arguments: &str) -> Result<String, String> {
@@ -497,7 +535,12 @@ impl Console {
         };
         let file = here.map_or(0, |location| location.file);
         let lines = panes::lines(&self.session, file, line.saturating_sub(5)..=line.saturating_add(5));
-        let lines = lines.ok_or("the source is not at hand")?;
+        let lines = lines.ok_or_else(|| {
+            let name = self.session.program().files.get(file as usize).map_or("it", String::as_str);
+            format!(
+                "the program carries no source of {name}: an image does unless it is assembled with --strip"
+            )
+        })?;
         let mut text = String::new();
         for line in lines {
             let mark = if line.next { '>' } else { ' ' };

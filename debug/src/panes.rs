@@ -163,7 +163,10 @@ pub(crate) fn head(session: &mut Session) -> String {
             format!("waits for the tick, since {}", program.bundle_text(*address))
         }
         Status::Running => {
-            let at = program.bundle_text(address);
+            let at = match session.location() {
+                Some(line) => format!("bundle {address} ({})", program.place_text(line)),
+                None => format!("bundle {address}"),
+            };
             let label = program.nearest_label(address);
             let label = label.map_or(String::new(), |(label, distance)| match distance {
                 0 => format!(", {label}"),
@@ -274,6 +277,7 @@ pub(crate) fn lines(session: &Session, file: u32, range: RangeInclusive<u32>) ->
         .iter()
         .filter_map(|(_, stop)| match stop {
             Stop::Break { at: Where::Bundle(address), .. } => program.location(*address),
+            Stop::Break { at: Where::Line(line, _), .. } => Some(*line),
             _ => None,
         })
         .collect();

@@ -27,6 +27,7 @@ impl Emulator {
             let address = waiting.unwrap_or(self.front.next);
             return Err(self.fault(address, None, FaultKind::CycleLimit { limit: now }, sink));
         }
+        self.begin_cycle();
         while self.ticks.take(now) {
             self.see_tick(now, sink);
         }
@@ -46,6 +47,13 @@ impl Emulator {
         self.issue(address, sink)?;
         self.now += 1;
         Ok(Step::Issued { cycle: now, address })
+    }
+
+    /// Takes latched inputs, if that is to be done before the next cycle.
+    pub(crate) fn begin_cycle(&mut self) {
+        if self.state.latches.as_ref().is_some_and(|latches| latches.take) {
+            self.state.take_inputs();
+        }
     }
 
     /// What keeps the next bundle from issuing in this cycle, if anything.

@@ -451,7 +451,8 @@ impl Emulator {
         !matches!(&self.recent, Recent::List(recent) if recent.is_empty())
     }
 
-    /// A register's bits; `None` if it was never written. A result appears in the cycle of its writeback.
+    /// A register's bits; `None` if it was never written. A result appears in the cycle of its writeback. What the outside sees
+    /// on an output port is [`Emulator::output_bits`].
     pub fn register(&self, register: u16) -> Option<u32> {
         (register <= ZERO && self.state.written.contains(register)).then(|| self.state.get(register))
     }

@@ -20,7 +20,7 @@ pub enum Event {
     },
     /// An operation completed.
     Retire(Retire),
-    /// An output port took a value.
+    /// An output port took a value. If ports are latched, the outside sees it from the next [`Event::Wait`] on.
     PortWrite(PortWrite),
     /// The tick was seen.
     Tick {
@@ -37,7 +37,7 @@ pub enum Event {
         /// The tick's cycle.
         cycle: Cycle,
     },
-    /// The period's end was reached.
+    /// The period's end was reached; latched outputs are published.
     Wait {
         /// The cycle in which `wait` issued.
         cycle: Cycle,

@@ -93,12 +93,13 @@ impl Emulator {
             };
             let Some(id) = id else { return Fast::Step { until: entered + 1 } };
             let beyond_bound = self.beyond_bound().is_some();
-            let block = &mut self.cache.blocks[id as usize];
-            let (state, ending) = (&mut self.state, block.ending);
-            let last = entered + Cycle::from(block.last);
+            let last = entered + Cycle::from(self.cache.blocks[id as usize].last);
             if last >= bound {
                 return Fast::Step { until: bound.max(self.now + 1) };
             }
+            self.begin_cycle();
+            let block = &mut self.cache.blocks[id as usize];
+            let (state, ending) = (&mut self.state, block.ending);
             let stack_fault = match ending {
                 Ending::Call(_) => state.stack.len() >= self.code.machine.stack_depth as usize,
                 Ending::Return => state.stack.is_empty(),

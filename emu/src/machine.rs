@@ -4,7 +4,7 @@ use crate::event::{PortWrite, Retire};
 use takt_isa::fp::{Flags, is_nan};
 use takt_isa::spec::machines::REGISTER_SPACE;
 use takt_isa::timing::{Address, Cycle};
-use takt_isa::{Program, ZERO};
+use takt_isa::{Machine, Program, ZERO};
 
 /// Words of the register array: the register space, then the words that blocks use for themselves (`block`).
 pub(crate) const WORDS: usize = 2 * REGISTER_SPACE;
@@ -71,6 +71,49 @@ pub(crate) struct State {
     /// In the order of issue.
     pub(crate) pending: Vec<Pending>,
     pub(crate) nan_writes: NanWrites,
+    /// What is beside the registers if ports are latched.
+    pub(crate) latches: Option<Box<Latches>>,
+}
+
+/// Latched ports: registers hold the inputs as they were taken last, and the outputs as the program has written them.
+#[derive(Clone, Debug)]
+pub(crate) struct Latches {
+    /// The inputs as the host has set them.
+    inputs: [u32; REGISTER_SPACE],
+    /// The outputs as they were published, and which of them were ever written.
+    outputs: [u32; REGISTER_SPACE],
+    published: RegisterSet,
+    /// Inputs that were set since they were last taken.
+    changed: Vec<u16>,
+    /// Whether they are to be taken at the beginning of the cycle to come.
+    pub(crate) take: bool,
+}
+
+impl Latches {
+    /// After reset: what the loader wrote to outputs stands there, and inputs are taken before the first cycle.
+    fn new(state: &State, machine: &Machine) -> Latches {
+        let mut latches = Latches {
+            inputs: [0; REGISTER_SPACE],
+            outputs: [0; REGISTER_SPACE],
+            published: RegisterSet::default(),
+            changed: Vec::new(),
+            take: true,
+        };
+        latches.publish(state, machine);
+        latches
+    }
+
+    fn publish(&mut self, state: &State, machine: &Machine) {
+        for slot in 0..machine.slots.len() {
+            for number in 0..machine.outputs_per_bank {
+                let register = machine.output_register(slot, number);
+                if state.written.contains(register) {
+                    self.outputs[usize::from(register)] = state.get(register);
+                    self.published.insert(register);
+                }
+            }
+        }
+    }
 }
 
 impl State {
@@ -86,12 +129,62 @@ impl State {
             flags: Flags::NONE,
             pending: Vec::new(),
             nan_writes: NanWrites::default(),
+            latches: None,
         };
         state.written.insert(ZERO);
         for &(register, bits) in &program.constants {
             state.set(register, bits);
         }
+        if program.latched {
+            state.latches = Some(Box::new(Latches::new(&state, program.machine)));
+        }
         state
+    }
+
+    /// The host sets an input port.
+    pub(crate) fn set_input(&mut self, register: u16, bits: u32) {
+        let Some(latches) = &mut self.latches else { return self.set(register, bits) };
+        latches.inputs[usize::from(register) % REGISTER_SPACE] = bits;
+        if !latches.changed.contains(&register) {
+            latches.changed.push(register);
+        }
+    }
+
+    /// Latched inputs are taken, if there are such.
+    pub(crate) fn take_inputs(&mut self) {
+        let Some(latches) = &mut self.latches else { return };
+        latches.take = false;
+        for register in latches.changed.drain(..) {
+            let place = usize::from(register) % REGISTER_SPACE;
+            self.registers[place] = latches.inputs[place];
+            self.written.insert(register);
+        }
+    }
+
+    /// Latched inputs are taken at the beginning of the next cycle, if there are such.
+    pub(crate) fn take_inputs_next(&mut self) {
+        if let Some(latches) = &mut self.latches {
+            latches.take = true;
+        }
+    }
+
+    /// Latched outputs are published, if there are such.
+    pub(crate) fn publish_outputs(&mut self, machine: &Machine) {
+        if let Some(mut latches) = self.latches.take() {
+            latches.publish(self, machine);
+            self.latches = Some(latches);
+        }
+    }
+
+    /// What the outside sees on an output port; `None` if nothing was ever written there.
+    pub(crate) fn output(&self, register: u16) -> Option<u32> {
+        match &self.latches {
+            None => self.written.contains(register).then(|| self.get(register)),
+            Some(latches) => {
+                let place = usize::from(register) % REGISTER_SPACE;
+                latches.published.contains(register).then(|| latches.outputs[place])
+            }
+        }
     }
 
     #[inline]

@@ -199,13 +199,14 @@ impl Emulator {
         self.program.outputs.iter().find(|port| port.name == name)
     }
 
-    /// Sets an input port. Bundles that issue from now on see the value.
+    /// Sets an input port. Bundles that issue from now on see the value; if ports are latched, those of the next period: the
+    /// one whose tick is in the cycle to come, at the earliest, or what runs once, if no cycle has passed yet.
     ///
     /// # Errors
     /// If the program has no such port, or one of another type.
     pub fn set_input(&mut self, name: &str, value: Number) -> Result<(), PortError> {
         let register = self.input_for(name, value)?;
-        self.state.set(register, value.bits());
+        self.state.set_input(register, value.bits());
         Ok(())
     }
 
@@ -217,11 +218,17 @@ impl Emulator {
         if !self.machine().is_input(register) {
             return Err(PortError::NoInput { register });
         }
-        self.state.set(register, bits);
+        self.state.set_input(register, bits);
         Ok(())
     }
 
-    /// The value on an output port; `None` if none was ever written.
+    /// What the outside sees on an output port, by its register: what was last written there, or, if ports are latched, what
+    /// was last published. `None` if nothing ever was, or if there is no such port.
+    pub fn output_bits(&self, register: u16) -> Option<u32> {
+        self.machine().is_output(register).then(|| self.state.output(register))?
+    }
+
+    /// The value on an output port, as [`Emulator::output_bits`]; `None` if none was ever written.
     ///
     /// # Errors
     /// If the program has no such port.
@@ -229,7 +236,7 @@ impl Emulator {
         let Some(port) = self.output_port(name) else {
             return Err(PortError::Unknown { name: name.to_owned(), kind: "output" });
         };
-        Ok(self.register(port.register).map(|bits| Number::of(port.ty, bits)))
+        Ok(self.output_bits(port.register).map(|bits| Number::of(port.ty, bits)))
     }
 
     fn input_for(&self, name: &str, value: Number) -> Result<u16, PortError> {
@@ -288,6 +295,7 @@ impl Emulator {
         emit(sink, || Event::Tick { cycle });
         if let Status::Waiting { since, address } = self.status {
             self.status = Status::Running;
+            self.state.take_inputs();
             let delivered = timing::after_tick(self.code.machine, since, cycle);
             self.continue_at(self.front.next, delivered, address);
             self.period = Some(Period { tick: cycle, start: cycle, missed: 0, lost: 0 });
@@ -313,6 +321,7 @@ impl Emulator {
             self.ticks.start(cycle);
         }
         self.ticks.waited = Some(cycle);
+        self.state.publish_outputs(self.code.machine);
         if let Some(Period { tick, start, missed, lost }) = self.period.take() {
             let (missed, cycles) = (missed > 0, cycle - start);
             self.report =
@@ -320,6 +329,7 @@ impl Emulator {
         }
         match self.ticks.remembered.take() {
             Some(tick) => {
+                self.state.take_inputs_next();
                 self.continue_at(target, timing::after_redirect(self.code.machine, cycle), address);
                 self.period = Some(Period { tick, start: cycle, missed: 0, lost: 0 });
             }

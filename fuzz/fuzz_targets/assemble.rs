@@ -15,13 +15,17 @@ fuzz_target!(|bytes: &[u8]| {
     match assemble("a.s", &loader, &options) {
         Err(diagnostics) => assert!(!diagnostics.render(false).is_empty()),
         Ok(assembled) => {
-            let bytes = image::write(&assembled.program);
+            let bytes = image::write(&assembled.program).expect("an image holds it");
             let program = image::read(&bytes).expect("an image that was written reads");
             assert_eq!(program, assembled.program);
+            let debug = assembled.debug_info();
+            let carried = image::read_with(&image::write_with(&program, Some(&debug)).expect("an image holds it"));
+            let (_, carried) = carried.expect("an image with what a debugger knows reads");
+            assert_eq!(carried.map(|carried| carried.names), Some(debug.names));
             let text = disasm::disassemble(&program);
             let again = assemble("a.s", &MemoryLoader::of("a.s", text.as_str()), &options);
             let again = again.unwrap_or_else(|errors| panic!("{text}\n{}", errors.render(false)));
-            assert_eq!(image::write(&again.program), bytes, "{text}");
+            assert_eq!(image::write(&again.program).expect("an image holds it"), bytes, "{text}");
         }
     }
 });

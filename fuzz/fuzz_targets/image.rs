@@ -12,7 +12,7 @@ fuzz_target!(|bytes: &[u8]| {
     let text = disasm::disassemble(&program);
     let again = assemble("a.s", &MemoryLoader::of("a.s", text.as_str()), &options);
     let again = again.unwrap_or_else(|errors| panic!("{text}\n{}", errors.render(false)));
-    assert_eq!(image::write(&again.program), image::write(&program), "{text}");
+    assert_eq!(image::write(&again.program).expect("an image holds it"), image::write(&program).expect("an image holds it"), "{text}");
     if let Ok(mut emulator) = Emulator::new(&program) {
         emulator.set_cycle_limit(2_000);
         for _ in 0..3 {

@@ -20,6 +20,8 @@ pub struct Program {
     pub inputs: Vec<Port>,
     /// Output ports, in the order of their declaration.
     pub outputs: Vec<Port>,
+    /// Whether the ports are latched: inputs are taken together at the tick, outputs published together at `wait`.
+    pub latched: bool,
     /// Registers that the source names.
     pub registers: Vec<Port>,
     /// Labels, by address.
@@ -111,6 +113,20 @@ pub enum IllegalWord {
 }
 
 impl Program {
+    /// Input ports that the circuit latches: a power of two above the number of every input that the program can read; 0 if
+    /// its ports are not latched.
+    pub fn latched_inputs(&self) -> u16 {
+        if !self.latched {
+            return 0;
+        }
+        let instructions = self.code.iter().filter_map(|&word| Instruction::decode(word).ok());
+        let read = instructions.flat_map(|instruction| instruction.reads().to_vec());
+        let declared = self.inputs.iter().map(|port| port.register);
+        let numbers = read.chain(declared).filter_map(|register| self.machine.input_number(register));
+        // Two at least: a choice among one is none.
+        numbers.max().map_or(2, |last| (last + 1).next_power_of_two().max(2))
+    }
+
     /// Bundles in the program.
     pub fn bundles(&self) -> u32 {
         (self.code.len() / self.machine.slots.len()) as u32

@@ -30,17 +30,39 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("hybrid/tracking_literal.s", include_str!("../hybrid/tracking_literal.s")),
 ];
 
+/// The examples and their inputs: name and text of every file in `examples/`.
+pub const EXAMPLES: &[(&str, &str)] = &[
+    ("biquads.csv", include_str!("../examples/biquads.csv")),
+    ("biquads.s", include_str!("../examples/biquads.s")),
+    ("blink.s", include_str!("../examples/blink.s")),
+    ("foc.csv", include_str!("../examples/foc.csv")),
+    ("foc.s", include_str!("../examples/foc.s")),
+    ("kalman.csv", include_str!("../examples/kalman.csv")),
+    ("kalman.s", include_str!("../examples/kalman.s")),
+    ("lu.csv", include_str!("../examples/lu.csv")),
+    ("lu.s", include_str!("../examples/lu.s")),
+    ("pi.csv", include_str!("../examples/pi.csv")),
+    ("pi.s", include_str!("../examples/pi.s")),
+    ("table.csv", include_str!("../examples/table.csv")),
+    ("table.s", include_str!("../examples/table.s")),
+];
+
 /// The library, for `.include <name>`: name and text of every file in `library/`.
 pub const LIBRARY: &[(&str, &str)] = &[("math.s", include_str!("../library/math.s"))];
 
 #[cfg(test)]
 mod tests {
     #[test]
-    fn every_file_of_the_library_is_carried() {
-        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/library");
-        let entries = std::fs::read_dir(folder).expect("it is part of the crate");
-        let mut files: Vec<_> = entries.map(|entry| entry.expect("it can be read").file_name()).collect();
-        files.sort();
-        assert_eq!(files, super::LIBRARY.iter().map(|(name, _)| *name).collect::<Vec<_>>());
+    fn every_file_of_the_library_and_the_examples_is_carried() {
+        let carried = [("library", super::LIBRARY), ("examples", super::EXAMPLES)];
+        for (folder, list) in carried {
+            let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+            let entries = std::fs::read_dir(path).expect("it is part of the crate");
+            let entries = entries.map(|entry| entry.expect("it can be read"));
+            let files = entries.filter(|entry| entry.path().is_file()).map(|entry| entry.file_name());
+            let mut files: Vec<_> = files.collect();
+            files.sort();
+            assert_eq!(files, list.iter().map(|(name, _)| *name).collect::<Vec<_>>(), "{folder}");
+        }
     }
 }

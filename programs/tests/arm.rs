@@ -27,7 +27,9 @@ impl Ported {
     fn new(path: &str, inputs: &str, outputs: &str) -> Ported {
         let options = Options { machine: &T3, ..Options::default() };
         let assembled = takt_asm::assemble(path, &MemoryLoader::new(SOURCES), &options);
-        let program: Program = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false))).program;
+        let assembled = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false)));
+        assert!(assembled.warnings.is_empty(), "{}", assembled.warnings.render(false));
+        let program: Program = assembled.program;
         let register = |ports: &[takt_isa::program::Port], name: &str| {
             ports.iter().find(|port| port.name == name).unwrap_or_else(|| panic!("no port {name}")).register
         };

@@ -5,7 +5,7 @@
 //   choose: one-hot, or none, for which value is 0. With AHEAD it is that of the cycle before.
 
 module takt_choice #(
-    parameter VALUES = 6,  // even
+    parameter VALUES = 6,  // 2 at least
     parameter AHEAD  = 0
 ) (
     input  wire                 clk,
@@ -14,13 +14,17 @@ module takt_choice #(
     output reg  [31:0]          value
 );
 
-    localparam LINKS = VALUES / 2;
+    localparam LINKS = (VALUES + 1) / 2;
 
-    generate
-        if (VALUES != 2 * LINKS) begin : g_even
-            takt_choice_has_an_even_number_of_values unsupported ();
-        end
-    endgenerate
+    // An odd number of values has one beside them that is never chosen.
+    reg [2*LINKS-1:0]  choices;
+    reg [64*LINKS-1:0] chosen;
+    always @* begin
+        choices = {2*LINKS{1'b0}};
+        chosen  = {64*LINKS{1'b0}};
+        choices[VALUES-1:0]   = choose;
+        chosen[32*VALUES-1:0] = values;
+    end
 
     // The first link delivers 0 without low and high, one of its values with one of them, and 1 with both, which chooses the
     // second value of the link that is on.
@@ -31,11 +35,11 @@ module takt_choice #(
         second = 1'b0;
         on     = {LINKS{1'b0}};
         for (i = 1; i < LINKS; i = i + 1) begin
-            second = second | choose[2*i+1];
-            on[i]  = choose[2*i] | choose[2*i+1];
+            second = second | choices[2*i+1];
+            on[i]  = choices[2*i] | choices[2*i+1];
         end
     end
-    wire [LINKS+1:0] next = {on, choose[1] | second, choose[0] | second};
+    wire [LINKS+1:0] next = {on, choices[1] | second, choices[0] | second};
 
     wire [LINKS+1:0] now;
     generate
@@ -50,9 +54,9 @@ module takt_choice #(
 
     integer j;
     always @* begin
-        value = now[1] ? values[63:32] | {32{now[0]}} : values[31:0] & {32{now[0]}};
+        value = now[1] ? chosen[63:32] | {32{now[0]}} : chosen[31:0] & {32{now[0]}};
         for (j = 1; j < LINKS; j = j + 1) begin
-            if (now[j+2]) value = (value & values[64*j+32 +: 32]) | (~value & values[64*j +: 32]);
+            if (now[j+2]) value = (value & chosen[64*j+32 +: 32]) | (~value & chosen[64*j +: 32]);
         end
     end
 

@@ -9,6 +9,8 @@
 //   fault: the bundle that issued two cycles ago was at fault: neither it nor what has issued since takes effect.
 //   block: nothing issues in the next cycle.
 //   Reset acts as a jump to 0 in the cycle before cycle 0.
+//   open: the program waits, and the tick is not seen in this cycle. ends: a `wait` issued in the last cycle; ended: in the cycle
+//   before that, and no fault keeps it from taking effect.
 //   tick is seen in the cycle in which it is high. missed, lost: in that cycle, the deadline was missed, the tick was lost.
 //   fault and fault_* stand from the second cycle after that of the fault on; without a fault, fault_* mean nothing. kind: 1 illegal word, 2 data address, 3 return stack full, 4 empty.
 
@@ -47,6 +49,9 @@ module takt_sequencer #(
     output reg              x_issued,
     output reg  [15:0]      x_address,
     output reg              waiting,
+    output wire             open,
+    output wire             ends,
+    output wire             ended,
     output wire             missed,
     output wire             lost,
     output reg              deadline_missed,
@@ -137,6 +142,11 @@ module takt_sequencer #(
     assign missed = tick & ~waits & ~still;
     assign lost   = tick & ~waits & still;
     wire wait_next = waits & ~tick;
+    assign open = wait_next;
+    assign ends = x_wait & ~fault;
+    reg was_wait;
+    always @(posedge clk) was_wait <= ends & ~rst;
+    assign ended = was_wait & ~fault;
 
     always @(posedge clk) begin
         waiting    <= wait_next;

@@ -8,19 +8,23 @@
 //   As takt_hazard. m_bank: one-hot, the slots' banks, then the inputs; none if there is no such operand or it is `zero`.
 //   result: the slots' buses. was_result: the same, one cycle later.
 //   input_write, _index, _value: a value for an input port, which goes into the bank; input_next_value: the same one cycle later.
-//   Bundles that issue in the cycle after that or later read it.
+//   Bundles that issue in the cycle after that or later read it. If LATCHED, an input port has two places: input_write_place is
+//   that of the value, input_now says whether bundles read it from now on, m_place is the place that the bundle in match reads.
 //   r_constant: what takes a source's place. Zero if there is a source. i_status: likewise, with i_reads_status, later.
 
 module takt_source #(
     parameter SLOTS = 3,
     parameter DEPTH = 10,
     parameter LATE  = 1,
-    parameter INDEX = 8
+    parameter INDEX = 8,
+    parameter LATCHED = 0,
+    parameter INPUTS  = 8   // bits of an input port's number
 ) (
     input  wire                         clk,
     input  wire                         advance,
     input  wire [SLOTS:0]               m_bank,
     input  wire [INDEX-1:0]             m_index,
+    input  wire                         m_place,
     input  wire [SLOTS*DEPTH-1:0]       underway,
     input  wire [SLOTS*DEPTH*INDEX-1:0] underway_index,
     input  wire [SLOTS-1:0]             writes,          // takt_underway's
@@ -35,6 +39,8 @@ module takt_source #(
     input  wire [SLOTS*32-1:0]          result,
     input  wire [SLOTS*32-1:0]          was_result,
     input  wire                         input_write,
+    input  wire                         input_write_place,
+    input  wire                         input_now,
     input  wire [INDEX-1:0]             input_write_index,
     input  wire [31:0]                  input_write_value,
     input  wire [31:0]                  input_next_value,
@@ -74,8 +80,8 @@ module takt_source #(
     reg  r_is_next, i_is_next;
     wire r_is_written = r_bank[SLOTS] & (r_index == input_write_index);
     always @(posedge clk) begin
-        r_is_next <= input_write & (advance ? m_bank[SLOTS] & (m_index == input_write_index) : r_is_written);
-        i_is_next <= input_write & (advance ? r_is_written : i_bank[SLOTS] & (i_index == input_write_index));
+        r_is_next <= input_now & (advance ? m_bank[SLOTS] & (m_index == input_write_index) : r_is_written);
+        i_is_next <= input_now & (advance ? r_is_written : i_bank[SLOTS] & (i_index == input_write_index));
     end
     wire next_input = advance ? r_is_next : i_is_next;
     wire next_fresh = advance & ~r_taken & ~r_is_next;  // the bundle that will be in issue is new there, and what was read is its operand
@@ -84,13 +90,22 @@ module takt_source #(
     wire [SLOTS:0]    next_copy  = {r_bank[SLOTS], r_copy} & {(SLOTS + 1){next_fresh}};
     wire [32*SLOTS+31:0] copy;  // of the bundle that was in read in the last cycle, or 0
 
-    takt_bank #(.INDEX(INDEX)) inputs (
-        .clk(clk), .write(input_write), .write_index(input_write_index), .write_value(input_write_value),
-        .read_index(read_index), .show(next_copy[SLOTS]), .value(copy[32*SLOTS +: 32])
-    );
-
     genvar s;
     generate
+        if (LATCHED == 0) begin : g_inputs
+            takt_bank #(.INDEX(INDEX)) inputs (
+                .clk(clk), .write(input_write), .write_index(input_write_index), .write_value(input_write_value),
+                .read_index(read_index), .show(next_copy[SLOTS]), .value(copy[32*SLOTS +: 32])
+            );
+            wire unused = &{1'b0, m_place, input_write_place};
+        end else begin : g_latched_inputs
+            reg r_place;
+            always @(posedge clk) if (advance) r_place <= m_place;
+            takt_bank #(.INDEX(INPUTS + 1)) inputs (
+                .clk(clk), .write(input_write), .write_index({input_write_place, input_write_index[INPUTS-1:0]}), .write_value(input_write_value),
+                .read_index({advance ? m_place : r_place, read_index[INPUTS-1:0]}), .show(next_copy[SLOTS]), .value(copy[32*SLOTS +: 32])
+            );
+        end
         for (s = 0; s < SLOTS; s = s + 1) begin : g_slot
             takt_bank #(.INDEX(INDEX)) bank (
                 .clk(clk), .write(writes[s]), .write_index(underway_index[s*DEPTH*INDEX +: INDEX]),

@@ -56,8 +56,8 @@ pub struct Library {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum CircuitError {
     /// The unit has no file, or names one that is not there.
-    #[error("there is no circuit `{0}`")]
-    NoFile(String),
+    #[error("unit `{0}`: there is no circuit rtl/units/{1}: write it and list it in rtl/src/files.rs")]
+    NoFile(&'static str, String),
     /// A line that begins with `//@` cannot be read.
     #[error(
         "`{0}`: expected `//@ op <width>'b<bits> <mnemonic> …`, `//@ op - <mnemonic> …` or `//@ as <unit>`"
@@ -73,8 +73,11 @@ pub enum CircuitError {
     #[error("`{0}` has two codes")]
     Twice(&'static str),
     /// Instructions that the unit's row promises and the circuit lacks.
-    #[error("no circuit for {0}: the unit offers the function, but its Verilog file names no code")]
-    Missing(String),
+    #[error(
+        "no circuit for {1}: unit `{0}` offers the function, but its Verilog file names no code: a line `//@ op <code> {1}` in the \
+         header of rtl/units/{0}.v, and what it computes below"
+    )]
+    Missing(&'static str, String),
     /// The row wants of the circuit what it refuses.
     #[error("unit `{unit}` has {} {value}; rtl/units/{unit}.v wants {limit}", limit.quantity)]
     Limit {
@@ -180,12 +183,13 @@ impl Library {
     /// # Errors
     /// If its file is not there, its header cannot be read or does not give exactly the unit's instructions.
     pub fn circuit(&self, unit: &Unit) -> Result<Circuit, CircuitError> {
+        let own = unit.name;
         let file = |unit: &str| {
             let name = format!("{unit}.v");
-            let text = self.text(&name).ok_or_else(|| CircuitError::NoFile(name.clone()))?;
+            let text = self.text(&name).ok_or_else(|| CircuitError::NoFile(own, name.clone()))?;
             Ok::<_, CircuitError>((name, text))
         };
-        let (own, text) = file(unit.name)?;
+        let (own_file, text) = file(own)?;
         let mut files = Vec::new();
         let inner = text.lines().find_map(|line| line.strip_prefix("//@ as "));
         let (op_bits, operations) = match inner {
@@ -202,7 +206,7 @@ impl Library {
                 return Err(CircuitError::Limit { unit: unit.name, value, limit });
             }
         }
-        files.push(own);
+        files.push(own_file);
         let files = self.with_common(files);
         let operands =
             operations.iter().map(|operation| operand_ports(operation.op.row())).max().unwrap_or(0);
@@ -270,7 +274,7 @@ fn codes(unit: &Unit, text: &str) -> Result<(u32, Vec<Operation>), CircuitError>
         .map(|row| row.mnemonic)
         .collect();
     if !missing.is_empty() {
-        return Err(CircuitError::Missing(missing.join(", ")));
+        return Err(CircuitError::Missing(unit.name, missing.join(" ")));
     }
     operations.sort_by_key(|operation| operation.op);
     Ok((width.unwrap_or(0), operations))
@@ -347,6 +351,6 @@ mod tests {
         assert!(message(&ADD, "//@ op 1'b0 fmul").contains("no instruction that the unit `add`"));
         assert!(message(&ADD, "//@ op 1'd0 fadd").contains("expected"));
         assert!(message(&MULTIPLY, "").contains("no circuit for fmul"));
-        assert!(message(&MULTIPLY, "//@ as fused").contains("no circuit `fused.v`"));
+        assert!(message(&MULTIPLY, "//@ as fused").contains("no circuit rtl/units/fused.v"));
     }
 }

@@ -48,10 +48,15 @@ pub struct Design {
     pub synthesis: String,
     /// Modules that take the place of those of the same name on Lattice ECP5.
     pub ecp5: Vec<DesignFile>,
+    /// The core's parameter of that name: 0, or, for a program whose ports are latched, its
+    /// [`latched_inputs`](takt_isa::Program::latched_inputs). The files have 0 for their default.
+    pub latched: u16,
 }
 
 /// Cycles between a value on the input port and the first bundle that may read it, less 1.
 pub const INPUT_DELAY: u64 = 3;
+/// The same for latched ports, between a value on the input port and the first tick that takes it.
+pub const LATCHED_INPUT_DELAY: u64 = 2;
 /// Cycles between the tick on its pin and the cycle in which it is seen.
 pub const TICK_DELAY: u64 = 1;
 /// Cycles for which reset must be held, so that nothing is left of what was before.
@@ -87,5 +92,5 @@ pub fn export(machine: &'static Machine, library: &Library) -> Result<Design, Ex
     let ecp5 =
         ECP5.iter().map(|&(name, text)| DesignFile { name: format!("ecp5/{name}"), text: text.to_owned() });
     let synthesis = parts::synthesis(&plan)?;
-    Ok(Design { machine, synthesis, top: plan.top(), files, ecp5: ecp5.collect(), plan })
+    Ok(Design { machine, synthesis, top: plan.top(), files, ecp5: ecp5.collect(), latched: 0, plan })
 }

@@ -47,6 +47,8 @@ pub(crate) const CORE: &[File] = files!("core":
     "takt_issue.v"
     "takt_late.v"
     "takt_memory.v"
+    "takt_outputs.v"
+    "takt_places.v"
     "takt_program.v"
     "takt_sequencer.v"
     "takt_source.v"

@@ -9,6 +9,7 @@ pub mod bench;
 pub mod circuit;
 pub mod export;
 mod files;
+pub mod header;
 mod parts;
 pub mod plan;
 pub mod synthesis;

@@ -2,41 +2,114 @@
 
 use crate::export::{Design, RESET_CYCLES};
 use std::fmt::Write as _;
+use takt_isa::spec::machines::REGISTER_SPACE;
 
-/// Registers of the slave: word address, name, access, meaning. The wrapper, its manual and its test take them from here.
-pub const REGISTERS: &[(u16, &str, &str, &str)] = &[
-    (
-        0,
-        "control",
-        "rw",
-        "bit 0: run. While it is 0 the core is in reset and can be loaded; 0 after `rst_i`. A reset, however short it is asked for, lasts as long as the core wants.",
-    ),
-    (
-        1,
-        "status",
-        "r",
-        "bit 0 waiting, 1 deadline missed, 2 halted, 3 fault, 12:10 sticky flags; with a fault, 6:4 its kind, 9:7 its slot, 31:16 its bundle.",
-    ),
-    (
-        2,
-        "period",
-        "rw",
-        "Clock cycles from tick to tick, once the program has first waited; 0: ticks come from register 3 only.",
-    ),
-    (3, "tick", "w", "Any write is a tick."),
-    (4, "load_place", "w", "Where the loader writes: bits 15:0 address, 17:16 space, 20:18 slot."),
-    (5, "load_high", "w", "Bits 47:32 of the words loaded from now on."),
-    (
-        6,
-        "load_low",
-        "w",
-        "Bits 31:0 of a word: loads it at `load_place`, which then moves on by one address. Acknowledged when the core's results have died away.",
-    ),
-];
+/// A register of the slave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Register {
+    /// Its word address.
+    pub address: u16,
+    /// Its name.
+    pub name: &'static str,
+    /// `r`, `w` or `rw`.
+    pub access: &'static str,
+    /// What it is for.
+    pub text: &'static str,
+    /// Its parts, from bit 0 on; none if it is a number as a whole.
+    pub fields: &'static [Field],
+}
+
+/// A part of a register.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Field {
+    /// Its name; in `status`, that of the slave's signal.
+    pub name: &'static str,
+    /// Its lowest bit.
+    pub low: u32,
+    /// Its bits.
+    pub width: u32,
+    /// What it says.
+    pub text: &'static str,
+}
+
+const fn field(name: &'static str, low: u32, width: u32, text: &'static str) -> Field {
+    Field { name, low, width, text }
+}
+
+const CONTROL: Register = Register {
+    address: 0,
+    name: "control",
+    access: "rw",
+    text: "While run is 0 the core is in reset and can be loaded; 0 after `rst_i`. A reset, however short it is asked for, lasts as long as the core wants; with RESTORE, what was loaded is written again in it.",
+    fields: &[field("run", 0, 1, "The program runs.")],
+};
+const STATUS: Register = Register {
+    address: 1,
+    name: "status",
+    access: "r",
+    text: "What the program does.",
+    fields: &[
+        field("waiting", 0, 1, "It waits for the tick: the outputs of the period stand."),
+        field("deadline_missed", 1, 1, "A tick came before its `wait`, since reset."),
+        field("halted", 2, 1, "It has halted."),
+        field("fault", 3, 1, "It has stopped with a fault, which the other fields describe."),
+        field(
+            "fault_kind",
+            4,
+            3,
+            "1 illegal word, 2 data address, 3 return stack full, 4 return stack empty.",
+        ),
+        field("fault_slot", 7, 3, "The slot of the fault."),
+        field(
+            "flags",
+            10,
+            3,
+            "The sticky flags: invalid, divide by zero, overflow, the last in the lowest bit.",
+        ),
+        field("fault_address", 16, 16, "The bundle of the fault."),
+    ],
+};
+const PERIOD: Register = Register {
+    address: 2,
+    name: "period",
+    access: "rw",
+    text: "Clock cycles from tick to tick, once the program has first waited; 0: ticks come from register 3 only.",
+    fields: &[],
+};
+const TICK: Register =
+    Register { address: 3, name: "tick", access: "w", text: "Any write is a tick.", fields: &[] };
+const LOAD_PLACE: Register = Register {
+    address: 4,
+    name: "load_place",
+    access: "w",
+    text: "Where the loader writes.",
+    fields: &[
+        field("address", 0, 16, "Bundle, data word or register."),
+        field("space", 16, 2, "0 program memory, 1 data memory, 2 registers."),
+        field("slot", 18, 3, "In program memory, the word of the bundle."),
+    ],
+};
+const LOAD_HIGH: Register = Register {
+    address: 5,
+    name: "load_high",
+    access: "w",
+    text: "Bits 47:32 of the words loaded from now on.",
+    fields: &[],
+};
+const LOAD_LOW: Register = Register {
+    address: 6,
+    name: "load_low",
+    access: "w",
+    text: "Bits 31:0 of a word: loads it at `load_place`, which then moves on by one address. Acknowledged when the core's reset has lasted long enough.",
+    fields: &[],
+};
+
+/// Registers of the slave, by address. The wrapper, its test and the headers of programs take them from here.
+pub const REGISTERS: &[Register] = &[CONTROL, STATUS, PERIOD, TICK, LOAD_PLACE, LOAD_HIGH, LOAD_LOW];
 
 /// Word address of input port 0.
 pub const INPUTS: u16 = 0x1000;
-/// Word address of the first bank's output port 0; the other banks' follow.
+/// Word address of output port 0.
 pub const OUTPUTS: u16 = 0x2000;
 
 /// Name of the slave's module.
@@ -44,59 +117,70 @@ pub fn name(design: &Design) -> String {
     format!("{}_wishbone", design.top)
 }
 
-fn address(register: &str) -> u16 {
-    REGISTERS.iter().find(|row| row.1 == register).expect("a register of the table").0
+/// What the slave answers for its status register: fields at their places, zeros between them.
+fn status() -> String {
+    let (mut parts, mut next) = (Vec::new(), 0);
+    for field in STATUS.fields {
+        if field.low > next {
+            parts.push(format!("{}'d0", field.low - next));
+        }
+        parts.push(field.name.to_owned());
+        next = field.low + field.width;
+    }
+    parts.reverse();
+    format!("{{{}}}", parts.join(", "))
 }
 
-/// The slave.
-pub fn wrapper(design: &Design) -> String {
+/// The slave, for a core whose ports are latched as [`Program::latched_inputs`](takt_isa::Program::latched_inputs) says, unless
+/// its parameter says otherwise.
+pub fn wrapper(design: &Design, latched: u16) -> String {
     let machine = design.machine;
     let name = name(design);
     let port_bits = machine.outputs_per_bank.trailing_zeros();
     let input_bits = machine.inputs.depth.trailing_zeros();
-    let bank_bits = machine.slots.len().next_power_of_two().trailing_zeros().max(1);
-    let (mut wires, mut ports, mut writes, mut reads) =
-        (String::new(), String::new(), String::new(), String::new());
-    for (s, slot) in machine.slots.iter().enumerate() {
-        let b = slot.bank.name;
-        let _ = writeln!(
-            wires,
-            "    wire        output_{b}_write;\n    wire [{}:0]  output_{b}_index;\n    wire [31:0] output_{b}_value;\n    reg  [31:0] held_{b} [0:{}];",
-            port_bits - 1,
-            machine.outputs_per_bank - 1
-        );
-        let _ = writeln!(
-            ports,
-            "        .output_{b}_write(output_{b}_write), .output_{b}_index(output_{b}_index), .output_{b}_value(output_{b}_value),"
-        );
-        let _ = writeln!(
-            writes,
-            "        if (output_{b}_write & ~rst) held_{b}[output_{b}_index] <= output_{b}_value;"
-        );
-        let _ = writeln!(
-            reads,
-            "            {bank_bits}'d{s}: output_value = held_{b}[adr_i[{}:0]];",
-            port_bits - 1
-        );
-    }
+    let data_bits = machine.data_depth.trailing_zeros();
+    let register_bits = REGISTER_SPACE.trailing_zeros();
+    let inputs_page = format!("{}'d{}", register_bits - input_bits, machine.inputs.base >> input_bits);
+    // What is kept to be loaded again: data, then registers.
+    let half = data_bits.max(register_bits);
+    let streams: String = machine
+        .slots
+        .iter()
+        .map(|slot| {
+            let b = slot.bank.name;
+            format!(".output_{b}_write(), .output_{b}_index(), .output_{b}_value(), ")
+        })
+        .collect();
     let mut table = String::new();
-    for (address, name, access, meaning) in REGISTERS {
-        let _ = writeln!(table, "//   {address:04x} {access:<2} {name}: {meaning}");
+    for Register { address, name, access, text, fields } in REGISTERS {
+        let _ = writeln!(table, "//   {address:04x} {access:<2} {name}: {text}");
+        for Field { name, low, width, text } in *fields {
+            let bits = if *width == 1 { low.to_string() } else { format!("{}:{low}", low + width - 1) };
+            let _ = writeln!(table, "//             {bits} {name}: {text}");
+        }
     }
-    let [control, status, period, tick, place, high, low] =
-        ["control", "status", "period", "tick", "load_place", "load_high", "load_low"].map(address);
+    let [control, period, tick, place, high, low] =
+        [CONTROL, PERIOD, TICK, LOAD_PLACE, LOAD_HIGH, LOAD_LOW].map(|register| register.address);
     format!(
         r#"// {name}: the core as a Wishbone B4 slave (classic cycles, 32 bits, one wait state). Generated by `takt rtl`.
 //
 // Contract
 //   adr_i counts words; addresses are hexadecimal:
 {table}//   {INPUTS:04x} + port  w  input port
-//   {OUTPUTS:04x} + {outputs:x} x bank + port  r  output port: what was last written to it
-//   Every access but load_low is acknowledged in the next cycle; what is written nowhere is lost, what is read nowhere is 0.
+//   {OUTPUTS:04x} + port  r  output port: what was last written to it; if LATCHED, as of the last `wait`
+//   Accesses are acknowledged in the next cycle, but load_low and, with RESTORE, input ports only when a reset underway has
+//   lasted long enough. What is written nowhere is lost, what is read nowhere is 0.
 //   rst_i: for a cycle at least, after power-up.
 //   waiting: the program waits for the tick: the outputs of the period stand. It can serve as an interrupt.
+//   LATCHED: the core's.
+//   RESTORE: a reset writes again what was loaded into data memory and registers, and what was written to input ports, while run
+//   was 0: so the program starts again as it did first. It costs {words} words of 33 bits in block RAM and as many cycles of a reset.
+//   With 0, data memory and registers are after a reset as the program left them: load them anew before it runs again.
 
-module {name} (
+module {name} #(
+    parameter LATCHED = {latched},
+    parameter RESTORE = 1
+) (
     input  wire        clk_i,
     input  wire        rst_i,
     input  wire        cyc_i,
@@ -113,6 +197,7 @@ module {name} (
 
     reg         run, ticks, loads, writes_input;
     reg  [6:0]  in_reset;     // cycles of reset so far; the core wants {RESET_CYCLES}
+    reg         done, settled;
     reg  [31:0] period, elapsed, value, low;
     reg  [15:0] place, load_address, high;
     reg  [1:0]  space;
@@ -120,31 +205,37 @@ module {name} (
     reg  [{input_high}:0]  input_index;
     reg         waited;       // since reset
 
-    wire        deadline_missed, halted, fault;
+    wire        deadline_missed, halted, fault, restored;
     wire [2:0]  fault_kind, fault_slot, flags;
     wire [15:0] fault_address;
-{wires}
-    wire settled = in_reset == 7'd{RESET_CYCLES};
-    wire rst     = ~(run & settled);
-    wire access  = cyc_i & stb_i & ~ack_o & (settled | ~we_i | adr_i != 16'd{low});
-    wire writes  = access & we_i;
-    wire due     = waited & period != 32'd0 & elapsed >= period - 32'd1;
+    wire [31:0] output_value;
+
+    wire quiet    = in_reset == 7'd{RESET_CYCLES};
+    wire rst      = ~(run & settled);
+    wire to_input = adr_i[15:{input_bits}] == {input_page_bits}'d{input_page};
+    wire held     = we_i & (adr_i == 16'd{low} | (to_input & RESTORE != 0));
+    wire access   = cyc_i & stb_i & ~ack_o & (settled | ~held);
+    wire writes   = access & we_i;
+    wire due      = waited & period != 32'd0 & elapsed >= period - 32'd1;
 
     always @(posedge clk_i) begin
         ack_o        <= access;
         ticks        <= (writes & adr_i == 16'd{tick}) | due;
         loads        <= writes & adr_i == 16'd{low};
-        writes_input <= writes & adr_i[15:{input_bits}] == {input_page_bits}'d{input_page} & ~&adr_i[{input_high}:0];  // the last is `zero`
+        writes_input <= writes & to_input & ~&adr_i[{input_high}:0];  // the last is `zero`
         input_index  <= adr_i[{input_high}:0];
         value        <= dat_i;
         waited       <= ~rst & (waited | waiting);
         elapsed      <= due | ~waited ? 32'd0 : elapsed + 32'd1;
-        if (~settled) in_reset <= in_reset + 7'd1;
+        if (~quiet) in_reset <= in_reset + 7'd1;
+        // The last word has arrived before the reset ends.
+        done         <= quiet & restored;
+        settled      <= done;
         if (writes) begin
             case (adr_i)
                 16'd{control}: begin
                     run <= dat_i[0];
-                    if (~dat_i[0] & run) in_reset <= 7'd0;
+                    if (~dat_i[0] & run) {{settled, done, in_reset}} <= 9'd0;
                 end
                 16'd{period}: period <= dat_i;
                 16'd{place}: {{slot, space, place}} <= dat_i[20:0];
@@ -159,38 +250,77 @@ module {name} (
         end
         if (rst_i) begin
             run      <= 1'b0;
-            in_reset <= 7'd0;
             period   <= 32'd0;
             ack_o    <= 1'b0;
+            {{settled, done, in_reset}} <= 9'd0;
         end
     end
 
-    // ---- output ports, held
-
-    reg [31:0] output_value;
-    always @* begin
-        case (adr_i[{bank_high}:{port_bits}])
-{reads}            default: output_value = 32'd0;
-        endcase
-    end
-
     always @(posedge clk_i) begin
-{writes}        if (access) begin
-            if (adr_i[15:{bank_top}] == {output_page_bits}'d{output_page}) dat_o <= output_value;
+        if (access) begin
+            if (adr_i[15:{port_bits}] == {output_page_bits}'d{output_page}) dat_o <= output_value;
             else case (adr_i)
                 16'd{control}: dat_o <= {{31'd0, run}};
-                16'd{status}: dat_o <= {{fault_address, 3'd0, flags, fault_slot, fault_kind, fault, halted, deadline_missed, waiting}};
+                16'd{status}: dat_o <= {status_word};
                 16'd{period}: dat_o <= period;
                 default: dat_o <= 32'd0;
             endcase
         end
     end
 
-    {top} core (
+    // ---- what is loaded, kept and loaded again
+
+    wire        replays, replays_register, replays_input;
+    wire [{half_high}:0]  replay_address;
+    wire [31:0] replay_value;
+    generate
+        if (RESTORE != 0) begin : g_restore
+            reg  [32:0] kept [0:{last_word}];  // the highest bit: it was loaded. Data, then registers and input ports
+            reg  [32:0] word;
+            reg  [{half_bits}:0] at;
+            reg  [{half_count}:0] next;
+            reg         reads;
+            integer     i;
+            initial for (i = 0; i <= {last_word}; i = i + 1) kept[i] = 33'd0;
+
+            wire        keeps_register = loads & space == 2'd2 & load_address[15:{register_bits}] == {register_rest}'d0;
+            wire        keeps_data     = loads & space == 2'd1;
+            wire [{half_high}:0] keeps_at = writes_input ? {inputs_at} : keeps_data ? {data_at} : {register_at};
+            assign restored = next[{half_count}];
+            always @(posedge clk_i) begin
+                if (rst & (keeps_data | keeps_register | writes_input))
+                    kept[{{~keeps_data, keeps_at}}] <= {{1'b1, writes_input ? value : low}};
+                word  <= kept[next[{half_bits}:0]];
+                at    <= next[{half_bits}:0];
+                reads <= quiet & ~restored;
+                if (~quiet) next <= {half_total}'d0;
+                else if (~restored) next <= next + {half_total}'d1;
+            end
+            assign replays          = reads & word[32];
+            assign replays_input    = at[{half_bits}] & at[{register_high}:{input_bits}] == {inputs_page};
+            assign replays_register = at[{half_bits}];
+            assign replay_address   = at[{half_high}:0];
+            assign replay_value     = word[31:0];
+        end else begin : g_lost
+            assign restored = 1'b1;
+            assign {{replays, replays_register, replays_input, replay_address, replay_value}} = {none}'d0;
+        end
+    endgenerate
+
+    wire        core_load    = loads | (replays & ~replays_input);
+    wire [1:0]  core_space   = replays ? {{replays_register, ~replays_register}} : space;
+    wire [15:0] core_address = replays ? {{{address_pad}'d0, replay_address}} : load_address;
+    wire [47:0] core_value   = replays ? {{16'd0, replay_value}} : {{high, low}};
+    wire        core_input   = writes_input | (replays & replays_input);
+
+    {top} #(.LATCHED(LATCHED)) core (
         .clk(clk_i), .rst(rst),
-        .load(loads), .load_space(space), .load_slot(slot), .load_address(load_address), .load_value({{high, low}}),
-        .input_write(writes_input), .input_index(input_index), .input_value(value),
-{ports}        .tick(ticks), .waiting(waiting), .deadline_missed(deadline_missed), .tick_missed(), .tick_lost(),
+        .load(core_load), .load_space(core_space), .load_slot(slot), .load_address(core_address), .load_value(core_value),
+        .input_write(core_input), .input_index(replays ? replay_address[{input_high}:0] : input_index),
+        .input_value(replays ? replay_value : value),
+        {streams}
+        .read_output(adr_i[{port_high}:0]), .read_value(output_value), .ended(),
+        .tick(ticks), .waiting(waiting), .deadline_missed(deadline_missed), .tick_missed(), .tick_lost(),
         .halted(halted), .fault(fault), .fault_kind(fault_kind), .fault_slot(fault_slot), .fault_address(fault_address),
         .issued(), .issued_address(), .stored(), .stored_address(), .stored_value(),
         .retire(), .retire_address(), .retire_register(), .retire_value(), .retire_flags(), .status(flags)
@@ -198,14 +328,34 @@ module {name} (
 
 endmodule
 "#,
-        outputs = machine.outputs_per_bank,
+        words = 2 << half,
         input_high = input_bits - 1,
-        bank_high = port_bits + bank_bits - 1,
         input_page_bits = 16 - input_bits,
         input_page = INPUTS >> input_bits,
-        bank_top = port_bits + bank_bits,
-        output_page_bits = 16 - port_bits - bank_bits,
-        output_page = OUTPUTS >> (port_bits + bank_bits),
+        output_page_bits = 16 - port_bits,
+        output_page = OUTPUTS >> port_bits,
+        port_high = port_bits - 1,
+        status = STATUS.address,
+        status_word = status(),
+        last_word = (2 << half) - 1,
+        half_high = half - 1,
+        half_bits = half,
+        half_count = half + 1,
+        half_total = half + 2,
+        register_rest = 16 - register_bits,
+        register_high = register_bits - 1,
+        inputs_at = padded(half, register_bits, &format!("{inputs_page}, input_index")),
+        data_at = padded(half, data_bits, &format!("load_address[{}:0]", data_bits - 1)),
+        register_at = padded(half, register_bits, &format!("load_address[{}:0]", register_bits - 1)),
+        none = 3 + half + 32,
+        address_pad = 16 - half,
+        streams = streams.trim_end(),
         top = design.top,
+        inputs_page = inputs_page,
     )
+}
+
+/// Verilog's concatenation of zeros and something of `bits` bits, `wide` bits in all.
+fn padded(wide: u32, bits: u32, what: &str) -> String {
+    if wide == bits { format!("{{{what}}}") } else { format!("{{{}'d0, {what}}}", wide - bits) }
 }

@@ -36,6 +36,10 @@ fn no_tool_complains() {
             silent(lint.args(files));
         };
         verilator(&["-f".to_owned(), format!("{top}.f")], top);
+        // With latched ports, of which there are two, many, all.
+        for latched in [2, 32, 256] {
+            verilator(&[format!("-GLATCHED={latched}"), "-f".to_owned(), format!("{top}.f")], top);
+        }
         let synthesis = format!("{top}_synthesis");
         verilator(&["-f".to_owned(), format!("{top}.f"), format!("{synthesis}.v")], &synthesis);
         let mut icarus = Command::new("iverilog");

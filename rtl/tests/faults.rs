@@ -7,6 +7,7 @@ mod harness;
 
 use harness::{Simulation, circuit, full, library};
 use takt_isa::UNITS;
+use takt_rtl::Circuit;
 
 /// A unit, what is replaced (it occurs once), and by what.
 type Fault = (&'static str, &'static str, &'static str);
@@ -159,6 +160,18 @@ fn passes(unit: &str, text: String) -> Result<(), String> {
     let outcome = simulation.check_special_values().and_then(|_| simulation.check_random(100_000, 1));
     simulation.remove();
     outcome.map(|_| ())
+}
+
+/// A test of a unit that finds nothing would pass unnoticed.
+#[test]
+fn every_unit_has_planted_faults() {
+    for unit in UNITS.iter().filter(|unit| Circuit::rows(unit).next().is_some() && unit.name != "memory") {
+        assert!(
+            FAULTS.iter().any(|(name, _, _)| *name == unit.name),
+            "no fault is planted in rtl/units/{0}.v: add one to FAULTS in rtl/tests/faults.rs, (\"{0}\", what to replace, by what)",
+            unit.name
+        );
+    }
 }
 
 #[test]

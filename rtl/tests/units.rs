@@ -65,7 +65,7 @@ macro_rules! units {
         fn every_unit_is_tested() {
             let tested = [$(stringify!($unit)),*];
             for unit in UNITS.iter().filter(|unit| is_arithmetic(unit)) {
-                assert!(tested.contains(&unit.name), "no test of the unit `{}`", unit.name);
+                assert!(tested.contains(&unit.name), "the unit `{0}` is not tested: add `{0}` to `units!` at the end of rtl/tests/units.rs", unit.name);
             }
         }
     };

@@ -12,8 +12,10 @@ use std::fmt::Write as _;
 use std::fs;
 use std::time::Instant;
 use takt_isa::spec::machines::MACHINES;
-use takt_isa::{Bank, Field, Function, Machine, ROWS, Slot};
+use takt_isa::{Bank, Field, Machine};
 use takt_rtl::export::export;
+use takt_rtl::plan::names::net;
+use takt_rtl::plan::{ControlBit, Plan, SlotPlan, Stage};
 use takt_rtl::{Design, Library};
 
 /// Cycles of reset ahead of what is proved.
@@ -44,15 +46,16 @@ pub(crate) fn formal(arguments: &Arguments) -> Result<()> {
     ensure!(!machines.is_empty(), "there is no machine `{}`", arguments.machine.as_deref().unwrap_or(""));
     for machine in machines {
         let design = export(machine, &library)?;
-        for slot in machine.slots {
-            let module = format!("{}_decode_{}", design.top, slot.name);
+        for slot in &design.plan.slots {
+            let module = design.plan.decoder(slot);
             prove(&venv, &design, &module, &decoder(machine, slot), 1)?;
             println!(
                 "{}: slot {}: every word is one operation or is illegal: proved",
-                machine.name, slot.name
+                machine.name,
+                slot.name()
             );
         }
-        prove(&venv, &design, &design.top, &scoreboard(machine), RESET + arguments.depth)?;
+        prove(&venv, &design, &design.top, &scoreboard(&design.plan), RESET + arguments.depth)?;
         println!(
             "{}: no operation issues before its operands, its destination, its unit or its write port, and every result is written \
              when and where it must: proved for {} cycles after reset",
@@ -83,12 +86,11 @@ fn prove(venv: &Venv, design: &Design, module: &str, properties: &str, cycles: u
         let _ = write!(list, " {name}");
     }
     // Which way a branch goes and whether the fetch leaves the program: arbitrary too. Addresses prove nothing here.
-    let arbitrary = match design.machine.host(Function::Control) {
-        Some((slot, _)) if module == design.top => {
-            let slot = design.machine.slots[slot].name;
-            format!("cutpoint w:x_{slot}_a w:f_outside; delete w:retire_* w:*_address w:output_*; ")
-        }
-        _ => String::new(),
+    let arbitrary = if module == design.top {
+        let tested = design.plan.control().operand(0);
+        format!("cutpoint w:{tested} w:{}; delete w:retire_* w:*_address w:output_*; ", net::F_OUTSIDE)
+    } else {
+        String::new()
     };
     let script = format!(
         "read_verilog -lib{cut}; read_verilog -sv -formal{read}; hierarchy -top {module}; proc; cutpoint -blackbox; flatten; {arbitrary}\
@@ -114,7 +116,7 @@ fn prove(venv: &Venv, design: &Design, module: &str, properties: &str, cycles: u
 }
 
 /// A decoder: a word is illegal unless it is one of the table's; of units and of latencies it names one at most.
-fn decoder(machine: &Machine, slot: &Slot) -> String {
+fn decoder(machine: &Machine, slot: &SlotPlan) -> String {
     // Operands lie in one of the machine's banks, the input ports' included.
     let exists = |field: Field| {
         let bits = field.bits();
@@ -127,15 +129,13 @@ fn decoder(machine: &Machine, slot: &Slot) -> String {
         format!(" && ({})", banks.join(" || "))
     };
     let mut v = String::from("    always @* begin\n        assert (illegal == ~(");
-    let rows =
-        ROWS.iter().filter(|row| row.function == Function::Idle || slot.unit_for(row.function).is_some());
     let mut legal = Vec::new();
-    for row in rows {
+    for row in &slot.rows {
         // The opcode, what the shape leaves unused, the bank of the destination, those of the operands.
         let unused = !row.shape.mask() & ((1 << 41) - 1);
         let mut text = format!("word[47:41] == 7'h{:02x} && (word[40:0] & 41'h{unused:x}) == 0", row.opcode);
         if row.shape.has_dest() {
-            let _ = write!(text, " && word[40:32] < {}", slot.bank.depth);
+            let _ = write!(text, " && word[40:32] < {}", slot.slot.bank.depth);
         }
         for field in [Field::A, Field::B, Field::C].into_iter().take(row.shape.sources()) {
             text += &exists(field);
@@ -148,10 +148,10 @@ fn decoder(machine: &Machine, slot: &Slot) -> String {
 }
 
 /// The rules of issue, from what issues alone: nothing of the core's own bookkeeping is used.
-fn scoreboard(machine: &Machine) -> String {
-    let index = machine.banks().map(|bank| bank.depth.trailing_zeros()).max().unwrap_or(0);
-    let last = index - 1;
-    let banks = machine.slots.len();
+fn scoreboard(plan: &Plan) -> String {
+    let last = plan.index - 1;
+    let banks = plan.slots.len();
+    let (issue, fault, rst, load, advance) = (net::ISSUE, net::FAULT, net::RST, net::LOAD, net::ADVANCE);
     let mut v = format!(
         "
     // ---- properties, added by `cargo xtask formal`
@@ -161,24 +161,25 @@ fn scoreboard(machine: &Machine) -> String {
     (* anyconst *) reg [{last}:0] f_register;
     always @(posedge clk) begin
         if (f_cycle != 8'hff) f_cycle <= f_cycle + 8'd1;
-        if (fault) f_stopped <= 1'b1;
-        if (rst) f_stopped <= 1'b0;
+        if ({fault}) f_stopped <= 1'b1;
+        if ({rst}) f_stopped <= 1'b0;
     end
     always @* begin
-        assume (rst == (f_cycle < {RESET}));
-        assume (~load);
+        assume ({rst} == (f_cycle < {RESET}));
+        assume (~{load});
     end
     // After a fault nothing issues any more.
-    wire f_issue = issue & ~fault & ~f_stopped & ~rst;
-    wire f_check = ~f_stopped & ~fault & ~rst;
+    wire f_issue = {issue} & ~{fault} & ~f_stopped & ~{rst};
+    wire f_check = ~f_stopped & ~{fault} & ~{rst};
 "
     );
-    let mut checks = String::from("        if (f_stopped & ~rst) assert (~issue);\n");
+    let mut checks = format!("        if (f_stopped & ~{rst}) assert (~{issue});\n");
     let mut drains = Vec::new();
-    for slot in machine.slots {
-        let (name, upper) = (slot.name, slot.name.to_uppercase());
+    for slot in &plan.slots {
+        let name = slot.name();
+        let dest = slot.dest(Stage::Issue);
         let mut latencies: Vec<u32> =
-            slot.units.iter().map(|unit| unit.latency).filter(|&latency| latency > 0).collect();
+            slot.slot.units.iter().map(|unit| unit.latency).filter(|&latency| latency > 0).collect();
         latencies.sort_unstable();
         latencies.dedup();
         // Cycles until the writeback of f_register; cycles in which the bank will be written.
@@ -188,14 +189,14 @@ fn scoreboard(machine: &Machine) -> String {
     reg [5:0]  f_{name}_pending;
     reg        f_{name}_due;
     reg [63:0] f_{name}_booked;
-    wire       f_{name}_hit = i_{name}_dest == f_register;
+    wire       f_{name}_hit = {dest} == f_register;
     always @(posedge clk) begin
         f_{name}_pending <= f_{name}_pending - {{5'd0, |f_{name}_pending}};
         f_{name}_due     <= f_{name}_pending == 6'd1;
         f_{name}_booked  <= f_{name}_booked >> 1;"
         );
         for &latency in &latencies {
-            let issues = format!("f_issue & i_{name}_control[{upper}_RESULT_{latency}]");
+            let issues = format!("f_issue & {}", slot.bit(Stage::Issue, ControlBit::Result(latency)));
             let _ = writeln!(
                 v,
                 "        if ({issues}) f_{name}_booked[{0}] <= 1'b1;\n        if ({issues} & f_{name}_hit) f_{name}_pending <= 6'd{0};",
@@ -207,53 +208,54 @@ fn scoreboard(machine: &Machine) -> String {
         }
         let _ = writeln!(
             v,
-            "        if (rst) begin\n            f_{name}_pending <= 6'd0;\n            f_{name}_due <= 1'b0;\n            f_{name}_booked <= 64'd0;\n        end\n    end"
+            "        if ({rst}) begin\n            f_{name}_pending <= 6'd0;\n            f_{name}_due <= 1'b0;\n            f_{name}_booked <= 64'd0;\n        end\n    end"
         );
-        let _ = writeln!(checks, "        if (f_check) assert ({name}_underway[0] == f_{name}_booked[0]);");
+        let (written, register) = (slot.underway().at(0), slot.underway_index().low(plan.index));
+        let _ = writeln!(checks, "        if (f_check) assert ({written} == f_{name}_booked[0]);");
         let _ = writeln!(
             checks,
-            "        if (f_check) assert (({name}_underway[0] & ({name}_underway_index[{last}:0] == f_register)) == f_{name}_due);"
+            "        if (f_check) assert (({written} & ({register} == f_register)) == f_{name}_due);"
         );
         drains.push(format!("(|f_{name}_booked[63:1])"));
-        for unit in slot.units.iter().filter(|unit| unit.interval > 1) {
-            let (u, uses) = (
-                format!("f_{name}_{}_busy", unit.name),
-                format!("f_issue & i_{name}_control[{upper}_UNIT_{}]", unit.name.to_uppercase()),
-            );
+        for late in &slot.late {
+            let u = format!("f_{name}_{}_busy", late.unit.name);
+            let uses = format!("f_issue & {}", slot.bit(Stage::Issue, ControlBit::Unit(late.unit.name)));
             let _ = writeln!(
                 v,
-                "    reg [5:0] {u};\n    always @(posedge clk) {u} <= rst ? 6'd0 : {uses} ? 6'd{} : {u} - {{5'd0, |{u}}};",
-                unit.interval - 1
+                "    reg [5:0] {u};\n    always @(posedge clk) {u} <= {rst} ? 6'd0 : {uses} ? 6'd{} : {u} - {{5'd0, |{u}}};",
+                late.unit.interval - 1
             );
             let _ = writeln!(checks, "        if ({uses}) assert ({u} == 6'd0);");
         }
-        let rows = ROWS.iter().filter(|row| slot.unit_for(row.function).is_some());
-        let sources = rows.map(|row| row.shape.sources()).max().unwrap_or(0);
-        for letter in ["a", "b", "c"].iter().take(sources) {
-            let source = format!("{name}_{letter}");
+        for operand in 0..slot.sources {
+            let source = slot.source(operand);
             let _ = writeln!(
                 v,
                 "    reg [{banks}:0] f_r_{source}_bank, f_i_{source}_bank;
     reg [{last}:0] f_r_{source}_index, f_i_{source}_index;
-    always @(posedge clk) if (advance) begin
-        f_r_{source}_bank  <= m_{source}_bank;
-        f_r_{source}_index <= m_{source}_index;
+    always @(posedge clk) if ({advance}) begin
+        f_r_{source}_bank  <= {};
+        f_r_{source}_index <= {};
         f_i_{source}_bank  <= f_r_{source}_bank;
         f_i_{source}_index <= f_r_{source}_index;
-    end"
+    end",
+                slot.source_bank(Stage::Match, operand),
+                slot.source_index(Stage::Match, operand)
             );
-            for (s, producer) in machine.slots.iter().enumerate() {
+            for producer in &plan.slots {
                 let _ = writeln!(
                     checks,
-                    "        if (f_issue & f_i_{source}_bank[{s}] & (f_i_{source}_index == f_register)) assert (f_{}_pending == 6'd0);",
-                    producer.name
+                    "        if (f_issue & f_i_{source}_bank[{}] & (f_i_{source}_index == f_register)) assert (f_{}_pending == 6'd0);",
+                    producer.number,
+                    producer.name()
                 );
             }
         }
-        if slot.unit_for(Function::Control).is_some() {
+        if slot.has(ControlBit::Drains) {
             let _ = writeln!(
                 checks,
-                "        if (f_issue & i_{name}_control[{upper}_DRAINS]) assert (~f_undrained);"
+                "        if (f_issue & {}) assert (~f_undrained);",
+                slot.bit(Stage::Issue, ControlBit::Drains)
             );
         }
     }

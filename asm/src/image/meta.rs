@@ -12,6 +12,9 @@ pub(super) struct Meta {
     pub(super) machine: String,
     inputs: Vec<MetaPort>,
     outputs: Vec<MetaPort>,
+    /// Left out if it is false.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    latched: bool,
     registers: Vec<MetaPort>,
     sections: Vec<MetaSection>,
     files: Vec<String>,
@@ -37,7 +40,7 @@ struct MetaPort {
 /// Types as the source writes them.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-enum MetaType {
+pub(super) enum MetaType {
     Float,
     Int,
     Bits,
@@ -91,6 +94,7 @@ impl Meta {
             machine: program.machine.name.to_owned(),
             inputs: ports(&program.inputs),
             outputs: ports(&program.outputs),
+            latched: program.latched,
             registers: ports(&program.registers),
             sections: program.sections.iter().map(section).collect(),
             files: program.files.clone(),
@@ -102,9 +106,8 @@ impl Meta {
         }
     }
 
-    pub(super) fn to_json(&self) -> Vec<u8> {
-        // Strings and numbers only: nothing that JSON cannot hold.
-        serde_json::to_vec(self).unwrap_or_default()
+    pub(super) fn to_json(&self) -> serde_json::Result<Vec<u8>> {
+        serde_json::to_vec(self)
     }
 
     pub(super) fn from_json(bytes: &[u8]) -> Result<Meta, ImageError> {
@@ -136,6 +139,7 @@ impl Meta {
             constants,
             inputs: ports(self.inputs),
             outputs: ports(self.outputs),
+            latched: self.latched,
             registers: ports(self.registers),
             symbols,
             loop_bounds: Vec::new(),

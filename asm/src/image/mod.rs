@@ -5,10 +5,12 @@
 //! bounded by the size of the file. A program that was read is one that the assembler could have made, but that any word
 //! may stand in its code: the machine faults on those that are no instructions.
 
+mod debug;
 mod meta;
 mod validate;
 
 use crate::limits;
+use crate::names::DebugInfo;
 use meta::Meta;
 use object::elf;
 use object::read::elf::{FileHeader as _, SectionHeader as _, Sym as _};
@@ -31,6 +33,8 @@ const CONSTANTS: &str = ".takt.constants";
 const META: &str = ".takt.meta";
 /// There only if a loop has a bound.
 const LOOPS: &str = ".takt.loops";
+/// There unless the image is stripped: what only a debugger reads.
+const DEBUG: &str = ".takt.debug";
 
 /// Why a file is not an image that can be loaded.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
@@ -148,6 +152,12 @@ pub enum ImageError {
         /// What is wrong.
         reason: &'static str,
     },
+    /// The format cannot hold it.
+    #[error("an image cannot hold this program: {0}")]
+    Unwritable(String),
+    /// What is there for a debugger does not fit the program.
+    #[error("the image's section `{DEBUG}` cannot be used: {0}")]
+    Debug(String),
     /// The source lines do not fit the code.
     #[error("the source lines do not fit the code: {0}")]
     Lines(String),
@@ -163,18 +173,43 @@ fn clean(name: &str) -> String {
     name.replace('\0', "")
 }
 
-/// The image of a program.
-pub fn write(program: &Program) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    let names: Vec<String> = program.symbols.iter().map(|symbol| clean(&symbol.name)).collect();
-    // Errors are those of sizes beyond 32 bits, which no program for a machine reaches.
-    match write_elf(program, &names, &mut bytes) {
-        Ok(()) => bytes,
-        Err(_) => Vec::new(),
-    }
+/// The image of a program, without what only a debugger reads.
+///
+/// # Errors
+/// As [`write_with`].
+pub fn write(program: &Program) -> Result<Vec<u8>, ImageError> {
+    write_with(program, None)
 }
 
-fn write_elf(program: &Program, names: &[String], bytes: &mut Vec<u8>) -> Result<(), object::write::Error> {
+/// The image of a program with what a debugger knows of it beyond the program.
+///
+/// # Errors
+/// If an image cannot hold it: its sizes go beyond 32 bits, or beyond what [`read`] takes.
+pub fn write_with(program: &Program, debug: Option<&DebugInfo>) -> Result<Vec<u8>, ImageError> {
+    within(program, debug, LIMIT)
+}
+
+/// The image of a program, if it has at most so many bytes.
+fn within(program: &Program, debug: Option<&DebugInfo>, most: usize) -> Result<Vec<u8>, ImageError> {
+    let unwritable = |error: String| ImageError::Unwritable(error);
+    let meta = Meta::of(program).to_json().map_err(|error| unwritable(error.to_string()))?;
+    let debug = debug.map(debug::to_json).transpose().map_err(|error| unwritable(error.to_string()))?;
+    let mut bytes = Vec::new();
+    let names: Vec<String> = program.symbols.iter().map(|symbol| clean(&symbol.name)).collect();
+    write_elf(program, (&meta, debug.as_deref()), &names, &mut bytes)
+        .map_err(|error| unwritable(error.to_string()))?;
+    if bytes.len() > most {
+        return Err(ImageError::TooLarge { bytes: bytes.len() });
+    }
+    Ok(bytes)
+}
+
+fn write_elf(
+    program: &Program,
+    (meta, debug): (&[u8], Option<&[u8]>),
+    names: &[String],
+    bytes: &mut Vec<u8>,
+) -> Result<(), object::write::Error> {
     let code: Vec<u8> = program.code.iter().flat_map(|word| word.to_le_bytes()).collect();
     let data: Vec<u8> = program.data.iter().flat_map(|word| word.to_le_bytes()).collect();
     let pair = |(first, second): (u32, u32)| {
@@ -186,7 +221,6 @@ fn write_elf(program: &Program, names: &[String], bytes: &mut Vec<u8>) -> Result
     let constants: Vec<u8> = constants.flat_map(pair).collect();
     let loops = program.loop_bounds.iter().map(|bound| (bound.address, bound.most));
     let loops: Vec<u8> = loops.flat_map(pair).collect();
-    let meta = Meta::of(program).to_json();
     // First everything is given its place, then everything is written there, in the same order.
     let mut writer = write::Writer::new(Endianness::Little, false, bytes);
     writer.reserve_file_header();
@@ -194,10 +228,13 @@ fn write_elf(program: &Program, names: &[String], bytes: &mut Vec<u8>) -> Result
         (CODE, &code[..], 8, elf::SHF_ALLOC | elf::SHF_EXECINSTR),
         (DATA, &data[..], 4, elf::SHF_ALLOC | elf::SHF_WRITE),
         (CONSTANTS, &constants[..], 4, elf::SHF_ALLOC),
-        (META, &meta[..], 1, elf::SectionFlags(0)),
+        (META, meta, 1, elf::SectionFlags(0)),
     ];
     if !loops.is_empty() {
         contents.push((LOOPS, &loops[..], 4, elf::SectionFlags(0)));
+    }
+    if let Some(debug) = debug {
+        contents.push((DEBUG, debug, 1, elf::SectionFlags(0)));
     }
     writer.reserve_null_section_index();
     let mut place = |(name, content, align, flags): (&'static str, _, _, _)| {
@@ -280,6 +317,14 @@ fn write_elf(program: &Program, names: &[String], bytes: &mut Vec<u8>) -> Result
 /// # Errors
 /// The first defect that is found.
 pub fn read(bytes: &[u8]) -> Result<Program, ImageError> {
+    Ok(read_with(bytes)?.0)
+}
+
+/// The program of an image, and what it has for a debugger unless it is stripped.
+///
+/// # Errors
+/// The first defect that is found.
+pub fn read_with(bytes: &[u8]) -> Result<(Program, Option<DebugInfo>), ImageError> {
     if !is_image(bytes) {
         return Err(ImageError::NotElf);
     }
@@ -369,5 +414,25 @@ pub fn read(bytes: &[u8]) -> Result<Program, ImageError> {
     let bound = |&[address, most]: &[u32; 2]| LoopBound { address, most };
     program.loop_bounds = words(loops).as_chunks::<2>().0.iter().map(bound).collect();
     validate::program(&program)?;
-    Ok(program)
+    let debug = optional(DEBUG)?;
+    let debug = debug.map(|(_, debug)| debug::from_json(debug, &program)).transpose()?;
+    Ok((program, debug))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_image_that_could_not_be_read_is_not_written() {
+        let program = crate::assemble(
+            "a.s",
+            &crate::MemoryLoader::of("a.s", "here: jmp here\n"),
+            &crate::Options::default(),
+        );
+        let program = program.expect("it is right").program;
+        let bytes = write(&program).expect("it is small").len();
+        assert!(within(&program, None, bytes).is_ok());
+        assert_eq!(within(&program, None, bytes - 1), Err(ImageError::TooLarge { bytes }));
+    }
 }

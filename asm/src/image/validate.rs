@@ -7,7 +7,7 @@ use takt_isa::program::{LoopBound, Port, Space};
 use takt_isa::{Machine, Program, ZERO};
 
 /// The longest name of a source file.
-const FILE_NAME: usize = 4096;
+pub(super) const FILE_NAME: usize = 4096;
 
 /// Register addresses and bits, from the words of their section.
 pub(super) fn constants(words: &[u32], machine: &Machine) -> Result<Vec<(u16, u32)>, ImageError> {
@@ -29,15 +29,21 @@ pub(super) fn constants(words: &[u32], machine: &Machine) -> Result<Vec<(u16, u3
     Ok(constants)
 }
 
-fn in_bank(machine: &Machine, register: u16) -> bool {
+pub(super) fn in_bank(machine: &Machine, register: u16) -> bool {
     machine.banks().any(|bank| bank.contains(register))
+}
+
+/// Whether a name has the letters of one, and no more than `limit`. (Those that a macro's use gives may be longer than a
+/// source's.)
+pub(super) fn is_spelled(name: &str, limit: usize) -> bool {
+    let first = |c: char| c.is_ascii_alphabetic() || c == '_';
+    let other = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
+    name.starts_with(first) && name.chars().all(other) && name.len() <= limit
 }
 
 /// Whether a source could declare the name.
 pub(crate) fn is_name(name: &str) -> bool {
-    let first = |c: char| c.is_ascii_alphabetic() || c == '_';
-    let other = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
-    name.starts_with(first) && name.chars().all(other) && name.len() <= limits::NAME_BYTES && name != "zero"
+    is_spelled(name, limits::NAME_BYTES) && name != "zero"
 }
 
 pub(super) fn program(program: &Program) -> Result<(), ImageError> {
@@ -99,8 +105,15 @@ fn ports(program: &Program) -> Result<(), ImageError> {
     for port in &program.inputs {
         check("input", port, machine.is_input(port.register))?;
     }
+    let mut numbers = HashSet::new();
     for port in &program.outputs {
-        check("output", port, machine.is_output(port.register))?;
+        let number = machine.output_number(port.register);
+        check("output", port, number.is_some())?;
+        if !numbers.insert(number) {
+            let (what, address) = (format!("output `{}`", port.name), port.register.into());
+            let reason = "another output has the same number, in another bank: assemble its source anew";
+            return Err(ImageError::Register { what, address, reason });
+        }
     }
     for port in &program.registers {
         let plain = !machine.is_input(port.register) && !machine.is_output(port.register);

@@ -300,7 +300,7 @@ impl<'a> Demands<'a> {
             error = error.note(format!("{what} has {count} operations to issue for it, one after another"));
             error = error.also(last.span, "written here");
         }
-        sink.push(error.help(format!("allow cycle {cycles} or later, or compute less before it")));
+        sink.push(error.help(later(cycles)));
         false
     }
 
@@ -339,7 +339,7 @@ impl<'a> Demands<'a> {
                 match (demand.kind, before) {
                     (DemandKind::Deadline(limit), _) if last > limit => {
                         let message = format!("`{name}` is written in cycle {last}, demanded in {limit}");
-                        let mut error = Diagnostic::error("timing", span, message);
+                        let mut error = Diagnostic::error("timing", span, message).help(help);
                         if let Some(event) = self.last(block, port) {
                             let keep = block.problem.before(|i| i == event.task);
                             let ends = |i| (i == event.task).then_some(event.after);
@@ -347,8 +347,12 @@ impl<'a> Demands<'a> {
                             error = error
                                 .also(event.span, "written here")
                                 .note(format!("by itself it cannot be written before cycle {bound}"));
+                            // No order of the operations makes it.
+                            if bound > limit {
+                                error = error.help(later(bound));
+                            }
                         }
-                        sink.push(error.help(help));
+                        sink.push(error);
                     }
                     (DemandKind::Order, Some((other, end))) if first <= end => {
                         let other = self.name(other);
@@ -369,6 +373,11 @@ impl<'a> Demands<'a> {
         }
         reports
     }
+}
+
+/// What to do about a deadline that nothing can meet.
+fn later(cycles: u32) -> String {
+    format!("allow cycle {cycles} or later, or compute less before it")
 }
 
 /// Sorts the tasks by their edges, else as they stand. False if there is a cycle.

@@ -368,6 +368,9 @@ impl Random {
 /// Thresholds that the bound of a resource tries.
 const TAILS: usize = 128;
 
+/// Edges that cost as much as placing a task: more than an operation has but for loads and stores in great number.
+const EDGES: usize = 16;
+
 /// Passes of schedule generation that a unit of effort buys, counted in tasks placed.
 const TASKS_PER_EFFORT: u64 = 200_000;
 
@@ -539,7 +542,8 @@ impl Search<'_> {
             self.graph.pass(Direction::Forward, &key, forward, &mut self.table, &mut plan);
             spent += 2;
         }
-        let cost = spent * n as u64;
+        // Where an operation has very many to wait for, that is the work.
+        let cost = spent * n.max(self.graph.problem.edges.len() / EDGES) as u64;
         let lasts = self.budget >= cost;
         self.budget = self.budget.saturating_sub(cost);
         lasts

@@ -9,7 +9,7 @@
         nop
         jmp     period
 .period
-period: fmul    p, a, b || fadd s, a, b || ilt k, a, b
+period: fmul    p, a, b || fadd s, a, b || flt k, a, b
         fadd    b, p, s ||
         ; the bundle continues
         mov     a, s
@@ -18,6 +18,6 @@ period: fmul    p, a, b || fadd s, a, b || ilt k, a, b
         wait    period
 other:  st      [zero], a || fadd F, a, 0
         rdflags k
-        ld      a, 0 || fmul p, k, a
+        ld      a, 0 || fmul p, k:float, a
         fadd    F, p, a
         wait    period || fadd F, a, p

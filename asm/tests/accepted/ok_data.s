@@ -16,7 +16,7 @@ end:
 .period
 period: ld      F, table[i]
         ld      F, table+1[i]
-        ld      F, count
+        ld      F:bits, count
         ld      F, [i]
         ld      k, N*2[zero]
         st      room[i], F

@@ -9,3 +9,9 @@ period: .deadline y = 11
         fadd    x, a, b
         fadd    y, t, b
         wait    period
+.once
+        .deadline x = 5         ; no order makes this one
+        .deadline y = 6         ; by another order
+        fadd    x, a, b
+        fadd    y, a, b
+        wait    period

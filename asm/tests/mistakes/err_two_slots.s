@@ -1,14 +1,18 @@
-; A register that lies in one bank cannot be written from two; within a straight run the assembler splits the name.
-.reg total
-.state kept
-.output F
+; A value that several slots compute is copied to one place, if there is a way.
+.input x, n:int
+.output F, G
+.state placed @ a3, tested
 .once
-        mov     kept, 0
+        fadd    placed, x, 1
+        fadd    tested, x, 1
+        wait    period
 .period
-period: fmul    total, kept, 2
-        bz      total, over
-        fadd    total, kept, 2
-over:   fadd    kept, total, 1
-        fadd    F, total, 0
-        fmul    F, total, 0
+period: ld      placed, [n]
+        fadd    tested, tested, x || bz tested, over
+        ld      tested, [n]
+over:   mov     @x7, n
+        fadd    @x7, x, 1
+        fadd    F, placed, tested
+        fadd    G, x, 1 || mov G, n
+        fadd    F, @x7, 1
         wait    period

@@ -1,4 +1,5 @@
 //! Random sources from a seed, which every machine takes.
+#![allow(dead_code)]
 
 use std::fmt::Write as _;
 

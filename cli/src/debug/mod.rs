@@ -102,9 +102,10 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
         let path = arguments.file.as_deref().context("no file")?;
         let loaded = load.with_source(path)?;
         let inputs = arguments.inputs.as_deref().map(|path| rows(path, &loaded)).transpose()?;
-        let Loaded { program, constants, sources } = loaded;
-        let tick = arguments.tick;
-        Session::new(&program, Options { inputs, tick, constants, sources, control: Arc::clone(&control) })?
+        changed_sources(path, &loaded, color);
+        let Loaded { program, constants, sources, names } = loaded;
+        let (tick, control) = (arguments.tick, Arc::clone(&control));
+        Session::new(&program, Options { inputs, tick, constants, sources, names, control })?
     };
     let mut console = Console::new(session);
     #[cfg(feature = "tui")]
@@ -120,6 +121,22 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
         None => batch(&mut console, "standard input", &mut BufReader::new(std::io::stdin()), color, out)?,
     }
     Ok(())
+}
+
+/// Warns of sources that were changed since the image that is debugged was made of them. They are looked for where the
+/// assembler looks, from the image's folder on; one that is not there is no one's mistake, for the image has its text.
+fn changed_sources(path: &Path, loaded: &Loaded, color: bool) {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    for (name, text) in &loaded.sources {
+        let file = folder.join(name);
+        let Some(size) = file.metadata().ok().filter(|of| of.is_file()).map(|of| of.len()) else { continue };
+        let is_same = || std::fs::read(&file).is_ok_and(|now| now == text.as_bytes());
+        if size != text.len() as u64 || !is_same() {
+            let text =
+                format!("{name} has changed since {} was made; shown is what it was then", path.display());
+            output::warning(&text, color);
+        }
+    }
 }
 
 /// A script's name and text.
@@ -143,10 +160,10 @@ fn rows(path: &Path, loaded: &Loaded) -> Result<Arc<Rows>> {
 
 /// A session on what a program did in a closed loop, at the period that is worth a look.
 fn in_recording(recording: Recording, control: &Arc<Control>, out: &mut Out) -> Result<Session> {
-    let Recording { loaded: Loaded { program, constants, sources }, inputs, tick, period, why } = recording;
-    let inputs = Some(Arc::new(inputs));
-    let mut session =
-        Session::new(&program, Options { inputs, tick, constants, sources, control: Arc::clone(control) })?;
+    let Recording { loaded, inputs, tick, period, why } = recording;
+    let Loaded { program, constants, sources, names } = loaded;
+    let (inputs, control) = (Some(Arc::new(inputs)), Arc::clone(control));
+    let mut session = Session::new(&program, Options { inputs, tick, constants, sources, names, control })?;
     writeln!(out, "{why}")?;
     // To where the period's first bundle is about to issue.
     let why = match session.go_to_period(period) {

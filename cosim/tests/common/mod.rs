@@ -8,7 +8,7 @@ use takt_programs::gcode;
 use takt_programs::hybrid::closed_loop::{ClosedLoop, Inputs};
 use takt_programs::hybrid::{Outputs, ports};
 use takt_programs::trajectory::Trajectory;
-use takt_rtl::{Library, export};
+use takt_rtl::{Design, Library, export};
 
 /// Where compiled designs are kept.
 pub(crate) fn folder() -> PathBuf {
@@ -17,7 +17,13 @@ pub(crate) fn folder() -> PathBuf {
 
 /// A machine's circuit, compiled.
 pub(crate) fn model(machine: &'static Machine) -> Model {
+    latched_model(machine, 0)
+}
+
+/// Likewise, so many of its input ports latched.
+pub(crate) fn latched_model(machine: &'static Machine, latched: u16) -> Model {
     let design = export(machine, &Library::builtin()).expect("every machine has a circuit");
+    let design = Design { latched, ..design };
     Model::build(&design, &folder(), false).unwrap_or_else(|error| panic!("{error}"))
 }
 

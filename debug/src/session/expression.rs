@@ -2,20 +2,25 @@
 //!
 //! | written | means |
 //! |---|---|
-//! | `x` | the port or register of that name, or the label's address, or the constant |
+//! | `x` | what the source line at hand would read: the port or register of that name, or the label's address, or the constant |
 //! | `@m12` | the register at that place (`m12` too, if nothing else is named so) |
 //! | `table[i]`, `4[i]`, `[i]` | the data word at that offset and index, as binary32 |
 //! | `x:int`, `@m12:bits`, `[i]:float` | the same bits as a value of that type |
 //! | `cycle period address depth` | cycles and periods that have passed; the next bundle; entries of the return stack |
 
+use super::meaning::{At, Held, Life, Meaning, Name, held};
 use std::collections::BTreeSet;
 use takt_asm::Expression;
 use takt_asm::diag::{Diagnostics, nearest};
 use takt_asm::expr::{BUILTINS, Value};
+use takt_asm::names::{Names, Position};
 use takt_emu::Emulator;
-use takt_isa::program::Space;
+use takt_isa::program::{Location, Space};
+use takt_isa::timing::{Address, Cycle};
 use takt_isa::{Program, Type};
 
+/// Values that a watched expression may have at one time; more is an error.
+const VARIANTS: usize = 64;
 /// Brackets within brackets; more is an error.
 const NESTING: usize = 16;
 
@@ -32,7 +37,15 @@ pub enum Place {
 #[derive(Clone, Debug)]
 enum Operand {
     Register(u16, Type),
-    Memory { offset: Box<Live>, index: Box<Live>, ty: Type },
+    /// A name that stands for different things at different places; and the type that it is read as, if one is given.
+    Name(Box<Name>, Option<Type>),
+    /// One of the values of such a name.
+    Held(Box<Held>, Option<Type>),
+    Memory {
+        offset: Box<Live>,
+        index: Box<Live>,
+        ty: Type,
+    },
     Constant(Value),
     Cycle,
     Period,
@@ -64,6 +77,9 @@ pub struct Live {
 pub(crate) struct Machine<'e> {
     pub(crate) emulator: &'e Emulator,
     pub(crate) periods: u64,
+    pub(crate) names: &'e Names,
+    /// The line at hand, if it is not the one that the next bundle shows.
+    pub(crate) line: Option<Location>,
 }
 
 impl Machine<'_> {
@@ -75,6 +91,38 @@ impl Machine<'_> {
             .map(|retire| retire.value)
             .next()
             .or_else(|| self.emulator.register(register))
+    }
+
+    /// The position of the source line at hand.
+    pub(crate) fn at_hand(&self) -> Position {
+        let (slots, next) = (self.emulator.machine().slots.len(), self.emulator.next_address());
+        let start = next as usize * slots;
+        let lines = self.emulator.program().lines.get(start..start + slots).unwrap_or_default();
+        let word = lines.iter().position(|line| line.is_some() && *line == self.line);
+        let position = word.and_then(|word| self.names.positions.get(start + word).copied().flatten());
+        position.unwrap_or_else(|| self.names.at_hand(slots, next))
+    }
+
+    /// A bundle that is still to write a register although it comes before the line at hand in the source: what is there now
+    /// is older than what that line would read.
+    pub(crate) fn writes_yet(&self, register: u16) -> Option<Address> {
+        let program = self.emulator.program();
+        let (position, slots) = (self.at_hand(), program.machine.slots);
+        (self.emulator.next_address()..program.bundles()).find(|address| {
+            let words = *address as usize * slots.len()..(*address as usize + 1) * slots.len();
+            let Some(Ok(bundle)) = program.bundle(*address) else { return false };
+            let positions = self.names.positions.get(words).unwrap_or_default();
+            bundle.iter().zip(slots).zip(positions).any(|((instruction, slot), at)| {
+                instruction.writes(slot) == Some(register) && at.is_some_and(|at| at.order < position.order)
+            })
+        })
+    }
+
+    /// Cycles until the result in flight to a register is there, if there is one.
+    pub(crate) fn arrives(&self, register: u16) -> Option<Cycle> {
+        let now = self.emulator.now();
+        let flying = self.emulator.underway().filter(|retire| retire.register == Some(register));
+        flying.map(|retire| retire.cycle.saturating_sub(now)).filter(|left| *left > 0).max()
     }
 
     pub(crate) fn read(&self, place: Place, program: &Program) -> Result<u32, String> {
@@ -116,8 +164,13 @@ impl Live {
     ///
     /// # Errors
     /// What is wrong, with the place pointed at if it is the language's.
-    pub fn parse(text: &str, program: &Program, constants: &[(String, Value)]) -> Result<Live, String> {
-        parse(text, program, constants, NESTING)
+    pub fn parse(
+        text: &str,
+        program: &Program,
+        constants: &[(String, Value)],
+        names: &Names,
+    ) -> Result<Live, String> {
+        parse(text, Known { program, constants, names }, NESTING)
     }
 
     /// The text that it was parsed from.
@@ -131,6 +184,14 @@ impl Live {
             match operand {
                 Operand::Register(register, _) => {
                     reads.registers.insert(*register);
+                }
+                Operand::Name(name, _) => {
+                    reads.registers.extend(name.values().map(|value| value.register));
+                    // It is another value where another line is at hand.
+                    reads.every = true;
+                }
+                Operand::Held(value, _) => {
+                    reads.registers.insert(value.register);
                 }
                 Operand::Memory { offset, index, .. } => {
                     reads.memory = true;
@@ -147,7 +208,12 @@ impl Live {
 
     /// The registers and data words that it reads, as written.
     pub(crate) fn places(&self) -> Vec<&str> {
-        let is_place = |operand: &Operand| matches!(operand, Operand::Register(..) | Operand::Memory { .. });
+        let is_place = |operand: &Operand| {
+            matches!(
+                operand,
+                Operand::Register(..) | Operand::Name(..) | Operand::Held(..) | Operand::Memory { .. }
+            )
+        };
         let mut places: Vec<&str> = Vec::new();
         for (_, operand, written) in &self.operands {
             if is_place(operand) && !places.contains(&written.as_str()) {
@@ -157,20 +223,127 @@ impl Live {
         places
     }
 
+    /// The expression in each of the ways in which it can be read: for each choice of values for the names in it that have
+    /// several.
+    ///
+    /// # Errors
+    /// If there are more than [`VARIANTS`].
+    pub(crate) fn variants(&self) -> Result<Vec<Live>, String> {
+        let mut variants = vec![self.clone()];
+        for (i, (_, operand, written)) in self.operands.iter().enumerate() {
+            let values: Vec<Operand> = match operand {
+                Operand::Name(name, ty) => {
+                    name.values().map(|value| Operand::Held(Box::new(value.clone()), *ty)).collect()
+                }
+                Operand::Memory { offset, index, ty } => {
+                    let (offsets, indices) = (offset.variants()?, index.variants()?);
+                    let pairs =
+                        offsets.iter().flat_map(|offset| indices.iter().map(move |index| (offset, index)));
+                    let memory = |(offset, index): (&Live, &Live)| Operand::Memory {
+                        offset: Box::new(offset.clone()),
+                        index: Box::new(index.clone()),
+                        ty: *ty,
+                    };
+                    pairs.take(VARIANTS + 1).map(memory).collect()
+                }
+                _ => continue,
+            };
+            if values.len() * variants.len() > VARIANTS {
+                return Err(format!(
+                    "`{written}` stands for {} registers here and there, more than the {VARIANTS} that one watchpoint watches: name one (`info {written}` lists them)",
+                    values.len()
+                ));
+            }
+            let with = |value: &Operand| {
+                let value = value.clone();
+                variants.iter().cloned().map(move |mut variant| {
+                    variant.operands[i].1 = value.clone();
+                    variant
+                })
+            };
+            variants = values.iter().flat_map(with).collect();
+        }
+        Ok(variants)
+    }
+
+    /// The variants, or if there are too many the expression as it is.
+    pub(crate) fn each(&self) -> Vec<Live> {
+        self.variants().unwrap_or_else(|_| vec![self.clone()])
+    }
+
+    /// Of a variant that is one value of a name, that value's own name.
+    pub(crate) fn held(&self) -> Option<&str> {
+        match self.only()? {
+            Operand::Held(value, _) => Some(&value.label),
+            _ => None,
+        }
+    }
+
+    /// The one operand that the expression is, if it is nothing else.
+    fn only(&self) -> Option<&Operand> {
+        let [(name, operand, _)] = &self.operands[..] else { return None };
+        // Placeholders are as long as what they stand for.
+        let mut names = self.expression.names();
+        (names.next() == Some(name) && self.text.len() == name.len()).then_some(operand)
+    }
+
+    /// The registers that the expression, if it is a name of any, may stand for.
+    pub(crate) fn lives(&self, machine: &Machine<'_>, program: &Program) -> Vec<Life> {
+        let life = |value: &Held, at_hand| Life {
+            label: value.label.clone(),
+            register: value.register,
+            ty: value.ty,
+            bundles: value.bundles,
+            at_hand,
+        };
+        match self.only() {
+            Some(Operand::Name(name, _)) => {
+                let at_hand = match name.at(machine) {
+                    Ok(At::Value(value)) => Some(value),
+                    _ => None,
+                };
+                name.values().map(|value| life(value, at_hand == Some(value))).collect()
+            }
+            Some(Operand::Held(value, _)) => vec![life(value, true)],
+            Some(Operand::Register(register, ty)) => {
+                let (label, register, ty) = (program.register_text(*register), *register, *ty);
+                vec![Life { label, register, ty, bundles: None, at_hand: true }]
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// The value's own name, if the expression is a name that has several, of which this is the one at hand.
+    pub(crate) fn label(&self, machine: &Machine<'_>) -> Option<String> {
+        match self.only()? {
+            Operand::Name(name, _) => match name.at(machine).ok()? {
+                At::Value(value) => Some(value.label.clone()),
+                At::Constant(_) => None,
+            },
+            _ => None,
+        }
+    }
+
     /// The place that the expression is, if it is nothing else, and the type that it is read as.
     pub(crate) fn place(
         &self,
         machine: &Machine<'_>,
         program: &Program,
     ) -> Result<Option<(Place, Type)>, String> {
-        let [(name, operand, _)] = &self.operands[..] else { return Ok(None) };
-        // Placeholders are as long as what they stand for.
-        let mut names = self.expression.names();
-        if names.next() != Some(name) || self.text.len() != name.len() {
-            return Ok(None);
-        }
+        let Some(operand) = self.only() else { return Ok(None) };
         Ok(match operand {
             Operand::Register(register, ty) => Some((Place::Register(*register), *ty)),
+            Operand::Name(name, ty) => match name.at(machine)? {
+                At::Constant(_) => None,
+                At::Value(value) => {
+                    value.is_there(machine, program)?;
+                    Some((Place::Register(value.register), ty.unwrap_or(value.ty)))
+                }
+            },
+            Operand::Held(value, ty) => {
+                value.is_there(machine, program)?;
+                Some((Place::Register(value.register), ty.unwrap_or(value.ty)))
+            }
             Operand::Memory { offset, index, ty } => {
                 Some((Place::Word(word(offset, index, machine, program)?), *ty))
             }
@@ -186,6 +359,11 @@ impl Live {
                 Operand::Register(register, ty) => {
                     machine.read(Place::Register(*register), program).map(|bits| value(*ty, bits))
                 }
+                Operand::Name(name, ty) => name.at(machine).and_then(|at| match at {
+                    At::Constant(constant) => Ok(constant),
+                    At::Value(held) => read_held(held, *ty, machine, program),
+                }),
+                Operand::Held(held, ty) => read_held(held, *ty, machine, program),
                 Operand::Memory { offset, index, ty } => word(offset, index, machine, program)
                     .and_then(|word| machine.read(Place::Word(word), program))
                     .map(|bits| value(*ty, bits)),
@@ -208,6 +386,17 @@ impl Live {
     }
 }
 
+fn read_held(
+    held: &Held,
+    ty: Option<Type>,
+    machine: &Machine<'_>,
+    program: &Program,
+) -> Result<Value, String> {
+    held.is_there(machine, program)?;
+    let bits = machine.read(Place::Register(held.register), program)?;
+    Ok(value(ty.unwrap_or(held.ty), bits))
+}
+
 fn word(offset: &Live, index: &Live, machine: &Machine<'_>, program: &Program) -> Result<u32, String> {
     let integer = |live: &Live| {
         live.evaluate(machine, program)?.integer().map_err(|fault| format!("`{}`: {fault}", live.text))
@@ -216,7 +405,15 @@ fn word(offset: &Live, index: &Live, machine: &Machine<'_>, program: &Program) -
     u32::try_from(word).map_err(|_| format!("data word {word} does not exist"))
 }
 
-fn parse(text: &str, program: &Program, constants: &[(String, Value)], depth: usize) -> Result<Live, String> {
+/// What names are looked up in.
+#[derive(Clone, Copy)]
+struct Known<'k> {
+    program: &'k Program,
+    constants: &'k [(String, Value)],
+    names: &'k Names,
+}
+
+fn parse(text: &str, known: Known<'_>, depth: usize) -> Result<Live, String> {
     if depth == 0 {
         return Err(format!("brackets nested more than {NESTING} deep"));
     }
@@ -236,7 +433,7 @@ fn parse(text: &str, program: &Program, constants: &[(String, Value)], depth: us
         let mut operand = None;
         let head = &text[start..at];
         if let Some(place) = head.strip_prefix('@') {
-            let machine = program.machine;
+            let machine = known.program.machine;
             let register = machine.register_address(place).ok_or_else(|| {
                 let banks: Vec<String> = machine.banks().map(|bank| format!("{}0 …", bank.name)).collect();
                 format!("{} has no register {head} (registers: {})", machine.name, banks.join(" "))
@@ -244,7 +441,7 @@ fn parse(text: &str, program: &Program, constants: &[(String, Value)], depth: us
             operand = Some(Operand::Register(register, Type::F));
         } else if bytes.get(at) == Some(&b'[') {
             let end = closing(bytes, at).ok_or_else(|| format!("`{}`: a `]` is missing", &text[at..]))?;
-            let part = |text: &str| parse(text, program, constants, depth - 1).map(Box::new);
+            let part = |text: &str| parse(text, known, depth - 1).map(Box::new);
             let offset = part(if head.is_empty() { "0" } else { head })?;
             let index = part(&text[at + 1..end])?;
             operand = Some(Operand::Memory { offset, index, ty: Type::F });
@@ -272,11 +469,12 @@ fn parse(text: &str, program: &Program, constants: &[(String, Value)], depth: us
         }
         let mut operand = match operand {
             Some(operand) => operand,
-            None => name(head, program, constants)?,
+            None => name(head, known)?,
         };
         if let Some(wanted) = ty {
             match &mut operand {
                 Operand::Register(_, ty) | Operand::Memory { ty, .. } => *ty = wanted,
+                Operand::Name(_, ty) => *ty = Some(wanted),
                 _ => return Err(format!("`{head}` is no register: it has no type")),
             }
         }
@@ -314,16 +512,16 @@ fn closing(bytes: &[u8], open: usize) -> Option<usize> {
     None
 }
 
-fn name(name: &str, program: &Program, constants: &[(String, Value)]) -> Result<Operand, String> {
-    let ports = || program.inputs.iter().chain(&program.outputs).chain(&program.registers);
-    if let Some(port) = ports().find(|port| port.name == name) {
-        return Ok(Operand::Register(port.register, port.ty));
-    }
-    if let Some(symbol) = program.symbols.iter().find(|symbol| symbol.name == name) {
-        return Ok(Operand::Constant(Value::Int(symbol.address.into())));
-    }
-    if let Some((_, value)) = constants.iter().find(|constant| constant.0 == name) {
-        return Ok(Operand::Constant(*value));
+fn name(name: &str, known: Known<'_>) -> Result<Operand, String> {
+    let Known { program, names, .. } = known;
+    if let Some(found) = meanings(name, known) {
+        return Ok(match found.fixed() {
+            Some(Meaning::Constant(value)) => Operand::Constant(*value),
+            Some(Meaning::Values(values)) if values.len() == 1 => {
+                Operand::Register(values[0].register, values[0].ty)
+            }
+            _ => Operand::Name(Box::new(found), None),
+        });
     }
     match name {
         "cycle" => return Ok(Operand::Cycle),
@@ -338,22 +536,41 @@ fn name(name: &str, program: &Program, constants: &[(String, Value)]) -> Result<
     if let Some((_, value)) = BUILTINS.iter().find(|builtin| builtin.0 == name) {
         return Ok(Operand::Constant(*value));
     }
+    let ports = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
     let symbols = program.symbols.iter().map(|symbol| symbol.name.as_str());
-    let near = nearest(name, ports().map(|port| port.name.as_str()).chain(symbols));
+    let values = names.values.iter().map(|value| value.name.as_str());
+    let near = nearest(name, ports.map(|port| port.name.as_str()).chain(symbols).chain(values));
     let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
     Err(format!("nothing is named `{name}`{near}"))
+}
+
+/// What a name of the source may stand for.
+fn meanings(name: &str, known: Known<'_>) -> Option<Name> {
+    let Known { program, constants, names } = known;
+    let constant = |value| Some(Meaning::Constant(value));
+    let global = held(name, names).map(Meaning::Values).or_else(|| {
+        let mut ports = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
+        Some(Meaning::Values(vec![Held::always(ports.find(|port| port.name == name)?)]))
+    });
+    let symbol = || program.symbols.iter().find(|symbol| symbol.name == name);
+    let named = || constants.iter().find(|constant| constant.0 == name);
+    let global =
+        global.or_else(|| constant(Value::Int(symbol()?.address.into()))).or_else(|| constant(named()?.1));
+    Name::find(name, global, program, names)
 }
 
 /// Names that complete one that is being typed.
 pub(crate) fn names<'p>(
     program: &'p Program,
     constants: &'p [(String, Value)],
+    names: &'p Names,
 ) -> impl Iterator<Item = &'p str> {
     let ports = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
     ports
         .map(|port| port.name.as_str())
         .chain(program.symbols.iter().map(|symbol| symbol.name.as_str()))
         .chain(constants.iter().map(|constant| constant.0.as_str()))
+        .chain(names.values.iter().flat_map(|value| [value.name.as_str(), value.label.as_str()]))
 }
 
 /// The label and the distance that a code place such as `loop+3` names.

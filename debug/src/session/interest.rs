@@ -48,12 +48,13 @@ impl Interest {
                 Stop::Break { at: Where::Bundle(address), .. } => {
                     interest.bundles.insert(*address);
                 }
+                Stop::Break { at: Where::Line(_, bundles), .. } => interest.bundles.extend(bundles),
                 Stop::Break { at: Where::Cycle(cycle), .. } => {
                     interest.cycles.insert(*cycle);
                 }
                 Stop::Break { at: Where::Period(_), .. } => {}
                 Stop::Watch { what, test, .. } => {
-                    interest.add_value(what, program);
+                    what.each().iter().for_each(|what| interest.add_value(what, program));
                     if let Test::Equals(other) | Test::Above(other) = test {
                         interest.add_value(other, program);
                     }

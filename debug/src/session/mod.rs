@@ -13,25 +13,27 @@
 
 mod expression;
 mod interest;
+mod meaning;
 mod number;
+mod run;
 mod stops;
 
 pub use expression::{Live, Place};
+pub use meaning::Life;
 pub use number::{Shown, UlpDistance, hex_float, ulp_distance};
 pub use stops::{Stop, Test, Where};
 
 use expression::Machine;
-use interest::Interest;
 use std::collections::BTreeSet;
 use std::num::NonZeroU64;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use stops::Watcher;
 use takt_asm::expr::Value;
-use takt_emu::{Emulator, Fault, LoadError, PeriodError, PeriodReport, Retire, Status, Upcoming};
+use takt_asm::names::Names;
+use takt_emu::{Emulator, Fault, LoadError, PeriodReport, Retire, Status};
 use takt_isa::program::Location;
 use takt_isa::timing::{Address, Cause, Cycle};
-use takt_isa::{Effect, Program, Type, ZERO};
+use takt_isa::{Program, Type, ZERO};
 
 /// Checkpoints that are kept. At 10⁸ cycles they are at most 2¹⁹ cycles apart.
 pub const CHECKPOINTS: usize = 512;
@@ -58,6 +60,8 @@ pub struct Options {
     pub constants: Vec<(String, Value)>,
     /// Sources, by the names that the program has for them.
     pub sources: Vec<(String, String)>,
+    /// What the source's names stand for.
+    pub names: Names,
     /// What is shared with whoever watches.
     pub control: Arc<Control>,
 }
@@ -154,10 +158,6 @@ struct Core {
 }
 
 impl Core {
-    fn machine(&self) -> Machine<'_> {
-        Machine { emulator: &self.emulator, periods: self.periods }
-    }
-
     fn checkpoint(&mut self) -> Core {
         let emulator = self.emulator.snapshot();
         Core { emulator, report: self.report.clone(), ..*self }
@@ -180,6 +180,8 @@ pub struct Session {
     edits: Vec<Edit>,
     stops: Vec<(u32, Stop)>,
     next_id: u32,
+    /// The line that a breakpoint stopped at, and the cycle.
+    line: Option<(Cycle, Location)>,
     /// Cycles for which a command may run.
     pub run_limit: Cycle,
 }
@@ -208,6 +210,7 @@ impl Session {
             edits: Vec::new(),
             stops: Vec::new(),
             next_id: 1,
+            line: None,
             run_limit: RUN_LIMIT,
         };
         session.set_row();
@@ -258,8 +261,11 @@ impl Session {
         }
     }
 
-    /// The source place of the bundle that issues next.
+    /// The source line at hand: the one that a breakpoint stopped at, or else that of the bundle that issues next.
     pub fn location(&self) -> Option<Location> {
+        if let Some(line) = self.machine().line {
+            return Some(line);
+        }
         let address = self.core.emulator.next_address();
         (address < self.program().bundles()).then(|| self.program().location(address)).flatten()
     }
@@ -299,9 +305,15 @@ impl Session {
         }
     }
 
+    fn machine(&self) -> Machine<'_> {
+        let Core { emulator, periods, .. } = &self.core;
+        let line = self.line.filter(|(cycle, _)| *cycle == self.cycle()).map(|(_, line)| line);
+        Machine { emulator, periods: *periods, names: &self.options.names, line }
+    }
+
     /// What a bundle that issued in the cycle to come would read from a register.
     pub fn register(&self, register: u16) -> Option<u32> {
-        self.core.machine().register(register)
+        self.machine().register(register)
     }
 
     /// Operations issued and not yet written back, in the order of their writebacks, each with the cycles to go: 1 for
@@ -322,7 +334,7 @@ impl Session {
         if text.trim().is_empty() {
             return Err("an expression is missing".to_owned());
         }
-        Live::parse(text.trim(), self.program(), &self.options.constants)
+        Live::parse(text.trim(), self.program(), &self.options.constants, &self.options.names)
     }
 
     /// The value of an expression.
@@ -330,7 +342,7 @@ impl Session {
     /// # Errors
     /// Why it has none.
     pub fn evaluate(&self, live: &Live) -> Result<Value, String> {
-        live.evaluate(&self.core.machine(), self.program())
+        live.evaluate(&self.machine(), self.program())
     }
 
     /// The register or data word that an expression is, if it is one, with the type that it is read as, and its bits.
@@ -339,7 +351,7 @@ impl Session {
     /// Why it has none.
     #[allow(clippy::type_complexity)]
     pub fn place(&self, live: &Live) -> Result<Option<(Place, Type, Option<u32>)>, String> {
-        let (machine, program) = (self.core.machine(), self.program());
+        let (machine, program) = (self.machine(), self.program());
         let Some((place, ty)) = live.place(&machine, program)? else { return Ok(None) };
         let bits = match place {
             Place::Register(register) => machine.register(register),
@@ -348,9 +360,30 @@ impl Session {
         Ok(Some((place, ty, bits)))
     }
 
+    /// The value's own name (`t.1`), if an expression is a name that stands for several, of which this is the one at hand.
+    pub fn label(&self, live: &Live) -> Option<String> {
+        live.label(&self.machine())
+    }
+
+    /// A bundle that is still to write a register although it comes before the line at hand in the source: what the register
+    /// holds is older than what that line would read.
+    pub fn writes_yet(&self, register: u16) -> Option<Address> {
+        self.machine().writes_yet(register)
+    }
+
+    /// The registers that an expression, if it is a name of any, may stand for, and where each lives.
+    pub fn lives(&self, live: &Live) -> Vec<Life> {
+        live.lives(&self.machine(), self.program())
+    }
+
+    /// Cycles until the result in flight to a register is there; `None` if none is.
+    pub fn arrives(&self, register: u16) -> Option<Cycle> {
+        self.machine().arrives(register)
+    }
+
     /// Names that begin like this.
     pub fn names(&self, beginning: &str) -> Vec<String> {
-        let names = expression::names(self.program(), &self.options.constants);
+        let names = expression::names(self.program(), &self.options.constants, &self.options.names);
         let found: BTreeSet<&str> = names.filter(|name| name.starts_with(beginning)).collect();
         found.into_iter().map(str::to_owned).collect()
     }
@@ -369,7 +402,7 @@ impl Session {
             }
             Place::Register(_) => {}
             Place::Word(_) => {
-                self.core.machine().read(place, self.program())?;
+                self.machine().read(place, self.program())?;
             }
         }
         let edit = Edit { cycle: self.cycle(), place, bits };
@@ -405,312 +438,6 @@ impl Session {
             // Rows are made for the program's ports.
             let _ = self.core.emulator.set_input_bits(register, bits);
         }
-    }
-
-    // ---- Running.
-
-    /// Runs on to a cycle; less far if the run ends or is interrupted.
-    fn advance(&mut self, target: Cycle) -> Result<(), End> {
-        self.make_edits();
-        while self.cycle() < target {
-            self.slice(target)?;
-        }
-        Ok(())
-    }
-
-    /// Runs on towards a cycle: to the end of the period, to the next edit or checkpoint, if they come before.
-    fn slice(&mut self, target: Cycle) -> Result<(), End> {
-        let control = &self.options.control;
-        control.cycle.store(self.cycle(), Ordering::Relaxed);
-        if control.interrupt.load(Ordering::Relaxed) {
-            control.clear();
-            return Err(Why::Interrupted);
-        }
-        if self.options.inputs.as_ref().is_some_and(|rows| self.core.periods >= rows.len() as u64) {
-            return Err(Why::InputsEnd);
-        }
-        let edit = self.edits.get(self.core.edits).map_or(Cycle::MAX, |edit| edit.cycle);
-        let last = self.checkpoints.last().map_or(0, |checkpoint| checkpoint.emulator.now());
-        // Before the last checkpoint there is none to make.
-        let checkpoint = if self.cycle() < last { Cycle::MAX } else { last + self.interval };
-        let begin = self.cycle();
-        let until = target.min(edit).min(checkpoint).min(begin + SLICE);
-        let result = self.core.emulator.run_period_until(until);
-        self.core.boundary = false;
-        match result {
-            Ok(None) => {}
-            Ok(Some(report)) => {
-                self.core.periods += 1;
-                self.core.boundary = true;
-                self.core.report = Some(report);
-                self.set_row();
-            }
-            Err(PeriodError::Fault(fault)) => return Err(Why::Fault(fault)),
-            // The position behind the last cycle is one of the run's: who goes on from there learns that it has halted.
-            Err(PeriodError::Halted) if self.cycle() > begin => {}
-            // Nothing asks for ports by name.
-            Err(PeriodError::Halted | PeriodError::Port(_)) => return Err(Why::Halted),
-        }
-        if self.cycle() >= checkpoint {
-            self.keep();
-        }
-        self.make_edits();
-        Ok(())
-    }
-
-    /// Keeps a checkpoint of this position, before its edits; if there are too many, every other one goes.
-    fn keep(&mut self) {
-        if self.checkpoints.len() >= CHECKPOINTS {
-            let mut index = 0;
-            self.checkpoints.retain(|_| {
-                index += 1;
-                index % 2 == 1
-            });
-            self.interval *= 2;
-        }
-        let checkpoint = self.core.checkpoint();
-        self.checkpoints.push(checkpoint);
-    }
-
-    /// The cycles of the checkpoints.
-    pub fn checkpoints(&self) -> Vec<Cycle> {
-        self.checkpoints.iter().map(|checkpoint| checkpoint.emulator.now()).collect()
-    }
-
-    /// Goes back, or on, to a cycle.
-    ///
-    /// # Returns
-    /// [`Why::Done`], or why the run ends before.
-    pub fn go_to(&mut self, cycle: Cycle) -> Why {
-        self.approach(|core| core.emulator.now() <= cycle);
-        self.advance(cycle).err().unwrap_or(Why::Done)
-    }
-
-    /// Restores the last checkpoint at which `is_before` holds, unless this position is nearer to the end of those.
-    fn approach(&mut self, is_before: impl Fn(&Core) -> bool) {
-        let index = self.checkpoints.partition_point(&is_before);
-        let Some(checkpoint) = self.checkpoints.get(index.saturating_sub(1)) else { return };
-        if checkpoint.emulator.now() > self.cycle() || !is_before(&self.core) {
-            self.core = checkpoint.restore();
-        }
-        self.make_edits();
-    }
-
-    /// Goes to where so many periods have ended.
-    pub fn go_to_period(&mut self, period: u64) -> Why {
-        self.approach(|core| core.periods < period || core.periods == period && core.boundary);
-        while self.period() < period {
-            if let Err(end) = self.run_period() {
-                return end;
-            }
-        }
-        Why::Done
-    }
-
-    /// Runs to the end of the period.
-    fn run_period(&mut self) -> Result<(), End> {
-        let (periods, until) = (self.period(), self.cycle().saturating_add(self.run_limit));
-        self.make_edits();
-        while self.period() == periods {
-            if self.cycle() >= until {
-                return Err(Why::Limit(self.run_limit));
-            }
-            self.slice(until)?;
-        }
-        Ok(())
-    }
-
-    /// Visits the positions after this one that are of interest, up to `until`, until `visit` finds one.
-    fn scan(
-        &mut self,
-        until: Cycle,
-        interest: &Interest,
-        visit: &mut dyn FnMut(&Session, Option<Address>) -> Option<Why>,
-    ) -> Result<Why, End> {
-        self.core.emulator.set_pauses(interest.pauses());
-        let result = self.scan_positions(until, interest, visit);
-        self.core.emulator.set_pauses([]);
-        result
-    }
-
-    fn scan_positions(
-        &mut self,
-        until: Cycle,
-        interest: &Interest,
-        visit: &mut dyn FnMut(&Session, Option<Address>) -> Option<Why>,
-    ) -> Result<Why, End> {
-        self.make_edits();
-        let mut upcoming = self.core.emulator.upcoming();
-        while self.cycle() < until {
-            let is_now = |upcoming: &Upcoming| upcoming.issue.cycle == self.cycle();
-            let issuing = upcoming.filter(is_now).map(|upcoming| upcoming.address);
-            self.slice(interest.next(&self.core.emulator, issuing, until))?;
-            let now = self.cycle();
-            if upcoming.is_none_or(|upcoming| upcoming.issue.cycle < now) {
-                upcoming = self.core.emulator.upcoming();
-            }
-            let issuing = upcoming.filter(|upcoming| upcoming.issue.cycle == now);
-            if let Some(why) = visit(self, issuing.map(|upcoming| upcoming.address)) {
-                return Ok(why);
-            }
-        }
-        Err(Why::Limit(self.run_limit))
-    }
-
-    /// Goes to the next position that `visit` finds.
-    fn forward(
-        &mut self,
-        interest: &Interest,
-        mut visit: impl FnMut(&Session, Option<Address>) -> Option<Why>,
-    ) -> Why {
-        let until = self.cycle().saturating_add(self.run_limit);
-        self.scan(until, interest, &mut visit).unwrap_or_else(|end| end)
-    }
-
-    /// Goes to the last position before this one that `visit` finds; `begin` is told where each stretch begins. Interrupted,
-    /// it stays here.
-    fn backward<V: FnMut(&Session, Option<Address>) -> Option<Why>>(
-        &mut self,
-        interest: &Interest,
-        begin: impl Fn(&Session) -> V,
-    ) -> Why {
-        let from = self.cycle();
-        // Positions from here on are seen, or not wanted.
-        let (mut end, mut window) = (from, WINDOW);
-        while end >= 2 {
-            // What is found lies behind the beginning of the stretch, so that it is known how things were before. What is
-            // looked for may be near, and else a stretch begins at a checkpoint.
-            let near = (end - 1).saturating_sub(window);
-            let index = self.checkpoints.partition_point(|checkpoint| checkpoint.emulator.now() <= end - 2);
-            let checkpoint =
-                self.checkpoints[..index].last().map_or(0, |checkpoint| checkpoint.emulator.now());
-            let start = near.max(checkpoint);
-            window = window.saturating_mul(8);
-            let mut found = self.go_to(start);
-            let (mut visit, mut last) = (begin(self), None);
-            let mut all = |session: &Session, issuing| {
-                if let Some(why) = visit(session, issuing) {
-                    last = Some((session.cycle(), why));
-                }
-                None
-            };
-            if found == Why::Done {
-                found = self.scan(end - 1, interest, &mut all).unwrap_or_else(|end| end);
-            }
-            if found == Why::Interrupted {
-                self.go_to(from);
-                return found;
-            }
-            if let Some((cycle, why)) = last {
-                self.go_to(cycle);
-                return why;
-            }
-            if from - start > self.run_limit {
-                return Why::Limit(self.run_limit);
-            }
-            end = start + 1;
-        }
-        self.go_to(0);
-        Why::Start
-    }
-
-    /// Steps forth.
-    pub fn step(&mut self, unit: Unit) -> Why {
-        match unit {
-            Unit::Cycle => return self.go_to(self.cycle() + 1),
-            Unit::Period => return self.run_period().err().unwrap_or(Why::Done),
-            _ => {}
-        }
-        let stack = self.core.emulator.stack();
-        let (depth, caller) = (stack.len(), stack.last().copied());
-        let next = self.core.emulator.next_address();
-        let interest = match unit {
-            // Nowhere else does it end that it is over.
-            Unit::Call if self.calls(next) => Interest::bundles([next, next + 1]),
-            Unit::Out => Interest::bundles(caller),
-            _ => Interest::everything(),
-        };
-        self.forward(&interest, move |session, issuing| session.ends_step(unit, depth, issuing))
-    }
-
-    /// Whether a bundle calls a subroutine.
-    fn calls(&self, address: Address) -> bool {
-        let bundle = self.program().bundle(address).and_then(Result::ok);
-        bundle.is_some_and(|bundle| {
-            bundle.iter().any(|instruction| instruction.op.row().effect == Effect::Call)
-        })
-    }
-
-    /// Steps back.
-    pub fn step_back(&mut self, unit: Unit) -> Why {
-        if self.cycle() == 0 {
-            return Why::Start;
-        }
-        match unit {
-            Unit::Cycle => return self.go_to(self.cycle() - 1),
-            Unit::Period => {
-                let period = self.period() - u64::from(self.core.boundary && self.period() > 0);
-                return if period == 0 { self.go_to(0) } else { self.go_to_period(period) };
-            }
-            _ => {}
-        }
-        let depth = self.core.emulator.stack().len();
-        let interest = Interest::everything();
-        self.backward(&interest, |_| {
-            move |session: &Session, issuing| session.ends_step(unit, depth, issuing)
-        })
-    }
-
-    /// Whether a step by `unit` that began `depth` calls deep ends here, where `issuing` is about to issue.
-    fn ends_step(&self, unit: Unit, depth: usize, issuing: Option<Address>) -> Option<Why> {
-        let address = issuing?;
-        let now = self.core.emulator.stack().len();
-        let ends = match unit {
-            Unit::Cycle | Unit::Bundle | Unit::Period => true,
-            Unit::Call => now <= depth,
-            Unit::Out => now < depth,
-            Unit::Line => {
-                let line = |address| self.program().location(address);
-                let last = self.core.emulator.last_issued().and_then(line);
-                line(address).is_some_and(|line| Some(line) != last)
-            }
-        };
-        ends.then_some(Why::Done)
-    }
-
-    /// Runs on to the next breakpoint or watchpoint.
-    pub fn resume(&mut self) -> Why {
-        let mut watcher = Watcher::new(self);
-        let interest = Interest::stops(&self.stops, self.program());
-        self.forward(&interest, move |session, issuing| watcher.visit(session, issuing))
-    }
-
-    /// Runs back to the last breakpoint or watchpoint.
-    pub fn resume_back(&mut self) -> Why {
-        let interest = Interest::stops(&self.stops, self.program());
-        self.backward(&interest, |session| {
-            let mut watcher = Watcher::new(session);
-            move |session: &Session, issuing| watcher.visit(session, issuing)
-        })
-    }
-
-    /// Runs on to the next position at which an expression holds (is not zero). Where it has no value it does not.
-    pub fn run_until(&mut self, live: &Live) -> Why {
-        // What holds already may still hold in the next cycle, in which nothing need change that the search looks for.
-        if self.holds(live) {
-            match self.go_to(self.cycle() + 1) {
-                Why::Done if self.holds(live) => return Why::Holds,
-                Why::Done => {}
-                end => return end,
-            }
-        }
-        let interest = Interest::value(live, self.program());
-        self.forward(&interest, |session, _| session.holds(live).then_some(Why::Holds))
-    }
-
-    /// Whether an expression has a value other than zero.
-    fn holds(&self, live: &Live) -> bool {
-        self.evaluate(live).is_ok_and(|value| !value.is_zero())
     }
 
     // ---- Breakpoints and watchpoints.

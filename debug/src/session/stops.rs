@@ -4,14 +4,17 @@ use super::expression::{self, Live};
 use super::{Session, Why};
 use takt_asm::expr::Value;
 use takt_isa::Program;
-use takt_isa::program::Space;
+use takt_isa::program::{Location, Space};
 use takt_isa::timing::{Address, Cycle};
 
 /// Where a breakpoint stops.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Where {
     /// Where this bundle is about to issue.
     Bundle(Address),
+    /// Where a bundle with an operation of this line is about to issue; these have one. A line of a macro or a repetition has
+    /// several.
+    Line(Location, Vec<Address>),
     /// When so many cycles have passed.
     Cycle(Cycle),
     /// When so many periods have ended.
@@ -85,7 +88,7 @@ impl Where {
             };
         }
         if let Some((file, line)) = text.rsplit_once(':') {
-            return line_address(file, number(line, "line")?, program).map(Where::Bundle);
+            return line_bundles(file, number(line, "line")?, program);
         }
         if let Ok(number) = text.parse() {
             return bundle(number, program);
@@ -110,10 +113,13 @@ fn bundle(number: u64, program: &Program) -> Result<Where, String> {
         .ok_or_else(|| format!("bundle {number}: the program has bundles 0 to {}", bundles - 1))
 }
 
-/// The first bundle with an operation of a source line.
-fn line_address(file: &str, line: u64, program: &Program) -> Result<Address, String> {
+/// The bundles with an operation of a source line, ascending.
+fn line_bundles(file: &str, line: u64, program: &Program) -> Result<Where, String> {
     let names = || program.files.iter().map(String::as_str);
-    let ends = |name: &str| name == file || name.rsplit('/').next() == Some(file);
+    // A file by its name alone, whichever folder or library it is of.
+    let alone =
+        |name: &str| name.trim_start_matches('<').trim_end_matches('>').rsplit('/').next() == Some(file);
+    let ends = |name: &str| name == file || alone(name);
     let file = if file.is_empty() { Some(0) } else { names().position(ends) };
     let Some(file) = file else {
         return Err(format!("no such source (sources: {})", names().collect::<Vec<_>>().join(" ")));
@@ -125,8 +131,11 @@ fn line_address(file: &str, line: u64, program: &Program) -> Result<Address, Str
             .filter_map(|(i, location)| location.map(|location| ((i / slots) as u32, location)))
             .filter(|(_, location)| location.file as usize == file)
     };
-    if let Some((address, _)) = places().find(|(_, location)| u64::from(location.line) == line) {
-        return Ok(address);
+    let mut of_line = places().filter(|(_, place)| u64::from(place.line) == line).peekable();
+    if let Some(&(_, place)) = of_line.peek() {
+        let mut bundles: Vec<Address> = of_line.map(|(address, _)| address).collect();
+        bundles.dedup();
+        return Ok(Where::Line(place, bundles));
     }
     let next = places().map(|(_, location)| location.line).filter(|next| u64::from(*next) > line).min();
     let next = next.map_or(String::new(), |next| format!("; the next line with one is {next}"));
@@ -135,8 +144,8 @@ fn line_address(file: &str, line: u64, program: &Program) -> Result<Address, Str
 
 /// Sees from position to position whether there is a reason to stop.
 pub(super) struct Watcher {
-    /// For each stop, what was there before.
-    before: Vec<Seen>,
+    /// For each stop, what was there before: of a watched value in each of the ways in which its names can be read.
+    before: Vec<Vec<(Live, Seen)>>,
 }
 
 /// A watched value and whether it was as waited for.
@@ -148,7 +157,17 @@ struct Seen {
 
 impl Watcher {
     pub(super) fn new(session: &Session) -> Watcher {
-        Watcher { before: session.stops.iter().map(|(_, stop)| see(session, stop)).collect() }
+        let before = |stop: &Stop| match stop {
+            Stop::Break { .. } => Vec::new(),
+            Stop::Watch { what, test, .. } => {
+                let seen = |live: Live| {
+                    let seen = see(session, &live, test);
+                    (live, seen)
+                };
+                what.each().into_iter().map(seen).collect()
+            }
+        };
+        Watcher { before: session.stops.iter().map(|(_, stop)| before(stop)).collect() }
     }
 
     pub(super) fn visit(&mut self, session: &Session, issuing: Option<Address>) -> Option<Why> {
@@ -156,29 +175,41 @@ impl Watcher {
         for ((id, stop), before) in session.stops.iter().zip(&mut self.before) {
             match stop {
                 Stop::Break { at, condition, text } => {
-                    let here = match *at {
-                        Where::Bundle(address) => issuing == Some(address),
-                        Where::Cycle(cycle) => session.cycle() == cycle,
-                        Where::Period(period) => session.core.boundary && session.period() == period,
+                    let here = match at {
+                        Where::Bundle(address) => issuing == Some(*address),
+                        Where::Line(_, bundles) => issuing.is_some_and(|address| bundles.contains(&address)),
+                        Where::Cycle(cycle) => session.cycle() == *cycle,
+                        Where::Period(period) => session.core.boundary && session.period() == *period,
                     };
                     if here
                         && why.is_none()
-                        && condition.as_ref().is_none_or(|condition| session.holds(condition))
+                        && condition.as_ref().is_none_or(|condition| match at {
+                            Where::Line(line, _) => session.holds_at(*line, condition),
+                            _ => session.holds(condition),
+                        })
                     {
                         why = Some(Why::Stop { id: *id, text: text.clone(), change: None });
                     }
                 }
                 Stop::Watch { test, text, .. } => {
-                    let now = see(session, stop);
-                    let hit = match test {
-                        Test::Changed => !same(before.value, now.value),
-                        _ => now.is && !before.is,
-                    };
-                    if hit && why.is_none() {
-                        let change = Some((shown(before.value), shown(now.value)));
-                        why = Some(Why::Stop { id: *id, text: text.clone(), change });
+                    for (live, before) in before {
+                        let now = see(session, live, test);
+                        let label = live.held();
+                        // That its register has gone to another value is no change of this one.
+                        if label.is_some() && now.value.is_none() {
+                            continue;
+                        }
+                        let hit = match test {
+                            Test::Changed => !same(before.value, now.value),
+                            _ => now.is && !before.is,
+                        };
+                        if hit && why.is_none() {
+                            let change = Some((shown(before.value), shown(now.value)));
+                            let label = label.map_or(String::new(), |label| format!(" ({label})"));
+                            why = Some(Why::Stop { id: *id, text: format!("{text}{label}"), change });
+                        }
+                        *before = now;
                     }
-                    *before = now;
                 }
             }
         }
@@ -206,8 +237,7 @@ fn shown(value: Option<Value>) -> String {
     }
 }
 
-fn see(session: &Session, stop: &Stop) -> Seen {
-    let Stop::Watch { what, test, .. } = stop else { return Seen::default() };
+fn see(session: &Session, what: &Live, test: &Test) -> Seen {
     let value = session.evaluate(what).ok();
     let real = value.map(Value::real);
     let other = |live: &Live| session.evaluate(live).ok().map(Value::real);

@@ -75,6 +75,9 @@ impl Signal {
                 heard(|event| matches!(event, Event::DeadlineMissed { .. } | Event::TickLost { .. }))
             }
             Source::Stall(kind) => Some(record.stall.is_some_and(|(_, cause)| cause.kind() == kind).into()),
+            Source::Register(register) if emulator.machine().is_output(register) => {
+                emulator.output_bits(register)
+            }
             Source::Register(register) => emulator.register(register),
         }
     }

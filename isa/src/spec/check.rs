@@ -129,26 +129,6 @@ impl Message {
     }
 }
 
-impl Function {
-    /// The variant's name.
-    const fn variant(self) -> &'static str {
-        match self {
-            Function::Idle => "Idle",
-            Function::Control => "Control",
-            Function::Memory => "Memory",
-            Function::Alu => "Alu",
-            Function::Add => "Add",
-            Function::Convert => "Convert",
-            Function::Multiply => "Multiply",
-            Function::Divide => "Divide",
-            Function::Root => "Root",
-            Function::Sine => "Sine",
-            Function::Arctangent => "Arctangent",
-            Function::Arccosine => "Arccosine",
-        }
-    }
-}
-
 impl MachineError {
     pub(super) const fn message(&self) -> Message {
         use MachineReason::*;
@@ -234,7 +214,7 @@ impl MachineError {
                 .text(" and unit ")
                 .name(unit)
                 .text(" both offer ")
-                .text(function.variant())
+                .text(function.name())
                 .text("; in a slot, one unit executes a function"),
             NoSequencer => m.text("no slot hosts the sequencer (function Control)"),
             TwoSlots { function, slot, other } => m
@@ -242,7 +222,7 @@ impl MachineError {
                 .text(" and slot ")
                 .name(slot)
                 .text(" both host ")
-                .text(function.variant())
+                .text(function.name())
                 .text("; a machine has one sequencer, and one data memory at most"),
         }
     }

@@ -10,10 +10,27 @@
 use crate::fp::{self, Arithmetic, Flags, Value};
 use crate::shape::Shape;
 
-/// What an instruction asks of the unit that executes it. A machine can execute an instruction if one of its slots hosts a unit with the function.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Function {
+macro_rules! functions {
+    ($(#[doc = $text:literal] $name:ident,)*) => {
+        /// What an instruction asks of the unit that executes it. A machine can execute an instruction if one of its slots hosts a unit with the function.
+        #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord, serde::Serialize)]
+        #[serde(rename_all = "lowercase")]
+        pub enum Function {
+            $(#[doc = $text] $name,)*
+        }
+
+        impl Function {
+            /// Its name in the tables.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Function::$name => stringify!($name),)*
+                }
+            }
+        }
+    };
+}
+
+functions! {
     /// Nothing: every slot of every machine offers it.
     Idle,
     /// Sequencing: branches, calls, the period's end.

@@ -1,7 +1,7 @@
 //! The table of machines: a named list of issue slots, each hosting units and owning a register bank.
 //!
 //! Every slot writes its own bank and every slot reads every bank, the inputs included. A bank is a window of the register
-//! space of 1,024 addresses. The last [`Machine::outputs_per_bank`] registers of each bank are its output ports; the bank
+//! space of 1,024 addresses. The last [`Machine::outputs_per_bank`] registers of each bank are the output ports; the bank
 //! after the slots' is the input ports', written from outside, and its last register, `zero`, is never written.
 
 use super::instructions::Function;
@@ -183,9 +183,30 @@ impl Machine {
 
     /// Whether the address is an output port.
     pub fn is_output(&self, address: u16) -> bool {
-        self.slots.iter().any(|slot| {
-            slot.bank.contains(address) && address - slot.bank.base >= slot.bank.depth - self.outputs_per_bank
-        })
+        self.output_number(address).is_some()
+    }
+
+    /// The number of the output port at an address: its place in the output window of its bank. The windows of all banks
+    /// stand for the same ports: the outside sees [`Machine::outputs_per_bank`] of them, by number, whichever slot writes.
+    pub fn output_number(&self, address: u16) -> Option<u16> {
+        let slot = self.slots.iter().find(|slot| slot.bank.contains(address))?;
+        (address - slot.bank.base).checked_sub(slot.bank.depth - self.outputs_per_bank)
+    }
+
+    /// Where slot `slot` writes the output port of a number, which is below [`Machine::outputs_per_bank`].
+    pub fn output_register(&self, slot: usize, number: u16) -> u16 {
+        let bank = &self.slots[slot].bank;
+        bank.base + bank.depth - self.outputs_per_bank + number
+    }
+
+    /// The number of the input port at an address: its place in the input bank.
+    pub fn input_number(&self, address: u16) -> Option<u16> {
+        self.is_input(address).then(|| address - self.inputs.base)
+    }
+
+    /// Input ports: those of the bank but `zero`.
+    pub fn input_count(&self) -> u16 {
+        self.inputs.depth - u16::from(self.inputs.contains(ZERO))
     }
 
     /// Whether the address is an input port (`zero` is not).

@@ -33,7 +33,7 @@ fn assemble(mutations: &[Mutation]) -> Program {
         let lines: Vec<String> = source(file).lines().enumerate().map(line).collect();
         loader.add(file, lines.join("\n"));
     }
-    let options = Options { machine: &T1, schedule: Schedule::None, effort: 0 };
+    let options = Options { machine: &T1, schedule: Schedule::None, effort: 0, ..Options::default() };
     let assembled = takt_asm::assemble(TRACKING, &loader, &options);
     assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false))).program
 }

@@ -38,6 +38,7 @@ pub(crate) fn assemble(path: &'static str, machine: &'static Machine, schedule: 
     let assembled = takt_asm::assemble(path, &MemoryLoader::new(SOURCES), &options);
     let assembled =
         assembled.unwrap_or_else(|errors| panic!("{path} on {}: {}", machine.name, errors.render(false)));
+    assert!(assembled.warnings.is_empty(), "{path}: {}", assembled.warnings.render(false));
     let assembled = Arc::new(assembled);
     done.push((path, machine, schedule, Arc::clone(&assembled)));
     assembled

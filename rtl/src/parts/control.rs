@@ -2,12 +2,16 @@
 
 use crate::plan::names::net;
 use crate::plan::{ControlBit, Plan, SlotPlan, Stage};
-use crate::verilog::{Module, any, choose, decimal, set, when};
+use crate::verilog::{Expr, Instance, Module, any, choose, concat, decimal, no, number, set, when};
 use takt_isa::Effect;
 
 /// Where the control bits stand.
 pub(super) fn parameters(plan: &Plan, m: &mut Module) {
     m.banner("control bits of each slot, from its decoder");
+    m.comment(
+        "unit_<name>: a unit of the slot's row; result_<latency>: it writes a register; code: the unit's own, from the header of its \
+         file; the others: effects in the table of instructions.",
+    );
     m.blank();
     for slot in &plan.slots {
         for control in &slot.controls {
@@ -18,15 +22,50 @@ pub(super) fn parameters(plan: &Plan, m: &mut Module) {
 
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("from decode to issue");
+    m.comment("A bundle moves on with advance. The letters: d_ decode, m_ match, r_ read, i_ issue.");
+    m.blank();
+    places(plan, m);
     for slot in &plan.slots {
         m.blank();
         stages(slot, m);
     }
 }
 
+/// Which place of a latched input port each source reads.
+fn places(plan: &Plan, m: &mut Module) {
+    let (bits, [decode, matched]) =
+        (plan.input_bits, [Stage::Decode, Stage::Match].map(|stage| plan.place(stage)));
+    let indices: Vec<_> =
+        plan.sources().map(|(slot, operand)| slot.source_index(Stage::Decode, operand).low(bits)).collect();
+    m.comment("docs/timing.md, latched ports: two places each, which change sides at the end of a period.");
+    m.wires([net::INPUTS_OPEN, net::INPUTS_TAKEN, net::INPUT1_PLACE]);
+    m.wires([decode.clone()]);
+    m.instance(
+        Instance::new("takt_places", "inputs")
+            .parameter_as("PORTS", &net::LATCHED)
+            .parameter("INDEX", bits)
+            .parameter("WRITES", 1)
+            .parameter("READS", decode.width())
+            .same([net::CLK])
+            .port("flip", net::INPUTS_TAKEN | net::RST)
+            .port("open", net::INPUTS_OPEN | net::RST)
+            .port("drop", no())
+            .port("write", net::INPUT1)
+            .port("write_index", plan.input1_index().low(bits))
+            .port("write_place", net::INPUT1_PLACE)
+            .port("read_index", concat(indices))
+            .port("read_place", decode.clone()),
+    );
+    let direct = Expr::from(&net::LATCHED).is(number(0));
+    m.define(net::INPUT1_NOW, net::INPUT1 & (direct | net::INPUTS_OPEN | net::RST));
+    m.regs([matched.clone()]);
+    m.clocked(vec![when(net::ADVANCE, vec![set(matched, decode)])]);
+}
+
 fn stages(slot: &SlotPlan, m: &mut Module) {
     use Stage::{Decode, Issue, Match, Read};
     let constant = slot.constant_bits() > 0;
+    let address = slot.address_bits() > 0;
     let immediate = slot.has_effect(Effect::Immediate);
     m.regs([Match, Read, Issue].map(|stage| slot.control(stage)));
     m.regs([Match, Read, Issue].map(|stage| slot.illegal(stage)));
@@ -37,6 +76,8 @@ fn stages(slot: &SlotPlan, m: &mut Module) {
     }
     if constant {
         m.regs([slot.constant(Match)]);
+    }
+    if address {
         m.regs([Read, Issue].map(|stage| slot.constant(stage)));
     }
     if immediate {
@@ -63,8 +104,10 @@ fn stages(slot: &SlotPlan, m: &mut Module) {
         set(slot.dest(Issue), slot.dest(Read)),
     ]);
     if constant {
+        body.push(set(slot.constant(Match), slot.constant(Decode)));
+    }
+    if address {
         body.extend([
-            set(slot.constant(Match), slot.constant(Decode)),
             set(slot.constant(Read), slot.constant(Match).low(slot.constant(Read).width())),
             set(slot.constant(Issue), slot.constant(Read)),
         ]);

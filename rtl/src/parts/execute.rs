@@ -8,6 +8,17 @@ use takt_isa::{Effect, Function};
 
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("execute: the sequencer and the data memory");
+    let machine = plan.machine;
+    m.comment(format!(
+        "Branches, wait and tick, faults: docs/timing.md, under these names. Row: refill {}, resolve {}, stack_depth {}; data_depth {}; \
+         the sequencer in slot `{}`, the data memory in slot `{}`.",
+        machine.refill,
+        machine.resolve,
+        machine.stack_depth,
+        machine.data_depth,
+        plan.control().name(),
+        plan.memory().name()
+    ));
     m.blank();
     m.wires([net::X_ISSUED]);
     m.wires([net::X_ADDRESS]);
@@ -17,6 +28,10 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     memory(plan, m);
 
     m.banner("units");
+    m.comment(
+        "One drives its slot's bus in a cycle at most (rule 6): the others' share is 0. An operation that issues in cycle c stands on a \
+         unit's inputs in c + 1 and its result on the bus in c + latency.",
+    );
     m.blank();
     m.regs([net::LOADED_VALUE]);
     m.clocked(vec![set(net::LOADED_VALUE, net::LOADS_VALUE.low(32))]);
@@ -57,6 +72,9 @@ fn sequencer(plan: &Plan, m: &mut Module) {
             .port("tick", net::TICKS)
             .same([net::FLUSH, plan.fetch(), net::F_OUTSIDE, net::BLOCK, net::I_ADDRESS])
             .same([net::X_ISSUED, net::X_ADDRESS, net::WAITING])
+            .port("open", net::INPUTS_OPEN)
+            .port("ends", net::INPUTS_TAKEN)
+            .same([net::ENDED])
             .port("missed", net::TICK_MISSED)
             .port("lost", net::TICK_LOST)
             .same([net::DEADLINE_MISSED, net::HALTED, net::FAULT, net::FAULT_KIND, net::FAULT_SLOT])
@@ -128,6 +146,7 @@ fn units(plan: &Plan, slot: &SlotPlan, m: &mut Module) {
     let (mut results, mut flags) = (Vec::new(), Vec::new());
     for circuit in &slot.circuits {
         let unit = &circuit.unit;
+        m.comment(format!("Row: `{}`, latency {}, interval {}.", unit.name, unit.latency, unit.interval));
         m.wires([slot.unit_valid(unit)]);
         m.wires([slot.unit_result(unit)]);
         m.wires([slot.unit_flags(unit)]);

@@ -7,6 +7,7 @@ use takt_isa::Effect;
 
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("fetch and decode");
+    m.comment(format!("Row: code_depth {}; a memory and a decoder for each slot.", plan.machine.code_depth));
     m.blank();
     m.wires([net::ADVANCE, net::ISSUE, net::FLUSH, net::BLOCK, net::REFUSED, net::M_VALID, net::F_OUTSIDE]);
     m.wires([plan.fetch()]);

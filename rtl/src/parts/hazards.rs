@@ -9,11 +9,16 @@ use crate::verilog::{Expr, Instance, Module, any};
 
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("destinations");
+    m.comment("Rule 3: a bundle waits while a register that it writes is pending.");
     for slot in &plan.slots {
         m.blank();
         destination(plan, slot, m);
     }
     m.banner("units, write ports, drain: for the bundle in read and for the one in issue, in the next cycle");
+    m.comment(
+        "Rule 4, _busy: a unit of interval above 1 accepts no operation yet. Rule 6, _port: a result that is in flight has its \
+         writeback in the cycle in which this one would have it. Rule 5, _drain: something is in flight.",
+    );
     m.blank();
     for slot in &plan.slots {
         for (stage, busy) in [Stage::Read, Stage::Issue].map(|stage| (stage, unit_busy(slot, stage))) {
@@ -117,6 +122,7 @@ fn drain(plan: &Plan, m: &mut Module) {
 
 /// What issues, and what moves on.
 fn issue(plan: &Plan, m: &mut Module) {
+    m.comment("Rules 2, 3, 4 and 6, then 5. Rule 1 is takt_issue's: a bundle is in issue only once it is delivered.");
     for (stage, ready, drain) in
         [(Stage::Read, net::R_READY, net::R_DRAIN), (Stage::Issue, net::I_READY, net::I_DRAIN)]
     {

@@ -5,7 +5,11 @@ use crate::plan::{ControlBit, LateUnit, Plan, SlotPlan, Stage};
 use crate::verilog::{Expr, Instance, Module, Net, any, concat, decimal, gated, no, set};
 
 pub(super) fn write(plan: &Plan, m: &mut Module) {
-    m.banner("results underway, and the buses");
+    m.banner("results in flight, and the buses");
+    m.comment(
+        "Rules 2 to 6 look at what is in flight: each slot's results by the cycles to their writeback (place j: j cycles), and before \
+         these, units that work on one operation at a time.",
+    );
     m.blank();
     m.wires([net::I_ADDRESS]);
     for slot in &plan.slots {
@@ -21,6 +25,15 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
 
 /// A unit whose operation is in flight for longer than the slot's common places.
 fn late_unit(slot: &SlotPlan, late: &LateUnit, m: &mut Module) {
+    m.comment(format!(
+        "Row: `{}` in slot `{}`, latency {}, interval {}: {} cycles here, then in the slot's {} places.",
+        late.unit.name,
+        slot.name(),
+        late.unit.latency,
+        late.unit.interval,
+        late.beyond,
+        slot.depth
+    ));
     m.wires([slot.late_at(late)]);
     m.wires([slot.late_underway(late), slot.late_last(late), slot.late_busy(late)]);
     m.wires([slot.late_index(late)]);
@@ -56,6 +69,14 @@ fn places(slot: &SlotPlan, m: &mut Module) {
         several => any(several.iter().map(|late| gated(width, slot.late_last(late), what(late)))),
     };
     let index = slot.dest(Stage::Issue).width();
+    let latencies: Vec<_> = slot.latencies.iter().map(u32::to_string).collect();
+    m.comment(format!(
+        "Row: slot `{}`, bank `{}`: results of latency {}; {} places.",
+        slot.name(),
+        slot.slot.bank.name,
+        latencies.join(", "),
+        slot.depth
+    ));
     let insert = (1..=slot.depth).map(|latency| {
         let bit = ControlBit::Result(latency);
         if slot.has(bit) { net::ISSUE & slot.bit(Stage::Issue, bit) } else { no() }

@@ -6,6 +6,13 @@ use crate::verilog::{Expr, Module, concat, decimal, set};
 
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("loader and input ports");
+    m.comment(format!(
+        "Row: inputs `{}`, at {}: {} ports in a bank as deep as the deepest, {} registers.",
+        plan.machine.inputs.name,
+        plan.machine.inputs.base,
+        plan.machine.inputs.depth,
+        1 << plan.index
+    ));
     m.blank();
     m.regs([net::LOADS]);
     m.regs([net::LOADS_SPACE]);

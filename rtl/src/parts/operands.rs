@@ -7,18 +7,21 @@ use takt_isa::Effect;
 
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("operands: banks, forwarding, hazards");
+    m.comment(
+        "Rule 2: a bundle waits while a register that it reads is pending. Each source has a copy of every bank, takes from the buses \
+         what these do not hold yet, and says whether it holds up the bundle in read, in issue.",
+    );
     m.blank();
     m.regs([net::STICKY]);
     m.wires([net::STICKY_NOW]);
-    for slot in &plan.slots {
-        for operand in 0..slot.sources {
-            m.blank();
-            source(plan, slot, operand, m);
-        }
+    for (number, (slot, operand)) in plan.sources().enumerate() {
+        m.blank();
+        source(plan, slot, operand, number as u32, m);
     }
 }
 
-fn source(plan: &Plan, slot: &SlotPlan, operand: usize, m: &mut Module) {
+/// An operand of a slot, which is the source of that number of the plan.
+fn source(plan: &Plan, slot: &SlotPlan, operand: usize, number: u32, m: &mut Module) {
     // The first operand's place is also that of an immediate and of the status register.
     let constant = match operand {
         0 if slot.has_effect(Effect::Immediate) => slot.immediate(Stage::Read).into(),
@@ -41,9 +44,12 @@ fn source(plan: &Plan, slot: &SlotPlan, operand: usize, m: &mut Module) {
             .parameter("DEPTH", plan.depth)
             .parameter("LATE", plan.late)
             .parameter("INDEX", plan.index)
+            .parameter_as("LATCHED", &net::LATCHED)
+            .parameter("INPUTS", plan.input_bits)
             .same([net::CLK, net::ADVANCE])
             .port("m_bank", slot.source_bank(Stage::Match, operand))
             .port("m_index", slot.source_index(Stage::Match, operand))
+            .port("m_place", plan.place(Stage::Match).at(number))
             .same([plan.underway(), plan.underway_index(), plan.writes(), plan.late(), plan.late_index()])
             .same(
                 [Stage::Read, Stage::Issue]
@@ -52,6 +58,8 @@ fn source(plan: &Plan, slot: &SlotPlan, operand: usize, m: &mut Module) {
             )
             .same([plan.result(), plan.was_result()])
             .port("input_write", net::INPUT1)
+            .port("input_write_place", net::INPUT1_PLACE)
+            .port("input_now", net::INPUT1_NOW)
             .port("input_write_index", plan.input1_index())
             .port("input_write_value", net::INPUT1_VALUE)
             .port("input_next_value", net::INPUT2_VALUE)
@@ -66,6 +74,5 @@ fn source(plan: &Plan, slot: &SlotPlan, operand: usize, m: &mut Module) {
 
 /// Of every source, whether it holds up the bundle in a stage.
 pub(super) fn waits(plan: &Plan, stage: Stage) -> Vec<Expr> {
-    let sources = plan.slots.iter().flat_map(|slot| (0..slot.sources).map(move |operand| (slot, operand)));
-    sources.map(|(slot, operand)| slot.source_waits(stage, operand).into()).collect()
+    plan.sources().map(|(slot, operand)| slot.source_waits(stage, operand).into()).collect()
 }

@@ -5,7 +5,8 @@ use crate::plan::Plan;
 use crate::plan::names::net;
 use crate::verilog::{Direction, Net, Port};
 
-/// The ports, in order. Those that serve verification only are marked.
+/// The ports, in order. Those that a synthesis without a board leaves out are marked: they serve verification only, or who integrates
+/// the core.
 pub(super) fn ports(plan: &Plan) -> Vec<(Port, bool)> {
     let machine = plan.machine;
     let input = |net| Port::new(Direction::Input, net);
@@ -21,7 +22,8 @@ pub(super) fn ports(plan: &Plan) -> Vec<(Port, bool)> {
         input(net::LOAD_ADDRESS),
         input(net::LOAD_VALUE),
         input(net::INPUT_WRITE).heading(format!(
-            "Input ports: written in cycle t, read by bundles that issue in t + {INPUT_DELAY} or later."
+            "Input ports: written in cycle t, read by bundles that issue in t + {INPUT_DELAY} or later. If latched, by those of the \
+             period whose tick is high in t + 1 or later."
         )),
         input(plan.input_index()),
         input(net::INPUT_VALUE),
@@ -30,7 +32,7 @@ pub(super) fn ports(plan: &Plan) -> Vec<(Port, bool)> {
         let write = output(plan.output_write(&slot.bank));
         ports.push(match s {
             0 => write.heading(format!(
-                "Output ports, the last {} registers of each bank: what is written, in the cycle of writeback.",
+                "Output ports, the last {} registers of each bank: what is written, in the cycle of writeback, latched or not.",
                 machine.outputs_per_bank
             )),
             _ => write,
@@ -38,7 +40,15 @@ pub(super) fn ports(plan: &Plan) -> Vec<(Port, bool)> {
         ports.push(output(plan.output_index(&slot.bank)));
         ports.push(output(plan.output_value(&slot.bank)));
     }
-    ports.extend([
+    let by_number = vec![
+        input(plan.read_output()).heading(
+            "The ports by number, whichever bank has them, as the outside is to see them: if latched, as last published.",
+        ),
+        output(net::READ_VALUE),
+        output(net::ENDED)
+            .remark("a `wait` issued two cycles ago: read_value is of the period that it ended"),
+    ];
+    let rest = [
         input(net::TICK).heading("The tick: high for one cycle, seen in the next one."),
         output(net::WAITING),
         output(net::DEADLINE_MISSED).remark("sticky"),
@@ -50,7 +60,7 @@ pub(super) fn ports(plan: &Plan) -> Vec<(Port, bool)> {
             .remark("1 illegal word, 2 data address, 3 return stack full, 4 return stack empty"),
         output(net::FAULT_SLOT),
         output(net::FAULT_ADDRESS),
-    ]);
+    ];
     let verification = vec![
         output(net::ISSUED).heading(
             "For verification: a bundle two cycles after its issue, a store likewise, and each slot's writeback.",
@@ -68,6 +78,7 @@ pub(super) fn ports(plan: &Plan) -> Vec<(Port, bool)> {
     let marked = |mark| move |port| (port, mark);
     let status = [output(net::STATUS).remark("the sticky flags")];
     let used = ports.into_iter().map(marked(false));
+    let used = used.chain(by_number.into_iter().map(marked(true))).chain(rest.map(marked(false)));
     used.chain(verification.into_iter().map(marked(true))).chain(status.map(marked(false))).collect()
 }
 
@@ -76,8 +87,8 @@ const _: () = assert!(RESET_CYCLES == 64, "say so in the remark");
 
 /// The same, by name: what drives the core from outside and what it delivers, the clock and reset apart.
 pub(super) fn used(plan: &Plan, direction: Direction) -> impl Iterator<Item = Net> {
-    ports(plan).into_iter().filter_map(move |(port, verification)| {
-        let wanted = port.direction == direction && !verification;
+    ports(plan).into_iter().filter_map(move |(port, left_out)| {
+        let wanted = port.direction == direction && !left_out;
         (wanted && port.net != net::CLK && port.net != net::RST).then_some(port.net)
     })
 }

@@ -7,6 +7,10 @@ use takt_isa::Effect;
 
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("the status register");
+    m.comment(
+        "docs/timing.md, Flags: what is raised joins in the cycle of writeback; what clears drains (rule 5), and does not concern its \
+         own bundle.",
+    );
     m.blank();
     let bit = ControlBit::Effect(Effect::ClearFlags);
     let clears = plan.slots.iter().filter(|slot| slot.has(bit)).map(|slot| slot.bit(Stage::Issue, bit));

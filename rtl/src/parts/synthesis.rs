@@ -44,8 +44,10 @@ pub(super) fn module(plan: &Plan) -> Result<String, ModuleError> {
             low += net.width();
         }
     }
-    for (port, verification) in ports::ports(plan) {
-        if verification {
+    for (port, left_out) in ports::ports(plan) {
+        if left_out && port.direction == Direction::Input {
+            core = core.port(port.net.name(), decimal(port.net.width(), 0_u32));
+        } else if left_out {
             let open = Net::named(format!("unused_{}", port.net)).wide(port.net.width());
             m.wires([open.clone()]);
             core = core.port(port.net.name(), open);

@@ -2,10 +2,15 @@
 
 use crate::plan::names::net;
 use crate::plan::{Plan, SlotPlan};
-use crate::verilog::{Expr, Module, concat, decimal};
+use crate::verilog::{Expr, Instance, Module, Net, concat, decimal};
+use takt_isa::Bank;
 
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("output and retire ports");
+    m.comment(format!(
+        "Row: outputs_per_bank {}: the last registers of each bank, whose indices are ones above the port's number.",
+        plan.machine.outputs_per_bank
+    ));
     m.blank();
     for slot in &plan.slots {
         let bank = slot.slot.bank;
@@ -15,6 +20,20 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
         m.assign(plan.output_index(&bank), slot.underway_index().low(plan.port_bits));
         m.assign(plan.output_value(&bank), slot.result());
     }
+    let of_banks = |of: &dyn Fn(&Plan, &Bank) -> Net| plan.each(|slot| of(plan, &slot.slot.bank));
+    m.instance(
+        Instance::new("takt_outputs", "outputs")
+            .parameter_as("LATCHED", &net::LATCHED)
+            .parameter("BANKS", plan.slots.len() as u32)
+            .parameter("INDEX", plan.port_bits)
+            .same([net::CLK, net::RST])
+            .port("publish", net::ENDED)
+            .port("write", of_banks(&Plan::output_write))
+            .port("index", of_banks(&Plan::output_index))
+            .port("value", of_banks(&Plan::output_value))
+            .port("number", plan.read_output())
+            .port("shown", net::READ_VALUE),
+    );
     m.assign(plan.retire(), plan.each(|slot| slot.writes() & !net::RST));
     m.assign(plan.retire_address(), plan.each(SlotPlan::retire_address));
     let register = |slot: &SlotPlan| {

@@ -224,6 +224,11 @@ impl Plan {
         self.slots.iter().find(|slot| slot.name() == name)
     }
 
+    /// Every source operand: its slot, and its number there.
+    pub fn sources(&self) -> impl Iterator<Item = (&SlotPlan, usize)> {
+        self.slots.iter().flat_map(|slot| (0..slot.sources).map(move |operand| (slot, operand)))
+    }
+
     /// The slot that hosts the sequencer.
     pub fn control(&self) -> &SlotPlan {
         &self.slots[self.control_slot]

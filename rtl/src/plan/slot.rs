@@ -173,11 +173,19 @@ impl SlotPlan {
         self.rows.iter().any(|row| row.effect == effect)
     }
 
+    fn widest(&self, fields: &[Field]) -> u32 {
+        let used = self.rows.iter().flat_map(|row| row.shape.fields());
+        used.filter(|field| fields.contains(field)).map(|field| field.bits().width).max().unwrap_or(0)
+    }
+
     /// Bits of constant: an immediate, or a target or offset, or none.
     pub fn constant_bits(&self) -> u32 {
-        let fields = self.rows.iter().flat_map(|row| row.shape.fields());
-        let wide = |field: &Field| matches!(field, Field::Immediate | Field::Target | Field::Offset);
-        fields.filter(|field| wide(field)).map(|field| field.bits().width).max().unwrap_or(0)
+        self.widest(&[Field::Immediate, Field::Target, Field::Offset])
+    }
+
+    /// Bits of those that are wanted in issue: a target or offset, or none.
+    pub fn address_bits(&self) -> u32 {
+        self.widest(&[Field::Target, Field::Offset])
     }
 
     /// The value of the control bits for an instruction.

@@ -1,8 +1,11 @@
 //! Names and expressions of Verilog.
 
 use std::borrow::Cow;
-use std::fmt;
+use std::fmt::{self, Write as _};
 use std::ops::{BitAnd, BitOr, BitXor, Not};
+
+/// Columns for what continues an expression.
+const LINE: usize = 118;
 
 /// A name that a module declares: a port, a wire, a register, a parameter. It is written as its name.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -159,6 +162,11 @@ pub fn decimal(width: u32, value: impl Into<u64>) -> Expr {
     Expr::Literal(format!("{width}'d{}", value.into()))
 }
 
+/// A number without a width, as parameters are.
+pub fn number(value: u32) -> Expr {
+    Expr::Literal(value.to_string())
+}
+
 /// A number in hexadecimal, of all its digits.
 pub fn hexadecimal(width: u32, value: u64) -> Expr {
     Expr::Literal(format!("{width}'h{value:0digits$x}", digits = width.div_ceil(4) as usize))
@@ -271,6 +279,7 @@ impl Expr {
     /// As an operator's operand.
     fn nested(&self) -> String {
         match self {
+            Expr::Chain(_, terms) if terms.len() == 1 => terms[0].nested(),
             Expr::Reduce(..) | Expr::Chain(..) | Expr::Compare(..) | Expr::Choose(_) => format!("({self})"),
             _ => self.to_string(),
         }
@@ -286,11 +295,33 @@ impl Expr {
         match self {
             Expr::Chain(operator, terms) if terms.len() > 1 => {
                 let terms: Vec<_> = terms.iter().map(Expr::nested).collect();
-                terms.join(&format!("\n{indent}{operator} "))
+                // Names stand several in a line, anything longer alone.
+                let long = terms.iter().any(|term| term.contains(' '));
+                let mut text = String::new();
+                let mut left = if long { 0 } else { room };
+                for (i, term) in terms.iter().enumerate() {
+                    let piece = format!("{operator} {term}");
+                    let (breaks, piece) = match i {
+                        0 => (false, term.as_str()),
+                        _ => (left < piece.len() + 1, piece.as_str()),
+                    };
+                    if breaks {
+                        let _ = write!(text, "\n{indent}");
+                        left = if long { 0 } else { LINE.saturating_sub(indent.len()) };
+                    } else if i > 0 {
+                        text.push(' ');
+                    }
+                    text.push_str(piece);
+                    left = left.saturating_sub(piece.len() + 1);
+                }
+                text
             }
             Expr::Concat(terms) if terms.len() > 1 => {
                 let terms: Vec<_> = terms.iter().map(Expr::to_string).collect();
                 format!("{{{}}}", terms.join(&format!(",\n{indent}")))
+            }
+            Expr::Not(of) if matches!(**of, Expr::Chain(..)) => {
+                format!("~({})", of.broken(room.saturating_sub(3), indent))
             }
             _ => whole,
         }

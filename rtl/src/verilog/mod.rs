@@ -8,7 +8,8 @@ mod expression;
 mod print;
 
 pub use expression::{
-    Expr, Net, Place, Select, any, binary, choose, concat, decimal, gated, hexadecimal, no, repeat, yes,
+    Expr, Net, Place, Select, any, binary, choose, concat, decimal, gated, hexadecimal, no, number, repeat,
+    yes,
 };
 
 use std::collections::BTreeSet;
@@ -76,6 +77,16 @@ impl Port {
     pub fn remark(self, text: &'static str) -> Port {
         Port { remark: Some(text), ..self }
     }
+}
+
+/// A parameter of a module.
+#[derive(Clone, Debug)]
+pub(crate) struct Parameter {
+    pub(crate) net: Net,
+    /// Unless an instance says otherwise.
+    pub(crate) value: u32,
+    /// Said on a line of its own before it.
+    pub(crate) heading: String,
 }
 
 /// What drives a net, in its declaration.
@@ -157,8 +168,8 @@ impl Statement {
 pub(crate) struct Instance {
     module: String,
     name: String,
-    parameters: Vec<(&'static str, u32)>,
-    ports: Vec<(String, Option<Expr>)>,
+    parameters: Vec<(&'static str, Expr)>,
+    ports: Vec<(String, Expr)>,
 }
 
 impl Instance {
@@ -167,18 +178,24 @@ impl Instance {
     }
 
     pub(crate) fn parameter(mut self, name: &'static str, value: u32) -> Instance {
-        self.parameters.push((name, value));
+        self.parameters.push((name, number(value)));
+        self
+    }
+
+    /// A parameter that is a parameter of this module.
+    pub(crate) fn parameter_as(mut self, name: &'static str, value: &Net) -> Instance {
+        self.parameters.push((name, value.into()));
         self
     }
 
     pub(crate) fn port(mut self, name: impl Into<String>, value: impl Into<Expr>) -> Instance {
-        self.ports.push((name.into(), Some(value.into())));
+        self.ports.push((name.into(), value.into()));
         self
     }
 
     /// Ports that are connected to the nets of their names.
     pub(crate) fn same(mut self, nets: impl IntoIterator<Item = Net>) -> Instance {
-        self.ports.extend(nets.into_iter().map(|net| (net.name().to_owned(), Some(net.into()))));
+        self.ports.extend(nets.into_iter().map(|net| (net.name().to_owned(), net.into())));
         self
     }
 }
@@ -200,6 +217,7 @@ enum Item {
 pub(crate) struct Module {
     name: String,
     heading: Vec<String>,
+    parameters: Vec<Parameter>,
     ports: Vec<Port>,
     items: Vec<Item>,
     declared: BTreeSet<String>,
@@ -215,6 +233,7 @@ impl Module {
         let mut module = Module {
             name: name.to_owned(),
             heading,
+            parameters: Vec::new(),
             ports: Vec::new(),
             items: Vec::new(),
             declared: BTreeSet::new(),
@@ -225,6 +244,12 @@ impl Module {
         }
         module.ports = ports;
         module
+    }
+
+    /// Adds a parameter.
+    pub(crate) fn takes(&mut self, parameter: Parameter) {
+        self.declare(&parameter.net);
+        self.parameters.push(parameter);
     }
 
     fn declare(&mut self, net: &Net) {
@@ -258,11 +283,9 @@ impl Module {
                 body.iter().for_each(|statement| statement.nets(&mut see));
             }
             Item::Instance(instance) => {
-                instance
-                    .ports
-                    .iter()
-                    .filter_map(|port| port.1.as_ref())
-                    .for_each(|value| value.nets(&mut see));
+                let values = instance.parameters.iter().map(|(_, value)| value);
+                let values = values.chain(instance.ports.iter().map(|(_, value)| value));
+                values.for_each(|value| value.nets(&mut see));
             }
         }
         used.iter().for_each(|net| self.uses(net));

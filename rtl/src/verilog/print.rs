@@ -9,9 +9,19 @@ const COLUMNS: usize = 120;
 pub(super) fn module(module: &Module) -> String {
     let mut v = String::new();
     for line in &module.heading {
-        let _ = writeln!(v, "{}", format!("// {line}").trim_end());
+        comment(&mut v, "", line);
     }
-    let _ = writeln!(v, "\nmodule {} (", module.name);
+    let _ = write!(v, "\nmodule {} ", module.name);
+    if !module.parameters.is_empty() {
+        v.push_str("#(\n");
+        for (i, parameter) in module.parameters.iter().enumerate() {
+            let comma = if i + 1 < module.parameters.len() { "," } else { "" };
+            comment(&mut v, "    ", &parameter.heading);
+            let _ = writeln!(v, "    parameter {} = {}{comma}", parameter.net, parameter.value);
+        }
+        v.push_str(") ");
+    }
+    v.push_str("(\n");
     ports(&mut v, &module.ports);
     v.push_str(");\n\n");
     let mut blank = true;
@@ -29,6 +39,26 @@ pub(super) fn module(module: &Module) -> String {
     v
 }
 
+/// A comment in as many lines as it takes; those after the first stand as far in as the first one's text.
+fn comment(v: &mut String, indent: &str, text: &str) {
+    let inner = &text[..text.len() - text.trim_start().len()];
+    let mut line = format!("{indent}//");
+    let mut words = text.split_whitespace().peekable();
+    let mut fresh = true;
+    while let Some(word) = words.next() {
+        line.push_str(if fresh && !inner.is_empty() { inner } else { "" });
+        line.push(' ');
+        line.push_str(word);
+        fresh = false;
+        if words.peek().is_some_and(|next| line.len() + 1 + next.len() > COLUMNS) {
+            let _ = writeln!(v, "{line}");
+            line = format!("{indent}//");
+            fresh = true;
+        }
+    }
+    let _ = writeln!(v, "{line}");
+}
+
 fn ports(v: &mut String, ports: &[Port]) {
     let wide = ports.iter().map(|port| port.net.range_text().len()).max().unwrap_or(0);
     let direction = |port: &Port| match port.direction {
@@ -40,7 +70,7 @@ fn ports(v: &mut String, ports: &[Port]) {
     let column = ports.iter().map(|port| text(port).len()).max().unwrap_or(0) + 3;
     for (i, port) in ports.iter().enumerate() {
         if let Some(heading) = &port.heading {
-            let _ = writeln!(v, "    // {heading}");
+            comment(v, "    ", heading);
         }
         let comma = if i + 1 < ports.len() { "," } else { "" };
         let text = format!("{}{comma}", text(port));
@@ -54,7 +84,10 @@ fn ports(v: &mut String, ports: &[Port]) {
 fn write_item(v: &mut String, item: &Item) {
     let _ = match item {
         Item::Blank => writeln!(v),
-        Item::Comment(text) => writeln!(v, "    // {text}"),
+        Item::Comment(text) => {
+            comment(v, "    ", text);
+            Ok(())
+        }
         Item::Parameter { net, value } => writeln!(v, "    localparam {net} = {value};"),
         Item::Nets { kind, nets, value, remark } => {
             let kind = match kind {
@@ -206,11 +239,8 @@ fn write_instance(v: &mut String, instance: &Instance) {
             let _ = write!(v, "#(\n{}\n    ) ", fill(&values, "        "));
         }
     }
-    let port = |(port, value): &(String, Option<Expr>)| {
-        let value = value.as_ref().map_or_else(String::new, |value| {
-            value.broken(COLUMNS.saturating_sub(port.len() + 13), "            ")
-        });
-        format!(".{port}({value})")
+    let port = |(port, value): &(String, Expr)| {
+        format!(".{port}({})", value.broken(COLUMNS.saturating_sub(port.len() + 13), "            "))
     };
     let ports: Vec<_> = ports.iter().map(port).collect();
     let _ = writeln!(v, "{name} (\n{}\n    );", fill(&ports, "        "));

@@ -1,0 +1,32 @@
+//! What the programs of this repository take, as their documents say: no change of the assembler makes them longer unseen.
+
+mod common;
+
+use std::path::Path;
+use takt_asm::FileLoader;
+use takt_isa::{Machine, T1, T3};
+
+/// Cycles of the block at the label `period`, or else of the longest.
+fn cycles(folder: &str, name: &str, machine: &'static Machine) -> u32 {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../programs").join(folder);
+    let assembled = takt_asm::assemble(name, &FileLoader::new(root), &common::options(machine));
+    let assembled = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false)));
+    let period = assembled.blocks.iter().find(|block| block.label.as_deref() == Some("period"));
+    let longest = assembled.blocks.iter().map(|block| block.cycles).max();
+    period.map(|block| block.cycles).or(longest).expect("it has a scheduled block")
+}
+
+#[test]
+fn programs_take_no_longer() {
+    let figures = [
+        ("hybrid", "tracking.s", &T3, 124),
+        ("hybrid", "tracking_literal.s", &T3, 341),
+        ("hybrid", "tracking.s", &T1, 304),
+        ("arm", "forward.s", &T3, 100),
+        ("arm", "inverse.s", &T3, 209),
+    ];
+    for (folder, name, machine, most) in figures {
+        let found = cycles(folder, name, machine);
+        assert!(found <= most, "{name} on {}: {found} cycles, {most} before", machine.name);
+    }
+}

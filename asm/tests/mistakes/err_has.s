@@ -1,0 +1,7 @@
+; machine t1
+.const A = has.fatan
+.const B = has.multiply_accumulate
+.if has.fatan2
+        nonsense
+.endif
+        halt

@@ -1,0 +1,118 @@
+//! Where sources come from, on every command that assembles: `-I`, the library that the binary carries, `-W`.
+
+mod common;
+
+use common::Folder;
+
+const MAIN: &str = "\
+.include \"twice.s\"
+.include <math.s>
+.input  x
+.output F
+.reg    t
+.once
+        wait    period
+.period
+period: twice   t, x
+        clamp   F, t, -1, 1
+        wait    period
+";
+
+const TWICE: &str = ".macro twice y, x\n        fadd    y, x, x\n.endm\n";
+
+/// A controller that needs a folder beside its own, and inputs for it.
+fn project() -> Folder {
+    let folder = Folder::new();
+    for name in ["app", "lib", "other"] {
+        std::fs::create_dir(folder.path().join(name)).unwrap();
+    }
+    folder.write("app/main.s", MAIN);
+    folder.write("lib/twice.s", TWICE);
+    folder.write("other/twice.s", TWICE.replace("fadd    y, x, x", "fmul    y, x, 4"));
+    folder.write("in.csv", "x\n0.25\n0.75\n");
+    folder
+}
+
+#[test]
+fn folders_and_the_library_are_asked_by_every_command_that_assembles() {
+    let folder = project();
+    let run = |line: &str| folder.line(line).ok();
+    assert!(run("run app/main.s -I lib --inputs in.csv --outputs -").contains("\n0.5,"));
+    assert!(run("asm app/main.s -I lib --listing -").contains("./lib/twice.s:2"));
+    assert!(run("asm app/main.s -I lib --listing -").contains("<math.s>:"));
+    assert!(run("disasm app/main.s -I lib").contains(".loc \"./lib/twice.s\" 2"));
+    for line in ["bound", "analyse"] {
+        assert!(run(&format!("{line} app/main.s -I lib")).contains("period"));
+    }
+    run("rtl -o rtl --machine t1 --program app/main.s -I lib");
+    // The first folder that has the file.
+    assert!(run("run app/main.s -I other -I lib --inputs in.csv --outputs -").contains("\n1.0,"));
+    let track = folder.line("track --program app/main.s -I lib");
+    assert!(track.stderr.contains("port"), "it assembles, and has not the robot's ports: {}", track.stderr);
+    for command in ["asm", "disasm", "run", "debug", "track", "bound", "analyse", "rtl", "cosim"] {
+        let help = run(&format!("{command} --help"));
+        assert!(help.contains("-I, --include <DIR>") && help.contains("-W, --warnings <LEVEL>"), "{command}");
+    }
+}
+
+#[test]
+fn the_debugger_shows_the_text_of_library_and_folder() {
+    let folder = project();
+    let debug = |script: &[u8]| {
+        let done = folder.fed("debug app/main.s -I lib --inputs in.csv --script -", script);
+        assert_eq!(done.status, Some(0), "{}", done.stderr);
+        done.stdout
+    };
+    let text = debug(b"break math.s:5\ncontinue\nlist\n");
+    assert!(text.contains(">    5          fmax    y, x, low"), "{text}");
+    let text = debug(b"break ./lib/twice.s:2\ncontinue\nlist\n");
+    assert!(text.contains(">    2          fadd    y, x, x"), "{text}");
+}
+
+#[test]
+fn what_is_not_found_is_told_what_there_is() {
+    let folder = project();
+    let fails = |line: &str, status: i32| {
+        let done = folder.line(line);
+        assert_eq!((done.status, done.stdout.as_str()), (Some(status), ""), "{}", done.stderr);
+        done.stderr
+    };
+    let text = fails("asm app/main.s -I app --check", 1);
+    assert!(text.contains("`twice.s` cannot be read: there is no such file"), "{text}");
+    assert!(text.contains("nor is it in `./app/`"), "{text}");
+    folder.write("app/typo.s", ".include <maths.s>\n");
+    let text = fails("asm app/typo.s --check", 1);
+    assert!(
+        text.contains("there are <math.s>") && text.contains("did you mean `.include <math.s>`?"),
+        "{text}"
+    );
+    assert!(fails("asm app/main.s -I nowhere", 2).contains("there is no such folder"));
+    assert!(fails("run app/main.s -I in.csv", 2).contains("it is a file, not a folder"));
+}
+
+#[test]
+fn warnings_are_errors_if_asked_for() {
+    let folder = Folder::new();
+    folder.write("a.s", ".input x, n:int\n.output F\n.once\n wait p\n.period\np: fadd F, x, n\n wait p\n");
+    let done = folder.line("asm a.s");
+    assert_eq!(done.status, Some(0));
+    assert!(
+        done.stderr.starts_with("warning[types]: `n` is an integer, and `fadd` reads a float"),
+        "{}",
+        done.stderr
+    );
+    folder.line("asm a.s -W error -W allow=types -o b.takt").ok();
+    std::fs::remove_file(folder.path().join("a.takt")).unwrap();
+    for line in ["asm a.s -W error", "asm a.s -W error=types", "run a.s --periods 1 -W error"] {
+        let done = folder.line(line);
+        assert_eq!((done.status, done.stdout.as_str()), (Some(1), ""), "{line}");
+        assert!(done.stderr.starts_with("error[types]: `n` is an integer"), "{}", done.stderr);
+        assert_eq!(folder.list(), ["a.s", "b.takt"], "{line}: no image of what failed");
+    }
+    let done = folder.line("asm a.s --check --json -W error");
+    assert_eq!(done.status, Some(1));
+    assert!(done.stdout.contains("\"severity\": \"error\"") && done.stderr.is_empty(), "{done:?}");
+    let done = folder.line("asm a.s -W error=type");
+    assert_eq!(done.status, Some(2));
+    assert!(done.stderr.contains("there is no warning `type`; did you mean `types`?"), "{}", done.stderr);
+}

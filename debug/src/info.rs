@@ -1,0 +1,124 @@
+//! `info`: what a name stands for and where its values live, as text.
+
+use crate::session::{Life, Session, Where};
+use std::fmt::Write as _;
+use takt_asm::expr::Value;
+use takt_isa::{Program, Type};
+
+/// Bundles that are listed of those that write or read a register.
+const LISTED: usize = 6;
+
+/// What a name stands for: its registers, the bundles that write and read them, which of them is at hand.
+///
+/// # Errors
+/// If nothing is named so.
+pub(crate) fn info(session: &Session, name: &str) -> Result<String, String> {
+    let live = session.parse(name)?;
+    let program = session.program();
+    let lives = session.lives(&live);
+    let mut text = String::new();
+    if lives.is_empty() {
+        let value = session.evaluate(&live)?;
+        let symbol = program.symbols.iter().find(|symbol| symbol.name == live.text());
+        let _ = match (symbol, value) {
+            (Some(symbol), _) if symbol.space == takt_isa::program::Space::Code => {
+                writeln!(text, "{name} is {}", program.bundle_text(symbol.address))
+            }
+            (Some(symbol), _) => writeln!(text, "{name} is data word {}", symbol.address),
+            (None, Value::Int(value)) => writeln!(text, "{name} is {value}"),
+            (None, Value::Real(value)) => writeln!(text, "{name} is {value:?}"),
+        };
+        return Ok(text);
+    }
+    let width = lives.iter().map(|life| life.label.len()).max().unwrap_or(0);
+    if let [only] = &lives[..] {
+        let place = place(program, only);
+        let _ =
+            writeln!(text, "{name} is {}, {}: {}", kind(program, only.register), place, type_name(only.ty));
+    } else {
+        let at_hand = lives.iter().any(|life| life.at_hand);
+        let at_hand = if at_hand { "; > is at hand" } else { "; none is at hand" };
+        let _ = writeln!(text, "{name} stands for {} registers here and there{at_hand}", lives.len());
+    }
+    for life in &lives {
+        let mark = if life.at_hand { '>' } else { ' ' };
+        let head = format!("{mark} {:<width$}  {:<5}", life.label, place(program, life));
+        let head = if lives.len() == 1 { " ".to_owned() } else { head };
+        let _ = writeln!(text, "{head} {}", lifetime(program, life));
+    }
+    Ok(text)
+}
+
+fn place(program: &Program, life: &Life) -> String {
+    program.machine.register_name(life.register).unwrap_or_default()
+}
+
+fn kind(program: &Program, register: u16) -> &'static str {
+    let among = |ports: &[takt_isa::program::Port]| ports.iter().any(|port| port.register == register);
+    match () {
+        () if among(&program.inputs) => "an input port",
+        () if among(&program.outputs) => "an output port",
+        () => "a register",
+    }
+}
+
+const fn type_name(ty: Type) -> &'static str {
+    match ty {
+        Type::F => "float",
+        Type::I => "int",
+        Type::B => "bits",
+    }
+}
+
+/// Where a value is written and read, each bundle with the line of the operation that does so.
+fn lifetime(program: &Program, life: &Life) -> String {
+    let (mut written, mut read) = (Vec::new(), Vec::new());
+    let (first, last) = life.bundles.unwrap_or((0, program.bundles().saturating_sub(1)));
+    for address in first..=last {
+        let Some(Ok(instructions)) = program.bundle(address) else { continue };
+        let slots = program.machine.slots;
+        for ((instruction, slot), number) in instructions.iter().zip(slots).zip(0..) {
+            let place = || {
+                let line = program.lines.get(address as usize * slots.len() + number).copied().flatten();
+                let line = line.map_or(String::new(), |line| format!(" ({})", program.place_text(line)));
+                format!("bundle {address}{line}")
+            };
+            // Where registers are shared, the bundle of a value's last use may write the next one.
+            let next = life.bundles.is_some() && address == last && address != first;
+            if instruction.writes(slot) == Some(life.register) && !next {
+                written.push(place());
+            }
+            // And that of its first write may read the one before.
+            let before = life.bundles.is_some() && address == first;
+            if instruction.reads().contains(&life.register) && !before {
+                read.push(place());
+            }
+        }
+    }
+    format!("written in {}; read in {}", listed(written), listed(read))
+}
+
+/// Where a breakpoint stops: `bundle 12 (a.s:4)`, or `3 places: …`.
+pub(crate) fn places(program: &Program, at: &Where) -> String {
+    match at {
+        Where::Bundle(address) => program.bundle_text(*address),
+        Where::Line(line, bundles) => {
+            let line = program.place_text(*line);
+            listed(bundles.iter().map(|address| format!("bundle {address} ({line})")).collect())
+        }
+        Where::Cycle(cycle) => format!("cycle {cycle}"),
+        Where::Period(period) => format!("period {period}"),
+    }
+}
+
+/// The first of some places, and how many there are.
+fn listed(mut places: Vec<String>) -> String {
+    places.dedup();
+    let shown = || places.iter().take(LISTED).map(String::as_str).collect::<Vec<_>>().join(", ");
+    match places.len() {
+        0 => "no bundle".to_owned(),
+        1 => shown(),
+        count if count > LISTED => format!("{count} places: {}, …", shown()),
+        count => format!("{count} places: {}", shown()),
+    }
+}

@@ -1,0 +1,161 @@
+//! Latched ports: what the host sets and sees, and when.
+
+mod common;
+
+use common::{latency, program};
+use std::num::NonZeroU64;
+use takt_emu::{Emulator, Number, Stop};
+use takt_isa::{Function, Program, T3};
+
+/// Reads its input early and late and writes both, once before the first period and in each.
+fn early_and_late() -> Program {
+    let program = program(
+        &T3,
+        ".input x i0 int
+         .output early x224 int
+         .output late x225 int
+         mov x224, i0
+         mov x225, i0
+         wait 3
+         period: mov x224, i0
+         nop
+         nop
+         mov x225, i0
+         wait 3",
+    );
+    Program { latched: true, ..program }
+}
+
+fn outputs(emulator: &Emulator) -> [Option<i32>; 2] {
+    ["early", "late"].map(|name| match emulator.output(name) {
+        Ok(Some(Number::Integer(value))) => Some(value),
+        Ok(None) => None,
+        other => panic!("{other:?}"),
+    })
+}
+
+/// With and without blocks.
+fn both(test: impl Fn(&mut Emulator)) {
+    for blocks in [true, false] {
+        let mut emulator = Emulator::new(&early_and_late()).unwrap();
+        emulator.set_blocks(blocks);
+        test(&mut emulator);
+    }
+}
+
+#[test]
+fn inputs_are_taken_at_reset_and_at_the_tick() {
+    both(|emulator| {
+        emulator.set_input("x", 1.into()).unwrap();
+        assert_eq!(outputs(emulator), [None, None]);
+        // What runs once sees what was set before it began, and nothing later.
+        emulator.run_until(1).unwrap();
+        emulator.set_input("x", 2.into()).unwrap();
+        let Stop::Wait { cycle: wait, .. } = emulator.run_to_wait().unwrap() else { panic!() };
+        assert_eq!(outputs(emulator), [Some(1), Some(1)]);
+        // A period has what was set up to its tick, none of what is set within it.
+        let tick = wait + 20;
+        assert!(emulator.tick_at(tick));
+        emulator.run_until(tick).unwrap();
+        emulator.set_input("x", 3.into()).unwrap();
+        emulator.run_until(tick + 1).unwrap();
+        emulator.set_input("x", 4.into()).unwrap();
+        assert_eq!(outputs(emulator), [Some(1), Some(1)]);
+        emulator.run_to_wait().unwrap();
+        assert_eq!(outputs(emulator), [Some(3), Some(3)]);
+        // What is not set anew keeps its value.
+        emulator.run_period(&[]).unwrap();
+        assert_eq!(outputs(emulator), [Some(4), Some(4)]);
+        emulator.run_period(&[]).unwrap();
+        assert_eq!(outputs(emulator), [Some(4), Some(4)]);
+    });
+}
+
+#[test]
+fn outputs_are_published_at_the_wait() {
+    both(|emulator| {
+        emulator.run_period(&[("x", 1.into())]).unwrap();
+        emulator.set_input("x", 2.into()).unwrap();
+        let tick = emulator.now() + 20;
+        emulator.tick_at(tick);
+        // Both registers have been written; the `wait` has not issued.
+        emulator.run_until(tick + 4 + latency(&T3, Function::Alu)).unwrap();
+        assert_eq!(emulator.register(736), Some(2));
+        assert_eq!(outputs(emulator), [Some(1), Some(1)]);
+        let before = emulator.now();
+        emulator.run_to_wait().unwrap();
+        assert_eq!(emulator.now(), before + 1);
+        assert_eq!(outputs(emulator), [Some(2), Some(2)]);
+    });
+}
+
+/// The tick that came too early takes its inputs in the cycle after the `wait` that ends the period before.
+#[test]
+fn a_remembered_tick_takes_inputs_after_the_wait() {
+    both(|emulator| {
+        emulator.run_period(&[("x", 1.into())]).unwrap();
+        let tick = emulator.now() + 20;
+        assert!(emulator.tick_at(tick) && emulator.tick_at(tick + 3));
+        emulator.run_until(tick + 3).unwrap();
+        emulator.set_input("x", 2.into()).unwrap();
+        emulator.run_to_wait().unwrap();
+        assert!(emulator.deadline_missed());
+        assert_eq!(outputs(emulator), [Some(1), Some(1)]);
+        emulator.set_input("x", 3.into()).unwrap();
+        emulator.run_until(emulator.now() + 1).unwrap();
+        emulator.set_input("x", 4.into()).unwrap();
+        emulator.run_to_wait().unwrap();
+        assert_eq!(outputs(emulator), [Some(3), Some(3)]);
+    });
+}
+
+/// A debugger's period that is cut into pieces takes its inputs once.
+#[test]
+fn pieces_of_a_run_make_no_difference() {
+    both(|emulator| {
+        emulator.set_tick_period(NonZeroU64::new(10));
+        let mut whole = emulator.clone();
+        for cycle in 0..200 {
+            let value: i32 = (cycle / 7) as i32;
+            emulator.set_input("x", value.into()).unwrap();
+            whole.set_input("x", value.into()).unwrap();
+            emulator.step_cycle().unwrap();
+            whole.run_until(cycle + 1).unwrap();
+            assert_eq!(outputs(emulator), outputs(&whole), "cycle {cycle}");
+        }
+        assert!(whole.deadline_missed());
+    });
+}
+
+#[test]
+fn reset_gives_the_start_again() {
+    let memory = program(
+        &T3,
+        ".input x i0
+         .output y m224
+         .preset a0 1.5
+         .preset x0 0
+         wait 1
+         ld x1, 0[x0] || fadd a0, a0, i0
+         fmul m224, a0, x1
+         st 0[x0], m224
+         wait 1",
+    );
+    for latched in [false, true] {
+        let program = Program { data: vec![2f32.to_bits()], latched, ..memory.clone() };
+        let mut emulator = Emulator::new(&program).unwrap();
+        let run = |emulator: &mut Emulator| -> Vec<Option<Number>> {
+            let inputs = (0..5).map(|i| i as f32);
+            let period = |x: f32| {
+                emulator.run_period(&[("x", x.into())]).unwrap();
+                emulator.output("y").unwrap()
+            };
+            inputs.map(period).collect()
+        };
+        let first = run(&mut emulator);
+        assert_eq!(first[..2], [Some(Number::Float(3.0)), Some(Number::Float(7.5))]);
+        emulator.reset();
+        assert_eq!(emulator.output("y"), Ok(None));
+        assert_eq!(run(&mut emulator), first);
+    }
+}

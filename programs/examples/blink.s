@@ -1,0 +1,26 @@
+; A lamp that blinks: SECONDS on, SECONDS off. A counter of periods and an output.
+;
+;   takt run programs/examples/blink.s --periods 2000
+
+.schedule on
+
+.const  RATE    = 1000                  ; periods per second
+.const  SECONDS = 0.5
+.const  LAST    = RATE*SECONDS - 1      ; periods of one side, counted from 0
+
+.output lamp:int                        ; 1: on
+.state  count:int                       ; periods since the lamp changed
+
+.once
+        mov     lamp, zero
+        mov     count, zero
+        wait    period
+
+.period
+period:
+.reg    full:int                        ; local names: what a period computes and forgets
+        ieq     full, count, LAST
+        ixor    lamp, lamp, full
+        iadd    count, count, 1
+        sel     count, full, 0, count
+        wait    period

@@ -1,0 +1,140 @@
+//! `programs/examples/`: each on every machine, over its recorded inputs, against the same written independently in binary64; and
+//! what each costs, in `docs/examples.md`.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod listings;
+mod reference;
+
+use reference::Reference;
+use takt_asm::{Assembled, MemoryLoader, Options, Search};
+use takt_emu::Emulator;
+use takt_isa::{MACHINES, Machine, Type};
+use takt_programs::{EXAMPLES, LIBRARY};
+
+/// An example, its reference, and how far the two may be apart.
+struct Case {
+    name: &'static str,
+    reference: fn() -> Box<dyn Reference>,
+    /// Absolute, for each output, in its unit.
+    tolerance: f64,
+    /// Periods to run if it has no inputs.
+    periods: usize,
+}
+
+const fn case(name: &'static str, reference: fn() -> Box<dyn Reference>, tolerance: f64) -> Case {
+    Case { name, reference, tolerance, periods: 0 }
+}
+
+const CASES: &[Case] = &[
+    Case { periods: 2600, ..case("blink", || Box::<reference::Blink>::default(), 0.0) },
+    case("pi", || Box::<reference::Pi>::default(), 1e-5),
+    case("foc", || Box::<reference::Foc>::default(), 2e-6),
+    case("biquads", || Box::<reference::Biquads>::default(), 1e-5),
+    case("kalman", || Box::<reference::Kalman>::default(), 2e-5),
+    case("lu", || Box::<reference::Lu>::default(), 2e-3),
+    case("table", || Box::<reference::Table>::default(), 2e-5),
+];
+
+fn text(name: &str) -> Option<&'static str> {
+    EXAMPLES.iter().find(|(file, _)| *file == name).map(|(_, text)| *text)
+}
+
+/// An example, assembled; a warning is an error.
+fn assemble(machine: &'static Machine, name: &str) -> Assembled {
+    let file = format!("{name}.s");
+    let source = text(&file).unwrap_or_else(|| panic!("there is no {file}"));
+    assemble_text(machine, &file, source)
+}
+
+fn assemble_text(machine: &'static Machine, file: &str, source: &str) -> Assembled {
+    let loader = Search::new(MemoryLoader::of(file, source)).library(LIBRARY);
+    let options = Options { machine, ..Options::default() };
+    let assembled = takt_asm::assemble(file, &loader, &options);
+    let assembled = assembled.unwrap_or_else(|errors| panic!("{}: {}", machine.name, errors.render(false)));
+    assert!(assembled.warnings.list.is_empty(), "{}: {}", machine.name, assembled.warnings.render(false));
+    assembled
+}
+
+/// The rows of an example's inputs, in the order of its ports.
+fn rows(case: &Case, assembled: &Assembled) -> Vec<Vec<f32>> {
+    let Some(csv) = text(&format!("{}.csv", case.name)) else {
+        return vec![Vec::new(); case.periods];
+    };
+    let (head, rows) = csv.split_once('\n').expect("it has rows");
+    let ports: Vec<&str> = assembled.program.inputs.iter().map(|port| port.name.as_str()).collect();
+    assert_eq!(head.split(',').collect::<Vec<_>>(), ports, "{}.csv", case.name);
+    rows.lines().map(|row| row.split(',').map(|value| value.parse().expect("a number")).collect()).collect()
+}
+
+/// Runs an example; the cycles of its periods after the first, which `.once` precedes.
+fn run(case: &Case, machine: &'static Machine, assembled: &Assembled, wrong: &mut Vec<String>) -> u64 {
+    let name = format!("{} on {}", case.name, machine.name);
+    let program = &assembled.program;
+    let mut emulator = Emulator::new(program).expect("it fits");
+    let mut reference = (case.reference)();
+    let mut cycles = Vec::new();
+    let (mut largest, mut worst) = (0.0_f64, String::new());
+    for (period, row) in rows(case, assembled).iter().enumerate() {
+        for (port, value) in program.inputs.iter().zip(row) {
+            emulator.set_input_bits(port.register, value.to_bits()).expect("it is an input");
+        }
+        cycles.push(emulator.run_period(&[]).expect("it cannot fault").cycles);
+        let inputs: Vec<f64> = row.iter().map(|&value| value.into()).collect();
+        let expected = reference.period(&inputs);
+        assert_eq!(expected.len(), program.outputs.len(), "{name}");
+        for (port, exact) in program.outputs.iter().zip(expected) {
+            let bits = emulator.register(port.register).expect("it is written");
+            let got = match port.ty {
+                Type::F => f64::from(f32::from_bits(bits)),
+                _ => f64::from(bits.cast_signed()),
+            };
+            let error = (got - exact).abs();
+            if error > largest {
+                (largest, worst) = (error, format!("period {period}: {} is {got}, not {exact}", port.name));
+            }
+        }
+    }
+    // The tolerance is no looser than it need be.
+    if largest > case.tolerance || largest * 8.0 < case.tolerance {
+        wrong.push(format!("{name}: {largest:e} apart, {:e} allowed; {worst}", case.tolerance));
+    }
+    assert!(cycles[1..].iter().all(|&count| count == cycles[1]), "{name}: {cycles:?}");
+    cycles[1]
+}
+
+#[test]
+fn examples_compute_what_they_ought_to_in_the_documented_time() {
+    let mut table = String::from("| example | operations |");
+    let mut rule = String::from("|---|---|");
+    for machine in MACHINES {
+        table += &format!(" {0}: cycles | bound |", machine.name);
+        rule += "---|---|";
+    }
+    table += &format!("\n{rule}\n");
+    let mut wrong = Vec::new();
+    for case in CASES {
+        let mut row = String::new();
+        let mut operations = 0;
+        for machine in MACHINES {
+            let assembled = assemble(machine, case.name);
+            let cycles = run(case, machine, &assembled, &mut wrong);
+            let block = assembled.blocks.iter().find(|block| block.label.as_deref() == Some("period"));
+            let block = block.expect("it is scheduled");
+            assert_eq!(u64::from(block.cycles), cycles, "{} on {}", case.name, machine.name);
+            operations = operations.max(block.operations);
+            row += &format!(" {cycles} | {} |", block.bound.cycles());
+        }
+        table += &format!("| `{}.s` | {operations} |{row}\n", case.name);
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+    common::check_table("docs/examples.md", "cycles", &table);
+}
+
+#[test]
+fn every_example_is_tried() {
+    for (file, _) in EXAMPLES {
+        let name = file.split('.').next().expect("it has a name");
+        assert!(CASES.iter().any(|case| case.name == name), "{file}");
+    }
+}

@@ -1,0 +1,40 @@
+//! `programs/library/math.s`: what each macro's error is, what it raises, what it costs, on every machine.
+//!
+//! By default over a sample of operands; with `TAKT_FULL=1` over all 2³², then the figures must come out exactly:
+//!
+//! ```text
+//! TAKT_FULL=1 cargo test --profile tests -p takt-programs --test library -- --nocapture
+//! ```
+#![allow(clippy::print_stdout)]
+
+mod batch;
+#[path = "../common/mod.rs"]
+mod common;
+mod cost;
+mod functions;
+mod measure;
+mod pairs;
+
+use takt_asm::{Assembled, MemoryLoader, Options, Search};
+use takt_isa::Machine;
+use takt_programs::LIBRARY;
+
+/// A program that includes the library, assembled. Warnings are errors.
+fn assemble(machine: &'static Machine, text: &str) -> Assembled {
+    let program = MemoryLoader::of("test.s", format!(".include <math.s>\n.schedule on\n{text}"));
+    let loader = Search::new(program).library(LIBRARY);
+    let options = Options { machine, ..Options::default() };
+    let assembled = takt_asm::assemble("test.s", &loader, &options);
+    let assembled = assembled.unwrap_or_else(|errors| panic!("{text}{}", errors.render(false)));
+    assert!(assembled.warnings.list.is_empty(), "{}", assembled.warnings.render(false));
+    assembled
+}
+
+/// A program whose period is one use of a macro.
+fn one_use(machine: &'static Machine, usage: &str, operands: usize, before: &str) -> Assembled {
+    let inputs = ["x", "x, y"][operands - 1];
+    let text = format!(
+        ".input {inputs}\n.output d\n.once\n wait period\n.period\nperiod: {before}\n {usage}\n wait period\n"
+    );
+    assemble(machine, &text)
+}

@@ -1,0 +1,171 @@
+//! The macros of two operands: powers, over random pairs and all pairs of notable operands, and the remainder, which is exact.
+
+use crate::batch::{Batch, LANES};
+use crate::measure::{Measured, Random, check_emulator, full, notable, parallel};
+use crate::one_use;
+use takt_isa::fp::{CANONICAL_NAN, Flags};
+use takt_isa::{MACHINES, T3};
+
+/// The largest error of `pow`, ulp, over [`FULL_PAIRS`] random pairs and those of notable operands.
+pub(crate) const POW_ERROR: f64 = 0.9;
+/// Random pairs with `TAKT_FULL=1`.
+const FULL_PAIRS: u64 = 1_000_000_000;
+/// Random pairs else.
+const PAIRS: u64 = 1_000_000;
+/// Steps of the remainder whose domain is small, and the quotient that they allow, 2^22.
+const STEPS: u32 = 2;
+
+fn is_signaling(x: u32) -> bool {
+    f32::from_bits(x).is_nan() && x & 0x0040_0000 == 0
+}
+
+/// A random pair of one kind or another.
+type Draw = fn(u64, &mut Random) -> [u32; 2];
+
+/// Runs pairs through a program and takes up each result.
+fn measure(
+    program: &takt_isa::Program,
+    count: u64,
+    draw: Draw,
+    take: impl Fn(&mut Measured, [u32; 2], u32, Flags) + Sync,
+) -> Measured {
+    let batch = Batch::new(program);
+    let special: Vec<[u32; 2]> = notable().flat_map(|x| notable().map(move |y| [x, y])).collect();
+    let pieces = parallel(count, |range| {
+        let (mut batch, mut measured) = (batch.clone(), Measured::default());
+        let mut random = Random(range.start + 1);
+        let drawn = range.clone().map(|index| draw(index, &mut random));
+        let mut pairs = special.iter().copied().chain(drawn).peekable();
+        while let Some(&first) = pairs.peek() {
+            let mut columns = [[0; LANES]; 2];
+            for lane in 0..LANES {
+                let pair = pairs.next().unwrap_or(first);
+                (columns[0][lane], columns[1][lane]) = (pair[0], pair[1]);
+            }
+            let results = *batch.run(&columns);
+            for lane in 0..LANES {
+                let pair = [columns[0][lane], columns[1][lane]];
+                take(&mut measured, pair, results[lane], batch.flags[lane]);
+            }
+        }
+        measured
+    });
+    pieces.into_iter().fold(Measured::default(), Measured::join)
+}
+
+/// Random bits; a base of any size and an exponent that leads to a result of any size; a base near 1; integers and halves.
+fn draw_power(index: u64, random: &mut Random) -> [u32; 2] {
+    let bits = random.next();
+    let (x, y) = (bits as u32, (bits >> 32) as u32);
+    let towards = |x: f32| {
+        let exponent = (y % 303_000) as f32 / 1000.0 - 151.0;
+        [x.to_bits(), (exponent / x.log2()).to_bits()]
+    };
+    match index % 4 {
+        0 => [x, y],
+        1 => towards(f32::from_bits(x & 0x7fff_ffff)),
+        2 => towards(f32::from_bits(0x3f80_0000_u32.wrapping_add_signed(x.cast_signed() >> (8 + x % 16)))),
+        _ => {
+            let exponent = y.cast_signed() % 200;
+            [x, (exponent as f32 / 2.0).to_bits()]
+        }
+    }
+}
+
+fn take_power(measured: &mut Measured, [x, y]: [u32; 2], result: u32, flags: Flags) {
+    let (base, exponent, got) = (f32::from_bits(x), f32::from_bits(y), f32::from_bits(result));
+    let nearest = core_math::powf(base, exponent);
+    let finite = base.is_finite() && exponent.is_finite();
+    let expected = if base.is_nan() || exponent.is_nan() {
+        if is_signaling(x) || is_signaling(y) { Flags::INVALID } else { Flags::NONE }
+    } else if nearest.is_nan() {
+        Flags::INVALID
+    } else if nearest.is_infinite() && finite {
+        if base == 0.0 { Flags::DIVIDE_BY_ZERO } else { Flags::OVERFLOW }
+    } else {
+        Flags::NONE
+    };
+    assert_eq!(flags, expected, "flags of pow of {x:08x}, {y:08x}, which gives {result:08x}");
+    measured.operands += 1;
+    // IEEE 754 leaves open what 1 to the power of a signaling NaN is.
+    let one = y << 1 == 0 || base == 1.0;
+    let nearest = if one { 1.0 } else { nearest };
+    if nearest.is_nan() {
+        assert_eq!(result, CANONICAL_NAN, "pow of {x:08x}, {y:08x}");
+    } else if result != nearest.to_bits() {
+        let wrong = !got.is_finite() || got == 0.0 && nearest.to_bits() << 1 != 2;
+        assert!(!wrong, "pow of {x:08x}, {y:08x} gives {result:08x}, not {:08x}", nearest.to_bits());
+        measured.miss([x, y], got, core_math::pow(f64::from(base), f64::from(exponent)));
+    }
+}
+
+#[test]
+fn powers_are_within_the_documented_error() {
+    for machine in MACHINES {
+        let program = one_use(machine, "pow d, x, y", 2, "clrflags").program;
+        check_emulator(&program, 2);
+        if full() && machine.name != MACHINES[0].name {
+            continue;
+        }
+        let count = if full() { FULL_PAIRS } else { PAIRS };
+        let measured = measure(&program, count, draw_power, take_power);
+        assert_eq!(measured.check(&format!("pow on {}", machine.name), POW_ERROR), None);
+    }
+}
+
+/// Random bits; quotients up to 2^24; multiples, and next to them; subnormals.
+fn draw_remainder(index: u64, random: &mut Random) -> [u32; 2] {
+    let bits = random.next();
+    let (x, y) = (bits as u32, (bits >> 32) as u32);
+    match index % 4 {
+        0 => [x, y],
+        1 => {
+            let exponent = ((y >> 23 & 255) + (x >> 23) % 25).min(254);
+            [x & 0x807f_ffff | exponent << 23, y]
+        }
+        2 => {
+            let multiple = f32::from_bits(y) * ((x >> 8) as f32);
+            [multiple.to_bits().wrapping_add_signed((x & 3).cast_signed() - 1), y]
+        }
+        _ => [x, y & 0x80ff_ffff],
+    }
+}
+
+fn take_remainder(measured: &mut Measured, [x, y]: [u32; 2], result: u32, flags: Flags, limit: f64) {
+    let (a, b) = (f32::from_bits(x), f32::from_bits(y));
+    let any_nan = a.is_nan() || b.is_nan();
+    // Both are exact in binary64; their quotient is not, but a power of two separates no two of them.
+    let digits = |v: f64| (v.abs().to_bits() >> 52).cast_signed();
+    let far = a.is_finite() && b.is_finite() && b != 0.0 && a != 0.0 && {
+        digits(f64::from(a)) - digits(f64::from(b)) > limit as i64
+    };
+    let exact = if far { f32::NAN } else { a % b };
+    measured.operands += 1;
+    let expected = if exact.is_nan() { CANONICAL_NAN } else { exact.to_bits() };
+    assert_eq!(result, expected, "the remainder of {x:08x} and {y:08x}");
+    let invalid = exact.is_nan() && (!any_nan || is_signaling(x) || is_signaling(y));
+    let raised = if invalid { Flags::INVALID } else { Flags::NONE };
+    assert_eq!(flags, raised, "flags of the remainder of {x:08x} and {y:08x}");
+}
+
+#[test]
+fn remainders_are_exact() {
+    let count = if full() { FULL_PAIRS / 10 } else { PAIRS / 4 };
+    for machine in MACHINES {
+        let program = one_use(machine, "fmod d, x, y", 2, "clrflags").program;
+        check_emulator(&program, 2);
+        if full() && machine.name != T3.name {
+            continue;
+        }
+        let measured = measure(&program, count, draw_remainder, |measured, pair, result, flags| {
+            take_remainder(measured, pair, result, flags, f64::INFINITY);
+        });
+        assert_eq!(measured.check(&format!("fmod on {}", machine.name), 0.0), None);
+        let program = one_use(machine, &format!("fmod_in d, x, y, {STEPS}"), 2, "clrflags").program;
+        check_emulator(&program, 2);
+        let measured = measure(&program, count, draw_remainder, |measured, pair, result, flags| {
+            take_remainder(measured, pair, result, flags, f64::from(11 * STEPS));
+        });
+        assert_eq!(measured.check(&format!("fmod_in on {}", machine.name), 0.0), None);
+    }
+}

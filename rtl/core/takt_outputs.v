@@ -1,0 +1,75 @@
+// takt_outputs: the output ports as the outside sees them: one set, whichever slots write them.
+//
+// Contract
+//   write, index, value: what goes to the ports of each bank, in the cycle of its writeback. Of two values for one port the later
+//   one stands; of the same cycle, that of the bank named last.
+//   shown: the value of the port `number`, in the same cycle: what was written to it before. If LATCHED, what was written to it
+//   before the last publish, from that cycle on.
+//   rst: what the loader writes is shown at once; what was written and not yet published is forgotten.
+//   Left open, it costs nothing.
+
+module takt_outputs #(
+    parameter LATCHED = 0,
+    parameter BANKS   = 3,
+    parameter INDEX   = 5   // bits of a port's number
+) (
+    input  wire                   clk,
+    input  wire                   rst,
+    input  wire                   publish,
+    input  wire [BANKS-1:0]       write,
+    input  wire [BANKS*INDEX-1:0] index,
+    input  wire [BANKS*32-1:0]    value,
+    input  wire [INDEX-1:0]       number,
+    output reg  [31:0]            shown
+);
+
+    localparam PLACES = LATCHED == 0 ? 1 : 2;
+    localparam DEPTH  = PLACES << INDEX;
+
+    wire [BANKS-1:0] place;
+    wire             number_place;
+    takt_places #(.PORTS(LATCHED == 0 ? 0 : 1 << INDEX), .INDEX(INDEX), .WRITES(BANKS), .READS(1)) places (
+        .clk(clk), .flip(publish), .open(rst), .drop(rst),
+        .write(write), .write_index(index), .write_place(place), .read_index(number), .read_place(number_place)
+    );
+
+    // The place is 0 where there is only one.
+    localparam ADDRESS = $clog2(DEPTH);
+    wire [INDEX:0]           read_at = {number_place, number};
+    wire [BANKS*ADDRESS-1:0] write_at;
+    wire [BANKS*32-1:0]      held;
+    genvar b;
+    generate
+        for (b = 0; b < BANKS; b = b + 1) begin : g_bank
+            wire [INDEX:0] at = {place[b], index[b*INDEX +: INDEX]};
+            assign write_at[b*ADDRESS +: ADDRESS] = at[ADDRESS-1:0];
+            reg  [31:0] words [0:DEPTH-1];
+            always @(posedge clk) if (write[b]) words[at[ADDRESS-1:0]] <= value[32*b +: 32];
+            assign held[32*b +: 32] = words[read_at[ADDRESS-1:0]];
+            wire unused = &{1'b0, at[INDEX]};
+        end
+    endgenerate
+    wire unused = &{1'b0, read_at[INDEX]};
+
+    generate
+        if (BANKS == 1) begin : g_one
+            always @* shown = held;
+            wire unused_one = &{1'b0, write_at};
+        end else begin : g_several
+            // Which bank has what was written last.
+            localparam OWNER = $clog2(BANKS);
+            reg  [OWNER-1:0] owner [0:DEPTH-1];
+            wire [OWNER-1:0] of_number = owner[read_at[ADDRESS-1:0]];
+            integer k;
+            always @(posedge clk) begin
+                for (k = 0; k < BANKS; k = k + 1) if (write[k]) owner[write_at[k*ADDRESS +: ADDRESS]] <= k[OWNER-1:0];
+            end
+            integer j;
+            always @* begin
+                shown = held[31:0];
+                for (j = 1; j < BANKS; j = j + 1) if (of_number == j[OWNER-1:0]) shown = held[32*j +: 32];
+            end
+        end
+    endgenerate
+
+endmodule

@@ -1,0 +1,253 @@
+//! What a host must know of a program, as a header in the host's language: ports and their addresses on the bus, what the
+//! loader writes, cycles.
+//!
+//! Addresses are those of [`wishbone`], which count words of 32 bits. The same [`Header`] is written in every
+//! [`Language`]; as JSON, it is itself what is written.
+
+mod c;
+mod names;
+mod rust;
+mod svd;
+
+use crate::bench::{LoadRecord, Space, load_records};
+use crate::wishbone::{self, REGISTERS};
+use serde::Serialize;
+use takt_isa::program::Port;
+use takt_isa::{Program, Type};
+
+/// The version of [`Header`]'s JSON.
+pub const SCHEMA: u32 = 1;
+
+/// A language that a header can be written in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Language {
+    /// C99.
+    C,
+    /// Rust, without the standard library.
+    Rust,
+    /// JSON: `docs/headers.md`.
+    Json,
+    /// CMSIS-SVD: the bus slave as a peripheral.
+    Svd,
+}
+
+/// What a host must know of a program.
+#[derive(Clone, Debug, Serialize)]
+pub struct Header {
+    /// [`SCHEMA`].
+    pub schema: u32,
+    /// The program's name.
+    pub name: String,
+    /// The machine's name.
+    pub machine: &'static str,
+    /// Whether the ports are latched.
+    pub latched: bool,
+    /// The circuit's parameter of that name: how many input ports are.
+    pub latched_inputs: u16,
+    /// The bus slave's own registers.
+    pub registers: Vec<BusRegister>,
+    /// Input ports, in the order of their declaration.
+    pub inputs: Vec<BusPort>,
+    /// Output ports, in the order of their declaration.
+    pub outputs: Vec<BusPort>,
+    /// What the loader writes, apart from zeros.
+    pub load: Load,
+    /// What each section can take; `None` where that cannot be bounded.
+    pub cycles: Option<Vec<Cycles>>,
+    /// Why it cannot.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub no_bound: Option<String>,
+}
+
+/// A register of the bus slave.
+#[derive(Clone, Debug, Serialize)]
+pub struct BusRegister {
+    /// Its name.
+    pub name: &'static str,
+    /// Its address, in words.
+    pub address: u16,
+    /// `r`, `w` or `rw`.
+    pub access: &'static str,
+    /// What it is for.
+    pub text: &'static str,
+    /// Its parts.
+    pub fields: Vec<BusField>,
+}
+
+/// A part of a register.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct BusField {
+    /// Its name.
+    pub name: &'static str,
+    /// Its lowest bit.
+    pub low: u32,
+    /// Its bits.
+    pub width: u32,
+    /// What it says.
+    pub text: &'static str,
+}
+
+/// A port.
+#[derive(Clone, Debug, Serialize)]
+pub struct BusPort {
+    /// Its name in the source.
+    pub name: String,
+    /// Its number.
+    pub number: u16,
+    /// Its address on the bus, in words.
+    pub address: u16,
+    /// What it carries: `float` (binary32), `int` or `bits`.
+    #[serde(rename = "type")]
+    pub ty: &'static str,
+}
+
+/// What the loader writes. All else in program and data memory is zero, and is written too.
+#[derive(Clone, Debug, Serialize)]
+pub struct Load {
+    /// Bundles of the program memory.
+    pub bundles: u32,
+    /// Words of a bundle.
+    pub slots: u32,
+    /// Words of the data memory.
+    pub data_words: u32,
+    /// Words that are not zero.
+    pub records: Vec<Record>,
+}
+
+/// A word that the loader writes.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Record {
+    /// 0 program memory, 1 data memory, 2 registers, 3 input ports.
+    pub space: u8,
+    /// In program memory, the word of the bundle.
+    pub slot: u8,
+    /// Bundle, data word, register, or number of the input port.
+    pub address: u16,
+    /// The word.
+    pub value: u64,
+}
+
+/// The fewest and the most cycles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Span {
+    /// No run takes fewer.
+    pub best: u64,
+    /// No run takes more.
+    pub worst: u64,
+}
+
+/// What a section can take.
+#[derive(Clone, Debug, Serialize)]
+pub struct Cycles {
+    /// Its name: its label, or `once`.
+    pub name: String,
+    /// Its first bundle.
+    pub address: u32,
+    /// Whether it runs once, from reset to its `wait`; else from each tick.
+    pub once: bool,
+    /// Cycles to the issue of its `wait`; of a period, with its tick in time.
+    pub cycles: Span,
+    /// Of a period whose tick came before the `wait` of the one before.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub missed: Option<Span>,
+}
+
+impl Header {
+    /// What a host must know of a program; its cycles as far as the caller has bounds for them, else why there are none.
+    pub fn new(program: &Program, name: &str, cycles: Result<Vec<Cycles>, String>) -> Header {
+        let machine = program.machine;
+        let port = |port: &Port, number: Option<u16>, base: u16| {
+            let number = number.unwrap_or_default();
+            let ty = match port.ty {
+                Type::F => "float",
+                Type::I => "int",
+                Type::B => "bits",
+            };
+            BusPort { name: port.name.clone(), number, address: base + number, ty }
+        };
+        let input = |of: &Port| port(of, machine.input_number(of.register), wishbone::INPUTS);
+        let output = |of: &Port| port(of, machine.output_number(of.register), wishbone::OUTPUTS);
+        let records = load_records(program).into_iter();
+        let records = records.filter(|record| {
+            // A register that the loader sets to zero must be written: only the memories are cleared.
+            record.value != 0 || matches!(record.space, Space::Register | Space::Input)
+        });
+        let record =
+            |LoadRecord { space, slot, address, value }| Record { space: space as u8, slot, address, value };
+        let (cycles, no_bound) = match cycles {
+            Ok(cycles) => (Some(cycles), None),
+            Err(reason) => (None, Some(reason)),
+        };
+        let field =
+            |of: &wishbone::Field| BusField { name: of.name, low: of.low, width: of.width, text: of.text };
+        let register = |of: &wishbone::Register| BusRegister {
+            name: of.name,
+            address: of.address,
+            access: of.access,
+            text: of.text,
+            fields: of.fields.iter().map(field).collect(),
+        };
+        Header {
+            schema: SCHEMA,
+            name: name.to_owned(),
+            machine: machine.name,
+            latched: program.latched,
+            latched_inputs: program.latched_inputs(),
+            registers: REGISTERS.iter().map(register).collect(),
+            inputs: program.inputs.iter().map(input).collect(),
+            outputs: program.outputs.iter().map(output).collect(),
+            load: Load {
+                bundles: machine.code_depth,
+                slots: machine.slots.len() as u32,
+                data_words: machine.data_depth,
+                records: records.map(record).collect(),
+            },
+            cycles,
+            no_bound,
+        }
+    }
+
+    /// The header's text.
+    pub fn text(&self, language: Language) -> String {
+        match language {
+            Language::C => c::write(self),
+            Language::Rust => rust::write(self),
+            // Strings and numbers only: nothing that JSON cannot hold.
+            Language::Json => serde_json::to_string_pretty(self).unwrap_or_default() + "\n",
+            Language::Svd => svd::write(self),
+        }
+    }
+
+    /// In a line, what it is of.
+    fn title(&self) -> String {
+        let ports = if self.latched { ", ports latched" } else { "" };
+        format!("{}: the program on {}, as its host sees it on the bus{ports}.", self.name, self.machine)
+    }
+
+    /// Each figure of the program's cycles with a name, and what it is.
+    fn figures(&self) -> Vec<(String, u64, String)> {
+        let mut figures = Vec::new();
+        for Cycles { name, once, cycles, missed, .. } in self.cycles.iter().flatten() {
+            let what = if *once { "from reset to its `wait`" } else { "from the tick to its `wait`" };
+            figures.push((
+                format!("{name}_best"),
+                cycles.best,
+                format!("Cycles of {name} at least, {what}."),
+            ));
+            figures.push((
+                format!("{name}_worst"),
+                cycles.worst,
+                format!("Cycles of {name} at most, {what}."),
+            ));
+            if let Some(missed) = missed {
+                let what = "after a tick that came too early";
+                figures.push((
+                    format!("{name}_worst_missed"),
+                    missed.worst,
+                    format!("Cycles of {name} at most, {what}."),
+                ));
+            }
+        }
+        figures
+    }
+}

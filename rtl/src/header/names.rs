@@ -1,0 +1,45 @@
+//! Names of the source as identifiers of other languages.
+
+use std::collections::HashSet;
+
+/// Gives out identifiers, no two the same.
+pub(super) struct Names {
+    taken: HashSet<String>,
+    /// Whether identifiers that differ in case alone are the same.
+    fold: bool,
+}
+
+impl Names {
+    pub(super) fn new(reserved: &[&str]) -> Names {
+        Names { taken: reserved.iter().map(|&name| name.to_owned()).collect(), fold: false }
+    }
+
+    /// For a language that knows no case.
+    pub(super) fn without_case() -> Names {
+        Names { taken: HashSet::new(), fold: true }
+    }
+
+    /// An identifier for a name: letters, digits and `_`, a number behind it where it would be another's.
+    pub(super) fn give(&mut self, name: &str) -> String {
+        let plain = identifier(name);
+        let key = |name: &str| if self.fold { name.to_lowercase() } else { name.to_owned() };
+        let mut given = plain.clone();
+        let mut number = 2;
+        while self.taken.contains(&key(&given)) {
+            given = format!("{plain}_{number}");
+            number += 1;
+        }
+        self.taken.insert(key(&given));
+        given
+    }
+}
+
+/// Letters, digits and `_`, not beginning with a digit.
+pub(super) fn identifier(name: &str) -> String {
+    let letter = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
+    let mut text: String = name.chars().map(letter).collect();
+    if !text.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') {
+        text.insert(0, '_');
+    }
+    text
+}

@@ -1,0 +1,126 @@
+//! Rows that are machines and have no circuit: every reason, by the message that names machine, slot, unit and value; and every
+//! machine of the table has one.
+
+use takt_isa::spec::units::*;
+use takt_isa::{Bank, MACHINES, Machine, Slot, T1, T3};
+use takt_rtl::verilog::ModuleError;
+use takt_rtl::{ExportError, Library, Plan, export};
+
+fn leak<T>(value: impl Into<Box<[T]>>) -> &'static [T] {
+    Box::leak(value.into())
+}
+
+fn refused(machine: Machine) -> String {
+    assert_eq!(machine.error(), None, "it is no machine at all");
+    let machine: &'static Machine = Box::leak(Box::new(machine));
+    Plan::new(machine, &Library::builtin()).map(|_| ()).expect_err("no circuit").to_string()
+}
+
+/// t3 with a slot changed.
+fn slot(number: usize, change: impl FnOnce(&mut Slot)) -> Machine {
+    let mut slots = T3.slots.to_vec();
+    change(&mut slots[number]);
+    Machine { slots: leak(slots), ..T3 }
+}
+
+fn units(number: usize, units: &[Unit]) -> Machine {
+    slot(number, |slot| slot.units = leak(units))
+}
+
+#[test]
+fn machines_of_the_table_have_circuits() {
+    for machine in MACHINES {
+        export(machine, &Library::builtin()).unwrap_or_else(|error| panic!("{error}"));
+    }
+}
+
+#[test]
+fn every_reason() {
+    let cases: [(Machine, &str); 17] = [
+        (units(2, &[ALU, SEQUENCER]), "no slot hosts the data memory (function Memory), which the core has"),
+        (
+            slot(1, |slot| slot.bank.depth = 192),
+            "the depth of bank `a` is 192; the circuit wants a power of two from 2 to 512",
+        ),
+        (
+            slot(1, |slot| slot.bank = Bank { base: 384, depth: 128, ..slot.bank }),
+            "bank `a` begins at 384; the circuit wants a multiple of 256, the depth of the deepest bank",
+        ),
+        (
+            Machine { outputs_per_bank: 12, ..T3 },
+            "outputs_per_bank is 12; the circuit wants a power of two from 2 to 128",
+        ),
+        (
+            Machine { outputs_per_bank: 256, ..T3 },
+            "outputs_per_bank is 256; the circuit wants a power of two from 2 to 128",
+        ),
+        (
+            Machine { outputs_per_bank: 1, ..T3 },
+            "outputs_per_bank is 1; the circuit wants a power of two from 2 to 128",
+        ),
+        (
+            Machine { code_depth: 1 << 16, ..T3 },
+            "code_depth is 65536; the circuit wants a power of two from 2 to 32768",
+        ),
+        (
+            Machine { data_depth: 1000, ..T3 },
+            "data_depth is 1000; the circuit wants a power of two from 2 to 4096",
+        ),
+        (Machine { refill: 5, ..T3 }, "refill is 5; rtl/core/takt_sequencer.v wants refill 6"),
+        (Machine { resolve: 1, ..T1 }, "resolve is 1; rtl/core/takt_sequencer.v wants resolve 2"),
+        (Machine { stack_depth: 32, ..T3 }, "stack_depth is 32; rtl/core/takt_sequencer.v wants stack 16"),
+        (
+            units(2, &[ALU, Unit { latency: 3, ..MEMORY }, SEQUENCER]),
+            "slot `aux`: the latency of unit `memory` is 3; rtl/core/takt_memory.v wants latency 4",
+        ),
+        (
+            units(1, &[Unit { latency: 4, ..ADD }, CONVERT]),
+            "slot `add`: unit `add` has latency 4; rtl/units/add.v wants latency 5",
+        ),
+        (
+            units(0, &[MULTIPLY, Unit { interval: 13, ..DIVIDE }]),
+            "slot `mul`: unit `divide` has interval 13; rtl/units/divide.v wants interval 14 at least",
+        ),
+        (
+            units(0, &[Unit { name: "fused", ..MULTIPLY }]),
+            "slot `mul`: unit `fused`: there is no circuit rtl/units/fused.v: write it and list it in rtl/src/files.rs",
+        ),
+        // A sine every other cycle, beside an adder.
+        (
+            units(1, &[ADD, CONVERT, Unit { interval: 2, ..SINE }]),
+            "slot `add`: unit `sine` has latency 14 and interval 2; beside results that are in flight for 12 cycles, a unit of \
+             interval above 1 wants a latency of 14 and an interval of 3 at least",
+        ),
+        // An adder every third cycle beside a pipelined divider.
+        (
+            units(1, &[Unit { interval: 3, ..ADD }, DIVROOT]),
+            "slot `add`: unit `add` has latency 5 and interval 3; beside results that are in flight for 10 cycles, a unit of \
+             interval above 1 wants a latency of 12 and an interval of 3 at least",
+        ),
+    ];
+    for (machine, message) in cases {
+        let name = machine.name;
+        assert_eq!(refused(machine), format!("machine `{name}`: {message}"));
+    }
+}
+
+/// A row that is no machine has no circuit either.
+#[test]
+fn no_machine() {
+    let machine = Box::leak(Box::new(Machine { slots: &[], ..T3 }));
+    let error = export(machine, &Library::builtin()).expect_err("no machine");
+    assert_eq!(error.to_string(), "machine `t3`: 0 slots; a machine has 1 to 8");
+}
+
+/// The name of a slot or bank that makes another name of the core.
+#[test]
+fn names_that_clash() {
+    for name in ["m_mul", "r"] {
+        let clash = slot(1, |slot| slot.name = name);
+        let machine: &'static Machine = Box::leak(Box::new(clash));
+        match export(machine, &Library::builtin()) {
+            Err(ExportError::Module(ModuleError::Twice { module, .. })) => assert_eq!(module, "takt_t3"),
+            other => panic!("{name}: {:?}", other.map(|design| design.top)),
+        }
+    }
+}
