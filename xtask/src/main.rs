@@ -4,6 +4,7 @@
 mod docs;
 mod formal;
 mod reach;
+mod share;
 mod synth;
 mod venv;
 
@@ -151,6 +152,7 @@ fn lint() -> Result<()> {
         "-p",
         "takt-emu",
     ]))?;
+    share::check()?;
     docs::run(&root(), true)
 }
 
