@@ -96,9 +96,12 @@ impl Given {
     }
 }
 
+/// An operation: the tree that it is written in, its number there, and the expansion.
+type Place = (u32, u32, u32);
+
 /// What the source says of the parts of operations: by tree, operation of the tree, and expansion.
 #[derive(Default)]
-pub(crate) struct GivenTypes(HashMap<(u32, u32, u32), SmallVec<[(Part, Given); 1]>>);
+pub(crate) struct GivenTypes(HashMap<Place, SmallVec<[(Part, Given); 1]>>);
 
 impl GivenTypes {
     pub(crate) fn insert(&mut self, operation: &Operation, part: Part, given: Given) {

@@ -276,17 +276,18 @@ fn bounds_of_loops() {
 fn ports_in_images() {
     let text = ".ports latched\n.input x\n.output F, G\n.period\n fmul F, x, x\n fadd G, x, x\n";
     let mut program = common::good(text).program;
-    let bytes = image::write(&program);
+    let bytes = image::write(&program).expect("an image holds it");
     assert_eq!(image::read(&bytes).as_ref(), Ok(&program));
     assert!(bytes.windows(14).any(|window| window == b"\"latched\":true"));
     // Images of programs without latched ports are as they were before there were such.
     program.latched = false;
-    let bytes = image::write(&program);
+    let bytes = image::write(&program).expect("an image holds it");
     assert_eq!(image::read(&bytes).as_ref(), Ok(&program));
     assert!(!bytes.windows(7).any(|window| window == b"latched"));
     // Two outputs of one number, in two banks.
     program.outputs[1].register = program.machine.output_register(1, 0);
-    let error = image::read(&image::write(&program)).expect_err("one number twice");
+    let error =
+        image::read(&image::write(&program).expect("an image holds it")).expect_err("one number twice");
     assert!(error.to_string().contains("output `G`") && error.to_string().contains("same number"), "{error}");
 }
 

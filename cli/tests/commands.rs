@@ -594,7 +594,7 @@ fn explained(help: &str) -> BTreeMap<String, bool> {
 /// Options a text names, without what follows them: `--gcode`, `-m`.
 fn options(text: &str) -> Vec<&str> {
     let words = text.split(|c: char| !(c.is_ascii_alphanumeric() || c == '-'));
-    words.filter(|word| word.starts_with('-') && word.trim_start_matches('-') != "").collect()
+    words.filter(|word| word.starts_with('-') && !word.trim_start_matches('-').is_empty()).collect()
 }
 
 /// The commands that the help lists.
