@@ -12,7 +12,7 @@ use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_isa::MACHINES;
-use takt_rtl::{Design, Library, bench, export};
+use takt_rtl::{Library, bench, export};
 
 /// Write the circuit of a machine: a complete Verilog design, with a test bench.
 ///
@@ -76,7 +76,7 @@ pub(crate) fn run(arguments: &Rtl, color: bool, out: &mut Out) -> Result<()> {
         );
     }
     let latched = program.as_ref().map_or(0, takt_isa::Program::latched_inputs);
-    let design = Design { latched, ..export(machine, &Library::builtin())? };
+    let design = export(machine, &Library::builtin())?.latching(latched)?;
     let mut written = Vec::new();
     for file in bench::folder(&design, program.as_ref(), &periods) {
         write(&arguments.output, &file.name, &file.text)?;

@@ -91,10 +91,11 @@ fn latched_ports_come_from_the_program() {
     folder.line("rtl -o out --machine t1 --program p.s --inputs in.csv").ok();
     for file in ["takt_t1.v", "takt_t1_wishbone.v"] {
         let text = folder.read_text(&format!("out/{file}"));
-        assert!(text.contains("parameter LATCHED = 2 ") || text.contains("parameter LATCHED = 2,"), "{file}");
+        let parameter = |line: &str| line.trim().trim_end_matches(',') == "parameter LATCHED = 2";
+        assert!(text.lines().any(parameter), "{file}");
     }
     folder.line("rtl -o out --machine t1").ok();
-    assert!(folder.read_text("out/takt_t1.v").contains("parameter LATCHED = 0 "));
+    assert!(folder.read_text("out/takt_t1.v").contains("parameter LATCHED = 0\n"));
     let text = cosim(&folder, "cosim p.s --machine t1 --inputs in.csv").ok();
     assert!(text.contains("3 periods on t1") && text.contains("no difference"), "{text}");
 }

@@ -73,11 +73,6 @@ pub fn folder(design: &Design, program: Option<&Program>, periods: &[Vec<(u16, u
     let latched = design.latched;
     let put = |name: String, text: String| DesignFile { name, text };
     let mut files = design.files.clone();
-    // The core of a program whose ports are latched is for it, unless its parameter says otherwise.
-    for file in files.iter_mut().filter(|file| file.name == format!("{top}.v")) {
-        file.text =
-            file.text.replacen("parameter LATCHED = 0 ", &format!("parameter LATCHED = {latched} "), 1);
-    }
     files.extend(design.ecp5.clone());
     let list = |own: &[String], ecp5: bool| {
         let base = |name: &str| name.rsplit('/').next().map(str::to_owned);

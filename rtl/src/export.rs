@@ -49,7 +49,7 @@ pub struct Design {
     /// Modules that take the place of those of the same name on Lattice ECP5.
     pub ecp5: Vec<DesignFile>,
     /// The core's parameter of that name: 0, or, for a program whose ports are latched, its
-    /// [`latched_inputs`](takt_isa::Program::latched_inputs). The files have 0 for their default.
+    /// [`latched_inputs`](takt_isa::Program::latched_inputs). The core's own default is 0 unless [`Design::latching`] changes it.
     pub latched: u16,
 }
 
@@ -61,6 +61,19 @@ pub const LATCHED_INPUT_DELAY: u64 = 2;
 pub const TICK_DELAY: u64 = 1;
 /// Cycles for which reset must be held, so that nothing is left of what was before.
 pub const RESET_CYCLES: u64 = takt_isa::spec::units::MAX_LATENCY as u64;
+
+impl Design {
+    /// The design for programs with so many latched inputs, which is then the default of the core's parameter.
+    ///
+    /// # Errors
+    /// As [`export`].
+    pub fn latching(mut self, latched: u16) -> Result<Design, ExportError> {
+        let name = format!("{}.v", self.top);
+        let text = parts::core(&self.plan, latched)?;
+        self.files.iter_mut().filter(|file| file.name == name).for_each(|file| file.text.clone_from(&text));
+        Ok(Design { latched, ..self })
+    }
+}
 
 /// The circuit of a machine.
 ///
@@ -74,7 +87,7 @@ pub fn export(machine: &'static Machine, library: &Library) -> Result<Design, Ex
             files.push(DesignFile { name, text });
         }
     };
-    put(format!("{}.v", plan.top()), parts::core(&plan)?);
+    put(format!("{}.v", plan.top()), parts::core(&plan, 0)?);
     for slot in &plan.slots {
         put(format!("{}.v", plan.decoder(slot)), parts::decoder(&plan, slot)?);
     }

@@ -24,13 +24,13 @@ impl Plan {
     }
 }
 
-/// The core.
-pub(crate) fn core(plan: &Plan) -> Result<String, ModuleError> {
+/// The core, with a default for its parameter `LATCHED`.
+pub(crate) fn core(plan: &Plan, latched: u16) -> Result<String, ModuleError> {
     let ports = ports::ports(plan).into_iter().map(|(port, _)| port).collect();
     let mut m = Module::new(&plan.top(), heading(plan), ports);
     m.takes(Parameter {
         net: net::LATCHED.clone(),
-        value: 0,
+        value: u32::from(latched),
         heading:
             "0, or how many input ports are latched, from port 0 on: a power of two; then outputs are, too"
                 .to_owned(),
