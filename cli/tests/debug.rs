@@ -42,7 +42,7 @@ fn the_source_of_an_image() {
     assert_eq!(bare.stderr, message);
     assert!(bare.stdout.contains("sum = 0.0 "), "the rest is there: {}", bare.stdout);
 
-    folder.write("sum.s", &SUM.replace("table[i]", "table[0]"));
+    folder.write("sum.s", SUM.replace("table[i]", "table[0]"));
     let stale = listed("sum.takt");
     assert_eq!((stale.status, &stale.stdout), (Some(0), &fresh.stdout));
     assert_eq!(
