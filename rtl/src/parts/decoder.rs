@@ -14,12 +14,12 @@ use takt_isa::{Effect, Row};
 pub(super) fn module(plan: &Plan, slot: &SlotPlan) -> Result<String, ModuleError> {
     let name = plan.decoder(slot);
     let mut m = Module::new(&name, heading(slot, &name), ports(plan, slot));
-    let shapes = stray(slot, &mut m);
+    stray(slot, &mut m);
     m.blank();
     m.regs([decode::BAD]);
     m.regs([decode::WRITES]);
     m.regs([decode::READS]);
-    rows(slot, &shapes, &mut m);
+    rows(slot, &mut m);
     m.blank();
 
     let mut illegal = vec![Expr::from(decode::BAD)];
@@ -88,8 +88,8 @@ fn ports(plan: &Plan, slot: &SlotPlan) -> Vec<Port> {
     ports
 }
 
-/// What a shape leaves unused must be 0. The shapes of the slot's instructions.
-fn stray(slot: &SlotPlan, m: &mut Module) -> Vec<Shape> {
+/// What the shapes of the slot's instructions leave unused must be 0.
+fn stray(slot: &SlotPlan, m: &mut Module) {
     let mut shapes: Vec<Shape> = Vec::new();
     for row in &slot.rows {
         if !shapes.contains(&row.shape) {
@@ -97,14 +97,13 @@ fn stray(slot: &SlotPlan, m: &mut Module) -> Vec<Shape> {
         }
     }
     m.comment("A bit is set that the shape does not use.");
-    for &shape in &shapes {
+    for shape in shapes {
         m.define(decode::stray(shape), decode::is_stray(shape));
     }
-    shapes
 }
 
 /// What the table says of each opcode.
-fn rows(slot: &SlotPlan, shapes: &[Shape], m: &mut Module) {
+fn rows(slot: &SlotPlan, m: &mut Module) {
     let width = slot.width();
     let control = || decode::control(slot);
     let marks = || concat([Expr::from(decode::READS), decode::WRITES.into()]);
@@ -120,7 +119,6 @@ fn rows(slot: &SlotPlan, shapes: &[Shape], m: &mut Module) {
         }
         Arm { value: hexadecimal(OPCODE.width, row.opcode.into()), body, remark: row.mnemonic }
     };
-    debug_assert!(slot.rows.iter().all(|row| shapes.contains(&row.shape)));
     let mut body = vec![set(control(), decimal(width, 0_u32))];
     if slot.has_effect(Effect::Immediate) {
         body.push(set(decode::IMMEDIATE, no()));
