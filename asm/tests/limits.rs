@@ -24,8 +24,14 @@ fn error(text: &str, code: &str) -> Diagnostics {
     report
 }
 
+/// On the smallest stack that a system gives a program's first thread: Windows' 1 MiB.
 #[test]
 fn deep_expressions() {
+    let thread = std::thread::Builder::new().stack_size(1 << 20).spawn(deep).unwrap();
+    thread.join().unwrap();
+}
+
+fn deep() {
     for text in ["(", "-", "~", "2^", "sqrt(", "x{", "(-"] {
         error(&format!(".const X = {}", text.repeat(200_000)), "limit");
         error(&format!(".period\n mov a, {}1", text.repeat(200_000)), "limit");
