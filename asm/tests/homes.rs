@@ -9,6 +9,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use takt_asm::{Assembled, Made, MemoryLoader, Options, Schedule, listing};
 use takt_emu::{Emulator, Event};
+use takt_isa::spec::units::MAX_LATENCY;
+use takt_isa::timing::Cycle;
 use takt_isa::{MACHINES, Machine, Program, ROWS, T1, T3};
 
 /// Instructions of each slot of t3, with two sources.
@@ -130,6 +132,9 @@ fn run(program: &Program, seed: u64) -> Seen {
         };
         emulator.observed(&mut sink).run_period(&[]).unwrap_or_else(|error| panic!("{error}"));
     }
+    // What shares a bundle with the last `wait` is in flight when that issues: its flags are still to come.
+    let landed = emulator.now() + Cycle::from(MAX_LATENCY);
+    emulator.run_until(landed).unwrap_or_else(|error| panic!("{error}"));
     (writes, emulator.memory().to_vec(), emulator.flags().bits())
 }
 
