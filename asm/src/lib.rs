@@ -150,7 +150,7 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
     let mut context = context::Context::new(options.machine);
     context.sink.levels = options.levels;
     let (mut context, flat) = expand::Expander::new(context, loader).expand(path);
-    let mut ir = resolve::resolve(&mut context, flat);
+    let mut ir = resolve::resolve(&mut context, loader, flat);
     let packs = |scheduled| match options.schedule {
         Schedule::AsWritten => scheduled,
         Schedule::All => true,

@@ -7,6 +7,7 @@ use crate::diag::{Diagnostic, nearest};
 use crate::expr::{EvalError, Value};
 use crate::intern::NameId;
 use crate::ir::{Constant, Label, LabelId, Operation, Register, RegisterId, RegisterKind};
+use crate::load::Loader;
 use crate::resolve::Resolver;
 use crate::source::Span;
 use crate::types::{Given, Kind, Part, What};
@@ -504,6 +505,8 @@ impl Resolver<'_> {
         );
         let error = if Directive::ALL.iter().any(|known| known.name() == directive) {
             error.did_you_mean(Some(directive))
+        } else if let Some(file) = self.library_with(&text) {
+            error.help(format!("the library defines it: `.include <{file}>`"))
         } else if let Some(help) = absent(&text.to_ascii_lowercase()) {
             error.help(help)
         } else {
@@ -515,6 +518,22 @@ impl Resolver<'_> {
             error.did_you_mean(alias(&lower).map(str::to_owned).or_else(|| nearest(&text, known)))
         };
         self.context.report(at.scope, error)
+    }
+}
+
+impl Resolver<'_> {
+    /// The file of a library that defines a macro.
+    fn library_with(&self, macro_name: &str) -> Option<String> {
+        let defines = |line: &str| {
+            let rest = line.trim_start().strip_prefix(".macro").unwrap_or_default();
+            rest.split_whitespace().next() == Some(macro_name)
+        };
+        let libraries = self.loader.places().iter().filter(|place| !place.takes_quoted());
+        let mut files = libraries.flat_map(|place| place.names().into_iter().map(move |name| (place, name)));
+        let found = files.find(|(place, name)| {
+            place.load(name).is_ok_and(|bytes| String::from_utf8_lossy(&bytes).lines().any(defines))
+        });
+        found.map(|(_, name)| name)
     }
 }
 

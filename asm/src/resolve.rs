@@ -5,6 +5,7 @@ use crate::context::{At, Context, Reported};
 use crate::diag::{Diagnostic, nearest};
 use crate::expand::{self, Data, Flat, Item, Timing};
 use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
+use crate::load::Loader;
 use crate::serialise;
 use crate::source::Span;
 use smallvec::SmallVec;
@@ -18,7 +19,7 @@ use takt_isa::{Op, ROWS, Type};
 const MAX_CYCLES: u32 = 1 << 24;
 
 /// Resolves the expanded source. What has a mistake is left out; the report says whether there is any.
-pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
+pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) -> Ir {
     let machine = context.machine;
     let slots = ROWS
         .iter()
@@ -49,7 +50,7 @@ pub(crate) fn resolve(context: &mut Context, flat: Flat) -> Ir {
     let data_words = flat.data.iter().map(words).sum();
     let (pool, own_files) = (HashMap::new(), Vec::new());
     let mut resolver =
-        Resolver { context, flat, ir, slots, pool, own_files, label: 0, data_words, cast: None };
+        Resolver { context, loader, flat, ir, slots, pool, own_files, label: 0, data_words, cast: None };
     let once = std::mem::take(&mut resolver.flat.once);
     resolver.section(Section::Once, &once);
     resolver.ir.period = resolver.ir.bundles.len() as u32;
@@ -85,6 +86,8 @@ enum Host {
 
 pub(crate) struct Resolver<'c> {
     pub(crate) context: &'c mut Context,
+    /// Where further sources are: for what a mistake may have meant.
+    pub(crate) loader: &'c dyn Loader,
     flat: Flat,
     pub(crate) ir: Ir,
     slots: Vec<Host>,

@@ -493,7 +493,7 @@ fn wrong_source(
     let message =
         format!("`{name}` is {}, and `{}` reads {}", words(ty), operation.row().mnemonic, words(wanted));
     let warning = explained(Diagnostic::warning("types", place, message), ty, source.origin);
-    let written = context.sources.text(place);
+    let written = bare(context.sources.text(place));
     let written = if written.contains('[') { &name } else { written };
     let declare = match source.origin {
         // Not where another's value was passed on to it.
@@ -508,6 +508,11 @@ fn wrong_source(
     context.report(ScopeId(operation.expansion), warning.help(help));
 }
 
+/// An operand without the type that it is taken as.
+fn bare(written: &str) -> &str {
+    written.split_once(':').map_or(written, |(name, _)| name.trim_end())
+}
+
 /// An operation chooses between an integer and a float.
 fn either(context: &mut Context, operation: &Operation, int: (usize, Typed), float: (usize, Typed)) {
     let mnemonic = operation.row().mnemonic;
@@ -518,7 +523,7 @@ fn either(context: &mut Context, operation: &Operation, int: (usize, Typed), flo
         Some(What::Literal(value)) => shown(value, Type::F).1.map(|instead| format!("write `{instead}`")),
         _ => None,
     };
-    let written = context.sources.text(here);
+    let written = bare(context.sources.text(here));
     let help = help.unwrap_or_else(|| {
         format!("{}or write `{written}:bits` if its bits are meant", convert(Type::I, Type::F))
     });
@@ -557,7 +562,7 @@ fn wrong_register(
     let warning = Diagnostic::warning("types", place, message).also(register.span, "declared here");
     // That the operation itself gives it needs no telling.
     let origin = result.origin.filter(|origin| origin.span != operation.span);
-    let written = context.sources.text(place);
+    let written = bare(context.sources.text(place));
     let help = format!("{declare}, {}or write `{written}:bits` if its bits are meant", convert(ty, wanted));
     context.report(ScopeId(operation.expansion), explained(warning, ty, origin).help(help));
 }

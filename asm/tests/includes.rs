@@ -65,6 +65,12 @@ fn the_library_is_asked_by_angle_brackets_only() {
 }
 
 #[test]
+fn a_macro_of_the_library_is_told_where_it_is() {
+    let text = fails(".input x\n.output y\n.period\np: twice y, x\n wait p\n", &[]);
+    assert!(text.contains("help: the library defines it: `.include <second.s>`"), "{text}");
+}
+
+#[test]
 fn an_unknown_library_file_is_told_what_there_is() {
     let text = fails(".include <secnd.s>\n", &[]);
     assert!(text.contains("error[load]: there is no `<secnd.s>`"), "{text}");

@@ -419,3 +419,11 @@ fn a_name_asks_what_the_machine_has() {
     // A declaration of one's own comes first, as with `pi`.
     assert_eq!(good(".const has.fadd = 7\n.data\n.word has.fadd\n").program.data, [7]);
 }
+
+#[test]
+fn advice_on_a_cast_operand_assembles() {
+    let text = ".input x\n.output y\n.period\np: flt y:int, x, 1.0\n wait p\n";
+    let report = good(text).warnings.render(false);
+    assert!(report.contains("`y:bits`") && !report.contains("y:int:bits"), "{report}");
+    assert!(good(&text.replace("y:int", "y:bits")).warnings.list.is_empty());
+}

@@ -389,3 +389,13 @@ fn a_long_run() {
     let clock = session.parse("cycle == 71999").unwrap();
     assert!(session.run_until(&clock) == Why::Holds && session.cycle() == 71_999);
 }
+
+/// Most programs have a label `period`: its address is not what a condition on the period asks for.
+#[test]
+fn counters_come_before_labels() {
+    let mut console = console(
+        ".output y\n.state s\n.once\n mov s, zero\n wait period\n.period\nperiod: fadd s, s, 1.0\n mov y, s\n wait period\n",
+    );
+    console.execute("until period == 3").expect("it comes");
+    assert_eq!(value(&console, "period"), 3.0);
+}

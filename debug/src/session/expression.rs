@@ -512,6 +512,17 @@ fn closing(bytes: &[u8], open: usize) -> Option<usize> {
     None
 }
 
+/// What a session counts.
+fn counter(name: &str) -> Option<Operand> {
+    Some(match name {
+        "cycle" => Operand::Cycle,
+        "period" => Operand::Period,
+        "address" => Operand::Address,
+        "depth" => Operand::Depth,
+        _ => return None,
+    })
+}
+
 fn name(name: &str, known: Known<'_>) -> Result<Operand, String> {
     let Known { program, names, .. } = known;
     if let Some(found) = meanings(name, known) {
@@ -523,12 +534,8 @@ fn name(name: &str, known: Known<'_>) -> Result<Operand, String> {
             _ => Operand::Name(Box::new(found), None),
         });
     }
-    match name {
-        "cycle" => return Ok(Operand::Cycle),
-        "period" => return Ok(Operand::Period),
-        "address" => return Ok(Operand::Address),
-        "depth" => return Ok(Operand::Depth),
-        _ => {}
+    if let Some(counter) = counter(name) {
+        return Ok(counter);
     }
     if let Some(register) = program.machine.register_address(name) {
         return Ok(Operand::Register(register, Type::F));
@@ -552,7 +559,9 @@ fn meanings(name: &str, known: Known<'_>) -> Option<Name> {
         let mut ports = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
         Some(Meaning::Values(vec![Held::always(ports.find(|port| port.name == name)?)]))
     });
-    let symbol = || program.symbols.iter().find(|symbol| symbol.name == name);
+    // A label called `period` is common, and its address is not what `until period == 3` asks for.
+    let symbol =
+        || program.symbols.iter().find(|symbol| symbol.name == name).filter(|_| counter(name).is_none());
     let named = || constants.iter().find(|constant| constant.0 == name);
     let global =
         global.or_else(|| constant(Value::Int(symbol()?.address.into()))).or_else(|| constant(named()?.1));
