@@ -1,0 +1,8 @@
+//! From a robot's description, or another tool's expressions, to equations that the assembler reads.
+
+mod error;
+pub mod graph;
+pub mod functions;
+pub mod robot;
+
+pub use error::Error;
