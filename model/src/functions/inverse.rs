@@ -1,11 +1,10 @@
 //! Inverse dynamics: the forces that a motion takes, by Newton and Euler from link to link, in the links' own frames.
 
-use super::links::{Angles, Motion, State, Style, motions};
-use super::vector::{Vector, add, constant, cross, turn, zero};
-use super::{Function, Port};
-use crate::graph::{Expr, Graph, Rewrites};
-use crate::robot::frames::{self, Layout, Link};
-use crate::robot::{Kind, Robot, space};
+use super::links::{Angles, Motion, State, motions};
+use super::vector::{Vector, add, constant, cross, turn, weigh, zero};
+use crate::graph::{Expr, Graph};
+use crate::robot::frames::Link;
+use crate::robot::space::V3;
 
 /// The force and moment that a link's motion takes, at its origin.
 fn load<'g>(graph: &'g Graph, link: &Link, state: &State<'g>) -> (Vector<'g>, Vector<'g>) {
@@ -27,15 +26,16 @@ fn load<'g>(graph: &'g Graph, link: &Link, state: &State<'g>) -> (Vector<'g>, Ve
     (force, add(moment, cross(first, state.a)))
 }
 
-/// The joints' forces, from the links' motions.
+/// The joints' forces that a motion takes.
 pub(super) fn forces<'g>(
     graph: &'g Graph,
     links: &[Link],
+    gravity: V3,
     angles: &Angles<'g>,
     motion: &[Motion<'g>],
-    states: &[State<'g>],
 ) -> Vec<Expr<'g>> {
-    let loads: Vec<_> = links.iter().zip(states).map(|(link, state)| load(graph, link, state)).collect();
+    let states = motions(graph, links, gravity, angles, motion);
+    let loads: Vec<_> = links.iter().zip(&states).map(|(link, state)| load(graph, link, state)).collect();
     let (mut force, mut moment): (Vec<Vector<'g>>, Vec<Vector<'g>>) = loads.into_iter().unzip();
     // Moments across the axis, gathered where the first of the joints about parallel axes begins.
     let mut across: Vec<Vector<'g>> = vec![zero(graph); links.len()];
@@ -63,7 +63,7 @@ pub(super) fn forces<'g>(
                 (outer_force, rest)
             }
             _ => {
-                result[index] = super::vector::weigh(link.axis, f);
+                result[index] = weigh(link.axis, f);
                 let arm = constant(graph, link.axis).map(|axis| axis * motion[index].q);
                 (f, add(n, cross(arm, f)))
             }
@@ -77,22 +77,3 @@ pub(super) fn forces<'g>(
     result
 }
 
-/// One attempt.
-pub fn attempt(robot: &Robot, rewrites: Rewrites, layout: &Layout, sums: bool) -> Function {
-    let graph = Graph::new(rewrites);
-    let links = frames::place(robot, layout);
-    let n = links.len();
-    let motion: Vec<Motion<'_>> = (0..n)
-        .map(|i| Motion { q: graph.input(i), qd: graph.input(n + i), qdd: graph.input(2 * n + i) })
-        .collect();
-    let q: Vec<_> = motion.iter().map(|motion| motion.q).collect();
-    let angles = Angles::new(&graph, &links, &q, Style { sums });
-    let states = motions(&graph, &links, robot.gravity, &angles, &motion);
-    let tau = forces(&graph, &links, &angles, &motion, &states);
-    let port = |what: &str, i: usize| Port { name: format!("{what}{}", i + 1), text: String::new() };
-    let outputs = tau.iter().enumerate().map(|(i, tau)| (port("tau", i), tau.id())).collect();
-    let inputs = ["q", "qd", "qdd"].iter().flat_map(|what| (0..n).map(|i| port(what, i))).collect();
-    let _ = space::IDENTITY;
-    let _ = Kind::Revolute;
-    Function { title: String::new(), notes: vec![], inputs, outputs, graph }
-}

@@ -5,7 +5,7 @@
 //! in the link and in the one that carries it. So U's last column is only turned from link to link, and what else
 //! is needed of U and of the angular acceleration follows from it and from products of ω.
 
-use super::vector::{Angle, Vector, constant, turn_back, weigh, zero};
+use super::vector::{Angle, Vector, add, constant, cross, turn_back, weigh, zero};
 use crate::graph::{Expr, Graph};
 use crate::robot::frames::Link;
 use crate::robot::{Kind, space};
@@ -31,13 +31,6 @@ pub(super) struct State<'g> {
     pub(super) differences: Vector<'g>,
     /// Acceleration of its origin, with that of free fall taken off, m/s².
     pub(super) a: Vector<'g>,
-}
-
-/// How sums of angles are used.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct Style {
-    /// Joints about parallel axes take what turns with them from the link before the first of them, by the sum of their angles.
-    pub(super) sums: bool,
 }
 
 /// The angles of the joints: of each by itself, and since the last joint about an axis that is not parallel.
@@ -72,13 +65,14 @@ fn angle<'g>(sum: Option<Expr<'g>>, number: f64, graph: &'g Graph, names: &(Stri
 }
 
 impl<'g> Angles<'g> {
-    pub(super) fn new(graph: &'g Graph, links: &[Link], q: &[Expr<'g>], style: Style) -> Angles<'g> {
+    /// With `sums`, joints about parallel axes take what turns with them from the link before the first of them.
+    pub(super) fn new(graph: &'g Graph, links: &[Link], q: &[Expr<'g>], sums: bool) -> Angles<'g> {
         let mut angles = Angles { own: Vec::new(), sum: Vec::new(), first: Vec::new() };
-        let mut sums: Vec<(Expr<'g>, f64, String)> = Vec::new();
+        let mut totals: Vec<(Expr<'g>, f64, String)> = Vec::new();
         for (index, link) in links.iter().enumerate() {
             let signed = if link.sign < 0.0 { -q[index] } else { q[index] };
             let number = index + 1;
-            let first = match link.parent.filter(|_| link.parallel && style.sums) {
+            let first = match link.parent.filter(|_| link.parallel && sums) {
                 Some(parent) => angles.first[parent],
                 None => index,
             };
@@ -87,7 +81,7 @@ impl<'g> Angles<'g> {
             let own = angle(Some(signed), link.offset, graph, &names);
             let (sum, offset, name) = match link.parent.filter(|_| first != index) {
                 Some(parent) => {
-                    let (sum, offset, name) = sums[parent].clone();
+                    let (sum, offset, name) = totals[parent].clone();
                     (sum + signed, offset + link.offset, format!("{name}_{number}"))
                 }
                 None => (signed, link.offset, number.to_string()),
@@ -96,7 +90,7 @@ impl<'g> Angles<'g> {
                 true => own,
                 false => angle(Some(sum), offset, graph, &(format!("s{name}"), format!("c{name}"))),
             };
-            sums.push((sum, offset, name));
+            totals.push((sum, offset, name));
             let turns = link.kind == Kind::Revolute;
             angles.own.push(turns.then_some(own));
             angles.sum.push(turns.then_some(whole));
@@ -144,7 +138,7 @@ pub(super) fn motions<'g>(
         let before = link.parent.map_or(base, |parent| states[parent]);
         let motion = motions[index];
         let along = |m: &[Vector<'g>; 3], a: space::V3| m.map(|row| weigh(a, row));
-        let shifted = super::vector::add(before.a, along(&before.u, link.origin));
+        let shifted = add(before.a, along(&before.u, link.origin));
         let (Some(own), Some(sum)) = (angles.own[index], angles.sum[index]) else {
             states.push(slide(link, &before, shifted, motion));
             rests.push((before.w, zero(graph)));
@@ -221,7 +215,7 @@ fn slide<'g>(link: &Link, before: &State<'g>, shifted: Vector<'g>, motion: Motio
     let graph = motion.q.graph();
     let axis = constant(graph, link.axis);
     let twice = motion.qd + motion.qd;
-    let turning = super::vector::cross(before.w, axis);
+    let turning = cross(before.w, axis);
     let a = std::array::from_fn(|i| {
         shifted[i] + motion.q * weigh(link.axis, before.u[i]) + twice * turning[i] + motion.qdd * axis[i]
     });

@@ -1,10 +1,61 @@
 //! What is computed of a robot: each a graph with named inputs and outputs.
 
-pub mod inverse;
+mod inverse;
+mod kinematics;
 mod links;
+mod mass;
+mod search;
 mod vector;
 
 use crate::graph::{Count, Delays, Graph, Id, depth, optimise};
+pub use search::{Options, derive};
+
+/// What of a robot is computed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum What {
+    /// The tip's pose.
+    ForwardKinematics,
+    /// The tip's velocity per joint's.
+    Jacobian,
+    /// The joints' forces for a motion.
+    InverseDynamics,
+    /// The joints' forces at rest.
+    Gravity,
+    /// The joints' inertia.
+    MassMatrix,
+    /// The joints' acceleration under forces.
+    ForwardDynamics,
+    /// The joints' forces that make errors decay.
+    ComputedTorque,
+}
+
+impl What {
+    /// All of them, their names, and what they are.
+    pub const ALL: [(What, &'static str, &'static str); 7] = [
+        (What::ForwardKinematics, "forward-kinematics", "pose of the tip in the base's frame: rotation and position"),
+        (What::Jacobian, "jacobian", "geometric Jacobian of the tip, in the base's axes: linear velocity, then angular"),
+        (What::InverseDynamics, "inverse-dynamics", "joint forces that a motion takes"),
+        (What::Gravity, "gravity", "joint forces that hold the robot at rest"),
+        (What::MassMatrix, "mass-matrix", "joint-space inertia, the lower triangle"),
+        (What::ForwardDynamics, "forward-dynamics", "joint accelerations under joint forces"),
+        (What::ComputedTorque, "computed-torque", "joint forces that follow a reference: inverse dynamics of qddr + kp (qr - q) + kd (qdr - qd)"),
+    ];
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        What::ALL.iter().find(|(what, ..)| *what == self).map_or("", |(_, name, _)| name)
+    }
+
+    /// What it is.
+    pub fn text(self) -> &'static str {
+        What::ALL.iter().find(|(what, ..)| *what == self).map_or("", |(_, _, text)| text)
+    }
+
+    /// The one of a name.
+    pub fn from_name(name: &str) -> Option<What> {
+        What::ALL.iter().find(|(_, other, _)| *other == name).map(|(what, ..)| *what)
+    }
+}
 
 /// An input or output.
 #[derive(Clone, PartialEq, Debug)]

@@ -124,6 +124,8 @@ pub struct Rewrites {
     pub factor: bool,
     /// Long sums are added in the order in which their terms are ready. Changes rounding.
     pub balance: bool,
+    /// Of a robot whose joints all turn: lengths are in a unit that makes one of them 1. Changes rounding.
+    pub scale: bool,
 }
 
 impl Rewrites {
@@ -136,13 +138,15 @@ impl Rewrites {
         strength: true,
         factor: true,
         balance: true,
+        scale: true,
     };
     /// Those that leave every operation's rounding as it is written: for finite values, the result is the same to the bit
     /// but for the sign of a zero.
-    pub const EXACT: Rewrites = Rewrites { strength: false, factor: false, balance: false, ..Rewrites::ALL };
+    pub const EXACT: Rewrites = 
+        Rewrites { strength: false, factor: false, balance: false, scale: false, ..Rewrites::ALL };
 
     /// Name and effect of each, in the order of the fields.
-    pub const NAMES: [(&'static str, &'static str); 7] = [
+    pub const NAMES: [(&'static str, &'static str); 8] = [
         ("fold", "operations on constants are carried out, in binary64"),
         ("identities", "x + 0, x - x, 1*x, 0*x, -(-x), x/1"),
         ("share", "equal subexpressions are computed once"),
@@ -150,6 +154,7 @@ impl Rewrites {
         ("strength", "division by a constant and powers become products"),
         ("factor", "a*b + a*c becomes a*(b + c)"),
         ("balance", "long sums are added in the order in which their terms are ready"),
+        ("scale", "lengths are in a unit that makes one of them 1"),
     ];
 
     /// Switches one off by its name; `false` if there is none of that name.
@@ -162,6 +167,7 @@ impl Rewrites {
             "strength" => &mut self.strength,
             "factor" => &mut self.factor,
             "balance" => &mut self.balance,
+            "scale" => &mut self.scale,
             _ => return false,
         };
         *flag = false;

@@ -5,6 +5,7 @@ pub mod space;
 mod tree;
 pub mod urdf;
 
+pub(crate) use tree::list;
 pub use tree::{Element, ElementKind, Tree};
 
 use space::{Inertia, Pose, V3};

@@ -134,9 +134,16 @@ impl Tree {
             children.entry(&joint.parent).or_default().push(joint);
         }
         let mut held = Vec::new();
-        let mut stack = vec![(base, None, Pose::IDENTITY)];
+        let mut stack: Vec<(&str, Carrier)> = vec![(base, Carrier::Known(None, Pose::IDENTITY))];
         let mut seen = 0;
-        while let Some((link, carrier, pose)) = stack.pop() {
+        while let Some((link, carrier)) = stack.pop() {
+            let (carrier, pose) = match carrier {
+                Carrier::Known(carrier, pose) => (carrier, pose),
+                Carrier::New(joint) => {
+                    robot.joints.push(joint);
+                    (Some(robot.joints.len() - 1), Pose::IDENTITY)
+                }
+            };
             seen += 1;
             if seen > self.links.len() {
                 return Err(Error::plain("the links are no tree: a link carries itself"));
@@ -153,7 +160,7 @@ impl Tree {
                 let kind = match joint.kind {
                     ElementKind::Moves(kind) => kind,
                     ElementKind::Fixed => {
-                        stack.push((&joint.child, carrier, pose.then(&rest)));
+                        stack.push((&joint.child, Carrier::Known(carrier, pose.then(&rest))));
                         continue;
                     }
                 };
@@ -162,29 +169,28 @@ impl Tree {
                     if carrier.is_some() {
                         held.push(joint.name.as_str());
                     }
-                    stack.push((&joint.child, carrier, pose.then(&rest)));
+                    stack.push((&joint.child, Carrier::Known(carrier, pose.then(&rest))));
                     continue;
                 }
                 let length = space::norm(joint.axis);
                 if !(length.is_finite() && length > 1e-9) {
                     return Err(Error::at(&joint.name, "its axis has no direction"));
                 }
-                if robot.joints.len() == MAX_JOINTS {
+                if robot.joints.len() >= MAX_JOINTS {
                     let text = format!("the robot has more than {MAX_JOINTS} joints; --base and --tip take a part of it");
                     return Err(Error::at(&joint.name, text));
                 }
-                robot.joints.push(Joint {
+                let moving = Joint {
                     name: joint.name.clone(),
                     kind,
                     parent: carrier,
                     place: pose.then(&rest),
                     axis: space::scale(1.0 / length, joint.axis),
                     body: Inertia::default(),
-                });
-                stack.push((&joint.child, Some(robot.joints.len() - 1), Pose::IDENTITY));
+                };
+                stack.push((&joint.child, Carrier::New(moving)));
             }
         }
-        // Depth first put several branches in between: a joint's number is when it was found, which its carrier always was before.
         if robot.joints.is_empty() {
             return Err(Error::plain(match tip {
                 Some(tip) => format!("no joint moves between `{base}` and `{tip}`"),
@@ -196,6 +202,13 @@ impl Tree {
         }
         Ok(robot)
     }
+}
+
+/// What carries a link: a joint that has its number, or one that gets it now, so that joints are numbered in the order of the
+/// description, each after the one that carries it.
+enum Carrier {
+    Known(Option<usize>, Pose),
+    New(Joint),
 }
 
 /// Names for a message, not too many of them.
