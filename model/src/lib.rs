@@ -3,6 +3,8 @@
 mod error;
 pub mod graph;
 pub mod functions;
+pub mod instructions;
 pub mod robot;
+pub mod write;
 
 pub use error::Error;

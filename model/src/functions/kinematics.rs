@@ -102,7 +102,8 @@ impl<'g> Chain<'g> {
     }
 }
 
-/// The tip's rotation by rows, and its position.
+/// The tip's rotation by rows, and its position. Positions are added from the base outwards up to joint `split` of the way, and
+/// from the tip inwards behind it: the first links' axes have zeros, and so has what the last links carry.
 pub(super) fn pose<'g>(
     graph: &'g Graph,
     links: &[Link],
@@ -110,28 +111,27 @@ pub(super) fn pose<'g>(
     q: &[Expr<'g>],
     tip: usize,
     pose: &Pose,
-    forward: bool,
+    split: usize,
 ) -> ([Vector<'g>; 3], Vector<'g>) {
     let chain = Chain::new(graph, links, angles, q, tip, pose);
     let last = chain.turned[chain.turned.len() - 1];
     let axes = columns(&last, &pose.rotation);
     let rotation = std::array::from_fn(|i| axes.map(|column| column[i]));
-    if !forward {
+    if split == 0 {
         return (rotation, chain.tip);
     }
-    // From the base outwards: better where the first links' axes have zeros.
     let mut at = constant(graph, [0.0; 3]);
     for (place, &index) in chain.path.iter().enumerate() {
         let link = &links[index];
         let step = constant(graph, link.origin);
-        at = match place {
-            0 => add(at, step),
-            _ => add(at, times(&chain.turned[place - 1], step)),
-        };
+        let within = |a: Vector<'g>| if place == 0 { a } else { times(&chain.turned[place - 1], a) };
+        at = add(at, within(step));
+        if place == split {
+            let axes = if angles.own[index].is_some() { chain.rest[place] } else { chain.turned[place] };
+            return (rotation, add(at, times(&axes, chain.arm[place])));
+        }
         if angles.own[index].is_none() {
-            let axis = constant(graph, link.axis).map(|axis| axis * q[index]);
-            let axis = if place == 0 { axis } else { times(&chain.turned[place - 1], axis) };
-            at = add(at, axis);
+            at = add(at, within(constant(graph, link.axis).map(|axis| axis * q[index])));
         }
     }
     (rotation, add(at, times(&last, constant(graph, pose.origin))))

@@ -24,14 +24,17 @@ pub struct Options<'a> {
     pub kd: f64,
 }
 
+/// More joints take longer to write down, and there are more of them to try: of so many, each is.
+const TRIED: usize = 16;
+
 /// One way to write the equations.
 #[derive(Clone, PartialEq, Debug)]
 struct Attempt {
     layout: Layout,
     /// Use sums of angles of parallel axes.
     sums: bool,
-    /// Positions from the base outwards.
-    forward: bool,
+    /// Up to which joint of the way positions are added from the base outwards.
+    split: usize,
     /// The unit of length, m.
     unit: f64,
 }
@@ -46,10 +49,13 @@ pub fn derive(robot: &Robot, what: What, options: &Options<'_>) -> Result<Functi
         _ => None,
     };
     let cost = |attempt: &Attempt| {
-        let function = write(robot, what, options, tip, attempt);
+        let mut function = write(robot, what, options, tip, attempt);
+        if robot.joints.len() <= TRIED {
+            function = function.optimised(&options.delays);
+        }
         (function.count().total(), function.depth(&options.delays))
     };
-    let mut best = Attempt { layout: Layout::new(robot), sums: true, forward: false, unit: 1.0 };
+    let mut best = Attempt { layout: Layout::new(robot), sums: true, split: 0, unit: 1.0 };
     let mut least = cost(&best);
     let mut consider = |best: &mut Attempt, change: &dyn Fn(&mut Attempt)| {
         let mut other = best.clone();
@@ -60,14 +66,21 @@ pub fn derive(robot: &Robot, what: What, options: &Options<'_>) -> Result<Functi
         }
     };
     consider(&mut best, &|attempt| attempt.sums = false);
-    consider(&mut best, &|attempt| attempt.forward = true);
-    // More joints take longer to write down, and there are more of them to try.
-    const TRIED: usize = 16;
+    if what == What::ForwardKinematics {
+        for split in 1..=robot.joints.len().min(TRIED) {
+            consider(&mut best, &|attempt| attempt.split = split);
+        }
+    }
     for joint in 0..robot.joints.len().min(TRIED) {
         consider(&mut best, &|attempt| attempt.layout.incoming[joint] ^= true);
     }
     for joint in robot.leaves().into_iter().take(TRIED) {
         consider(&mut best, &|attempt| attempt.layout.balanced[joint] ^= true);
+    }
+    for joint in 0..robot.joints.len().min(TRIED) {
+        for quarters in 1..4 {
+            consider(&mut best, &|attempt| attempt.layout.quarters[joint] = quarters);
+        }
     }
     consider(&mut best, &|attempt| attempt.sums ^= true);
     let scales = options.rewrites.scale
@@ -290,7 +303,7 @@ fn equations(
                 return jacobian_ports(graph, robot, &columns);
             }
             let (rotation, position) =
-                kinematics::pose(graph, &links, &angles, &q, joint, &pose, attempt.forward);
+                kinematics::pose(graph, &links, &angles, &q, joint, &pose, attempt.split);
             let mut ports = Vec::new();
             for (i, row) in rotation.iter().enumerate() {
                 for (j, entry) in row.iter().enumerate() {

@@ -223,6 +223,16 @@ impl Graph {
         self.store.borrow().nodes[id.index()]
     }
 
+    /// The node at a place.
+    pub fn id_at(&self, index: usize) -> Id {
+        Id(index as u32)
+    }
+
+    /// What the node at a place is.
+    pub fn node_at(&self, index: usize) -> Node {
+        self.node(self.id_at(index))
+    }
+
     /// The node itself, not rewritten but for sharing.
     fn raw(&self, node: Node) -> Id {
         let mut store = self.store.borrow_mut();

@@ -40,12 +40,15 @@ pub struct Layout {
     pub incoming: Vec<bool>,
     /// Whether the x axis of a link that carries no other goes through its centre of mass.
     pub balanced: Vec<bool>,
+    /// By how many quarter turns more each x axis is turned: it costs nothing, and decides which signs are needed.
+    pub quarters: Vec<u8>,
 }
 
 impl Layout {
     /// Origins towards the next joint, axes that need no offset.
     pub fn new(robot: &Robot) -> Layout {
-        Layout { incoming: vec![false; robot.joints.len()], balanced: vec![false; robot.joints.len()] }
+        let count = robot.joints.len();
+        Layout { incoming: vec![false; count], balanced: vec![false; count], quarters: vec![0; count] }
     }
 }
 
@@ -242,8 +245,9 @@ pub fn place(robot: &Robot, layout: &Layout) -> Vec<Link> {
                     let angle = y.atan2(x);
                     let turns = (angle / std::f64::consts::FRAC_PI_2).round() * std::f64::consts::FRAC_PI_2;
                     link.offset = if (angle - turns).abs() < 1e-9 { turns } else { angle };
-                    frame.rotation = space::product(&frame.rotation, &space::about(2, link.offset));
                 }
+                link.offset += f64::from(layout.quarters[index]) * std::f64::consts::FRAC_PI_2;
+                frame.rotation = space::product(&frame.rotation, &space::about(2, link.offset));
                 link.origin = carrier.inverse().point(frame.origin);
                 let own = space::turn(&geometry.world[index].rotation, joint.axis);
                 link.sign = if space::dot(own, line.direction) < 0.0 { -1.0 } else { 1.0 };
