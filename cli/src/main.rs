@@ -19,6 +19,7 @@ mod isa;
 mod load;
 mod machines;
 mod man;
+mod model;
 mod nan;
 mod number;
 mod output;
@@ -67,6 +68,7 @@ enum Command {
     Track(track::Track),
     Arm(arm::Arm),
     Asm(asm::Asm),
+    Model(model::Model),
     Disasm(disasm::Disasm),
     Run(run::Run),
     Debug(debug::Debug),
@@ -86,6 +88,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Track(track) => track::run(track, color, out),
         Command::Arm(arm) => arm::run(arm, color, out),
         Command::Asm(asm) => asm::run(asm, color, out),
+        Command::Model(model) => model::run(model, color, out),
         Command::Disasm(disasm) => disasm::run(disasm, color),
         Command::Run(run) => run::run(run, color, out),
         Command::Debug(debug) => debug::run(debug, color, out),

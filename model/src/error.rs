@@ -29,7 +29,7 @@ impl Error {
     }
 
     /// With the line on which the source names the place, as an attribute `name`.
-    pub(crate) fn located(mut self, source: &str) -> Error {
+    pub fn located(mut self, source: &str) -> Error {
         if self.line.is_none()
             && let Some(name) = &self.place
         {

@@ -5,7 +5,7 @@ Reads requests, one JSON object a line, and answers each with one line:
     {"urdf": path, "joints": [...], "base": link, "tip": link or null, "function": name,
      "states": n, "seed": n, "kp": x, "kd": x, "casadi": bool}
 
-`urdf` may begin with `erd:`, for a file of example-robot-data. Joints that are not named are held at 0. The answer has
+A request `{"locate": path}` is answered with the file's place. `urdf` may begin with `erd:`, for a file of example-robot-data. Joints that are not named are held at 0. The answer has
 `inputs` and `outputs`, a row for each state, in the order of takt's ports; with `casadi`, `operations`: how many
 operations the function has in CasADi after `cse`, written as the textbooks have it (Featherstone, in link frames).
 """
@@ -336,6 +336,8 @@ class Textbook:
 
 
 def answer(request):
+    if "locate" in request:
+        return os.path.abspath(locate(request["locate"]))
     robot = Robot(request)
     function = request["function"]
     random = np.random.default_rng(request["seed"])

@@ -1,5 +1,6 @@
 //! A robot: a tree of joints that move, each with the body behind it. Fixed joints are merged away.
 
+pub mod dh;
 pub mod frames;
 pub mod space;
 mod tree;
