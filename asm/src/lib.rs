@@ -115,7 +115,7 @@ pub struct Assembled {
 }
 
 impl Assembled {
-    /// What a debugger wants to know of the program: for [`image::write_with`].
+    /// What a debugger needs to know of the program: for [`image::write_with`].
     pub fn debug_info(&self) -> names::DebugInfo {
         let files = self.sources.files().iter();
         names::DebugInfo {

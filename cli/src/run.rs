@@ -119,7 +119,7 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
     trace_file.map_or(Ok(()), Out::finish)?;
     let denials = watch.end(&emulator);
     let periods = match result {
-        // Who has stopped reading wants no summary; what happened until then counts.
+        // A reader that has gone needs no summary; what happened until then counts.
         Err(error) if output::is_closed_pipe(&error) => return denials.verdict(),
         result => result?,
     };

@@ -1,4 +1,4 @@
-//! The manual: the tables as a reader wants them. Text for the terminal, Markdown for `docs/isa.md`, plain data for JSON.
+//! The manual: the tables for a reader. Text for the terminal, Markdown for `docs/isa.md`, plain data for JSON.
 
 use crate::shape::{Field, OPCODE, Shape, WORD_BITS};
 use crate::spec::instructions::{Function, ROWS, Row, Type};

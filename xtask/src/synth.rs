@@ -496,7 +496,7 @@ pub(crate) fn markdown(rows: &[Synthesis]) -> String {
     let mut text = String::from(
         "# Synthesis\n
 <!-- Written by `cargo xtask synth` and `cargo xtask docs` from synthesis.json. -->\n
-How fast the circuit is and how much of a device it takes, after place and route with open tools. `cargo xtask synth` measures anew
+How fast the circuit is and how much of a device it takes, after place and route with open tools. `cargo xtask synth` measures it,
 and writes this file; the first run installs the tools (400 MB) in `.venv`, or in the folder that `TAKT_VENV` names.\n
 Clocks are nextpnr's, for the slowest conditions of the speed grade, with the seeds 1, 2, … (as many as stated; of an even number the lower one of the two in the middle); the median is the clock that the README and
 `takt track` count with. LUTs are nextpnr's TRELLIS_COMB: carry chains and memories in logic included. Multipliers are of 18 x 18 bits, block

@@ -111,7 +111,7 @@ fn ports(program: &Program) -> Result<(), ImageError> {
         check("output", port, number.is_some())?;
         if !numbers.insert(number) {
             let (what, address) = (format!("output `{}`", port.name), port.register.into());
-            let reason = "another output has the same number, in another bank: assemble its source anew";
+            let reason = "another output has the same number, in another bank: assemble its source again";
             return Err(ImageError::Register { what, address, reason });
         }
     }
