@@ -52,7 +52,7 @@ pub use homes::{Adjustment, Made};
 pub use output::{disasm, image, listing, names};
 pub use report::diag::{Diagnostic, Diagnostics};
 pub use report::levels::Levels;
-pub use report::{diag, levels, source};
+pub use report::{diag, levels, nearest, source};
 pub use syntax::{Expression, expr};
 
 /// What the assembler is to do.

@@ -5,8 +5,8 @@ use crate::info;
 use crate::panes::{self, Flying, Kind, Panes};
 use crate::session::{Live, Place, Session, Shown, Stop, Test, Unit, Where, Why, hex_float, ulp_distance};
 use std::fmt::Write as _;
-use takt_asm::diag::nearest;
 use takt_asm::expr::Value;
+use takt_asm::nearest;
 use takt_isa::Type;
 use takt_isa::program::Space;
 
