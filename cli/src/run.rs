@@ -35,7 +35,7 @@ pub(crate) struct Run {
     machine: OptionalMachine,
     #[command(flatten)]
     source: SourceArguments,
-    /// CSV with one named column for each input port and one row for each period; `-` is standard input.
+    /// CSV with one named column for each input port and one row for each period; other columns are ignored; `-` is standard input.
     #[arg(long, value_name = "CSV")]
     inputs: Option<PathBuf>,
     /// Where the output ports go, as CSV, one row for each period, with a column `cycles`; `-` is standard output, where
