@@ -19,7 +19,7 @@ use takt_emu::{Emulator, Status};
 use takt_isa::program::Location;
 use takt_isa::spec::instructions::Function;
 use takt_isa::timing::{Cause, Cycle};
-use takt_isa::{Instruction, Machine, Program};
+use takt_isa::{BundleAddress, Instruction, Machine, Program, SlotIndex};
 
 /// Show where the cycles of a period went: every bundle, every stall, the chain that sets the time.
 ///
@@ -174,12 +174,12 @@ fn faster(arguments: &Analyse, load: &Load, program: &Program, trace: &Trace, ro
 }
 
 /// A machine with one cycle less in a unit, or in the front end. It is never given back: there are as many as units.
-fn quicker(machine: &Machine, unit: Option<(u8, u8)>) -> &'static Machine {
+fn quicker(machine: &Machine, unit: Option<(SlotIndex, u8)>) -> &'static Machine {
     let mut slots = machine.slots.to_vec();
     let mut refill = machine.refill;
     match unit {
         Some((slot, unit)) => {
-            let slot = &mut slots[usize::from(slot)];
+            let slot = &mut slots[slot.index()];
             let mut units = slot.units.to_vec();
             let row = &mut units[usize::from(unit)];
             row.latency -= 1;
@@ -202,10 +202,8 @@ struct Analysis<'p> {
 }
 
 impl Analysis<'_> {
-    fn unit(&self, unit: Option<(u8, u8)>) -> &'static str {
-        unit.map_or("front end", |(slot, unit)| {
-            self.program.machine.slots[usize::from(slot)].units[usize::from(unit)].name
-        })
+    fn unit(&self, unit: Option<(SlotIndex, u8)>) -> &'static str {
+        unit.map_or("front end", |(slot, unit)| self.program.machine.slot(slot).units[usize::from(unit)].name)
     }
 
     fn bundle(&self, issue: usize) -> Vec<Instruction> {
@@ -234,7 +232,7 @@ impl Analysis<'_> {
             LinkKind::Unit { slot, unit } => format!("{} busy", self.unit(Some((slot, unit)))),
             LinkKind::Drain => "drain".to_owned(),
             LinkKind::WritePort { slot } => {
-                format!("write port of bank {}", machine.slots[usize::from(slot)].bank.name)
+                format!("write port of bank {}", machine.slot(slot).bank.name)
             }
             LinkKind::FrontEnd => "front end".to_owned(),
             LinkKind::Order => "order of issue".to_owned(),
@@ -283,16 +281,20 @@ impl Analysis<'_> {
         counts
     }
 
-    fn operation_json(&self, address: u32, s: usize, instruction: &Instruction) -> Option<Value> {
-        let (program, slot) = (self.program, &self.program.machine.slots[s]);
+    fn operation_json(
+        &self,
+        address: BundleAddress,
+        s: SlotIndex,
+        instruction: &Instruction,
+    ) -> Option<Value> {
+        let (program, slot) = (self.program, self.program.machine.slot(s));
         let function = instruction.op.row().function;
         let unit = &slot.units[slot.unit_for(function).filter(|_| function != Function::Idle)?];
-        let target = |address: u32| match program.nearest_label(address) {
+        let target = |address: BundleAddress| match program.nearest_label(address) {
             Some((label, 0)) => label.to_owned(),
             _ => address.to_string(),
         };
-        let word = address as usize * program.machine.slots.len() + s;
-        let place = program.lines.get(word).copied().flatten();
+        let place = program.operation_location(address, s);
         Some(json!({
             "slot": slot.name,
             "unit": unit.name,
@@ -322,7 +324,7 @@ impl Analysis<'_> {
         };
         let bundle = |(i, issue): (usize, &Issued)| {
             let operations = self.bundle(i);
-            let operations = operations.iter().enumerate();
+            let operations = SlotIndex::all().zip(&operations);
             json!({
                 "address": issue.address,
                 "cycle": self.cycle(i),

@@ -27,10 +27,9 @@ mod system;
 #[cfg(feature = "testing")]
 pub mod testing;
 
-pub use code::MAX_SLOTS;
 pub use emulator::{Emulator, MAX_CYCLE, Observed, Status, Step, Stop, Upcoming};
 pub use event::{Event, PortWrite, Retire};
-pub use fault::{Fault, FaultKind, LoadError};
+pub use fault::{Fault, FaultKind, LoadError, ShownFault};
 pub use machine::MAX_NAN_WRITES;
 pub use statistics::Statistics;
 pub use system::{Number, PeriodError, PeriodReport, PortError};

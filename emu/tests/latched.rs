@@ -80,7 +80,7 @@ fn outputs_are_published_at_the_wait() {
         emulator.tick_at(tick);
         // Both registers have been written; the `wait` has not issued.
         emulator.run_until(tick + 4 + latency(&T3, Function::Alu)).unwrap();
-        assert_eq!(emulator.register(736), Some(2));
+        assert_eq!(emulator.register(T3.register_address("x224").unwrap()), Some(2));
         assert_eq!(outputs(emulator), [Some(1), Some(1)]);
         let before = emulator.now();
         emulator.run_to_wait().unwrap();

@@ -63,7 +63,7 @@ fn timing(row: &Row, machine: &'static Machine) -> Option<Timing> {
         return Some(Timing { machine: machine.name, slot: "any", unit: "", latency: 0, interval: 1 });
     }
     let (s, u) = machine.host(row.function)?;
-    let (slot, unit) = (&machine.slots[s], &machine.slots[s].units[u]);
+    let (slot, unit) = (machine.slot(s), &machine.slot(s).units[u]);
     let latency = if row.shape.has_dest() { unit.latency } else { 0 };
     Some(Timing { machine: machine.name, slot: slot.name, unit: unit.name, latency, interval: unit.interval })
 }

@@ -2,7 +2,6 @@
 
 use crate::export::{Design, RESET_CYCLES};
 use std::fmt::Write as _;
-use takt_isa::spec::machines::REGISTER_SPACE;
 
 /// A register of the slave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -139,7 +138,7 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
     let port_bits = machine.outputs_per_bank.trailing_zeros();
     let input_bits = machine.inputs.depth.trailing_zeros();
     let data_bits = machine.data_depth.trailing_zeros();
-    let register_bits = REGISTER_SPACE.trailing_zeros();
+    let register_bits = takt_isa::Register::COUNT.trailing_zeros();
     let inputs_page = format!("{}'d{}", register_bits - input_bits, machine.inputs.base >> input_bits);
     // What is kept to be loaded again: data, then registers.
     let half = data_bits.max(register_bits);

@@ -181,7 +181,7 @@ impl Plan {
             return Err(error.into());
         }
         check_windows(machine)?;
-        let host = |function| machine.host(function).map(|(slot, _)| slot);
+        let host = |function| machine.host(function).map(|(slot, _)| slot.index());
         let control_slot = host(Function::Control).unwrap_or(0);
         let memory_slot = host(Function::Memory).ok_or(PlanError::NoMemory { machine: machine.name })?;
         check_parts(machine)?;
