@@ -7,7 +7,7 @@ use random_source::{Random, source};
 use std::collections::BTreeMap;
 use takt_asm::Assembled;
 use takt_asm::diag::{Diagnostics, Message, Severity};
-use takt_asm::ir::DemandKind;
+use takt_asm::schedule::DemandKind;
 use takt_asm::schedule::TimingReport;
 use takt_asm::{MemoryLoader, Options, Schedule, assemble};
 use takt_emu::{Emulator, Event};
@@ -118,7 +118,7 @@ fn refusal(errors: &Diagnostics) -> Message {
 }
 
 /// The cycles of a period in which a port's register is read or written, from 1.
-fn seen_cycles(program: &Program, register: u16) -> Vec<u32> {
+fn seen_cycles(program: &Program, register: takt_isa::Register) -> Vec<u32> {
     let mut emulator = Emulator::new(program).expect("it fits");
     for port in &program.inputs {
         emulator.set_input_bits(port.register, 1.5f32.to_bits()).expect("it is an input");

@@ -4,8 +4,8 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use takt_emu::Statistics;
-use takt_isa::timing::{Address, Cause};
-use takt_isa::{Program, ROWS};
+use takt_isa::timing::Cause;
+use takt_isa::{BundleAddress, Program, ROWS};
 
 /// Counts over a run or a period. `cycles = bundles + Σ stalls`.
 #[derive(Clone, Debug)]
@@ -16,7 +16,7 @@ pub(crate) struct Account {
     pub(crate) operations: BTreeMap<&'static str, u64>,
     /// By kind of cause, all of them.
     stalls: BTreeMap<&'static str, u64>,
-    causes: Vec<((Address, Cause), u64)>,
+    causes: Vec<((BundleAddress, Cause), u64)>,
 }
 
 impl Account {

@@ -1,0 +1,160 @@
+//! The metadata of an image: what ELF has no place for, as JSON.
+
+use super::validate::{NO_BANK, wrong_port};
+use super::{ImageError, VERSION};
+use serde::{Deserialize, Serialize};
+use takt_isa::program::{Location, Port, Section, Symbol};
+use takt_isa::{BundleAddress, Machine, Program, Register, Type};
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Meta {
+    pub(super) version: u32,
+    pub(super) machine: String,
+    inputs: Vec<MetaPort>,
+    outputs: Vec<MetaPort>,
+    /// Left out if it is false.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    latched: bool,
+    registers: Vec<MetaPort>,
+    sections: Vec<MetaSection>,
+    files: Vec<String>,
+    /// For each word of code its file and line.
+    lines: Vec<Option<(u32, u32)>>,
+}
+
+/// Read first: of a metadata of another version nothing else may be assumed.
+#[derive(Deserialize)]
+struct Head {
+    version: u32,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MetaPort {
+    name: String,
+    register: u16,
+    #[serde(rename = "type")]
+    ty: MetaType,
+}
+
+/// Types as the source writes them.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum MetaType {
+    Float,
+    Int,
+    Bits,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MetaSection {
+    name: String,
+    start: BundleAddress,
+    end: BundleAddress,
+}
+
+impl From<Type> for MetaType {
+    fn from(ty: Type) -> MetaType {
+        match ty {
+            Type::F => MetaType::Float,
+            Type::I => MetaType::Int,
+            Type::B => MetaType::Bits,
+        }
+    }
+}
+
+impl From<MetaType> for Type {
+    fn from(ty: MetaType) -> Type {
+        match ty {
+            MetaType::Float => Type::F,
+            MetaType::Int => Type::I,
+            MetaType::Bits => Type::B,
+        }
+    }
+}
+
+impl Meta {
+    pub(super) fn of(program: &Program) -> Meta {
+        let ports = |ports: &[Port]| {
+            let port = |port: &Port| MetaPort {
+                name: port.name.clone(),
+                register: port.register.get(),
+                ty: port.ty.into(),
+            };
+            ports.iter().map(port).collect()
+        };
+        let section = |section: &Section| MetaSection {
+            name: section.name.clone(),
+            start: section.start,
+            end: section.end,
+        };
+        Meta {
+            version: VERSION,
+            machine: program.machine.name.to_owned(),
+            inputs: ports(&program.inputs),
+            outputs: ports(&program.outputs),
+            latched: program.latched,
+            registers: ports(&program.registers),
+            sections: program.sections.iter().map(section).collect(),
+            files: program.files.clone(),
+            lines: program
+                .lines
+                .iter()
+                .map(|line| line.map(|Location { file, line }| (file, line)))
+                .collect(),
+        }
+    }
+
+    pub(super) fn to_json(&self) -> serde_json::Result<Vec<u8>> {
+        serde_json::to_vec(self)
+    }
+
+    pub(super) fn from_json(bytes: &[u8]) -> Result<Meta, ImageError> {
+        let wrong = |error: serde_json::Error| ImageError::Meta(error.to_string());
+        let Head { version } = serde_json::from_slice(bytes).map_err(wrong)?;
+        if version != VERSION {
+            return Err(ImageError::Version { found: version });
+        }
+        serde_json::from_slice(bytes).map_err(wrong)
+    }
+
+    pub(super) fn into_program(
+        self,
+        machine: &'static Machine,
+        code: Vec<u64>,
+        data: Vec<u32>,
+        constants: Vec<(Register, u32)>,
+        symbols: Vec<Symbol>,
+    ) -> Result<Program, ImageError> {
+        let ports = |kind, ports: Vec<MetaPort>| -> Result<Vec<Port>, ImageError> {
+            let port = |MetaPort { name, register, ty }| {
+                let known = Register::new(register.into());
+                let register = known.ok_or_else(|| wrong_port(kind, &name, register, NO_BANK))?;
+                Ok(Port { name, register, ty: ty.into() })
+            };
+            ports.into_iter().map(port).collect()
+        };
+        let section = |MetaSection { name, start, end }| Section { name, start, end };
+        Ok(Program {
+            machine,
+            code,
+            data,
+            constants,
+            inputs: ports("input", self.inputs)?,
+            outputs: ports("output", self.outputs)?,
+            latched: self.latched,
+            registers: ports("register", self.registers)?,
+            symbols,
+            loop_bounds: Vec::new(),
+            sections: self.sections.into_iter().map(section).collect(),
+            files: self.files,
+            lines: self
+                .lines
+                .into_iter()
+                .map(|line| line.map(|(file, line)| Location { file, line }))
+                .collect(),
+        })
+    }
+}

@@ -1,0 +1,201 @@
+//! What a program must keep to so that the loader, the debugger and the disassembler can rely on it.
+
+use super::ImageError;
+use crate::limits;
+use std::collections::HashSet;
+use takt_isa::program::{LoopBound, Port, Space};
+use takt_isa::{BundleAddress, Machine, Program, Register};
+
+/// The longest name of a source file.
+pub(super) const FILE_NAME: usize = 4096;
+
+/// Register addresses and bits, from the words of their section.
+pub(super) fn constants(words: &[u32], machine: &Machine) -> Result<Vec<(Register, u32)>, ImageError> {
+    let mut constants: Vec<(Register, u32)> = Vec::with_capacity(words.len() / 2);
+    for &[address, bits] in words.as_chunks::<2>().0 {
+        let wrong = |reason| ImageError::Register { what: "a constant".to_owned(), address, reason };
+        let register = register(machine, address).ok_or_else(|| wrong(NO_BANK))?;
+        if register == Register::ZERO {
+            return Err(wrong("nothing can be written there"));
+        }
+        if constants.last().is_some_and(|(last, _)| *last >= register) {
+            return Err(wrong("constants are not in ascending order"));
+        }
+        constants.push((register, bits));
+    }
+    Ok(constants)
+}
+
+/// Why an address names no register.
+pub(super) const NO_BANK: &str = "it is in no bank";
+
+/// The register that a machine has at an address of an image.
+pub(super) fn register(machine: &Machine, address: u32) -> Option<Register> {
+    Register::new(address as usize).filter(|register| machine.has_register(*register))
+}
+
+/// That a named register of an image is none.
+pub(super) fn wrong_port(kind: &str, name: &str, address: u16, reason: &'static str) -> ImageError {
+    ImageError::Register { what: format!("{kind} `{name}`"), address: address.into(), reason }
+}
+
+/// Whether a name has the letters of one, and no more than `limit`. (Those that a macro's use gives may be longer than a
+/// source's.)
+pub(super) fn is_spelled(name: &str, limit: usize) -> bool {
+    let first = |c: char| c.is_ascii_alphabetic() || c == '_';
+    let other = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
+    name.starts_with(first) && name.chars().all(other) && name.len() <= limit
+}
+
+/// Whether a source could declare the name.
+pub(crate) fn is_name(name: &str) -> bool {
+    is_spelled(name, limits::NAME_BYTES) && name != "zero"
+}
+
+pub(super) fn program(program: &Program) -> Result<(), ImageError> {
+    let machine = program.machine;
+    let slots = machine.slots.len();
+    if !program.code.len().is_multiple_of(slots) {
+        return Err(ImageError::WordCount { words: program.code.len(), slots, machine: machine.name });
+    }
+    let size = |what, found: usize, limit: u32| match found > limit as usize {
+        true => Err(ImageError::MemorySize { what, found, limit, machine: machine.name }),
+        false => Ok(()),
+    };
+    size("bundles", program.code.len() / slots, machine.code_depth)?;
+    size("words of data", program.data.len(), machine.data_depth)?;
+    ports(program)?;
+    names(program)?;
+    labels(program)?;
+    sections(program)?;
+    loops(program)?;
+    lines(program)
+}
+
+fn loops(program: &Program) -> Result<(), ImageError> {
+    let mut last = None;
+    for &LoopBound { address, most } in &program.loop_bounds {
+        let reason = match () {
+            () if address.get() >= program.bundles() => "there is no such bundle",
+            () if most == 0 => "a loop that is entered turns at least once",
+            () if last.is_some_and(|last| last >= address) => "bounds are not in ascending order",
+            () => "",
+        };
+        if !reason.is_empty() {
+            return Err(ImageError::Loop { address, reason });
+        }
+        last = Some(address);
+    }
+    Ok(())
+}
+
+fn ports(program: &Program) -> Result<(), ImageError> {
+    let machine = program.machine;
+    let mut seen = HashSet::new();
+    let mut check = |what: &str, port: &Port, fits: bool| {
+        let wrong = |reason| Err(wrong_port(what, &port.name, port.register.get(), reason));
+        if !machine.has_register(port.register) || port.register == Register::ZERO {
+            return wrong(NO_BANK);
+        }
+        if !fits {
+            return wrong("it does not lie where such registers lie");
+        }
+        if !seen.insert(port.register) {
+            return wrong("two names share the register");
+        }
+        Ok(())
+    };
+    for port in &program.inputs {
+        check("input", port, machine.is_input(port.register))?;
+    }
+    let mut numbers = HashSet::new();
+    for port in &program.outputs {
+        let number = machine.output_number(port.register);
+        check("output", port, number.is_some())?;
+        if !numbers.insert(number) {
+            let reason = "another output has the same number, in another bank: assemble its source again";
+            return Err(wrong_port("output", &port.name, port.register.get(), reason));
+        }
+    }
+    for port in &program.registers {
+        let plain = !machine.is_input(port.register) && !machine.is_output(port.register);
+        check("register", port, plain)?;
+    }
+    Ok(())
+}
+
+fn names(program: &Program) -> Result<(), ImageError> {
+    let ports = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
+    let names = ports.map(|port| &port.name).chain(program.symbols.iter().map(|symbol| &symbol.name));
+    let mut seen = HashSet::new();
+    for name in names {
+        if !is_name(name) {
+            return Err(ImageError::Name(name.clone()));
+        }
+        if !seen.insert(name.as_str()) {
+            return Err(ImageError::RepeatedName(name.clone()));
+        }
+    }
+    let mut seen = HashSet::new();
+    for file in &program.files {
+        if file.is_empty() || file.len() > FILE_NAME {
+            return Err(ImageError::Name(file.chars().take(80).collect()));
+        }
+        if !seen.insert(file.as_str()) {
+            return Err(ImageError::RepeatedName(file.clone()));
+        }
+    }
+    Ok(())
+}
+
+fn labels(program: &Program) -> Result<(), ImageError> {
+    let mut last = None;
+    for symbol in &program.symbols {
+        let wrong = |reason| ImageError::Label { name: symbol.name.clone(), address: symbol.address, reason };
+        let end = match symbol.space {
+            Space::Code => program.bundles() as usize,
+            Space::Data => program.data.len(),
+        };
+        if symbol.address as usize > end {
+            return Err(wrong("it points past the end of its memory"));
+        }
+        let place = (symbol.space, symbol.address);
+        if last.is_some_and(|last| last > place) {
+            return Err(wrong("labels are not in ascending order"));
+        }
+        last = Some(place);
+    }
+    Ok(())
+}
+
+fn sections(program: &Program) -> Result<(), ImageError> {
+    let bundles = program.bundles();
+    let (wrong, end) = (ImageError::Sections { bundles }, BundleAddress::new(bundles));
+    let mut at = BundleAddress::RESET;
+    let mut allowed: &[&str] = &["once", "period"];
+    for section in &program.sections {
+        let Some(position) = allowed.iter().position(|name| *name == section.name) else { return Err(wrong) };
+        allowed = &allowed[position + 1..];
+        if section.start != at || section.end <= section.start || section.end > end {
+            return Err(wrong);
+        }
+        at = section.end;
+    }
+    if at == end { Ok(()) } else { Err(wrong) }
+}
+
+fn lines(program: &Program) -> Result<(), ImageError> {
+    let wrong = |message: String| Err(ImageError::Lines(message));
+    if program.lines.len() != program.code.len() {
+        return wrong(format!("{} for {} words", program.lines.len(), program.code.len()));
+    }
+    for location in program.lines.iter().flatten() {
+        if location.file as usize >= program.files.len() {
+            return wrong(format!("one is in file {}, and there are {}", location.file, program.files.len()));
+        }
+        if location.line == 0 {
+            return wrong("one is line 0, and lines count from 1".to_owned());
+        }
+    }
+    Ok(())
+}
