@@ -24,7 +24,7 @@ impl Delays {
     /// Those of a machine.
     pub fn of(machine: &Machine) -> Delays {
         let delay = |function| {
-            let unit = machine.host(function).map(|(slot, unit)| &machine.slots[slot].units[unit]);
+            let unit = machine.host(function).map(|(slot, unit)| &machine.slots[slot.index()].units[unit]);
             unit.map(|unit| unit.latency)
         };
         let div = delay(Function::Divide).unwrap_or(1);
