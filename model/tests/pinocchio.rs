@@ -3,92 +3,14 @@
 //!
 //! `cargo xtask test` installs Pinocchio and the robots; TAKT_VENV names another environment that has them.
 
-use serde_json::{Value, json};
-use std::io::{BufRead, BufReader, Write};
-use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+mod common;
+
+use common::{Case, Reference, cases, numbers, robot};
+use serde_json::json;
+use std::path::Path;
 use takt_model::functions::{Options, What, derive};
 use takt_model::graph::{Delays, Rewrites};
-use takt_model::robot::{Robot, urdf};
-
-/// The process that answers.
-struct Reference {
-    child: Child,
-    input: ChildStdin,
-    output: BufReader<ChildStdout>,
-}
-
-fn python() -> PathBuf {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the crate lies in the project");
-    std::env::var_os("TAKT_VENV").map_or_else(|| root.join(".venv"), PathBuf::from).join("bin/python3")
-}
-
-impl Reference {
-    fn start() -> Reference {
-        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference.py");
-        let mut child = Command::new(python())
-            .arg(script)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("no Python environment: `cargo xtask test` makes one");
-        let input = child.stdin.take().expect("piped");
-        let output = BufReader::new(child.stdout.take().expect("piped"));
-        Reference { child, input, output }
-    }
-
-    fn ask(&mut self, request: &Value) -> Value {
-        writeln!(self.input, "{request}").expect("the reference runs");
-        let mut line = String::new();
-        self.output.read_line(&mut line).expect("the reference answers");
-        serde_json::from_str(&line).unwrap_or_else(|_| panic!("the reference failed: {request}"))
-    }
-}
-
-impl Drop for Reference {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-fn numbers(value: &Value) -> Vec<f64> {
-    value.as_array().expect("numbers").iter().map(|x| x.as_f64().expect("a number")).collect()
-}
-
-struct Case {
-    name: String,
-    urdf: String,
-    source: String,
-    base: Option<String>,
-    tip: Option<String>,
-    end: String,
-}
-
-fn cases(reference: &mut Reference) -> Vec<Case> {
-    let table: Value = serde_json::from_str(include_str!("robots.json")).expect("robots.json");
-    let text = |value: &Value| value.as_str().map(str::to_owned);
-    let rows = table.as_array().expect("a list").iter();
-    rows.map(|row| {
-        let urdf = text(&row["urdf"]).expect("a path");
-        let path = reference.ask(&json!({ "locate": urdf }));
-        let path = path.as_str().expect("a path").to_owned();
-        Case {
-            name: text(&row["name"]).expect("a name"),
-            source: std::fs::read_to_string(&path).expect("the robot's file"),
-            urdf,
-            base: text(&row["base"]),
-            tip: text(&row["tip"]),
-            end: text(&row["end"]).expect("a link"),
-        }
-    })
-    .collect()
-}
-
-fn robot(case: &Case, snap: f64) -> Robot {
-    let tree = urdf::read(&case.source, snap).expect("URDF");
-    tree.robot(case.base.as_deref(), case.tip.as_deref()).expect("a robot")
-}
+use takt_model::robot::urdf;
 
 /// The largest error of any output, beside the largest output of its state.
 fn error(reference: &mut Reference, case: &Case, what: What, rewrites: Rewrites, snap: f64, states: usize) -> f64 {

@@ -344,7 +344,8 @@ def answer(request):
     names, n = INPUTS[function], len(robot.ids)
     inputs, outputs = [], []
     for _ in range(request["states"]):
-        x = {name: random.uniform(-SPREAD[name], SPREAD[name], n) for name in names}
+        # In binary32, as the machine reads them.
+        x = {name: np.float32(random.uniform(-SPREAD[name], SPREAD[name], n)).astype(float) for name in names}
         inputs.append(np.concatenate([x[name] for name in names]).tolist())
         outputs.append(compute(robot, function, x, request).tolist())
     result = {"inputs": inputs, "outputs": outputs}

@@ -18,20 +18,26 @@ pub fn read(source: &str, snap: f64) -> Result<Tree, Error> {
     if source.len() > MAX_BYTES {
         return Err(Error::plain(format!("the file is longer than {} MiB", MAX_BYTES >> 20)));
     }
+    // This parser says where it is that a text is no XML.
+    let document = roxmltree::Document::parse(source)
+        .map_err(|error| Error::on(error.pos().row as usize, format!("this is no XML: {error}")))?;
+    if document.root_element().tag_name().name() != "robot" {
+        let name = document.root_element().tag_name().name();
+        return Err(Error::plain(format!("this is no URDF: its element is `{name}`, not `robot`")));
+    }
     let robot = urdf_rs::read_from_string(source).map_err(|error| not_urdf(source, &error.to_string()))?;
     convert(&robot, snap).map_err(|error| error.located(source))
 }
 
-/// The parser's message, with a line where it gives one.
+/// The parser's message, with the line of the value that it quotes.
 fn not_urdf(source: &str, message: &str) -> Error {
-    let mut lines = message.lines().map(str::trim).filter(|line| !line.is_empty());
-    let text = lines.next().unwrap_or("it cannot be read");
-    // "12:7: text", as one of the parsers puts it.
-    let number = text.split(|c: char| !c.is_ascii_digit()).next().and_then(|digits| digits.parse().ok());
-    let error = format!("this is no URDF: {text}");
-    match number.filter(|line| (1..=source.lines().count()).contains(line)) {
-        Some(line) => Error::on(line, error),
-        None => Error::plain(error),
+    let text = message.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or("it cannot be read");
+    let text = format!("this is no URDF: {}", text.strip_prefix("custom: ").unwrap_or(text));
+    let quoted = message.rsplit_once('[').and_then(|(_, rest)| rest.split_once(']')).map(|(value, _)| value);
+    let at = quoted.and_then(|value| source.find(&format!("\"{value}\"")));
+    match at {
+        Some(at) => Error::on(1 + source[..at].matches('\n').count(), text),
+        None => Error::plain(text),
     }
 }
 
@@ -45,6 +51,9 @@ fn convert(robot: &urdf_rs::Robot, snap: f64) -> Result<Tree, Error> {
         snapped += count;
         Ok(Pose { rotation, origin: *origin.xyz })
     };
+    if robot.links.is_empty() {
+        return Err(Error::plain("the robot has no link"));
+    }
     let mut links: Vec<(String, Inertia)> = Vec::new();
     let mut names = std::collections::HashSet::new();
     for link in &robot.links {
