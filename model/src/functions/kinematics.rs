@@ -26,6 +26,40 @@ fn times<'g>(axes: &Axes<'g>, a: Vector<'g>) -> Vector<'g> {
     std::array::from_fn(|i| a[0] * axes[0][i] + a[1] * axes[1][i] + a[2] * axes[2][i])
 }
 
+/// A point of the last link of a path as seen from each joint's origin, and in the base's frame: backwards, by what follows a joint,
+/// and by sums of angles what follows the first of those about parallel axes.
+fn arms<'g>(
+    graph: &'g Graph,
+    links: &[Link],
+    angles: &Angles<'g>,
+    q: &[Expr<'g>],
+    path: &[usize],
+    point: Vector<'g>,
+) -> (Vec<Vector<'g>>, Vector<'g>) {
+    let mut arm = vec![constant(graph, [0.0; 3]); path.len()];
+    let mut after = point;
+    for (place, &index) in path.iter().enumerate().rev() {
+        let link = &links[index];
+        arm[place] = match angles.sum[index] {
+            None => std::array::from_fn(|i| after[i] + link.axis[i] * q[index]),
+            Some(angle) => {
+                let own = angle.out(after);
+                let following = path.get(place + 1).copied();
+                match following.filter(|&next| angles.first[next] == angles.first[index]) {
+                    Some(_) => add(own, arm[place + 1]),
+                    None => own,
+                }
+            }
+        };
+        // What the joint before adds to it: the way to this joint's origin, and all behind unless it is added by sums.
+        after = match angles.sum[index].is_some() && angles.first[index] != index {
+            true => constant(graph, link.origin),
+            false => add(constant(graph, link.origin), turn(&link.rest, arm[place])),
+        };
+    }
+    (arm, after)
+}
+
 /// What the kinematics of a tip are made of, for each joint on the way to it.
 struct Chain<'g> {
     path: Vec<usize>,
@@ -45,10 +79,10 @@ impl<'g> Chain<'g> {
         links: &[Link],
         angles: &Angles<'g>,
         q: &[Expr<'g>],
-        tip: usize,
+        last: usize,
         pose: &Pose,
     ) -> Chain<'g> {
-        let path = path(links, tip);
+        let path = path(links, last);
         let base: Axes<'g> = std::array::from_fn(|j| constant(graph, space::column(&space::IDENTITY, j)));
         let mut turned: Vec<Axes<'g>> = Vec::new();
         let mut rest: Vec<Axes<'g>> = Vec::new();
@@ -75,35 +109,13 @@ impl<'g> Chain<'g> {
                 }
             });
         }
-        // Backwards: what follows a joint, and what follows the first of those about parallel axes, by the sums of angles.
-        let mut arm = vec![constant(graph, [0.0; 3]); path.len()];
-        let mut after = constant(graph, pose.origin);
-        for place in (0..path.len()).rev() {
-            let index = path[place];
-            let link = &links[index];
-            arm[place] = match angles.sum[index] {
-                None => std::array::from_fn(|i| after[i] + link.axis[i] * q[index]),
-                Some(angle) => {
-                    let own = angle.out(after);
-                    let following = path.get(place + 1).copied();
-                    match following.filter(|&next| angles.first[next] == angles.first[index]) {
-                        Some(_) => add(own, arm[place + 1]),
-                        None => own,
-                    }
-                }
-            };
-            // What the joint before adds to it: the way to this joint's origin, and all behind unless it is added by sums.
-            after = match angles.sum[index].is_some() && angles.first[index] != index {
-                true => constant(graph, link.origin),
-                false => add(constant(graph, link.origin), turn(&link.rest, arm[place])),
-            };
-        }
-        Chain { path, turned, rest, arm, tip: after }
+        let (arm, tip) = arms(graph, links, angles, q, &path, constant(graph, pose.origin));
+        Chain { path, turned, rest, arm, tip }
     }
 }
 
-/// The tip's rotation by rows, and its position. Positions are added from the base outwards up to joint `split` of the way, and
-/// from the tip inwards behind it: the first links' axes have zeros, and so has what the last links carry.
+/// The tip's rotation by rows, and its position. Positions are computed backwards through the first `split` joints of the way,
+/// whose turns are shared by what they carry, and behind them added along the axes, which are there already.
 pub(super) fn pose<'g>(
     graph: &'g Graph,
     links: &[Link],
@@ -117,24 +129,23 @@ pub(super) fn pose<'g>(
     let last = chain.turned[chain.turned.len() - 1];
     let axes = columns(&last, &pose.rotation);
     let rotation = std::array::from_fn(|i| axes.map(|column| column[i]));
-    if split == 0 {
+    let step = |place: usize| match chain.path.get(place) {
+        Some(&index) => constant(graph, links[index].origin),
+        None => constant(graph, pose.origin),
+    };
+    let split = split.min(chain.path.len());
+    if split == chain.path.len() {
         return (rotation, chain.tip);
     }
-    let mut at = constant(graph, [0.0; 3]);
-    for (place, &index) in chain.path.iter().enumerate() {
-        let link = &links[index];
-        let step = constant(graph, link.origin);
-        let within = |a: Vector<'g>| if place == 0 { a } else { times(&chain.turned[place - 1], a) };
-        at = add(at, within(step));
-        if place == split {
-            let axes = if angles.own[index].is_some() { chain.rest[place] } else { chain.turned[place] };
-            return (rotation, add(at, times(&axes, chain.arm[place])));
-        }
+    let (_, mut at) = arms(graph, links, angles, q, &chain.path[..split], step(split));
+    for (place, &index) in chain.path.iter().enumerate().skip(split) {
         if angles.own[index].is_none() {
-            at = add(at, within(constant(graph, link.axis).map(|axis| axis * q[index])));
+            let axis = constant(graph, links[index].axis).map(|axis| axis * q[index]);
+            at = add(at, if place == 0 { axis } else { times(&chain.turned[place - 1], axis) });
         }
+        at = add(at, times(&chain.turned[place], step(place + 1)));
     }
-    (rotation, add(at, times(&last, constant(graph, pose.origin))))
+    (rotation, at)
 }
 
 /// For each joint: the tip's linear and angular velocity for a unit of the joint's; `None` for one that does not carry it.

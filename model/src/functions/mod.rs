@@ -103,7 +103,11 @@ impl Function {
 
     /// The same with fewer operations.
     pub fn optimised(self, delays: &Delays) -> Function {
-        let (graph, nodes) = optimise(&self.graph, &self.nodes(), delays);
+        self.improved(delays, true)
+    }
+
+    fn improved(self, delays: &Delays, thorough: bool) -> Function {
+        let (graph, nodes) = optimise(&self.graph, &self.nodes(), delays, thorough);
         let outputs = self.outputs.into_iter().zip(nodes).map(|((port, _), id)| (port, id)).collect();
         Function { graph, outputs, ..self }
     }

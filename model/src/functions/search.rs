@@ -33,7 +33,7 @@ struct Attempt {
     layout: Layout,
     /// Use sums of angles of parallel axes.
     sums: bool,
-    /// Up to which joint of the way positions are added from the base outwards.
+    /// Through how many joints of the way positions are computed backwards.
     split: usize,
     /// The unit of length, m.
     unit: f64,
@@ -51,11 +51,11 @@ pub fn derive(robot: &Robot, what: What, options: &Options<'_>) -> Result<Functi
     let cost = |attempt: &Attempt| {
         let mut function = write(robot, what, options, tip, attempt);
         if robot.joints.len() <= TRIED {
-            function = function.optimised(&options.delays);
+            function = function.improved(&options.delays, false);
         }
         (function.count().total(), function.depth(&options.delays))
     };
-    let mut best = Attempt { layout: Layout::new(robot), sums: true, split: 0, unit: 1.0 };
+    let mut best = Attempt { layout: Layout::new(robot), sums: true, split: usize::MAX, unit: 1.0 };
     let mut least = cost(&best);
     let mut consider = |best: &mut Attempt, change: &dyn Fn(&mut Attempt)| {
         let mut other = best.clone();
@@ -67,7 +67,7 @@ pub fn derive(robot: &Robot, what: What, options: &Options<'_>) -> Result<Functi
     };
     consider(&mut best, &|attempt| attempt.sums = false);
     if what == What::ForwardKinematics {
-        for split in 1..=robot.joints.len().min(TRIED) {
+        for split in 0..robot.joints.len().min(TRIED) {
             consider(&mut best, &|attempt| attempt.split = split);
         }
     }
@@ -80,6 +80,12 @@ pub fn derive(robot: &Robot, what: What, options: &Options<'_>) -> Result<Functi
     for joint in 0..robot.joints.len().min(TRIED) {
         for quarters in 1..4 {
             consider(&mut best, &|attempt| attempt.layout.quarters[joint] = quarters);
+        }
+        for quarters in 0..4 {
+            consider(&mut best, &|attempt| {
+                attempt.layout.flipped[joint] ^= true;
+                attempt.layout.quarters[joint] = quarters;
+            });
         }
     }
     consider(&mut best, &|attempt| attempt.sums ^= true);

@@ -8,6 +8,7 @@
 mod evaluate;
 mod expr;
 mod passes;
+mod signs;
 mod simplify;
 
 pub use evaluate::{Count, evaluate};
@@ -264,11 +265,7 @@ impl Graph {
     fn label(&self, id: Id, label: Label) {
         if let Node::Unary(Unary::Neg, inner) = self.node(id) {
             // The sign moves on to where it costs nothing; what is computed is the other one.
-            let name = match label.name.strip_suffix("_neg") {
-                Some(name) => name.to_owned(),
-                None => label.name + "_neg",
-            };
-            return self.label(inner, Label { name, text: label.text });
+            return self.label(inner, signs::negated(label));
         }
         if self.node(id).operates() {
             self.store.borrow_mut().labels.entry(id).or_insert(label);

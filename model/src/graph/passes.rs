@@ -1,8 +1,9 @@
 //! Rewrites that depend on how often a value is used and when it is ready: sums are flattened, common factors are taken
 //! out, what remains is added in the order in which it is ready; then signs are moved to where they cost nothing.
 
-use super::{Binary, Count, Graph, Id, Node, Rewrites, Unary};
-use std::collections::{BTreeMap, HashMap};
+use super::{Binary, Count, Graph, Id, Node, Unary};
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
 use takt_isa::Machine;
 use takt_isa::spec::instructions::Function;
 
@@ -77,8 +78,9 @@ fn extend(graph: &Graph, ready: &mut Vec<u32>, delays: &Delays) {
 /// changes, nearly always after two.
 const ROUNDS: usize = 6;
 
-/// The graph that computes `outputs` with fewer operations, or in a shorter chain, and where its outputs are.
-pub fn optimise(graph: &Graph, outputs: &[Id], delays: &Delays) -> (Graph, Vec<Id>) {
+/// The graph that computes `outputs` with fewer operations, or in a shorter chain, and where its outputs are. If not `thorough`,
+/// it takes a tenth of the time and leaves a few signs more.
+pub fn optimise(graph: &Graph, outputs: &[Id], delays: &Delays, thorough: bool) -> (Graph, Vec<Id>) {
     let rewrites = graph.rewrites;
     let (mut best, mut at) = rebuild(graph, outputs, delays, sums);
     let mut cost = (Count::of(&best, &at).total(), depth(&best, &at, delays));
@@ -93,12 +95,7 @@ pub fn optimise(graph: &Graph, outputs: &[Id], delays: &Delays) -> (Graph, Vec<I
     if !rewrites.signs {
         return (best, at);
     }
-    // The constructors would move the signs back.
-    let settled = Graph::new(Rewrites { signs: false, ..rewrites });
-    let uses = best.uses(&at);
-    let mut settle = Settle { old: &best, new: &settled, uses: &uses, map: HashMap::new() };
-    let outputs = at.iter().map(|id| settle.plain(*id)).collect();
-    (settled, outputs)
+    super::signs::settle(&best, &at, thorough)
 }
 
 /// A graph in the making.
@@ -142,7 +139,8 @@ fn rebuild(
         }
         let id = Id(index as u32);
         live.push(id);
-        if flat && matches!(old.node(id), Node::Binary(Binary::Add | Binary::Sub, ..)) {
+        // Without balancing, only sums of two are looked at: the order stays.
+        if old.rewrites.balance && matches!(old.node(id), Node::Binary(Binary::Add | Binary::Sub, ..)) {
             for operand in old.node(id).operands() {
                 let once = uses[operand.index()] == 1;
                 part[operand.index()] =
@@ -186,54 +184,68 @@ impl Rebuild<'_> {
         }
     }
 
-    fn flatten(&self, id: Id, negative: bool, terms: &mut Vec<Term>) {
-        match self.old.node(id) {
-            Node::Binary(op @ (Binary::Add | Binary::Sub), a, b) if self.map[id.index()].is_none() => {
-                self.flatten(a, negative, terms);
-                self.flatten(b, negative ^ (op == Binary::Sub), terms);
-            }
-            node => {
-                let (sign, value) = self.unsigned(self.at(id));
-                let factors = match (node, self.new.node(value)) {
-                    (Node::Binary(Binary::Mul, ..), Node::Binary(Binary::Mul, a, b))
-                        if self.uses[id.index()] == 1 =>
-                    {
-                        Some((a, b))
-                    }
-                    _ => None,
-                };
-                terms.push(Term { negative: negative ^ sign, value, factors });
+    /// The terms of the sum at `id`, in its order.
+    fn flatten(&self, id: Id) -> Vec<Term> {
+        let mut terms = Vec::new();
+        let mut rest = vec![(id, false)];
+        while let Some((id, negative)) = rest.pop() {
+            match self.old.node(id) {
+                Node::Binary(op @ (Binary::Add | Binary::Sub), a, b) if self.map[id.index()].is_none() => {
+                    rest.push((b, negative ^ (op == Binary::Sub)));
+                    rest.push((a, negative));
+                }
+                node => {
+                    let (sign, value) = self.unsigned(self.at(id));
+                    let once = self.uses[id.index()] == 1;
+                    let factors = match (node, self.new.node(value)) {
+                        (Node::Binary(Binary::Mul, ..), Node::Binary(Binary::Mul, a, b)) if once => {
+                            Some((a, b))
+                        }
+                        _ => None,
+                    };
+                    terms.push(Term { negative: negative ^ sign, value, factors });
+                }
             }
         }
+        terms
     }
 
-    /// The sum of terms: its sign, and the sum without it.
-    fn add_up(&mut self, mut terms: Vec<Term>) -> Term {
+    /// The sum of terms: its sign, and the sum without it. The two that are ready first are added first; of those ready together,
+    /// the older. Without balancing, from left to right.
+    fn add_up(&mut self, terms: Vec<Term>) -> Term {
+        let mut waiting = BinaryHeap::new();
         extend(self.new, &mut self.ready, self.delays);
         let balance = self.new.rewrites.balance;
-        while terms.len() > 1 {
-            if balance {
-                // The two that are ready first; of those ready together, the older.
-                terms.sort_by_key(|term| (self.ready[term.value.index()], term.value));
-            }
-            let (a, b) = (terms[0], terms.remove(1));
+        let key = |state: &Self, term: &Term| if balance { (state.ready[term.value.index()], term.value) } else { (0, Id(0)) };
+        for (place, term) in terms.iter().enumerate() {
+            waiting.push(Reverse((key(self, term), place, term.negative, term.value)));
+        }
+        let mut place = terms.len();
+        loop {
+            let Some(Reverse((_, first, negative, value))) = waiting.pop() else {
+                return Term { negative: false, value: self.new.constant(0.0).id, factors: None };
+            };
+            let a = Term { negative, value, factors: None };
+            let Some(Reverse((_, _, negative, value))) = waiting.pop() else { return a };
+            let b = Term { negative, value, factors: None };
             let (op, negative, a, b) = match (a.negative, b.negative) {
                 (sign, other) if sign == other => (Binary::Add, sign, a, b),
                 (true, _) => (Binary::Sub, false, b, a),
                 _ => (Binary::Sub, false, a, b),
             };
             let (sign, value) = self.unsigned(self.new.binary(op, a.value, b.value));
-            terms[0] = Term { negative: negative ^ sign, value, factors: None };
             extend(self.new, &mut self.ready, self.delays);
+            let sum = Term { negative: negative ^ sign, value, factors: None };
+            place += 1;
+            let order = if balance { place } else { first };
+            waiting.push(Reverse((key(self, &sum), order, sum.negative, sum.value)));
         }
-        terms[0]
     }
 }
 
 /// The sum at `id`, flattened, its common factors taken out.
 fn sums(state: &mut Rebuild<'_>, id: Id) -> Id {
-    let mut terms = Vec::new();
-    state.flatten(id, false, &mut terms);
+    let mut terms = state.flatten(id);
     while let Some(factor) = state.new.rewrites.factor.then(|| common(&terms)).flatten() {
         let mut inner = Vec::new();
         terms.retain(|term| {
@@ -267,71 +279,4 @@ fn common(terms: &[Term]) -> Option<Id> {
         }
     }
     often.into_iter().filter(|(_, often)| *often > 1).max_by_key(|(id, often)| (*often, *id)).map(|(id, _)| id)
-}
-
-/// Moves signs into what nothing else uses: `-(a - b)` is `b - a`, `-(2*x)` is `-2*x`.
-struct Settle<'a> {
-    old: &'a Graph,
-    new: &'a Graph,
-    uses: &'a [u32],
-    map: HashMap<Id, Id>,
-}
-
-impl Settle<'_> {
-    fn plain(&mut self, id: Id) -> Id {
-        // Operands come first, so that this never recurs deeply.
-        for index in self.map.len()..=id.index() {
-            let id = Id(index as u32);
-            let made = match self.old.node(id) {
-                Node::Constant(bits) => self.new.constant(f64::from_bits(bits)).id,
-                Node::Input(index) => self.new.input(index as usize).id,
-                Node::Unary(Unary::Neg, a) => match self.flipped(a, 0) {
-                    Some(made) => made,
-                    None => self.new.raw(Node::Unary(Unary::Neg, self.map[&a])),
-                },
-                Node::Unary(op, a) => self.new.raw(Node::Unary(op, self.map[&a])),
-                Node::Binary(op, a, b) => self.new.raw(Node::Binary(op, self.map[&a], self.map[&b])),
-                Node::Select(c, a, b) => {
-                    self.new.raw(Node::Select(self.map[&c], self.map[&a], self.map[&b]))
-                }
-            };
-            self.map.insert(id, made);
-            if let Some(label) = self.old.label_of(id) {
-                self.new.label(made, label);
-            }
-        }
-        self.map[&id]
-    }
-
-    /// Minus the node at no cost, if nothing else uses it.
-    fn flipped(&mut self, id: Id, depth: usize) -> Option<Id> {
-        /// How far down a sign is carried.
-        const REACH: usize = 32;
-        if self.uses[id.index()] != 1 || depth > REACH {
-            return self.old.value(id).map(|value| self.new.constant(-value).id);
-        }
-        let (op, a, b) = match self.old.node(id) {
-            Node::Constant(bits) => return Some(self.new.constant(-f64::from_bits(bits)).id),
-            Node::Binary(op, a, b) => (op, a, b),
-            _ => return None,
-        };
-        match op {
-            Binary::Sub => Some(self.new.raw(Node::Binary(Binary::Sub, self.map[&b], self.map[&a]))),
-            Binary::Mul | Binary::Div => {
-                let (a, b) = match self.flipped(a, depth + 1) {
-                    Some(a) => (a, self.map[&b]),
-                    None => (self.map[&a], self.flipped(b, depth + 1)?),
-                };
-                Some(self.new.raw(Node::Binary(op, a, b)))
-            }
-            Binary::Add => {
-                let (a, b) = match self.flipped(a, depth + 1) {
-                    Some(a) => (a, self.map[&b]),
-                    None => (self.flipped(b, depth + 1)?, self.map[&a]),
-                };
-                Some(self.new.raw(Node::Binary(Binary::Sub, a, b)))
-            }
-            _ => None,
-        }
-    }
 }

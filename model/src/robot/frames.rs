@@ -42,13 +42,16 @@ pub struct Layout {
     pub balanced: Vec<bool>,
     /// By how many quarter turns more each x axis is turned: it costs nothing, and decides which signs are needed.
     pub quarters: Vec<u8>,
+    /// Whether a z axis points against the joint's: this, too, decides which signs are needed.
+    pub flipped: Vec<bool>,
 }
 
 impl Layout {
     /// Origins towards the next joint, axes that need no offset.
     pub fn new(robot: &Robot) -> Layout {
         let count = robot.joints.len();
-        Layout { incoming: vec![false; count], balanced: vec![false; count], quarters: vec![0; count] }
+        let no = vec![false; count];
+        Layout { incoming: no.clone(), balanced: no.clone(), quarters: vec![0; count], flipped: no }
     }
 }
 
@@ -93,7 +96,7 @@ struct Geometry<'a> {
 }
 
 impl<'a> Geometry<'a> {
-    fn new(robot: &'a Robot) -> Geometry<'a> {
+    fn new(robot: &'a Robot, layout: &Layout) -> Geometry<'a> {
         let count = robot.joints.len();
         let mut world: Vec<Pose> = Vec::with_capacity(count);
         for joint in &robot.joints {
@@ -102,6 +105,9 @@ impl<'a> Geometry<'a> {
         let mut lines: Vec<Line> = Vec::with_capacity(count);
         for (index, (joint, pose)) in robot.joints.iter().zip(&world).enumerate() {
             let mut direction = space::turn(&pose.rotation, joint.axis);
+            if layout.flipped[index] {
+                direction = space::scale(-1.0, direction);
+            }
             // Axes that are parallel point the same way: then their angles add up.
             let mut carrier = robot.joints[index].parent;
             while let Some(before) = carrier.filter(|before| robot.joints[*before].kind == Kind::Prismatic) {
@@ -209,13 +215,14 @@ fn rest(axis: V3) -> M3 {
 
 /// The links of a robot in canonical frames, and what they weigh.
 pub fn place(robot: &Robot, layout: &Layout) -> Vec<Link> {
-    let mut geometry = Geometry::new(robot);
+    let mut geometry = Geometry::new(robot, layout);
     let mut links: Vec<Link> = Vec::with_capacity(robot.joints.len());
     for (index, joint) in robot.joints.iter().enumerate() {
         let carrier = joint.parent.map_or(Pose::IDENTITY, |parent| geometry.frames[parent]);
         let line = geometry.lines[index];
         let back = space::transpose(&carrier.rotation);
         let axis = space::turn(&space::cleaned(&back), line.direction);
+        let axis = if joint.kind == Kind::Prismatic && layout.flipped[index] { space::scale(-1.0, axis) } else { axis };
         let axis = normalised(axis.map(|x| if (x - x.round()).abs() < 1e-9 { x.round() } else { x }));
         let beside = geometry.revolute(joint.parent).is_some_and(|parent| geometry.together(parent, index));
         let mut link = Link {
