@@ -126,6 +126,7 @@ fn apt_install(packages: &[&str]) -> Result<()> {
 
 fn test(full: bool, rest: &[String]) -> Result<()> {
     install()?;
+    venv::Venv::with(&venv::MODELS)?;
     if rest.is_empty() {
         formal::formal(&formal::Arguments::SHARE)?;
     }
