@@ -176,7 +176,11 @@ pub(crate) fn run(arguments: &Model, color: bool, out: &mut Out) -> Result<()> {
     if !alone {
         let Built { cycles, bound, bundles } = built;
         let cycles = cycles.map_or_else(|| "unbounded".to_owned(), |cycles| cycles.to_string());
-        writeln!(out, "{cycles} cycles on {}, bound {bound}, chain {chain}; {bundles} bundles", machine.name)?;
+        writeln!(
+            out,
+            "{cycles} cycles on {}, bound {bound}, chain {chain}; {bundles} bundles",
+            machine.name
+        )?;
     }
     Ok(())
 }
@@ -202,7 +206,10 @@ fn function(arguments: &Model, delays: &Delays) -> Result<Function> {
                 ("--tip", arguments.tip.is_some()),
             ];
             if let Some((option, _)) = unused.iter().find(|(_, given)| *given) {
-                return Err(Failure::Usage(format!("{option} is about robots; {name} is a list of instructions")).into());
+                return Err(Failure::Usage(format!(
+                    "{option} is about robots; {name} is a list of instructions"
+                ))
+                .into());
             }
             return Ok(instructions::read(&text, rewrites).map_err(told)?.optimised(delays));
         }
@@ -212,7 +219,9 @@ fn function(arguments: &Model, delays: &Delays) -> Result<Function> {
     };
     let Some(what) = arguments.function else {
         let names: Vec<&str> = What::ALL.iter().map(|(_, name, _)| *name).collect();
-        return Err(Failure::Usage(format!("say with --function what to compute: {}", names.join(", "))).into());
+        return Err(
+            Failure::Usage(format!("say with --function what to compute: {}", names.join(", "))).into()
+        );
     };
     let (base, tip) = (arguments.base.as_deref(), arguments.tip.as_deref());
     let robot = tree.robot(base, tip).map_err(|error| told(error.located(&text)))?;

@@ -8,10 +8,24 @@ fn main() {
     let delays = Delays::of(&takt_isa::T3);
     let options = Options { rewrites: Rewrites::ALL, delays, tip: opt(2).or(opt(4)), kp: 100.0, kd: 20.0 };
     for (what, name, _) in What::ALL {
-        if a[1] != "all" && a[1] != name { continue; }
+        if a[1] != "all" && a[1] != name {
+            continue;
+        }
         let f = derive(&robot, what, &options).unwrap();
-        if a[1] != "all" { print!("{}", takt_model::write::source(&f)); continue; }
+        if a[1] != "all" {
+            print!("{}", takt_model::write::source(&f));
+            continue;
+        }
         let c = f.count();
-        println!("{name:20} total {:4}  add {} mul {} div {} trig {} other {} depth {}", c.total(), c.add, c.mul, c.div, c.trig, c.other, f.depth(&delays));
+        println!(
+            "{name:20} total {:4}  add {} mul {} div {} trig {} other {} depth {}",
+            c.total(),
+            c.add,
+            c.mul,
+            c.div,
+            c.trig,
+            c.other,
+            f.depth(&delays)
+        );
     }
 }

@@ -63,7 +63,8 @@ impl Argument {
         if self.rows.saturating_mul(self.columns) > MAX_PORTS {
             return Err(wrong(format!("{} by {} is more than {MAX_PORTS} scalars", self.rows, self.columns)));
         }
-        let dense = || (0..self.columns).flat_map(|j| (0..self.rows).map(move |i| [i, j])).collect::<Vec<_>>();
+        let dense =
+            || (0..self.columns).flat_map(|j| (0..self.rows).map(move |i| [i, j])).collect::<Vec<_>>();
         let places = self.nonzeros.clone().unwrap_or_else(dense);
         let plain: String =
             self.name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
@@ -117,7 +118,8 @@ pub fn read(source: &str, rewrites: Rewrites) -> Result<Function, Error> {
     let outputs = file.outputs.iter().map(Argument::ports).collect::<Result<Vec<_>, _>>()?;
     let graph = Graph::new(rewrites);
     let nodes = {
-        let mut reader = Reader { graph: &graph, first, names: &ports, places: HashMap::new(), outputs: HashMap::new() };
+        let mut reader =
+            Reader { graph: &graph, first, names: &ports, places: HashMap::new(), outputs: HashMap::new() };
         for (number, step) in file.code.iter().enumerate() {
             reader.step(step).map_err(|text| match line_of(source, number) {
                 Some(line) => Error::on(line, text),

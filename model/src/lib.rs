@@ -1,8 +1,8 @@
 //! From a robot's description, or another tool's expressions, to equations that the assembler reads.
 
 mod error;
-pub mod graph;
 pub mod functions;
+pub mod graph;
 pub mod instructions;
 pub mod robot;
 pub mod write;

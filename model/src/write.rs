@@ -263,7 +263,6 @@ impl Writer<'_> {
             }
         }
     }
-
 }
 
 /// How values are written.

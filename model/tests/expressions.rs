@@ -35,10 +35,15 @@ fn other_tools_agree() {
             let function = function.optimised(&Delays::of(&takt_isa::T3));
             for line in text(&format!("{name}.values")).lines() {
                 let state: Value = serde_json::from_str(line).expect("JSON");
-                let (computed, expected) = (function.evaluate(&numbers(&state["inputs"])), numbers(&state["outputs"]));
+                let (computed, expected) =
+                    (function.evaluate(&numbers(&state["inputs"])), numbers(&state["outputs"]));
                 assert_eq!(computed.len(), expected.len(), "{name}");
                 for ((port, _), (x, y)) in function.outputs.iter().zip(computed.iter().zip(&expected)) {
-                    assert!((x - y).abs() <= 1e-12 * (1.0 + y.abs()), "{name}: {}: {x} is not {y}", port.name);
+                    assert!(
+                        (x - y).abs() <= 1e-12 * (1.0 + y.abs()),
+                        "{name}: {}: {x} is not {y}",
+                        port.name
+                    );
                 }
             }
         }
@@ -48,12 +53,19 @@ fn other_tools_agree() {
         let inputs = function.inputs.iter().chain(function.outputs.iter().map(|(port, _)| port));
         inputs.map(|port| port.name.clone()).collect()
     };
-    assert_eq!(names("matrices.json")[..8], ["q_1_1", "q_2_1", "q_1_2", "q_2_2", "q_1_3", "q_2_3", "sparse_3_1", "sparse_1_2"]);
+    assert_eq!(
+        names("matrices.json")[..8],
+        ["q_1_1", "q_2_1", "q_1_2", "q_2_2", "q_1_3", "q_2_3", "sparse_3_1", "sparse_1_2"]
+    );
     assert_eq!(names("symbols.json")[..4], ["p_1", "p_2", "c", "y_1"]);
     let error = |name: &str| read(&text(name), Rewrites::ALL).err().expect("an error");
     assert_eq!(error("unknown.json").text, "operation `erf` has no meaning here; in `erf(sin(x) + 1.0)`");
     assert!(error("unknown.json").line.is_some_and(|line| line > 1));
-    assert!(error("power.json").text.contains("only a constant power has one; in `pow(x, x)`"), "{}", error("power.json"));
+    assert!(
+        error("power.json").text.contains("only a constant power has one; in `pow(x, x)`"),
+        "{}",
+        error("power.json")
+    );
     std::fs::remove_dir_all(folder).expect("removed");
 }
 
@@ -77,8 +89,14 @@ fn wrong_lists_are_refused() {
         (r#"{"op": "input", "to": 1, "port": [3, 0]}"#, "5: there is no input 3 with a scalar 0"),
         (r#"{"op": "input", "to": 1, "port": [0, 1]}"#, "5: there is no input 0 with a scalar 1"),
         (r#"{"op": "const", "to": 1}"#, "5: `const` has no `value`"),
-        (r#"{"op": "constpow", "to": 1, "of": [0, 0]}"#, "5: operation `constpow` has no meaning here: only a constant power has one; in `constpow(x, x)`"),
-        (r#"{"op": "sin", "to": -1, "of": [7]}"#, "5: this is no list of instructions: invalid value: integer `-1`, expected usize"),
+        (
+            r#"{"op": "constpow", "to": 1, "of": [0, 0]}"#,
+            "5: operation `constpow` has no meaning here: only a constant power has one; in `constpow(x, x)`",
+        ),
+        (
+            r#"{"op": "sin", "to": -1, "of": [7]}"#,
+            "5: this is no list of instructions: invalid value: integer `-1`, expected usize",
+        ),
     ] {
         assert_eq!(list(x, y, &format!("{input},\n{code}")), expected);
     }

@@ -130,13 +130,28 @@ fn each_rewrite_can_be_switched_off() {
     let cases: [(&str, Make, &str, &str); 9] = [
         ("fold", |x, _, _| ((2.0 + x.graph().constant(3.0)) * x).id(), "out = 5.0*x", "out = x*(3.0 + 2.0)"),
         ("identities", |x, _, _| (1.0 * x + 0.0 * x).id(), "out = x", "out = 1.0*x"),
-        ("share", |x, y, _| ((x * y).sin() + (x * y).cos()).id(), "t1 = x*y; out = sin(t1) + cos(t1)", "out = sin(x*y) + cos(x*y)"),
-        ("signs", |x, y, z| (z * (y - x)).sin().binary(Binary::Add, (z * (x - y)).cos()).id(), "t1 = z*(x - y); out = cos(t1) - sin(t1)", "out = sin(z*(y - x)) + cos(z*(x - y))"),
+        (
+            "share",
+            |x, y, _| ((x * y).sin() + (x * y).cos()).id(),
+            "t1 = x*y; out = sin(t1) + cos(t1)",
+            "out = sin(x*y) + cos(x*y)",
+        ),
+        (
+            "signs",
+            |x, y, z| (z * (y - x)).sin().binary(Binary::Add, (z * (x - y)).cos()).id(),
+            "t1 = z*(x - y); out = cos(t1) - sin(t1)",
+            "out = sin(z*(y - x)) + cos(z*(x - y))",
+        ),
         ("strength", |x, _, _| (x / x.graph().constant(8.0)).id(), "out = 0.125*x", "out = x/8.0"),
         ("factor", |x, y, z| (x * y + x * z).id(), "out = x*(y + z)", "out = x*y + x*z"),
         ("balance", |x, y, z| (x.sin() + y + z).id(), "out = sin(x) + (y + z)", "out = z + (y + sin(x))"),
         ("signs", |x, y, _| (-(x - y)).id(), "out = y - x", "out = -(x - y)"),
-        ("factor", |x, y, z| (3.0 * x - 3.0 * y + z).id(), "out = z + 3.0*(x - y)", "out = z + 3.0*x - 3.0*y"),
+        (
+            "factor",
+            |x, y, z| (3.0 * x - 3.0 * y + z).id(),
+            "out = z + 3.0*(x - y)",
+            "out = z + 3.0*x - 3.0*y",
+        ),
     ];
     for (name, make, on, off) in cases {
         let mut without = Rewrites::ALL;
@@ -146,7 +161,9 @@ fn each_rewrite_can_be_switched_off() {
     }
     // A sum of so many terms that whoever recurred over it would run out of stack.
     let graph = Graph::new(Rewrites::ALL);
-    let long = (0..200_000).fold(graph.input(0).sin(), |sum, i| sum + graph.constant(f64::from(i) + 0.5) * graph.input(i as usize % 7));
+    let long = (0..200_000).fold(graph.input(0).sin(), |sum, i| {
+        sum + graph.constant(f64::from(i) + 0.5) * graph.input(i as usize % 7)
+    });
     let negated = (0..200_000).fold(long, |value, _| value.unary(Unary::Neg));
     let (better, at) = optimise(&graph, &[negated.id()], &Delays::of(&takt_isa::T3), true);
     assert!(evaluate(&better, &at, &[0.5; 7])[0].is_finite());

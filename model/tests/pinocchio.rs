@@ -13,7 +13,14 @@ use takt_model::graph::{Delays, Rewrites};
 use takt_model::robot::urdf;
 
 /// The largest error of any output, beside the largest output of its state.
-fn error(reference: &mut Reference, case: &Case, what: What, rewrites: Rewrites, snap: f64, states: usize) -> f64 {
+fn error(
+    reference: &mut Reference,
+    case: &Case,
+    what: What,
+    rewrites: Rewrites,
+    snap: f64,
+    states: usize,
+) -> f64 {
     let robot = robot(case, snap);
     let delays = Delays::of(&takt_isa::T3);
     let options = Options { rewrites, delays, tip: Some(&case.end), kp: 100.0, kd: 20.0 };
@@ -23,7 +30,11 @@ fn error(reference: &mut Reference, case: &Case, what: What, rewrites: Rewrites,
         "urdf": case.urdf, "joints": joints, "base": robot.base, "tip": case.end, "function": what.name(),
         "states": states, "seed": 1, "kp": options.kp, "kd": options.kd,
     }));
-    let states = answer["inputs"].as_array().expect("states").iter().zip(answer["outputs"].as_array().expect("states"));
+    let states = answer["inputs"]
+        .as_array()
+        .expect("states")
+        .iter()
+        .zip(answer["outputs"].as_array().expect("states"));
     let mut worst: f64 = 0.0;
     for (inputs, outputs) in states {
         let expected = numbers(outputs);

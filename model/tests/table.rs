@@ -24,8 +24,13 @@ struct Built {
 }
 
 fn function(case: &Case, what: What, machine: &Machine) -> Function {
-    let options =
-        Options { rewrites: Rewrites::ALL, delays: Delays::of(machine), tip: Some(&case.end), kp: 100.0, kd: 20.0 };
+    let options = Options {
+        rewrites: Rewrites::ALL,
+        delays: Delays::of(machine),
+        tip: Some(&case.end),
+        kp: 100.0,
+        kd: 20.0,
+    };
     derive(&robot(case, urdf::SNAP), what, &options).expect("equations")
 }
 
@@ -74,7 +79,11 @@ fn row(reference: &mut Reference, case: &Case, what: What, states: usize) -> Row
     let mut t3 = built(&function_t3, &T3);
     let read = write::inputs_read(&function_t3);
     let (mut error, mut machine) = (0.0f64, Vec::new());
-    let states = answer["inputs"].as_array().expect("states").iter().zip(answer["outputs"].as_array().expect("states"));
+    let states = answer["inputs"]
+        .as_array()
+        .expect("states")
+        .iter()
+        .zip(answer["outputs"].as_array().expect("states"));
     for (inputs, outputs) in states {
         let (inputs, expected) = (numbers(inputs), numbers(outputs));
         let size = expected.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
@@ -83,7 +92,8 @@ fn row(reference: &mut Reference, case: &Case, what: What, states: usize) -> Row
         };
         error = error.max(worst(&function_t3.evaluate(&inputs)));
         let Ok(Built { emulator, .. }) = &mut t3 else { continue };
-        for ((port, value), _) in function_t3.inputs.iter().zip(&inputs).zip(&read).filter(|(_, read)| **read) {
+        for ((port, value), _) in function_t3.inputs.iter().zip(&inputs).zip(&read).filter(|(_, read)| **read)
+        {
             emulator.set_input(&port.name, Number::Float(*value as f32)).expect("a port");
         }
         emulator.run_period(&[]).expect("a period");
@@ -191,7 +201,8 @@ fn targets_are_kept() {
         .map(|line| line.split('|').map(str::trim).collect())
         .collect();
     assert!(rows.len() >= 8 * What::ALL.len());
-    let number = |text: &str| -> u64 { text.split(' ').next().and_then(|text| text.parse().ok()).expect("a number") };
+    let number =
+        |text: &str| -> u64 { text.split(' ').next().and_then(|text| text.parse().ok()).expect("a number") };
     for row in &rows {
         let (operations, casadi) = (number(row[3]), number(row[4]));
         assert!(10 * operations <= 9 * casadi, "{row:?}");

@@ -193,7 +193,10 @@ pub(super) fn motions<'g>(
         let text = format!("acceleration of the origin of link {number}, less that of free fall");
         let a = std::array::from_fn(|i| a[i].named(name("a", ["x", "y", "z"][i]), &text));
         let entry = |value: Expr<'g>, axes: &str| {
-            value.named(name("u", axes), format!("acceleration of points of link {number} relative to its origin, 1/s²"))
+            value.named(
+                name("u", axes),
+                format!("acceleration of points of link {number} relative to its origin, 1/s²"),
+            )
         };
         states.push(State {
             w: [wx, wy, wz],

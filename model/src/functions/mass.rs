@@ -56,7 +56,12 @@ fn about_z<'g>(angle: &Angle<'g>, s: Symmetric<'g>) -> Symmetric<'g> {
 pub(super) type Matrix<'g> = Vec<Vec<Option<Expr<'g>>>>;
 
 /// The joint-space inertia, the lower triangle.
-pub(super) fn matrix<'g>(graph: &'g Graph, links: &[Link], angles: &Angles<'g>, q: &[Expr<'g>]) -> Matrix<'g> {
+pub(super) fn matrix<'g>(
+    graph: &'g Graph,
+    links: &[Link],
+    angles: &Angles<'g>,
+    q: &[Expr<'g>],
+) -> Matrix<'g> {
     let mut whole: Vec<Composite<'g>> = links
         .iter()
         .map(|link| {

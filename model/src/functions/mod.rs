@@ -32,13 +32,25 @@ pub enum What {
 impl What {
     /// All of them, their names, and what they are.
     pub const ALL: [(What, &'static str, &'static str); 7] = [
-        (What::ForwardKinematics, "forward-kinematics", "pose of the tip in the base's frame: rotation and position"),
-        (What::Jacobian, "jacobian", "geometric Jacobian of the tip, in the base's axes: linear velocity, then angular"),
+        (
+            What::ForwardKinematics,
+            "forward-kinematics",
+            "pose of the tip in the base's frame: rotation and position",
+        ),
+        (
+            What::Jacobian,
+            "jacobian",
+            "geometric Jacobian of the tip, in the base's axes: linear velocity, then angular",
+        ),
         (What::InverseDynamics, "inverse-dynamics", "joint forces that a motion takes"),
         (What::Gravity, "gravity", "joint forces that hold the robot at rest"),
         (What::MassMatrix, "mass-matrix", "joint-space inertia, the lower triangle"),
         (What::ForwardDynamics, "forward-dynamics", "joint accelerations under joint forces"),
-        (What::ComputedTorque, "computed-torque", "joint forces that follow a reference: inverse dynamics of qddr + kp (qr - q) + kd (qdr - qd)"),
+        (
+            What::ComputedTorque,
+            "computed-torque",
+            "joint forces that follow a reference: inverse dynamics of qddr + kp (qr - q) + kd (qdr - qd)",
+        ),
     ];
 
     /// Its name on the command line.

@@ -143,9 +143,8 @@ fn tip<'a>(robot: &'a Robot, name: Option<&str>) -> Result<Tip<'a>, Error> {
         let ends = crate::robot::list(&names);
         Error::plain(format!("the robot has several ends: choose a link with --tip, among them {ends}"))
     })?;
-    let joint = frame.joint.ok_or_else(|| {
-        Error::plain(format!("--tip: link `{}` does not move", frame.name))
-    })?;
+    let joint =
+        frame.joint.ok_or_else(|| Error::plain(format!("--tip: link `{}` does not move", frame.name)))?;
     Ok((&frame.name, joint, frame.pose))
 }
 
@@ -193,7 +192,13 @@ struct Inputs<'g> {
 
 impl<'g> Inputs<'g> {
     /// One for each joint.
-    fn joints(&mut self, robot: &Robot, what: &str, text: &str, unit: &dyn Fn(Kind) -> String) -> Vec<Expr<'g>> {
+    fn joints(
+        &mut self,
+        robot: &Robot,
+        what: &str,
+        text: &str,
+        unit: &dyn Fn(Kind) -> String,
+    ) -> Vec<Expr<'g>> {
         let names = port_names(robot);
         let mut inputs = Vec::new();
         for (joint, name) in robot.joints.iter().zip(names) {
@@ -205,7 +210,13 @@ impl<'g> Inputs<'g> {
     }
 }
 
-fn write(robot: &Robot, what: What, options: &Options<'_>, tip: Option<Tip<'_>>, attempt: &Attempt) -> Function {
+fn write(
+    robot: &Robot,
+    what: What,
+    options: &Options<'_>,
+    tip: Option<Tip<'_>>,
+    attempt: &Attempt,
+) -> Function {
     let graph = Graph::new(options.rewrites);
     let (inputs, outputs) = {
         let mut inputs = Inputs { graph: &graph, ports: Vec::new() };
@@ -231,7 +242,8 @@ fn equations(
         gravity = space::scale(1.0 / unit, gravity);
         for link in &mut links {
             link.origin = link.origin.map(|x| if x.abs() == unit { x.signum() } else { x / unit });
-            link.body.first = link.body.first.map(|x| if (x * unit).abs() - 1.0 == 0.0 { x.signum() } else { x * unit });
+            link.body.first =
+                link.body.first.map(|x| if (x * unit).abs() - 1.0 == 0.0 { x.signum() } else { x * unit });
             link.body.mass *= unit * unit;
         }
     }
@@ -330,7 +342,8 @@ fn equations(
 /// joint's, where what remains is quarter turns.
 fn aligned(links: &mut [Link], joint: usize, pose: &Pose) -> Pose {
     let tip = links[joint].own.then(pose);
-    let tip = Pose { rotation: space::cleaned(&tip.rotation), origin: space::cleaned_vector(tip.origin, 1.0) };
+    let tip =
+        Pose { rotation: space::cleaned(&tip.rotation), origin: space::cleaned_vector(tip.origin, 1.0) };
     let across = (0..3).find(|&j| tip.rotation[2][j].abs() == 1.0).map(|j| (j + 1) % 3);
     let Some(column) = across.filter(|_| links[joint].kind == Kind::Revolute) else { return tip };
     let [x, y, _] = space::column(&tip.rotation, column);
@@ -354,12 +367,19 @@ fn jacobian_ports<'g>(
     for row in 0..6 {
         for (column, entries) in columns.iter().enumerate() {
             let entry = match entries {
-                Some((linear, angular)) => if row < 3 { linear[row] } else { angular[row - 3] },
+                Some((linear, angular)) => {
+                    if row < 3 {
+                        linear[row]
+                    } else {
+                        angular[row - 3]
+                    }
+                }
                 None => nothing,
             };
             let axis = ["x", "y", "z"][row % 3];
             let unit = if row < 3 { "velocity" } else { "angular velocity" };
-            let text = format!("{unit} of the tip along {axis} per velocity of {}", robot.joints[column].name);
+            let text =
+                format!("{unit} of the tip along {axis} per velocity of {}", robot.joints[column].name);
             ports.push((Port { name: format!("J_{}_{}", row + 1, column + 1), text }, entry.id()));
         }
     }

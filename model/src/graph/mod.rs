@@ -70,7 +70,10 @@ impl Binary {
     }
 
     fn commutes(self) -> bool {
-        matches!(self, Binary::Add | Binary::Mul | Binary::Min | Binary::Max | Binary::Equal | Binary::NotEqual)
+        matches!(
+            self,
+            Binary::Add | Binary::Mul | Binary::Min | Binary::Max | Binary::Equal | Binary::NotEqual
+        )
     }
 }
 
@@ -143,7 +146,7 @@ impl Rewrites {
     };
     /// Those that leave every operation's rounding as it is written: for finite values, the result is the same to the bit
     /// but for the sign of a zero.
-    pub const EXACT: Rewrites = 
+    pub const EXACT: Rewrites =
         Rewrites { strength: false, factor: false, balance: false, scale: false, ..Rewrites::ALL };
 
     /// Name and effect of each, in the order of the fields.

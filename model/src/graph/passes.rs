@@ -216,7 +216,9 @@ impl Rebuild<'_> {
         let mut waiting = BinaryHeap::new();
         extend(self.new, &mut self.ready, self.delays);
         let balance = self.new.rewrites.balance;
-        let key = |state: &Self, term: &Term| if balance { (state.ready[term.value.index()], term.value) } else { (0, Id(0)) };
+        let key = |state: &Self, term: &Term| {
+            if balance { (state.ready[term.value.index()], term.value) } else { (0, Id(0)) }
+        };
         for (place, term) in terms.iter().enumerate() {
             waiting.push(Reverse((key(self, term), place, term.negative, term.value)));
         }
@@ -278,5 +280,9 @@ fn common(terms: &[Term]) -> Option<Id> {
             *often.entry(b).or_default() += 1;
         }
     }
-    often.into_iter().filter(|(_, often)| *often > 1).max_by_key(|(id, often)| (*often, *id)).map(|(id, _)| id)
+    often
+        .into_iter()
+        .filter(|(_, often)| *often > 1)
+        .max_by_key(|(id, often)| (*often, *id))
+        .map(|(id, _)| id)
 }

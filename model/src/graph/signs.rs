@@ -20,7 +20,8 @@ struct Signs<'a> {
 /// A graph whose outputs are the same and whose negations are few.
 pub(super) fn settle(graph: &Graph, outputs: &[Id], thorough: bool) -> (Graph, Vec<Id>) {
     let uses = graph.uses(outputs);
-    let live: Vec<Id> = (0..uses.len()).filter(|&index| uses[index] > 0).map(|index| Id(index as u32)).collect();
+    let live: Vec<Id> =
+        (0..uses.len()).filter(|&index| uses[index] > 0).map(|index| Id(index as u32)).collect();
     let mut signs = Signs { graph, outputs, live, turned: vec![false; uses.len()] };
     signs.search(if thorough { 10_000_000 } else { 50_000 });
     signs.rebuilt()
@@ -141,11 +142,12 @@ impl Signs<'_> {
                 Node::Unary(Unary::Neg, _) => continue,
                 Node::Constant(bits) => new.constant(f64::from_bits(bits)).id,
                 Node::Input(index) => new.input(index as usize).id,
-                Node::Unary(Unary::Sqrt | Unary::Acos | Unary::Exp | Unary::Log, _)
-                | Node::Select(..) => {
+                Node::Unary(Unary::Sqrt | Unary::Acos | Unary::Exp | Unary::Log, _) | Node::Select(..) => {
                     let node = match self.graph.node(id) {
                         Node::Unary(op, a) => Node::Unary(op, right(a, &map)),
-                        Node::Select(c, a, b) => Node::Select(there(c, &map).0, right(a, &map), right(b, &map)),
+                        Node::Select(c, a, b) => {
+                            Node::Select(there(c, &map).0, right(a, &map), right(b, &map))
+                        }
                         other => other,
                     };
                     new.raw(node)

@@ -58,7 +58,11 @@ pub fn read(source: &str, name: &str, snap: f64) -> Result<Tree, Error> {
                 convention = Some(match which.trim() {
                     "standard" => Convention::Standard,
                     "modified" => Convention::Modified,
-                    other => return Err(wrong(format!("convention `{other}`: `standard` and `modified` are known"))),
+                    other => {
+                        return Err(wrong(format!(
+                            "convention `{other}`: `standard` and `modified` are known"
+                        )));
+                    }
                 });
             }
             continue;
@@ -81,7 +85,9 @@ pub fn read(source: &str, name: &str, snap: f64) -> Result<Tree, Error> {
             None | Some("") => Ok(0.0),
             Some(text) => {
                 let value = number(text);
-                value.ok_or_else(|| wrong(format!("`{column}`: `{text}` is no finite number, such as 0.5 or -pi/2")))
+                value.ok_or_else(|| {
+                    wrong(format!("`{column}`: `{text}` is no finite number, such as 0.5 or -pi/2"))
+                })
             }
         };
         let kind = match fields[columns["kind"]] {
@@ -110,7 +116,9 @@ pub fn read(source: &str, name: &str, snap: f64) -> Result<Tree, Error> {
         let shift = |x: f64, z: f64| Pose { rotation: IDENTITY, origin: [x, 0.0, z] };
         let (before, after) = match convention {
             Convention::Standard => (turn(2, theta), shift(a, d).then(&turn(0, alpha))),
-            Convention::Modified => (turn(0, alpha).then(&shift(a, 0.0)).then(&turn(2, theta)), shift(0.0, d)),
+            Convention::Modified => {
+                (turn(0, alpha).then(&shift(a, 0.0)).then(&turn(2, theta)), shift(0.0, d))
+            }
         };
         let [mass, cx, cy, cz] = [value("mass")?, value("cx")?, value("cy")?, value("cz")?];
         if mass < 0.0 {
@@ -156,7 +164,9 @@ fn header<'a>(fields: &[&'a str]) -> Result<HashMap<&'a str, usize>, String> {
         }
     }
     match NEEDED.iter().find(|needed| !columns.contains_key(**needed)) {
-        Some(missing) => Err(format!("the header has no column `{missing}`; needed are {}", NEEDED.join(", "))),
+        Some(missing) => {
+            Err(format!("the header has no column `{missing}`; needed are {}", NEEDED.join(", ")))
+        }
         None => Ok(columns),
     }
 }

@@ -151,8 +151,8 @@ impl<'a> Geometry<'a> {
         let line = self.lines[joint];
         let carrier = |joint: usize| self.revolute(self.robot.joints[joint].parent);
         let mut first = joint;
-        while let Some(before) = carrier(first)
-            .filter(|before| self.together(*before, first) && self.next[*before] == Some(first))
+        while let Some(before) =
+            carrier(first).filter(|before| self.together(*before, first) && self.next[*before] == Some(first))
         {
             first = before;
         }
@@ -164,9 +164,9 @@ impl<'a> Geometry<'a> {
             let start = self.lines[from];
             space::dot(space::sub(start.point, line.point), line.direction) + distance
         };
-        let outgoing = self.revolute(self.next[last]).and_then(|next| {
-            foot(self.lines[last], self.lines[next]).map(|distance| along(last, distance))
-        });
+        let outgoing = self
+            .revolute(self.next[last])
+            .and_then(|next| foot(self.lines[last], self.lines[next]).map(|distance| along(last, distance)));
         let incoming = carrier(first).and_then(|before| {
             foot(self.lines[first], self.lines[before]).map(|distance| along(first, distance))
         });
@@ -222,7 +222,11 @@ pub fn place(robot: &Robot, layout: &Layout) -> Vec<Link> {
         let line = geometry.lines[index];
         let back = space::transpose(&carrier.rotation);
         let axis = space::turn(&space::cleaned(&back), line.direction);
-        let axis = if joint.kind == Kind::Prismatic && layout.flipped[index] { space::scale(-1.0, axis) } else { axis };
+        let axis = if joint.kind == Kind::Prismatic && layout.flipped[index] {
+            space::scale(-1.0, axis)
+        } else {
+            axis
+        };
         let axis = normalised(axis.map(|x| if (x - x.round()).abs() < 1e-9 { x.round() } else { x }));
         let beside = geometry.revolute(joint.parent).is_some_and(|parent| geometry.together(parent, index));
         let mut link = Link {

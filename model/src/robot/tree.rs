@@ -69,14 +69,21 @@ impl Tree {
     }
 
     /// The joints from a link to the root, that of the link first.
-    fn path<'a>(&'a self, carriers: &HashMap<&str, &'a Element>, link: &str) -> Result<Vec<&'a Element>, Error> {
+    fn path<'a>(
+        &'a self,
+        carriers: &HashMap<&str, &'a Element>,
+        link: &str,
+    ) -> Result<Vec<&'a Element>, Error> {
         let mut path: Vec<&Element> = Vec::new();
         let mut link = link;
         while let Some(joint) = carriers.get(link).copied() {
             path.push(joint);
             link = &joint.parent;
             if path.len() > self.joints.len() {
-                return Err(Error::at(&joint.name, "its link carries itself: a robot is a tree, without loops"));
+                return Err(Error::at(
+                    &joint.name,
+                    "its link carries itself: a robot is a tree, without loops",
+                ));
             }
         }
         Ok(path)
@@ -96,12 +103,14 @@ impl Tree {
     /// If there is no such link, the tip is not carried by the base, the links are no tree, or there is nothing that moves.
     pub fn robot(&self, base: Option<&str>, tip: Option<&str>) -> Result<Robot, Error> {
         let carriers = self.carriers()?;
-        let mut roots = self.links.iter().map(|(link, _)| link.as_str()).filter(|link| !carriers.contains_key(link));
-        let root = roots.next().ok_or_else(|| {
-            Error::plain("every link is carried by a joint: a robot is a tree with a base")
-        })?;
+        let mut roots =
+            self.links.iter().map(|(link, _)| link.as_str()).filter(|link| !carriers.contains_key(link));
+        let root = roots
+            .next()
+            .ok_or_else(|| Error::plain("every link is carried by a joint: a robot is a tree with a base"))?;
         if let Some(other) = roots.next() {
-            let text = format!("links `{root}` and `{other}` are both carried by no joint: a robot has one base");
+            let text =
+                format!("links `{root}` and `{other}` are both carried by no joint: a robot has one base");
             return Err(Error::plain(text));
         }
         let base = base.map_or(Ok(root), |name| self.link(name, "--base"))?;
@@ -110,9 +119,8 @@ impl Tree {
             Some(tip) => {
                 let path = self.path(&carriers, self.link(tip, "--tip")?)?;
                 let end = path.iter().position(|joint| joint.parent == base);
-                let end = end.ok_or_else(|| {
-                    Error::plain(format!("--tip: link `{tip}` is not carried by `{base}`"))
-                })?;
+                let end = end
+                    .ok_or_else(|| Error::plain(format!("--tip: link `{tip}` is not carried by `{base}`")))?;
                 Some(path[..=end].iter().map(|joint| joint.name.as_str()).collect::<Vec<_>>())
             }
         };
@@ -177,7 +185,9 @@ impl Tree {
                     return Err(Error::at(&joint.name, "its axis has no direction"));
                 }
                 if robot.joints.len() >= MAX_JOINTS {
-                    let text = format!("the robot has more than {MAX_JOINTS} joints; --base and --tip take a part of it");
+                    let text = format!(
+                        "the robot has more than {MAX_JOINTS} joints; --base and --tip take a part of it"
+                    );
                     return Err(Error::at(&joint.name, text));
                 }
                 let moving = Joint {

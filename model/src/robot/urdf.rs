@@ -1,9 +1,9 @@
 //! Robots from URDF.
 
+use super::Kind;
 use super::space::{self, Inertia, Pose};
 use super::tree::{Element, ElementKind, Tree, rotation};
 use crate::Error;
-use super::Kind;
 
 /// The largest description that is read, bytes.
 pub const MAX_BYTES: usize = 64 << 20;
@@ -19,8 +19,14 @@ pub fn read(source: &str, snap: f64) -> Result<Tree, Error> {
         return Err(Error::plain(format!("the file is longer than {} MiB", MAX_BYTES >> 20)));
     }
     // This parser says where it is that a text is no XML.
-    let document = roxmltree::Document::parse(source)
-        .map_err(|error| Error::on(error.pos().row as usize, format!("this is no XML: {error}")))?;
+    let document = roxmltree::Document::parse(source).map_err(|error| {
+        let text = format!("this is no XML: {error}");
+        match error {
+            // It gives these the first line.
+            roxmltree::Error::UnclosedRootNode | roxmltree::Error::NoRootNode => Error::plain(text),
+            error => Error::on(error.pos().row as usize, text),
+        }
+    })?;
     if document.root_element().tag_name().name() != "robot" {
         let name = document.root_element().tag_name().name();
         return Err(Error::plain(format!("this is no URDF: its element is `{name}`, not `robot`")));
@@ -62,7 +68,10 @@ fn convert(robot: &urdf_rs::Robot, snap: f64) -> Result<Tree, Error> {
         }
         let mass = link.inertial.mass.value;
         if !(mass.is_finite() && mass >= 0.0) {
-            return Err(Error::at(&link.name, format!("its mass is {mass}; a mass is finite and not negative")));
+            return Err(Error::at(
+                &link.name,
+                format!("its mass is {mass}; a mass is finite and not negative"),
+            ));
         }
         let i = &link.inertial.inertia;
         let tensor = [[i.ixx, i.ixy, i.ixz], [i.ixy, i.iyy, i.iyz], [i.ixz, i.iyz, i.izz]];

@@ -87,4 +87,3 @@ pub fn robot(case: &Case, snap: f64) -> Robot {
     let tree = urdf::read(&case.source, snap).expect("URDF");
     tree.robot(case.base.as_deref(), case.tip.as_deref()).expect("a robot")
 }
-
