@@ -55,8 +55,8 @@ pub fn inputs_read(function: &Function) -> Vec<bool> {
     let graph = &function.graph;
     let uses = graph.uses(&function.nodes());
     let mut read = vec![false; function.inputs.len()];
-    for index in 0..graph.len() {
-        if let (Node::Input(input), true) = (graph.node_at(index), uses[index] > 0) {
+    for (index, uses) in uses.into_iter().enumerate() {
+        if let (Node::Input(input), true) = (graph.node_at(index), uses > 0) {
             read[input as usize] = true;
         }
     }

@@ -105,10 +105,11 @@ fn needs(links: &[Link]) -> Vec<[bool; 3]> {
     for index in (0..links.len()).rev() {
         let link = &links[index];
         let Some(parent) = link.parent else { continue };
-        for axis in 0..3 {
-            needs[parent][axis] |= match link.kind {
+        let own = needs[index];
+        for (axis, need) in needs[parent].iter_mut().enumerate() {
+            *need |= match link.kind {
                 Kind::Revolute => link.axis[axis] != 0.0,
-                Kind::Prismatic => needs[index][axis],
+                Kind::Prismatic => own[axis],
             };
         }
     }
