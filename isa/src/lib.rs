@@ -17,6 +17,6 @@ pub use encode::{DecodeError, EncodeError, Instruction, PlacementError};
 pub use program::Program;
 pub use shape::{Field, Operand, Shape};
 pub use spec::check::{MachineError, MachineReason};
-pub use spec::instructions::{Effect, Function, Op, ROWS, Row, Type, compute};
+pub use spec::instructions::{Effect, Form, Function, Op, ROWS, Row, Type, compute};
 pub use spec::machines::{Bank, MACHINES, Machine, Slot, T1, T3, ZERO};
 pub use spec::units::{UNITS, Unit};

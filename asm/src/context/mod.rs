@@ -6,7 +6,7 @@ mod reports;
 mod scopes;
 mod unknown;
 
-pub(crate) use declared::{Argument, Declared, NamedConstant};
+pub(crate) use declared::{Argument, Array, Declared, NamedConstant};
 pub(crate) use reports::Reports;
 pub(crate) use scopes::{Binding, MacroDefinition, ScopeId, ScopeKind, Scopes};
 pub(crate) use unknown::Wanted;

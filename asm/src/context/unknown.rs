@@ -24,6 +24,8 @@ pub(crate) enum Wanted {
     Value,
     /// A place in data memory.
     Table,
+    /// An array of registers.
+    Array,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -101,6 +103,7 @@ impl Context {
                         error.help(format!("put the label `{text}:` before the bundle to continue at"))
                     }
                     Wanted::Value => error.help(format!("define it with `.const {text} = …`")),
+                    Wanted::Array => error.help(format!("declare it with `.reg {text}[n]`, or `.reg {text}[n,m]`")),
                     Wanted::Table => error.help(format!(
                         "put it into data memory: `.data`, then `{text}: .float …`, `.word …` or `.space …`"
                     )),
@@ -115,6 +118,8 @@ impl Context {
     fn similar(&self, scope: ScopeId, text: &str, wanted: Wanted) -> Option<String> {
         let fits = |binding: Binding| match (wanted, binding) {
             (_, Binding::None) => false,
+            (Wanted::Array, binding) => matches!(binding, Binding::Array(_) | Binding::Argument(_)),
+            (_, Binding::Array(_)) => false,
             (_, Binding::Argument(_)) => true,
             (Wanted::Dest, Binding::Register(id)) => {
                 !matches!(self.declared.registers[id.index()].kind, RegisterKind::Input | RegisterKind::Zero)

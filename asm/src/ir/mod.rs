@@ -121,11 +121,20 @@ pub struct Operation {
     pub made: bool,
     /// Its place in the order of the source: the index of its bundle before any was moved.
     pub order: u32,
-    /// Where it is written: the tree, and the operation of the tree. For messages that point at an operand.
+    /// Where it is written: the tree, and the operation of the tree; [`Operation::COMPUTED`] if it is a part of an equation.
+    /// For messages that point at an operand.
     pub(crate) written: (u32, u32),
 }
 
 impl Operation {
+    /// In [`Operation::written`] the operation that no tree has: one that computes a part of an equation, where its span is.
+    pub(crate) const COMPUTED: u32 = u32::MAX;
+
+    /// Whether it computes a part of an equation.
+    pub(crate) fn is_computed(&self) -> bool {
+        self.written.1 == Operation::COMPUTED
+    }
+
     /// The instruction's row.
     #[inline]
     pub fn row(&self) -> &'static Row {

@@ -1,15 +1,22 @@
 //! Names to registers, labels and numbers: the expanded source as [`Ir`].
 
 mod address;
+pub(crate) mod equation;
+mod mismatch;
+pub(crate) mod forms;
 mod operand;
+mod sharing;
 pub(crate) mod serialise;
 
 use crate::context::{At, Context, Reported};
 use crate::expand::load::Loader;
 use crate::expand::{self, Data, Flat, Item, Timing};
 use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
+use crate::ir::given::Kind;
 use crate::report::diag::{Diagnostic, nearest};
 use crate::report::source::Span;
+use crate::resolve::forms::Forms;
+use crate::resolve::sharing::Sharing;
 use crate::syntax::ast::*;
 use smallvec::SmallVec;
 use std::collections::{BTreeMap, HashMap};
@@ -52,8 +59,22 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
     };
     let data_words = flat.data.iter().map(words).sum();
     let (pool, own_files) = (HashMap::new(), Vec::new());
-    let mut resolver =
-        Resolver { context, loader, flat, ir, slots, pool, own_files, label: 0, data_words, cast: None };
+    let mut resolver = Resolver {
+        context,
+        loader,
+        flat,
+        ir,
+        slots,
+        pool,
+        own_files,
+        label: 0,
+        data_words,
+        cast: None,
+        forms: Forms::new(),
+        kinds: Vec::new(),
+        sharing: Sharing::default(),
+        turns: 0,
+    };
     let once = std::mem::take(&mut resolver.flat.once);
     resolver.section(Section::Once, &once);
     resolver.ir.period = resolver.ir.bundles.len() as u32;
@@ -104,12 +125,21 @@ pub(crate) struct Resolver<'c> {
     pub(crate) cast: Option<Type>,
     /// Words of data memory that the source declares.
     pub(crate) data_words: u32,
+    /// What equations write for instructions.
+    forms: Forms,
+    /// What was last written to each register, above the line at hand.
+    kinds: Vec<Kind>,
+    /// What is computed already.
+    sharing: Sharing,
+    /// Turns of all sums.
+    turns: usize,
 }
 
 impl Resolver<'_> {
     /// Resolves the bundles of a section, and moves the section's labels from statements to bundles.
     fn section(&mut self, section: Section, items: &[Item]) {
         self.label = 0;
+        self.sharing.cut();
         let mut bounds = self.flat.loop_bounds.clone();
         bounds.retain(|bound| bound.section == section);
         let mut bounds = bounds.into_iter().peekable();
@@ -117,6 +147,7 @@ impl Resolver<'_> {
             self.place_labels(section, index as u32);
             if let Some(expand::LoopBound { most, .. }) = bounds.next_if(|bound| bound.item == index as u32) {
                 self.ir.loop_bounds.push(LoopBound { position: self.ir.bundles.len() as u32, most });
+                self.sharing.cut();
             }
             self.item(item);
         }
@@ -131,6 +162,9 @@ impl Resolver<'_> {
                     return;
                 }
                 label.position = self.ir.bundles.len() as u32;
+                if section != Section::Data {
+                    self.sharing.cut();
+                }
             }
             self.label += 1;
         }
@@ -138,13 +172,19 @@ impl Resolver<'_> {
 
     fn item(&mut self, item: &Item) {
         let ast = Rc::clone(&self.context.asts[item.at.ast as usize]);
-        let StatementKind::Bundle(first, count) = ast.statements[item.statement as usize].kind else {
-            return;
+        let (first, count) = match ast.statements[item.statement as usize].kind {
+            StatementKind::Bundle(first, count) => (first, count),
+            StatementKind::Equation(equation) => {
+                // What goes wrong is in the report.
+                let _ = self.equation(item, &ast, equation);
+                return;
+            }
+            StatementKind::Empty | StatementKind::Directive(_) => return,
         };
         let written = &ast.operations[first as usize..(first + count) as usize];
         let mut operations: SmallVec<[Operation; 1]> = SmallVec::with_capacity(written.len());
         for (index, (operation, number)) in written.iter().zip(first..).enumerate() {
-            let location = self.location(item, operation, index, written.len());
+            let location = self.location(item, (operation.span, operation.line), index, written.len());
             // What goes wrong is in the report; other operations may have mistakes of their own.
             if let Ok(operation) = self.operation(item.at, &ast, number, written.len(), location) {
                 operations.push(operation);
@@ -155,13 +195,13 @@ impl Resolver<'_> {
         }
         let explicit = written.len() > 1;
         if !explicit {
-            self.ir.bundles.push(Bundle { operations, explicit, scheduled: item.scheduled });
+            self.push(Bundle { operations, explicit, scheduled: item.scheduled });
         } else if self.ir.machine.slots.len() == 1 {
             match serialise::order(&operations) {
                 Ok(order) => {
                     for index in order {
                         let operations = SmallVec::from_elem(operations[index], 1);
-                        self.ir.bundles.push(Bundle { operations, explicit, scheduled: item.scheduled });
+                        self.push(Bundle { operations, explicit, scheduled: item.scheduled });
                     }
                 }
                 Err(diagnostic) => {
@@ -174,15 +214,31 @@ impl Resolver<'_> {
                 let diagnostic = diagnostic(&self.context.declared.registers, self.ir.machine);
                 self.context.report(item.at.scope, diagnostic);
             }
-            self.ir.bundles.push(Bundle { operations, explicit, scheduled: item.scheduled });
+            self.push(Bundle { operations, explicit, scheduled: item.scheduled });
         }
+    }
+
+    /// Adds a bundle to the program.
+    fn push(&mut self, bundle: Bundle) {
+        let is_opaque = bundle.is_opaque();
+        for operation in &bundle.operations {
+            if let Some(dest) = operation.dest {
+                let kind = self.result_kind(operation);
+                self.set_kind(dest, kind);
+                self.sharing.write(dest);
+            }
+            if is_opaque || operation.redirects() || operation.row().effect.drains() {
+                self.sharing.cut();
+            }
+        }
+        self.ir.bundles.push(bundle);
     }
 
     /// Where an operation comes from: its own line, or what `.loc` says.
     fn location(
         &mut self,
         item: &Item,
-        operation: &crate::syntax::ast::Operation,
+        (span, line): (Span, u32),
         index: usize,
         count: usize,
     ) -> Option<Location> {
@@ -190,7 +246,7 @@ impl Resolver<'_> {
             let places = &self.flat.locs[item.loc as usize];
             if places.len() > 1 && places.len() != count {
                 let message = format!("a bundle of {count}, and `.loc` gives {} places", places.len());
-                self.context.error(item.at.scope, "loc", operation.span, message);
+                self.context.error(item.at.scope, "loc", span, message);
                 return None;
             }
             let place = places.get(if places.len() == 1 { 0 } else { index }).copied().flatten();
@@ -198,14 +254,14 @@ impl Resolver<'_> {
         }
         let ast = item.at.ast as usize;
         if let Some(Some(file)) = self.own_files.get(ast) {
-            return Some(Location { file: *file, line: operation.line });
+            return Some(Location { file: *file, line });
         }
-        let file = self.context.reports.sources.file_of(operation.span.start);
+        let file = self.context.reports.sources.file_of(span.start);
         let name = std::sync::Arc::clone(&self.context.reports.sources.files()[file].name);
         let file = self.flat.file(&name);
         self.own_files.resize(self.own_files.len().max(ast + 1), None);
         self.own_files[ast] = Some(file);
-        Some(Location { file, line: operation.line })
+        Some(Location { file, line })
     }
 
     /// Two operations of a bundle that need one slot are a mistake.
@@ -242,6 +298,24 @@ impl Resolver<'_> {
         result
     }
 
+    /// The slot that executes an instruction; none if any can.
+    fn slot(&mut self, at: At, op: Op, span: Span) -> Result<Option<u8>, Reported> {
+        let row = op.row();
+        match self.slots[op as usize] {
+            Host::Any => Ok(None),
+            Host::Slot(slot) => Ok(Some(slot)),
+            Host::None => {
+                let message = format!("{} has no unit for `{}`", self.ir.machine.name, row.mnemonic);
+                let having = takt_isa::MACHINES.iter().find(|machine| machine.host(row.function).is_some());
+                let mut error = Diagnostic::error("no-unit", span, message);
+                if let Some(machine) = having {
+                    error = error.note(format!("machine {} has one", machine.name));
+                }
+                Err(self.context.report(at.scope, error))
+            }
+        }
+    }
+
     fn operation(
         &mut self,
         at: At,
@@ -260,19 +334,7 @@ impl Resolver<'_> {
             return Err(self.unknown_mnemonic(at, name, written, of));
         };
         let row = op.row();
-        let slot = match self.slots[op as usize] {
-            Host::Any => None,
-            Host::Slot(slot) => Some(slot),
-            Host::None => {
-                let message = format!("{} has no unit for `{}`", self.ir.machine.name, row.mnemonic);
-                let having = takt_isa::MACHINES.iter().find(|machine| machine.host(row.function).is_some());
-                let mut error = Diagnostic::error("no-unit", written.mnemonic.span, message);
-                if let Some(machine) = having {
-                    error = error.note(format!("machine {} has one", machine.name));
-                }
-                return Err(self.context.report(at.scope, error));
-            }
-        };
+        let slot = self.slot(at, op, written.mnemonic.span)?;
         let places = row.shape.operands();
         if places.len() != operands.len() {
             return Err(self.wrong_count(at, row, written, operands));
