@@ -110,8 +110,8 @@ pub(crate) fn place(program: &Program, address: Address) -> String {
             format!(" ({label} + {distance})")
         });
     }
-    match (address < program.bundles()).then(|| program.location(address)).flatten() {
-        Some(location) => format!("{}: {text}", program.place_text(location)),
+    match program.bundle_place(address) {
+        Some(place) => format!("{place}: {text}"),
         None => text,
     }
 }

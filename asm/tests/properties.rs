@@ -250,6 +250,7 @@ prop_compose! {
                 .collect(),
             files: files.clone(),
             lines,
+            parts: Vec::new(),
         }
     }
 }

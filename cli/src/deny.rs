@@ -138,12 +138,11 @@ impl Finding {
     }
 }
 
-/// `file:line` of the operation, or else of its bundle.
+/// `file:line`, and the columns of a part of an equation, of the operation, or else of its bundle.
 fn location(program: &Program, first: &First) -> Option<String> {
     let slots = program.machine.slots.len();
     let word = first.operation.map(|(slot, _)| first.address as usize * slots + usize::from(slot));
-    let own = word.and_then(|word| *program.lines.get(word)?);
-    own.or_else(|| program.location(first.address)).map(|location| program.place_text(location))
+    word.and_then(|word| program.word_place(word)).or_else(|| program.bundle_place(first.address))
 }
 
 impl Watch {

@@ -79,8 +79,8 @@ fn lifetime(program: &Program, life: &Life) -> String {
         let slots = program.machine.slots;
         for ((instruction, slot), number) in instructions.iter().zip(slots).zip(0..) {
             let place = || {
-                let line = program.lines.get(address as usize * slots.len() + number).copied().flatten();
-                let line = line.map_or(String::new(), |line| format!(" ({})", program.place_text(line)));
+                let line = program.word_place(address as usize * slots.len() + number);
+                let line = line.map_or(String::new(), |line| format!(" ({line})"));
                 format!("bundle {address}{line}")
             };
             // Where registers are shared, the bundle of a value's last use may write the next one.

@@ -84,14 +84,10 @@ impl Fault {
     ) -> Fault {
         let slots = program.machine.slots;
         let own = slot.and_then(|slot| {
-            *program.lines.get((address as usize).checked_mul(slots.len())?.checked_add(slot.into())?)?
+            program.word_place((address as usize).checked_mul(slots.len())?.checked_add(slot.into())?)
         });
-        let location = own.or_else(|| {
-            // Program::location slices, which an address far outside would overflow.
-            (address < program.bundles()).then(|| program.location(address)).flatten()
-        });
-        let mut place = match location {
-            Some(location) => format!("{}: bundle {address}", program.place_text(location)),
+        let mut place = match own.or_else(|| program.bundle_place(address)) {
+            Some(place) => format!("{place}: bundle {address}"),
             None => format!("bundle {address}"),
         };
         if let Some(slot) = slot.and_then(|slot| slots.get(usize::from(slot))) {

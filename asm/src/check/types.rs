@@ -6,7 +6,7 @@
 //! written to it, or none. What may be either is not reported: every warning is about a value that is certainly of the other type.
 
 use crate::check::{dest_span, source_span, text};
-use crate::context::{Context, ScopeId, type_name};
+use crate::context::{Context, ScopeId, type_name, words};
 use crate::ir::given::{Given, GivenTypes, Kind, Part, What};
 use crate::ir::runs::{Run, runs};
 use crate::ir::{Ir, LabelId, Operation, Register, RegisterId, RegisterKind};
@@ -275,15 +275,6 @@ fn tables(ir: &Ir, types: &[Type]) -> HashMap<LabelId, Typed> {
         (LabelId(number as u32), Typed { kind, origin: Some(origin) })
     };
     labels.map(table).collect()
-}
-
-/// A type in words.
-fn words(ty: Type) -> &'static str {
-    match ty {
-        Type::F => "a float",
-        Type::I => "an integer",
-        Type::B => "bits",
-    }
 }
 
 /// The instruction that converts from one type to another.

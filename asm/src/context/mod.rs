@@ -131,6 +131,15 @@ pub(crate) const fn type_name(ty: Type) -> &'static str {
     }
 }
 
+/// A type in words.
+pub(crate) const fn words(ty: Type) -> &'static str {
+    match ty {
+        Type::F => "a float",
+        Type::I => "an integer",
+        Type::B => "bits",
+    }
+}
+
 /// Whether a label is of a space, for the listing and the report.
 pub(crate) fn space_of(section: Section) -> Space {
     if section == Section::Data { Space::Data } else { Space::Code }

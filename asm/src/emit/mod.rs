@@ -17,6 +17,8 @@ pub(crate) struct Emitted {
     pub(crate) expanded: Vec<u32>,
     /// For each word that has a source line, its operation's order and expansion.
     pub(crate) origins: Vec<Option<(u32, u32)>>,
+    /// Words that compute a part of an equation, and where that stands.
+    pub(crate) parts: Vec<(u32, Span)>,
 }
 
 /// Writes the program.
@@ -25,7 +27,8 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
     let filler = Instruction::NOP.encode().unwrap_or(0);
     let mut code = vec![filler; ir.bundles.len() * slots];
     let mut lines = vec![None; ir.bundles.len() * slots];
-    let mut expanded = Vec::new();
+    let (mut expanded, mut parts) = (Vec::new(), Vec::new());
+    let mut columns = Vec::new();
     let mut origins = vec![None; ir.bundles.len() * slots];
     for (address, bundle) in ir.bundles.iter().enumerate() {
         let words = address * slots..(address + 1) * slots;
@@ -49,13 +52,18 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
             code[index] = word(ir, operation, slot, placement, sink);
             lines[index] = operation.location;
             origins[index] = operation.location.map(|_| (operation.order, operation.expansion));
-            if operation.expansion != 0 || operation.made {
+            columns.extend(operation.columns.filter(|_| operation.location.is_some()).map(|part| (index as u32, part)));
+            if operation.is_computed() && operation.columns.is_none() {
+                parts.push((index as u32, operation.span));
+            }
+            if operation.expansion != 0 || operation.made || operation.is_computed() {
                 expanded.push(index as u32);
             }
         }
     }
     limits(ir, sink);
     expanded.sort_unstable();
+    parts.sort_unstable_by_key(|(word, _)| *word);
     let mut program = Program {
         machine: ir.machine,
         code,
@@ -70,9 +78,11 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
         loop_bounds: loop_bounds(ir),
         files: ir.files.clone(),
         lines,
+        // Those of equations are known where the sources are.
+        parts: columns,
     };
     distinguish(&mut program);
-    Emitted { program, expanded, origins }
+    Emitted { program, expanded, origins, parts }
 }
 
 fn word(ir: &Ir, operation: &Operation, slot: usize, placement: &Placement, sink: &mut Sink) -> u64 {

@@ -8,6 +8,7 @@ use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
+use crate::syntax::name::NameId;
 use smallvec::SmallVec;
 use takt_isa::{Machine, Type, ZERO};
 
@@ -44,6 +45,17 @@ impl Expander<'_> {
     ) -> Result<(), Reported> {
         let Name { name, span } = declaration.name;
         let id = self.context.name(at, name, span)?;
+        self.declare_name(at, what, declaration, id)
+    }
+
+    fn declare_name(
+        &mut self,
+        at: At,
+        what: Declares,
+        declaration: &Declaration,
+        id: NameId,
+    ) -> Result<(), Reported> {
+        let span = declaration.name.span;
         let kind = match what {
             Declares::Register => RegisterKind::Plain,
             Declares::State => RegisterKind::State,
@@ -92,10 +104,24 @@ impl Expander<'_> {
                 return Err(self.context.report(at.scope, error));
             }
         };
-        if let Some(place) = declaration.place {
-            let error = Diagnostic::error("place", place.span, "an array has no place of its own")
-                .help("leave its elements' places to the assembler");
-            return Err(self.context.report(at.scope, error));
+        // With a place it is one element that is declared: what disassembly says of an array.
+        if declaration.place.is_some() {
+            let mut indices = Vec::with_capacity(sizes.len());
+            for size in sizes {
+                let index = self.context.integer(at, *size)?;
+                if index < 1 {
+                    let message = format!("there is no element {index}: indices count from 1");
+                    return Err(self.context.error(at.scope, "range", size.span, message));
+                }
+                indices.push(index.to_string());
+            }
+            if let Binding::Array(_) = self.context.lookup(at.scope, id) {
+                let message = format!("`{text}` is declared already, as an array without places");
+                return Err(self.context.error(at.scope, "declared-twice", span, message));
+            }
+            let element = format!("{}[{}]", self.context.scopes.text(id), indices.join(","));
+            let id = self.context.scopes.names_mut().intern(&element);
+            return self.declare_name(at, what, declaration, id);
         }
         if sizes.len() > limits::ARRAY_INDICES {
             let message = format!("an array has at most {} indices", limits::ARRAY_INDICES);

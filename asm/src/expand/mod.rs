@@ -25,6 +25,7 @@ use crate::syntax::name::NameId;
 use std::collections::HashMap;
 use std::rc::Rc;
 use takt_isa::Type;
+use takt_isa::program::{Columns, Location};
 
 /// A bundle or an equation of the source where it is expanded.
 #[derive(Clone, Copy, Debug)]
@@ -90,7 +91,7 @@ pub(crate) struct Flat {
     /// What `.ports` says, `latched` or not, and where.
     pub(crate) ports: Option<(bool, Span)>,
     /// What each `.loc` says; the first is none at all.
-    pub(crate) locs: Vec<Vec<Option<(u32, u32)>>>,
+    pub(crate) locs: Vec<Vec<Option<(Location, Option<Columns>)>>>,
     /// Files that `.loc` names, in order, then those whose own lines are code.
     pub(crate) files: Vec<String>,
     file_numbers: HashMap<String, u32>,
@@ -646,6 +647,18 @@ impl<'l> Expander<'l> {
         Ok(())
     }
 
+    fn columns(&mut self, at: At, first: Expr, last: Expr) -> Result<Columns, Reported> {
+        let span = first.span.to(last.span);
+        let (first, last) = (self.context.integer(at, first)?, self.context.integer(at, last)?);
+        match (u32::try_from(first), u32::try_from(last)) {
+            (Ok(first), Ok(last)) if 0 < first && first <= last => Ok(Columns { first, last }),
+            _ => {
+                let message = format!("there are no columns {first} to {last}: they count from 1");
+                Err(self.context.error(at.scope, "range", span, message))
+            }
+        }
+    }
+
     fn set_loc(&mut self, at: At, places: &[Loc]) -> Result<(), Reported> {
         let mut locations = Vec::with_capacity(places.len());
         for place in places {
@@ -659,14 +672,18 @@ impl<'l> Expander<'l> {
                     }
                     None
                 }
-                Loc::At(file, line) => {
+                Loc::At(file, line, columns) => {
                     let number = self.context.integer(at, *line)?;
                     let Some(number) = u32::try_from(number).ok().filter(|number| *number > 0) else {
                         let message = format!("there is no line {number}: lines count from 1");
                         return Err(self.context.error(at.scope, "range", line.span, message));
                     };
+                    let columns = match columns {
+                        Some((first, last)) => Some(self.columns(at, *first, *last)?),
+                        None => None,
+                    };
                     let file = self.flat.file(file);
-                    Some((file, number))
+                    Some((Location { file, line: number }, columns))
                 }
             });
         }

@@ -20,7 +20,7 @@ use crate::report::source::Span;
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
-use takt_isa::program::{Location, Space};
+use takt_isa::program::{Columns, Location, Space};
 use takt_isa::{Machine, Op, Operand, Row, Type};
 
 /// A register of [`Ir::registers`].
@@ -113,6 +113,8 @@ pub struct Operation {
     pub constant: Constant,
     /// The source line that it is attributed to.
     pub location: Option<Location>,
+    /// The part of that line, where the source says it (`.loc`).
+    pub columns: Option<Columns>,
     /// Its place in the source.
     pub span: Span,
     /// Which use of a macro, or turn of a repetition, made it; 0 if it stands in the source as it is.
@@ -171,6 +173,7 @@ impl Operation {
             sources: [RegisterId::ZERO; 3],
             constant: Constant::None,
             location: None,
+            columns: None,
             expansion: 0,
             ..*self
         }

@@ -1,11 +1,11 @@
 //! What is wrong where no instruction computes what an equation asks for. A part of [`equation`](crate::resolve::equation).
 
-use crate::context::{At, Reported};
+use crate::context::{At, Reported, words};
 use crate::ir::given::Kind;
 use crate::report::diag::{Diagnostic, nearest};
 use crate::report::source::Span;
 use crate::resolve::Resolver;
-use crate::resolve::equation::{Term, words};
+use crate::resolve::equation::Term;
 use takt_isa::Type;
 
 impl Resolver<'_> {

@@ -2,13 +2,14 @@
 
 mod address;
 pub(crate) mod equation;
+mod expression;
 mod mismatch;
 pub(crate) mod forms;
 mod operand;
 mod sharing;
 pub(crate) mod serialise;
 
-use crate::context::{At, Context, Reported};
+use crate::context::{At, Context, Reported, ScopeId};
 use crate::expand::load::Loader;
 use crate::expand::{self, Data, Flat, Item, Timing};
 use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
@@ -21,7 +22,7 @@ use crate::syntax::ast::*;
 use smallvec::SmallVec;
 use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
-use takt_isa::program::Location;
+use takt_isa::program::{Columns, Location};
 use takt_isa::spec::instructions::Function;
 use takt_isa::{Op, ROWS, Type};
 
@@ -80,6 +81,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
     resolver.ir.period = resolver.ir.bundles.len() as u32;
     let period = std::mem::take(&mut resolver.flat.period);
     resolver.section(Section::Period, &period);
+    resolver.entered();
     resolver.data();
     resolver.presets();
     for timing in std::mem::take(&mut resolver.flat.timing) {
@@ -218,6 +220,35 @@ impl Resolver<'_> {
         }
     }
 
+    /// Refuses jumps by number to where an equation counts on what was computed above.
+    fn entered(&mut self) {
+        if self.sharing.stretches.is_empty() {
+            return;
+        }
+        // How many stretches begin, and less how many end, before each bundle.
+        let mut steps = vec![0i64; self.ir.bundles.len() + 2];
+        for (computed, used) in &self.sharing.stretches {
+            steps[*computed as usize + 1] += 1;
+            steps[*used as usize + 1] -= 1;
+        }
+        let within: Vec<bool> = steps
+            .iter()
+            .scan(0, |open, step| {
+                *open += step;
+                Some(*open > 0)
+            })
+            .collect();
+        let enters = |target: u32| within.get(target as usize).copied().unwrap_or(false);
+        let jumps = self.ir.operations().filter(|operation| operation.target_number().is_some_and(enters));
+        let wrong: Vec<(Span, u32)> = jumps.map(|operation| (operation.span, operation.expansion)).collect();
+        for (span, expansion) in wrong {
+            let message = "a jump by number between equations that share what they compute";
+            let error = Diagnostic::error("target", span, message)
+                .help("jump to a label: equations behind it compute everything themselves");
+            self.context.report(ScopeId(expansion), error);
+        }
+    }
+
     /// Adds a bundle to the program.
     fn push(&mut self, bundle: Bundle) {
         let is_opaque = bundle.is_opaque();
@@ -241,7 +272,7 @@ impl Resolver<'_> {
         (span, line): (Span, u32),
         index: usize,
         count: usize,
-    ) -> Option<Location> {
+    ) -> Option<(Location, Option<Columns>)> {
         if item.loc != 0 {
             let places = &self.flat.locs[item.loc as usize];
             if places.len() > 1 && places.len() != count {
@@ -250,18 +281,18 @@ impl Resolver<'_> {
                 return None;
             }
             let place = places.get(if places.len() == 1 { 0 } else { index }).copied().flatten();
-            return place.map(|(file, line)| Location { file, line });
+            return place;
         }
         let ast = item.at.ast as usize;
         if let Some(Some(file)) = self.own_files.get(ast) {
-            return Some(Location { file: *file, line });
+            return Some((Location { file: *file, line }, None));
         }
         let file = self.context.reports.sources.file_of(span.start);
         let name = std::sync::Arc::clone(&self.context.reports.sources.files()[file].name);
         let file = self.flat.file(&name);
         self.own_files.resize(self.own_files.len().max(ast + 1), None);
         self.own_files[ast] = Some(file);
-        Some(Location { file, line })
+        Some((Location { file, line }, None))
     }
 
     /// Two operations of a bundle that need one slot are a mistake.
@@ -322,7 +353,7 @@ impl Resolver<'_> {
         ast: &Ast,
         number: u32,
         of: usize,
-        location: Option<Location>,
+        location: Option<(Location, Option<Columns>)>,
     ) -> Result<Operation, Reported> {
         let written = &ast.operations[number as usize];
         let name = self.context.name(at, written.mnemonic.name, written.mnemonic.span)?;
@@ -345,7 +376,8 @@ impl Resolver<'_> {
             dest: None,
             sources: [RegisterId::ZERO; 3],
             constant: Constant::None,
-            location,
+            location: location.map(|(location, _)| location),
+            columns: location.and_then(|(_, columns)| columns),
             span: written.span,
             expansion: at.scope.0,
             made: false,
@@ -367,7 +399,7 @@ impl Resolver<'_> {
         number: u32,
         written: &crate::syntax::ast::Operation,
         operands: &[Operand],
-        location: Option<Location>,
+        location: Option<(Location, Option<Columns>)>,
     ) -> Result<Operation, Reported> {
         let [slot, word] = operands else { return Err(Reported) };
         let slots = self.ir.machine.slots;
@@ -394,7 +426,8 @@ impl Resolver<'_> {
             dest: None,
             sources: [RegisterId::ZERO; 3],
             constant: Constant::Raw(self.ir.raw.len() as u32 - 1),
-            location,
+            location: location.map(|(location, _)| location),
+            columns: location.and_then(|(_, columns)| columns),
             span: written.span,
             expansion: at.scope.0,
             made: false,

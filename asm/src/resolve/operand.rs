@@ -197,7 +197,17 @@ impl Resolver<'_> {
                     let OperandKind::Name(name) = argument.operand.kind else { return None };
                     binding = self.context.lookup(argument.at.scope, name.resolve().ok()?);
                 }
-                let Binding::Array(_) = binding else { return None };
+                match (binding, base.kind) {
+                    (Binding::Array(_), _) => {}
+                    // An element that is declared with its place.
+                    (Binding::None, OperandKind::Expr(expr)) => {
+                        let [Node { kind: NodeKind::Int(index), .. }] = ast.nodes[expr.range()] else { return None };
+                        let element = format!("{}[{index}]", self.context.scopes.text(id));
+                        let element = self.context.scopes.names_mut().intern(&element);
+                        let Binding::Register(_) = self.context.lookup(at.scope, element) else { return None };
+                    }
+                    _ => return None,
+                }
                 let index = match base.kind {
                     OperandKind::Name(name) => vec![Node { kind: NodeKind::Name(name), span: base.span }],
                     OperandKind::Expr(expr) => ast.nodes[expr.range()].to_vec(),
@@ -222,7 +232,16 @@ impl Resolver<'_> {
         let array = match meaning {
             Some((_, Binding::Array(array))) => self.context.declared.arrays[array as usize].clone(),
             Some((id, Binding::None)) => {
-                return Err(self.context.unknown(place.scope, id, name.span, Wanted::Array));
+                let indices: Result<Vec<String>, Reported> = indices
+                    .iter()
+                    .map(|nodes| self.context.index(at, nodes, span).map(|index| index.to_string()))
+                    .collect();
+                let element = format!("{}[{}]", self.context.scopes.text(id), indices?.join(","));
+                let element = self.context.scopes.names_mut().intern(&element);
+                return match self.context.lookup(place.scope, element) {
+                    Binding::Register(register) => Ok(register),
+                    _ => Err(self.context.unknown(place.scope, id, name.span, Wanted::Array)),
+                };
             }
             _ => {
                 let text = self.context.reports.sources.text(name.span).to_owned();

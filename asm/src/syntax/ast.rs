@@ -326,8 +326,8 @@ pub(crate) enum DirectiveKind {
 pub(crate) enum Loc {
     /// `none`, or another name by mistake.
     None(Name),
-    /// A file and a line.
-    At(String, Expr),
+    /// A file, a line, and perhaps the first and the last column of a part of it.
+    At(String, Expr, Option<(Expr, Expr)>),
 }
 
 macro_rules! directives {

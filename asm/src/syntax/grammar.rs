@@ -744,9 +744,16 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
         .then(just(Token::Assign).labelled("`=`").ignore_then(expr.clone().labelled("cycles")).or_not())
         .map(|(ports, cost)| DirectiveKind::Late(ports, cost));
     let error = is(Directive::Error).ignore_then(text()).map(DirectiveKind::Error);
+    let columns = expr
+        .clone()
+        .then_ignore(comma())
+        .then(expr.clone())
+        .delimited_by(just(Token::BracketOpen).labelled("`[`"), just(Token::BracketClose).labelled("`]`"))
+        .or_not();
     let at = text()
         .then(expr.clone().labelled("a line number"))
-        .map(|(file, line)| Loc::At(file, line))
+        .then(columns)
+        .map(|((file, line), columns)| Loc::At(file, line, columns))
         .or(name.map(Loc::None));
     let loc = is(Directive::Loc)
         .ignore_then(at.separated_by(just(Token::Bars).labelled("`||`")).at_least(1).collect::<Vec<_>>())

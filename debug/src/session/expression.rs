@@ -3,6 +3,7 @@
 //! | written | means |
 //! |---|---|
 //! | `x` | what the source line at hand would read: the port or register of that name, or the label's address, or the constant |
+//! | `P[2,3]` | the element of an array of registers |
 //! | `@m12` | the register at that place (`m12` too, if nothing else is named so) |
 //! | `table[i]`, `4[i]`, `[i]` | the data word at that offset and index, as binary32 |
 //! | `x:int`, `@m12:bits`, `[i]:float` | the same bits as a value of that type |
@@ -439,6 +440,15 @@ fn parse(text: &str, known: Known<'_>, depth: usize) -> Result<Live, String> {
                 format!("{} has no register {head} (registers: {})", machine.name, banks.join(" "))
             })?;
             operand = Some(Operand::Register(register, Type::F));
+        } else if bytes.get(at) == Some(&b'[') {
+            let end = closing(bytes, at).ok_or_else(|| format!("`{}`: a `]` is missing", &text[at..]))?;
+            let element = text[start..=end].replace(' ', "");
+            if meanings(&element, known).is_some() {
+                operand = Some(name(&element, known)?);
+                at = end + 1;
+            }
+        }
+        if operand.is_some() {
         } else if bytes.get(at) == Some(&b'[') {
             let end = closing(bytes, at).ok_or_else(|| format!("`{}`: a `]` is missing", &text[at..]))?;
             let part = |text: &str| parse(text, known, depth - 1).map(Box::new);

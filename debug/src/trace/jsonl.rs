@@ -41,13 +41,12 @@ impl<'w> JsonLines<'w> {
         let row = retire.op.row();
         let machine = program.machine;
         let index = retire.address as usize * machine.slots.len() + usize::from(retire.slot);
-        let location = program.lines.get(index).copied().flatten();
         Some(Line {
             issued: Some(retire.issued),
             bundle: Some(retire.address),
             slot: Some(machine.slots[usize::from(retire.slot)].name),
             op: Some(row.mnemonic),
-            source: location.map(|location| program.place_text(location)),
+            source: program.word_place(index),
             register: retire.register.map(|register| program.register_text(register)),
             bits: (retire.register.is_some() || retire.memory.is_some())
                 .then(|| format!("0x{:08x}", retire.value)),

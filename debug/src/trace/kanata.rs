@@ -111,9 +111,8 @@ impl<'w> Kanata<'w> {
                 cycle,
                 format_args!("L\t{id}\t0\t{address} {}: {label}{text}", machine.slots[slot].name),
             );
-            let place = program.lines.get(address as usize * machine.slots.len() + slot);
-            if let Some(&Some(location)) = place {
-                self.line(cycle, format_args!("L\t{id}\t1\t{}", program.place_text(location)));
+            if let Some(place) = program.word_place(address as usize * machine.slots.len() + slot) {
+                self.line(cycle, format_args!("L\t{id}\t1\t{place}"));
             }
             self.line(cycle, format_args!("S\t{id}\t0\t{stage}"));
             rows.push((id, slot, instruction));

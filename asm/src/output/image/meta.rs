@@ -2,7 +2,7 @@
 
 use super::{ImageError, VERSION};
 use serde::{Deserialize, Serialize};
-use takt_isa::program::{Location, Port, Section, Symbol};
+use takt_isa::program::{Columns, Location, Port, Section, Symbol};
 use takt_isa::{Machine, Program, Type};
 
 #[derive(Serialize, Deserialize)]
@@ -20,6 +20,9 @@ pub(super) struct Meta {
     files: Vec<String>,
     /// For each word of code its file and line.
     lines: Vec<Option<(u32, u32)>>,
+    /// Of words that compute a part of an equation, the word's index and the part's first and last column. Left out if there is none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    parts: Vec<(u32, u32, u32)>,
 }
 
 /// Read first: of a metadata of another version nothing else may be assumed.
@@ -103,6 +106,7 @@ impl Meta {
                 .iter()
                 .map(|line| line.map(|Location { file, line }| (file, line)))
                 .collect(),
+            parts: program.parts.iter().map(|(word, part)| (*word, part.first, part.last)).collect(),
         }
     }
 
@@ -150,6 +154,7 @@ impl Meta {
                 .into_iter()
                 .map(|line| line.map(|(file, line)| Location { file, line }))
                 .collect(),
+            parts: self.parts.into_iter().map(|(word, first, last)| (word, Columns { first, last })).collect(),
         })
     }
 }
