@@ -147,7 +147,8 @@ fn evaluate(tree: &Tree, registers: &Registers) -> Result<Seen, NoValue> {
             })
         }
         Infix(operator, ..) => {
-            let (a, b) = (f32::from_bits(bits(operands[0], Type::F)?), f32::from_bits(bits(operands[1], Type::F)?));
+            let (a, b) =
+                (f32::from_bits(bits(operands[0], Type::F)?), f32::from_bits(bits(operands[1], Type::F)?));
             let truth = |condition: bool| Seen::Int(condition.into());
             match *operator {
                 "+" => Seen::Float(run(Op::fadd, &operands, Type::F)?),
@@ -381,7 +382,8 @@ fn jumps_by_number_do_not_skip_what_is_shared() {
             ".input x, n:int\n.output a, b\n.reg t\n.once\n t = x\n wait period\n.period\nperiod: bz n, {target}\n a = t*t + 1\n b = t*t - 1\n wait period\n"
         )
     };
-    let codes = |report: takt_asm::diag::Diagnostics| report.list.iter().map(|error| error.code).collect::<Vec<_>>();
+    let codes =
+        |report: takt_asm::diag::Diagnostics| report.list.iter().map(|error| error.code).collect::<Vec<_>>();
     // Bundles: mov, wait, bz, fmul, fadd, fsub, wait.
     assert!(assemble(&text(3), &T3).is_ok());
     assert_eq!(codes(bad(&text(4), &T3)), ["target"]);
@@ -406,7 +408,9 @@ fn what_a_machine_lacks() {
     let lacks = |row: &&takt_isa::Row| T1.host(row.function).is_none() && !row.forms.is_empty();
     for row in takt_isa::ROWS.iter().filter(lacks) {
         let form = row.forms[0].replace("(a", "(x").replace(", b", ", y");
-        let text = |value: &str| format!(".input x, y\n.output a\n.once\n wait p\n.period\np: a = {value}\n wait p\n");
+        let text = |value: &str| {
+            format!(".input x, y\n.output a\n.once\n wait p\n.period\np: a = {value}\n wait p\n")
+        };
         let report = bad(&text(&form), &T1);
         assert_eq!(report.list[0].code, "no-unit", "{}", report.render(false));
         let chosen = format!("has.{} ? {form} : x*y", row.mnemonic);
@@ -454,7 +458,9 @@ fn words_know_their_part_of_the_line() {
 #[test]
 fn limits_are_finite() {
     let code = |line: &str, declarations: &str| {
-        let text = format!(".input x\n.output a\n{declarations}\n.once\n wait p\n.period\np:\n a = x\n {line}\n wait p\n");
+        let text = format!(
+            ".input x\n.output a\n{declarations}\n.once\n wait p\n.period\np:\n a = x\n {line}\n wait p\n"
+        );
         let report = bad(&text, &T3);
         assert_eq!(report.list.len(), 1, "{}", report.render(false));
         report.list[0].code
@@ -470,5 +476,10 @@ fn limits_are_finite() {
     assert_eq!(code(&format!("{} = {values}", names.join(", ")), ".reg t[65]"), "limit");
     // What is long, but not deep, is read.
     let long = vec!["x*x"; 200].join(" + ");
-    assert!(good(&format!(".input x\n.output a\n.once\n wait p\n.period\np: a = {long}\n wait p\n")).program.bundles() > 200);
+    assert!(
+        good(&format!(".input x\n.output a\n.once\n wait p\n.period\np: a = {long}\n wait p\n"))
+            .program
+            .bundles()
+            > 200
+    );
 }

@@ -83,10 +83,15 @@ impl Fault {
         kind: FaultKind,
     ) -> Fault {
         let slots = program.machine.slots;
-        let own = slot.and_then(|slot| {
-            program.word_place((address as usize).checked_mul(slots.len())?.checked_add(slot.into())?)
+        let word =
+            slot.and_then(|slot| (address as usize).checked_mul(slots.len())?.checked_add(slot.into()));
+        let own = word.and_then(|word| *program.lines.get(word)?);
+        let location = own.or_else(|| {
+            // Program::location slices, which an address far outside would overflow.
+            (address < program.bundles()).then(|| program.location(address)).flatten()
         });
-        let mut place = match own.or_else(|| program.bundle_place(address)) {
+        let text = word.and_then(|word| program.word_place(word));
+        let mut place = match text.or_else(|| program.bundle_place(address)) {
             Some(place) => format!("{place}: bundle {address}"),
             None => format!("bundle {address}"),
         };

@@ -49,10 +49,8 @@ pub const EXAMPLES: &[(&str, &str)] = &[
 ];
 
 /// The library, for `.include <name>`: name and text of every file in `library/`.
-pub const LIBRARY: &[(&str, &str)] = &[
-    ("math.s", include_str!("../library/math.s")),
-    ("matrix.s", include_str!("../library/matrix.s")),
-];
+pub const LIBRARY: &[(&str, &str)] =
+    &[("math.s", include_str!("../library/math.s")), ("matrix.s", include_str!("../library/matrix.s"))];
 
 #[cfg(test)]
 mod tests {

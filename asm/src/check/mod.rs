@@ -82,7 +82,8 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
             let all = || array.elements().map(|id| id.index());
             all().for_each(|element| elements[element] = true);
             // Of an array it is enough that one element is used.
-            let best = all().max_by_key(|&element| (uses[element].read.is_some(), uses[element].written.is_some()));
+            let best =
+                all().max_by_key(|&element| (uses[element].read.is_some(), uses[element].written.is_some()));
             if let Some(best) = best {
                 let register = Register { name: array.name.clone(), ..ir.registers[best].clone() };
                 unused(context, &register, &uses[best]);

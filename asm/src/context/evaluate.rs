@@ -229,7 +229,10 @@ impl Context {
                 let name = context.name(at, name, operand.span)?;
                 context.name_value(at.scope, name, operand.span)
             })?,
-            OperandKind::Place(_) | OperandKind::Memory(_) | OperandKind::Cast(_) | OperandKind::Element(_) => {
+            OperandKind::Place(_)
+            | OperandKind::Memory(_)
+            | OperandKind::Cast(_)
+            | OperandKind::Element(_) => {
                 let error = Diagnostic::error("not-a-value", span, "a value is needed here")
                     .also(operand.span, "the argument is an operand without one");
                 return Err(self.report(at.scope, error));

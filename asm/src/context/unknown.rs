@@ -103,7 +103,9 @@ impl Context {
                         error.help(format!("put the label `{text}:` before the bundle to continue at"))
                     }
                     Wanted::Value => error.help(format!("define it with `.const {text} = …`")),
-                    Wanted::Array => error.help(format!("declare it with `.reg {text}[n]`, or `.reg {text}[n,m]`")),
+                    Wanted::Array => {
+                        error.help(format!("declare it with `.reg {text}[n]`, or `.reg {text}[n,m]`"))
+                    }
                     Wanted::Table => error.help(format!(
                         "put it into data memory: `.data`, then `{text}: .float …`, `.word …` or `.space …`"
                     )),

@@ -3,7 +3,7 @@
 pub(crate) mod place;
 
 use crate::emit::place::Placement;
-use crate::ir::{Constant, Ir, Operation, RegisterKind};
+use crate::ir::{Constant, Ir, Operation, RegisterKind, numbered};
 use crate::limits::NAME_BYTES;
 use crate::report::diag::{Diagnostic, Sink};
 use crate::report::source::Span;
@@ -52,7 +52,9 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
             code[index] = word(ir, operation, slot, placement, sink);
             lines[index] = operation.location;
             origins[index] = operation.location.map(|_| (operation.order, operation.expansion));
-            columns.extend(operation.columns.filter(|_| operation.location.is_some()).map(|part| (index as u32, part)));
+            columns.extend(
+                operation.columns.filter(|_| operation.location.is_some()).map(|part| (index as u32, part)),
+            );
             if operation.is_computed() && operation.columns.is_none() {
                 parts.push((index as u32, operation.span));
             }
@@ -223,10 +225,12 @@ fn distinguish(program: &mut Program) {
             continue;
         }
         // ASCII throughout: a name can be cut anywhere.
-        let stem = name[..name.len().min(NAME_BYTES - 12)].to_owned();
+        let (head, indices) = name.split_at(name.find('[').unwrap_or(name.len()));
+        let room = (NAME_BYTES - 12).saturating_sub(indices.len());
+        let stem = format!("{}{indices}", &head[..head.len().min(room)]);
         let mut number = 2;
         *name = loop {
-            let candidate = format!("{stem}._{number}");
+            let candidate = numbered(&stem, &format!("._{number}"));
             if taken.insert(candidate.clone()) {
                 break candidate;
             }

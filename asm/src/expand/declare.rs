@@ -159,7 +159,14 @@ impl Expander<'_> {
             let register = RegisterId::new(self.context.declared.registers.len());
             self.context.declared.typed.extend(ty.map(|_| register));
             let ty = ty.unwrap_or(Type::F);
-            self.context.declared.registers.push(Register { name, kind, ty, pinned: None, preset: None, span });
+            self.context.declared.registers.push(Register {
+                name,
+                kind,
+                ty,
+                pinned: None,
+                preset: None,
+                span,
+            });
             for (index, size) in indices.iter_mut().zip(&shape).rev() {
                 *index += 1;
                 if *index <= *size {

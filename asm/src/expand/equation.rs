@@ -83,22 +83,30 @@ impl Expander<'_> {
                 let NodeKind::Call(name, _) = node.kind else { continue };
                 let Some(definition) = self.context.scopes.macros.get(&name) else { continue };
                 let arguments = operands(&parts, index);
-                let is_constant = |&(from, to): &(u32, u32)| {
-                    self.is_constant(at, &nodes[from as usize..=to as usize])
-                };
+                let is_constant =
+                    |&(from, to): &(u32, u32)| self.is_constant(at, &nodes[from as usize..=to as usize]);
                 if name.function().is_some() && arguments.iter().all(is_constant) {
                     continue;
                 }
                 let (parameters, defined) = definition.parameters(&self.context.asts);
                 let text = self.context.scopes.text(name).to_owned();
                 if parameters != arguments.len() + 1 {
-                    return Err(self.wrong_arguments(at, node.span, &text, (parameters, arguments.len()), defined));
+                    return Err(self.wrong_arguments(
+                        at,
+                        node.span,
+                        &text,
+                        (parameters, arguments.len()),
+                        defined,
+                    ));
                 }
                 if let Some((from, _)) = sums.iter().find(|(from, to)| (*from..*to).contains(&index)) {
-                    let message = format!("macro `{text}` within a `{SUM}`: it would be used once for all turns");
+                    let message =
+                        format!("macro `{text}` within a `{SUM}`: it would be used once for all turns");
                     let error = Diagnostic::error("macro-in-sum", node.span, message)
                         .also(nodes[*from as usize].span, "counts here")
-                        .help("compute what it gives in a `.rep`, into registers of its own, and add those up");
+                        .help(
+                            "compute what it gives in a `.rep`, into registers of its own, and add those up",
+                        );
                     return Err(self.context.report(at.scope, error));
                 }
                 let mut given = Vec::with_capacity(parameters);
@@ -115,7 +123,8 @@ impl Expander<'_> {
                             None => {
                                 let register = self.register(span);
                                 let argument = Some((Expr { id, span }, register));
-                                steps.push(Step::Piece(Piece { argument, results: Rc::new(results.clone()) }));
+                                steps
+                                    .push(Step::Piece(Piece { argument, results: Rc::new(results.clone()) }));
                                 self.unnamed(register)
                             }
                         },
@@ -188,7 +197,11 @@ impl Expander<'_> {
 
     fn is_value(&self, binding: Binding) -> bool {
         match binding {
-            Binding::Constant(_) | Binding::Count(_) | Binding::Builtin(_) | Binding::Has(_) | Binding::Data(_) => true,
+            Binding::Constant(_)
+            | Binding::Count(_)
+            | Binding::Builtin(_)
+            | Binding::Has(_)
+            | Binding::Data(_) => true,
             Binding::Argument(argument) => {
                 let argument = self.context.declared.arguments[argument as usize];
                 match argument.operand.kind {
@@ -220,7 +233,8 @@ impl Expander<'_> {
         let Some(target) = meaning(target) else { return true };
         others.iter().any(|other| match other.kind {
             OperandKind::Expr(_) => false,
-            _ => meaning(*other).is_none_or(|other| other == target || other.1 == Binding::None && other.0 == target.0),
+            _ => meaning(*other)
+                .is_none_or(|other| other == target || other.1 == Binding::None && other.0 == target.0),
         })
     }
 
@@ -242,6 +256,13 @@ impl Expander<'_> {
 impl Register {
     /// One for a value that the source gives no name.
     pub(crate) fn unnamed(span: Span) -> Register {
-        Register { name: String::new(), kind: RegisterKind::Plain, ty: Type::B, pinned: None, preset: None, span }
+        Register {
+            name: String::new(),
+            kind: RegisterKind::Plain,
+            ty: Type::B,
+            pinned: None,
+            preset: None,
+            span,
+        }
     }
 }

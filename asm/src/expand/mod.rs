@@ -391,8 +391,8 @@ impl<'l> Expander<'l> {
                     StatementKind::Equation(_) => "an equation in `.data`",
                     _ => "an instruction in `.data`",
                 };
-                let error = Diagnostic::error("section", span, what)
-                    .help("open `.once` or `.period` before it");
+                let error =
+                    Diagnostic::error("section", span, what).help("open `.once` or `.period` before it");
                 self.context.report(at.scope, error);
                 return;
             }

@@ -85,6 +85,12 @@ pub struct Register {
     pub span: Span,
 }
 
+/// A name with something behind it, and that before the indices if it is an element's: `t.1`, `P.1[2,3]`.
+pub(crate) fn numbered(name: &str, number: &str) -> String {
+    let (head, indices) = name.split_at(name.find('[').unwrap_or(name.len()));
+    format!("{head}{number}{indices}")
+}
+
 /// What an operation carries beyond registers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Constant {

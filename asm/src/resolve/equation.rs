@@ -92,7 +92,8 @@ impl Resolver<'_> {
                 Ok((register, wanted)) => {
                     if let Some((_, _, first)) = targets.iter().find(|(other, ..)| *other == register) {
                         let message = "one register is written twice in one equation";
-                        let error = Diagnostic::error("equation", target.span, message).also(*first, "the other");
+                        let error =
+                            Diagnostic::error("equation", target.span, message).also(*first, "the other");
                         return Err(self.context.report(item.at.scope, error));
                     }
                     targets.push((register, wanted, target.span));
@@ -299,7 +300,14 @@ impl Resolver<'_> {
     }
 
     /// The register that holds a constant as a type has it.
-    pub(super) fn holding(&mut self, at: At, value: Value, expr: ExprId, span: Span, ty: Type) -> Result<RegisterId, Reported> {
+    pub(super) fn holding(
+        &mut self,
+        at: At,
+        value: Value,
+        expr: ExprId,
+        span: Span,
+        ty: Type,
+    ) -> Result<RegisterId, Reported> {
         let operand = Operand { kind: OperandKind::Expr(expr), span };
         let bits = self.bits(at, value, ty, operand)?;
         Ok(self.pooled(bits, span))

@@ -80,7 +80,9 @@ impl Resolver<'_> {
                 NodeKind::Call(name, count) if self.context.scopes.text(name) == SUM => {
                     let counts = matches!(nodes[first as usize].kind, NodeKind::Name(_));
                     if count != 4 || !counts {
-                        let message = format!("a `{SUM}` has an index, its first and its last value, and what is added up");
+                        let message = format!(
+                            "a `{SUM}` has an index, its first and its last value, and what is added up"
+                        );
                         let error = Diagnostic::error("arguments", node.span, message)
                             .help(format!("write it as `{SUM}(i, 1, 4, a[i]*b[i])`"));
                         return Err(self.context.report(at.scope, error));
@@ -181,7 +183,13 @@ impl Resolver<'_> {
             }
             stretch.next += 1;
             let node = nodes[index as usize];
-            let here = (node.span, ExprId { first: id.first + plan.parts[index as usize], count: index - plan.parts[index as usize] + 1 });
+            let here = (
+                node.span,
+                ExprId {
+                    first: id.first + plan.parts[index as usize],
+                    count: index - plan.parts[index as usize] + 1,
+                },
+            );
             let mut take = |count: usize| stack.split_off(stack.len().saturating_sub(count));
             let term = match node.kind {
                 NodeKind::Int(value) => constant(Value::Int(value), index, index, node.span),
@@ -198,7 +206,12 @@ impl Resolver<'_> {
                     match terms[..] {
                         [Term { part: Part::Constant(value, _), .. }] => {
                             let value = expr::prefix(operator, value);
-                            constant(self.folded(at, value, node.span)?, here.1.first - id.first, index, node.span)
+                            constant(
+                                self.folded(at, value, node.span)?,
+                                here.1.first - id.first,
+                                index,
+                                node.span,
+                            )
                         }
                         _ => self.apply(at, line, operator.text(), &terms, here, Kind::None)?,
                     }
@@ -208,7 +221,12 @@ impl Resolver<'_> {
                     match (terms[0].value(), terms[1].value()) {
                         (Some(a), Some(b)) => {
                             let value = expr::infix(operator, a, b);
-                            constant(self.folded(at, value, node.span)?, here.1.first - id.first, index, node.span)
+                            constant(
+                                self.folded(at, value, node.span)?,
+                                here.1.first - id.first,
+                                index,
+                                node.span,
+                            )
                         }
                         _ => self.apply(at, line, operator.text(), &terms, here, Kind::None)?,
                     }
@@ -224,7 +242,12 @@ impl Resolver<'_> {
                     match (name.function(), values) {
                         (Some(function), Some(values)) => {
                             let value = expr::call(function, &values);
-                            constant(self.folded(at, value, node.span)?, here.1.first - id.first, index, node.span)
+                            constant(
+                                self.folded(at, value, node.span)?,
+                                here.1.first - id.first,
+                                index,
+                                node.span,
+                            )
                         }
                         _ => self.function(at, line, name, &terms, here)?,
                     }
@@ -324,11 +347,17 @@ impl Resolver<'_> {
         here: (Span, ExprId),
         wanted: Kind,
     ) -> Result<Term, Reported> {
-        let fitting: Vec<Meaning> =
-            self.forms.get(symbol, terms.len()).iter().filter(|meaning| self.fits(meaning, terms)).cloned().collect();
+        let fitting: Vec<Meaning> = self
+            .forms
+            .get(symbol, terms.len())
+            .iter()
+            .filter(|meaning| self.fits(meaning, terms))
+            .cloned()
+            .collect();
         // Where the terms leave the type open, as constants do, it is float.
         let is_float = |meaning: &&Meaning| meaning.op.row().types.contains(&Type::F);
-        let is_int = terms.iter().all(|term| term.value().is_some_and(|value| matches!(value, Value::Int(_))));
+        let is_int =
+            terms.iter().all(|term| term.value().is_some_and(|value| matches!(value, Value::Int(_))));
         let found = match is_int {
             true => fitting.iter().find(|meaning| !is_float(meaning)),
             false => fitting.iter().find(is_float),
@@ -359,10 +388,12 @@ impl Resolver<'_> {
             (Kind::Any, _) => Type::B,
             (Kind::None, Kind::Float | Kind::None) => Type::F,
             (Kind::None, Kind::Int) => Type::I,
-            (Kind::None, Kind::Any) => match terms.iter().zip(sources).any(|(t, which)| among(which) && is_real(t)) {
-                true => Type::F,
-                false => Type::I,
-            },
+            (Kind::None, Kind::Any) => {
+                match terms.iter().zip(sources).any(|(t, which)| among(which) && is_real(t)) {
+                    true => Type::F,
+                    false => Type::I,
+                }
+            }
         };
         let mut registers = [RegisterId::ZERO; 3];
         let mut kinds = [Kind::Any; 3];
@@ -374,9 +405,7 @@ impl Resolver<'_> {
             };
             (registers[which], kinds[which]) = match term.part {
                 Part::Register(register, kind) => (register, kind),
-                Part::Constant(value, expr) => {
-                    (self.holding(at, value, expr, term.span, ty)?, Kind::of(ty))
-                }
+                Part::Constant(value, expr) => (self.holding(at, value, expr, term.span, ty)?, Kind::of(ty)),
             };
         }
         let result = self.forms.result(op, |which| kinds[which]);

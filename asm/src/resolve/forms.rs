@@ -59,7 +59,8 @@ impl Forms {
     /// The function that converts from one type to another.
     pub(crate) fn conversion(&self, from: Type, to: Type) -> Option<&str> {
         let converts = |row: &Row| row.effect == Effect::Compute && row.types == [to, from];
-        let mut found = self.forms.iter().filter(|(_, meanings)| meanings.iter().any(|m| converts(m.op.row())));
+        let mut found =
+            self.forms.iter().filter(|(_, meanings)| meanings.iter().any(|m| converts(m.op.row())));
         found.next().map(|((symbol, _), _)| symbol.as_str())
     }
 

@@ -22,21 +22,28 @@ impl Resolver<'_> {
         let condition = symbol == "?:";
         if condition && terms[0].kind() == Some(Kind::Float) {
             let condition = text(self, &terms[0]);
-            let error = Diagnostic::error("equation", terms[0].span, "a condition is an integer, as comparisons give it, and this is a float")
-                .help(format!("compare it: `{condition} != 0`"));
+            let error = Diagnostic::error(
+                "equation",
+                terms[0].span,
+                "a condition is an integer, as comparisons give it, and this is a float",
+            )
+            .help(format!("compare it: `{condition} != 0`"));
             return self.context.report(at.scope, error);
         }
         // What the instructions with this form want.
         let wants = |ty| {
-            self.forms.get(symbol, terms.len()).iter().any(|meaning| {
-                meaning.sources.iter().any(|which| meaning.op.row().source_type(*which) == ty)
-            })
+            self.forms
+                .get(symbol, terms.len())
+                .iter()
+                .any(|meaning| meaning.sources.iter().any(|which| meaning.op.row().source_type(*which) == ty))
         };
         let error = match (find(Kind::Int), find(Kind::Float)) {
             (Some(int), Some(float)) => {
                 let (name, other) = (text(self, int), text(self, float));
                 let message = format!("{shown} between an integer and a float");
-                let error = Diagnostic::error("equation", int.span, message).here("an integer").also(float.span, "a float");
+                let error = Diagnostic::error("equation", int.span, message)
+                    .here("an integer")
+                    .also(float.span, "a float");
                 match (convert(Type::I, Type::F), convert(Type::F, Type::I)) {
                     (Some(float_of), Some(int_of)) if wants(Type::I) => error
                         .help(format!("convert one of them: `{float_of}({name})` or `{int_of}({other})`")),
@@ -88,7 +95,10 @@ impl Resolver<'_> {
             let message = format!("no instruction computes `{symbol}`");
             let text = |term: &Term| self.context.reports.sources.text(term.span);
             let help = match (symbol, terms) {
-                ("^", [base, _]) => Some(format!("multiply: `{0}*{0}`; `pow(x, y)` of `<math.s>` takes any exponent", text(base))),
+                ("^", [base, _]) => Some(format!(
+                    "multiply: `{0}*{0}`; `pow(x, y)` of `<math.s>` takes any exponent",
+                    text(base)
+                )),
                 ("%", _) => Some("`fmod(x, y)` of `<math.s>` computes remainders".to_owned()),
                 ("~", _) => Some("`xor(…, -1)` flips all bits".to_owned()),
                 _ => None,
@@ -110,18 +120,23 @@ impl Resolver<'_> {
         let error = match (later, library) {
             (Some((_, definition)), _) => {
                 let defined = definition.span(&self.context.asts);
-                error.also(defined, "a macro of that name is defined only here").help("move the definition up")
+                error
+                    .also(defined, "a macro of that name is defined only here")
+                    .help("move the definition up")
             }
             (None, Some(file)) => error.help(format!("the library defines it: `.include <{file}>`")),
             (None, None) => {
-                let mut known: Vec<&str> = macros.keys().map(|name| self.context.scopes.text(*name)).collect();
+                let mut known: Vec<&str> =
+                    macros.keys().map(|name| self.context.scopes.text(*name)).collect();
                 known.sort_unstable();
                 let functions = self.forms.functions();
                 let meant = nearest(symbol, functions.iter().copied().chain(known));
                 match meant {
                     Some(_) => error.did_you_mean(meant),
-                    None => error
-                        .note(format!("functions: {}; and macros, as those of `<math.s>`", functions.join(" "))),
+                    None => error.note(format!(
+                        "functions: {}; and macros, as those of `<math.s>`",
+                        functions.join(" ")
+                    )),
                 }
             }
         };

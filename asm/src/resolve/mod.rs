@@ -3,17 +3,17 @@
 mod address;
 pub(crate) mod equation;
 mod expression;
-mod mismatch;
 pub(crate) mod forms;
+mod mismatch;
 mod operand;
-mod sharing;
 pub(crate) mod serialise;
+mod sharing;
 
 use crate::context::{At, Context, Reported, ScopeId};
 use crate::expand::load::Loader;
 use crate::expand::{self, Data, Flat, Item, Timing};
-use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
 use crate::ir::given::Kind;
+use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
 use crate::report::diag::{Diagnostic, nearest};
 use crate::report::source::Span;
 use crate::resolve::forms::Forms;

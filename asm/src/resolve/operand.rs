@@ -31,7 +31,8 @@ impl Resolver<'_> {
         self.cast = None;
         match place {
             Place::Dest => {
-                operation.dest = Some(self.dest(at, operand, "the first operand is the register to write")?);
+                operation.dest =
+                    Some(self.dest(at, operand, "the first operand is the register to write")?);
                 self.note_cast(operation, Part::Dest);
             }
             Place::Source(index) => {
@@ -188,8 +189,12 @@ impl Resolver<'_> {
                 Some((*name, indices.clone()))
             }
             OperandKind::Memory(memory) => {
-                let Memory { offset: Some(offset), base } = ast.memories[memory as usize] else { return None };
-                let [Node { kind: NodeKind::Name(name), span }] = ast.nodes[offset.id.range()] else { return None };
+                let Memory { offset: Some(offset), base } = ast.memories[memory as usize] else {
+                    return None;
+                };
+                let [Node { kind: NodeKind::Name(name), span }] = ast.nodes[offset.id.range()] else {
+                    return None;
+                };
                 let id = name.resolve().ok()?;
                 let mut binding = self.context.lookup(at.scope, id);
                 while let Binding::Argument(argument) = binding {
@@ -201,10 +206,14 @@ impl Resolver<'_> {
                     (Binding::Array(_), _) => {}
                     // An element that is declared with its place.
                     (Binding::None, OperandKind::Expr(expr)) => {
-                        let [Node { kind: NodeKind::Int(index), .. }] = ast.nodes[expr.range()] else { return None };
+                        let [Node { kind: NodeKind::Int(index), .. }] = ast.nodes[expr.range()] else {
+                            return None;
+                        };
                         let element = format!("{}[{index}]", self.context.scopes.text(id));
                         let element = self.context.scopes.names_mut().intern(&element);
-                        let Binding::Register(_) = self.context.lookup(at.scope, element) else { return None };
+                        let Binding::Register(_) = self.context.lookup(at.scope, element) else {
+                            return None;
+                        };
                     }
                     _ => return None,
                 }
@@ -245,7 +254,8 @@ impl Resolver<'_> {
             }
             _ => {
                 let text = self.context.reports.sources.text(name.span).to_owned();
-                let kind = meaning.map_or("no array", |(_, binding)| self.context.declared.kind_text(binding));
+                let kind =
+                    meaning.map_or("no array", |(_, binding)| self.context.declared.kind_text(binding));
                 let message = format!("`{text}` is {kind}, not an array of registers");
                 let mut error = Diagnostic::error("array", name.span, message);
                 if let Some(declared) =

@@ -7,7 +7,13 @@ use takt_isa::{MACHINES, Machine};
 use takt_programs::LIBRARY;
 
 /// What the loops are written in.
-trait Number: Copy + std::ops::Mul<Output = Self> + std::ops::Add<Output = Self> + std::ops::Sub<Output = Self> + std::ops::Div<Output = Self> {
+trait Number:
+    Copy
+    + std::ops::Mul<Output = Self>
+    + std::ops::Add<Output = Self>
+    + std::ops::Sub<Output = Self>
+    + std::ops::Div<Output = Self>
+{
     fn of(value: f32) -> Self;
     fn root(self) -> Self;
 }
@@ -40,7 +46,8 @@ struct Matrix<N> {
 impl<N: Number> Matrix<N> {
     /// `n` by `columns`, each element from its row and column.
     fn new(n: usize, columns: usize, element: impl Fn(usize, usize) -> N) -> Matrix<N> {
-        let values = (0..n).flat_map(|i| (0..columns).map(move |j| (i, j))).map(|(i, j)| element(i, j)).collect();
+        let values =
+            (0..n).flat_map(|i| (0..columns).map(move |j| (i, j))).map(|(i, j)| element(i, j)).collect();
         Matrix { columns, values }
     }
 
@@ -98,7 +105,8 @@ fn solved<N: Number>(a: &Matrix<N>, b: &[N]) -> Vec<N> {
 /// All that the program below computes, in the order of its outputs, from A (3×4), B (4×2), x (4), y (3).
 fn computed<N: Number>(inputs: &[f32]) -> Vec<N> {
     let mut inputs = inputs.iter().map(|value| N::of(*value));
-    let mut matrix = |n: usize, m: usize| Matrix { columns: m, values: inputs.by_ref().take(n * m).collect() };
+    let mut matrix =
+        |n: usize, m: usize| Matrix { columns: m, values: inputs.by_ref().take(n * m).collect() };
     let (a, b, x, y) = (matrix(3, 4), matrix(4, 2), matrix(4, 1), matrix(3, 1));
     let mut all = Vec::new();
     let product = times(&a, &b);
@@ -210,7 +218,12 @@ fn judge(machine: &'static Machine) {
             let found = emulator.register(port.register).map(f32::from_bits).expect("it is written");
             assert_eq!(found.to_bits(), single.to_bits(), "{} on {}, seed {seed}", port.name, machine.name);
             let off = (f64::from(found) - double).abs();
-            assert!(off <= 1e-4 * double.abs().max(1.0), "{} on {}: {found}, {double}", port.name, machine.name);
+            assert!(
+                off <= 1e-4 * double.abs().max(1.0),
+                "{} on {}: {found}, {double}",
+                port.name,
+                machine.name
+            );
         }
     }
 }

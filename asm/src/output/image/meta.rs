@@ -154,7 +154,11 @@ impl Meta {
                 .into_iter()
                 .map(|line| line.map(|(file, line)| Location { file, line }))
                 .collect(),
-            parts: self.parts.into_iter().map(|(word, first, last)| (word, Columns { first, last })).collect(),
+            parts: self
+                .parts
+                .into_iter()
+                .map(|(word, first, last)| (word, Columns { first, last }))
+                .collect(),
         })
     }
 }
