@@ -16,6 +16,8 @@ use takt_isa::ROWS;
 pub(crate) enum Wanted {
     /// A register to write.
     Dest,
+    /// The same, left of an equation's `=`.
+    Left,
     /// A register or constant to read.
     Source,
     /// A code label.
@@ -96,6 +98,9 @@ impl Context {
                 None if name.op().is_some() => error.note(format!("`{text}` is an instruction")),
                 None => match wanted {
                     Wanted::Dest => error.help(format!("declare it with `.reg {text}` or `.output {text}`")),
+                    Wanted::Left => error.help(format!(
+                        "declare it with `.reg {text}` or `.output {text}`; a constant is `.const {text} = …`"
+                    )),
                     Wanted::Source => error.help(format!(
                         "declare it with `.reg {text}`, `.input {text}` or `.const {text} = …`"
                     )),
@@ -123,10 +128,10 @@ impl Context {
             (Wanted::Array, binding) => matches!(binding, Binding::Array(_) | Binding::Argument(_)),
             (_, Binding::Array(_)) => false,
             (_, Binding::Argument(_)) => true,
-            (Wanted::Dest, Binding::Register(id)) => {
+            (Wanted::Dest | Wanted::Left, Binding::Register(id)) => {
                 !matches!(self.declared.registers[id.index()].kind, RegisterKind::Input | RegisterKind::Zero)
             }
-            (Wanted::Dest, _) => false,
+            (Wanted::Dest | Wanted::Left, _) => false,
             (Wanted::Source, Binding::Code(_)) => false,
             (Wanted::Source, _) => true,
             (Wanted::Target, binding) => matches!(binding, Binding::Code(_)),

@@ -2,7 +2,7 @@
 //! names, in the order in which the equation is written ([`expression`](crate::resolve::expression)). Each operation has the part
 //! of the line that it computes as its span. Here is what becomes of the values: where they go, and what types they have.
 
-use crate::context::{At, Reported, type_name, words};
+use crate::context::{At, Reported, Wanted, type_name, words};
 use crate::expand::Item;
 use crate::expand::equation::Results;
 use crate::ir::given::Kind;
@@ -76,7 +76,12 @@ impl Resolver<'_> {
         }
         if equation.targets.len() != equation.values.len() {
             let (targets, values) = (equation.targets.len(), equation.values.len());
-            let message = format!("{targets} registers to write and {values} values");
+            let plural = |count: usize| if count == 1 { "" } else { "s" };
+            let message = format!(
+                "{targets} register{} to write and {values} value{}",
+                plural(targets),
+                plural(values)
+            );
             let error = Diagnostic::error("equation", equation.span, message)
                 .help("write one value for each register, separated by `,`");
             return Err(self.context.report(item.at.scope, error));
@@ -115,7 +120,7 @@ impl Resolver<'_> {
     /// The register that an equation writes, and the type that it has whatever is written.
     fn target_of(&mut self, at: At, target: Operand) -> Result<(RegisterId, Kind), Reported> {
         self.cast = None;
-        let register = self.dest(at, target, "what stands left of `=` is the register to write")?;
+        let register = self.dest(at, target, Wanted::Left)?;
         Ok((register, self.declared_kind(register).unwrap_or(Kind::None)))
     }
 
@@ -263,9 +268,11 @@ impl Resolver<'_> {
         let Register { name, span: declared, .. } = &self.context.declared.registers[target.index()];
         let (name, declared) = (name.clone(), *declared);
         let message = format!("this is {}, and `{name}` {}", words(is), words(to));
+        let written = self.context.reports.sources.text(term.span);
+        let written = if written.len() > 24 { "…" } else { written };
         let help = match self.forms.conversion(is, to) {
             Some(convert) => {
-                format!("write `{convert}(…)` to convert it, or declare `{name}:{}`", type_name(is))
+                format!("convert it: `{convert}({written})`, or declare `{name}:{}`", type_name(is))
             }
             None => format!("declare `{name}:{}`", type_name(is)),
         };

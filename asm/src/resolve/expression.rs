@@ -129,7 +129,16 @@ impl Resolver<'_> {
                     Some(total) => {
                         let first = plan.parts[turns.node as usize];
                         let id = ExprId { first: id.first + first, count: turns.node - first + 1 };
-                        self.apply(at, line, Operator::Add.text(), &[total, term], (span, id), Kind::None)?
+                        match (total.value(), term.value()) {
+                            (Some(a), Some(b)) => {
+                                let value = self.folded(at, expr::infix(Operator::Add, a, b), span)?;
+                                Term { part: Part::Constant(value, id), span }
+                            }
+                            _ => {
+                                let symbol = Operator::Add.text();
+                                self.apply(at, line, symbol, &[total, term], (span, id), Kind::None)?
+                            }
+                        }
                     }
                 };
                 if turns.value == turns.last {

@@ -1,6 +1,6 @@
 //! What is wrong where no instruction computes what an equation asks for. A part of [`equation`](crate::resolve::equation).
 
-use crate::context::{At, Reported, words};
+use crate::context::{At, Reported};
 use crate::ir::given::Kind;
 use crate::report::diag::{Diagnostic, nearest};
 use crate::report::source::Span;
@@ -17,9 +17,11 @@ impl Resolver<'_> {
         }
         let text = |resolver: &Self, term: &Term| resolver.context.reports.sources.text(term.span).to_owned();
         let shown = if symbol == "?:" { "`? :`".to_owned() } else { format!("`{symbol}`") };
-        let find = |kind| terms.iter().find(|term| term.kind() == Some(kind));
-        let convert = |from, to| self.forms.conversion(from, to);
         let condition = symbol == "?:";
+        // What a choice's condition is does not matter to its alternatives.
+        let mixed = if condition { &terms[1..] } else { terms };
+        let find = |kind| mixed.iter().find(|term| term.kind() == Some(kind));
+        let convert = |from, to| self.forms.conversion(from, to);
         if condition && terms[0].kind() == Some(Kind::Float) {
             let condition = text(self, &terms[0]);
             let error = Diagnostic::error(
@@ -69,12 +71,11 @@ impl Resolver<'_> {
             }
             (_, Some(float)) => {
                 let name = text(self, float);
-                let wanted = if wants(Type::I) { words(Type::I) } else { "bits" };
                 let message = format!("{shown} takes integers, and `{name}` is a float");
                 let error = Diagnostic::error("equation", float.span, message).here("a float");
                 match convert(Type::F, Type::I) {
                     Some(convert) => error.help(format!(
-                        "convert it: `{convert}({name})`, or declare it `:bits` if {wanted} of its pattern is meant"
+                        "convert it: `{convert}({name})`, or declare it `:bits` if its pattern is meant"
                     )),
                     None => error,
                 }
@@ -100,7 +101,7 @@ impl Resolver<'_> {
                     text(base)
                 )),
                 ("%", _) => Some("`fmod(x, y)` of `<math.s>` computes remainders".to_owned()),
-                ("~", _) => Some("`xor(…, -1)` flips all bits".to_owned()),
+                ("~", [operand]) => Some(format!("`xor({}, -1)` flips all bits", text(operand))),
                 _ => None,
             };
             let mut error = Diagnostic::error("equation", place, message);

@@ -31,8 +31,7 @@ impl Resolver<'_> {
         self.cast = None;
         match place {
             Place::Dest => {
-                operation.dest =
-                    Some(self.dest(at, operand, "the first operand is the register to write")?);
+                operation.dest = Some(self.dest(at, operand, Wanted::Dest)?);
                 self.note_cast(operation, Part::Dest);
             }
             Place::Source(index) => {
@@ -129,13 +128,17 @@ impl Resolver<'_> {
         }
     }
 
-    /// The register that an operand names, to be written. `help` says which that is.
-    pub(crate) fn dest(&mut self, at: At, operand: Operand, help: &str) -> Result<RegisterId, Reported> {
+    /// The register that an operand names, to be written: by an instruction, or an equation.
+    pub(crate) fn dest(&mut self, at: At, operand: Operand, wanted: Wanted) -> Result<RegisterId, Reported> {
+        let help = match wanted {
+            Wanted::Left => "what stands left of `=` is the register to write",
+            _ => "the first operand is the register to write",
+        };
         let (place, given, meaning) = self.meaning(at, operand)?;
         let register = match (given.kind, meaning) {
             (_, Some((_, Binding::Register(register)))) => register,
             (_, Some((name, Binding::None))) => {
-                return Err(self.context.unknown(place.scope, name, given.span, Wanted::Dest));
+                return Err(self.context.unknown(place.scope, name, given.span, wanted));
             }
             (OperandKind::Place(name), _) => {
                 let address = address(self.context, place, Name { name, span: given.span })?;

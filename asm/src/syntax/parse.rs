@@ -389,13 +389,23 @@ fn describe<'s>(
             format!("{shown} in the middle of a line"),
             Some("a directive begins its line; only a label may stand before it".to_owned()),
         ),
-        (Some(Token::Name(_) | Token::End(_)), Token::Assign) if directive.is_none() && !is_alone => (
-            "a constant is defined by a directive".to_owned(),
-            Some(format!(
-                "write `.const {}`",
-                text(tokens[0].1.to(tokens[tokens.len().saturating_sub(2)].1))
-            )),
+        _ if is_equation(tokens) && tokens.iter().any(|(token, _)| *token == Token::Bars) => (
+            "an equation within a bundle".to_owned(),
+            Some("an equation has a line of its own: the scheduler packs its operations".to_owned()),
         ),
+        (Some(_), Token::Assign) if tokens[..at].iter().any(|(token, _)| *token == Token::Assign) => {
+            ("a second `=`".to_owned(), Some("`==` compares; `a, b = x, y` writes two registers".to_owned()))
+        }
+        (Some(Token::Name(_)), Token::Name(_) | Token::Int(_) | Token::Real(_)) if is_equation(tokens) => (
+            format!("{shown} follows an operand"),
+            Some("is an operator missing, or a function's parentheses?".to_owned()),
+        ),
+        (_, Token::Newline)
+            if tokens.iter().filter(|(token, _)| *token == Token::Question).count()
+                > tokens.iter().skip(2).filter(|(token, _)| *token == Token::Colon).count() =>
+        {
+            ("the choice is incomplete".to_owned(), Some("a choice is written `c ? a : b`".to_owned()))
+        }
         (_, Token::Name(name))
             if operand(previous) && name.op().is_some() && directive.is_none() && !is_alone =>
         {
@@ -502,7 +512,7 @@ mod tests {
             pieces in prop::collection::vec(
                 prop::sample::select(vec![
                     "a", "b", "fadd", "l:", ":", "1", "2.5", ",", ", ", " ", " ", "||", " || ", "||\n", "\n", "[", "]", "4[a]",
-                    "t[b]", "2.5[a]", "@", "@m3", "-", "+", "x{i}", "(", ")", ".reg", "; c",
+                    "t[b]", "=", " = ", "?", "t[b,c]", "2.5[a]", "@", "@m3", "-", "+", "x{i}", "(", ")", ".reg", "; c",
                 ]),
                 0..14,
             )

@@ -1,7 +1,12 @@
 ; Equations that cannot be read.
 .input  x
 .output y
-.reg    a b P[2] Q[0] R[2,] S[2] @ m3 T[1,1,1,1,1,1,1,1,1]
+.reg    a b P[2]
+.reg    Q[0] P[3]
+.reg    R[2,]
+.reg    S[0] @ m3
+.reg    P[1] @ m4
+.reg    T[1,1,1,1,1,1,1,1,1] U[1e9]
 .input  z[3]
 .once
         wait    period
