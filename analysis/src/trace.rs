@@ -38,7 +38,7 @@ pub struct Trace {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TraceError {
     /// The program faulted.
-    #[error(transparent)]
+    #[error("{0}")]
     Fault(#[from] Fault),
     /// It has halted before.
     #[error("the program has halted: there is no further period")]

@@ -278,7 +278,8 @@ fn counted_loops_are_bounded_by_their_turns() {
                     emulator.set_blocks(blocks);
                     let fault = emulator.run().unwrap_err();
                     assert_eq!(fault.kind, FaultKind::LoopBound { most: turns - 1 });
-                    assert!(fault.to_string().starts_with("test.s:6: bundle 1"), "{fault}");
+                    let shown = fault.show(&program).to_string();
+                    assert!(shown.starts_with("test.s:6: bundle 1"), "{shown}");
                 }
             }
         }

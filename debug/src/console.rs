@@ -251,7 +251,7 @@ impl Console {
             Why::Start => "the beginning of the run\n".to_owned(),
             Why::Halted => "the program has halted\n".to_owned(),
             Why::InputsEnd => "the recorded inputs end here\n".to_owned(),
-            Why::Fault(_) => "the program has stopped with a fault\n".to_owned(),
+            Why::Fault(fault) => self.session.diagnose(&fault).render(false),
             Why::Limit(cycles) => format!("nothing to stop at in {cycles} cycles\n"),
             Why::Interrupted => "interrupted\n".to_owned(),
         };

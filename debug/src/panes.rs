@@ -158,7 +158,7 @@ pub(crate) fn head(session: &mut Session) -> String {
     let program = session.program();
     let what = match session.emulator().status() {
         Status::Halted { .. } => format!("halted at {}", program.bundle_text(address)),
-        Status::Faulted(fault) => fault.to_string(),
+        Status::Faulted(fault) => fault.show(program).to_string(),
         Status::Waiting { address, .. } => {
             format!("waits for the tick, since {}", program.bundle_text(*address))
         }

@@ -63,6 +63,22 @@ pub enum FaultKind {
     },
 }
 
+impl FaultKind {
+    /// Its name, in a word or two.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            FaultKind::IllegalWord(_) => "illegal word",
+            FaultKind::ProgramCounter { .. } => "program counter",
+            FaultKind::DataAddress { .. } => "data address",
+            FaultKind::UnwrittenRegister { .. } => "unwritten register",
+            FaultKind::StackOverflow { .. } => "return stack full",
+            FaultKind::StackUnderflow => "return stack empty",
+            FaultKind::LoopBound { .. } => "loop bound",
+            FaultKind::CycleLimit { .. } => "cycle limit",
+        }
+    }
+}
+
 impl Fault {
     /// The fault in words, for the program that was running.
     pub fn show<'a>(&'a self, program: &'a Program) -> ShownFault<'a> {

@@ -28,6 +28,7 @@ use std::collections::BTreeSet;
 use std::num::NonZeroU64;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use takt_asm::diag::Diagnostics;
 use takt_asm::expr::Value;
 use takt_asm::names::Names;
 use takt_emu::{Emulator, Fault, LoadError, PeriodReport, Retire, Status};
@@ -268,6 +269,11 @@ impl Session {
         }
         let address = self.core.emulator.next_address();
         self.program().location(address)
+    }
+
+    /// A fault of this program, at its source line.
+    pub fn diagnose(&self, fault: &Fault) -> Diagnostics {
+        crate::fault::diagnose(fault, self.program(), &self.options.sources)
     }
 
     /// The text of a source line, without its end.
