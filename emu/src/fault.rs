@@ -113,7 +113,8 @@ impl ShownFault<'_> {
         match &self.fault.kind {
             FaultKind::IllegalWord(reason) => format!("illegal word: {reason}"),
             FaultKind::ProgramCounter { bundles } => {
-                format!("execution left the program, which has {bundles} bundles")
+                let plural = if *bundles == 1 { "" } else { "s" };
+                format!("execution left the program, which has {bundles} bundle{plural}")
             }
             FaultKind::DataAddress { address, depth, store } => {
                 let does = if *store { "writes" } else { "reads" };
@@ -131,7 +132,7 @@ impl ShownFault<'_> {
             }
             FaultKind::StackUnderflow => "return with the return stack empty".to_owned(),
             FaultKind::LoopBound { most } => {
-                format!("the loop turns more than the {most} times that its .loop_bound promises")
+                format!("the loop iterates more often than its `.loop_bound {most}` allows")
             }
             FaultKind::CycleLimit { limit } => format!("limit of {limit} cycles reached"),
         }

@@ -53,8 +53,8 @@ fn faults_say_where_and_what() {
             16 * (1 + refill),
             ":1: bundle 0, slot aux, cycle {}: call with the return stack full (16 entries)",
         ),
-        ("jmp 65535", 1 + refill, "bundle 65535, cycle {}: execution left the program, which has 1 bundles"),
-        ("nop", 1, "bundle 1, cycle {}: execution left the program, which has 1 bundles"),
+        ("jmp 65535", 1 + refill, "bundle 65535, cycle {}: execution left the program, which has 1 bundle"),
+        ("nop", 1, "bundle 1, cycle {}: execution left the program, which has 1 bundle"),
         // The operand's wait comes first: the address is known only then.
         (
             ".preset a0 5000\nmov x0, a0\nld x1, 0[x0]",
