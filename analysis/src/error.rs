@@ -31,7 +31,7 @@ pub enum Refusal {
     },
     /// A loop whose head is reached again in a way that the bound does not count.
     #[error(
-        "this loop has a bound, but {from} leads to it again in a way that begins the count anew: let a backward \
+        "this loop has a bound, but {from} leads to it again in a way that restarts the count: let a backward \
          jump or branch close the loop"
     )]
     Uncounted {

@@ -218,7 +218,7 @@ impl Trace {
     }
 
     /// What one cycle less would bring: of the latency (and interval) of each unit that the trace uses, and of the front end's refill. The bundles stay as they
-    /// are; the rules are applied anew.
+    /// are; the rules are applied again.
     pub fn what_if(&self, program: &Program) -> Vec<WhatIf> {
         let machine = program.machine;
         let mut used: Vec<(SlotIndex, u8)> = self
@@ -247,12 +247,12 @@ impl Trace {
         faster.chain([front].into_iter().filter(|_| machine.refill > 0)).collect()
     }
 
-    /// The rules applied anew to the bundles as they are: [`Trace::cycles`] again, unless the emulator has another idea of the rules.
+    /// The cycles by the rules alone: equal to [`Trace::cycles`], or else the emulator and the rules disagree.
     pub fn replayed(&self, program: &Program) -> Cycle {
         self.replay(program, |bundle| bundle, 0).0
     }
 
-    /// The cycles of the trace and what they were stalled for, the rules applied anew to changed bundles, with so many cycles of refill fewer.
+    /// The cycles of the trace and what they were stalled for, the rules applied again to changed bundles, with so many cycles of refill fewer.
     fn replay(&self, program: &Program, change: impl Fn(Bundle) -> Bundle, sooner: Cycle) -> (Cycle, Stalls) {
         let bundle = |address| {
             let instructions = program.bundle(address).and_then(Result::ok).unwrap_or_default();

@@ -227,7 +227,7 @@ fn what_cannot_be_bounded_is_refused() {
         (".input n\nloop: nop\n bnz n, loop\n halt\n", "test.s:2: bundle 0 (loop): a loop begins here"),
         (".input n\n.loop_bound 3\nloop: nop\n bz n, on\n jmp loop\non: halt\n nop\n", ""),
         (".loop_bound 3\n nop\n halt\n", "test.s:2: bundle 0: .loop_bound stands here"),
-        // Falling into the head counts anew.
+        // Falling into the head restarts the count.
         (
             ".input n\n jmp head\na: jmp head\n.loop_bound 3\nhead: bz n, a\n bnz n, head\n halt\n",
             "test.s:5: bundle 2 (head): this loop has a bound, but test.s:3: bundle 1 (a) leads to it again",

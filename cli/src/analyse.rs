@@ -147,14 +147,14 @@ fn follow(arguments: &Analyse, program: &Program, rows: &Rows) -> Result<(Trace,
     Ok((trace, period))
 }
 
-/// What a faster unit would bring: to the program as it is, and assembled anew for a machine that has it.
+/// What a faster unit would bring: to the program as it is, and assembled for a machine that has it.
 struct Faster {
     what: WhatIf,
-    anew: Option<Anew>,
+    reassembled: Option<Reassembled>,
 }
 
 /// The program assembled for a machine with a faster unit.
-struct Anew {
+struct Reassembled {
     cycles: Cycle,
     /// What no schedule of its blocks can be shorter than.
     least: Cycle,
@@ -164,16 +164,16 @@ fn faster(arguments: &Analyse, load: &Load, program: &Program, trace: &Trace, ro
     // Standard input has been read; an image has no source.
     let source = Some(&arguments.file).filter(|file| !files::is_dash(file));
     let source = source.and_then(|file| Load::source(file).ok());
-    let anew = |what: &WhatIf| {
+    let reassembled = |what: &WhatIf| {
         let machine = Some(quicker(program.machine, what.unit));
         let assembled = Load { machine, ..load.clone() }.assemble(&arguments.file, source.clone()?).ok()?;
         let found = follow(arguments, &assembled.program, rows).ok()?.0;
         let visits = |address| found.issues.iter().filter(|issue| issue.address == address).count() as Cycle;
         let spare = |block: &BlockReport| Cycle::from(block.cycles.saturating_sub(block.bound.cycles()));
         let spare: Cycle = assembled.blocks.iter().map(|block| visits(block.address) * spare(block)).sum();
-        Some(Anew { cycles: found.cycles, least: found.cycles.saturating_sub(spare) })
+        Some(Reassembled { cycles: found.cycles, least: found.cycles.saturating_sub(spare) })
     };
-    trace.what_if(program).into_iter().map(|what| Faster { anew: anew(&what), what }).collect()
+    trace.what_if(program).into_iter().map(|what| Faster { reassembled: reassembled(&what), what }).collect()
 }
 
 /// A machine with one cycle less in a unit, or in the front end. It is never given back: there are as many as units.
@@ -350,12 +350,12 @@ impl Analysis<'_> {
             })
         };
         let faster = |faster: &Faster| {
-            let anew = faster.anew.as_ref();
+            let reassembled = faster.reassembled.as_ref();
             json!({
                 "unit": self.unit(faster.what.unit),
                 "as_it_is": faster.what.cycles,
-                "assembled_anew": anew.map(|anew| anew.cycles),
-                "least_anew": anew.map(|anew| anew.least),
+                "reassembled": reassembled.map(|reassembled| reassembled.cycles),
+                "reassembled_least": reassembled.map(|reassembled| reassembled.least),
                 "stalls": gained(&faster.what).map(|(kind, more)| (kind.to_owned(), json!(more))).collect::<Value>(),
             })
         };
@@ -418,11 +418,12 @@ impl Analysis<'_> {
     /// What a faster unit would bring; where that is more cycles than today, why.
     fn faster_text(&self, out: &mut Out) -> Result<()> {
         let today = self.trace.cycles;
-        writeln!(out, "\none cycle less in      as it is   assembled anew")?;
+        writeln!(out, "\none cycle less in      as it is      reassembled")?;
         let gain = |new: Cycle| format!("{new} ({:+})", new.cast_signed() - today.cast_signed());
-        for Faster { what, anew } in &self.faster {
-            let anew = anew.as_ref().map_or_else(|| "-".to_owned(), |anew| gain(anew.cycles));
-            writeln!(out, "  {:<16} {:>12} {anew:>16}", self.unit(what.unit), gain(what.cycles))?;
+        for Faster { what, reassembled } in &self.faster {
+            let reassembled =
+                reassembled.as_ref().map_or_else(|| "-".to_owned(), |reassembled| gain(reassembled.cycles));
+            writeln!(out, "  {:<16} {:>12} {reassembled:>16}", self.unit(what.unit), gain(what.cycles))?;
         }
         let worse: Vec<&WhatIf> =
             self.faster.iter().map(|faster| &faster.what).filter(|what| what.cycles > today).collect();
@@ -436,13 +437,21 @@ impl Analysis<'_> {
             let stalls: Vec<String> = gained(what).map(|(kind, more)| format!("{kind} {more:+}")).collect();
             writeln!(out, "  {:<16} stalled cycles: {}", self.unit(what.unit), stalls.join(", "))?;
         }
-        let worse = || self.faster.iter().filter_map(|faster| Some((faster, faster.anew.as_ref()?)));
-        let worse = || worse().filter(|(_, anew)| anew.cycles > today);
+        let worse = || self.faster.iter().filter_map(|faster| Some((faster, faster.reassembled.as_ref()?)));
+        let worse = || worse().filter(|(_, reassembled)| reassembled.cycles > today);
         if worse().next().is_some() {
-            writeln!(out, "more anew: the search ended with a longer schedule, which proves nothing")?;
+            writeln!(
+                out,
+                "more when reassembled: the search ended with a longer schedule, which proves nothing"
+            )?;
         }
-        for (faster, anew) in worse() {
-            writeln!(out, "  {:<16} none takes fewer than {}", self.unit(faster.what.unit), anew.least)?;
+        for (faster, reassembled) in worse() {
+            writeln!(
+                out,
+                "  {:<16} none takes fewer than {}",
+                self.unit(faster.what.unit),
+                reassembled.least
+            )?;
         }
         Ok(())
     }

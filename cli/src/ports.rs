@@ -138,7 +138,7 @@ impl Table {
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(source);
         let header = reader.headers().map_err(|error| explain(&name, error))?.clone();
         if header.is_empty() {
-            bail!("{name} is empty: it wants a header with a column for each input port");
+            bail!("{name} is empty: it needs a header with a column for each input port");
         }
         let columns = |port: &Port| -> Vec<usize> {
             header.iter().enumerate().filter(|(_, title)| *title == port.name).map(|(i, _)| i).collect()

@@ -23,9 +23,9 @@ pub enum LockstepError {
     #[error(transparent)]
     Model(#[from] ModelError),
     /// The circuit's ports are not the program's.
-    #[error("the program's ports are {}, and the circuit was built with {circuit} latched inputs, where it wants {program}", if *.program > 0 { "latched" } else { "not latched" })]
+    #[error("the program's ports are {}, and the circuit was built with {circuit} latched inputs, where it needs {program}", if *.program > 0 { "latched" } else { "not latched" })]
     Ports {
-        /// Latched inputs that the program wants.
+        /// Latched inputs that the program needs.
         program: u16,
         /// Those of the circuit.
         circuit: u16,

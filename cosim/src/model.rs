@@ -110,7 +110,7 @@ impl Model {
     /// # Errors
     /// If Verilator or a C++ compiler is missing or fails.
     pub fn build(design: &Design, folder: &Path, trace: bool) -> Result<Model, ModelError> {
-        // Threads that want the same design build it once.
+        // Threads that need the same design build it once.
         static ONE: Mutex<()> = Mutex::new(());
         let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
         let version = run("verilator", "verilator", Command::new("verilator").arg("--version"))?;

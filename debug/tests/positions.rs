@@ -199,8 +199,8 @@ fn steps_are_all_issues() {
         let issues: Vec<Cycle> = recording.issues.iter().map(|(cycle, _)| *cycle).collect();
         for (unit, expected) in [(Unit::Bundle, issues), (Unit::Line, recording.lines())] {
             session.go_to(0);
-            let forth = all(&mut session, |session| session.step(unit));
-            assert_eq!(forth, expected, "{run}, {unit:?}");
+            let forward = all(&mut session, |session| session.step(unit));
+            assert_eq!(forward, expected, "{run}, {unit:?}");
             assert_eq!(session.go_to(recording.end), Why::Done, "{run}");
             let mut back = all(&mut session, |session| session.step_back(unit));
             back.reverse();
@@ -274,8 +274,8 @@ fn watch_and_until_see_every_change() {
             session.go_to(0);
             let stop = Stop::Watch { what: Box::new(what), test: Test::Changed, text: String::new() };
             let id = session.add_stop(stop);
-            let forth = all(&mut session, Session::resume);
-            assert_eq!(within(forth), changes, "{run}, watch {text}");
+            let forward = all(&mut session, Session::resume);
+            assert_eq!(within(forward), changes, "{run}, watch {text}");
             let mut back = all(&mut session, Session::resume_back);
             back.reverse();
             assert_eq!(within(back), changes, "{run}, watch {text}, back");

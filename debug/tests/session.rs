@@ -1,4 +1,4 @@
-//! Sessions against the run that they are of: wherever one goes, forth or back, everything is as it was there.
+//! Sessions against the run that they are of: wherever one goes, forward or back, everything is as it was there.
 
 use std::sync::Arc;
 use takt_asm::{MemoryLoader, Options as AsmOptions, assemble};
@@ -80,8 +80,8 @@ fn anywhere() {
     }
 }
 
-/// Positions at which stepping forth by a unit stops, from the beginning to the end.
-fn forth(session: &mut Session, unit: Unit) -> Vec<u64> {
+/// Positions at which stepping forward by a unit stops, from the beginning to the end.
+fn forward(session: &mut Session, unit: Unit) -> Vec<u64> {
     session.go_to(0);
     let mut positions = vec![0];
     while session.step(unit) == Why::Done {
@@ -95,7 +95,7 @@ fn back_is_forth_reversed() {
     for seed in 0..16 {
         let mut session = random_session(seed, seed as usize, 3);
         for unit in [Unit::Bundle, Unit::Line, Unit::Period] {
-            let forth = forth(&mut session, unit);
+            let forward = forward(&mut session, unit);
             let mut back = vec![];
             loop {
                 let why = session.step_back(unit);
@@ -108,9 +108,9 @@ fn back_is_forth_reversed() {
             }
             back.reverse();
             // The end of the run may itself be such a position.
-            let end = if forth.len() > back.len() { back.len() } else { forth.len() };
-            assert_eq!(back[..end], forth[..end], "seed {seed} {unit:?}");
-            assert!(forth.len() - end <= 1);
+            let end = if forward.len() > back.len() { back.len() } else { forward.len() };
+            assert_eq!(back[..end], forward[..end], "seed {seed} {unit:?}");
+            assert!(forward.len() - end <= 1);
         }
     }
 }
@@ -186,18 +186,18 @@ fn stops_forth_and_back() {
         let mut console = console(SOURCE);
         let kind = stop.split(' ').next().unwrap();
         console.execute(stop).unwrap();
-        let mut forth = vec![];
+        let mut forward = vec![];
         while matches!(console.session.resume(), Why::Stop { id: 1, .. }) {
-            forth.push((console.session.cycle(), fingerprint(&mut console.session)));
+            forward.push((console.session.cycle(), fingerprint(&mut console.session)));
         }
         let mut back = vec![];
         while matches!(console.session.resume_back(), Why::Stop { id: 1, .. }) {
             back.push((console.session.cycle(), fingerprint(&mut console.session)));
         }
         back.reverse();
-        assert_eq!(forth.len(), expected, "{stop}");
+        assert_eq!(forward.len(), expected, "{stop}");
         assert!(
-            forth == back,
+            forward == back,
             "{kind} {stop}: {:?}",
             back.iter().map(|(cycle, _)| cycle).collect::<Vec<_>>()
         );

@@ -16,7 +16,7 @@ use takt_isa::{BundleAddress, Flow, Op, ROWS, Register};
 
 /// Bundles in a block at most: longer lines are cut.
 const MAX_BUNDLES: usize = 1024;
-/// Micros in all blocks together; when there are more, the cache starts anew. (16 bytes each.)
+/// Micros in all blocks together; when there are more, the cache starts again from empty. (16 bytes each.)
 const MAX_MICROS: usize = 1 << 20;
 /// Blocks at most, for the same reason.
 const MAX_BLOCKS: usize = 1 << 14;
@@ -127,7 +127,7 @@ impl Cache {
         self.blocks.iter().for_each(|block| block.count(tally));
     }
 
-    /// Whether it is time to start anew.
+    /// Whether it is time to start again from empty.
     pub(crate) fn is_full(&self) -> bool {
         self.micros >= MAX_MICROS || self.blocks.len() >= MAX_BLOCKS
     }

@@ -89,7 +89,7 @@ impl Emulator {
         }
     }
 
-    /// The rules applied to everything issued, made anew where blocks have run since.
+    /// The rules applied to everything issued, rebuilt where blocks have run since.
     pub(crate) fn scoreboard(&mut self) -> &mut Scoreboard {
         let scoreboard = self.scoreboard.take().unwrap_or_else(|| {
             self.list_recent();

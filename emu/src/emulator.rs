@@ -158,7 +158,7 @@ pub struct Emulator {
     /// For each counted loop, the turns of its present run.
     pub(crate) turns: Vec<u32>,
     pub(crate) recent: Recent,
-    /// The rules applied to everything issued; `None` when blocks have run since and it must be made anew.
+    /// The rules applied to everything issued; `None` when blocks have run since and it must be rebuilt.
     pub(crate) scoreboard: Option<Box<Scoreboard>>,
     /// How the next bundle issues. There only while it stalls for another reason than the front end.
     pub(crate) planned: Option<Issue>,
@@ -234,7 +234,7 @@ impl Emulator {
         })
     }
 
-    /// Loads the program anew and resets the machine: everything is as [`Emulator::new`] made it, except the settings
+    /// Reloads the program and resets the machine: everything is as [`Emulator::new`] made it, except the settings
     /// (cycle limit, tick period, pauses).
     pub fn reset(&mut self) {
         self.state = State::new(&self.program);

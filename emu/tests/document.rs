@@ -1,5 +1,5 @@
 //! The examples in `docs/timing.md` are what the emulator does. `TAKT_BLESS=1 cargo test -p takt-emu --test document`
-//! writes them anew.
+//! rewrites them.
 
 mod common;
 

@@ -63,7 +63,7 @@ fn inputs_are_taken_at_reset_and_at_the_tick() {
         assert_eq!(outputs(emulator), [Some(1), Some(1)]);
         emulator.run_to_wait().unwrap();
         assert_eq!(outputs(emulator), [Some(3), Some(3)]);
-        // What is not set anew keeps its value.
+        // What is not set again keeps its value.
         emulator.run_period(&[]).unwrap();
         assert_eq!(outputs(emulator), [Some(4), Some(4)]);
         emulator.run_period(&[]).unwrap();

@@ -60,7 +60,7 @@ fn every_row_runs_on_a_unit_and_a_machine() {
         let function = row.function.name();
         assert!(
             UNITS.iter().any(|unit| unit.functions.contains(&row.function)),
-            "`{}` wants a unit that offers {function}: isa/src/spec/units.rs has none",
+            "`{}` needs a unit that offers {function}: isa/src/spec/units.rs has none",
             row.mnemonic
         );
         assert!(

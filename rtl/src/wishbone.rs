@@ -39,7 +39,7 @@ const CONTROL: Register = Register {
     address: 0,
     name: "control",
     access: "rw",
-    text: "While run is 0 the core is in reset and can be loaded; 0 after `rst_i`. A reset, however short it is asked for, lasts as long as the core wants; with RESTORE, what was loaded is written again in it.",
+    text: "While run is 0 the core is in reset and can be loaded; 0 after `rst_i`. A reset, however short it is asked for, lasts as long as the core needs; with RESTORE, what was loaded is written again in it.",
     fields: &[field("run", 0, 1, "The program runs.")],
 };
 const STATUS: Register = Register {
@@ -174,7 +174,7 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
 //   LATCHED: the core's.
 //   RESTORE: a reset writes again what was loaded into data memory and registers, and what was written to input ports, while run
 //   was 0: so the program starts again as it did first. It costs {words} words of 33 bits in block RAM and as many cycles of a reset.
-//   With 0, data memory and registers are after a reset as the program left them: load them anew before it runs again.
+//   With 0, data memory and registers are after a reset as the program left them: load them again before it runs again.
 
 module {name} #(
     parameter LATCHED = {latched},
@@ -195,7 +195,7 @@ module {name} #(
     // ---- registers
 
     reg         run, ticks, loads, writes_input;
-    reg  [6:0]  in_reset;     // cycles of reset so far; the core wants {RESET_CYCLES}
+    reg  [6:0]  in_reset;     // cycles of reset so far; the core needs {RESET_CYCLES}
     reg         done, settled;
     reg  [31:0] period, elapsed, value, low;
     reg  [15:0] place, load_address, high;

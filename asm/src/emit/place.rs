@@ -83,7 +83,7 @@ pub(crate) fn place(ir: &Ir, sink: &mut Sink) -> Placement {
     outputs(ir, &writer, &mut space, &mut addresses, sink);
     let ranges = ranges(ir);
     let is_local = |index: usize| ranges[index].is_some() && addresses[index].is_none();
-    // The most registers that short-lived values want in each bank: room that constants leave if they can.
+    // The most registers that short-lived values need in each bank: room that constants leave if they can.
     let mut wanted_by_locals = vec![0; machine.slots.len()];
     for index in (0..ir.registers.len()).filter(|index| is_local(*index)) {
         wanted_by_locals[writer[index].unwrap_or(SlotIndex::FIRST).index()] += 1;

@@ -11,9 +11,10 @@
 use super::meaning::{At, Held, Life, Meaning, Name, held};
 use std::collections::BTreeSet;
 use takt_asm::Expression;
-use takt_asm::diag::{Diagnostics, nearest};
+use takt_asm::diag::Diagnostics;
 use takt_asm::expr::{BUILTINS, Value};
 use takt_asm::names::{Names, Position};
+use takt_asm::nearest;
 use takt_emu::Emulator;
 use takt_isa::program::{Location, Space};
 use takt_isa::timing::Cycle;

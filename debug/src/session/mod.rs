@@ -1,4 +1,4 @@
-//! A debug session: a run that can be stopped anywhere, looked at, changed, and stepped forth and back, exactly to the cycle.
+//! A debug session: a run that can be stopped anywhere, looked at, changed, and stepped forward and back, exactly to the cycle.
 //!
 //! **Positions.** The session stands between two cycles: at position *n*, cycles 0 to *n* - 1 have passed. What it shows is
 //! what a bundle would read that issued in cycle *n*. Breakpoints stop where their bundle is about to issue, so that what

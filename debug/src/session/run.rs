@@ -1,4 +1,4 @@
-//! Going forth and back: to a cycle or a period, by steps, to where something is found.
+//! Going forward and back: to a cycle or a period, by steps, to where something is found.
 
 use super::expression::Machine;
 use super::interest::Interest;
@@ -215,7 +215,7 @@ impl Session {
         Why::Start
     }
 
-    /// Steps forth.
+    /// Steps forward.
     pub fn step(&mut self, unit: Unit) -> Why {
         match unit {
             Unit::Cycle => return self.go_to(self.cycle() + 1),

@@ -97,7 +97,7 @@ impl Where {
             return bundle(address.into(), program);
         }
         let labels = program.symbols.iter().filter(|symbol| symbol.space == Space::Code);
-        let near = takt_asm::diag::nearest(text, labels.map(|symbol| symbol.name.as_str()));
+        let near = takt_asm::nearest(text, labels.map(|symbol| symbol.name.as_str()));
         let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
         Err(format!(
             "no label is named `{text}`{near} (places: label, label+2, file.s:12, :12, bundle 3, cycle 100, period 5)"

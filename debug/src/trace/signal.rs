@@ -2,7 +2,7 @@
 
 use super::Format;
 use crate::matches;
-use takt_asm::diag::nearest;
+use takt_asm::nearest;
 use takt_emu::Emulator;
 use takt_isa::timing::Cause;
 use takt_isa::{BundleAddress, Program, Register, Type};

@@ -113,7 +113,7 @@ fn ports(program: &Program) -> Result<(), ImageError> {
         let number = machine.output_number(port.register);
         check("output", port, number.is_some())?;
         if !numbers.insert(number) {
-            let reason = "another output has the same number, in another bank: assemble its source anew";
+            let reason = "another output has the same number, in another bank: assemble its source again";
             return Err(wrong_port("output", &port.name, port.register.get(), reason));
         }
     }
