@@ -1,61 +1,59 @@
 //! The assembler: Takt source to [`Program`], and a program to an image and back.
 //!
-//! The stages, each a module:
+//! ```
+//! use takt_asm::{MemoryLoader, Options, assemble};
 //!
-//! ```text
-//! text ─ lex ─ tokens ─ parse ─ ast ─ expand ─ flat list ─ resolve ─ ir ─ homes ─ schedule ─ place ─ emit ─ Program ─ image
+//! let source = MemoryLoader::of("gain.s", ".input x\n.output y\n.period\nstart:\n    fadd y, x, x\n    wait start\n");
+//! match assemble("gain.s", &source, &Options::default()) {
+//!     Ok(assembled) => {
+//!         assert_eq!(assembled.program.inputs[0].name, "x");
+//!         let image = takt_asm::image::write(&assembled.program).expect("it fits the machine");
+//!         assert_eq!(takt_asm::image::read(&image).expect("it was just written").code, assembled.program.code);
+//!     }
+//!     Err(mistakes) => panic!("{}", mistakes.render(false)),
+//! }
 //! ```
 //!
+//! The stages, each a folder:
+//!
+//! ```text
+//! text ─ syntax ─ tree ─ expand ─ flat list ─ resolve ─ ir ─ check ─ homes ─ schedule ─ emit ─ Program ─ output
+//! ```
+//!
+//! `syntax` reads a file; `expand` writes out macros, repetitions and includes, and declares; `resolve` gives every name its
+//! meaning; `check` looks at the whole program (types, who writes what); `homes` finds each value its place; `schedule` packs bundles;
+//! `emit` places registers and makes words; `output` is what can be made of the result. `context` is what the stages before
+//! `schedule` share, `report` how mistakes are told. A stage uses those before it, never one after it.
+//!
 //! `docs/language.md` is the contract of the language, `docs/image.md` that of the image. Nothing here prints, and nothing here
-//! touches the file system but [`load::FileLoader`]. No input makes the assembler panic; [`limits`] bounds what it takes.
+//! touches the file system but [`FileLoader`]. No input makes the assembler panic; [`limits`] bounds what it takes.
 
-mod address;
-pub mod ast;
-mod blocks;
 mod check;
 mod context;
-mod copies;
-mod declare;
-pub mod diag;
-pub mod disasm;
 mod emit;
 mod expand;
-pub mod expr;
-mod expression;
-mod files;
-mod flow;
-mod grammar;
 mod homes;
-pub mod image;
-pub mod intern;
-pub mod ir;
-pub mod levels;
-mod lex;
+mod ir;
 pub mod limits;
-pub mod listing;
-pub mod load;
-pub mod names;
-mod operand;
-pub mod parse;
-pub mod place;
-pub mod resolve;
+mod output;
+mod report;
+mod resolve;
 pub mod schedule;
-mod serialise;
-pub mod source;
-mod types;
-mod unknown;
-mod values;
+mod syntax;
 
-use diag::Diagnostics;
-use source::Sources;
+use emit::place;
+use homes::{copies, values};
+use report::source::Sources;
 use std::sync::Arc;
 use takt_isa::{Machine, Program, T3};
 
-pub use diag::Diagnostic;
-pub use expression::Expression;
+pub use expand::load::{FileLoader, LoadError, Loader, MemoryLoader, Search};
 pub use homes::{Adjustment, Made};
-pub use levels::Levels;
-pub use load::{FileLoader, LoadError, Loader, MemoryLoader, Search};
+pub use output::{disasm, image, listing, names};
+pub use report::diag::{Diagnostic, Diagnostics};
+pub use report::levels::Levels;
+pub use report::{diag, levels, source};
+pub use syntax::{Expression, expr};
 
 /// What the assembler is to do.
 #[derive(Clone, Copy, Debug)]
@@ -139,7 +137,7 @@ pub fn assemble_bytes(
     loader: &dyn Loader,
     options: &Options,
 ) -> Result<Assembled, Diagnostics> {
-    assemble(name, &load::First { name, bytes, rest: loader }, options)
+    assemble(name, &expand::load::First { name, bytes, rest: loader }, options)
 }
 
 /// Assembles the program that begins with the source at `path`.
@@ -148,7 +146,7 @@ pub fn assemble_bytes(
 /// Every error of the program, and its warnings.
 pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<Assembled, Diagnostics> {
     let mut context = context::Context::new(options.machine);
-    context.sink.levels = options.levels;
+    context.reports.sink.levels = options.levels;
     let (mut context, flat) = expand::Expander::new(context, loader).expand(path);
     let mut ir = resolve::resolve(&mut context, loader, flat);
     let packs = |scheduled| match options.schedule {
@@ -157,18 +155,18 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
         Schedule::None => false,
     };
     ir.bundles.iter_mut().for_each(|bundle| bundle.scheduled = packs(bundle.scheduled));
-    types::check(&mut context, &ir);
+    check::types::check(&mut context, &ir);
     // Of a program that cannot fit nothing else is worth its time.
     if emit::is_too_long(&ir) {
-        emit::limits(&ir, &mut context.sink);
-        return Err(context.sink.finish(Arc::new(context.sources)));
+        emit::limits(&ir, &mut context.reports.sink);
+        return Err(context.reports.sink.finish(Arc::new(context.reports.sources)));
     }
     let mut homes = homes::choose(&mut ir);
     let values = values::split(&mut ir, &mut homes);
     copies::insert(&mut ir, &mut homes, &values);
     check::check(&mut context, &ir, &homes);
-    let mut sink = std::mem::take(&mut context.sink);
-    let sources = Arc::new(std::mem::take(&mut context.sources));
+    let mut sink = std::mem::take(&mut context.reports.sink);
+    let sources = Arc::new(std::mem::take(&mut context.reports.sources));
     // What follows would only report what follows from the errors there are.
     if sink.errors > 0 {
         return Err(sink.finish(sources));
@@ -185,8 +183,12 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
     if report.has_errors() {
         return Err(report);
     }
-    let constants =
-        context.constants.into_iter().filter_map(|constant| Some((constant.name, constant.value?))).collect();
+    let constants = context
+        .declared
+        .constants
+        .into_iter()
+        .filter_map(|constant| Some((constant.name, constant.value?)))
+        .collect();
     Ok(Assembled {
         program: emitted.program,
         warnings: report,

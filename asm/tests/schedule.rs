@@ -7,7 +7,7 @@ use random_source::{Random, source};
 use std::collections::BTreeMap;
 use takt_asm::Assembled;
 use takt_asm::diag::{Diagnostics, Message, Severity};
-use takt_asm::ir::DemandKind;
+use takt_asm::schedule::DemandKind;
 use takt_asm::schedule::TimingReport;
 use takt_asm::{MemoryLoader, Options, Schedule, assemble};
 use takt_emu::{Emulator, Event};

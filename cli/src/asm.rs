@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
-use takt_asm::ir::DemandKind;
+use takt_asm::schedule::DemandKind;
 use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, TimingReport};
 use takt_asm::{Adjustment, Assembled, Made, Schedule, image, listing};
 use takt_isa::Program;

@@ -3,10 +3,10 @@
 
 use super::Block;
 use super::solve::{Edge, Problem};
-use crate::diag::{Diagnostic, Sink};
+use crate::ir::runs::Run;
 use crate::ir::{Bundle, Demand, DemandKind, Ir, Operation, RegisterId, RegisterKind};
-use crate::source::Span;
-use crate::values::Run;
+use crate::report::diag::{Diagnostic, Sink};
+use crate::report::source::Span;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 

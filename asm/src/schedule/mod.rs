@@ -8,13 +8,13 @@ mod demand;
 mod memory;
 mod solve;
 
+pub use crate::ir::DemandKind;
 pub use demand::TimingReport;
 pub use solve::Bound;
 
-use crate::diag::Sink;
-use crate::flow;
+use crate::ir::runs;
 use crate::ir::{Bundle, Ir, Operation, RegisterId, RegisterKind};
-use crate::values;
+use crate::report::diag::Sink;
 use demand::Demands;
 use memory::Memory;
 use smallvec::{SmallVec, smallvec};
@@ -56,12 +56,12 @@ pub struct Report {
 
 /// Schedules every block of bundles that ask for it ([`Bundle::scheduled`]), and checks what is demanded of ports.
 pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
-    let fixed = flow::jumps_to_numbers(ir);
+    let fixed = runs::jumps_to_numbers(ir);
     if fixed && ir.demands.is_empty() {
         return Report::default();
     }
     let fixed_registers = memory::fixed(ir);
-    let runs = values::runs(ir);
+    let runs = runs::runs(ir);
     let demands = demand::assign(ir, &runs, sink);
     let mut report = Report::default();
     let mut bundles: Vec<Bundle> = Vec::with_capacity(ir.bundles.len());

@@ -1,0 +1,317 @@
+//! What a program must keep to beyond each line's own rules: who writes a register, and whether anyone does.
+
+pub(crate) mod types;
+
+use crate::context::{Context, ScopeId};
+use crate::homes::{Homeless, Homes};
+use crate::ir::{Constant, Ir, Operation, Register, RegisterId, RegisterKind};
+use crate::report::diag::{Diagnostic, Severity, nearest};
+use crate::report::source::Span;
+use crate::syntax::ast::Section;
+use takt_isa::program::Space;
+use takt_isa::{Effect, Field, Operand, ROWS};
+
+/// An operation's place in the program: its bundle, and its index there.
+type Where = (u32, u32);
+
+/// How a register is used.
+#[derive(Clone, Copy, Default, Debug)]
+struct Use {
+    /// The first operation that reads it, and as which of its sources.
+    read: Option<(Where, usize)>,
+    /// The first operation that writes it, and its slot.
+    written: Option<(Where, u8)>,
+    /// Whether an operation of `.once` writes it.
+    once: bool,
+    /// Slots, by bit, that write it though another does.
+    conflicts: u64,
+}
+
+/// Checks a resolved program, whose registers have their homes.
+pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
+    // Operations with mistakes are not in the program: what then seems unused need not be.
+    let complete = context.reports.sink.errors == 0;
+    let mut uses = vec![Use::default(); ir.registers.len()];
+    let mut opaque = false;
+    for (index, bundle) in (0..).zip(&ir.bundles) {
+        for (number, operation) in (0..).zip(&bundle.operations) {
+            for (which, source) in operation.reads().iter().enumerate() {
+                uses[source.index()].read.get_or_insert(((index, number), which));
+            }
+            opaque |= matches!(operation.constant, Constant::Raw(_));
+            let (Some(dest), Some(slot)) = (operation.dest, operation.slot) else { continue };
+            let found = &mut uses[dest.index()];
+            found.once |= index < ir.period;
+            match found.written {
+                None => {
+                    found.written = Some(((index, number), slot));
+                    // Of one without a home that is the mistake.
+                    if homes.homeless(dest).is_none() {
+                        reach(context, ir, operation, dest, slot);
+                    }
+                }
+                // One report for each slot too many is enough.
+                Some((first, owner)) if owner != slot && found.conflicts & 1 << slot == 0 => {
+                    found.conflicts |= 1 << slot;
+                    two_slots(context, ir, operation, (slot, owner), at(ir, first), homes.homeless(dest));
+                }
+                Some(_) => {}
+            }
+        }
+    }
+    let found = |index: usize| (&ir.registers[index], &uses[index], RegisterId::new(index));
+    for (register, used, id) in (0..uses.len()).map(found).filter(|_| complete) {
+        // A raw word may read and write anything.
+        if !opaque && !homes.quiet.contains(&id) {
+            unwritten(context, ir, register, used, &uses);
+        }
+        if !homes.set_once.contains(&id) {
+            state(context, ir, register, used);
+        }
+    }
+    targets(context, ir);
+    // What a mistake leaves unused is no mistake of its own.
+    if context.reports.sink.errors > 0 {
+        return;
+    }
+    if !opaque {
+        no_wait(context, ir);
+        for (register, used, _) in (0..uses.len()).map(found).filter(|(.., id)| !homes.quiet.contains(id)) {
+            unused(context, register, used);
+        }
+    }
+    for constant in &context.declared.constants {
+        if !constant.used && constant.watched && !constant.name.starts_with('_') {
+            context.reports.sink.add(Severity::Warning, "unused", constant.span, || {
+                Diagnostic::warning(
+                    "unused",
+                    constant.span,
+                    format!("constant `{}` is never used", constant.name),
+                )
+            });
+        }
+    }
+}
+
+fn at(ir: &Ir, (bundle, number): Where) -> &Operation {
+    &ir.bundles[bundle as usize].operations[number as usize]
+}
+
+/// The place of an operand of an operation.
+fn operand(context: &Context, operation: &Operation, wanted: impl Fn(&Operand) -> bool) -> Span {
+    let (ast, number) = operation.written;
+    let written = || {
+        let ast = context.asts.get(ast as usize)?;
+        let index = operation.row().shape.operands().iter().position(wanted)?;
+        let first = ast.operations.get(number as usize)?.first as usize;
+        Some(ast.operands.get(first + index)?.span)
+    };
+    written().unwrap_or(operation.span)
+}
+
+pub(crate) fn dest_span(context: &Context, operation: &Operation) -> Span {
+    operand(context, operation, |operand| *operand == Operand::Dest)
+}
+
+pub(crate) fn source_span(context: &Context, operation: &Operation, which: usize) -> Span {
+    operand(context, operation, |operand| match operand {
+        Operand::Source(source) => *source == which,
+        Operand::Memory => which == 0,
+        _ => false,
+    })
+}
+
+/// A register that two slots write lies in neither's bank.
+fn two_slots(
+    context: &mut Context,
+    ir: &Ir,
+    operation: &Operation,
+    (slot, owner): (u8, u8),
+    first: &Operation,
+    homeless: Option<&Homeless>,
+) {
+    let Some(dest) = operation.dest else { return };
+    let slots = ir.machine.slots;
+    let (slot, owner) = (&slots[slot as usize], &slots[owner as usize]);
+    let message = format!(
+        "`{}` is written by slot `{}` and by slot `{}`: no register is in both banks",
+        text(ir, ir.register(dest)),
+        owner.name,
+        slot.name
+    );
+    let (span, before) = (dest_span(context, operation), dest_span(context, first));
+    let writes = |by: &takt_isa::Slot, operation: &Operation| {
+        format!("`{}` is of slot `{}`, which writes bank {}", operation.row().mnemonic, by.name, by.bank.name)
+    };
+    let mut error = Diagnostic::error("two-slots", span, message)
+        .here(writes(slot, operation))
+        .also(before, writes(owner, first))
+        .help(homeless.map_or("use two registers", |homeless| &homeless.help));
+    if let Some((span, because)) = homeless.and_then(|homeless| homeless.because.as_ref()) {
+        error = error.also(*span, because);
+    }
+    context.report(ScopeId(operation.expansion), error);
+}
+
+/// A register with a place must be in the bank of the slot that writes it.
+fn reach(context: &mut Context, ir: &Ir, operation: &Operation, dest: RegisterId, slot: u8) {
+    let register = ir.register(dest);
+    let slot = &ir.machine.slots[slot as usize];
+    let Some(address) = register.pinned.filter(|address| !slot.bank.contains(*address)) else { return };
+    let place = ir.machine.register_name(address).unwrap_or_default();
+    let message = format!("`{place}` is out of reach: slot `{}` writes bank {}", slot.name, slot.bank.name);
+    let mut error = Diagnostic::error("out-of-reach", dest_span(context, operation), message).here(format!(
+        "`{}` is of slot `{}`",
+        operation.row().mnemonic,
+        slot.name
+    ));
+    if !register.name.is_empty() {
+        error = error.also(register.span, "placed here");
+    }
+    let help = format!("place it in bank {}, or leave the place to the assembler", slot.bank.name);
+    context.report(ScopeId(operation.expansion), error.help(help));
+}
+
+pub(crate) fn text(ir: &Ir, register: &Register) -> String {
+    if !register.name.is_empty() {
+        return register.name.clone();
+    }
+    let place = register.pinned.and_then(|address| ir.machine.register_name(address)).unwrap_or_default();
+    format!("@{place}")
+}
+
+/// Registers that are never used, outputs that are never written, and what is written and never read.
+fn unused(context: &mut Context, register: &Register, found: &Use) {
+    let name = &register.name;
+    let (read, written) = (found.read.is_some(), is_written(register, found));
+    let message = match register.kind {
+        RegisterKind::Zero | RegisterKind::Constant(_) => return,
+        RegisterKind::Input if !read => format!("input `{name}` is never read"),
+        RegisterKind::Output if !written => format!("output `{name}` is never written"),
+        RegisterKind::Input | RegisterKind::Output => return,
+        RegisterKind::Plain | RegisterKind::State => match (read, written) {
+            (true, _) => return,
+            (false, false) => format!("register `{name}` is never used"),
+            (false, true) => format!("register `{name}` is written and never read"),
+        },
+    };
+    // A name that begins with `_` says: on purpose. A register without a name has none to declare.
+    if !name.is_empty() && !name.starts_with('_') {
+        let span = register.span;
+        context
+            .reports
+            .sink
+            .add(Severity::Warning, "unused", span, || Diagnostic::warning("unused", span, message));
+    }
+}
+
+/// Whether a register gets a value: from an operation or the loader.
+fn is_written(register: &Register, found: &Use) -> bool {
+    found.written.is_some() || register.preset.is_some()
+}
+
+/// A register that is read and that nothing writes. By giving it a place, one says that one knows.
+fn unwritten(context: &mut Context, ir: &Ir, register: &Register, found: &Use, uses: &[Use]) {
+    let is_register = matches!(register.kind, RegisterKind::Plain | RegisterKind::State);
+    let Some((place, which)) = found.read.filter(|_| is_register && !is_written(register, found)) else {
+        return;
+    };
+    if register.pinned.is_some_and(|address| ir.machine.is_input(address)) {
+        return;
+    }
+    let operation = at(ir, place);
+    let span = source_span(context, operation, which);
+    let name = text(ir, register);
+    let message = format!("`{name}` is read here, and nothing writes it");
+    let mut diagnostic = Diagnostic::error("never-written", span, message);
+    if register.pinned.is_some() {
+        diagnostic.severity = Severity::Warning;
+    }
+    if !register.name.is_empty() {
+        diagnostic = diagnostic.also(register.span, "declared here");
+    }
+    // Mistaken for another: that one is written and perhaps never read.
+    let written =
+        ir.registers.iter().zip(uses).filter(|(_, found)| found.written.is_some() && found.read.is_none());
+    diagnostic = match nearest(&name, written.map(|(register, _)| register.name.as_str())) {
+        Some(meant) => diagnostic.did_you_mean(Some(meant)),
+        None => diagnostic
+            .help(format!("write it first, give it a value with `.preset {name} = …`, or make it an input")),
+    };
+    context.report(ScopeId(operation.expansion), diagnostic);
+}
+
+/// A state must have a value before the first period.
+fn state(context: &mut Context, ir: &Ir, register: &Register, found: &Use) {
+    let set = found.once || register.preset.is_some() || found.written.is_none();
+    let (RegisterKind::State, false, Some((place, which))) = (register.kind, set, found.read) else { return };
+    let (name, section) = (&register.name, Section::Once.name());
+    let read = source_span(context, at(ir, place), which);
+    let error = Diagnostic::error(
+        "state-not-set",
+        register.span,
+        format!("state `{name}` is not set in `.{section}`"),
+    )
+    .also(read, "the first period reads it")
+    .help(format!("set it there, as with `mov {name}, zero`, or with `.preset {name} = 0`"));
+    context.reports.sink.push(error);
+}
+
+/// The bundle that an operation may continue at.
+fn target(ir: &Ir, operation: &Operation) -> Option<u32> {
+    let target = match operation.constant {
+        Constant::Value(target) => target,
+        Constant::Code(label) => ir.labels[label.0 as usize].position,
+        Constant::None | Constant::Raw(_) => return None,
+    };
+    operation.row().shape.fields().contains(&Field::Target).then_some(target)
+}
+
+/// Targets where there is no bundle.
+fn targets(context: &mut Context, ir: &Ir) {
+    let end = ir.bundles.len() as u32;
+    for operation in ir.operations() {
+        if target(ir, operation).is_some_and(|target| target >= end) {
+            let span = operand(context, operation, |operand| *operand == Operand::Target);
+            let message = "this continues past the end of the program";
+            let warning =
+                Diagnostic::warning("target", span, message).note(format!("the program has {end} bundles"));
+            context.report(ScopeId(operation.expansion), warning);
+        }
+    }
+}
+
+/// A period that never comes to a `wait` has no end.
+fn no_wait(context: &mut Context, ir: &Ir) {
+    let ends = |operation: &Operation| matches!(operation.row().effect, Effect::Wait | Effect::Halt);
+    let mut seen = vec![false; ir.bundles.len()];
+    let mut reached = vec![ir.period];
+    while let Some(index) = reached.pop() {
+        let Some(bundle) = ir.bundles.get(index as usize) else { continue };
+        if std::mem::replace(&mut seen[index as usize], true) {
+            continue;
+        }
+        if bundle.operations.iter().any(ends) {
+            return;
+        }
+        // A call comes back.
+        let goes_on = |operation: &Operation| {
+            operation.row().effect.falls_through() || operation.row().effect == Effect::Call
+        };
+        if bundle.operations.iter().all(goes_on) {
+            reached.push(index + 1);
+        }
+        reached.extend(bundle.operations.iter().filter_map(|operation| target(ir, operation)));
+    }
+    let Some(first) = ir.bundles.get(ir.period as usize).and_then(|bundle| bundle.operations.first()) else {
+        return;
+    };
+    let wait = ROWS.iter().find(|row| row.effect == Effect::Wait).map_or("", |row| row.mnemonic);
+    let start = ir.labels.iter().find(|label| label.space == Space::Code && label.position == ir.period);
+    let start = start.map_or("LABEL", |label| &label.name);
+    let warning = Diagnostic::warning("no-wait", first.span, format!("`.period` never comes to a `{wait}`"))
+        .here("it begins here")
+        .note("a period ends where the machine waits for the tick; without it, periods have no cycles and no outputs")
+        .help(format!("end it with `{wait} {start}`"));
+    context.report(ScopeId(first.expansion), warning);
+}

@@ -1,0 +1,461 @@
+//! Whether values are of the type that operations read them as.
+//!
+//! The instruction table gives every operand a type. A value has the type of the result that wrote it, of its declaration (ports, states,
+//! registers with a type or a preset), of its literal, or of its table in data memory; what takes any bits passes the type
+//! on. Types of other registers are followed through each straight run; where runs meet, a register has the type of all that is
+//! written to it, or none. What may be either is not reported: every warning is about a value that is certainly of the other type.
+
+use crate::check::{dest_span, source_span, text};
+use crate::context::{Context, ScopeId, type_name};
+use crate::ir::given::{Given, GivenTypes, Kind, Part, What};
+use crate::ir::runs::{Run, runs};
+use crate::ir::{Ir, LabelId, Operation, Register, RegisterId, RegisterKind};
+use crate::report::diag::Diagnostic;
+use crate::report::source::Span;
+use crate::syntax::expr::Value;
+use smallvec::SmallVec;
+use std::collections::HashMap;
+use takt_isa::program::Space;
+use takt_isa::spec::instructions::compute;
+use takt_isa::{Effect, ROWS, Row, Type};
+
+#[derive(Clone, Copy, Debug)]
+struct Origin {
+    what: What,
+    span: Span,
+    scope: ScopeId,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Typed {
+    kind: Kind,
+    origin: Option<Origin>,
+}
+
+impl Typed {
+    const ANY: Typed = Typed { kind: Kind::Any, origin: None };
+
+    fn join(self, other: Typed) -> Typed {
+        Typed { kind: self.kind.join(other.kind), origin: self.origin.or(other.origin) }
+    }
+}
+
+/// Passes after which types that are still being found count as unknown: each follows a value through one more register
+/// against the order of the program.
+const PASSES: usize = 8;
+
+/// Warns of values that are read as, or go to a register of, another type than theirs.
+pub(crate) fn check(context: &mut Context, ir: &Ir) {
+    // An operation with a mistake is not in the program, and what it would have written is unknown.
+    if context.reports.sink.errors > 0 {
+        return;
+    }
+    let given = std::mem::take(&mut context.declared.given);
+    let mut types = Types::new(context, ir, &given);
+    let runs = runs(ir);
+    for pass in 0.. {
+        types.changed = false;
+        types.walk(&runs, None);
+        if !types.changed {
+            break;
+        }
+        if pass == PASSES {
+            types.forget();
+        }
+    }
+    types.walk(&runs, Some(context));
+}
+
+struct Types<'i> {
+    ir: &'i Ir,
+    given: &'i GivenTypes,
+    /// What each register has where a run begins.
+    entry: Vec<Typed>,
+    /// Whether that is said by its declaration.
+    declared: Vec<bool>,
+    /// What each register has now, and in which run that was written.
+    now: Vec<(usize, Typed)>,
+    /// The tables of data memory, by label.
+    tables: HashMap<LabelId, Typed>,
+    /// For each instruction, the sources whose bits its result is.
+    passed: Vec<SmallVec<[usize; 3]>>,
+    changed: bool,
+}
+
+impl<'i> Types<'i> {
+    fn new(context: &Context, ir: &'i Ir, given: &'i GivenTypes) -> Types<'i> {
+        // A raw word may write anything.
+        let opaque = ir.bundles.iter().any(|bundle| bundle.is_opaque());
+        let mut declared = Vec::with_capacity(ir.registers.len());
+        let mut entry = Vec::with_capacity(ir.registers.len());
+        for (index, register) in ir.registers.iter().enumerate() {
+            let is_declared = match register.kind {
+                RegisterKind::Plain => {
+                    register.name.is_empty()
+                        || register.preset.is_some()
+                        || context.declared.typed.contains(&RegisterId::new(index))
+                }
+                _ => true,
+            };
+            declared.push(is_declared);
+            entry.push(match is_declared {
+                true => {
+                    let origin = Origin { what: What::Declared, span: register.span, scope: ScopeId::ROOT };
+                    Typed { kind: Kind::of(register.ty), origin: Some(origin) }
+                }
+                false if opaque => Typed::ANY,
+                false => Typed { kind: Kind::None, origin: None },
+            });
+        }
+        let now = entry.iter().map(|typed| (usize::MAX, *typed)).collect();
+        let passed = ROWS.iter().map(passed).collect();
+        let tables = tables(ir, &context.declared.data_types);
+        Types { ir, given, entry, declared, now, tables, passed, changed: false }
+    }
+
+    /// Gives up on what is still changing.
+    fn forget(&mut self) {
+        for (entry, declared) in self.entry.iter_mut().zip(&self.declared) {
+            if !declared {
+                *entry = Typed::ANY;
+            }
+        }
+        self.tables.values_mut().for_each(|table| *table = Typed::ANY);
+    }
+
+    /// Follows the types through every run, and reports mistakes if there is a context to report to.
+    fn walk(&mut self, runs: &[Run], mut context: Option<&mut Context>) {
+        let ir = self.ir;
+        for (number, run) in runs.iter().enumerate() {
+            for bundle in &ir.bundles[run.start..run.end] {
+                if let Some(context) = &mut context {
+                    for operation in &bundle.operations {
+                        self.reads(number, operation, context);
+                    }
+                }
+                // All operations of a bundle read before any writes.
+                let results: SmallVec<[Typed; 3]> =
+                    bundle.operations.iter().map(|operation| self.result(number, operation)).collect();
+                for (operation, result) in bundle.operations.iter().zip(results) {
+                    self.store(number, operation);
+                    self.write(number, operation, result, context.as_deref_mut());
+                }
+            }
+        }
+    }
+
+    /// What an operation reads as one of its sources.
+    fn source(&self, run: usize, operation: &Operation, which: usize) -> Typed {
+        match self.given.get(operation, Part::Source(which as u8)) {
+            Some(Given::Cast(ty)) => Typed { kind: Kind::of(ty), origin: None },
+            Some(Given::Literal { kind, what, span }) => literal(operation, kind, what, span),
+            _ => {
+                let index = operation.sources[which].index();
+                match (self.ir.registers[index].kind, self.now[index]) {
+                    (RegisterKind::Constant(_) | RegisterKind::Zero, _) => Typed::ANY,
+                    (_, (written, typed)) if written == run => typed,
+                    _ => self.entry[index],
+                }
+            }
+        }
+    }
+
+    /// What an operation writes.
+    fn result(&self, run: usize, operation: &Operation) -> Typed {
+        let row = operation.row();
+        let result = |ty| {
+            let what = What::Result(row.mnemonic);
+            let origin = Origin { what, span: operation.span, scope: ScopeId(operation.expansion) };
+            Typed { kind: Kind::of(ty), origin: Some(origin) }
+        };
+        if let Some(Given::Cast(ty)) = self.given.get(operation, Part::Dest) {
+            return result(ty);
+        }
+        if row.result_type() != Type::B {
+            return result(row.result_type());
+        }
+        match row.effect {
+            Effect::Immediate => match self.given.get(operation, Part::Immediate) {
+                Some(Given::Literal { kind, what, span }) => literal(operation, kind, what, span),
+                _ => Typed::ANY,
+            },
+            Effect::Load => self.table(operation).map_or(Typed::ANY, |label| self.tables[&label]),
+            _ => {
+                let passed = &self.passed[operation.op as usize];
+                let typed = passed.iter().map(|which| self.source(run, operation, *which));
+                typed.reduce(Typed::join).unwrap_or(Typed::ANY)
+            }
+        }
+    }
+
+    /// The table that an operation's memory operand lies in, if that is known.
+    fn table(&self, operation: &Operation) -> Option<LabelId> {
+        match self.given.get(operation, Part::Table) {
+            Some(Given::Table(label)) if self.tables.contains_key(&label) => Some(label),
+            _ => None,
+        }
+    }
+
+    /// What a store leaves in its table.
+    fn store(&mut self, run: usize, operation: &Operation) {
+        if operation.row().effect == Effect::Store
+            && let Some(label) = self.table(operation)
+        {
+            let stored = self.source(run, operation, 1);
+            if let Some(table) = self.tables.get_mut(&label) {
+                let joined = table.join(stored);
+                self.changed |= joined.kind != table.kind;
+                *table = joined;
+            }
+        }
+    }
+
+    fn write(&mut self, run: usize, operation: &Operation, result: Typed, context: Option<&mut Context>) {
+        let Some(dest) = operation.dest else { return };
+        let index = dest.index();
+        let register = self.ir.register(dest);
+        let value = if !self.declared[index] {
+            let joined = self.entry[index].join(result);
+            self.changed |= joined.kind != self.entry[index].kind;
+            self.entry[index] = joined;
+            result
+        } else if let Some(ty) = result.kind.mistaken_for(register.ty) {
+            if let Some(context) = context {
+                wrong_register(context, self.ir, operation, register, ty, result);
+            }
+            // One mistake, one warning.
+            Typed::ANY
+        } else if matches!(result.kind, Kind::Any | Kind::None) || register.ty == Type::B {
+            self.entry[index]
+        } else {
+            result
+        };
+        self.now[index] = (run, value);
+    }
+
+    /// Reports what an operation reads as another type than it is.
+    fn reads(&self, run: usize, operation: &Operation, context: &mut Context) {
+        for which in 0..operation.reads().len() {
+            let wanted = operation.row().source_type(which);
+            if wanted == Type::B {
+                continue;
+            }
+            let source = self.source(run, operation, which);
+            if let Some(ty) = source.kind.mistaken_for(wanted) {
+                wrong_source(context, self.ir, operation, which, (ty, wanted), source);
+            }
+        }
+        // A choice between an integer and a float is neither.
+        let passed = &self.passed[operation.op as usize];
+        let is = |kind| passed.iter().copied().find(|which| self.source(run, operation, *which).kind == kind);
+        if let (Some(int), Some(float)) = (is(Kind::Int), is(Kind::Float)) {
+            let int = (int, self.source(run, operation, int));
+            let float = (float, self.source(run, operation, float));
+            either(context, operation, int, float);
+        }
+    }
+}
+
+fn literal(operation: &Operation, kind: Kind, what: What, span: Span) -> Typed {
+    Typed { kind, origin: Some(Origin { what, span, scope: ScopeId(operation.expansion) }) }
+}
+
+/// The sources of which one gives an instruction's result its bits; none if it computes new ones. The table says what
+/// an instruction computes: it is asked with patterns that nothing but a copy gives again.
+fn passed(row: &Row) -> SmallVec<[usize; 3]> {
+    const PATTERNS: [u32; 3] = [0x1234_5679, 0xa5b6_c7d3, 0x5e8f_9a1b];
+    let mut passed = SmallVec::new();
+    if row.effect != Effect::Compute || row.result_type() != Type::B {
+        return passed;
+    }
+    for first in [PATTERNS[0], 0] {
+        let sources = [first, PATTERNS[1], PATTERNS[2]];
+        let result = compute::<takt_isa::fp::Host>(row.op, sources[0], sources[1], sources[2]).bits;
+        match sources[..row.shape.sources()].iter().position(|source| *source == result) {
+            Some(which) if passed.contains(&which) => {}
+            Some(which) => passed.push(which),
+            None => return SmallVec::new(),
+        }
+    }
+    passed
+}
+
+/// The types of the tables of data memory: each goes from its label to the next.
+fn tables(ir: &Ir, types: &[Type]) -> HashMap<LabelId, Typed> {
+    let labels = ir.labels.iter().enumerate().filter(|(_, label)| label.space == Space::Data);
+    let mut starts: Vec<usize> = labels.clone().map(|(_, label)| label.position as usize).collect();
+    starts.push(types.len());
+    starts.sort_unstable();
+    let table = |(number, label): (usize, &crate::ir::Label)| {
+        let start = label.position as usize;
+        let end = starts[starts.partition_point(|next| *next <= start).min(starts.len() - 1)];
+        let kinds = types.get(start..end).unwrap_or(&[]).iter().map(|ty| Kind::of(*ty));
+        let kind = kinds.reduce(Kind::join).unwrap_or(Kind::Any);
+        let origin = Origin { what: What::Table, span: label.span, scope: ScopeId::ROOT };
+        (LabelId(number as u32), Typed { kind, origin: Some(origin) })
+    };
+    labels.map(table).collect()
+}
+
+/// A type in words.
+fn words(ty: Type) -> &'static str {
+    match ty {
+        Type::F => "a float",
+        Type::I => "an integer",
+        Type::B => "bits",
+    }
+}
+
+/// The instruction that converts from one type to another.
+fn conversion(from: Type, to: Type) -> Option<&'static str> {
+    let converts = |row: &&Row| row.effect == Effect::Compute && row.types == [to, from];
+    ROWS.iter().find(converts).map(|row| row.mnemonic)
+}
+
+/// `convert it with …`, if there is such an instruction.
+fn convert(from: Type, to: Type) -> String {
+    conversion(from, to).map_or(String::new(), |mnemonic| format!("convert it with `{mnemonic}`, "))
+}
+
+/// Says where a value got its type.
+fn explained(warning: Diagnostic, ty: Type, origin: Option<Origin>) -> Diagnostic {
+    let Some(Origin { what, span, .. }) = origin else { return warning };
+    let is = words(ty);
+    warning.also(
+        span,
+        match what {
+            What::Declared => format!("declared here, as {is}"),
+            What::Result(mnemonic) => format!("`{mnemonic}` gives {is}"),
+            What::Table => format!("each word here is {is}"),
+            What::Address => "an address is an integer".to_owned(),
+            What::Literal(_) => is.to_owned(),
+        },
+    )
+}
+
+/// A literal as a warning shows it, and how it would be written as the wanted type.
+fn shown(value: Value, wanted: Type) -> (String, Option<String>) {
+    match (value, wanted) {
+        (Value::Int(value), Type::F) => (format!("the integer {value}"), Some(format!("{value}.0"))),
+        (Value::Int(value), _) => (format!("the integer {value}"), None),
+        (Value::Real(value), _) => {
+            let whole = value.trunc() == value && value.abs() < 2f64.powi(31);
+            (format!("the real number {value:?}"), whole.then(|| format!("{value:.0}")))
+        }
+    }
+}
+
+/// An operation reads a value as another type than it is.
+fn wrong_source(
+    context: &mut Context,
+    ir: &Ir,
+    operation: &Operation,
+    which: usize,
+    (ty, wanted): (Type, Type),
+    source: Typed,
+) {
+    let name = text(ir, ir.register(operation.sources[which]));
+    let place = source_span(context, operation, which);
+    if let Some(Origin { what: What::Literal(value), span, scope }) = source.origin {
+        let (shown, instead) = shown(value, wanted);
+        let message = format!("{shown} in `{name}` is read as {}", words(wanted));
+        let warning = Diagnostic::warning("types", span, message)
+            .also(place, format!("`{}` reads {} here", operation.row().mnemonic, words(wanted)));
+        let warning = noted(warning, value);
+        context.report(
+            scope,
+            match instead {
+                Some(instead) => {
+                    warning.help(format!("write `{instead}`, or `{name}:bits` there if these bits are meant"))
+                }
+                None => warning.help(format!("write `{name}:bits` there if these bits are meant")),
+            },
+        );
+        return;
+    }
+    let message =
+        format!("`{name}` is {}, and `{}` reads {}", words(ty), operation.row().mnemonic, words(wanted));
+    let warning = explained(Diagnostic::warning("types", place, message), ty, source.origin);
+    let written = bare(context.reports.sources.text(place));
+    let written = if written.contains('[') { &name } else { written };
+    let declare = match source.origin {
+        // Not where another's value was passed on to it.
+        Some(Origin { what: What::Declared, span, .. })
+            if span == ir.register(operation.sources[which]).span =>
+        {
+            format!("declare `{name}:{}` if it is {}, ", type_name(wanted), words(wanted))
+        }
+        _ => String::new(),
+    };
+    let help = format!("{declare}{}or write `{written}:bits` if its bits are meant", convert(ty, wanted));
+    context.report(ScopeId(operation.expansion), warning.help(help));
+}
+
+/// An operand without the type that it is taken as.
+fn bare(written: &str) -> &str {
+    written.split_once(':').map_or(written, |(name, _)| name.trim_end())
+}
+
+/// An operation chooses between an integer and a float.
+fn either(context: &mut Context, operation: &Operation, int: (usize, Typed), float: (usize, Typed)) {
+    let mnemonic = operation.row().mnemonic;
+    let (here, there) = (source_span(context, operation, int.0), source_span(context, operation, float.0));
+    let message = format!("`{mnemonic}` gives an integer or a float");
+    let warning = Diagnostic::warning("types", here, message).here("an integer").also(there, "a float");
+    let help = match int.1.origin.map(|origin| origin.what) {
+        Some(What::Literal(value)) => shown(value, Type::F).1.map(|instead| format!("write `{instead}`")),
+        _ => None,
+    };
+    let written = bare(context.reports.sources.text(here));
+    let help = help.unwrap_or_else(|| {
+        format!("{}or write `{written}:bits` if its bits are meant", convert(Type::I, Type::F))
+    });
+    // A flag that is kept in a state of no type.
+    let help = match float.1.origin {
+        Some(Origin { what: What::Declared, span, .. }) => {
+            let declared = context.reports.sources.text(span);
+            format!("{help}, or declare `{declared}:int` if it is an integer")
+        }
+        _ => help,
+    };
+    context.report(ScopeId(operation.expansion), warning.help(help));
+}
+
+/// A value goes to a register that is declared as another type.
+fn wrong_register(
+    context: &mut Context,
+    ir: &Ir,
+    operation: &Operation,
+    register: &Register,
+    ty: Type,
+    result: Typed,
+) {
+    let (name, wanted) = (text(ir, register), register.ty);
+    let declare = format!("declare `{name}:{}` if it is {}", type_name(ty), words(ty));
+    if let Some(Origin { what: What::Literal(value), span, scope }) = result.origin {
+        let (shown, instead) = shown(value, wanted);
+        let message = format!("{shown} goes to `{name}`, which is {}", words(wanted));
+        let warning = Diagnostic::warning("types", span, message).also(register.span, "declared here");
+        let instead = instead.map_or(String::new(), |instead| format!("write `{instead}`, or "));
+        context.report(scope, noted(warning, value).help(format!("{instead}{declare}")));
+        return;
+    }
+    let place = dest_span(context, operation);
+    let message = format!("{} goes to `{name}`, which is {}", words(ty), words(wanted));
+    let warning = Diagnostic::warning("types", place, message).also(register.span, "declared here");
+    // That the operation itself gives it needs no telling.
+    let origin = result.origin.filter(|origin| origin.span != operation.span);
+    let written = bare(context.reports.sources.text(place));
+    let help = format!("{declare}, {}or write `{written}:bits` if its bits are meant", convert(ty, wanted));
+    context.report(ScopeId(operation.expansion), explained(warning, ty, origin).help(help));
+}
+
+/// Shows what an integer is as a float.
+fn noted(warning: Diagnostic, value: Value) -> Diagnostic {
+    match value {
+        Value::Int(value) => {
+            warning.note(format!("as binary32 its bits are {:e}", f32::from_bits(value as u32)))
+        }
+        Value::Real(_) => warning,
+    }
+}

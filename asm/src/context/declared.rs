@@ -1,0 +1,111 @@
+//! What declared names stand for: registers, constants, labels, arguments.
+
+use crate::context::At;
+use crate::context::scopes::{Binding, ScopeId};
+use crate::ir::given::GivenTypes;
+use crate::ir::{Label, Register, RegisterId, RegisterKind};
+use crate::report::source::Span;
+use crate::syntax::ast::{Operand, Section};
+use crate::syntax::expr::Value;
+use crate::syntax::name::NameId;
+use std::collections::{BTreeMap, HashMap, HashSet};
+use takt_isa::{Type, ZERO};
+
+#[derive(Clone, Debug)]
+pub(crate) struct NamedConstant {
+    pub(crate) name: String,
+    /// None if its expression has a mistake, which is reported.
+    pub(crate) value: Option<Value>,
+    pub(crate) span: Span,
+    pub(crate) used: bool,
+    /// Whether that it is never used is worth a warning.
+    pub(crate) watched: bool,
+}
+
+/// An argument of a macro's use.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Argument {
+    pub(crate) operand: Operand,
+    pub(crate) at: At,
+    /// Its value, once computed: parameters passed on and on are computed once.
+    pub(crate) value: Option<Value>,
+}
+
+/// Everything that the source declares, by number.
+pub(crate) struct Declared {
+    pub(crate) registers: Vec<Register>,
+    /// Registers with a given address.
+    pub(crate) by_address: HashMap<u16, RegisterId>,
+    /// Outputs with a given number.
+    pub(crate) numbered: BTreeMap<u16, RegisterId>,
+    /// Registers that are declared with a type, rather than as floats by default.
+    pub(crate) typed: HashSet<RegisterId>,
+    /// What the source says of the types of operands that the instruction leaves open.
+    pub(crate) given: GivenTypes,
+    pub(crate) constants: Vec<NamedConstant>,
+    pub(crate) arguments: Vec<Argument>,
+    /// Parameters of macros' uses that stand for registers, as far as operations use them.
+    pub(crate) parameters: HashMap<(ScopeId, NameId), RegisterId>,
+    /// Labels. While the source is read a code label's position counts the statements of its section.
+    pub(crate) labels: Vec<Label>,
+    /// The section of each label.
+    pub(crate) label_sections: Vec<Section>,
+    /// The types of the words of data memory.
+    pub(crate) data_types: Vec<Type>,
+}
+
+impl Declared {
+    /// Nothing but the register `zero`.
+    pub(crate) fn new() -> Declared {
+        let zero = Register {
+            name: "zero".to_owned(),
+            kind: RegisterKind::Zero,
+            ty: Type::B,
+            pinned: Some(ZERO),
+            preset: None,
+            span: Span::default(),
+        };
+        Declared {
+            registers: vec![zero],
+            by_address: HashMap::from([(ZERO, RegisterId::ZERO)]),
+            numbered: BTreeMap::new(),
+            typed: HashSet::new(),
+            given: GivenTypes::default(),
+            constants: Vec::new(),
+            arguments: Vec::new(),
+            parameters: HashMap::new(),
+            labels: Vec::new(),
+            label_sections: Vec::new(),
+            data_types: Vec::new(),
+        }
+    }
+
+    /// Where something was declared.
+    pub(crate) fn declaration(&self, binding: Binding) -> Option<Span> {
+        match binding {
+            Binding::Register(id) => Some(self.registers[id.index()].span),
+            Binding::Constant(id) => Some(self.constants[id as usize].span),
+            Binding::Code(id) | Binding::Data(id) => Some(self.labels[id.0 as usize].span),
+            Binding::Argument(id) => Some(self.arguments[id as usize].operand.span),
+            Binding::None | Binding::Count(_) | Binding::Builtin(_) | Binding::Has(_) => None,
+        }
+    }
+
+    /// What a binding is, in words.
+    pub(crate) fn kind_text(&self, binding: Binding) -> &'static str {
+        match binding {
+            Binding::Register(id) => match self.registers[id.index()].kind {
+                RegisterKind::Input => "an input port",
+                RegisterKind::Output => "an output port",
+                RegisterKind::Zero => "the register that always reads as zero",
+                _ => "a register",
+            },
+            Binding::Constant(_) | Binding::Builtin(_) | Binding::Has(_) => "a constant",
+            Binding::Code(_) => "a code label",
+            Binding::Data(_) => "a data label",
+            Binding::Argument(_) => "a parameter",
+            Binding::Count(_) => "the count of a repetition",
+            Binding::None => "unknown",
+        }
+    }
+}

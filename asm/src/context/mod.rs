@@ -1,0 +1,137 @@
+//! What every stage after parsing shares: the names and their scopes, what declared names stand for, and the reports.
+
+mod declared;
+mod evaluate;
+mod reports;
+mod scopes;
+mod unknown;
+
+pub(crate) use declared::{Argument, Declared, NamedConstant};
+pub(crate) use reports::Reports;
+pub(crate) use scopes::{Binding, MacroDefinition, ScopeId, ScopeKind, Scopes};
+pub(crate) use unknown::Wanted;
+
+use crate::ir::RegisterId;
+use crate::report::diag::Diagnostic;
+use crate::report::source::Span;
+use crate::syntax::ast::*;
+use crate::syntax::name::NameId;
+use std::rc::Rc;
+use takt_isa::program::Space;
+use takt_isa::{Machine, Op, Type};
+
+/// What stands before a mnemonic in the name of the constant that says whether the machine has the instruction.
+pub(crate) const HAS: &str = "has.";
+
+/// The mistake is in the report.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Reported;
+
+/// Where an expression or operand stands: its tree and its scope.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct At {
+    pub(crate) ast: u32,
+    pub(crate) scope: ScopeId,
+}
+
+/// What the stages after parsing share.
+pub(crate) struct Context {
+    pub(crate) machine: &'static Machine,
+    pub(crate) asts: Vec<Rc<Ast>>,
+    pub(crate) scopes: Scopes,
+    pub(crate) declared: Declared,
+    pub(crate) reports: Reports,
+    /// Arguments and templates under evaluation, one within the other.
+    depth: usize,
+}
+
+impl Context {
+    pub(crate) fn new(machine: &'static Machine) -> Context {
+        let mut scopes = Scopes::new();
+        let zero = scopes.names_mut().intern("zero");
+        scopes.bind(ScopeId::ROOT, zero, Binding::Register(RegisterId::ZERO));
+        let (declared, reports) = (Declared::new(), Reports::default());
+        Context { machine, asts: Vec::new(), scopes, declared, reports, depth: 0 }
+    }
+
+    /// Reports a mistake in a scope, with the expansions that led there.
+    pub(crate) fn report(&mut self, scope: ScopeId, mut diagnostic: Diagnostic) -> Reported {
+        if self.reports.sink.keeps(diagnostic.severity) {
+            diagnostic = self.scopes.with_expansions(scope, diagnostic);
+        }
+        self.reports.sink.push(diagnostic);
+        Reported
+    }
+
+    pub(crate) fn error(
+        &mut self,
+        scope: ScopeId,
+        code: &'static str,
+        span: Span,
+        message: impl Into<String>,
+    ) -> Reported {
+        self.report(scope, Diagnostic::error(code, span, message))
+    }
+
+    /// What a name means in a scope.
+    #[inline]
+    pub(crate) fn lookup(&self, scope: ScopeId, name: NameId) -> Binding {
+        match self.scopes.lookup(scope, name) {
+            Binding::None => match name.builtin() {
+                Some(builtin) => Binding::Builtin(builtin as u32),
+                None => self.has(name).map_or(Binding::None, Binding::Has),
+            },
+            binding => binding,
+        }
+    }
+
+    /// Whether the machine has an instruction, where the name asks for that: `has.` and a mnemonic.
+    fn has(&self, name: NameId) -> Option<bool> {
+        let row = Op::from_mnemonic(self.scopes.text(name).strip_prefix(HAS)?)?.row();
+        Some(row.function == takt_isa::Function::Idle || self.machine.host(row.function).is_some())
+    }
+
+    /// Declares a name in the scope that takes declarations, unless it is declared there.
+    pub(crate) fn declare(
+        &mut self,
+        at: At,
+        name: NameId,
+        span: Span,
+        binding: Binding,
+    ) -> Result<(), Reported> {
+        let owner = self.scopes.scope(at.scope).owner;
+        let before = self.scopes.bound(owner, name);
+        if before == Binding::None {
+            self.scopes.bind(owner, name, binding);
+            return Ok(());
+        }
+        let text = self.scopes.text(name).to_owned();
+        let error = Diagnostic::error("declared-twice", span, format!("`{text}` is declared already"));
+        let error = match (before, self.declared.declaration(before)) {
+            (Binding::Register(RegisterId::ZERO), _) => {
+                error.note("`zero` is the register that always reads as zero").help("choose another name")
+            }
+            (Binding::Argument(_), Some(span)) => error.also(span, "as a parameter, for this argument"),
+            (_, Some(first)) if first == span => error.help(
+                "each turn of the repetition declares it: make the name depend on the count, as in `name{i}`",
+            ),
+            (_, Some(first)) => error.also(first, "declared here first").help("choose another name"),
+            _ => error,
+        };
+        Err(self.report(at.scope, error))
+    }
+}
+
+/// A type as the source writes it.
+pub(crate) const fn type_name(ty: Type) -> &'static str {
+    match ty {
+        Type::F => "float",
+        Type::I => "int",
+        Type::B => "bits",
+    }
+}
+
+/// Whether a label is of a space, for the listing and the report.
+pub(crate) fn space_of(section: Section) -> Space {
+    if section == Section::Data { Space::Data } else { Space::Code }
+}

@@ -1,0 +1,226 @@
+//! Placed registers to words: the last stage, where the program becomes what the machine loads.
+
+pub(crate) mod place;
+
+use crate::emit::place::Placement;
+use crate::ir::{Constant, Ir, Operation, RegisterKind};
+use crate::limits::NAME_BYTES;
+use crate::report::diag::{Diagnostic, Sink};
+use crate::report::source::Span;
+use std::collections::{BTreeMap, HashSet};
+use takt_isa::program::{LoopBound, Port, Section, Space, Symbol};
+use takt_isa::{Instruction, Program, ZERO};
+
+/// A program, and which of its words a macro, a repetition or the assembler itself made (as indices into its code, ascending).
+pub(crate) struct Emitted {
+    pub(crate) program: Program,
+    pub(crate) expanded: Vec<u32>,
+    /// For each word that has a source line, its operation's order and expansion.
+    pub(crate) origins: Vec<Option<(u32, u32)>>,
+}
+
+/// Writes the program.
+pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
+    let slots = ir.machine.slots.len();
+    let filler = Instruction::NOP.encode().unwrap_or(0);
+    let mut code = vec![filler; ir.bundles.len() * slots];
+    let mut lines = vec![None; ir.bundles.len() * slots];
+    let mut expanded = Vec::new();
+    let mut origins = vec![None; ir.bundles.len() * slots];
+    for (address, bundle) in ir.bundles.iter().enumerate() {
+        let words = address * slots..(address + 1) * slots;
+        let mut free = 0;
+        for operation in &bundle.operations {
+            // What any slot takes goes to the first that no other operation of the bundle claims.
+            let slot = match operation.slot {
+                Some(slot) => slot as usize,
+                None => {
+                    while bundle.operations.iter().any(|other| other.slot == Some(free)) {
+                        free += 1;
+                    }
+                    free += 1;
+                    free as usize - 1
+                }
+            };
+            let index = words.start + slot;
+            if slot >= slots {
+                continue;
+            }
+            code[index] = word(ir, operation, slot, placement, sink);
+            lines[index] = operation.location;
+            origins[index] = operation.location.map(|_| (operation.order, operation.expansion));
+            if operation.expansion != 0 || operation.made {
+                expanded.push(index as u32);
+            }
+        }
+    }
+    limits(ir, sink);
+    expanded.sort_unstable();
+    let mut program = Program {
+        machine: ir.machine,
+        code,
+        data: ir.data.clone(),
+        constants: constants(ir, placement),
+        inputs: ports(ir, placement, |kind| kind == RegisterKind::Input),
+        outputs: ports(ir, placement, |kind| kind == RegisterKind::Output),
+        latched: ir.latched,
+        registers: ports(ir, placement, |kind| matches!(kind, RegisterKind::Plain | RegisterKind::State)),
+        symbols: symbols(ir),
+        sections: sections(ir),
+        loop_bounds: loop_bounds(ir),
+        files: ir.files.clone(),
+        lines,
+    };
+    distinguish(&mut program);
+    Emitted { program, expanded, origins }
+}
+
+fn word(ir: &Ir, operation: &Operation, slot: usize, placement: &Placement, sink: &mut Sink) -> u64 {
+    // A register without a place is reported by the stage that found none.
+    let address = |id: crate::ir::RegisterId| placement.addresses[id.index()].unwrap_or(ZERO);
+    let base = ir.machine.slots[slot].bank.base;
+    let constant = match operation.constant {
+        Constant::None => 0,
+        Constant::Value(value) => value,
+        Constant::Code(label) => ir.labels[label.0 as usize].position,
+        Constant::Raw(index) => return ir.raw[index as usize],
+    };
+    let mut instruction = Instruction::bare(operation.op);
+    instruction.dest = operation.dest.map_or(0, |dest| address(dest).wrapping_sub(base));
+    for (source, id) in instruction.sources.iter_mut().zip(operation.reads()) {
+        *source = address(*id);
+    }
+    instruction.constant = constant;
+    match instruction.encode() {
+        Ok(word) => word,
+        Err(error) => {
+            // A register without a place, or out of reach, has been reported.
+            if error.field != takt_isa::Field::Dest {
+                sink.push(Diagnostic::error("range", operation.span, error.to_string()));
+            }
+            0
+        }
+    }
+}
+
+/// Whether no packing of the operations fits the program memory.
+pub(crate) fn is_too_long(ir: &Ir) -> bool {
+    let words = (ir.machine.code_depth as usize).saturating_mul(ir.machine.slots.len());
+    ir.operations().filter(|operation| operation.slot.is_some()).count() > words
+}
+
+/// The memories of the machine hold only so much.
+pub(crate) fn limits(ir: &Ir, sink: &mut Sink) {
+    let depth = ir.machine.code_depth as usize;
+    if ir.bundles.len() > depth {
+        let first = ir.bundles[depth].operations.first().map_or(Span::default(), |operation| operation.span);
+        let message =
+            format!("{} bundles, and {}'s program memory holds {depth}", ir.bundles.len(), ir.machine.name);
+        sink.push(Diagnostic::error("memory-full", first, message).here("the first that does not fit"));
+    }
+    let depth = ir.machine.data_depth as usize;
+    if ir.data.len() > depth {
+        let message = format!("{} words, and {}'s data memory holds {depth}", ir.data.len(), ir.machine.name);
+        let last =
+            ir.labels.iter().filter(|label| label.space == Space::Data).max_by_key(|label| label.position);
+        sink.push(match last {
+            Some(label) => Diagnostic::error("memory-full", label.span, message).here("the last part of it"),
+            None => Diagnostic::placeless("memory-full", message),
+        });
+    }
+}
+
+fn constants(ir: &Ir, placement: &Placement) -> Vec<(u16, u32)> {
+    let mut constants: Vec<(u16, u32)> = ir
+        .registers
+        .iter()
+        .zip(&placement.addresses)
+        .filter_map(|(register, address)| {
+            let bits = match register.kind {
+                RegisterKind::Constant(bits) => Some(bits),
+                _ => register.preset,
+            };
+            Some(((*address)?, bits?))
+        })
+        .collect();
+    constants.sort_unstable();
+    constants
+}
+
+fn ports(ir: &Ir, placement: &Placement, wanted: impl Fn(RegisterKind) -> bool) -> Vec<Port> {
+    ir.registers
+        .iter()
+        .zip(placement.addresses.iter().zip(&placement.shared))
+        // A register that stands for several names at different times has none.
+        .filter(|(register, (_, shared))| wanted(register.kind) && !register.name.is_empty() && !**shared)
+        .filter_map(|(register, (address, _))| {
+            Some(Port { name: register.name.clone(), register: (*address)?, ty: register.ty })
+        })
+        .collect()
+}
+
+fn symbols(ir: &Ir) -> Vec<Symbol> {
+    let symbol = |label: &crate::ir::Label| Symbol {
+        name: label.name.clone(),
+        space: label.space,
+        address: label.position,
+    };
+    let mut symbols: Vec<Symbol> = ir.labels.iter().map(symbol).collect();
+    // Labels of one address stay in the order of the source.
+    symbols.sort_by_key(|symbol| (symbol.space, symbol.address));
+    symbols
+}
+
+/// The sections that hold bundles.
+fn sections(ir: &Ir) -> Vec<Section> {
+    let end = ir.bundles.len() as u32;
+    [("once", 0, ir.period), ("period", ir.period, end)]
+        .into_iter()
+        .filter(|(_, start, end)| start < end)
+        .map(|(name, start, end)| Section { name: name.to_owned(), start, end })
+        .collect()
+}
+
+/// The bounds of loops. Where the scheduler left nothing of a block of idle bundles, two may have come to one place.
+fn loop_bounds(ir: &Ir) -> Vec<LoopBound> {
+    let mut bounds: BTreeMap<u32, u32> = BTreeMap::new();
+    for bound in ir.loop_bounds.iter().filter(|bound| (bound.position as usize) < ir.bundles.len()) {
+        let most = bounds.entry(bound.position).or_default();
+        *most = bound.most.max(*most);
+    }
+    bounds.into_iter().map(|(address, most)| LoopBound { address, most }).collect()
+}
+
+/// Gives every named thing a name of its own. The source's names are; those that the assembler makes, of a macro's locals and
+/// of values split from a name, might be another's or too long.
+fn distinguish(program: &mut Program) {
+    let count =
+        program.inputs.len() + program.outputs.len() + program.registers.len() + program.symbols.len();
+    let mut all: HashSet<&str> = HashSet::with_capacity(count);
+    let ports = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
+    let listed = ports.map(|port| &port.name).chain(program.symbols.iter().map(|symbol| &symbol.name));
+    all.extend(listed.filter(|name| name.len() <= NAME_BYTES).map(String::as_str));
+    if all.len() == count {
+        return;
+    }
+    // Names with a point yield to those without, which only the source can have given.
+    let mut taken: HashSet<String> =
+        all.into_iter().filter(|name| !name.contains('.')).map(str::to_owned).collect();
+    let Program { inputs, outputs, registers, symbols, .. } = program;
+    let ports = inputs.iter_mut().chain(outputs).chain(registers).map(|port| &mut port.name);
+    for name in ports.chain(symbols.iter_mut().map(|symbol| &mut symbol.name)) {
+        if !name.contains('.') || (name.len() <= NAME_BYTES && taken.insert(name.clone())) {
+            continue;
+        }
+        // ASCII throughout: a name can be cut anywhere.
+        let stem = name[..name.len().min(NAME_BYTES - 12)].to_owned();
+        let mut number = 2;
+        *name = loop {
+            let candidate = format!("{stem}._{number}");
+            if taken.insert(candidate.clone()) {
+                break candidate;
+            }
+            number += 1;
+        };
+    }
+}

@@ -1,0 +1,358 @@
+//! Registers to places.
+//!
+//! A register lies in the bank of the slot whose operations write it; one that nothing writes, a constant above all, lies
+//! in the bank with most room. Within a bank registers follow one another in the order of their declaration, around those
+//! that the source has placed. Inputs lie in the input bank. An output has a number, which the source gives or which is the
+//! first that is free, and lies at that place of the output window of the bank of the slot that writes it.
+//!
+//! A register that only one straight run of bundles uses, and writes before it reads, is needed from its first write to its
+//! last use: it takes a register that is free for so long. While there are enough, each gets one of its own.
+
+use crate::ir::runs;
+use crate::ir::{Ir, Register, RegisterId, RegisterKind};
+use crate::report::diag::{Diagnostic, Sink};
+use std::collections::{BTreeSet, HashMap, VecDeque};
+use takt_isa::spec::machines::REGISTER_SPACE;
+use takt_isa::{Bank, ZERO};
+
+/// Where each register of a program lies, by index; `None` for those that nothing uses.
+#[derive(Clone, Debug)]
+pub(crate) struct Placement {
+    /// The addresses.
+    pub addresses: Vec<Option<u16>>,
+    /// Whether another register has the same address, at another time.
+    pub shared: Vec<bool>,
+}
+
+/// The part of a bank that registers of a kind may take.
+#[derive(Clone, Copy)]
+struct Window {
+    first: u16,
+    end: u16,
+}
+
+impl Window {
+    fn of(bank: &Bank, kind: RegisterKind, outputs: u16) -> Window {
+        let split = bank.base + bank.depth - outputs.min(bank.depth);
+        match kind {
+            RegisterKind::Input => Window { first: bank.base, end: (bank.base + bank.depth).min(ZERO) },
+            _ => Window { first: bank.base, end: split },
+        }
+    }
+}
+
+/// The registers that are taken.
+struct Space {
+    taken: [bool; REGISTER_SPACE],
+}
+
+impl Space {
+    fn room(&self, window: Window) -> usize {
+        self.taken[window.first as usize..window.end as usize].iter().filter(|taken| !**taken).count()
+    }
+
+    fn take(&mut self, window: Window) -> Option<u16> {
+        let free = self.taken[window.first as usize..window.end as usize].iter().position(|taken| !taken)?;
+        let address = window.first + free as u16;
+        self.taken[address as usize] = true;
+        Some(address)
+    }
+}
+
+/// Gives every register that is used a place.
+pub(crate) fn place(ir: &Ir, sink: &mut Sink) -> Placement {
+    let machine = ir.machine;
+    // The slot that writes each register, and whether an operation uses it at all.
+    let mut writer: Vec<Option<u8>> = vec![None; ir.registers.len()];
+    let mut used = vec![false; ir.registers.len()];
+    for operation in ir.operations() {
+        for source in operation.reads() {
+            used[source.index()] = true;
+        }
+        if let (Some(dest), Some(slot)) = (operation.dest, operation.slot) {
+            writer[dest.index()] = Some(slot);
+            used[dest.index()] = true;
+        }
+    }
+    let mut space = Space { taken: [false; REGISTER_SPACE] };
+    let mut addresses: Vec<Option<u16>> = ir.registers.iter().map(|register| register.pinned).collect();
+    for address in addresses.iter().flatten() {
+        space.taken[*address as usize] = true;
+    }
+    outputs(ir, &writer, &mut space, &mut addresses, sink);
+    let ranges = ranges(ir);
+    let is_local = |index: usize| ranges[index].is_some() && addresses[index].is_none();
+    // The most registers that short-lived values want in each bank: room that constants leave if they can.
+    let mut wanted_by_locals = vec![0; machine.slots.len()];
+    for index in (0..ir.registers.len()).filter(|index| is_local(*index)) {
+        wanted_by_locals[usize::from(writer[index].unwrap_or(0))] += 1;
+    }
+    let locals: Vec<usize> = (0..ir.registers.len()).filter(|index| is_local(*index)).collect();
+    // Constants come after what has its bank: they go wherever there is room.
+    let is_constant = |index: &usize| {
+        let register: &Register = &ir.registers[*index];
+        matches!(register.kind, RegisterKind::Constant(_))
+            || (register.kind != RegisterKind::Input && writer[*index].is_none())
+    };
+    let wanted = (0..ir.registers.len()).filter(|index| {
+        let register = &ir.registers[*index];
+        addresses[*index].is_none()
+            && ranges[*index].is_none()
+            && register.kind != RegisterKind::Output
+            && (used[*index] || register.kind == RegisterKind::Input || register.preset.is_some())
+    });
+    let (constants, registers): (Vec<usize>, Vec<usize>) = wanted.partition(is_constant);
+    let mut missing: Vec<(usize, Option<u8>)> = Vec::new();
+    for index in registers {
+        let kind = ir.registers[index].kind;
+        let (bank, slot) = match (kind, writer[index]) {
+            (RegisterKind::Input, _) => (&machine.inputs, None),
+            (_, slot) => (&machine.slots[slot.unwrap_or(0) as usize].bank, slot),
+        };
+        match space.take(Window::of(bank, kind, machine.outputs_per_bank)) {
+            Some(address) => addresses[index] = Some(address),
+            None => missing.push((index, slot)),
+        }
+    }
+    let mut homeless = Vec::new();
+    for index in constants {
+        let kind = ir.registers[index].kind;
+        let windows = machine.slots.iter().enumerate();
+        let windows = windows.map(|(s, slot)| (s, Window::of(&slot.bank, kind, machine.outputs_per_bank)));
+        // The first of equals.
+        let roomiest =
+            windows.rev().max_by_key(|(s, window)| space.room(*window) as i64 - wanted_by_locals[*s]);
+        match roomiest.and_then(|(_, window)| space.take(window)) {
+            Some(address) => addresses[index] = Some(address),
+            None => homeless.push(index),
+        }
+    }
+    let shared = share(ir, &locals, &ranges, &writer, &mut space, &mut addresses, &mut missing);
+    report(ir, &writer, &missing, &homeless, &addresses, sink);
+    Placement { addresses, shared }
+}
+
+/// Gives every output its place.
+fn outputs(
+    ir: &Ir,
+    writer: &[Option<u8>],
+    space: &mut Space,
+    addresses: &mut [Option<u16>],
+    sink: &mut Sink,
+) {
+    let machine = ir.machine;
+    let count = machine.outputs_per_bank;
+    let given: HashMap<RegisterId, u16> = ir.numbers.iter().map(|(number, id)| (*id, *number)).collect();
+    // What the source writes at an output's place without a name has its number.
+    let unnamed = |number| {
+        let mut places = (0..machine.slots.len()).map(|slot| machine.output_register(slot, number));
+        places.any(|place| space.taken[usize::from(place)])
+    };
+    let mut free: VecDeque<u16> =
+        (0..count).filter(|number| !ir.numbers.contains_key(number) && !unnamed(*number)).collect();
+    let all = || (0..ir.registers.len()).filter(|index| ir.registers[*index].kind == RegisterKind::Output);
+    let mut missing = Vec::new();
+    for index in all() {
+        if addresses[index].is_some() {
+            continue;
+        }
+        let register = &ir.registers[index];
+        let Some(number) = given.get(&RegisterId::new(index)).copied().or_else(|| free.pop_front()) else {
+            missing.push(index);
+            continue;
+        };
+        let place = machine.output_register(usize::from(writer[index].unwrap_or(0)), number);
+        if space.taken[usize::from(place)] {
+            let name = machine.register_name(place).unwrap_or_default();
+            let message = format!("output {number}, `{}`, lies at `{name}`, which is taken", register.name);
+            let error = Diagnostic::error("place", register.span, message)
+                .note(format!("the source names `@{name}` elsewhere"))
+                .help("give it another number, or say its name there");
+            sink.push(error);
+            continue;
+        }
+        space.taken[usize::from(place)] = true;
+        addresses[index] = Some(place);
+    }
+    if let Some(first) = missing.first() {
+        let names: Vec<&str> = missing.iter().map(|index| ir.registers[*index].name.as_str()).collect();
+        let message = format!("{} output ports are needed, and {} has {count}", all().count(), machine.name);
+        let error = Diagnostic::error("bank-full", ir.registers[*first].span, message)
+            .here("no number is left for this one")
+            .note(format!("no number for: {}", few(&names)));
+        sink.push(error);
+    }
+}
+
+/// For each register that one run of bundles writes before it reads, and no other uses: the bundles of its first write and
+/// its last use.
+fn ranges(ir: &Ir) -> Vec<Option<(u32, u32)>> {
+    /// What is known of a register so far.
+    #[derive(Clone, Copy)]
+    enum Seen {
+        Nowhere,
+        In { run: u32, first: u32, last: u32 },
+        Wide,
+    }
+    let mut seen = vec![Seen::Nowhere; ir.registers.len()];
+    for (run, bounds) in (0..).zip(runs::runs(ir)) {
+        for (at, bundle) in (bounds.start as u32..).zip(&ir.bundles[bounds.start..bounds.end]) {
+            if bundle.is_opaque() {
+                // A raw word may use anything.
+                return vec![None; ir.registers.len()];
+            }
+            for source in bundle.operations.iter().flat_map(|operation| operation.reads()) {
+                let seen = &mut seen[source.index()];
+                *seen = match *seen {
+                    Seen::In { run: same, first, .. } if same == run => Seen::In { run, first, last: at },
+                    _ => Seen::Wide,
+                };
+            }
+            for dest in bundle.operations.iter().filter_map(|operation| operation.dest) {
+                let seen = &mut seen[dest.index()];
+                *seen = match *seen {
+                    Seen::Nowhere => Seen::In { run, first: at, last: at },
+                    Seen::In { run: same, first, .. } if same == run => Seen::In { run, first, last: at },
+                    _ => Seen::Wide,
+                };
+            }
+        }
+    }
+    let range = |(register, seen): (&Register, &Seen)| match *seen {
+        Seen::In { first, last, .. }
+            if register.kind == RegisterKind::Plain
+                && register.pinned.is_none()
+                && register.preset.is_none() =>
+        {
+            Some((first, last))
+        }
+        _ => None,
+    };
+    ir.registers.iter().zip(&seen).map(range).collect()
+}
+
+/// Places short-lived values, in the order of their first writes, in what room there is. A register is taken again only after
+/// all others of its bank have been; the bundle of a value's last read may write the next one, for it reads first.
+fn share(
+    ir: &Ir,
+    locals: &[usize],
+    ranges: &[Option<(u32, u32)>],
+    writer: &[Option<u8>],
+    space: &mut Space,
+    addresses: &mut [Option<u16>],
+    missing: &mut Vec<(usize, Option<u8>)>,
+) -> Vec<bool> {
+    let mut shared = vec![false; ir.registers.len()];
+    let mut starting: Vec<(u32, u32, usize)> =
+        locals.iter().filter_map(|&index| ranges[index].map(|(first, last)| (first, last, index))).collect();
+    starting.sort_unstable_by_key(|&(first, _, index)| (first, index));
+    for (number, slot) in (0u8..).zip(ir.machine.slots) {
+        let window = Window::of(&slot.bank, RegisterKind::Plain, ir.machine.outputs_per_bank);
+        // Free registers, the longest free first, and who had each before; values that end, soonest first.
+        let mut free: VecDeque<(u16, Option<usize>)> = VecDeque::new();
+        while let Some(address) = space.take(window) {
+            free.push_back((address, None));
+        }
+        let mut ending: BTreeSet<(u32, usize)> = BTreeSet::new();
+        for &(first, last, index) in starting.iter().filter(|(_, _, index)| writer[*index] == Some(number)) {
+            while let Some(&(end, old)) = ending.first().filter(|(end, _)| *end <= first) {
+                ending.remove(&(end, old));
+                free.extend(addresses[old].map(|address| (address, Some(old))));
+            }
+            match free.pop_front() {
+                Some((address, before)) => {
+                    addresses[index] = Some(address);
+                    if let Some(before) = before {
+                        (shared[before], shared[index]) = (true, true);
+                    }
+                    ending.insert((last, index));
+                }
+                None => missing.push((index, Some(number))),
+            }
+        }
+    }
+    shared
+}
+
+/// One error for each bank that is full.
+fn report(
+    ir: &Ir,
+    writer: &[Option<u8>],
+    missing: &[(usize, Option<u8>)],
+    homeless: &[usize],
+    addresses: &[Option<u16>],
+    sink: &mut Sink,
+) {
+    let machine = ir.machine;
+    let mut rest: Vec<&(usize, Option<u8>)> = missing.iter().collect();
+    while let Some(&&(first, slot)) = rest.first() {
+        let kind = ir.registers[first].kind;
+        let same = |(_, other): &(usize, Option<u8>)| *other == slot;
+        let names: Vec<&str> = rest
+            .iter()
+            .filter(|entry| same(entry))
+            .map(|entry| ir.registers[entry.0].name.as_str())
+            .collect();
+        let bank = slot.map_or(&machine.inputs, |slot| &machine.slots[slot as usize].bank);
+        let window = Window::of(bank, kind, machine.outputs_per_bank);
+        let available = usize::from(window.end - window.first);
+        let inside = |address: &Option<u16>| {
+            address.is_some_and(|address| (window.first..window.end).contains(&address))
+        };
+        let needed = addresses.iter().filter(|address| inside(address)).count() + names.len();
+        let what = match kind {
+            RegisterKind::Input => "input ports".to_owned(),
+            _ => format!("registers in bank {}", bank.name),
+        };
+        let mut error = Diagnostic::error(
+            "bank-full",
+            ir.registers[first].span,
+            format!("{needed} {what} are needed, and {} has {available}", machine.name),
+        )
+        .here("no room for this one");
+        error = error.note(format!("no room for: {}", few(&names)));
+        if let Some(slot) = slot {
+            let slot = &machine.slots[slot as usize];
+            error =
+                error.note(format!("bank {} is the one that slot `{}` writes", slot.bank.name, slot.name));
+        }
+        if matches!(kind, RegisterKind::Plain | RegisterKind::State) {
+            error = error.help("use a register again once its value is no longer needed");
+        }
+        sink.push(error);
+        rest.retain(|entry| !same(entry));
+    }
+    if let Some(first) = homeless.first() {
+        let written = writer.iter().filter(|slot| slot.is_some()).count();
+        let available: usize = machine
+            .slots
+            .iter()
+            .map(|slot| usize::from(slot.bank.depth - machine.outputs_per_bank.min(slot.bank.depth)))
+            .sum();
+        let constants =
+            ir.registers.iter().filter(|register| matches!(register.kind, RegisterKind::Constant(_)));
+        let error = Diagnostic::error(
+            "bank-full",
+            ir.registers[*first].span,
+            format!(
+                "no register is left for {} constant{}",
+                homeless.len(),
+                if homeless.len() == 1 { "" } else { "s" }
+            ),
+        )
+        .note(format!(
+            "{} constants and {written} written registers, and {} has {available} registers",
+            constants.count(),
+            machine.name
+        ))
+        .help("load rarely used constants with `li`, or keep them in data memory");
+        sink.push(error);
+    }
+}
+
+/// The first names of a list.
+fn few(names: &[&str]) -> String {
+    const SHOWN: usize = 8;
+    let shown = names.iter().take(SHOWN).copied().collect::<Vec<_>>().join(", ");
+    if names.len() > SHOWN { format!("{shown} and {} more", names.len() - SHOWN) } else { shown }
+}

@@ -1,0 +1,246 @@
+//! Declarations: registers and their places, presets, data. The part of [`expand`](crate::expand) that writes down what
+//! the program has, rather than where it goes.
+
+use crate::context::{At, Binding, Context, Reported};
+use crate::expand::{Data, Expander};
+use crate::ir::{Register, RegisterId, RegisterKind};
+use crate::limits;
+use crate::report::diag::Diagnostic;
+use crate::report::source::Span;
+use crate::syntax::ast::*;
+use takt_isa::{Machine, Type, ZERO};
+
+impl Expander<'_> {
+    pub(crate) fn data_section(&mut self, at: At, span: Span) -> Result<(), Reported> {
+        if self.section == Section::Data {
+            return Ok(());
+        }
+        let error =
+            Diagnostic::error("section", span, "data outside of `.data`").help("open `.data` before it");
+        Err(self.context.report(at.scope, error))
+    }
+
+    pub(crate) fn data(&mut self, at: At, values: &[Expr], ty: Type, span: Span) -> Result<(), Reported> {
+        self.data_section(at, span)?;
+        self.flat.data.extend(values.iter().map(|value| Data::Value(at, *value, ty)));
+        self.data_words += values.len();
+        self.check_data(at, span);
+        Ok(())
+    }
+
+    pub(crate) fn check_data(&mut self, at: At, span: Span) {
+        if self.data_words > limits::DATA_WORDS {
+            let message = format!("the program expands to more than {} words of data", limits::DATA_WORDS);
+            self.limit(at.scope, span, message);
+        }
+    }
+
+    pub(crate) fn declare(
+        &mut self,
+        at: At,
+        what: Declares,
+        declaration: &Declaration,
+    ) -> Result<(), Reported> {
+        let Name { name, span } = declaration.name;
+        let id = self.context.name(at, name, span)?;
+        let kind = match what {
+            Declares::Register => RegisterKind::Plain,
+            Declares::State => RegisterKind::State,
+            Declares::Input => RegisterKind::Input,
+            Declares::Output => RegisterKind::Output,
+        };
+        let register = RegisterId::new(self.context.declared.registers.len());
+        self.context.declare(at, id, span, Binding::Register(register))?;
+        // From here on the name is known: a mistake in its type or place is reported and the rest stands.
+        let name = self.context.scopes.full_name(at.scope, id);
+        self.context.declared.registers.push(Register {
+            name,
+            kind,
+            ty: Type::F,
+            pinned: None,
+            preset: None,
+            span,
+        });
+        if let Some(ty) = declaration.ty {
+            self.context.declared.registers[register.index()].ty = self.context.type_named(at, ty)?;
+            self.context.declared.typed.insert(register);
+        }
+        match declaration.place {
+            Some(place) => self.place(at, register, place),
+            None => Ok(()),
+        }
+    }
+
+    /// What follows the `@` of a declaration: a register's canonical name, or a port's number.
+    fn place(&mut self, at: At, register: RegisterId, place: Expr) -> Result<(), Reported> {
+        let name = match self.context.asts[at.ast as usize].nodes[place.id.range()] {
+            [Node { kind: NodeKind::Name(name), span }] => Some(Name { name, span }),
+            _ => None,
+        };
+        if let Some(name) = name {
+            let id = self.context.name(at, name.name, name.span)?;
+            let is_register = self.context.machine.register_address(self.context.scopes.text(id)).is_some();
+            let binding = self.context.lookup(at.scope, id);
+            // What is neither a register nor a number is taken for a register's name misspelt.
+            let is_number =
+                matches!(binding, Binding::Constant(_) | Binding::Count(_) | Binding::Argument(_));
+            if is_register || !is_number {
+                let address = address(&mut self.context, at, name)?;
+                return self.pin(at, register, address, place.span);
+            }
+        }
+        let number = self.context.integer(at, place)?;
+        self.number(at, register, number, place.span)
+    }
+
+    /// Gives a port its number.
+    fn number(&mut self, at: At, register: RegisterId, number: i64, span: Span) -> Result<(), Reported> {
+        let machine = self.context.machine;
+        let (what, count) = match self.context.declared.registers[register.index()].kind {
+            RegisterKind::Input => ("input", machine.input_count()),
+            RegisterKind::Output => ("output", machine.outputs_per_bank),
+            _ => {
+                let error = Diagnostic::error(
+                    "place",
+                    span,
+                    format!("`{number}` is no place: only ports have numbers"),
+                )
+                .help(format!("a register's place is its name, as `@ {}3`", machine.slots[0].bank.name));
+                return Err(self.context.report(at.scope, error));
+            }
+        };
+        let Some(number) = u16::try_from(number).ok().filter(|number| *number < count) else {
+            let message = format!("{} has no {what} {number}", machine.name);
+            let error = Diagnostic::error("place", span, message)
+                .note(format!("{what}s have the numbers 0 to {}", count - 1));
+            return Err(self.context.report(at.scope, error));
+        };
+        if what == "input" {
+            return self.pin(at, register, machine.inputs.base + number, span);
+        }
+        self.take_number(at, register, number, span)
+    }
+
+    /// Takes the number of an output port for it.
+    fn take_number(&mut self, at: At, register: RegisterId, number: u16, span: Span) -> Result<(), Reported> {
+        if let Some(other) = self.context.declared.numbered.get(&number) {
+            let Register { name, span: first, .. } = &self.context.declared.registers[other.index()];
+            let error = Diagnostic::error("place", span, format!("output {number} is taken"))
+                .also(*first, format!("by `{name}`"))
+                .note("an output has one number, whichever slot writes it");
+            return Err(self.context.report(at.scope, error));
+        }
+        self.context.declared.numbered.insert(number, register);
+        Ok(())
+    }
+
+    /// `.ports`: whether they are latched.
+    pub(crate) fn ports(&mut self, at: At, word: Name) -> Result<(), Reported> {
+        let name = self.context.name(at, word.name, word.span)?;
+        let latched = match self.context.scopes.text(name) {
+            "latched" => true,
+            "direct" => false,
+            other => {
+                let message = format!("`.ports` is `latched` or `direct`, not `{other}`");
+                return Err(self.context.error(at.scope, "ports", word.span, message));
+            }
+        };
+        match self.flat.ports {
+            Some((before, first)) if before != latched => {
+                let error = Diagnostic::error("ports", word.span, "ports are latched or direct, all of them")
+                    .also(first, "said otherwise here");
+                Err(self.context.report(at.scope, error))
+            }
+            _ => {
+                self.flat.ports.get_or_insert((latched, word.span));
+                Ok(())
+            }
+        }
+    }
+
+    fn pin(&mut self, at: At, register: RegisterId, address: u16, span: Span) -> Result<(), Reported> {
+        let machine = self.context.machine;
+        let place = machine.register_name(address).unwrap_or_default();
+        let wrong = match self.context.declared.registers[register.index()].kind {
+            _ if address == ZERO => Some("`zero` is never written: nothing can be placed there".to_owned()),
+            RegisterKind::Input if !machine.is_input(address) => {
+                Some(format!("`{place}` is not an input port"))
+            }
+            RegisterKind::Output if !machine.is_output(address) => {
+                Some(format!("`{place}` is not an output port"))
+            }
+            RegisterKind::Plain | RegisterKind::State if machine.is_output(address) => {
+                Some(format!("`{place}` is an output port"))
+            }
+            RegisterKind::Plain | RegisterKind::State if machine.is_input(address) => {
+                Some(format!("`{place}` is an input port"))
+            }
+            _ => None,
+        };
+        if let Some(message) = wrong {
+            let note = ports_text(machine);
+            return Err(self.context.report(at.scope, Diagnostic::error("place", span, message).note(note)));
+        }
+        if let Some(other) = self.context.declared.by_address.get(&address).copied() {
+            let Register { name, span: first, .. } = self.context.declared.registers[other.index()].clone();
+            let what = if name.is_empty() { "preset" } else { &name };
+            let error = Diagnostic::error("place", span, format!("`{place}` is taken"))
+                .also(first, format!("by `{what}`"));
+            return Err(self.context.report(at.scope, error));
+        }
+        if let Some(number) = machine.output_number(address) {
+            self.take_number(at, register, number, span)?;
+        }
+        self.context.declared.by_address.insert(address, register);
+        self.context.declared.registers[register.index()].pinned = Some(address);
+        Ok(())
+    }
+}
+
+/// The address of a register by its canonical name.
+pub(crate) fn address(context: &mut Context, at: At, place: Name) -> Result<u16, Reported> {
+    let id = context.name(at, place.name, place.span)?;
+    let text = context.scopes.text(id).to_owned();
+    let machine = context.machine;
+    machine.register_address(&text).ok_or_else(|| {
+        let banks: Vec<String> =
+            machine.banks().map(|bank| format!("{0}0…{0}{1}", bank.name, bank.depth - 1)).collect();
+        let error =
+            Diagnostic::error("place", place.span, format!("{} has no register `{text}`", machine.name))
+                .note(format!("registers: {}", banks.join(", ")));
+        context.report(at.scope, error)
+    })
+}
+
+/// The register at an address: the one the source names, or else one without a name.
+pub(crate) fn register_at(context: &mut Context, address: u16, span: Span) -> RegisterId {
+    if let Some(register) = context.declared.by_address.get(&address) {
+        return *register;
+    }
+    let register = RegisterId::new(context.declared.registers.len());
+    let (kind, ty) = (RegisterKind::Plain, Type::B);
+    context.declared.registers.push(Register {
+        name: String::new(),
+        kind,
+        ty,
+        pinned: Some(address),
+        preset: None,
+        span,
+    });
+    context.declared.by_address.insert(address, register);
+    register
+}
+
+fn ports_text(machine: &Machine) -> String {
+    let outputs: Vec<String> = machine
+        .slots
+        .iter()
+        .map(|slot| {
+            let (name, depth) = (slot.bank.name, slot.bank.depth);
+            format!("{name}{}…{name}{}", depth - machine.outputs_per_bank, depth - 1)
+        })
+        .collect();
+    let inputs = machine.inputs;
+    let last = machine.input_count() - 1;
+    format!("inputs: {0}0…{0}{last}; outputs: {1}", inputs.name, outputs.join(", "))
+}

@@ -1,0 +1,182 @@
+//! Source files: reading them, and `.include`. A part of [`expand`](crate::expand).
+
+use crate::context::{At, Reported};
+use crate::expand::load::{LoadError, Loader, Place, include_path};
+use crate::expand::{Expander, FrameKind};
+use crate::limits;
+use crate::report::diag::{Diagnostic, nearest};
+use crate::report::source::Span;
+use crate::syntax::parse;
+use std::rc::Rc;
+
+/// A source file: where it is, and its path there.
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+pub(crate) struct FileId {
+    /// Which of the loader's places beyond the project; `None` is the project itself.
+    pub(crate) place: Option<usize>,
+    pub(crate) path: String,
+}
+
+/// Why a file cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Unread {
+    #[error("{0}")]
+    Load(#[from] LoadError),
+    #[error(
+        "with it the program's sources have more than the {} bytes that the assembler reads",
+        limits::SOURCE_BYTES
+    )]
+    TooMuch,
+    #[error(
+        "it is not UTF-8 text: byte 0x{byte:02x} at offset {offset} (line {line}, byte {column} of the line)"
+    )]
+    NotText { byte: u8, offset: usize, line: usize, column: usize },
+}
+
+impl Expander<'_> {
+    /// Reads and parses a file, or finds it among those read.
+    pub(crate) fn load(&mut self, id: &FileId) -> Result<(u32, usize), Unread> {
+        if let Some(known) = self.files.get(id) {
+            return Ok(*known);
+        }
+        let (name, bytes) = match id.place {
+            None => (id.path.clone(), self.loader.load(&id.path)?),
+            Some(place) => {
+                let place = &self.loader.places()[place];
+                (place.name_of(&id.path), place.load(&id.path)?)
+            }
+        };
+        if bytes.len() > limits::FILE_BYTES {
+            return Err(LoadError::TooLarge.into());
+        }
+        self.bytes += bytes.len();
+        if self.bytes > limits::SOURCE_BYTES {
+            return Err(Unread::TooMuch);
+        }
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let offset = error.utf8_error().valid_up_to();
+            let before = &error.as_bytes()[..offset];
+            let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+            let column = offset - before.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1) + 1;
+            Unread::NotText { byte: error.as_bytes()[offset], offset, line, column }
+        })?;
+        let file = self.context.reports.sources.add(&name, text.into()).ok_or(Unread::TooMuch)?;
+        let source = self.context.reports.sources.files()[file].clone();
+        let ast = parse::parse(&source, self.context.scopes.names_mut(), &mut self.context.reports.sink);
+        self.context.asts.push(Rc::new(ast));
+        self.origins.push(id.clone());
+        let known = (self.context.asts.len() as u32 - 1, file);
+        self.files.insert(id.clone(), known);
+        Ok(known)
+    }
+
+    /// `.include "path"`, or `.include <path>` of the library.
+    pub(crate) fn include(&mut self, at: At, path: &str, library: bool, span: Span) -> Result<(), Reported> {
+        let files = self.frames.iter().filter_map(|frame| match frame.kind {
+            FrameKind::File(file, _) => Some(file),
+            _ => None,
+        });
+        let open: Vec<usize> = files.collect();
+        let from = open.last().map(|file| self.origins[*file].clone());
+        let from = from.unwrap_or(FileId { place: None, path: String::new() });
+        let within = include_path(if library { "" } else { &from.path }, path);
+        let Some(within) = within else {
+            let what = if library { "library" } else { "project" };
+            let error = Diagnostic::error("load", span, format!("`{path}` is not a path within the {what}"));
+            let error = match library {
+                true => error.help("a file of the project is written in `\"`"),
+                false => error.note(
+                    "paths are relative to the including file, and stay in the folder of the first one",
+                ),
+            };
+            return Err(self.context.report(at.scope, error));
+        };
+        if self.include_depth >= limits::INCLUDE_DEPTH {
+            let message = format!("files include one another more than {} deep", limits::INCLUDE_DEPTH);
+            return Err(self.context.error(at.scope, "limit", span, message));
+        }
+        self.includes += 1;
+        if self.includes > limits::INCLUDES {
+            self.limit(at.scope, span, format!("files are included more than {} times", limits::INCLUDES));
+            return Err(Reported);
+        }
+        // Beside the including file, then in the places that take such a name.
+        let beside = FileId { place: from.place, path: within.clone() };
+        let path = if library { Some(within.clone()) } else { include_path("", path) };
+        let places = self.loader.places().iter().enumerate();
+        let taken = places.filter(|(_, place)| library || place.takes_quoted());
+        let further =
+            taken.filter_map(|(number, _)| Some(FileId { place: Some(number), path: path.clone()? }));
+        let candidates: Vec<FileId> = Some(beside).filter(|_| !library).into_iter().chain(further).collect();
+        for id in candidates {
+            if let Some((_, file)) = self.files.get(&id).copied() {
+                // What several files need of the library is there once.
+                if library {
+                    return Ok(());
+                }
+                if open.contains(&file) {
+                    let name = |file: usize| &*self.context.reports.sources.files()[file].name;
+                    let chain: Vec<&str> =
+                        open.iter().skip_while(|open| **open != file).map(|open| name(*open)).collect();
+                    let message = format!("`{}` includes itself", name(file));
+                    let error = Diagnostic::error("include-cycle", span, message).note(format!(
+                        "{} → {}",
+                        chain.join(" → "),
+                        name(file)
+                    ));
+                    return Err(self.context.report(at.scope, error));
+                }
+            }
+            match self.load(&id) {
+                Ok((ast, file)) => {
+                    self.enter_file(ast, file);
+                    return Ok(());
+                }
+                Err(Unread::Load(LoadError::NotFound)) => {}
+                Err(unread) => {
+                    let message = format!("`{}` cannot be read: {unread}", id.path);
+                    return Err(self.context.error(at.scope, "load", span, message));
+                }
+            }
+        }
+        let error = if library { self.not_in_library(&within, span) } else { self.not_found(&within, span) };
+        Err(self.context.report(at.scope, error))
+    }
+
+    /// There is no file for `.include "path"`.
+    fn not_found(&self, path: &str, span: Span) -> Diagnostic {
+        let message = format!("`{path}` cannot be read: {}", LoadError::NotFound);
+        let error = Diagnostic::error("load", span, message);
+        let (folders, libraries): (Vec<&Place>, Vec<&Place>) =
+            self.loader.places().iter().partition(|place| place.takes_quoted());
+        if libraries.iter().any(|library| library.load(path).is_ok()) {
+            return error.help(format!("write `.include <{path}>` for the library's"));
+        }
+        match folders.iter().map(|folder| format!("`{}`", folder.name_of(""))).collect::<Vec<_>>() {
+            folders if folders.is_empty() => error,
+            folders => error.note(format!("nor is it in {}", folders.join(", "))),
+        }
+    }
+
+    /// There is no file for `.include <path>`.
+    fn not_in_library(&self, path: &str, span: Span) -> Diagnostic {
+        let error = Diagnostic::error("load", span, format!("there is no `<{path}>`"));
+        let mut names: Vec<String> = self.loader.places().iter().flat_map(Place::names).collect();
+        names.sort();
+        names.dedup();
+        let meant = nearest(path, names.iter().map(String::as_str));
+        let more = if names.len() > limits::LISTED { ", …" } else { "" };
+        let listed: Vec<String> = names.iter().take(limits::LISTED).map(|name| format!("<{name}>")).collect();
+        let error = match listed.is_empty() {
+            true => error.note("there is no library here, and no folder to look in"),
+            false => error.note(format!("there are {}{more}", listed.join(", "))),
+        };
+        match meant {
+            Some(meant) => error.did_you_mean(Some(format!(".include <{meant}>"))),
+            None if self.loader.load(path).is_ok() => {
+                error.help(format!("write `.include \"{path}\"` for the project's"))
+            }
+            None => error,
+        }
+    }
+}

@@ -1,0 +1,290 @@
+//! Where sources come from. The assembler assumes no file system: it asks a [`Loader`].
+
+use crate::limits;
+use std::collections::BTreeMap;
+use std::io::Read as _;
+use std::path::{Component, Path, PathBuf};
+
+/// Why a source cannot be had.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum LoadError {
+    /// There is none of that name.
+    #[error("there is no such file")]
+    NotFound,
+    /// It lies outside the project folder.
+    #[error("it lies outside the project folder")]
+    Outside,
+    /// It is a folder or a device.
+    #[error("it is not a regular file")]
+    NotAFile,
+    /// It is larger than [`limits::FILE_BYTES`].
+    #[error("it has more than the {} bytes that the assembler reads", limits::FILE_BYTES)]
+    TooLarge,
+    /// The system refuses.
+    #[error("{0}")]
+    System(String),
+}
+
+/// Gives sources by their path within the project: relative, `/` between folders, without `.` and `..`.
+pub trait Loader {
+    /// The bytes of a source.
+    ///
+    /// # Errors
+    /// If it cannot be had.
+    fn load(&self, path: &str) -> Result<Vec<u8>, LoadError>;
+
+    /// Where `.include` looks beyond the project, in this order.
+    fn places(&self) -> &[Place] {
+        &[]
+    }
+}
+
+/// A place beyond the project where `.include` looks: a folder, or a library in memory.
+#[derive(Clone, Debug)]
+pub struct Place(PlaceKind);
+
+#[derive(Clone, Debug)]
+enum PlaceKind {
+    /// What stands before the path of a file in it, and the folder.
+    Folder(String, FileLoader),
+    Library(MemoryLoader),
+}
+
+impl Place {
+    /// Whether it is searched for `"name"` too, not only for `<name>`.
+    pub(crate) fn takes_quoted(&self) -> bool {
+        matches!(self.0, PlaceKind::Folder(..))
+    }
+
+    /// A file in it as diagnostics, listings and the debugger name it: unlike any path within the project.
+    pub(crate) fn name_of(&self, path: &str) -> String {
+        match &self.0 {
+            PlaceKind::Folder(prefix, _) => format!("{prefix}{path}"),
+            PlaceKind::Library(_) => format!("<{path}>"),
+        }
+    }
+
+    /// The names that can be asked for; of a folder, its own sources.
+    pub(crate) fn names(&self) -> Vec<String> {
+        match &self.0 {
+            PlaceKind::Folder(_, folder) => folder.names(),
+            PlaceKind::Library(files) => files.files.keys().cloned().collect(),
+        }
+    }
+}
+
+impl Loader for Place {
+    fn load(&self, path: &str) -> Result<Vec<u8>, LoadError> {
+        match &self.0 {
+            PlaceKind::Folder(_, folder) => folder.load(path),
+            PlaceKind::Library(files) => files.load(path),
+        }
+    }
+}
+
+/// The sources of a project, and the places beyond it where `.include` looks.
+#[derive(Clone, Debug)]
+pub struct Search<L> {
+    project: L,
+    places: Vec<Place>,
+}
+
+impl<L: Loader> Search<L> {
+    /// The sources of a project and no further place.
+    pub fn new(project: L) -> Search<L> {
+        Search { project, places: Vec::new() }
+    }
+
+    /// A folder, searched after the places there are for `"name"` and for `<name>`.
+    #[must_use]
+    pub fn folder(mut self, folder: impl Into<PathBuf>) -> Search<L> {
+        let folder = folder.into();
+        let mut prefix = folder.display().to_string();
+        // Paths within the project begin with a name: they remain another file's.
+        if matches!(folder.components().next(), Some(Component::Normal(_))) {
+            prefix.insert_str(0, "./");
+        }
+        if !prefix.ends_with('/') {
+            prefix.push('/');
+        }
+        self.places.push(Place(PlaceKind::Folder(prefix, FileLoader::new(folder))));
+        self
+    }
+
+    /// A library in memory, each file a name and its text, searched after the places there are for `<name>` only.
+    #[must_use]
+    pub fn library<'s>(mut self, files: impl IntoIterator<Item = &'s (&'s str, &'s str)>) -> Search<L> {
+        self.places.push(Place(PlaceKind::Library(MemoryLoader::new(files))));
+        self
+    }
+}
+
+impl<L: Loader> Loader for Search<L> {
+    fn load(&self, path: &str) -> Result<Vec<u8>, LoadError> {
+        self.project.load(path)
+    }
+
+    fn places(&self) -> &[Place] {
+        &self.places
+    }
+}
+
+/// Sources in memory, by path: embedded programs, editors, tests.
+#[derive(Clone, Debug, Default)]
+pub struct MemoryLoader {
+    files: BTreeMap<String, Vec<u8>>,
+}
+
+impl MemoryLoader {
+    /// A loader of some sources, each a path and its text.
+    pub fn new<'s>(sources: impl IntoIterator<Item = &'s (&'s str, &'s str)>) -> MemoryLoader {
+        let mut loader = MemoryLoader::default();
+        for (path, text) in sources {
+            loader.add(*path, *text);
+        }
+        loader
+    }
+
+    /// A loader of one source.
+    pub fn of(path: impl Into<String>, text: impl Into<Vec<u8>>) -> MemoryLoader {
+        let mut loader = MemoryLoader::default();
+        loader.add(path, text);
+        loader
+    }
+
+    /// Adds a source, or replaces it.
+    pub fn add(&mut self, path: impl Into<String>, text: impl Into<Vec<u8>>) {
+        self.files.insert(path.into(), text.into());
+    }
+}
+
+impl Loader for MemoryLoader {
+    fn load(&self, path: &str) -> Result<Vec<u8>, LoadError> {
+        self.files.get(path).cloned().ok_or(LoadError::NotFound)
+    }
+}
+
+/// One source at hand, and another loader for the others.
+pub(crate) struct First<'l> {
+    pub(crate) name: &'l str,
+    pub(crate) bytes: Vec<u8>,
+    pub(crate) rest: &'l dyn Loader,
+}
+
+impl Loader for First<'_> {
+    fn load(&self, path: &str) -> Result<Vec<u8>, LoadError> {
+        if path == self.name { Ok(self.bytes.clone()) } else { self.rest.load(path) }
+    }
+
+    fn places(&self) -> &[Place] {
+        self.rest.places()
+    }
+}
+
+/// Sources of a project folder. Nothing outside of it is read, whatever the path, and wherever a symbolic link points.
+#[derive(Clone, Debug)]
+pub struct FileLoader {
+    root: PathBuf,
+}
+
+impl FileLoader {
+    /// The loader of a folder. Whether there is such a folder shows when it is asked for a file.
+    pub fn new(root: impl Into<PathBuf>) -> FileLoader {
+        FileLoader { root: root.into() }
+    }
+
+    /// The loader of a file's folder, and the file's path in it.
+    ///
+    /// # Errors
+    /// If the path names no file.
+    pub fn of_file(path: impl AsRef<Path>) -> Result<(FileLoader, String), LoadError> {
+        let path = path.as_ref();
+        let name = path.file_name().and_then(|name| name.to_str()).ok_or(LoadError::NotFound)?;
+        let folder = match path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        };
+        Ok((FileLoader::new(folder), name.to_owned()))
+    }
+
+    /// The names of the sources that lie in the folder itself, in order.
+    fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(&self.root).into_iter().flatten().flatten();
+        let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+        let mut names: Vec<String> =
+            names.filter(|name| name.ends_with(".s")).take(limits::CANDIDATES).collect();
+        names.sort();
+        names
+    }
+}
+
+fn system(error: std::io::Error) -> LoadError {
+    match error.kind() {
+        std::io::ErrorKind::NotFound => LoadError::NotFound,
+        _ => LoadError::System(error.to_string()),
+    }
+}
+
+impl Loader for FileLoader {
+    fn load(&self, path: &str) -> Result<Vec<u8>, LoadError> {
+        if path.contains('\0') {
+            return Err(LoadError::NotFound);
+        }
+        let relative = Path::new(path);
+        if !relative.components().all(|part| matches!(part, Component::Normal(_))) {
+            return Err(LoadError::Outside);
+        }
+        let root = self.root.canonicalize().map_err(system)?;
+        let whole = root.join(relative).canonicalize().map_err(system)?;
+        if !whole.starts_with(&root) {
+            return Err(LoadError::Outside);
+        }
+        let about = whole.metadata().map_err(system)?;
+        if !about.is_file() {
+            return Err(LoadError::NotAFile);
+        }
+        if about.len() > limits::FILE_BYTES as u64 {
+            return Err(LoadError::TooLarge);
+        }
+        let file = std::fs::File::open(&whole).map_err(system)?;
+        let mut bytes = Vec::new();
+        // One byte more than allowed shows a file that grows while it is read.
+        file.take(limits::FILE_BYTES as u64 + 1).read_to_end(&mut bytes).map_err(system)?;
+        Ok(bytes)
+    }
+}
+
+/// The path of an included file within the project, from that of the file that includes it; `None` if it leaves the
+/// project.
+pub(crate) fn include_path(from: &str, path: &str) -> Option<String> {
+    if path.starts_with('/') || path.contains(['\\', '\0']) || path.contains(':') {
+        return None;
+    }
+    let folder = from.rsplit_once('/').map_or("", |(folder, _)| folder);
+    let mut parts: Vec<&str> = folder.split('/').filter(|part| !part.is_empty()).collect();
+    for part in path.split('/') {
+        match part {
+            "" | "." => {}
+            ".." => {
+                parts.pop()?;
+            }
+            part => parts.push(part),
+        }
+    }
+    (!parts.is_empty()).then(|| parts.join("/"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn include_paths_stay_in_the_project() {
+        assert_eq!(include_path("a.s", "b.s").as_deref(), Some("b.s"));
+        assert_eq!(include_path("x/a.s", "b.s").as_deref(), Some("x/b.s"));
+        assert_eq!(include_path("x/a.s", "../y/./b.s").as_deref(), Some("y/b.s"));
+        for outside in ["../b.s", "x/../../b.s", "/etc/passwd", "C:b.s", "..\\b.s", "", "."] {
+            assert_eq!(include_path("a.s", outside), None, "{outside}");
+        }
+    }
+}

@@ -1,0 +1,644 @@
+//! Macros, repetitions, conditionals and includes: the source as one flat list of bundles, data and declarations.
+//!
+//! Statements are met in the order in which they take effect. What declares is done at once; what needs every name to be
+//! known, bundles and data, is listed for [`resolve`](crate::resolve). The walk has a stack of its own, not the thread's.
+
+mod declare;
+mod files;
+pub(crate) mod load;
+
+pub(crate) use declare::{address, register_at};
+
+use crate::context::{
+    Argument, At, Binding, Context, MacroDefinition, NamedConstant, Reported, ScopeId, ScopeKind, space_of,
+};
+use crate::expand::files::FileId;
+use crate::expand::load::{Loader, include_path};
+use crate::ir::{Label, LabelId};
+use crate::limits;
+use crate::report::diag::Diagnostic;
+use crate::report::source::Span;
+use crate::syntax::ast::*;
+use crate::syntax::name::NameId;
+use std::collections::HashMap;
+use std::rc::Rc;
+use takt_isa::Type;
+
+/// A bundle of the source where it is expanded.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Item {
+    pub(crate) at: At,
+    pub(crate) statement: u32,
+    /// The `.loc` in force: an index into [`Flat::locs`].
+    pub(crate) loc: u32,
+    /// Whether `.schedule on` is in force.
+    pub(crate) scheduled: bool,
+}
+
+/// Words of data memory.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Data {
+    /// A number, by its type.
+    Value(At, Expr, Type),
+    /// Zeros.
+    Space(u32),
+}
+
+/// A `.loop_bound`: of the bundle that follows, by its number in its section.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LoopBound {
+    pub(crate) section: Section,
+    pub(crate) item: u32,
+    pub(crate) most: u32,
+    pub(crate) at: At,
+    pub(crate) span: Span,
+}
+
+/// A `.preset`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Preset {
+    pub(crate) register: Name,
+    /// Whether `@` stands before it.
+    pub(crate) placed: bool,
+    pub(crate) value: Expr,
+    pub(crate) at: At,
+    pub(crate) span: Span,
+}
+
+/// A `.deadline`, `.order` or `.late`: the directive, and the section that it is about.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Timing {
+    pub(crate) at: At,
+    pub(crate) directive: u32,
+    pub(crate) section: Section,
+}
+
+/// The expanded source.
+#[derive(Debug)]
+pub(crate) struct Flat {
+    pub(crate) once: Vec<Item>,
+    pub(crate) period: Vec<Item>,
+    pub(crate) data: Vec<Data>,
+    pub(crate) presets: Vec<Preset>,
+    pub(crate) loop_bounds: Vec<LoopBound>,
+    pub(crate) timing: Vec<Timing>,
+    /// What `.ports` says, `latched` or not, and where.
+    pub(crate) ports: Option<(bool, Span)>,
+    /// What each `.loc` says; the first is none at all.
+    pub(crate) locs: Vec<Vec<Option<(u32, u32)>>>,
+    /// Files that `.loc` names, in order, then those whose own lines are code.
+    pub(crate) files: Vec<String>,
+    file_numbers: HashMap<String, u32>,
+}
+
+impl Flat {
+    /// The number of a file that code is attributed to.
+    pub(crate) fn file(&mut self, name: &str) -> u32 {
+        if let Some(known) = self.file_numbers.get(name) {
+            return *known;
+        }
+        let number = self.files.len() as u32;
+        self.files.push(name.to_owned());
+        self.file_numbers.insert(name.to_owned(), number);
+        number
+    }
+}
+
+/// A list of statements being walked.
+pub(crate) struct Frame {
+    at: At,
+    next: u32,
+    end: u32,
+    pub(crate) kind: FrameKind,
+}
+
+pub(crate) enum FrameKind {
+    /// A file, its path, and the `.loc` that was in force where it is included.
+    File(usize, u32),
+    Macro,
+    /// A repetition: the name that counts, its value and its last value, the first statement, and the scope around it.
+    Rep {
+        variable: NameId,
+        value: i64,
+        last: i64,
+        start: u32,
+        outer: ScopeId,
+        site: Span,
+    },
+}
+
+pub(crate) struct Expander<'l> {
+    pub(crate) context: Context,
+    pub(crate) loader: &'l dyn Loader,
+    pub(crate) flat: Flat,
+    pub(crate) frames: Vec<Frame>,
+    pub(crate) section: Section,
+    loc: u32,
+    pub(crate) data_words: usize,
+    statements: usize,
+    /// Files read: the tree and the index in the sources.
+    pub(crate) files: HashMap<FileId, (u32, usize)>,
+    /// Which file each of the sources is.
+    pub(crate) origins: Vec<FileId>,
+    /// Bytes of all files read.
+    pub(crate) bytes: usize,
+    /// Whether what follows is scheduled.
+    scheduled: bool,
+    pub(crate) include_depth: usize,
+    pub(crate) includes: usize,
+    macro_depth: usize,
+    /// A limit is reached: there is no going on.
+    stop: bool,
+}
+
+impl<'l> Expander<'l> {
+    pub(crate) fn new(context: Context, loader: &'l dyn Loader) -> Expander<'l> {
+        let flat = Flat {
+            once: Vec::new(),
+            period: Vec::new(),
+            data: Vec::new(),
+            presets: Vec::new(),
+            loop_bounds: Vec::new(),
+            timing: Vec::new(),
+            ports: None,
+            locs: vec![Vec::new()],
+            files: Vec::new(),
+            file_numbers: HashMap::new(),
+        };
+        Expander {
+            context,
+            loader,
+            flat,
+            frames: Vec::new(),
+            section: Section::Once,
+            loc: 0,
+            scheduled: false,
+            data_words: 0,
+            statements: 0,
+            files: HashMap::new(),
+            origins: Vec::new(),
+            bytes: 0,
+            include_depth: 0,
+            includes: 0,
+            macro_depth: 0,
+            stop: false,
+        }
+    }
+
+    /// Expands the program that begins with a file.
+    pub(crate) fn expand(mut self, path: &str) -> (Context, Flat) {
+        let Some(path) = include_path("", path) else {
+            let message = format!("`{path}` does not name a file of the project");
+            self.context.reports.sink.push(Diagnostic::placeless("load", message));
+            return (self.context, self.flat);
+        };
+        match self.load(&FileId { place: None, path: path.clone() }) {
+            Ok((ast, file)) => self.enter_file(ast, file),
+            Err(unread) => {
+                let message = format!("`{path}` cannot be read: {unread}");
+                self.context.reports.sink.push(Diagnostic::placeless("load", message));
+            }
+        }
+        while let Some(frame) = self.frames.last_mut() {
+            if self.stop {
+                break;
+            }
+            if frame.next < frame.end {
+                let (at, index) = (frame.at, frame.next);
+                frame.next += 1;
+                self.statement(at, index);
+            } else {
+                self.leave();
+            }
+        }
+        for LoopBound { section, item, at, span, .. } in self.flat.loop_bounds.clone() {
+            if item as usize >= self.bundles(section) {
+                self.context.error(at.scope, "loop", span, "no bundle follows that could head the loop");
+            }
+        }
+        (self.context, self.flat)
+    }
+
+    pub(crate) fn enter_file(&mut self, ast: u32, file: usize) {
+        let end = self.context.asts[ast as usize].statements.len() as u32;
+        let at = At { ast, scope: ScopeId::ROOT };
+        self.frames.push(Frame { at, next: 0, end, kind: FrameKind::File(file, self.loc) });
+        self.loc = 0;
+        self.include_depth += 1;
+    }
+
+    /// At the end of a frame's statements: goes on with the next turn, or leaves.
+    fn leave(&mut self) {
+        let Some(frame) = self.frames.last_mut() else { return };
+        match &mut frame.kind {
+            FrameKind::Rep { variable, value, last, start, outer, site } if *value < *last => {
+                *value += 1;
+                frame.next = *start;
+                let (variable, value, outer, site) = (*variable, *value, *outer, *site);
+                let scope = self.context.scopes.open(outer, outer, ScopeKind::Rep(variable, value), site);
+                if let Some(frame) = self.frames.last_mut() {
+                    frame.at.scope = scope;
+                }
+                self.count(outer, site);
+            }
+            _ => match self.frames.pop().map(|frame| frame.kind) {
+                Some(FrameKind::File(_, loc)) => {
+                    self.loc = loc;
+                    self.include_depth -= 1;
+                }
+                Some(FrameKind::Macro) => self.macro_depth -= 1,
+                _ => {}
+            },
+        }
+    }
+
+    /// Counts a statement.
+    #[inline]
+    fn count(&mut self, scope: ScopeId, span: Span) {
+        self.statements += 1;
+        if self.statements > limits::STATEMENTS {
+            self.limit(
+                scope,
+                span,
+                format!("the program expands to more than {} statements", limits::STATEMENTS),
+            );
+        }
+    }
+
+    pub(crate) fn limit(&mut self, scope: ScopeId, span: Span, message: String) {
+        self.context.error(scope, "limit", span, message);
+        self.stop = true;
+    }
+
+    fn statement(&mut self, at: At, index: u32) {
+        let ast = &self.context.asts[at.ast as usize];
+        let Statement { label, kind, .. } = ast.statements[index as usize];
+        self.statements += 1;
+        if self.statements > limits::STATEMENTS {
+            let span = self.frames.iter().find_map(|frame| match frame.kind {
+                FrameKind::Rep { site, .. } => Some(site),
+                FrameKind::Macro => Some(self.context.scopes.scope(frame.at.scope).site),
+                FrameKind::File(..) => None,
+            });
+            let message = format!("the program expands to more than {} statements", limits::STATEMENTS);
+            self.limit(ScopeId::ROOT, span.unwrap_or_default(), message);
+            return;
+        }
+        if let Some(label) = label {
+            self.label(at, label);
+        }
+        match kind {
+            StatementKind::Empty => {}
+            StatementKind::Bundle(first, count) => self.bundle(at, index, first, count),
+            StatementKind::Directive(directive) => {
+                let ast = Rc::clone(&self.context.asts[at.ast as usize]);
+                // What goes wrong is in the report; the walk goes on.
+                let _ = self.directive(at, &ast, directive, index);
+            }
+        }
+    }
+
+    /// Bundles of a section so far.
+    fn bundles(&self, section: Section) -> usize {
+        match section {
+            Section::Once => self.flat.once.len(),
+            Section::Period => self.flat.period.len(),
+            Section::Data => 0,
+        }
+    }
+
+    fn loop_bound(&mut self, at: At, most: Expr, span: Span) -> Result<(), Reported> {
+        let turns = self.context.integer(at, most)?;
+        let Some(turns) = u32::try_from(turns).ok().filter(|turns| *turns > 0) else {
+            let message = format!("{turns} turns: a loop has 1 to {}", u32::MAX);
+            return Err(self.context.error(at.scope, "range", most.span, message));
+        };
+        let section = self.section;
+        if section == Section::Data {
+            return Err(self.context.error(at.scope, "section", span, "a loop in `.data`"));
+        }
+        let item = self.bundles(section) as u32;
+        let mut before = self.flat.loop_bounds.iter();
+        if let Some(first) = before.find(|bound| (bound.section, bound.item) == (section, item)) {
+            let error = Diagnostic::error("declared-twice", span, "this bundle's loop has a bound already")
+                .also(first.span, "here");
+            return Err(self.context.report(at.scope, error));
+        }
+        self.flat.loop_bounds.push(LoopBound { section, item, most: turns, at, span });
+        Ok(())
+    }
+
+    fn label(&mut self, at: At, label: Name) {
+        let Ok(name) = self.context.name(at, label.name, label.span) else { return };
+        let position = match self.section {
+            Section::Data => self.data_words,
+            section => self.bundles(section),
+        };
+        let id = LabelId(self.context.declared.labels.len() as u32);
+        let space = space_of(self.section);
+        let binding = if self.section == Section::Data { Binding::Data(id) } else { Binding::Code(id) };
+        if self.context.declare(at, name, label.span, binding).is_ok() {
+            let name = self.context.scopes.full_name(at.scope, name);
+            self.context.declared.labels.push(Label {
+                name,
+                space,
+                position: position as u32,
+                span: label.span,
+            });
+            self.context.declared.label_sections.push(self.section);
+        }
+    }
+
+    fn bundle(&mut self, at: At, index: u32, first: u32, count: u32) {
+        let ast = &self.context.asts[at.ast as usize];
+        let operation = ast.operations[first as usize];
+        if count == 1 {
+            let Ok(name) = self.context.name(at, operation.mnemonic.name, operation.mnemonic.span) else {
+                return;
+            };
+            // A macro cannot have an instruction's name.
+            if name.op().is_none() && self.context.scopes.macros.contains_key(&name) {
+                self.call(at, name, operation);
+                return;
+            }
+        }
+        let items = match self.section {
+            Section::Once => &mut self.flat.once,
+            Section::Period => &mut self.flat.period,
+            Section::Data => {
+                let error = Diagnostic::error("section", operation.span, "an instruction in `.data`")
+                    .help("open `.once` or `.period` before it");
+                self.context.report(at.scope, error);
+                return;
+            }
+        };
+        items.push(Item { at, statement: index, loc: self.loc, scheduled: self.scheduled });
+        if self.flat.once.len() + self.flat.period.len() > limits::OPERATIONS {
+            let message = format!("the program expands to more than {} bundles", limits::OPERATIONS);
+            self.limit(at.scope, operation.span, message);
+        }
+    }
+
+    fn call(&mut self, at: At, name: NameId, operation: Operation) {
+        let Some(definition) = self.context.scopes.macros.get_mut(&name) else { return };
+        definition.uses += 1;
+        let MacroDefinition { ast, directive, start, uses } = *definition;
+        let body = Rc::clone(&self.context.asts[ast as usize]);
+        let DirectiveKind::Macro { parameters, end, name: defined, .. } =
+            &body.directives[directive as usize].kind
+        else {
+            return;
+        };
+        if parameters.len() != operation.count as usize {
+            let plural = if parameters.len() == 1 { "" } else { "s" };
+            let message = format!(
+                "macro `{}` takes {} argument{plural}, not {}",
+                self.context.scopes.text(name),
+                parameters.len(),
+                operation.count
+            );
+            let error =
+                Diagnostic::error("arguments", operation.span, message).also(defined.span, "defined here");
+            self.context.report(at.scope, error);
+            return;
+        }
+        if self.macro_depth >= limits::MACRO_DEPTH {
+            let message =
+                format!("macros are used within one another more than {} deep", limits::MACRO_DEPTH);
+            let error = Diagnostic::error("limit", operation.span, message)
+                .help("does the macro use itself without an `.if` that ends it?");
+            self.context.report(at.scope, error);
+            self.stop = true;
+            return;
+        }
+        let scope =
+            self.context.scopes.open(ScopeId::ROOT, at.scope, ScopeKind::Macro(name, uses), operation.span);
+        let first = operation.first as usize;
+        for (parameter, index) in parameters.iter().zip(first..) {
+            let mut operand = self.context.asts[at.ast as usize].operands[index];
+            let mut outer = at;
+            // A parameter that is passed on as it is stands for its own argument.
+            if let OperandKind::Name(passed) = operand.kind
+                && let Ok(passed) = passed.resolve()
+                && let Binding::Argument(argument) = self.context.lookup(at.scope, passed)
+            {
+                Argument { operand, at: outer, .. } = self.context.declared.arguments[argument as usize];
+            }
+            let id = self.context.declared.arguments.len() as u32;
+            self.context.declared.arguments.push(Argument { operand, at: outer, value: None });
+            if let Ok(parameter) = parameter.name.resolve() {
+                self.context.scopes.bind(scope, parameter, Binding::Argument(id));
+            }
+        }
+        self.macro_depth += 1;
+        self.frames.push(Frame { at: At { ast, scope }, next: start, end: *end, kind: FrameKind::Macro });
+    }
+
+    fn directive(&mut self, at: At, ast: &Ast, directive: u32, index: u32) -> Result<(), Reported> {
+        let DirectiveLine { kind, span } = &ast.directives[directive as usize];
+        let span = *span;
+        match kind {
+            DirectiveKind::Declare(what, names) => {
+                for declaration in names {
+                    // Each name is a declaration of its own: a mistake in one leaves the others.
+                    let _ = self.declare(at, *what, declaration);
+                }
+            }
+            DirectiveKind::Const(name, value) => {
+                let id = self.context.name(at, name.name, name.span)?;
+                let value = self.context.value(at, value.id).ok();
+                let number = self.context.declared.constants.len() as u32;
+                self.context.declare(at, id, name.span, Binding::Constant(number))?;
+                let text = self.context.scopes.full_name(at.scope, id);
+                let watched = self.include_depth == 1 && at.scope == ScopeId::ROOT;
+                self.context.declared.constants.push(NamedConstant {
+                    name: text,
+                    value,
+                    span: name.span,
+                    used: false,
+                    watched,
+                });
+            }
+            DirectiveKind::Preset { register, placed, value } => {
+                // Registers may be declared further down.
+                let (register, placed, value) = (*register, *placed, *value);
+                self.flat.presets.push(Preset { register, placed, value, at, span });
+            }
+            DirectiveKind::Section(section) => self.section = *section,
+            DirectiveKind::Float(values) => self.data(at, values, Type::F, span)?,
+            DirectiveKind::Word(values) => self.data(at, values, Type::I, span)?,
+            DirectiveKind::Space(words) => {
+                self.data_section(at, span)?;
+                let count = self.context.integer(at, *words)?;
+                if !(0..=limits::DATA_WORDS as i64).contains(&count) {
+                    let message = format!("{count} words of space: it is 0 to {}", limits::DATA_WORDS);
+                    return Err(self.context.error(at.scope, "limit", words.span, message));
+                }
+                self.data_words += count as usize;
+                self.flat.data.push(Data::Space(count as u32));
+                self.check_data(at, span);
+            }
+            DirectiveKind::Macro { name, parameters, end } => {
+                self.jump(*end + 1);
+                self.define(at, directive, *name, parameters, index + 1)?;
+            }
+            DirectiveKind::Rep { variable, first, last, end } => {
+                self.jump(*end + 1);
+                let variable = self.context.name(at, variable.name, variable.span)?;
+                let from = self.context.integer(at, *first)?;
+                let to = self.context.integer(at, *last)?;
+                if to.saturating_sub(from) >= limits::REPETITIONS {
+                    let message = format!(
+                        "{} repetitions: more than the {} that the assembler makes",
+                        i128::from(to) - i128::from(from) + 1,
+                        limits::REPETITIONS
+                    );
+                    return Err(self.context.error(at.scope, "limit", first.span.to(last.span), message));
+                }
+                if from <= to {
+                    let scope =
+                        self.context.scopes.open(at.scope, at.scope, ScopeKind::Rep(variable, from), span);
+                    let start = index + 1;
+                    let kind = FrameKind::Rep {
+                        variable,
+                        value: from,
+                        last: to,
+                        start,
+                        outer: at.scope,
+                        site: span,
+                    };
+                    self.frames.push(Frame { at: At { scope, ..at }, next: start, end: *end, kind });
+                }
+            }
+            DirectiveKind::If(condition, next) => {
+                // A condition with a mistake counts as true: of the branches one is read, not none.
+                if self.context.value(at, condition.id).is_ok_and(crate::syntax::expr::Value::is_zero) {
+                    self.branch(at, ast, *next);
+                }
+            }
+            // Reached from above: a branch was taken and ends here.
+            DirectiveKind::Elif(_, _, end) | DirectiveKind::Else(end) => self.jump(*end + 1),
+            DirectiveKind::End(_) => {}
+            DirectiveKind::Broken(_, end) => self.jump(*end + 1),
+            DirectiveKind::Include(path, library) => self.include(at, path, *library, span)?,
+            DirectiveKind::Loc(places) => self.set_loc(at, places)?,
+            DirectiveKind::Schedule(word) => {
+                let name = self.context.name(at, word.name, word.span)?;
+                match self.context.scopes.text(name) {
+                    "on" => self.scheduled = true,
+                    "off" => self.scheduled = false,
+                    other => {
+                        let message = format!("`.schedule` is `on` or `off`, not `{other}`");
+                        return Err(self.context.error(at.scope, "schedule", word.span, message));
+                    }
+                }
+            }
+            DirectiveKind::Ports(word) => self.ports(at, *word)?,
+            DirectiveKind::LoopBound(most) => self.loop_bound(at, *most, span)?,
+            DirectiveKind::Deadline(..) | DirectiveKind::Order(_) | DirectiveKind::Late(..) => {
+                if self.section == Section::Data {
+                    let error =
+                        Diagnostic::error("section", span, "ports are not read or written in `.data`")
+                            .help("open `.once` or `.period` before it");
+                    return Err(self.context.report(at.scope, error));
+                }
+                self.flat.timing.push(Timing { at, directive, section: self.section });
+            }
+            DirectiveKind::Error(text) => {
+                return Err(self.context.report(at.scope, Diagnostic::error("user", span, text.clone())));
+            }
+        }
+        Ok(())
+    }
+
+    /// Continues the current frame at a statement.
+    fn jump(&mut self, to: u32) {
+        if let Some(frame) = self.frames.last_mut() {
+            frame.next = to.min(frame.end);
+        }
+    }
+
+    /// Continues with the branch of an `.if` that is taken, from the first that may be.
+    fn branch(&mut self, at: At, ast: &Ast, mut next: u32) {
+        while let Some(StatementKind::Directive(directive)) =
+            ast.statements.get(next as usize).map(|statement| statement.kind)
+            && let DirectiveKind::Elif(condition, after, _) = &ast.directives[directive as usize].kind
+            && self.context.value(at, condition.id).is_ok_and(crate::syntax::expr::Value::is_zero)
+        {
+            next = *after;
+        }
+        self.jump(next + 1);
+    }
+
+    fn define(
+        &mut self,
+        at: At,
+        directive: u32,
+        name: Name,
+        parameters: &[Name],
+        start: u32,
+    ) -> Result<(), Reported> {
+        if at.scope != ScopeId::ROOT {
+            return Err(Reported);
+        }
+        let id = self.context.name(at, name.name, name.span)?;
+        let text = self.context.scopes.text(id).to_owned();
+        if id.op().is_some() {
+            let error = Diagnostic::error("declared-twice", name.span, format!("`{text}` is an instruction"))
+                .help("give the macro another name");
+            return Err(self.context.report(at.scope, error));
+        }
+        if let Some(before) = self.context.scopes.macros.get(&id) {
+            let first = before.span(&self.context.asts);
+            let error =
+                Diagnostic::error("declared-twice", name.span, format!("macro `{text}` is defined already"))
+                    .also(first, "defined here first");
+            return Err(self.context.report(at.scope, error));
+        }
+        let mut seen: HashMap<NameId, Span> = HashMap::new();
+        for parameter in parameters {
+            let Ok(id) = parameter.name.resolve() else {
+                let error = Diagnostic::error("name", parameter.span, "a parameter is a plain name");
+                return Err(self.context.report(at.scope, error));
+            };
+            if let Some(first) = seen.insert(id, parameter.span) {
+                let text = self.context.scopes.text(id);
+                let message = format!("parameter `{text}` is declared twice");
+                let error = Diagnostic::error("declared-twice", parameter.span, message)
+                    .also(first, "declared here first");
+                return Err(self.context.report(at.scope, error));
+            }
+        }
+        self.context.scopes.macros.insert(id, MacroDefinition { ast: at.ast, directive, start, uses: 0 });
+        Ok(())
+    }
+
+    fn set_loc(&mut self, at: At, places: &[Loc]) -> Result<(), Reported> {
+        let mut locations = Vec::with_capacity(places.len());
+        for place in places {
+            locations.push(match place {
+                Loc::None(name) => {
+                    let text = self.context.reports.sources.text(name.span);
+                    if text != "none" {
+                        let message =
+                            format!("`{text}` is not a place: a file in `\"` and a line, or `none`");
+                        return Err(self.context.error(at.scope, "syntax", name.span, message));
+                    }
+                    None
+                }
+                Loc::At(file, line) => {
+                    let number = self.context.integer(at, *line)?;
+                    let Some(number) = u32::try_from(number).ok().filter(|number| *number > 0) else {
+                        let message = format!("there is no line {number}: lines count from 1");
+                        return Err(self.context.error(at.scope, "range", line.span, message));
+                    };
+                    let file = self.flat.file(file);
+                    Some((file, number))
+                }
+            });
+        }
+        self.flat.locs.push(locations);
+        self.loc = self.flat.locs.len() as u32 - 1;
+        Ok(())
+    }
+}

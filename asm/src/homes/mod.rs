@@ -1,0 +1,405 @@
+//! Homes: in which bank a register lies that operations of several slots write, and what becomes of those whose slot writes
+//! another bank.
+//!
+//! A slot writes its own bank only. A value that must outlive its straight run, or that an output port shows, has to come
+//! to one place, the register's home. What another slot computes gets there in the cheapest of three ways: a constant that is
+//! there from the start is loaded with the program, a constant that comes later is computed by an operation of the right
+//! slot, and anything else is copied by an operation that copies bits ([`copies`](crate::homes::copies)).
+
+pub(crate) mod copies;
+pub(crate) mod values;
+
+use crate::ir::flow::{self, Flow};
+use crate::ir::runs::{self, Run};
+use crate::ir::{Constant, Ir, Operation, Register, RegisterId, RegisterKind};
+use crate::output::listing;
+use crate::report::source::Span;
+use std::collections::HashSet;
+use takt_isa::fp::Host;
+use takt_isa::program::Location;
+use takt_isa::{Effect, Machine, Op, ROWS, Row, Type, compute};
+
+/// What the assembler did about a register that operations of several slots write.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Adjustment {
+    /// The register's name.
+    pub register: String,
+    /// The bank that it lies in.
+    pub bank: &'static str,
+    /// The operation that could not write it: its name, and where it stands.
+    pub mnemonic: &'static str,
+    /// Where it stands.
+    pub location: Option<Location>,
+    /// What became of it.
+    pub made: Made,
+}
+
+/// What became of an operation whose slot does not write the bank of its destination.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Made {
+    /// The loader sets the register to these bits; the operation is gone.
+    Preset(u32),
+    /// An operation of the right slot, by name, gives the same bits.
+    Operation(&'static str),
+    /// Its value is copied.
+    Copy {
+        /// The bundle that copies.
+        address: u32,
+        /// Whether nothing else issues in that bundle.
+        alone: bool,
+        /// Cycles that its straight run of bundles takes longer for it, if these stay as they are written; else it is among what is scheduled.
+        cycles: Option<u32>,
+    },
+}
+
+impl std::fmt::Display for Made {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Made::Preset(bits) => write!(f, "loaded with the program, {}", listing::shown(*bits)),
+            Made::Operation(mnemonic) => write!(f, "becomes `{mnemonic}`"),
+            Made::Copy { address, alone, cycles } => {
+                match alone {
+                    true => write!(f, "copied in a bundle of its own, {address}")?,
+                    false => write!(f, "copied in a free slot of bundle {address}")?,
+                }
+                match cycles {
+                    Some(0) => write!(f, ": no cycle"),
+                    Some(1) => write!(f, ": 1 cycle"),
+                    Some(cycles) => write!(f, ": {cycles} cycles"),
+                    None => Ok(()),
+                }
+            }
+        }
+    }
+}
+
+/// The home of a register, for those that need to be given one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Home {
+    /// The slot that writes it.
+    pub(crate) slot: u8,
+    /// What copies bits there, if anything.
+    pub(crate) copier: Option<Op>,
+}
+
+/// A register that has no home that all who write it can reach, and what to do.
+#[derive(Clone, Debug)]
+pub(crate) struct Homeless {
+    pub(crate) register: RegisterId,
+    pub(crate) help: String,
+    /// What stands in the way, and where.
+    pub(crate) because: Option<(Span, String)>,
+}
+
+/// What is known of the homes of a program's registers.
+#[derive(Default)]
+pub(crate) struct Homes {
+    /// By register.
+    pub(crate) of: Vec<Option<Home>>,
+    /// For registers that have a home: by run, whether the value that the run leaves is wanted.
+    pub(crate) live: Vec<(RegisterId, Vec<bool>)>,
+    pub(crate) homeless: Vec<Homeless>,
+    /// Registers that the source writes in `.once`, if only to write them again before they are read.
+    pub(crate) set_once: HashSet<RegisterId>,
+    /// Registers made for values that nothing need read.
+    pub(crate) quiet: HashSet<RegisterId>,
+    pub(crate) adjustments: Vec<Adjustment>,
+    /// For each value that is copied which of the adjustments that is, and its register.
+    pub(crate) copied: Vec<(usize, RegisterId)>,
+}
+
+impl Homes {
+    pub(crate) fn get(&self, register: RegisterId) -> Option<Home> {
+        self.of.get(register.index()).copied().flatten()
+    }
+
+    /// What there is to say of a register that has no home.
+    pub(crate) fn homeless(&self, register: RegisterId) -> Option<&Homeless> {
+        self.homeless.iter().find(|homeless| homeless.register == register)
+    }
+
+    /// Whether what a run leaves in a register may be read after it, or is shown by a port.
+    pub(crate) fn is_live(&self, register: RegisterId, run: usize) -> bool {
+        let found = self.live.binary_search_by_key(&register, |(register, _)| *register);
+        found.map_or(true, |index| self.live[index].1[run])
+    }
+}
+
+/// A write of a register: each of an output port, of others the last of each run.
+struct Write {
+    bundle: usize,
+    number: usize,
+    slot: u8,
+    /// Whether its value must come home: a port shows it, or it may be read after the run.
+    live: bool,
+    /// The bits that it writes, if they are known.
+    constant: Option<u32>,
+    /// Whether they can be there from the start.
+    initial: bool,
+    /// Whether the value can be copied after it.
+    copied: bool,
+}
+
+/// What a write costs that comes home by an operation of the right slot, and by a copy.
+const OPERATION: u64 = 1;
+const COPY: u64 = 4;
+
+/// Chooses homes. Constants come home here; what is to be copied still writes the register.
+pub(crate) fn choose(ir: &mut Ir) -> Homes {
+    let contested = values::contested(ir);
+    let mut homes = Homes { of: vec![None; ir.registers.len()], ..Homes::default() };
+    if !contested.contains(&true) {
+        return homes;
+    }
+    let runs = runs::runs(ir);
+    let flow = Flow::new(ir, &runs);
+    for index in (0..contested.len()).filter(|index| contested[*index]) {
+        let id = RegisterId::new(index);
+        // What is named by its place alone is meant to be there, and nowhere else.
+        if ir.register(id).name.is_empty() {
+            continue;
+        }
+        let mut once = ir.bundles[..ir.period as usize].iter().flat_map(|bundle| &bundle.operations);
+        if once.any(|operation| operation.dest == Some(id)) {
+            homes.set_once.insert(id);
+        }
+        let live = if ir.register(id).kind == RegisterKind::Output {
+            vec![true; runs.len()]
+        } else {
+            let (reads, writes) = flow::uses(ir, &runs, id);
+            flow.live_after(&reads, &writes)
+        };
+        let writes = coming_home(ir, &runs, &flow, id, &live);
+        match best(ir, &flow, &writes, ir.register(id).pinned) {
+            Some(slot) => {
+                let home = Home { slot, copier: copier(ir.machine, slot) };
+                homes.of[index] = Some(home);
+                homes.live.push((id, live));
+                for write in writes.iter().filter(|write| write.live && write.slot != slot) {
+                    homes.adjustments.extend(bring(ir, id, slot, write));
+                }
+            }
+            None => {
+                homes.homeless.push(homeless(ir, &flow, id, &writes));
+            }
+        }
+    }
+    homes
+}
+
+/// The writes of a register that may have to come home.
+fn coming_home(ir: &Ir, runs: &[Run], flow: &Flow, id: RegisterId, live: &[bool]) -> Vec<Write> {
+    let output = ir.register(id).kind == RegisterKind::Output;
+    let fixed = runs::jumps_to_numbers(ir);
+    let mut writes = Vec::new();
+    // Whether an operation so far has used the register.
+    let mut used = false;
+    for (run, live) in runs.iter().zip(live) {
+        let first = writes.len();
+        for at in run.start..run.end {
+            let operations = &ir.bundles[at].operations;
+            let reads = operations.iter().any(|operation| operation.reads().contains(&id));
+            for (number, operation) in operations.iter().enumerate() {
+                let (Some(slot), true) = (operation.slot, operation.dest == Some(id)) else { continue };
+                let constant = constant(ir, operation);
+                let initial = constant.is_some() && !used && !reads && !output && at < flow.once;
+                let copied = !fixed && branch_that_reads(ir, at).is_none();
+                writes.push(Write { bundle: at, number, slot, live: *live, constant, initial, copied });
+            }
+            used |= reads || operations.iter().any(|operation| operation.dest == Some(id));
+        }
+        if !output {
+            let last = writes.len().saturating_sub(1).max(first);
+            writes.drain(first..last);
+        }
+    }
+    writes
+}
+
+/// A redirection that reads what its own bundle writes: it cannot be issued after the rest.
+fn branch_that_reads(ir: &Ir, at: usize) -> Option<&Operation> {
+    let operations = &ir.bundles[at].operations;
+    let writes = |register: &RegisterId| operations.iter().any(|operation| operation.dest == Some(*register));
+    operations.iter().find(|operation| operation.redirects() && operation.reads().iter().any(writes))
+}
+
+/// The slot whose bank is the home that costs least. Where the register is `pinned`, the bank is given.
+fn best(ir: &Ir, flow: &Flow, writes: &[Write], pinned: Option<u16>) -> Option<u8> {
+    let machine = ir.machine;
+    // Of equals that of the first write.
+    let live = || writes.iter().filter(|write| write.live);
+    let favourite = live().next().or(writes.first()).map(|write| write.slot);
+    let is_possible = |slot: &takt_isa::Slot| pinned.is_none_or(|address| slot.bank.contains(address));
+    let candidates = (0u8..).zip(machine.slots).filter(|(_, slot)| is_possible(slot));
+    let cost = |slot: u8| {
+        let copier = copier(machine, slot);
+        live().filter(|write| write.slot != slot).try_fold(0u64, |sum, write| {
+            let weight = flow.weights[write.bundle];
+            let cost = match write.constant {
+                Some(_) if write.initial => 0,
+                Some(bits) if is_free(ir, write, slot) && giving(machine, slot, bits).is_some() => {
+                    OPERATION * weight
+                }
+                _ if write.copied && copier.is_some() => COPY * weight,
+                _ => return None,
+            };
+            Some(sum.saturating_add(cost))
+        })
+    };
+    candidates
+        .filter_map(|(slot, _)| Some((cost(slot)?, Some(slot) != favourite, slot)))
+        .min()
+        .map(|(_, _, slot)| slot)
+}
+
+/// Whether no operation of a write's bundle needs a slot.
+fn is_free(ir: &Ir, write: &Write, slot: u8) -> bool {
+    ir.bundles[write.bundle].operations.iter().all(|operation| operation.slot != Some(slot))
+}
+
+/// Brings a constant home.
+fn bring(ir: &mut Ir, id: RegisterId, slot: u8, write: &Write) -> Option<Adjustment> {
+    let bits = write.constant?;
+    let old = ir.bundles[write.bundle].operations[write.number];
+    let made = if write.initial {
+        ir.registers[id.index()].preset = Some(bits);
+        // Taken out of its bundle once nothing counts on its place.
+        ir.bundles[write.bundle].operations[write.number] = Operation { made: true, ..old.idle() };
+        Made::Preset(bits)
+    } else if is_free(ir, write, slot) {
+        let (op, sources) = giving(ir.machine, slot, bits)?;
+        let mut new = Operation { op, slot: Some(slot), dest: Some(id), made: true, ..old.idle() };
+        (new.location, new.expansion) = (old.location, old.expansion);
+        match op.row().effect {
+            Effect::Immediate => new.constant = Constant::Value(bits),
+            _ => {
+                for (source, bits) in new.sources.iter_mut().zip(sources) {
+                    *source = holding(ir, bits, old.span);
+                }
+            }
+        }
+        ir.bundles[write.bundle].operations[write.number] = new;
+        Made::Operation(op.row().mnemonic)
+    } else {
+        return None;
+    };
+    Some(adjustment(ir, id, slot, &old, made))
+}
+
+pub(crate) fn adjustment(ir: &Ir, id: RegisterId, slot: u8, from: &Operation, made: Made) -> Adjustment {
+    Adjustment {
+        register: ir.register(id).name.clone(),
+        bank: ir.machine.slots[usize::from(slot)].bank.name,
+        mnemonic: from.row().mnemonic,
+        location: from.location,
+        made,
+    }
+}
+
+/// What copies bits to the bank of a slot: the quickest.
+fn copier(machine: &Machine, slot: u8) -> Option<Op> {
+    rows(machine, slot)
+        .filter(|(_, row)| row.copies())
+        .min_by_key(|(latency, _)| *latency)
+        .map(|(_, row)| row.op)
+}
+
+/// The instructions that a slot executes, with their latencies.
+fn rows(machine: &Machine, slot: u8) -> impl Iterator<Item = (u32, &'static Row)> + '_ {
+    ROWS.iter().filter_map(move |row| {
+        let (host, unit) = machine.host(row.function)?;
+        (host == usize::from(slot)).then(|| (machine.slots[host].units[unit].latency, row))
+    })
+}
+
+/// The bits that an operation writes, if they are known and it raises no flag.
+fn constant(ir: &Ir, operation: &Operation) -> Option<u32> {
+    let row = operation.row();
+    match (row.effect, operation.constant) {
+        (Effect::Immediate, Constant::Value(bits)) => Some(bits),
+        (Effect::Compute, _) => {
+            let mut bits = [0; 3];
+            for (bits, source) in bits.iter_mut().zip(operation.reads()) {
+                *bits = match ir.register(*source).kind {
+                    RegisterKind::Zero => 0,
+                    RegisterKind::Constant(bits) => bits,
+                    _ => return None,
+                };
+            }
+            let value = compute::<Host>(operation.op, bits[0], bits[1], bits[2]);
+            value.flags.is_empty().then_some(value.bits)
+        }
+        _ => None,
+    }
+}
+
+/// An operation of a slot that gives these bits and raises no flag, and the bits of its sources: the quickest, with the
+/// simplest sources.
+fn giving(machine: &Machine, slot: u8, bits: u32) -> Option<(Op, [u32; 2])> {
+    let palette = [0, bits, (-0.0f32).to_bits(), 1.0f32.to_bits()];
+    let sources = |row: &Row| {
+        let pairs = || palette.iter().flat_map(|&a| palette.iter().map(move |&b| [a, b]));
+        let gives = |&[a, b]: &[u32; 2]| {
+            let value = compute::<Host>(row.op, a, b, 0);
+            value.bits == bits && value.flags.is_empty()
+        };
+        match (row.effect, row.shape.sources()) {
+            (Effect::Immediate, _) => Some([0; 2]),
+            (Effect::Compute, 1 | 2) => pairs().find(gives),
+            _ => None,
+        }
+    };
+    rows(machine, slot)
+        .filter_map(|(latency, row)| Some((latency, row.op, sources(row)?)))
+        .min_by_key(|(latency, ..)| *latency)
+        .map(|(_, op, sources)| (op, sources))
+}
+
+/// The register that holds these bits.
+fn holding(ir: &mut Ir, bits: u32, span: Span) -> RegisterId {
+    let holds = |register: &Register| match register.kind {
+        RegisterKind::Zero => bits == 0,
+        RegisterKind::Constant(other) => other == bits,
+        _ => false,
+    };
+    let found = ir.registers.iter().position(holds);
+    let index = found.unwrap_or_else(|| {
+        let kind = RegisterKind::Constant(bits);
+        ir.registers.push(Register {
+            name: String::new(),
+            kind,
+            ty: Type::B,
+            pinned: None,
+            preset: None,
+            span,
+        });
+        ir.registers.len() - 1
+    });
+    RegisterId::new(index)
+}
+
+/// Why a register has no home, and what to do.
+fn homeless(ir: &Ir, flow: &Flow, register: RegisterId, writes: &[Write]) -> Homeless {
+    let found = ir.register(register);
+    let because_of = |help: String, because| Homeless { register, help, because };
+    if found.pinned.is_some()
+        && let Some(slot) = best(ir, flow, writes, None)
+    {
+        let bank = ir.machine.slots[usize::from(slot)].bank.name;
+        let help = format!("leave its place to the assembler, or place it in bank {bank}");
+        return because_of(help, Some((found.span, "placed here".to_owned())));
+    }
+    if let Some(jump) = ir.operations().find(|operation| operation.target_number().is_some()) {
+        let help = "jump to labels, so that the assembler can add an operation that copies";
+        let because = "this counts on every bundle's address".to_owned();
+        return because_of(help.to_owned(), Some((jump.span, because)));
+    }
+    match writes.iter().find_map(|write| branch_that_reads(ir, write.bundle)) {
+        Some(branch) => {
+            let name = branch.row().mnemonic;
+            let because = format!("`{name}` reads what its own bundle writes: no copy can come between");
+            because_of(format!("write `{name}` as a bundle of its own"), Some((branch.span, because)))
+        }
+        None => because_of("use two registers".to_owned(), None),
+    }
+}

@@ -1,0 +1,126 @@
+//! What the source says of the types of operations' parts, where the instruction leaves them open.
+
+use crate::ir::{LabelId, Operation};
+use crate::report::source::Span;
+use crate::syntax::expr::Value;
+use smallvec::SmallVec;
+use std::collections::HashMap;
+use takt_isa::Type;
+
+/// What is known of a value's type.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Kind {
+    /// Nothing is written yet.
+    None,
+    Float,
+    Int,
+    /// Any bits, or either.
+    Any,
+}
+
+impl Kind {
+    pub(crate) const fn of(ty: Type) -> Kind {
+        match ty {
+            Type::F => Kind::Float,
+            Type::I => Kind::Int,
+            Type::B => Kind::Any,
+        }
+    }
+
+    pub(crate) fn join(self, other: Kind) -> Kind {
+        match (self, other) {
+            (Kind::None, kind) | (kind, Kind::None) => kind,
+            (a, b) if a == b => a,
+            _ => Kind::Any,
+        }
+    }
+
+    /// The type, if it is certainly not the wanted one.
+    pub(crate) fn mistaken_for(self, wanted: Type) -> Option<Type> {
+        match (self, wanted) {
+            (Kind::Float, Type::I) => Some(Type::F),
+            (Kind::Int, Type::F) => Some(Type::I),
+            _ => None,
+        }
+    }
+}
+
+/// A part of an operation that the source says something of.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Part {
+    Dest,
+    Source(u8),
+    Immediate,
+    /// The table that a memory operand lies in.
+    Table,
+}
+
+/// What the source says of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Given {
+    /// It is taken as this type.
+    Cast(Type),
+    Literal {
+        kind: Kind,
+        what: What,
+        span: Span,
+    },
+    Table(LabelId),
+}
+
+impl Given {
+    /// A constant where any bits are taken, and whether it is an address.
+    pub(crate) fn literal(value: Value, is_address: bool, span: Span) -> Given {
+        let (kind, what) = match value {
+            Value::Int(_) if is_address => (Kind::Int, What::Address),
+            // The pattern of an ordinary number, as `bits(0.5)` gives it, may be either.
+            Value::Int(int) => {
+                let bits = f32::from_bits(int as u32);
+                let kind = if bits.is_subnormal() || bits.is_nan() { Kind::Int } else { Kind::Any };
+                (kind, What::Literal(value))
+            }
+            Value::Real(_) => (Kind::Float, What::Literal(value)),
+        };
+        Given::Literal { kind, what, span }
+    }
+}
+
+/// An operation: the tree that it is written in, its number there, and the expansion.
+type Place = (u32, u32, u32);
+
+/// What the source says of the parts of operations: by tree, operation of the tree, and expansion.
+#[derive(Default)]
+pub(crate) struct GivenTypes(HashMap<Place, SmallVec<[(Part, Given); 1]>>);
+
+impl GivenTypes {
+    pub(crate) fn insert(&mut self, operation: &Operation, part: Part, given: Given) {
+        let (ast, number) = operation.written;
+        let parts = self.0.entry((ast, number, operation.expansion)).or_default();
+        // The same source twice, as a file that is included twice.
+        parts.retain(|(known, _)| *known != part);
+        parts.push((part, given));
+    }
+
+    pub(crate) fn get(&self, operation: &Operation, part: Part) -> Option<Given> {
+        if self.0.is_empty() {
+            return None;
+        }
+        let (ast, number) = operation.written;
+        let parts = self.0.get(&(ast, number, operation.expansion))?;
+        parts.iter().find(|(known, _)| *known == part).map(|(_, given)| *given)
+    }
+}
+
+/// Where a value's type comes from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum What {
+    Literal(Value),
+    /// A label's address.
+    Address,
+    /// An operation's result.
+    Result(&'static str),
+    /// A declaration.
+    Declared,
+    /// A table in data memory.
+    Table,
+}

@@ -1,0 +1,296 @@
+//! The program between names and words: bundles of operations on virtual registers.
+//!
+//! [`resolve`](crate::resolve) makes it, a scheduler may rearrange it, [`place`](crate::emit::place) gives its registers
+//! addresses and `emit` its words. What holds at every stage:
+//!
+//! * a bundle has at least one operation and no two that claim one slot; on a machine with one slot it has exactly one;
+//! * all operations of a bundle read before any writes; bundles execute in the order of [`Ir::bundles`], and
+//!   [`Operation::redirects`] says where that order ends;
+//! * every register that is written is written from one slot only;
+//! * bundles of `once` precede those of `period`; a label stands before the bundle at its position, or at the end.
+//!
+//! Whoever moves bundles must move [`Label::position`]s, [`LoopBound::position`]s and [`Ir::period`] along, and leave alone, as fences, bundles that
+//! hold a raw word ([`Bundle::is_opaque`]). Targets that the source wrote as numbers stay as they are.
+
+pub(crate) mod flow;
+pub(crate) mod given;
+pub(crate) mod runs;
+
+use crate::report::source::Span;
+use smallvec::SmallVec;
+use std::collections::BTreeMap;
+use std::num::NonZeroU32;
+use takt_isa::program::{Location, Space};
+use takt_isa::{Machine, Op, Operand, Row, Type};
+
+/// A register of [`Ir::registers`].
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
+pub struct RegisterId(NonZeroU32);
+
+impl RegisterId {
+    /// The register that always reads as zero: the first of every program.
+    pub const ZERO: RegisterId = RegisterId(NonZeroU32::MIN);
+
+    /// The register of an index. Indices are below 2³² - 1.
+    #[inline]
+    pub const fn new(index: usize) -> RegisterId {
+        match NonZeroU32::new(index as u32 + 1) {
+            Some(id) => RegisterId(id),
+            None => RegisterId::ZERO,
+        }
+    }
+
+    /// Its index in [`Ir::registers`].
+    #[inline]
+    pub const fn index(self) -> usize {
+        self.0.get() as usize - 1
+    }
+}
+
+/// A label of [`Ir::labels`].
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
+pub struct LabelId(pub u32);
+
+/// What a register is for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum RegisterKind {
+    /// Declared by `.reg`, or named by its place alone.
+    Plain,
+    /// Declared by `.state`: its value outlives the period.
+    State,
+    /// An input port: written from outside, at the tick.
+    Input,
+    /// An output port.
+    Output,
+    /// Holds these bits from the start; nothing writes it.
+    Constant(u32),
+    /// Always reads as zero.
+    Zero,
+}
+
+/// A register.
+#[derive(Clone, Debug)]
+pub struct Register {
+    /// Its name; empty for a constant's and for one that the source names by its place alone.
+    pub name: String,
+    /// What it is for.
+    pub kind: RegisterKind,
+    /// How its bits are shown.
+    pub ty: Type,
+    /// The address that the source gives it.
+    pub pinned: Option<u16>,
+    /// What the loader writes there, if the source says so. A constant's bits stand in its kind.
+    pub preset: Option<u32>,
+    /// Where it is declared, or for a constant first used.
+    pub span: Span,
+}
+
+/// What an operation carries beyond registers.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Constant {
+    /// Nothing.
+    None,
+    /// An immediate, an offset, or a bundle address that the source gives as a number.
+    Value(u32),
+    /// The address of a code label.
+    Code(LabelId),
+    /// A word given bit by bit: its index in [`Ir::raw`]. What it reads and writes is not known.
+    Raw(u32),
+}
+
+/// An operation.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Operation {
+    /// The instruction; `nop` where the word is given bit by bit.
+    pub op: Op,
+    /// The slot that executes it; `None` if any can, as a `nop`.
+    pub slot: Option<u8>,
+    /// The register that it writes.
+    pub dest: Option<RegisterId>,
+    /// The registers that it reads: as many as the instruction's shape has sources, the rest zero.
+    pub sources: [RegisterId; 3],
+    /// Immediate, target or offset.
+    pub constant: Constant,
+    /// The source line that it is attributed to.
+    pub location: Option<Location>,
+    /// Its place in the source.
+    pub span: Span,
+    /// Which use of a macro, or turn of a repetition, made it; 0 if it stands in the source as it is.
+    pub expansion: u32,
+    /// Whether the assembler made it, for what stands at its place in the source.
+    pub made: bool,
+    /// Its place in the order of the source: the index of its bundle before any was moved.
+    pub order: u32,
+    /// Where it is written: the tree, and the operation of the tree. For messages that point at an operand.
+    pub(crate) written: (u32, u32),
+}
+
+impl Operation {
+    /// The instruction's row.
+    #[inline]
+    pub fn row(&self) -> &'static Row {
+        self.op.row()
+    }
+
+    /// The registers that it reads.
+    #[inline]
+    pub fn reads(&self) -> &[RegisterId] {
+        &self.sources[..self.row().shape.sources()]
+    }
+
+    /// The bundle that it may continue at: by its label, or else by number.
+    pub(crate) fn target(&self) -> Option<Result<LabelId, u32>> {
+        let has_target = self.row().shape.operands().contains(&Operand::Target);
+        match self.constant {
+            Constant::Code(label) if has_target => Some(Ok(label)),
+            Constant::Value(number) if has_target => Some(Err(number)),
+            _ => None,
+        }
+    }
+
+    /// The bundle that it may continue at, if the source gives it as a number.
+    pub(crate) fn target_number(&self) -> Option<u32> {
+        self.target()?.err()
+    }
+
+    /// One that does nothing, in its place.
+    pub(crate) fn idle(&self) -> Operation {
+        Operation {
+            op: Op::nop,
+            slot: None,
+            dest: None,
+            sources: [RegisterId::ZERO; 3],
+            constant: Constant::None,
+            location: None,
+            expansion: 0,
+            ..*self
+        }
+    }
+
+    /// Whether execution may continue elsewhere than at the next bundle.
+    #[inline]
+    pub fn redirects(&self) -> bool {
+        self.row().effect.redirects()
+    }
+}
+
+/// Operations that issue together.
+#[derive(Clone, Debug)]
+pub struct Bundle {
+    /// The operations, in the order of the source.
+    pub operations: SmallVec<[Operation; 1]>,
+    /// Whether the source wrote it with `||`.
+    pub explicit: bool,
+    /// Whether the scheduler may move it.
+    pub scheduled: bool,
+}
+
+impl Bundle {
+    /// Whether it holds a word given bit by bit, so that what it does is not known.
+    pub fn is_opaque(&self) -> bool {
+        self.operations.iter().any(|operation| matches!(operation.constant, Constant::Raw(_)))
+    }
+}
+
+/// A label.
+#[derive(Clone, Debug)]
+pub struct Label {
+    /// Its name; one that is local to a macro's use has the macro's name and the use's number before it.
+    pub name: String,
+    /// Which memory it points into.
+    pub space: Space,
+    /// Index of the bundle that it stands before, or word of data memory.
+    pub position: u32,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// How often a loop may turn.
+#[derive(Clone, Copy, Debug)]
+pub struct LoopBound {
+    /// Index of the bundle that heads the loop.
+    pub position: u32,
+    /// Turns at most.
+    pub most: u32,
+}
+
+/// What the source demands of the time at which ports are read or written.
+#[derive(Clone, Debug)]
+pub struct Demand {
+    /// What it demands.
+    pub kind: DemandKind,
+    /// The ports, in the order of the directive, and where they stand in it.
+    pub ports: Vec<(RegisterId, Span)>,
+    /// Whether it is about `.period`, else about `.once`.
+    pub period: bool,
+    /// The directive.
+    pub span: Span,
+}
+
+/// What a [`Demand`] demands.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum DemandKind {
+    /// Each output is written for the last time in this cycle or before; the section's first bundle issues in cycle 1.
+    Deadline(u32),
+    /// Whatever is read from or written to a port comes before what is read from or written to the next.
+    Order,
+    /// The inputs are read as late as a schedule allows that is at most so many cycles longer than the shortest found.
+    Late(u32),
+}
+
+/// A value of a name that has a register of its own ([`values`](crate::homes::values)).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Version {
+    /// The register that the source names.
+    pub(crate) name: RegisterId,
+    /// The value's own.
+    pub(crate) register: RegisterId,
+    /// The order of the operation that writes it: operations behind that one read it.
+    pub(crate) after: u32,
+    /// The order of the last operations that may read it: where the name is next written.
+    pub(crate) through: u32,
+}
+
+/// A program before registers have addresses.
+#[derive(Clone, Debug)]
+pub struct Ir {
+    /// The machine that it is for.
+    pub machine: &'static Machine,
+    /// The registers; the first is `zero`. Those that nothing uses get no address.
+    pub registers: Vec<Register>,
+    /// The bundles: those of `once`, then those of `period`.
+    pub bundles: Vec<Bundle>,
+    /// Index of the first bundle of `period`.
+    pub period: u32,
+    /// The labels, in the order of the source.
+    pub labels: Vec<Label>,
+    /// Bounds of loops, by ascending position.
+    pub loop_bounds: Vec<LoopBound>,
+    /// What is demanded of ports, in the order of the source.
+    pub demands: Vec<Demand>,
+    /// Whether inputs are taken together at the tick, outputs published together at `wait`.
+    pub latched: bool,
+    /// Outputs whose number the source gives, by number: `@ 3`, or that of the register it names.
+    pub numbers: BTreeMap<u16, RegisterId>,
+    /// Data memory.
+    pub data: Vec<u32>,
+    /// Words given bit by bit.
+    pub raw: Vec<u64>,
+    /// Source files that [`Operation::location`] names.
+    pub files: Vec<String>,
+    /// Values with registers of their own, by [`Version::after`] for each name.
+    pub(crate) versions: Vec<Version>,
+}
+
+impl Ir {
+    /// A register.
+    #[inline]
+    pub fn register(&self, id: RegisterId) -> &Register {
+        &self.registers[id.index()]
+    }
+
+    /// Every operation, in order.
+    pub fn operations(&self) -> impl Iterator<Item = &Operation> {
+        self.bundles.iter().flat_map(|bundle| &bundle.operations)
+    }
+}

@@ -1,0 +1,59 @@
+//! The straight runs of a program: control enters one at its first bundle only, and leaves it after its last only.
+
+use crate::ir::{Ir, Operation};
+use takt_isa::Effect;
+use takt_isa::program::Space;
+
+/// A straight run of bundles: control enters at the first only, and leaves after the last only.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Run {
+    /// Index of its first bundle.
+    pub(crate) start: usize,
+    /// Index of the bundle after its last.
+    pub(crate) end: usize,
+    /// Whether the scheduler may move its bundles.
+    pub(crate) scheduled: bool,
+}
+
+/// Cuts the program into runs: at labels, at heads of loops and at bundles that are jumped to by number, at the period's start,
+/// after redirections, around what must not move.
+pub(crate) fn runs(ir: &Ir) -> Vec<Run> {
+    let count = ir.bundles.len();
+    let mut cut = vec![false; count + 1];
+    cut[(ir.period as usize).min(count)] = true;
+    for label in ir.labels.iter().filter(|label| label.space == Space::Code) {
+        if let Some(cut) = cut.get_mut(label.position as usize) {
+            *cut = true;
+        }
+    }
+    for bound in &ir.loop_bounds {
+        cut[bound.position as usize] = true;
+    }
+    for address in ir.operations().filter_map(Operation::target_number) {
+        if let Some(cut) = cut.get_mut(address as usize) {
+            *cut = true;
+        }
+    }
+    for (i, bundle) in ir.bundles.iter().enumerate() {
+        // The status register sees every operation before and none after: a wall.
+        let flags =
+            |operation: &Operation| matches!(operation.row().effect, Effect::ReadFlags | Effect::ClearFlags);
+        let is_wall = bundle.is_opaque() || bundle.operations.iter().any(flags);
+        cut[i] |= is_wall || (i > 0 && ir.bundles[i - 1].scheduled != bundle.scheduled);
+        cut[i + 1] |= is_wall || bundle.operations.iter().any(Operation::redirects);
+    }
+    let mut runs = Vec::new();
+    let mut start = 0;
+    for (end, cut) in cut.into_iter().enumerate().skip(1) {
+        if cut || end == count {
+            runs.push(Run { start, end, scheduled: ir.bundles[start].scheduled });
+            start = end;
+        }
+    }
+    runs
+}
+
+/// Whether a target is a number: then every bundle must stay at its address.
+pub(crate) fn jumps_to_numbers(ir: &Ir) -> bool {
+    ir.operations().any(|operation| operation.target_number().is_some())
+}

@@ -1,0 +1,246 @@
+//! A program to source text that assembles to the same program, bit for bit.
+//!
+//! Everything has its place given (`@`), every operation its line (`.loc`). A word that the assembler would not put where
+//! it stands, because it is no instruction or stands in the wrong slot, is written bit by bit (`.raw`).
+
+use std::collections::HashMap;
+use std::fmt::Write as _;
+use takt_isa::program::{Location, Port, Space};
+use takt_isa::spec::instructions::Function;
+use takt_isa::{Effect, Instruction, Op, Program, Type, ZERO};
+
+/// The source text of a program.
+///
+/// For every program that [`image::read`](crate::output::image::read) accepts, and every one that the assembler makes, assembling
+/// the text for the same machine gives the program again.
+pub fn disassemble(program: &Program) -> String {
+    let mut writer = Writer::new(program);
+    writer.declarations();
+    writer.code();
+    writer.data();
+    writer.text
+}
+
+/// What the source says of where a bundle's operations come from.
+#[derive(Clone, PartialEq, Eq)]
+enum Loc {
+    /// All from one place.
+    One(Option<Location>),
+    /// Each from its own.
+    Each(Vec<Option<Location>>),
+}
+
+struct Writer<'p> {
+    program: &'p Program,
+    text: String,
+    /// Names of registers, by address.
+    registers: HashMap<u16, &'p str>,
+    /// The first label of each bundle.
+    targets: HashMap<u32, &'p str>,
+    filler: u64,
+}
+
+impl<'p> Writer<'p> {
+    fn new(program: &'p Program) -> Writer<'p> {
+        let ports = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
+        let mut targets = HashMap::new();
+        for symbol in program.symbols.iter().filter(|symbol| symbol.space == Space::Code) {
+            targets.entry(symbol.address).or_insert(symbol.name.as_str());
+        }
+        Writer {
+            program,
+            text: format!("; For machine {}.\n", program.machine.name),
+            registers: ports.map(|port| (port.register, port.name.as_str())).collect(),
+            targets,
+            filler: Instruction::NOP.encode().unwrap_or(0),
+        }
+    }
+
+    /// A line of text; a `String` takes all.
+    fn line(&mut self, line: std::fmt::Arguments<'_>) {
+        let _ = self.text.write_fmt(line);
+        self.text.push('\n');
+    }
+
+    fn place(&self, register: u16) -> String {
+        self.program.machine.register_name(register).unwrap_or_default()
+    }
+
+    fn declarations(&mut self) {
+        let Program { inputs, outputs, registers, constants, files, latched, .. } = self.program;
+        if *latched {
+            self.line(format_args!(".ports  latched"));
+        }
+        for (directive, ports) in [(".input", inputs), (".output", outputs), (".reg", registers)] {
+            for Port { name, register, ty } in ports {
+                let ty = match ty {
+                    Type::F => "",
+                    Type::I => ":int",
+                    Type::B => ":bits",
+                };
+                let place = self.place(*register);
+                self.line(format_args!("{directive:<8}{name}{ty} @ {place}"));
+            }
+        }
+        for (register, bits) in constants {
+            let place = self.place(*register);
+            let value = f32::from_bits(*bits);
+            self.line(format_args!(".preset @{place} = 0x{bits:08x}  ; {value:?}"));
+        }
+        // The order in which `.loc` first names the files is theirs in the program.
+        for file in files {
+            self.line(format_args!(".loc {} 1", quoted(file)));
+        }
+    }
+
+    fn code(&mut self) {
+        let program = self.program;
+        let slots = program.machine.slots.len();
+        let mut labels = program.symbols.iter().filter(|symbol| symbol.space == Space::Code).peekable();
+        let mut loc = None;
+        for address in 0..program.bundles() {
+            if let Some(section) = program.sections.iter().find(|section| section.start == address) {
+                self.line(format_args!("\n.{}", section.name));
+            }
+            while let Some(label) = labels.next_if(|label| label.address <= address) {
+                self.line(format_args!("{}:", label.name));
+            }
+            if let Some(bound) = program.loop_bounds.iter().find(|bound| bound.address == address) {
+                self.line(format_args!("        .loop_bound {}", bound.most));
+            }
+            let words = address as usize * slots..(address as usize + 1) * slots;
+            let (text, places) = self.bundle(&program.code[words.clone()], &program.lines[words]);
+            let wanted = match places.as_slice() {
+                [first, rest @ ..] if rest.iter().all(|place| place == first) => Loc::One(*first),
+                _ => Loc::Each(places),
+            };
+            if loc.as_ref() != Some(&wanted) {
+                let text = self.loc(&wanted);
+                self.line(format_args!("        .loc {text}"));
+                loc = Some(wanted);
+            }
+            self.line(format_args!("        {text}"));
+        }
+        for label in labels {
+            self.line(format_args!("{}:", label.name));
+        }
+    }
+
+    fn loc(&self, loc: &Loc) -> String {
+        let place = |place: &Option<Location>| match place {
+            Some(Location { file, line }) => {
+                format!(
+                    "{} {line}",
+                    quoted(self.program.files.get(*file as usize).map_or("", String::as_str))
+                )
+            }
+            None => "none".to_owned(),
+        };
+        match loc {
+            Loc::One(one) => place(one),
+            Loc::Each(each) => each.iter().map(place).collect::<Vec<_>>().join(" || "),
+        }
+    }
+
+    /// A bundle's text, and where its operations come from.
+    fn bundle(&self, words: &[u64], lines: &[Option<Location>]) -> (String, Vec<Option<Location>>) {
+        let is_filler = |slot: usize| words[slot] == self.filler && lines[slot].is_none();
+        let mut present: Vec<usize> = (0..words.len()).filter(|slot| !is_filler(*slot)).collect();
+        if present.is_empty() {
+            present.push(0);
+        }
+        let mut texts: Vec<String> = Vec::with_capacity(present.len());
+        let mut idle = Vec::new();
+        for &slot in &present {
+            texts.push(self.operation(words[slot], slot).unwrap_or_else(|| {
+                if words[slot] == self.filler {
+                    idle.push((texts.len(), slot));
+                }
+                self.raw(words[slot], slot)
+            }));
+        }
+        // A `nop` takes the first slot that is free: where that is the right one for each, they are written as such.
+        let free = (0..words.len())
+            .filter(|slot| !present.contains(slot) || idle.iter().any(|(_, nop)| nop == slot));
+        if free.zip(&idle).all(|(free, (_, slot))| free == *slot) {
+            for (index, _) in &idle {
+                texts[*index] = Op::nop.row().mnemonic.to_owned();
+            }
+        }
+        (texts.join(" || "), present.iter().map(|slot| lines[*slot]).collect())
+    }
+
+    fn raw(&self, word: u64, slot: usize) -> String {
+        format!(".raw {} 0x{word:012x}", self.program.machine.slots[slot].name)
+    }
+
+    /// The text of a word, if the assembler would put that text's word into this slot.
+    fn operation(&self, word: u64, slot: usize) -> Option<String> {
+        let machine = self.program.machine;
+        let instruction = Instruction::decode(word).ok()?;
+        instruction.place(machine, slot).ok()?;
+        let function = instruction.op.row().function;
+        if function == Function::Idle || machine.host(function)?.0 != slot {
+            return None;
+        }
+        let is_access = matches!(instruction.effect(), Effect::Load | Effect::Store);
+        if is_access && instruction.sources[0] == ZERO && instruction.constant >= machine.data_depth {
+            return None;
+        }
+        let register = |address: u16| match self.registers.get(&address) {
+            Some(name) => (*name).to_owned(),
+            None if address == ZERO => self.place(address),
+            None => format!("@{}", self.place(address)),
+        };
+        let target = |address: u32| match self.targets.get(&address) {
+            Some(name) => (*name).to_owned(),
+            None => address.to_string(),
+        };
+        Some(instruction.text_with(machine, slot, register, target))
+    }
+
+    fn data(&mut self) {
+        const WORDS: usize = 8;
+        let program = self.program;
+        let mut labels = program.symbols.iter().filter(|symbol| symbol.space == Space::Data).peekable();
+        if program.data.is_empty() && labels.peek().is_none() {
+            return;
+        }
+        self.line(format_args!("\n.data"));
+        let mut at = 0;
+        while at < program.data.len() {
+            while let Some(label) = labels.next_if(|label| label.address as usize <= at) {
+                self.line(format_args!("{}:", label.name));
+            }
+            let end = labels.peek().map_or(program.data.len(), |label| label.address as usize);
+            let rest = &program.data[at..end.min(program.data.len())];
+            let zeros = rest.iter().take_while(|word| **word == 0).count();
+            if zeros >= WORDS {
+                self.line(format_args!("        .space {zeros}"));
+                at += zeros;
+                continue;
+            }
+            let words: Vec<String> = rest.iter().take(WORDS).map(|word| format!("0x{word:08x}")).collect();
+            self.line(format_args!("        .word {}", words.join(", ")));
+            at += words.len();
+        }
+        for label in labels {
+            self.line(format_args!("{}:", label.name));
+        }
+    }
+}
+
+/// A text between quotes.
+fn quoted(text: &str) -> String {
+    let mut quoted = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' | '\\' => quoted.extend(['\\', c]),
+            '\n' => quoted.push_str("\\n"),
+            '\r' => quoted.push_str("\\r"),
+            c => quoted.push(c),
+        }
+    }
+    quoted.push('"');
+    quoted
+}

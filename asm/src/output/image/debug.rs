@@ -1,0 +1,190 @@
+//! What only a debugger reads of an image, as JSON: sources, constants, what names stand for.
+
+use super::ImageError;
+use super::meta::MetaType;
+use super::validate::{FILE_NAME, in_bank, is_spelled};
+use crate::output::names::{DebugInfo, NamedValue, Names, Position, Scope};
+use crate::syntax::expr::Value;
+use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
+use takt_isa::{Program, ZERO};
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Debug {
+    sources: Vec<Source>,
+    constants: Vec<Constant>,
+    positions: Vec<Option<(u32, u32)>>,
+    scopes: Vec<Use>,
+    values: Vec<Named>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Source {
+    name: String,
+    text: String,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Constant {
+    name: String,
+    value: Number,
+}
+
+/// A real number as text: JSON has neither infinities nor NaN.
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+enum Number {
+    Int(i64),
+    Real(String),
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Use {
+    name: String,
+    parameters: Vec<(String, String)>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Named {
+    name: String,
+    label: String,
+    register: u16,
+    #[serde(rename = "type")]
+    ty: MetaType,
+    orders: Option<(u32, u32)>,
+    bundles: Option<(u32, u32)>,
+}
+
+pub(super) fn to_json(info: &DebugInfo) -> serde_json::Result<Vec<u8>> {
+    let DebugInfo { sources, constants, names } = info;
+    let source = |(name, text): &(String, String)| Source { name: name.clone(), text: text.clone() };
+    let constant = |(name, value): &(String, Value)| Constant {
+        name: name.clone(),
+        value: match *value {
+            Value::Int(value) => Number::Int(value),
+            Value::Real(value) => Number::Real(format!("{value:?}")),
+        },
+    };
+    let scope = |scope: &Scope| Use { name: scope.name.clone(), parameters: scope.parameters.clone() };
+    let value = |value: &NamedValue| Named {
+        name: value.name.clone(),
+        label: value.label.clone(),
+        register: value.register,
+        ty: value.ty.into(),
+        orders: value.orders,
+        bundles: value.bundles,
+    };
+    let debug = Debug {
+        sources: sources.iter().map(source).collect(),
+        constants: constants.iter().map(constant).collect(),
+        positions: names.positions.iter().map(|at| at.map(|at| (at.order, at.scope))).collect(),
+        scopes: names.scopes.iter().map(scope).collect(),
+        values: names.values.iter().map(value).collect(),
+    };
+    serde_json::to_vec(&debug)
+}
+
+pub(super) fn from_json(bytes: &[u8], program: &Program) -> Result<DebugInfo, ImageError> {
+    let debug: Debug = serde_json::from_slice(bytes).map_err(|error| ImageError::Debug(error.to_string()))?;
+    let name = |name: String| {
+        if is_spelled(&name, FILE_NAME) { Ok(name) } else { Err(ImageError::Name(name)) }
+    };
+    let mut seen = HashSet::new();
+    for Source { name, .. } in &debug.sources {
+        if name.is_empty() || name.len() > FILE_NAME {
+            return Err(ImageError::Name(name.chars().take(80).collect()));
+        }
+        if !seen.insert(name.as_str()) {
+            return Err(ImageError::RepeatedName(name.clone()));
+        }
+    }
+    let constant = |constant: Constant| {
+        let value = match constant.value {
+            Number::Int(value) => Value::Int(value),
+            Number::Real(text) => {
+                let wrong = || ImageError::Debug(format!("`{text}` is no number"));
+                Value::Real(text.parse().map_err(|_| wrong())?)
+            }
+        };
+        Ok((name(constant.name)?, value))
+    };
+    let names = Names {
+        positions: debug
+            .positions
+            .iter()
+            .map(|position| position.map(|(order, scope)| Position { order, scope }))
+            .collect(),
+        scopes: debug.scopes.into_iter().map(|Use { name, parameters }| Scope { name, parameters }).collect(),
+        values: debug
+            .values
+            .into_iter()
+            .map(|Named { name, label, register, ty, orders, bundles }| NamedValue {
+                name,
+                label,
+                register,
+                ty: ty.into(),
+                orders,
+                bundles,
+            })
+            .collect(),
+    };
+    check(&names, program)?;
+    Ok(DebugInfo {
+        sources: debug.sources.into_iter().map(|Source { name, text }| (name, text)).collect(),
+        constants: debug.constants.into_iter().map(constant).collect::<Result<_, _>>()?,
+        names,
+    })
+}
+
+fn check(names: &Names, program: &Program) -> Result<(), ImageError> {
+    let wrong = |message: String| Err(ImageError::Debug(message));
+    let spelled = |name: &str| match is_spelled(name, FILE_NAME) {
+        true => Ok(()),
+        false => Err(ImageError::Name(name.chars().take(80).collect())),
+    };
+    let Names { positions, scopes, values } = names;
+    let bundles = program.bundles();
+    if !positions.is_empty() && positions.len() != program.code.len() {
+        return wrong(format!("{} positions for {} words", positions.len(), program.code.len()));
+    }
+    if let Some(position) =
+        positions.iter().flatten().find(|position| position.scope as usize >= scopes.len())
+    {
+        return wrong(format!("there is no scope {}", position.scope));
+    }
+    for (number, scope) in scopes.iter().enumerate() {
+        if number == 0 {
+            if *scope != Scope::default() {
+                return wrong("the first scope is that outside of macros: it has no name".to_owned());
+            }
+            continue;
+        }
+        spelled(&scope.name)?;
+        for (parameter, register) in &scope.parameters {
+            spelled(parameter)?;
+            spelled(register)?;
+        }
+    }
+    for NamedValue { name, label, register, orders, bundles: lives, .. } in values {
+        spelled(name)?;
+        spelled(label)?;
+        let machine = program.machine;
+        if !in_bank(machine, *register) || machine.is_input(*register) || *register == ZERO {
+            let reason = "it does not lie where such registers lie";
+            let what = format!("value `{label}`");
+            return Err(ImageError::Register { what, address: (*register).into(), reason });
+        }
+        if let Some((after, through)) = orders.filter(|(after, through)| after > through) {
+            return wrong(format!("`{label}` is read from {after} to {through}"));
+        }
+        if let Some((first, last)) = lives.filter(|(first, last)| first > last || *last >= bundles) {
+            return wrong(format!("`{label}` lives in bundles {first} to {last}, and there are {bundles}"));
+        }
+    }
+    Ok(())
+}

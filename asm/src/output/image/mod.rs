@@ -1,0 +1,438 @@
+//! A program as a file, and back: an ELF container that `readelf` and debuggers' readers know their way in.
+//!
+//! `docs/image.md` describes the format for who writes another reader. Writing is deterministic: equal programs give equal
+//! bytes. Reading trusts nothing: each defect is an [`ImageError`] of its own, nothing panics, and what is allocated is
+//! bounded by the size of the file. A program that was read is one that the assembler could have made, but that any word
+//! may stand in its code: the machine faults on those that are no instructions.
+
+mod debug;
+mod meta;
+mod validate;
+
+use crate::limits;
+use crate::output::names::DebugInfo;
+use meta::Meta;
+use object::elf;
+use object::read::elf::{FileHeader as _, SectionHeader as _, Sym as _};
+use object::write::elf as write;
+use object::{Endianness, LittleEndian as LE};
+use takt_isa::encode::WORD_MASK;
+use takt_isa::program::{LoopBound, Space, Symbol};
+use takt_isa::{Machine, Program};
+
+/// The largest file that is read.
+pub const LIMIT: usize = limits::IMAGE_BYTES;
+/// `e_flags` of an image: `TAK` and the version of the container.
+pub const FLAGS: u32 = u32::from_be_bytes(*b"TAK\x01");
+/// The version of the metadata.
+pub const VERSION: u32 = 1;
+
+const CODE: &str = ".takt.code";
+const DATA: &str = ".takt.data";
+const CONSTANTS: &str = ".takt.constants";
+const META: &str = ".takt.meta";
+/// There only if a loop has a bound.
+const LOOPS: &str = ".takt.loops";
+/// There unless the image is stripped: what only a debugger reads.
+const DEBUG: &str = ".takt.debug";
+
+/// Why a file is not an image that can be loaded.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum ImageError {
+    /// It does not begin like an ELF file.
+    #[error("this is not an image: it does not begin like an ELF file")]
+    NotElf,
+    /// It is larger than [`LIMIT`].
+    #[error("an image of {bytes} bytes: the largest has {LIMIT}")]
+    TooLarge {
+        /// Its size.
+        bytes: usize,
+    },
+    /// It is cut short, or its structure points outside of itself.
+    #[error("the image is truncated or damaged: {0}")]
+    Damaged(String),
+    /// It is an ELF file of another kind.
+    #[error("this ELF file is for another machine: it is no Takt image")]
+    NotTakt,
+    /// The container or the metadata is of another version.
+    #[error("the image has format version {found}, and this program reads version {VERSION}")]
+    Version {
+        /// Its version.
+        found: u32,
+    },
+    /// A section is missing.
+    #[error("the image has no section `{0}`")]
+    MissingSection(&'static str),
+    /// A section stands there twice.
+    #[error("the image has two sections `{0}`")]
+    RepeatedSection(&'static str),
+    /// A section's size is not a whole number of its elements.
+    #[error("section `{section}` has {bytes} bytes: not a multiple of {element}")]
+    SectionSize {
+        /// The section.
+        section: &'static str,
+        /// Its size.
+        bytes: usize,
+        /// The size of one element.
+        element: usize,
+    },
+    /// The metadata is not what it should be.
+    #[error("the image's metadata cannot be read: {0}")]
+    Meta(String),
+    /// No machine has the name.
+    #[error("the image is for machine `{0}`, which is not known here")]
+    UnknownMachine(String),
+    /// The code is not a whole number of bundles.
+    #[error("{words} words of code: not a multiple of the {slots} slots of {machine}")]
+    WordCount {
+        /// Its words.
+        words: usize,
+        /// The machine's slots.
+        slots: usize,
+        /// The machine.
+        machine: &'static str,
+    },
+    /// A word has more than 48 bits.
+    #[error("word {index} of the code, 0x{word:x}, has more than 48 bits")]
+    WordBits {
+        /// Its index.
+        index: usize,
+        /// The word.
+        word: u64,
+    },
+    /// A memory is too small for it.
+    #[error("{found} {what}, and {machine} holds {limit}")]
+    MemorySize {
+        /// What there is too much of.
+        what: &'static str,
+        /// How much there is.
+        found: usize,
+        /// How much there can be.
+        limit: u32,
+        /// The machine.
+        machine: &'static str,
+    },
+    /// A register address is in no bank, or in one where this register cannot be.
+    #[error("{what} at register address {address}: {reason}")]
+    Register {
+        /// What lies there.
+        what: String,
+        /// The address.
+        address: u32,
+        /// Why it cannot.
+        reason: &'static str,
+    },
+    /// A name is not one that a source could have.
+    #[error("`{0}` is not a name")]
+    Name(String),
+    /// Two things have one name.
+    #[error("two things are named `{0}`")]
+    RepeatedName(String),
+    /// A label points outside of its memory, or labels are not in order.
+    #[error("label `{name}` at {address}: {reason}")]
+    Label {
+        /// Its name.
+        name: String,
+        /// Where it points.
+        address: u32,
+        /// What is wrong.
+        reason: &'static str,
+    },
+    /// The sections of the program are not `once` and then `period`, over all bundles.
+    #[error("the program's sections do not cover its {bundles} bundles as `once` and then `period`")]
+    Sections {
+        /// Bundles of the program.
+        bundles: u32,
+    },
+    /// A bound of a loop is of no bundle, is 0, or is out of order.
+    #[error("the bound of the loop at bundle {address}: {reason}")]
+    Loop {
+        /// The bundle.
+        address: u32,
+        /// What is wrong.
+        reason: &'static str,
+    },
+    /// The format cannot hold it.
+    #[error("an image cannot hold this program: {0}")]
+    Unwritable(String),
+    /// What is there for a debugger does not fit the program.
+    #[error("the image's section `{DEBUG}` cannot be used: {0}")]
+    Debug(String),
+    /// The source lines do not fit the code.
+    #[error("the source lines do not fit the code: {0}")]
+    Lines(String),
+}
+
+/// Whether a file begins like an image (or another ELF file) rather than like a source.
+pub fn is_image(bytes: &[u8]) -> bool {
+    bytes.starts_with(&elf::ELFMAG)
+}
+
+/// A text as ELF's string tables can hold it.
+fn clean(name: &str) -> String {
+    name.replace('\0', "")
+}
+
+/// The image of a program, without what only a debugger reads.
+///
+/// # Errors
+/// As [`write_with`].
+pub fn write(program: &Program) -> Result<Vec<u8>, ImageError> {
+    write_with(program, None)
+}
+
+/// The image of a program with what a debugger knows of it beyond the program.
+///
+/// # Errors
+/// If an image cannot hold it: its sizes go beyond 32 bits, or beyond what [`read`] takes.
+pub fn write_with(program: &Program, debug: Option<&DebugInfo>) -> Result<Vec<u8>, ImageError> {
+    within(program, debug, LIMIT)
+}
+
+/// The image of a program, if it has at most so many bytes.
+fn within(program: &Program, debug: Option<&DebugInfo>, most: usize) -> Result<Vec<u8>, ImageError> {
+    let unwritable = |error: String| ImageError::Unwritable(error);
+    let meta = Meta::of(program).to_json().map_err(|error| unwritable(error.to_string()))?;
+    let debug = debug.map(debug::to_json).transpose().map_err(|error| unwritable(error.to_string()))?;
+    let mut bytes = Vec::new();
+    let names: Vec<String> = program.symbols.iter().map(|symbol| clean(&symbol.name)).collect();
+    write_elf(program, (&meta, debug.as_deref()), &names, &mut bytes)
+        .map_err(|error| unwritable(error.to_string()))?;
+    if bytes.len() > most {
+        return Err(ImageError::TooLarge { bytes: bytes.len() });
+    }
+    Ok(bytes)
+}
+
+fn write_elf(
+    program: &Program,
+    (meta, debug): (&[u8], Option<&[u8]>),
+    names: &[String],
+    bytes: &mut Vec<u8>,
+) -> Result<(), object::write::Error> {
+    let code: Vec<u8> = program.code.iter().flat_map(|word| word.to_le_bytes()).collect();
+    let data: Vec<u8> = program.data.iter().flat_map(|word| word.to_le_bytes()).collect();
+    let pair = |(first, second): (u32, u32)| {
+        let [a, b, c, d] = first.to_le_bytes();
+        let [e, f, g, h] = second.to_le_bytes();
+        [a, b, c, d, e, f, g, h]
+    };
+    let constants = program.constants.iter().map(|&(register, bits)| (register.into(), bits));
+    let constants: Vec<u8> = constants.flat_map(pair).collect();
+    let loops = program.loop_bounds.iter().map(|bound| (bound.address, bound.most));
+    let loops: Vec<u8> = loops.flat_map(pair).collect();
+    // First everything is given its place, then everything is written there, in the same order.
+    let mut writer = write::Writer::new(Endianness::Little, false, bytes);
+    writer.reserve_file_header();
+    let mut contents = vec![
+        (CODE, &code[..], 8, elf::SHF_ALLOC | elf::SHF_EXECINSTR),
+        (DATA, &data[..], 4, elf::SHF_ALLOC | elf::SHF_WRITE),
+        (CONSTANTS, &constants[..], 4, elf::SHF_ALLOC),
+        (META, meta, 1, elf::SectionFlags(0)),
+    ];
+    if !loops.is_empty() {
+        contents.push((LOOPS, &loops[..], 4, elf::SectionFlags(0)));
+    }
+    if let Some(debug) = debug {
+        contents.push((DEBUG, debug, 1, elf::SectionFlags(0)));
+    }
+    writer.reserve_null_section_index();
+    let mut place = |(name, content, align, flags): (&'static str, _, _, _)| {
+        let content: &[u8] = content;
+        let index = writer.reserve_section_index();
+        let id = writer.add_section_name(name.as_bytes());
+        let offset = writer.reserve(content.len() as u64, align);
+        (index, id, offset, content, align, flags)
+    };
+    let sections: Vec<_> = contents.into_iter().map(&mut place).collect();
+    writer.reserve_null_symbol_index();
+    let labels: Vec<_> = names
+        .iter()
+        .map(|name| {
+            writer.reserve_symbol_index(None);
+            writer.add_string(name.as_bytes())
+        })
+        .collect();
+    writer.reserve_symtab_section_index();
+    writer.reserve_symtab();
+    writer.reserve_strtab_section_index();
+    writer.reserve_strtab()?;
+    writer.reserve_shstrtab_section_index();
+    writer.reserve_shstrtab()?;
+    writer.reserve_section_headers();
+
+    writer.write_file_header(&write::FileHeader {
+        os_abi: elf::ELFOSABI_NONE,
+        abi_version: 0,
+        e_type: elf::ET_EXEC,
+        e_machine: elf::EM_NONE,
+        e_entry: 0,
+        e_flags: elf::FileFlags(FLAGS),
+    })?;
+    for (_, _, _, content, align, _) in &sections {
+        writer.write_align(*align);
+        writer.write(content);
+    }
+    writer.write_null_symbol();
+    for (symbol, name) in program.symbols.iter().zip(labels) {
+        let (section, kind) = match symbol.space {
+            Space::Code => (sections[0].0, elf::STT_FUNC),
+            Space::Data => (sections[1].0, elf::STT_OBJECT),
+        };
+        let symbol = write::Sym {
+            st_name: writer.string_offset(Some(name)),
+            section: Some(section.0),
+            st_info: elf::SymbolInfo::new(elf::STB_GLOBAL, kind),
+            st_other: elf::SymbolOther::default(),
+            st_shndx: elf::SHN_UNDEF,
+            st_value: symbol.address.into(),
+            st_size: 0,
+        };
+        writer.write_symbol(&symbol);
+    }
+    writer.write_strtab();
+    writer.write_shstrtab();
+    writer.write_null_section_header();
+    for (_, id, offset, content, align, flags) in sections {
+        let sh_name = writer.section_name_offset(Some(id));
+        writer.write_section_header(&write::SectionHeader {
+            sh_name,
+            sh_type: elf::SHT_PROGBITS,
+            sh_flags: flags,
+            sh_offset: offset,
+            sh_size: content.len() as u64,
+            sh_addralign: align,
+            ..Default::default()
+        });
+    }
+    // All symbols are global but the first, the null symbol.
+    writer.write_symtab_section_header(1);
+    writer.write_strtab_section_header();
+    writer.write_shstrtab_section_header();
+    Ok(())
+}
+
+/// The program of an image.
+///
+/// # Errors
+/// The first defect that is found.
+pub fn read(bytes: &[u8]) -> Result<Program, ImageError> {
+    Ok(read_with(bytes)?.0)
+}
+
+/// The program of an image, and what it has for a debugger unless it is stripped.
+///
+/// # Errors
+/// The first defect that is found.
+pub fn read_with(bytes: &[u8]) -> Result<(Program, Option<DebugInfo>), ImageError> {
+    if !is_image(bytes) {
+        return Err(ImageError::NotElf);
+    }
+    if bytes.len() > LIMIT {
+        return Err(ImageError::TooLarge { bytes: bytes.len() });
+    }
+    let damaged = |error: object::read::Error| ImageError::Damaged(error.to_string());
+    let ident = |index: usize| bytes.get(index).copied();
+    if bytes.len() >= 16 && (ident(4), ident(5)) != (Some(1), Some(1)) {
+        return Err(ImageError::NotTakt);
+    }
+    let header = elf::FileHeader32::<LE>::parse(bytes).map_err(damaged)?;
+    let flags = header.e_flags(LE).0;
+    if header.e_machine(LE) != elf::EM_NONE || flags >> 8 != FLAGS >> 8 {
+        return Err(ImageError::NotTakt);
+    }
+    if flags != FLAGS {
+        return Err(ImageError::Version { found: flags & 0xff });
+    }
+    let sections = header.sections(LE, bytes).map_err(damaged)?;
+    let optional = |name: &'static str| -> Result<Option<(usize, &[u8])>, ImageError> {
+        let mut found = None;
+        for (index, header) in sections.iter().enumerate() {
+            if sections.section_name(LE, header).map_err(damaged)? != name.as_bytes() {
+                continue;
+            }
+            if found.is_some() {
+                return Err(ImageError::RepeatedSection(name));
+            }
+            if header.sh_type(LE) != elf::SHT_PROGBITS {
+                return Err(ImageError::Damaged(format!("section `{name}` has no contents")));
+            }
+            found = Some((index, header.data(LE, bytes).map_err(damaged)?));
+        }
+        Ok(found)
+    };
+    let section = |name| optional(name)?.ok_or(ImageError::MissingSection(name));
+    let elements = |name: &'static str, content: &[u8], element: usize| match content.len() % element {
+        0 => Ok(()),
+        _ => Err(ImageError::SectionSize { section: name, bytes: content.len(), element }),
+    };
+    let meta = Meta::from_json(section(META)?.1)?;
+    let machine =
+        Machine::from_name(&meta.machine).ok_or_else(|| ImageError::UnknownMachine(meta.machine.clone()))?;
+    let (code_index, code) = section(CODE)?;
+    elements(CODE, code, 8)?;
+    let (data_index, data) = section(DATA)?;
+    elements(DATA, data, 4)?;
+    let (_, constants) = section(CONSTANTS)?;
+    elements(CONSTANTS, constants, 8)?;
+    let loops = optional(LOOPS)?.map_or(&[][..], |(_, loops)| loops);
+    elements(LOOPS, loops, 8)?;
+    let words = |content: &[u8]| -> Vec<u32> {
+        content.as_chunks::<4>().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect()
+    };
+    let code: Vec<u64> = code.as_chunks::<8>().0.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect();
+    if let Some((index, word)) = code.iter().enumerate().find(|(_, word)| **word > WORD_MASK) {
+        return Err(ImageError::WordBits { index, word: *word });
+    }
+    let constants = validate::constants(&words(constants), machine)?;
+    let symbols = {
+        let table = sections.symbols(LE, bytes, elf::SHT_SYMTAB).map_err(damaged)?;
+        let mut symbols = Vec::new();
+        // The first is the null symbol.
+        for symbol in table.iter().skip(1) {
+            let name = symbol.name(LE, table.strings()).map_err(damaged)?;
+            let name = std::str::from_utf8(name)
+                .map_err(|_| ImageError::Name(String::from_utf8_lossy(name).into_owned()))?
+                .to_owned();
+            let address = symbol.st_value(LE);
+            let space = match symbol.st_shndx(LE).0 as usize {
+                index if index == code_index => Space::Code,
+                index if index == data_index => Space::Data,
+                _ => {
+                    return Err(ImageError::Label {
+                        name,
+                        address,
+                        reason: "it is in neither code nor data",
+                    });
+                }
+            };
+            symbols.push(Symbol { name, space, address });
+        }
+        symbols
+    };
+    let mut program = meta.into_program(machine, code, words(data), constants, symbols)?;
+    let bound = |&[address, most]: &[u32; 2]| LoopBound { address, most };
+    program.loop_bounds = words(loops).as_chunks::<2>().0.iter().map(bound).collect();
+    validate::program(&program)?;
+    let debug = optional(DEBUG)?;
+    let debug = debug.map(|(_, debug)| debug::from_json(debug, &program)).transpose()?;
+    Ok((program, debug))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_image_that_could_not_be_read_is_not_written() {
+        let program = crate::assemble(
+            "a.s",
+            &crate::MemoryLoader::of("a.s", "here: jmp here\n"),
+            &crate::Options::default(),
+        );
+        let program = program.expect("it is right").program;
+        let bytes = write(&program).expect("it is small").len();
+        assert!(within(&program, None, bytes).is_ok());
+        assert_eq!(within(&program, None, bytes - 1), Err(ImageError::TooLarge { bytes }));
+    }
+}

@@ -1,0 +1,333 @@
+//! What a program became: the listing, the symbol map, and its memories as `$readmemh` files.
+
+use crate::Assembled;
+use crate::report::source::Lines;
+use crate::syntax::expr::Value;
+use serde::Serialize;
+use std::collections::HashMap;
+use std::fmt::Write as _;
+use takt_isa::program::{Location, Port, Space};
+use takt_isa::{Instruction, Program, Type};
+
+/// The listing of an assembled program: for each bundle its address, its words in the order of the slots, and the source
+/// lines that they come from. An operation that a macro, a repetition or the assembler made is shown as what it became, behind a `+`.
+pub fn listing(assembled: &Assembled) -> String {
+    let mut lister = Lister::new(assembled);
+    lister.code();
+    lister.data();
+    lister.constants();
+    lister.text
+}
+
+struct Lister<'a> {
+    program: &'a Program,
+    assembled: &'a Assembled,
+    /// For each file of the program its text and lines, if it is among the sources.
+    files: Vec<Option<(&'a str, Lines)>>,
+    filler: u64,
+    text: String,
+}
+
+impl<'a> Lister<'a> {
+    fn new(assembled: &'a Assembled) -> Lister<'a> {
+        let program = &assembled.program;
+        let source = |name: &String| {
+            let file = assembled.sources.files().iter().find(|file| *file.name == **name)?;
+            Some((&*file.text, Lines::of(&file.text)))
+        };
+        let files = program.files.iter().map(source).collect();
+        let filler = Instruction::NOP.encode().unwrap_or(0);
+        Lister { program, assembled, files, filler, text: String::new() }
+    }
+
+    /// A line of text; a `String` takes all.
+    fn line(&mut self, line: std::fmt::Arguments<'_>) {
+        let start = self.text.len();
+        let _ = self.text.write_fmt(line);
+        self.text.truncate(start + self.text[start..].trim_end().len());
+        self.text.push('\n');
+    }
+
+    fn code(&mut self) {
+        let program = self.program;
+        let slots = program.machine.slots;
+        let heads: String = slots.iter().map(|slot| format!("{:<14}", slot.name)).collect();
+        self.line(format_args!(
+            "; {} bundles of {} for {}, {} words of data, {} constants",
+            program.bundles(),
+            slots.len(),
+            program.machine.name,
+            program.data.len(),
+            program.constants.len()
+        ));
+        self.line(format_args!("; addr  {heads}line            source"));
+        let mut labels = program.symbols.iter().filter(|symbol| symbol.space == Space::Code).peekable();
+        for address in 0..program.bundles() {
+            if let Some(section) = program.sections.iter().find(|section| section.start == address) {
+                self.line(format_args!("\n.{}", section.name));
+            }
+            let first = address as usize * slots.len();
+            let range = first..first + slots.len();
+            let mut words = String::new();
+            for (word, line) in program.code[range.clone()].iter().zip(&program.lines[range]) {
+                // What fills a slot is left blank.
+                let blank = *word == self.filler && line.is_none();
+                let _ = write!(words, "{:<14}", if blank { "-".to_owned() } else { format!("{word:012x}") });
+            }
+            let mut rows = self.rows(first).into_iter();
+            let head = rows.next().unwrap_or_default();
+            while let Some(label) = labels.next_if(|label| label.address <= address) {
+                // Not where the source line shows it already.
+                if !head.1.starts_with(&format!("{}:", label.name)) {
+                    self.line(format_args!("{}:", label.name));
+                }
+            }
+            self.line(format_args!("  {address:04x}  {words}{:<15} {}", head.0, head.1));
+            let indent = 8 + words.len();
+            for (place, text) in rows {
+                self.line(format_args!("{:indent$}{place:<15} {text}", ""));
+            }
+        }
+        for label in labels {
+            self.line(format_args!("{}:", label.name));
+        }
+    }
+
+    /// The source lines of a bundle, whose words begin at `first`: place and text.
+    fn rows(&self, first: usize) -> Vec<(String, String)> {
+        let program = self.program;
+        let mut rows: Vec<(String, String)> = Vec::new();
+        let slots = program.machine.slots.len();
+        for slot in 0..slots {
+            let index = first + slot;
+            let row = match program.lines[index] {
+                None if program.code[index] == self.filler => continue,
+                None => (String::new(), self.operation(index, slot)),
+                Some(location) => {
+                    let expanded = self.assembled.expanded.binary_search(&(index as u32)).is_ok();
+                    let place = program.place_text(location);
+                    match self.source(location) {
+                        // Of a bundle that issues one after another each operation is shown by itself.
+                        Some(text) if !(expanded || slots == 1 && text.contains("||")) => (place, text),
+                        _ => (place + "+", self.operation(index, slot)),
+                    }
+                }
+            };
+            // A line with several operations is shown once.
+            if !rows.contains(&row) {
+                rows.push(row);
+            }
+        }
+        rows
+    }
+
+    fn source(&self, location: Location) -> Option<String> {
+        let (text, lines) = self.files.get(location.file as usize)?.as_ref()?;
+        // Tabs would lose the alignment; a listing is no place for a line of a megabyte.
+        let line = lines.text(text, location.line)?.trim().replace('\t', " ");
+        Some(line.chars().take(160).collect())
+    }
+
+    /// An operation as what it became.
+    fn operation(&self, index: usize, slot: usize) -> String {
+        let program = self.program;
+        let word = program.code[index];
+        match Instruction::decode(word) {
+            Ok(instruction) => {
+                let target = |address: u32| match program.nearest_label(address) {
+                    Some((label, 0)) => label.to_owned(),
+                    _ => address.to_string(),
+                };
+                instruction.text_with(program.machine, slot, |register| self.register(register), target)
+            }
+            Err(_) => format!(".raw 0x{word:012x}"),
+        }
+    }
+
+    /// The source's name of a register, or the value of the constant that it holds.
+    fn register(&self, register: u16) -> String {
+        let constants = &self.program.constants;
+        let named = self.program.registers.iter().any(|port| port.register == register);
+        match constants.binary_search_by_key(&register, |constant| constant.0) {
+            Ok(index) if !named => shown(constants[index].1),
+            _ => self.program.register_text(register),
+        }
+    }
+
+    fn data(&mut self) {
+        let program = self.program;
+        let mut labels = program.symbols.iter().filter(|symbol| symbol.space == Space::Data).peekable();
+        if program.data.is_empty() && labels.peek().is_none() {
+            return;
+        }
+        self.line(format_args!("\n.data"));
+        for (address, word) in program.data.iter().enumerate() {
+            while let Some(label) = labels.next_if(|label| label.address as usize <= address) {
+                self.line(format_args!("{}:", label.name));
+            }
+            self.line(format_args!("  {address:04x}  {word:08x}      {}", shown(*word)));
+        }
+        for label in labels {
+            self.line(format_args!("{}:", label.name));
+        }
+    }
+
+    fn constants(&mut self) {
+        let program = self.program;
+        if program.constants.is_empty() {
+            return;
+        }
+        self.line(format_args!("\n; registers that the loader sets"));
+        for (register, bits) in &program.constants {
+            let name = program.machine.register_name(*register).unwrap_or_default();
+            self.line(format_args!("  {name:<6}{bits:08x}      {}", shown(*bits)));
+        }
+    }
+}
+
+/// Bits as a number: as an integer if that is small, else as binary32.
+pub(crate) fn shown(bits: u32) -> String {
+    match bits as i32 {
+        small @ -0xffff..=0xffff => small.to_string(),
+        _ => format!("{:?}", f32::from_bits(bits)),
+    }
+}
+
+/// The names of a program and what they stand for.
+#[derive(Clone, Debug, Serialize)]
+pub struct SymbolMap {
+    /// Labels, by address.
+    pub labels: Vec<Label>,
+    /// Input ports.
+    pub inputs: Vec<Register>,
+    /// Output ports.
+    pub outputs: Vec<Register>,
+    /// Named registers.
+    pub registers: Vec<Register>,
+    /// Named constants.
+    pub constants: Vec<Constant>,
+}
+
+/// A label of the [`SymbolMap`].
+#[derive(Clone, Debug, Serialize)]
+pub struct Label {
+    /// Its name.
+    pub name: String,
+    /// Which memory it points into.
+    pub space: Space,
+    /// Bundle or word of data.
+    pub address: u32,
+}
+
+/// A named register of the [`SymbolMap`].
+#[derive(Clone, Debug, Serialize)]
+pub struct Register {
+    /// Its name in the source.
+    pub name: String,
+    /// Its canonical name.
+    pub place: String,
+    /// Its address.
+    pub address: u16,
+    /// Of a port: its number.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub number: Option<u16>,
+    /// How its bits are shown.
+    #[serde(rename = "type")]
+    pub ty: Type,
+}
+
+/// A named constant of the [`SymbolMap`].
+#[derive(Clone, Debug, Serialize)]
+pub struct Constant {
+    /// Its name.
+    pub name: String,
+    /// Its value.
+    pub value: Value,
+}
+
+/// The symbol map of an assembled program.
+pub fn symbol_map(assembled: &Assembled) -> SymbolMap {
+    let Program { machine, symbols, inputs, outputs, registers, .. } = &assembled.program;
+    let label = |symbol: &takt_isa::program::Symbol| Label {
+        name: symbol.name.clone(),
+        space: symbol.space,
+        address: symbol.address,
+    };
+    let list = |ports: &[Port]| {
+        let register = |port: &Port| Register {
+            name: port.name.clone(),
+            place: machine.register_name(port.register).unwrap_or_default(),
+            address: port.register,
+            number: machine.input_number(port.register).or_else(|| machine.output_number(port.register)),
+            ty: port.ty,
+        };
+        ports.iter().map(register).collect()
+    };
+    let constant = |(name, value): &(String, Value)| Constant { name: name.clone(), value: *value };
+    SymbolMap {
+        labels: symbols.iter().map(label).collect(),
+        inputs: list(inputs),
+        outputs: list(outputs),
+        registers: list(registers),
+        constants: assembled.constants.iter().map(constant).collect(),
+    }
+}
+
+impl std::fmt::Display for SymbolMap {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let names = self.labels.iter().map(|label| label.name.len());
+        let ports = self.inputs.iter().chain(&self.outputs).chain(&self.registers);
+        let names = names.chain(ports.map(|register| register.name.len()));
+        let width =
+            names.chain(self.constants.iter().map(|constant| constant.name.len())).max().unwrap_or(0) + 2;
+        for label in &self.labels {
+            let space = if label.space == Space::Code { "code" } else { "data" };
+            writeln!(f, "label     {:<width$}{space} {:04x}", label.name, label.address)?;
+        }
+        for (what, list) in
+            [("input", &self.inputs), ("output", &self.outputs), ("register", &self.registers)]
+        {
+            for register in list {
+                let ty = match register.ty {
+                    Type::F => "float",
+                    Type::I => "int",
+                    Type::B => "bits",
+                };
+                let what = register.number.map_or(what.to_owned(), |number| format!("{what} {number}"));
+                writeln!(f, "{what:<10}{:<width$}{:<5} {ty}", register.name, register.place)?;
+            }
+        }
+        for constant in &self.constants {
+            write!(f, "constant  {:<width$}", constant.name)?;
+            match constant.value {
+                Value::Int(value) => writeln!(f, "{value}")?,
+                Value::Real(value) => writeln!(f, "{value:?}")?,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The program's memories in the format that Verilog's `$readmemh` reads, as file names and contents: `code_SLOT.hex` for
+/// each slot, `data.hex`, and `constants_BANK.hex` for each bank, whose addresses count from the bank's first register.
+pub fn readmemh(program: &Program) -> Vec<(String, String)> {
+    let slots = program.machine.slots;
+    let mut files = Vec::new();
+    for (index, slot) in slots.iter().enumerate() {
+        let words = program.code.iter().skip(index).step_by(slots.len());
+        files.push((format!("code_{}.hex", slot.name), words.map(|word| format!("{word:012x}\n")).collect()));
+    }
+    files.push(("data.hex".to_owned(), program.data.iter().map(|word| format!("{word:08x}\n")).collect()));
+    let mut by_bank: HashMap<u16, String> = HashMap::new();
+    for (register, bits) in &program.constants {
+        if let Some(bank) = program.machine.banks().find(|bank| bank.contains(*register)) {
+            let text = by_bank.entry(bank.base).or_default();
+            let _ = writeln!(text, "@{:03x} {bits:08x}", register - bank.base);
+        }
+    }
+    for bank in program.machine.banks() {
+        let contents = by_bank.remove(&bank.base).unwrap_or_default();
+        files.push((format!("constants_{}.hex", bank.name), contents));
+    }
+    files
+}

@@ -1,0 +1,176 @@
+//! What the names of a source stand for, for who looks at a running program: the assembler may give the values that one name
+//! takes registers of their own, the scheduler moves what computes them, and a macro's names are other ones in each use.
+//!
+//! The order of the source is what says which value a name means: a line reads what the line before it in the source wrote,
+//! wherever the two ended up. So each word has the [`Position`] of its line, and each value the stretch of that order in which
+//! its name means it.
+
+use crate::context::{Context, ScopeId};
+use crate::emit::Emitted;
+use crate::emit::place::Placement;
+use crate::ir::{Ir, RegisterId};
+use crate::syntax::expr::Value;
+use std::collections::{BTreeMap, HashMap, HashSet};
+use takt_isa::Type;
+use takt_isa::timing::Address;
+
+/// What a debugger knows of a program beyond what the machine loads: an image carries it, unless it is stripped.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DebugInfo {
+    /// Sources: the names that the program has for them, and their texts.
+    pub sources: Vec<(String, String)>,
+    /// Named constants, in the order of the source.
+    pub constants: Vec<(String, Value)>,
+    /// What names stand for.
+    pub names: Names,
+}
+
+/// What names stand for.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Names {
+    /// Of each word of the code that has a source line, parallel to it. Empty if nothing is known.
+    pub positions: Vec<Option<Position>>,
+    /// Uses of macros. The first is none: the code outside of macros.
+    pub scopes: Vec<Scope>,
+    /// Names that stand for one register here and another there: all of its values for each.
+    pub values: Vec<NamedValue>,
+}
+
+impl Names {
+    /// The position of the line that a bundle shows: of its first operation that has one, or else of a bundle before.
+    pub fn at_hand(&self, slots: usize, address: Address) -> Position {
+        let end = (address as usize + 1).saturating_mul(slots).min(self.positions.len());
+        let bundles = self.positions[..end].rchunks(slots.max(1));
+        bundles.flat_map(|words| words.iter().flatten()).next().copied().unwrap_or_default()
+    }
+}
+
+/// Where a line stands in the source written out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Position {
+    /// Its place in the order of the source, macros and repetitions written out.
+    pub order: u32,
+    /// The use of a macro that it is of: an index into [`Names::scopes`].
+    pub scope: u32,
+}
+
+/// A use of a macro.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Scope {
+    /// What stands before the names declared in it, with a point between: the macro and which of its uses, `limit.2`.
+    pub name: String,
+    /// Its parameters that stand for registers, and the names of those.
+    pub parameters: Vec<(String, String)>,
+}
+
+/// A value of a name, and where it lives.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NamedValue {
+    /// The name in the source.
+    pub name: String,
+    /// The value's own name: `t.1`, or that of the source for the last one of a straight run, which later runs may read.
+    pub label: String,
+    /// Its register.
+    pub register: u16,
+    /// How its bits are read.
+    pub ty: Type,
+    /// The name means it for lines with an order above the first and up to the second. `None`: for all lines for which it means
+    /// no other value.
+    pub orders: Option<(u32, u32)>,
+    /// The first bundle that writes it and the last one that uses it, if it lives only there: its register may have other
+    /// values elsewhere.
+    pub bundles: Option<(Address, Address)>,
+}
+
+/// What the names of a program stand for.
+pub(crate) fn names(context: &Context, ir: &Ir, placement: &Placement, emitted: &Emitted) -> Names {
+    let (positions, scopes) = positions(context, ir, emitted);
+    Names { positions, scopes, values: values(ir, placement, emitted) }
+}
+
+fn positions(context: &Context, ir: &Ir, emitted: &Emitted) -> (Vec<Option<Position>>, Vec<Scope>) {
+    let mut parameters: BTreeMap<u32, Vec<(String, String)>> = BTreeMap::new();
+    for (&(scope, name), register) in &context.declared.parameters {
+        let register = &ir.register(*register).name;
+        if !register.is_empty() {
+            let names = (context.scopes.text(name).to_owned(), register.clone());
+            parameters.entry(scope.0).or_default().push(names);
+        }
+    }
+    let mut scopes = vec![Scope::default()];
+    let mut numbers: HashMap<u32, u32> = HashMap::new();
+    let mut position = |(order, expansion): (u32, u32)| {
+        let owner = context.scopes.scope(ScopeId(expansion)).owner;
+        let scope = match context.scopes.scope_name(owner) {
+            None => 0,
+            Some(name) => *numbers.entry(owner.0).or_insert_with(|| {
+                let mut parameters = parameters.remove(&owner.0).unwrap_or_default();
+                parameters.sort_unstable();
+                scopes.push(Scope { name, parameters });
+                scopes.len() as u32 - 1
+            }),
+        };
+        Position { order, scope }
+    };
+    let positions = emitted.origins.iter().map(|origin| origin.map(&mut position)).collect();
+    (positions, scopes)
+}
+
+fn values(ir: &Ir, placement: &Placement, emitted: &Emitted) -> Vec<NamedValue> {
+    // By the register that the source names: the values with registers of their own.
+    type Values = Vec<(RegisterId, Option<(u32, u32)>)>;
+    let mut split: BTreeMap<RegisterId, Values> = BTreeMap::new();
+    for version in &ir.versions {
+        split
+            .entry(version.name)
+            .or_default()
+            .push((version.register, Some((version.after, version.through))));
+    }
+    let made: HashSet<RegisterId> = ir.versions.iter().map(|version| version.register).collect();
+    let shared = (0..ir.registers.len()).filter(|index| placement.shared[*index]).map(RegisterId::new);
+    for id in shared.filter(|id| !made.contains(id)) {
+        split.entry(id).or_default();
+    }
+    let ranges = ranges(ir);
+    let own_names: HashMap<u16, &str> =
+        emitted.program.registers.iter().map(|port| (port.register, port.name.as_str())).collect();
+    let mut values = Vec::new();
+    for (original, mut versions) in split {
+        versions.push((original, None));
+        let name = &ir.register(original).name;
+        for (id, orders) in versions {
+            let Some(register) = placement.addresses[id.index()] else { continue };
+            let shared = placement.shared[id.index()];
+            let own = own_names.get(&register).filter(|_| !shared);
+            let label = own.map_or_else(|| ir.register(id).name.clone(), |own| (*own).to_owned());
+            let lives = orders.is_some() || shared;
+            values.push(NamedValue {
+                name: name.clone(),
+                label,
+                register,
+                ty: ir.register(id).ty,
+                orders,
+                bundles: ranges[id.index()].filter(|_| lives),
+            });
+        }
+    }
+    values
+}
+
+/// For each register the first bundle that writes it and the last one that uses it.
+fn ranges(ir: &Ir) -> Vec<Option<(Address, Address)>> {
+    let mut ranges: Vec<Option<(Address, Address)>> = vec![None; ir.registers.len()];
+    for (address, bundle) in (0..).zip(&ir.bundles) {
+        for operation in &bundle.operations {
+            for source in operation.reads() {
+                if let Some((_, last)) = &mut ranges[source.index()] {
+                    *last = address;
+                }
+            }
+        }
+        for dest in bundle.operations.iter().filter_map(|operation| operation.dest) {
+            ranges[dest.index()].get_or_insert((address, address)).1 = address;
+        }
+    }
+    ranges
+}

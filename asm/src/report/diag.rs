@@ -1,0 +1,482 @@
+//! Diagnostics: errors and warnings as plain data, and two ways to show them.
+//!
+//! Nothing here prints. [`Diagnostics::render`] makes the text for a terminal, with or without colour;
+//! [`Diagnostics::messages`] makes plain data for serde.
+
+use crate::limits;
+use crate::report::levels::{Level, Levels, WARNINGS};
+use crate::report::source::{Lines, Sources, Span};
+use codespan_reporting::diagnostic as codespan;
+use codespan_reporting::files::{Error, Files};
+use codespan_reporting::term;
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// How bad it is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// The program is assembled all the same.
+    Warning,
+    /// There is no program.
+    Error,
+}
+
+/// A place in the source and what is there.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Label {
+    /// The place.
+    pub span: Span,
+    /// What is there; may be empty.
+    pub message: String,
+}
+
+/// One error or warning.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Diagnostic {
+    /// How bad it is.
+    pub severity: Severity,
+    /// The kind of mistake, in a word or two: stable, for tools.
+    pub code: &'static str,
+    /// What is wrong.
+    pub message: String,
+    /// Where: the first is the place of the mistake, others explain it. Empty if it has no place in a source.
+    pub labels: Vec<Label>,
+    /// Explanations.
+    pub notes: Vec<String>,
+    /// What to do about it, as a sentence.
+    pub help: Option<String>,
+    /// What to write in the place of the mistake.
+    pub replacement: Option<String>,
+}
+
+impl Diagnostic {
+    /// An error at a place.
+    pub fn error(code: &'static str, span: Span, message: impl Into<String>) -> Diagnostic {
+        Diagnostic {
+            severity: Severity::Error,
+            code,
+            message: message.into(),
+            labels: vec![Label { span, message: String::new() }],
+            notes: Vec::new(),
+            help: None,
+            replacement: None,
+        }
+    }
+
+    /// A warning at a place.
+    ///
+    /// `code` is one of [`WARNINGS`].
+    pub fn warning(code: &'static str, span: Span, message: impl Into<String>) -> Diagnostic {
+        Diagnostic { severity: Severity::Warning, ..Diagnostic::error(code, span, message) }
+    }
+
+    /// An error without a place.
+    pub fn placeless(code: &'static str, message: impl Into<String>) -> Diagnostic {
+        let mut diagnostic = Diagnostic::error(code, Span::default(), message);
+        diagnostic.labels.clear();
+        diagnostic
+    }
+
+    /// Says what is at the place of the mistake.
+    pub fn here(mut self, message: impl Into<String>) -> Diagnostic {
+        if let Some(label) = self.labels.first_mut() {
+            label.message = message.into();
+        }
+        self
+    }
+
+    /// Points at another place.
+    pub fn also(mut self, span: Span, message: impl Into<String>) -> Diagnostic {
+        self.labels.push(Label { span, message: message.into() });
+        self
+    }
+
+    /// Adds an explanation.
+    pub fn note(mut self, note: impl Into<String>) -> Diagnostic {
+        self.notes.push(note.into());
+        self
+    }
+
+    /// Says what to do.
+    pub fn help(mut self, help: impl Into<String>) -> Diagnostic {
+        self.help = Some(help.into());
+        self
+    }
+
+    /// Offers a name in the place of a misspelt one, if there is one like it.
+    pub fn did_you_mean(mut self, name: Option<String>) -> Diagnostic {
+        if let Some(name) = name {
+            self.help = Some(format!("did you mean `{name}`?"));
+            self.replacement = Some(name);
+        }
+        self
+    }
+
+    fn span(&self) -> Span {
+        self.labels.first().map_or(Span::default(), |label| label.span)
+    }
+}
+
+/// Where diagnostics gather during assembly: bounded, and each mistake of the source once however often it is expanded.
+#[derive(Default)]
+pub struct Sink {
+    kept: Vec<Diagnostic>,
+    seen: HashSet<(&'static str, Span)>,
+    /// Errors met, those not kept included.
+    pub errors: usize,
+    /// Warnings met, those not kept included.
+    pub warnings: usize,
+    /// What becomes of warnings. One that is an error becomes it in the end, so that it hides no other.
+    pub levels: Levels,
+    /// Of the warnings those that are errors.
+    denied: usize,
+}
+
+impl Sink {
+    /// Whether a further diagnostic of this severity would be kept: if not, its text need not be made.
+    pub fn keeps(&self, severity: Severity) -> bool {
+        match severity {
+            Severity::Error => self.errors < limits::SHOWN,
+            Severity::Warning => self.warnings < limits::SHOWN,
+        }
+    }
+
+    /// Adds a diagnostic, made only if it is kept.
+    pub fn add(
+        &mut self,
+        severity: Severity,
+        code: &'static str,
+        span: Span,
+        make: impl FnOnce() -> Diagnostic,
+    ) {
+        // The set is bounded like the list: beyond, repetitions are counted as mistakes of their own.
+        if self.seen.contains(&(code, span)) {
+            return;
+        }
+        if severity == Severity::Warning {
+            debug_assert!(WARNINGS.iter().any(|warning| warning.0 == code), "{code} is in the table");
+            match self.levels.of(code) {
+                Level::Allow => return,
+                Level::Warn => {}
+                Level::Error => self.denied += 1,
+            }
+        }
+        if self.keeps(severity) {
+            self.seen.insert((code, span));
+            self.kept.push(make());
+        }
+        match severity {
+            Severity::Error => self.errors += 1,
+            Severity::Warning => self.warnings += 1,
+        }
+    }
+
+    /// Adds a diagnostic.
+    pub fn push(&mut self, diagnostic: Diagnostic) {
+        self.add(diagnostic.severity, diagnostic.code, diagnostic.span(), || diagnostic);
+    }
+
+    /// The report, in the order of the sources.
+    pub fn finish(mut self, sources: Arc<Sources>) -> Diagnostics {
+        self.kept.sort_by_key(Diagnostic::span);
+        for diagnostic in &mut self.kept {
+            if diagnostic.severity == Severity::Warning && self.levels.of(diagnostic.code) == Level::Error {
+                diagnostic.severity = Severity::Error;
+            }
+        }
+        let shown = |severity| self.kept.iter().filter(|d| d.severity == severity).count();
+        let more_errors = self.errors + self.denied - shown(Severity::Error);
+        let more_warnings = self.warnings - self.denied - shown(Severity::Warning);
+        Diagnostics { sources, list: self.kept, more_errors, more_warnings }
+    }
+}
+
+/// The errors and warnings of a program, in the order of its sources.
+#[derive(Clone, Debug, Default)]
+pub struct Diagnostics {
+    /// The sources that they point into.
+    pub sources: Arc<Sources>,
+    /// Those that were kept: at most [`limits::SHOWN`] of each severity.
+    pub list: Vec<Diagnostic>,
+    /// Errors beyond those.
+    pub more_errors: usize,
+    /// Warnings beyond those.
+    pub more_warnings: usize,
+}
+
+/// A diagnostic as plain data. Lines and columns count from 1; columns count characters.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Message {
+    /// Error or warning.
+    pub severity: Severity,
+    /// The kind of mistake.
+    pub code: &'static str,
+    /// What is wrong.
+    pub message: String,
+    /// Where, and what is there: the place of the mistake first.
+    pub places: Vec<Place>,
+    /// Explanations.
+    pub notes: Vec<String>,
+    /// What to do about it.
+    pub help: Option<String>,
+    /// What to write in the place of the mistake.
+    pub replacement: Option<String>,
+}
+
+/// A range of a source file. Lines and columns count from 1; columns count characters.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Place {
+    /// The file's path within the project.
+    pub file: String,
+    /// Line of the first character.
+    pub line: usize,
+    /// Column of the first character.
+    pub column: usize,
+    /// Line of the character after the last.
+    pub end_line: usize,
+    /// Column of the character after the last.
+    pub end_column: usize,
+    /// What is there.
+    pub message: String,
+}
+
+impl Diagnostics {
+    /// Whether one of them is an error.
+    pub fn has_errors(&self) -> bool {
+        self.more_errors > 0 || self.list.iter().any(|d| d.severity == Severity::Error)
+    }
+
+    /// Whether there is none at all.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty() && self.more_errors + self.more_warnings == 0
+    }
+
+    /// The text for a terminal: for each its message, file, line, column, the line of source and a caret.
+    pub fn render(&self, colour: bool) -> String {
+        let mut view = View::new(&self.sources);
+        let config = term::Config { tab_width: 8, ..term::Config::default() };
+        let mut out = Vec::new();
+        for diagnostic in &self.list {
+            let shown = view.focus(diagnostic);
+            // The view answers for every place that `focus` returns, and a vector takes all.
+            let _ = if colour {
+                let mut writer = term::termcolor::Ansi::new(&mut out);
+                let styles = term::Styles::default();
+                let mut writer = term::StylesWriter::new(&mut writer, &styles);
+                term::emit_to_write_style(&mut writer, &config, &view, &shown)
+            } else {
+                term::emit_to_io_write(&mut out, &config, &view, &shown)
+            };
+        }
+        let mut text = String::from_utf8_lossy(&out).into_owned();
+        for (count, what) in [(self.more_errors, "error"), (self.more_warnings, "warning")] {
+            if count > 0 {
+                text.push_str(&format!("… and {count} more {what}{}\n", if count == 1 { "" } else { "s" }));
+            }
+        }
+        text
+    }
+
+    /// Plain data, for serde.
+    pub fn messages(&self) -> Vec<Message> {
+        let mut view = View::new(&self.sources);
+        let mut place = |label: &Label| {
+            let file = view.file_of(label.span);
+            let start = view.line_column(file, label.span.start);
+            let end = view.line_column(file, label.span.end);
+            Place {
+                file: self.sources.files().get(file).map_or_else(String::new, |f| f.name.to_string()),
+                line: start.0,
+                column: start.1,
+                end_line: end.0,
+                end_column: end.1,
+                message: label.message.clone(),
+            }
+        };
+        let message = |d: &Diagnostic| Message {
+            severity: d.severity,
+            code: d.code,
+            message: d.message.clone(),
+            places: d.labels.iter().map(&mut place).collect(),
+            notes: d.notes.clone(),
+            help: d.help.clone(),
+            replacement: d.replacement.clone(),
+        };
+        self.list.iter().map(message).collect()
+    }
+
+    /// The messages as a JSON array.
+    pub fn to_json(&self) -> String {
+        // Strings and numbers only: nothing that JSON cannot hold.
+        serde_json::to_string_pretty(&self.messages()).unwrap_or_default()
+    }
+}
+
+/// The sources as codespan-reporting reads them. Of a long line it sees only the part around the diagnostic at hand, or
+/// else one error in a line of a megabyte would be a megabyte of text.
+struct View<'s> {
+    sources: &'s Sources,
+    lines: HashMap<usize, Lines>,
+    /// File, line index and visible bytes, where a line is cut.
+    windows: Vec<(usize, usize, Range<usize>)>,
+}
+
+impl<'s> View<'s> {
+    fn new(sources: &'s Sources) -> View<'s> {
+        View { sources, lines: HashMap::new(), windows: Vec::new() }
+    }
+
+    /// Readies the view for a diagnostic, and returns it with places that lie in what is seen.
+    fn focus(&mut self, diagnostic: &Diagnostic) -> codespan::Diagnostic<usize> {
+        self.windows.clear();
+        let severity = match diagnostic.severity {
+            Severity::Warning => codespan::Severity::Warning,
+            Severity::Error => codespan::Severity::Error,
+        };
+        let mut shown =
+            codespan::Diagnostic::new(severity).with_code(diagnostic.code).with_message(&diagnostic.message);
+        for (i, label) in diagnostic.labels.iter().enumerate() {
+            let file = self.file_of(label.span);
+            let Some(range) = self.window(file, label.span) else { continue };
+            let style = if i == 0 { codespan::LabelStyle::Primary } else { codespan::LabelStyle::Secondary };
+            shown.labels.push(codespan::Label::new(style, file, range).with_message(&label.message));
+        }
+        shown.notes.extend(diagnostic.notes.iter().map(|note| format!("note: {note}")));
+        shown.notes.extend(diagnostic.help.iter().map(|help| format!("help: {help}")));
+        shown
+    }
+
+    /// Opens a window on the span's line if that is long; the part of the span that is then seen, as bytes of its file.
+    fn window(&mut self, file: usize, span: Span) -> Option<Range<usize>> {
+        let source = self.sources.files().get(file)?;
+        let clamp = |offset: u32| ((offset - source.base) as usize).min(source.text.len());
+        let (start, mut end) = (clamp(span.start), clamp(span.end));
+        let index = self.lines(file)?.index(start as u32);
+        let line = self.lines(file)?.range(index)?;
+        // Diagnostics point within a line; a bundle that continues on further lines is shown by its first.
+        end = end.min(line.end).max(start);
+        if line.len() <= limits::QUOTED_BYTES {
+            return Some(start..end);
+        }
+        let seen = match self.windows.iter().find(|(f, l, _)| (*f, *l) == (file, index)) {
+            Some((_, _, seen)) => seen.clone(),
+            None => {
+                let from = start.saturating_sub(limits::QUOTED_BYTES / 2).max(line.start);
+                let to = (from + limits::QUOTED_BYTES).min(line.end);
+                let seen = boundary(&source.text, from)..boundary(&source.text, to);
+                self.windows.push((file, index, seen.clone()));
+                seen
+            }
+        };
+        let start = start.clamp(seen.start, seen.end);
+        Some(start..end.clamp(start, seen.end))
+    }
+
+    fn file_of(&self, span: Span) -> usize {
+        self.sources.file_of(span.start)
+    }
+
+    fn lines(&mut self, file: usize) -> Option<&Lines> {
+        let source = self.sources.files().get(file)?;
+        Some(self.lines.entry(file).or_insert_with(|| Lines::of(&source.text)))
+    }
+
+    fn line_column(&mut self, file: usize, offset: u32) -> (usize, usize) {
+        let Some(source) = self.sources.files().get(file) else { return (1, 1) };
+        let byte = ((offset - source.base) as usize).min(source.text.len());
+        let Some(lines) = self.lines(file) else { return (1, 1) };
+        let index = lines.index(byte as u32);
+        let start = lines.range(index).map_or(0, |range| range.start);
+        (index + 1, 1 + source.text.get(start..byte).map_or(0, |text| text.chars().count()))
+    }
+}
+
+/// The nearest character boundary at or before a byte.
+fn boundary(text: &str, mut byte: usize) -> usize {
+    while !text.is_char_boundary(byte) {
+        byte -= 1;
+    }
+    byte
+}
+
+impl<'s> Files<'s> for View<'_> {
+    type FileId = usize;
+    type Name = &'s str;
+    type Source = &'s str;
+
+    fn name(&'s self, id: usize) -> Result<&'s str, Error> {
+        self.sources.files().get(id).map(|file| &*file.name).ok_or(Error::FileMissing)
+    }
+
+    fn source(&'s self, id: usize) -> Result<&'s str, Error> {
+        self.sources.files().get(id).map(|file| &*file.text).ok_or(Error::FileMissing)
+    }
+
+    fn line_index(&'s self, id: usize, byte: usize) -> Result<usize, Error> {
+        self.lines.get(&id).map(|lines| lines.index(byte as u32)).ok_or(Error::FileMissing)
+    }
+
+    fn column_number(&'s self, id: usize, line: usize, byte: usize) -> Result<usize, Error> {
+        let whole = self.lines.get(&id).and_then(|lines| lines.range(line)).ok_or(Error::FileMissing)?;
+        let text = self.source(id)?;
+        Ok(1 + text.get(whole.start..byte.min(text.len())).map_or(0, |text| text.chars().count()))
+    }
+
+    fn line_range(&'s self, id: usize, line: usize) -> Result<Range<usize>, Error> {
+        if let Some((_, _, seen)) = self.windows.iter().find(|(f, l, _)| (*f, *l) == (id, line)) {
+            return Ok(seen.clone());
+        }
+        self.lines.get(&id).and_then(|lines| lines.range(line)).ok_or(Error::FileMissing)
+    }
+}
+
+/// The candidate most like a misspelt name, if one is near enough to be meant.
+pub fn nearest<'n>(name: &str, candidates: impl IntoIterator<Item = &'n str>) -> Option<String> {
+    let length = name.chars().count();
+    let allowed = match length {
+        0 => return None,
+        // Comparing takes the square of the length, and long names are seldom typed.
+        length if length > limits::COMPARED_CHARACTERS => return None,
+        1..=4 => 1,
+        5..=8 => 2,
+        _ => 3,
+    };
+    let mut best: Option<(usize, &str)> = None;
+    for candidate in candidates {
+        if candidate.len().abs_diff(name.len()) > allowed || candidate == name {
+            continue;
+        }
+        let mut distance = strsim::osa_distance(name, candidate);
+        if candidate.eq_ignore_ascii_case(name) {
+            distance = 0;
+        }
+        // A name of two letters with one wrong shares one letter: it must be the first.
+        let same_start = candidate.chars().next() == name.chars().next();
+        if distance > allowed || (distance > 0 && distance * 2 > length && !same_start) {
+            continue;
+        }
+        if best.is_none_or(|(least, _)| distance < least) {
+            best = Some((distance, candidate));
+        }
+    }
+    best.map(|(_, candidate)| candidate.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nearest_finds_what_is_meant_and_nothing_far_fetched() {
+        let names = ["fadd", "fsub", "qprev", "q", "KP", "period"];
+        let nearest = |name| nearest(name, names);
+        assert_eq!(nearest("fad").as_deref(), Some("fadd"));
+        assert_eq!(nearest("kp").as_deref(), Some("KP"));
+        assert_eq!(nearest("qperv").as_deref(), Some("qprev"));
+        assert_eq!(nearest("perod").as_deref(), Some("period"));
+        assert_eq!(nearest("z"), None);
+        assert_eq!(nearest("completely_different"), None);
+    }
+}

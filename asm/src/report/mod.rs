@@ -1,0 +1,5 @@
+//! What the assembler says: places in sources, diagnostics, and the warnings by name.
+
+pub mod diag;
+pub mod levels;
+pub mod source;

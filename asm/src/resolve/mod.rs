@@ -1,0 +1,444 @@
+//! Names to registers, labels and numbers: the expanded source as [`Ir`].
+
+mod address;
+mod operand;
+pub(crate) mod serialise;
+
+use crate::context::{At, Context, Reported};
+use crate::expand::load::Loader;
+use crate::expand::{self, Data, Flat, Item, Timing};
+use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
+use crate::report::diag::{Diagnostic, nearest};
+use crate::report::source::Span;
+use crate::syntax::ast::*;
+use smallvec::SmallVec;
+use std::collections::{BTreeMap, HashMap};
+use std::rc::Rc;
+use takt_isa::program::Location;
+use takt_isa::spec::instructions::Function;
+use takt_isa::{Op, ROWS, Type};
+
+/// The most cycles that a demand on ports can name: many times what a program memory holds.
+const MAX_CYCLES: u32 = 1 << 24;
+
+/// Resolves the expanded source. What has a mistake is left out; the report says whether there is any.
+pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) -> Ir {
+    let machine = context.machine;
+    let slots = ROWS
+        .iter()
+        .map(|row| match row.function {
+            Function::Idle => Host::Any,
+            function => machine.host(function).map_or(Host::None, |(slot, _)| Host::Slot(slot as u8)),
+        })
+        .collect();
+    let ir = Ir {
+        machine,
+        registers: Vec::new(),
+        bundles: Vec::with_capacity(flat.once.len() + flat.period.len()),
+        period: 0,
+        labels: Vec::new(),
+        loop_bounds: Vec::new(),
+        demands: Vec::new(),
+        latched: flat.ports.is_some_and(|(latched, _)| latched),
+        numbers: BTreeMap::new(),
+        data: Vec::new(),
+        raw: Vec::new(),
+        files: Vec::new(),
+        versions: Vec::new(),
+    };
+    let words = |data: &Data| match data {
+        Data::Space(count) => *count,
+        Data::Value(..) => 1,
+    };
+    let data_words = flat.data.iter().map(words).sum();
+    let (pool, own_files) = (HashMap::new(), Vec::new());
+    let mut resolver =
+        Resolver { context, loader, flat, ir, slots, pool, own_files, label: 0, data_words, cast: None };
+    let once = std::mem::take(&mut resolver.flat.once);
+    resolver.section(Section::Once, &once);
+    resolver.ir.period = resolver.ir.bundles.len() as u32;
+    let period = std::mem::take(&mut resolver.flat.period);
+    resolver.section(Section::Period, &period);
+    resolver.data();
+    resolver.presets();
+    for timing in std::mem::take(&mut resolver.flat.timing) {
+        // What goes wrong is in the report.
+        if let Ok(demand) = resolver.demand(&timing) {
+            resolver.ir.demands.push(demand);
+        }
+    }
+    let Resolver { mut ir, flat, .. } = resolver;
+    context.report_unknown();
+    ir.registers = std::mem::take(&mut context.declared.registers);
+    ir.numbers = std::mem::take(&mut context.declared.numbered);
+    ir.labels = std::mem::take(&mut context.declared.labels);
+    ir.files = flat.files;
+    for (order, bundle) in (0..).zip(&mut ir.bundles) {
+        bundle.operations.iter_mut().for_each(|operation| operation.order = order);
+    }
+    ir
+}
+
+/// Which slot executes an instruction.
+#[derive(Clone, Copy)]
+enum Host {
+    Any,
+    Slot(u8),
+    None,
+}
+
+pub(crate) struct Resolver<'c> {
+    pub(crate) context: &'c mut Context,
+    /// Where further sources are: for what a mistake may have meant.
+    pub(crate) loader: &'c dyn Loader,
+    flat: Flat,
+    pub(crate) ir: Ir,
+    slots: Vec<Host>,
+    /// Registers that hold constants, by bits.
+    pub(crate) pool: HashMap<u32, RegisterId>,
+    /// For each tree, the number of its file among those that code is attributed to.
+    own_files: Vec<Option<u32>>,
+    /// Labels before this one have their position.
+    label: usize,
+    /// The type that the operand at hand is taken as, if the source says so.
+    pub(crate) cast: Option<Type>,
+    /// Words of data memory that the source declares.
+    pub(crate) data_words: u32,
+}
+
+impl Resolver<'_> {
+    /// Resolves the bundles of a section, and moves the section's labels from statements to bundles.
+    fn section(&mut self, section: Section, items: &[Item]) {
+        self.label = 0;
+        let mut bounds = self.flat.loop_bounds.clone();
+        bounds.retain(|bound| bound.section == section);
+        let mut bounds = bounds.into_iter().peekable();
+        for (index, item) in items.iter().enumerate() {
+            self.place_labels(section, index as u32);
+            if let Some(expand::LoopBound { most, .. }) = bounds.next_if(|bound| bound.item == index as u32) {
+                self.ir.loop_bounds.push(LoopBound { position: self.ir.bundles.len() as u32, most });
+            }
+            self.item(item);
+        }
+        self.place_labels(section, u32::MAX);
+    }
+
+    /// Sets the position of the section's labels that stand at or before a statement.
+    fn place_labels(&mut self, section: Section, statement: u32) {
+        while let Some(label) = self.context.declared.labels.get_mut(self.label) {
+            if self.context.declared.label_sections[self.label] == section {
+                if label.position > statement {
+                    return;
+                }
+                label.position = self.ir.bundles.len() as u32;
+            }
+            self.label += 1;
+        }
+    }
+
+    fn item(&mut self, item: &Item) {
+        let ast = Rc::clone(&self.context.asts[item.at.ast as usize]);
+        let StatementKind::Bundle(first, count) = ast.statements[item.statement as usize].kind else {
+            return;
+        };
+        let written = &ast.operations[first as usize..(first + count) as usize];
+        let mut operations: SmallVec<[Operation; 1]> = SmallVec::with_capacity(written.len());
+        for (index, (operation, number)) in written.iter().zip(first..).enumerate() {
+            let location = self.location(item, operation, index, written.len());
+            // What goes wrong is in the report; other operations may have mistakes of their own.
+            if let Ok(operation) = self.operation(item.at, &ast, number, written.len(), location) {
+                operations.push(operation);
+            }
+        }
+        if operations.len() < written.len() {
+            return;
+        }
+        let explicit = written.len() > 1;
+        if !explicit {
+            self.ir.bundles.push(Bundle { operations, explicit, scheduled: item.scheduled });
+        } else if self.ir.machine.slots.len() == 1 {
+            match serialise::order(&operations) {
+                Ok(order) => {
+                    for index in order {
+                        let operations = SmallVec::from_elem(operations[index], 1);
+                        self.ir.bundles.push(Bundle { operations, explicit, scheduled: item.scheduled });
+                    }
+                }
+                Err(diagnostic) => {
+                    let diagnostic = diagnostic(&self.context.declared.registers, self.ir.machine);
+                    self.context.report(item.at.scope, diagnostic);
+                }
+            }
+        } else if self.check_slots(item.at, &operations).is_ok() {
+            if let Some(diagnostic) = serialise::twice(&operations) {
+                let diagnostic = diagnostic(&self.context.declared.registers, self.ir.machine);
+                self.context.report(item.at.scope, diagnostic);
+            }
+            self.ir.bundles.push(Bundle { operations, explicit, scheduled: item.scheduled });
+        }
+    }
+
+    /// Where an operation comes from: its own line, or what `.loc` says.
+    fn location(
+        &mut self,
+        item: &Item,
+        operation: &crate::syntax::ast::Operation,
+        index: usize,
+        count: usize,
+    ) -> Option<Location> {
+        if item.loc != 0 {
+            let places = &self.flat.locs[item.loc as usize];
+            if places.len() > 1 && places.len() != count {
+                let message = format!("a bundle of {count}, and `.loc` gives {} places", places.len());
+                self.context.error(item.at.scope, "loc", operation.span, message);
+                return None;
+            }
+            let place = places.get(if places.len() == 1 { 0 } else { index }).copied().flatten();
+            return place.map(|(file, line)| Location { file, line });
+        }
+        let ast = item.at.ast as usize;
+        if let Some(Some(file)) = self.own_files.get(ast) {
+            return Some(Location { file: *file, line: operation.line });
+        }
+        let file = self.context.reports.sources.file_of(operation.span.start);
+        let name = std::sync::Arc::clone(&self.context.reports.sources.files()[file].name);
+        let file = self.flat.file(&name);
+        self.own_files.resize(self.own_files.len().max(ast + 1), None);
+        self.own_files[ast] = Some(file);
+        Some(Location { file, line: operation.line })
+    }
+
+    /// Two operations of a bundle that need one slot are a mistake.
+    fn check_slots(&mut self, at: At, operations: &[Operation]) -> Result<(), Reported> {
+        let machine = self.ir.machine;
+        let mut result = Ok(());
+        for (index, operation) in operations.iter().enumerate() {
+            let Some(slot) = operation.slot else { continue };
+            let Some(first) = operations[..index].iter().find(|before| before.slot == Some(slot)) else {
+                continue;
+            };
+            let name = machine.slots[slot as usize].name;
+            let message = format!("two operations of the bundle need slot `{name}`");
+            let what = |operation: &Operation| match operation.constant {
+                Constant::Raw(_) => ".raw",
+                _ => operation.row().mnemonic,
+            };
+            let error = Diagnostic::error("slot-conflict", operation.span, message)
+                .here(format!("`{}` needs it", what(operation)))
+                .also(first.span, format!("so does `{}`", what(first)))
+                .help("write them as two bundles");
+            result = Err(self.context.report(at.scope, error));
+        }
+        if operations.len() > machine.slots.len() && result.is_ok() {
+            let message = format!(
+                "{} operations, and {} has {} slots",
+                operations.len(),
+                machine.name,
+                machine.slots.len()
+            );
+            let last = operations[operations.len() - 1].span;
+            result = Err(self.context.error(at.scope, "slot-conflict", last, message));
+        }
+        result
+    }
+
+    fn operation(
+        &mut self,
+        at: At,
+        ast: &Ast,
+        number: u32,
+        of: usize,
+        location: Option<Location>,
+    ) -> Result<Operation, Reported> {
+        let written = &ast.operations[number as usize];
+        let name = self.context.name(at, written.mnemonic.name, written.mnemonic.span)?;
+        let operands = &ast.operands[written.first as usize..(written.first + written.count) as usize];
+        let Some(op) = name.op() else {
+            if name.directive() == Some(Directive::Raw) {
+                return self.raw(at, number, written, operands, location);
+            }
+            return Err(self.unknown_mnemonic(at, name, written, of));
+        };
+        let row = op.row();
+        let slot = match self.slots[op as usize] {
+            Host::Any => None,
+            Host::Slot(slot) => Some(slot),
+            Host::None => {
+                let message = format!("{} has no unit for `{}`", self.ir.machine.name, row.mnemonic);
+                let having = takt_isa::MACHINES.iter().find(|machine| machine.host(row.function).is_some());
+                let mut error = Diagnostic::error("no-unit", written.mnemonic.span, message);
+                if let Some(machine) = having {
+                    error = error.note(format!("machine {} has one", machine.name));
+                }
+                return Err(self.context.report(at.scope, error));
+            }
+        };
+        let places = row.shape.operands();
+        if places.len() != operands.len() {
+            return Err(self.wrong_count(at, row, written, operands));
+        }
+        let mut operation = Operation {
+            op,
+            slot,
+            dest: None,
+            sources: [RegisterId::ZERO; 3],
+            constant: Constant::None,
+            location,
+            span: written.span,
+            expansion: at.scope.0,
+            made: false,
+            order: 0,
+            written: (at.ast, number),
+        };
+        let mut failed = false;
+        for (place, operand) in places.iter().zip(operands) {
+            // All operands are looked at, whatever is wrong with one.
+            failed |= self.operand(at, row, *place, *operand, &mut operation).is_err();
+        }
+        if failed { Err(Reported) } else { Ok(operation) }
+    }
+
+    /// `.raw slot word`.
+    fn raw(
+        &mut self,
+        at: At,
+        number: u32,
+        written: &crate::syntax::ast::Operation,
+        operands: &[Operand],
+        location: Option<Location>,
+    ) -> Result<Operation, Reported> {
+        let [slot, word] = operands else { return Err(Reported) };
+        let slots = self.ir.machine.slots;
+        let name = self.context.reports.sources.text(slot.span).to_owned();
+        let Some(index) = slots.iter().position(|slot| slot.name == name) else {
+            let names = slots.iter().map(|slot| slot.name);
+            let message = format!("{} has no slot `{name}`", self.ir.machine.name);
+            let meant = nearest(&name, names.clone());
+            let error = Diagnostic::error("operand", slot.span, message)
+                .note(format!("slots: {}", names.collect::<Vec<_>>().join(" ")))
+                .did_you_mean(meant);
+            return Err(self.context.report(at.scope, error));
+        };
+        let value = self.operand_value(at, *word)?;
+        let Some(bits) =
+            value.integer().ok().and_then(|value| u64::try_from(value).ok()).filter(|value| value >> 48 == 0)
+        else {
+            return Err(self.context.error(at.scope, "range", word.span, "a word has 48 bits"));
+        };
+        self.ir.raw.push(bits);
+        Ok(Operation {
+            op: Op::nop,
+            slot: Some(index as u8),
+            dest: None,
+            sources: [RegisterId::ZERO; 3],
+            constant: Constant::Raw(self.ir.raw.len() as u32 - 1),
+            location,
+            span: written.span,
+            expansion: at.scope.0,
+            made: false,
+            order: 0,
+            written: (at.ast, number),
+        })
+    }
+
+    fn data(&mut self) {
+        for entry in std::mem::take(&mut self.flat.data) {
+            match entry {
+                Data::Space(count) => {
+                    let length = self.ir.data.len() + count as usize;
+                    self.ir.data.resize(length, 0);
+                    self.context.declared.data_types.resize(length, Type::B);
+                }
+                Data::Value(at, value, ty) => {
+                    let word = self.context.value(at, value.id);
+                    let word = word.and_then(|word| self.bits(at, word, ty, value.into()));
+                    // A word with a mistake keeps its place.
+                    self.ir.data.push(word.unwrap_or(0));
+                    self.context.declared.data_types.push(ty);
+                }
+            }
+        }
+    }
+
+    /// A number of cycles, not less than `least`.
+    fn cycles(&mut self, at: At, cycles: Expr, least: u32) -> Result<u32, Reported> {
+        let value = self.context.integer(at, cycles)?;
+        u32::try_from(value).ok().filter(|cycles| (least..=MAX_CYCLES).contains(cycles)).ok_or_else(|| {
+            let message = format!("cycles are {least} to {MAX_CYCLES} here, not {value}");
+            self.context.error(at.scope, "range", cycles.span, message)
+        })
+    }
+
+    /// What a `.deadline`, `.order` or `.late` demands.
+    fn demand(&mut self, timing: &Timing) -> Result<Demand, Reported> {
+        let at = timing.at;
+        let ast = Rc::clone(&self.context.asts[at.ast as usize]);
+        let DirectiveLine { kind, span } = &ast.directives[timing.directive as usize];
+        let (kind, names, wanted) = match kind {
+            DirectiveKind::Deadline(names, cycle) => {
+                let limit = self.cycles(at, *cycle, 1)?;
+                (DemandKind::Deadline(limit), names, Some(RegisterKind::Output))
+            }
+            DirectiveKind::Order(names) => (DemandKind::Order, names, None),
+            DirectiveKind::Late(names, cost) => {
+                let cost = cost.map_or(Ok(0), |cost| self.cycles(at, cost, 0))?;
+                (DemandKind::Late(cost), names, Some(RegisterKind::Input))
+            }
+            _ => return Err(Reported),
+        };
+        if let Some((true, latched)) = self.flat.ports {
+            return Err(self.unlatched(at, kind, *span, latched));
+        }
+        let mut ports: Vec<(RegisterId, Span)> = Vec::with_capacity(names.len());
+        for name in names {
+            let port = self.port(at, *name, wanted)?;
+            if let Some((_, first)) = ports.iter().find(|(other, _)| *other == port) {
+                let message = format!(
+                    "`{}` stands twice in one directive",
+                    self.context.reports.sources.text(name.span)
+                );
+                let error =
+                    Diagnostic::error("declared-twice", name.span, message).also(*first, "first here");
+                return Err(self.context.report(at.scope, error));
+            }
+            ports.push((port, name.span));
+        }
+        Ok(Demand { kind, ports, period: timing.section == Section::Period, span: *span })
+    }
+
+    /// The ports of a program whose ports are latched have no times of their own.
+    fn unlatched(&mut self, at: At, kind: DemandKind, span: Span, latched: Span) -> Reported {
+        let (message, help) = match kind {
+            DemandKind::Deadline(_) => (
+                "a deadline for outputs that are published together, at the `wait`",
+                "bound the period instead: `takt bound --deadline`",
+            ),
+            DemandKind::Order => (
+                "an order of ports that are taken together, at the tick, or published together, at the `wait`",
+                "leave it out",
+            ),
+            DemandKind::Late(_) => (
+                "inputs that are to be read late are taken at the tick, whenever they are read",
+                "leave it out, or have `.ports direct`",
+            ),
+        };
+        let error = Diagnostic::error("ports", span, message).also(latched, "for here it says so").help(help);
+        self.context.report(at.scope, error)
+    }
+
+    fn presets(&mut self) {
+        for preset in std::mem::take(&mut self.flat.presets) {
+            let found = self.preset_register(preset.at, preset.register, preset.placed);
+            let Ok(value) = self.context.value(preset.at, preset.value.id) else { continue };
+            // A named register has a type, a place has any.
+            let Ok((register, ty)) = found else { continue };
+            let Ok(bits) = self.bits(preset.at, value, ty, preset.value.into()) else { continue };
+            let register = &mut self.context.declared.registers[register.index()];
+            if register.preset.replace(bits).is_some() {
+                let error =
+                    Diagnostic::error("declared-twice", preset.span, "this register is preset already");
+                self.context.report(preset.at.scope, error);
+            }
+        }
+    }
+}

@@ -1,0 +1,616 @@
+//! Operands to registers, labels and numbers: the part of [`resolve`](crate::resolve) that looks at one operand.
+
+use crate::context::Wanted;
+use crate::context::{Argument, At, Binding, Reported};
+use crate::expand::load::Loader;
+use crate::expand::{address, register_at};
+use crate::ir::given::{Given, Kind, Part, What};
+use crate::ir::{Constant, Label, LabelId, Operation, Register, RegisterId, RegisterKind};
+use crate::report::diag::{Diagnostic, nearest};
+use crate::report::source::Span;
+use crate::resolve::Resolver;
+use crate::syntax::ast::*;
+use crate::syntax::expr::{EvalError, Value};
+use crate::syntax::name::NameId;
+use takt_isa::shape::Field;
+use takt_isa::{Effect, Operand as Place, ROWS, Row, Type};
+
+/// An operand and where it stands, parameters replaced by what was given for them; and what its name means, if it is one.
+type Meaning = (At, Operand, Option<(NameId, Binding)>);
+
+impl Resolver<'_> {
+    pub(crate) fn operand(
+        &mut self,
+        at: At,
+        row: &Row,
+        place: Place,
+        operand: Operand,
+        operation: &mut Operation,
+    ) -> Result<(), Reported> {
+        self.cast = None;
+        match place {
+            Place::Dest => {
+                operation.dest = Some(self.dest(at, operand)?);
+                self.note_cast(operation, Part::Dest);
+            }
+            Place::Source(index) => {
+                let source = self.source(at, operand, row.source_type(index))?;
+                operation.sources[index] = source;
+                let is_constant =
+                    matches!(self.context.declared.registers[source.index()].kind, RegisterKind::Constant(_));
+                if is_constant && row.source_type(index) == Type::B {
+                    self.note_literal(at, operand, operation, Part::Source(index as u8));
+                }
+                self.note_cast(operation, Part::Source(index as u8));
+            }
+            Place::Immediate => {
+                operation.constant = match self.code_label(at, operand)? {
+                    Some(label) => Constant::Code(label),
+                    None => Constant::Value(self.constant(at, operand, row.result_type())?),
+                };
+                match operation.constant {
+                    Constant::Code(_) => {
+                        let given =
+                            Given::Literal { kind: Kind::Int, what: What::Address, span: operand.span };
+                        self.context.declared.given.insert(operation, Part::Immediate, given);
+                    }
+                    Constant::Value(0) => {}
+                    _ if row.result_type() == Type::B => {
+                        self.note_literal(at, operand, operation, Part::Immediate);
+                    }
+                    _ => {}
+                }
+            }
+            Place::Target => operation.constant = self.target(at, operand)?,
+            Place::Memory => {
+                let (offset, base) = self.memory(at, operand, row)?;
+                operation.constant = Constant::Value(offset);
+                operation.sources[0] = base;
+                if let Some(table) = self.table_of(at, operand.kind) {
+                    self.context.declared.given.insert(operation, Part::Table, Given::Table(table));
+                }
+                self.note_cast(operation, Part::Source(0));
+            }
+        }
+        Ok(())
+    }
+
+    /// Notes the type that the operand just read is taken as.
+    fn note_cast(&mut self, operation: &Operation, part: Part) {
+        if let Some(ty) = self.cast {
+            self.context.declared.given.insert(operation, part, Given::Cast(ty));
+        }
+    }
+
+    /// Notes the type of a constant where the instruction takes any.
+    fn note_literal(&mut self, at: At, operand: Operand, operation: &Operation, part: Part) {
+        let Ok(value) = self.operand_value(at, operand) else { return };
+        let is_address = self.table_of(at, operand.kind).is_some();
+        let given = Given::literal(value, is_address, operand.span);
+        self.context.declared.given.insert(operation, part, given);
+    }
+
+    /// Follows parameters to the operand that was given for them, and what its name means if it is a name.
+    fn meaning(&mut self, mut at: At, mut operand: Operand) -> Result<Meaning, Reported> {
+        let mut parameter = None;
+        loop {
+            if let OperandKind::Cast(cast) = operand.kind {
+                let Cast { operand: inner, ty } = self.context.asts[at.ast as usize].casts[cast as usize];
+                let ty = self.context.type_named(at, ty)?;
+                if !matches!(inner.kind, OperandKind::Name(_) | OperandKind::Place(_)) {
+                    let error = Diagnostic::error("type", operand.span, "only a register is taken as a type");
+                    return Err(self.context.report(at.scope, error));
+                }
+                self.cast.get_or_insert(ty);
+                operand = inner;
+            }
+            let OperandKind::Name(name) = operand.kind else { return Ok((at, operand, None)) };
+            let name = self.context.name(at, name, operand.span)?;
+            match self.context.lookup(at.scope, name) {
+                // Arguments that are parameters themselves were replaced when the macro was used.
+                Binding::Argument(argument) => {
+                    parameter.get_or_insert((self.context.scopes.scope(at.scope).owner, name));
+                    Argument { operand, at, .. } = self.context.declared.arguments[argument as usize];
+                }
+                binding => {
+                    if let (Some(parameter), Binding::Register(register)) = (parameter, binding) {
+                        self.context.declared.parameters.insert(parameter, register);
+                    }
+                    return Ok((at, operand, Some((name, binding))));
+                }
+            }
+        }
+    }
+
+    fn dest(&mut self, at: At, operand: Operand) -> Result<RegisterId, Reported> {
+        let (place, given, meaning) = self.meaning(at, operand)?;
+        let register = match (given.kind, meaning) {
+            (_, Some((_, Binding::Register(register)))) => register,
+            (_, Some((name, Binding::None))) => {
+                return Err(self.context.unknown(place.scope, name, given.span, Wanted::Dest));
+            }
+            (OperandKind::Place(name), _) => {
+                let address = address(self.context, place, Name { name, span: given.span })?;
+                register_at(self.context, address, given.span)
+            }
+            (_, Some((name, binding))) => {
+                let kind = self.context.declared.kind_text(binding);
+                let message = format!("`{}` is {kind}: it cannot be written", self.context.scopes.text(name));
+                let mut error = Diagnostic::error("not-writable", given.span, message);
+                if let Some(declared) = self.context.declared.declaration(binding) {
+                    error = error.also(declared, "declared here");
+                }
+                return Err(self
+                    .context
+                    .report(at.scope, error.help("the first operand is the register to write")));
+            }
+            _ => {
+                let error = Diagnostic::error("not-writable", given.span, "this cannot be written")
+                    .help("the first operand is the register to write");
+                return Err(self.context.report(at.scope, error));
+            }
+        };
+        let Register { kind, name, span, pinned, .. } = &self.context.declared.registers[register.index()];
+        let machine = self.ir.machine;
+        let input = *kind == RegisterKind::Input || pinned.is_some_and(|address| machine.is_input(address));
+        let error = match kind {
+            RegisterKind::Zero => {
+                let error = Diagnostic::error(
+                    "not-writable",
+                    given.span,
+                    "`zero` always reads as zero: it cannot be written",
+                );
+                error.help("name a register for the result, even an unused one")
+            }
+            _ if input && name.is_empty() => {
+                Diagnostic::error("not-writable", given.span, "an input port is written from outside only")
+            }
+            _ if input => {
+                let message = format!("`{name}` is an input port: it is written from outside only");
+                Diagnostic::error("not-writable", given.span, message).also(*span, "declared here")
+            }
+            _ => return Ok(register),
+        };
+        Err(self.context.report(at.scope, error))
+    }
+
+    /// The port that a name stands for, of a kind if one is wanted.
+    pub(crate) fn port(
+        &mut self,
+        at: At,
+        name: Name,
+        wanted: Option<RegisterKind>,
+    ) -> Result<RegisterId, Reported> {
+        let operand = Operand { kind: OperandKind::Name(name.name), span: name.span };
+        let (place, given, meaning) = self.meaning(at, operand)?;
+        if let Some((name, Binding::None)) = meaning {
+            return Err(self.context.unknown(place.scope, name, given.span, Wanted::Source));
+        }
+        let is_port = |kind| match wanted {
+            Some(wanted) => kind == wanted,
+            None => matches!(kind, RegisterKind::Input | RegisterKind::Output),
+        };
+        if let Some((_, Binding::Register(register))) = meaning
+            && is_port(self.context.declared.registers[register.index()].kind)
+        {
+            return Ok(register);
+        }
+        let wanted = match wanted {
+            Some(RegisterKind::Output) => "an output port",
+            Some(_) => "an input port",
+            None => "a port",
+        };
+        let text = self.context.reports.sources.text(given.span);
+        let message = match meaning {
+            Some((_, binding)) => {
+                format!("`{text}` is {}, not {wanted}", self.context.declared.kind_text(binding))
+            }
+            None => format!("{wanted} is needed here"),
+        };
+        let mut error = Diagnostic::error("operand", given.span, message);
+        if let Some(declared) = meaning.and_then(|(_, binding)| self.context.declared.declaration(binding)) {
+            error = error.also(declared, "declared here");
+        }
+        Err(self.context.report(at.scope, error))
+    }
+
+    /// The register that a `.preset` names, by its name or its place.
+    pub(crate) fn preset_register(
+        &mut self,
+        at: At,
+        name: Name,
+        placed: bool,
+    ) -> Result<(RegisterId, Type), Reported> {
+        let operand = Operand { kind: OperandKind::Name(name.name), span: name.span };
+        let (place, given, meaning) = if placed { (at, operand, None) } else { self.meaning(at, operand)? };
+        let (register, ty) = match (given.kind, meaning) {
+            (_, Some((_, Binding::Register(register)))) => {
+                (register, self.context.declared.registers[register.index()].ty)
+            }
+            (OperandKind::Name(name) | OperandKind::Place(name), _) => {
+                if let Some((id, Binding::None)) = meaning
+                    && !self.looks_like_a_place(id)
+                {
+                    return Err(self.context.unknown(place.scope, id, given.span, Wanted::Dest));
+                }
+                let address = address(self.context, place, Name { name, span: given.span })?;
+                (register_at(self.context, address, given.span), Type::B)
+            }
+            _ => {
+                let error = Diagnostic::error("operand", given.span, "a register is needed here");
+                return Err(self.context.report(at.scope, error));
+            }
+        };
+        if register == RegisterId::ZERO {
+            let error = Diagnostic::error("place", given.span, "`zero` always reads as zero");
+            return Err(self.context.report(at.scope, error));
+        }
+        Ok((register, ty))
+    }
+
+    /// Whether a name is a bank's and a number.
+    fn looks_like_a_place(&self, name: NameId) -> bool {
+        let text = self.context.scopes.text(name);
+        let digits = text.trim_end_matches(|c: char| c.is_ascii_digit());
+        digits.len() < text.len() && self.ir.machine.banks().any(|bank| bank.name == digits)
+    }
+
+    /// A register to read: a register as such, or the one that holds a constant.
+    fn source(&mut self, at: At, operand: Operand, ty: Type) -> Result<RegisterId, Reported> {
+        let (place, given, meaning) = self.meaning(at, operand)?;
+        match (given.kind, meaning) {
+            (_, Some((_, Binding::Register(register)))) => Ok(register),
+            (_, Some((name, Binding::None))) => {
+                Err(self.context.unknown(place.scope, name, given.span, Wanted::Source))
+            }
+            (OperandKind::Place(name), _) => {
+                let address = address(self.context, place, Name { name, span: given.span })?;
+                Ok(register_at(self.context, address, given.span))
+            }
+            (OperandKind::Memory(_), _) => {
+                let error =
+                    Diagnostic::error("operand", given.span, "a memory operand where a register is read")
+                        .help("load it into a register with `ld` first");
+                Err(self.context.report(at.scope, error))
+            }
+            _ => {
+                let bits = self.constant(place, given, ty)?;
+                Ok(self.pooled(bits, given.span))
+            }
+        }
+    }
+
+    /// The register that holds a constant.
+    fn pooled(&mut self, bits: u32, span: Span) -> RegisterId {
+        if bits == 0 {
+            return RegisterId::ZERO;
+        }
+        let registers = &mut self.context.declared.registers;
+        *self.pool.entry(bits).or_insert_with(|| {
+            registers.push(Register {
+                name: String::new(),
+                kind: RegisterKind::Constant(bits),
+                ty: Type::B,
+                pinned: None,
+                preset: None,
+                span,
+            });
+            RegisterId::new(registers.len() - 1)
+        })
+    }
+
+    /// The bits of a constant operand.
+    fn constant(&mut self, at: At, operand: Operand, ty: Type) -> Result<u32, Reported> {
+        let value = self.operand_value(at, operand)?;
+        self.bits(at, value, ty, operand)
+    }
+
+    pub(crate) fn bits(&mut self, at: At, value: Value, ty: Type, operand: Operand) -> Result<u32, Reported> {
+        let span = operand.span;
+        let bits = value.bits(ty).map_err(|fault| self.context.fault(at.scope, EvalError { span, fault }))?;
+        if let Value::Real(real) = value
+            && ty != Type::I
+            && bits << 1 == 0
+            && real != 0.0
+        {
+            let warning =
+                Diagnostic::warning("underflow", span, format!("{real:e} rounds to zero in binary32"));
+            self.context.report(at.scope, warning);
+        }
+        if let (Value::Int(_), Type::F) = (value, ty)
+            && let Some(label) = self.table_of(at, operand.kind)
+        {
+            let Label { name, span: declared, .. } = &self.context.declared.labels[label.0 as usize];
+            let message = format!("the address of `{name}` is taken as a float");
+            let warning =
+                Diagnostic::warning("types", span, message).also(*declared, "declared here").help(format!(
+                    "load the word there with `{}`, or write `float(…)` if the address is meant",
+                    loading()
+                ));
+            self.context.report(at.scope, warning);
+        }
+        Ok(bits)
+    }
+
+    pub(crate) fn operand_value(&mut self, at: At, operand: Operand) -> Result<Value, Reported> {
+        let (place, given, meaning) = self.meaning(at, operand)?;
+        match (given.kind, meaning) {
+            (OperandKind::Expr(expr), _) => self.context.value(place, expr),
+            (_, Some((name, _))) => self.context.name_value(place.scope, name, given.span),
+            _ => {
+                let error = Diagnostic::error("operand", given.span, "a constant expression is needed here");
+                Err(self.context.report(at.scope, error))
+            }
+        }
+    }
+
+    /// The code label that an operand is, if it is one.
+    fn code_label(&mut self, at: At, operand: Operand) -> Result<Option<LabelId>, Reported> {
+        Ok(match self.meaning(at, operand)? {
+            (_, _, Some((_, Binding::Code(label)))) => Some(label),
+            _ => None,
+        })
+    }
+
+    fn target(&mut self, at: At, operand: Operand) -> Result<Constant, Reported> {
+        let (place, given, meaning) = self.meaning(at, operand)?;
+        match meaning {
+            Some((_, Binding::Code(label))) => return Ok(Constant::Code(label)),
+            Some((name, Binding::None)) => {
+                return Err(self.context.unknown(place.scope, name, given.span, Wanted::Target));
+            }
+            Some((name, binding @ (Binding::Register(_) | Binding::Data(_)))) => {
+                let kind = self.context.declared.kind_text(binding);
+                let message = format!("`{}` is {kind}, not a code label", self.context.scopes.text(name));
+                let mut error = Diagnostic::error("operand", given.span, message);
+                if let Some(declared) = self.context.declared.declaration(binding) {
+                    error = error.also(declared, "declared here");
+                }
+                return Err(self.context.report(at.scope, error));
+            }
+            _ => {}
+        }
+        let value = self.operand_value(place, given)?;
+        let target = value
+            .integer()
+            .map_err(|fault| self.context.fault(at.scope, EvalError { span: given.span, fault }))?;
+        self.field(at, target, Field::Target, given.span, "a bundle address")
+    }
+
+    /// A number for a field of the word.
+    fn field(
+        &mut self,
+        at: At,
+        value: i64,
+        field: Field,
+        span: Span,
+        what: &str,
+    ) -> Result<Constant, Reported> {
+        let most = field.bits().max();
+        match u32::try_from(value) {
+            Ok(value) if value <= most => Ok(Constant::Value(value)),
+            _ => {
+                let error = Diagnostic::error("range", span, format!("{what} is 0 to {most}, not {value}"));
+                Err(self.context.report(at.scope, error))
+            }
+        }
+    }
+
+    /// Offset and base of a memory operand.
+    fn memory(&mut self, at: At, operand: Operand, row: &Row) -> Result<(u32, RegisterId), Reported> {
+        let (place, given, meaning) = self.meaning(at, operand)?;
+        let (value, span, base) = match (given.kind, meaning) {
+            (OperandKind::Memory(memory), _) => {
+                let Memory { offset, base } = self.context.asts[place.ast as usize].memories[memory as usize];
+                let value = match offset {
+                    Some(offset) => self.context.integer(place, offset).inspect_err(|_| {
+                        self.context.unknown_tables(offset.span);
+                    }),
+                    None => Ok(0),
+                };
+                let base = self.source(place, base, row.source_type(0));
+                (value?, offset.map_or(given.span, |offset| offset.span), base?)
+            }
+            (_, Some((name, binding @ (Binding::Register(_) | Binding::Code(_))))) => {
+                let text = self.context.scopes.text(name).to_owned();
+                let kind = self.context.declared.kind_text(binding);
+                let mut error = Diagnostic::error(
+                    "operand",
+                    given.span,
+                    format!("`{text}` is {kind}, not a place in memory"),
+                );
+                if matches!(binding, Binding::Register(_)) {
+                    error = error.help(format!("write `[{text}]` for the word that it points to"));
+                }
+                return Err(self.context.report(at.scope, error));
+            }
+            _ => {
+                let value = self.operand_value(place, given).inspect_err(|_| {
+                    self.context.unknown_tables(given.span);
+                })?;
+                let value = value.integer().map_err(|fault| {
+                    let span = given.span;
+                    self.context.fault(at.scope, EvalError { span, fault })
+                })?;
+                (value, given.span, RegisterId::ZERO)
+            }
+        };
+        match self.field(at, value, Field::Offset, span, "an offset")? {
+            Constant::Value(offset) => {
+                self.check_address(at, (place, given), offset, base, span);
+                Ok((offset, base))
+            }
+            _ => Err(Reported),
+        }
+    }
+
+    pub(crate) fn wrong_count(
+        &mut self,
+        at: At,
+        row: &Row,
+        written: &crate::syntax::ast::Operation,
+        operands: &[Operand],
+    ) -> Reported {
+        let places = row.shape.operands();
+        let plural = |count: usize| if count == 1 { "" } else { "s" };
+        let message = format!(
+            "`{}` takes {} operand{}, not {}",
+            row.mnemonic,
+            places.len(),
+            plural(places.len()),
+            operands.len()
+        );
+        // At the first operand too many, or else behind the last.
+        let span = match operands.get(places.len()) {
+            Some(first) => first.span.to(written.span),
+            None => written.span,
+        };
+        let error = Diagnostic::error("operands", span, message);
+        let write = format!("{} {}", row.mnemonic, row.shape.syntax());
+        self.context.report(at.scope, error.help(format!("write `{}`", write.trim_end())))
+    }
+
+    pub(crate) fn unknown_mnemonic(
+        &mut self,
+        at: At,
+        name: NameId,
+        written: &crate::syntax::ast::Operation,
+        of: usize,
+    ) -> Reported {
+        let text = self.context.scopes.text(name).to_owned();
+        let span = written.mnemonic.span;
+        if let Some(definition) = self.context.scopes.macros.get(&name)
+            && of > 1
+        {
+            let defined = definition.span(&self.context.asts);
+            let error = Diagnostic::error("macro-in-bundle", span, format!("macro `{text}` within a bundle"))
+                .also(defined, "defined here")
+                .help("a macro's use stands alone on its line");
+            return self.context.report(at.scope, error);
+        }
+        if let Some(definition) = self.context.scopes.macros.get(&name) {
+            let defined = definition.span(&self.context.asts);
+            let error = Diagnostic::error(
+                "declared-later",
+                span,
+                format!("macro `{text}` is used before its definition"),
+            )
+            .also(defined, "defined only here")
+            .help("move the definition up");
+            return self.context.report(at.scope, error);
+        }
+        let directive = format!(".{text}");
+        let error = Diagnostic::error(
+            "unknown-instruction",
+            span,
+            format!("there is no instruction or macro `{text}`"),
+        );
+        let error = if Directive::ALL.iter().any(|known| known.name() == directive) {
+            error.did_you_mean(Some(directive))
+        } else if let Some(file) = self.library_with(&text) {
+            error.help(format!("the library defines it: `.include <{file}>`"))
+        } else if let Some(help) = absent(&text.to_ascii_lowercase()) {
+            error.help(help)
+        } else {
+            let macros: Vec<&str> =
+                self.context.scopes.macros.keys().map(|name| self.context.scopes.text(*name)).collect();
+            let mut known: Vec<&str> = ROWS.iter().map(|row| row.mnemonic).chain(macros).collect();
+            known[ROWS.len()..].sort_unstable();
+            let lower = text.to_ascii_lowercase();
+            error.did_you_mean(alias(&lower).map(str::to_owned).or_else(|| nearest(&text, known)))
+        };
+        self.context.report(at.scope, error)
+    }
+}
+
+impl Resolver<'_> {
+    /// The file of a library that defines a macro.
+    fn library_with(&self, macro_name: &str) -> Option<String> {
+        let defines = |line: &str| {
+            let rest = line.trim_start().strip_prefix(".macro").unwrap_or_default();
+            rest.split_whitespace().next() == Some(macro_name)
+        };
+        let libraries = self.loader.places().iter().filter(|place| !place.takes_quoted());
+        let mut files = libraries.flat_map(|place| place.names().into_iter().map(move |name| (place, name)));
+        let found = files.find(|(place, name)| {
+            place.load(name).is_ok_and(|bytes| String::from_utf8_lossy(&bytes).lines().any(defines))
+        });
+        found.map(|(_, name)| name)
+    }
+}
+
+/// The instruction that loads a word.
+fn loading() -> &'static str {
+    ROWS.iter().find(|row| row.effect == Effect::Load).map_or("", |row| row.mnemonic)
+}
+
+/// What other processors have and Takt has not, though an instruction of a like name may do something else.
+fn absent(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "fma" | "fmadd" | "fmac" | "fmla" | "fnma" | "fms" | "fmsub" | "mac" | "madd" => {
+            "there is no fused operation: `fmul`, then `fadd` or `fsub`"
+        }
+        "imul" | "idiv" | "imod" | "irem" | "imin" | "imax" | "iabs" | "ineg" => {
+            "of integers there are sums, shifts, logic and comparisons: `itof` converts, and `ishl` multiplies by a power of two"
+        }
+        "fgt" | "fge" | "fcmp" => "swap the operands of `flt` or `fle`",
+        "igt" | "igtu" | "ige" | "ile" => {
+            "`ilt` with its operands swapped, or with its result tested by `bz`"
+        }
+        "fne" | "ine" => "test the result of `feq` or `ieq` with `bz`",
+        "beq" | "bne" | "blt" | "bgt" | "ble" | "bge" => {
+            "compare with `ieq`, `ilt`, `feq` or `flt`, then `bnz` or `bz`"
+        }
+        "not" | "inot" => "`ixor` with -1",
+        _ => return None,
+    })
+}
+
+/// What users of other assemblers may write.
+fn alias(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "add" => "fadd",
+        "sub" => "fsub",
+        "mul" => "fmul",
+        "div" => "fdiv",
+        "sqrt" => "fsqrt",
+        "sin" => "fsin",
+        "cos" => "fcos",
+        "atan2" => "fatan2",
+        "acos" => "facos",
+        "abs" => "fabs",
+        "neg" => "fneg",
+        "min" => "fmin",
+        "max" => "fmax",
+        "and" => "iand",
+        "or" => "ior",
+        "xor" => "ixor",
+        "shl" | "sll" => "ishl",
+        "shr" | "srl" => "ishr",
+        "sar" | "sra" => "isar",
+        "load" | "lw" => "ld",
+        "store" | "sw" => "st",
+        "move" | "mv" => "mov",
+        "jump" | "br" | "b" | "j" => "jmp",
+        "beqz" | "brz" => "bz",
+        "bnez" | "brnz" => "bnz",
+        "return" => "ret",
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Advice that names what there is not would be worse than none.
+    #[test]
+    fn advice_names_instructions() {
+        let known = |name: &str| ROWS.iter().any(|row| row.mnemonic == name);
+        for name in ["fma", "imul", "fgt", "igt", "fne", "beq", "not"] {
+            assert!(!known(name));
+            let help = absent(name).expect("there is advice");
+            assert!(help.split('`').skip(1).step_by(2).all(known), "{help}");
+        }
+    }
+}

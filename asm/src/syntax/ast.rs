@@ -1,0 +1,452 @@
+//! What a source file says, before any name has a meaning.
+//!
+//! Everything is kept in a few flat lists that refer to each other by index: a file of a million lines is a handful of
+//! allocations, and a statement within a repetition is read again and again without being copied.
+
+use crate::report::source::Span;
+use crate::syntax::name::{NameId, NameRef};
+use std::collections::BTreeSet;
+
+/// A name and its place.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Name {
+    /// The name.
+    pub name: NameRef,
+    /// Its place.
+    pub span: Span,
+}
+
+/// `head{e}middle{e}tail`: what precedes each braced expression, the expression, and the tail.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Template {
+    /// Text and expression, in turn.
+    pub parts: Vec<(NameId, Vec<Node>)>,
+    /// The text after the last expression.
+    pub tail: NameId,
+}
+
+/// A node of an expression's tree.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Node {
+    /// What it is.
+    pub kind: NodeKind,
+    /// The part of the source that it stands for.
+    pub span: Span,
+}
+
+/// What a node is. Operands precede their operator.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum NodeKind {
+    /// An integer literal.
+    Int(i64),
+    /// A real literal.
+    Real(f64),
+    /// A name.
+    Name(NameRef),
+    /// An operator before the one operand that precedes the node.
+    Prefix(Operator),
+    /// An operator between the two operands that precede the node.
+    Infix(Operator),
+    /// A function, by name, of as many arguments as precede the node.
+    Call(NameId, u32),
+}
+
+/// An expression: a range of nodes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct ExprId {
+    /// First node.
+    pub first: u32,
+    /// Number of nodes.
+    pub count: u32,
+}
+
+impl ExprId {
+    /// The nodes' indices.
+    #[inline]
+    pub fn range(self) -> std::ops::Range<usize> {
+        self.first as usize..(self.first + self.count) as usize
+    }
+}
+
+/// An expression and its place.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Expr {
+    /// The expression.
+    pub id: ExprId,
+    /// Its place.
+    pub span: Span,
+}
+
+/// An operand as written.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Operand {
+    /// What it is.
+    pub kind: OperandKind,
+    /// Its place.
+    pub span: Span,
+}
+
+impl From<Expr> for Operand {
+    fn from(Expr { id, span }: Expr) -> Operand {
+        Operand { kind: OperandKind::Expr(id), span }
+    }
+}
+
+/// What an operand looks like.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum OperandKind {
+    /// A name alone: a register, port, label, constant or parameter.
+    Name(NameRef),
+    /// Any other expression.
+    Expr(ExprId),
+    /// `@m12`: a register by its canonical name.
+    Place(NameRef),
+    /// `offset[register]`: an index into [`Ast::memories`].
+    Memory(u32),
+    /// `register:type`: an index into [`Ast::casts`].
+    Cast(u32),
+}
+
+/// `register:type`: its bits are taken as another type.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Cast {
+    /// What stands before the colon.
+    pub operand: Operand,
+    /// The type's name.
+    pub ty: Name,
+}
+
+/// `offset[register]`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Memory {
+    /// The offset; none is 0.
+    pub offset: Option<Expr>,
+    /// What stands in the brackets.
+    pub base: Operand,
+}
+
+/// An operation of a bundle, or the use of a macro.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Operation {
+    /// The mnemonic, the macro's name, or `.raw`.
+    pub mnemonic: Name,
+    /// Its first operand in [`Ast::operands`].
+    pub first: u32,
+    /// How many operands it has.
+    pub count: u32,
+    /// Line, from 1.
+    pub line: u32,
+    /// From the mnemonic to the last operand.
+    pub span: Span,
+}
+
+/// A line: an optional label, and what follows.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Statement {
+    /// The label.
+    pub label: Option<Name>,
+    /// What follows.
+    pub kind: StatementKind,
+    /// Line, from 1.
+    pub line: u32,
+}
+
+/// What a line does.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum StatementKind {
+    /// Nothing: a label alone, or a line that could not be read.
+    Empty,
+    /// Operations: their first in [`Ast::operations`] and their number.
+    Bundle(u32, u32),
+    /// A directive: its index in [`Ast::directives`].
+    Directive(u32),
+}
+
+/// What a declaration declares.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Declares {
+    /// Registers.
+    Register,
+    /// Registers whose value outlives the period.
+    State,
+    /// Input ports.
+    Input,
+    /// Output ports.
+    Output,
+}
+
+/// One name of a declaration.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Declaration {
+    /// The name.
+    pub name: Name,
+    /// What follows its colon.
+    pub ty: Option<Name>,
+    /// What follows its `@`: a name, of a register, or the number of a port.
+    pub place: Option<Expr>,
+}
+
+/// A section of the program.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Hash, PartialOrd, Ord)]
+pub(crate) enum Section {
+    /// What runs once, after reset.
+    Once,
+    /// What runs every period.
+    Period,
+    /// Data memory.
+    Data,
+}
+
+impl Section {
+    /// Its name, without the point.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Section::Once => "once",
+            Section::Period => "period",
+            Section::Data => "data",
+        }
+    }
+}
+
+/// A directive and its operands.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct DirectiveLine {
+    /// The directive.
+    pub kind: DirectiveKind,
+    /// The directive's place and, where it has operands, theirs.
+    pub span: Span,
+}
+
+/// A directive and its operands. `end` and `next` are indices into [`Ast::statements`], known once the file is read.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) enum DirectiveKind {
+    /// `.reg`, `.state`, `.input`, `.output`.
+    Declare(Declares, Vec<Declaration>),
+    /// `.const`.
+    Const(Name, Expr),
+    /// `.preset`.
+    Preset {
+        /// The register, by its name or its place.
+        register: Name,
+        /// Whether `@` stands before it: then it is a place.
+        placed: bool,
+        /// What the loader writes there.
+        value: Expr,
+    },
+    /// `.once`, `.period`, `.data`.
+    Section(Section),
+    /// `.float`.
+    Float(Vec<Expr>),
+    /// `.word`.
+    Word(Vec<Expr>),
+    /// `.space`.
+    Space(Expr),
+    /// `.macro`, its parameters, and the statement of its `.endm`.
+    Macro {
+        /// The macro.
+        name: Name,
+        /// Its parameters.
+        parameters: Vec<Name>,
+        /// Where it ends.
+        end: u32,
+    },
+    /// `.rep` and the statement of its `.endr`.
+    Rep {
+        /// The name that counts.
+        variable: Name,
+        /// Its first value.
+        first: Expr,
+        /// Its last value.
+        last: Expr,
+        /// Where it ends.
+        end: u32,
+    },
+    /// `.if` and the statement of the next branch or its `.endif`.
+    If(Expr, u32),
+    /// `.elif`, the next branch, and the `.endif`.
+    Elif(Expr, u32, u32),
+    /// `.else` and the `.endif`.
+    Else(u32),
+    /// `.endm`, `.endr`, `.endif`.
+    End(Directive),
+    /// A `.macro`, `.rep` or `.if` that could not be read, and where it ends: what it encloses is passed over.
+    Broken(Directive, u32),
+    /// `.include`, and whether the name stands in `<>`: in the library rather than beside this file.
+    Include(String, bool),
+    /// `.loc`: one place for all that follows, or one for each operation of each bundle that follows.
+    Loc(Vec<Loc>),
+    /// `.error`.
+    Error(String),
+    /// `.schedule` and `on` or `off`.
+    Schedule(Name),
+    /// `.ports` and `latched` or `direct`.
+    Ports(Name),
+    /// `.loop_bound`.
+    LoopBound(Expr),
+    /// `.deadline`, the ports, and the cycle.
+    Deadline(Vec<Name>, Expr),
+    /// `.order` and the ports.
+    Order(Vec<Name>),
+    /// `.late`, the ports, and the cycles that it may cost.
+    Late(Vec<Name>, Option<Expr>),
+}
+
+/// One place of a `.loc`.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) enum Loc {
+    /// `none`, or another name by mistake.
+    None(Name),
+    /// A file and a line.
+    At(String, Expr),
+}
+
+macro_rules! directives {
+    ($($variant:ident $name:literal $operands:literal;)*) => {
+        /// The directives, by name.
+        #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+        #[allow(missing_docs)]
+        pub enum Directive {
+            $($variant,)*
+        }
+
+        impl Directive {
+            /// Every directive.
+            pub const ALL: &[Directive] = &[$(Directive::$variant),*];
+
+            /// Its name, with the point.
+            pub const fn name(self) -> &'static str {
+                match self { $(Directive::$variant => $name,)* }
+            }
+
+            /// Its operands, as a message shows them.
+            pub const fn operands(self) -> &'static str {
+                match self { $(Directive::$variant => $operands,)* }
+            }
+        }
+    };
+}
+
+directives! {
+    Reg ".reg" "a, b:int, c @ m3";
+    State ".state" "a, b:int, c @ m3";
+    Input ".input" "a, b:int";
+    Output ".output" "a, b:int";
+    Const ".const" "NAME = expression";
+    Preset ".preset" "m12 = expression";
+    Once ".once" "";
+    Period ".period" "";
+    Data ".data" "";
+    Float ".float" "expression, …";
+    Word ".word" "expression, …";
+    Space ".space" "words";
+    Macro ".macro" "name p, q";
+    EndMacro ".endm" "";
+    Rep ".rep" "i, first, last";
+    EndRep ".endr" "";
+    If ".if" "expression";
+    Elif ".elif" "expression";
+    Else ".else" "";
+    EndIf ".endif" "";
+    Include ".include" "\"file\"|<file>";
+    Loc ".loc" "\"file\" line";
+    Error ".error" "\"text\"";
+    Schedule ".schedule" "on|off";
+    Ports ".ports" "latched|direct";
+    LoopBound ".loop_bound" "turns";
+    Deadline ".deadline" "port, port = cycle";
+    Order ".order" "port, port, …";
+    Late ".late" "port, port = cycles";
+    Raw ".raw" "slot 0x…";
+}
+
+/// A source file, read.
+#[derive(Clone, Default, Debug)]
+pub(crate) struct Ast {
+    /// Lines that say something, in order.
+    pub statements: Vec<Statement>,
+    /// Operations of the bundles.
+    pub operations: Vec<Operation>,
+    /// Operands of the operations.
+    pub operands: Vec<Operand>,
+    /// Nodes of the expressions.
+    pub nodes: Vec<Node>,
+    /// Memory operands.
+    pub memories: Vec<Memory>,
+    /// Operands with a type.
+    pub casts: Vec<Cast>,
+    /// Name templates.
+    pub templates: Vec<Template>,
+    /// Directives.
+    pub directives: Vec<DirectiveLine>,
+    /// Names in lines that could not be read and may have declared them: that they are unknown is no further error.
+    pub doubtful: BTreeSet<NameId>,
+}
+
+/// A binary or unary operator.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs)]
+pub enum Operator {
+    Eq,
+    Ne,
+    Lt,
+    Le,
+    Gt,
+    Ge,
+    Or,
+    And,
+    Shl,
+    Shr,
+    Add,
+    Sub,
+    Mul,
+    Div,
+    Rem,
+    Complement,
+    Not,
+    Power,
+}
+
+impl Operator {
+    /// How the source writes it.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Operator::Eq => "==",
+            Operator::Ne => "!=",
+            Operator::Lt => "<",
+            Operator::Le => "<=",
+            Operator::Gt => ">",
+            Operator::Ge => ">=",
+            Operator::Or => "|",
+            Operator::And => "&",
+            Operator::Shl => "<<",
+            Operator::Shr => ">>",
+            Operator::Add => "+",
+            Operator::Sub => "-",
+            Operator::Mul => "*",
+            Operator::Div => "/",
+            Operator::Rem => "%",
+            Operator::Complement => "~",
+            Operator::Not => "!",
+            Operator::Power => "^",
+        }
+    }
+
+    /// How tightly it binds as a binary operator, from 1; 0 if it is not one.
+    pub const fn precedence(self) -> u16 {
+        match self {
+            Operator::Eq | Operator::Ne | Operator::Lt | Operator::Le | Operator::Gt | Operator::Ge => 1,
+            Operator::Or => 2,
+            Operator::And => 3,
+            Operator::Shl | Operator::Shr => 4,
+            Operator::Add | Operator::Sub => 5,
+            Operator::Mul | Operator::Div | Operator::Rem => 6,
+            Operator::Power => 8,
+            Operator::Complement | Operator::Not => 0,
+        }
+    }
+
+    /// Whether it may stand before an operand.
+    pub const fn is_prefix(self) -> bool {
+        matches!(self, Operator::Add | Operator::Sub | Operator::Complement | Operator::Not)
+    }
+}
