@@ -14,7 +14,7 @@ use fp_common::{SIGN, Triples, full, parallel, random_count, special_values};
 use rustc_apfloat::ieee::Single;
 use rustc_apfloat::{Float, Round, Status};
 use takt_isa::fp::{Arithmetic, CANONICAL_NAN, Flags, Host, SoftFloat, Value, is_nan};
-use takt_isa::{Op, compute};
+use takt_isa::{Fusion, Op, compute, fusions};
 
 const ONE: u32 = 0x3f80_0000;
 
@@ -150,6 +150,15 @@ fn signs_and_conventions() {
     assert_eq!(flags(Op::fma, [f32::NAN, f32::INFINITY, 1.0]), Flags::NONE);
     assert_eq!(flags(Op::fms, [2.0, f32::INFINITY, f32::INFINITY]), Flags::INVALID);
     assert_eq!(flags(Op::fnms, [2.0, f32::INFINITY, f32::INFINITY]), Flags::NONE);
+}
+
+/// Which instruction does both, as the assembler's contraction takes it from the meanings.
+#[test]
+fn what_fuses() {
+    let of = |sum: Op, source: usize, fused: Op| Fusion { product: Op::fmul, sum, source, fused };
+    let expected =
+        [of(Op::fadd, 0, Op::fma), of(Op::fadd, 1, Op::fma), of(Op::fsub, 0, Op::fms), of(Op::fsub, 1, Op::fnma)];
+    assert_eq!(fusions(), expected);
 }
 
 /// The identities by which one unit executes products and sums too: `a · b` is `a · b` plus a zero of its sign, `a + b` is
