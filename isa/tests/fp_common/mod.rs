@@ -295,6 +295,15 @@ impl Triples {
             let other = if tiny { 103 - exponent } else { pairs.random.between(80, 200) };
             b = pairs.pack(other, 0x0080_0000 - 2 * i);
         }
+        // A product halfway between two numbers, and one bit, far below, that decides.
+        if kind == 15 {
+            let width = pairs.random.between(2, 23);
+            let exponents = pairs.random.between(121, 181);
+            let first = pairs.random.between(1, exponents - 1);
+            let at = |number: u32, exponent: i32| number & 0x807f_ffff | (exponent as u32) << 23;
+            a = at(pairs.short_odd(width), first);
+            b = at(pairs.short_odd(25 - width), exponents - first);
+        }
         let product = (f64::from(f32::from_bits(a)) * f64::from(f32::from_bits(b))) as f32;
         let (bits, at) = (product.to_bits(), exponent(product.to_bits()));
         let c = match kind {
@@ -307,7 +316,7 @@ impl Triples {
                 pairs.with_exponent(a, exponent).1
             }
             // Cancellation: the product but for its last places, which binary32 does not hold, or but for a binade.
-            6..=8 | 15 => (bits ^ SIGN).wrapping_add_signed(pairs.random.between(-3, 3)),
+            6..=8 => (bits ^ SIGN).wrapping_add_signed(pairs.random.between(-3, 3)),
             9 => {
                 let exponent = at + pairs.random.between(-2, 2);
                 pairs.with_exponent(a, exponent).1
@@ -318,6 +327,7 @@ impl Triples {
                 let fraction = pairs.fraction();
                 pairs.pack(if tiny { 0 } else { at + 24 }, fraction)
             }
+            15 => pairs.random.bits() & SIGN | 1 << pairs.random.between(0, 22),
             // Sums about the largest number.
             _ => bits & SIGN | 0x7f00_0000 | pairs.fraction() & 0x00ff_ffff,
         };
