@@ -20,7 +20,7 @@ fn on_t4(text: &str) -> Assembled {
     assembled(text, &T4, Schedule::AsWritten, Contract::AsWritten)
 }
 
-const HEAD: &str = ".input a, b, c, d\n.output F, G\n.reg t u\n.state s\n.preset s = 1.0\n";
+const HEAD: &str = ".input a, b, c, d\n.output F, G\n.reg t u v\n.state s\n.preset s = 1.0\n";
 
 /// What becomes of a period, with contraction: the program that one would write by hand.
 #[track_caller]
@@ -58,16 +58,30 @@ fn names_that_are_used_again() {
     );
     becomes(" mov t, a\n fmul t, t, b\n fadd F, t, c", " mov t, a\n fma F, t, b, c");
     becomes(" mov t, a\n fmul t, t, b\n fadd t, t, c\n mov F, t", " mov t, a\n fma t, t, b, c\n mov F, t");
-    becomes(" fmul t, a, b\n fsqrt u, c\n fadd F, t, u", " fsqrt u, c\n fma F, a, b, u");
+}
+
+/// What takes longer than everything else: beside it there is time.
+const LONG: &str = "\n fsqrt v, d\n fsqrt G, v";
+
+#[track_caller]
+fn becomes_beside(period: &str, by_hand: &str) {
+    becomes(&format!("{period}{LONG}"), &format!("{by_hand}{LONG}"));
+}
+
+/// A sum that waits for what is added would be there later: it is fused where the run takes no longer for it.
+#[test]
+fn sums_that_wait_for_something_else() {
+    stays(" fsqrt u, c\n fmul t, a, b\n fadd F, t, u");
+    becomes_beside(" fsqrt u, c\n fmul t, a, b\n fadd F, t, u", " fsqrt u, c\n fma F, a, b, u");
+    // But not where it waits for the product too.
+    becomes(" fadd u, c, d\n fmul t, a, b\n fadd F, t, u", " fadd u, c, d\n fma F, a, b, u");
 }
 
 /// Of two products in one sum the one whose factors come later, else the second.
 #[test]
 fn two_products_in_one_sum() {
-    becomes(
-        " fmul t, a, b\n fmul u, c, d\n fadd F, t, u",
-        " fmul t, a, b\n fma F, c, d, t",
-    );
+    stays(" fmul t, a, b\n fmul u, c, d\n fadd F, t, u");
+    becomes_beside(" fmul t, a, b\n fmul u, c, d\n fadd F, t, u", " fmul t, a, b\n fma F, c, d, t");
     becomes(
         " fsqrt t, a\n fmul t, t, b\n fmul u, c, d\n fsub F, t, u",
         " fsqrt t, a\n fmul u, c, d\n fms F, t, b, u",

@@ -1,12 +1,12 @@
 //! `takt arm`: the six-axis arm's kinematics, on the paper's examples, random poses and a path.
 
+use crate::account::{fused_operations, rounding};
 use crate::fault::explain;
 use crate::files::{self, Given, Out};
 use crate::load::Load;
 use crate::number;
 use crate::plot::ArmPlot;
 use crate::run::PERIOD_LIMIT;
-use crate::account::{fused_operations, rounding};
 use crate::select::{self, ContractArgument, SourceArguments};
 use crate::track::progress;
 use crate::{output, ports};

@@ -266,8 +266,14 @@ fn write_contractions(assembled: &Assembled, out: &mut Out) -> Result<()> {
         *counts.entry(contraction.mnemonic).or_default() += 1;
     }
     if !counts.is_empty() {
-        let counts: Vec<String> = counts.iter().map(|(mnemonic, count)| format!("{count} {mnemonic}")).collect();
-        writeln!(out, "contracted: {} products fused into sums ({})", assembled.contractions.len(), counts.join(", "))?;
+        let counts: Vec<String> =
+            counts.iter().map(|(mnemonic, count)| format!("{count} {mnemonic}")).collect();
+        writeln!(
+            out,
+            "contracted: {} products fused into sums ({})",
+            assembled.contractions.len(),
+            counts.join(", ")
+        )?;
     }
     Ok(())
 }

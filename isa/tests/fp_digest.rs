@@ -23,7 +23,12 @@ const OPERATIONS: [(&str, Operation, Operation, u64); 11] = [
     ("sub", |a, b| Host::sub(a, b), Reference::sub, 0xc3ad_6baf_593d_31fd),
     ("mul", |a, b| Host::mul(a, b), Reference::mul, 0x9882_dcdf_e626_3285),
     ("div", |a, b| Host::div(a, b), Reference::div, 0xedea_c4d2_d676_6cc1),
-    ("mul_add", |a, b| Host::mul_add(a, b, addend(a, b)), |a, b| Reference::mul_add(a, b, addend(a, b)), 0xc993_7a2f_53e3_5429),
+    (
+        "mul_add",
+        |a, b| Host::mul_add(a, b, addend(a, b)),
+        |a, b| Reference::mul_add(a, b, addend(a, b)),
+        0xc993_7a2f_53e3_5429,
+    ),
     ("sqrt", |a, _| Host::sqrt(a), |a, _| Reference::sqrt(a), 0x19cc_8b25_28f7_3985),
     ("itof", |a, _| Host::itof(a), |a, _| Reference::itof(a), 0x8ac2_5e0d_ba81_2df5),
     ("ftoi", |a, _| Host::ftoi(a), |a, _| Reference::ftoi(a), 0x289e_6b2a_c742_8435),

@@ -97,7 +97,8 @@ fn random_triples_reach_every_case() {
         let finite = !is_nan(result.bits) && magnitude < 0x7f80_0000;
         // Rounded to binary64 first, or the product to binary32 first, the sum would be another one.
         let twice = finite && ((x * y + z) as f32).to_bits() != result.bits;
-        let unfused = finite && f32::from_bits(a) * f32::from_bits(b) + f32::from_bits(c) != f32::from_bits(result.bits);
+        let unfused = finite
+            && f32::from_bits(a) * f32::from_bits(b) + f32::from_bits(c) != f32::from_bits(result.bits);
         let reached = [
             result.flags.contains(Flags::INVALID),
             result.flags.contains(Flags::OVERFLOW),
@@ -156,8 +157,12 @@ fn signs_and_conventions() {
 #[test]
 fn what_fuses() {
     let of = |sum: Op, source: usize, fused: Op| Fusion { product: Op::fmul, sum, source, fused };
-    let expected =
-        [of(Op::fadd, 0, Op::fma), of(Op::fadd, 1, Op::fma), of(Op::fsub, 0, Op::fms), of(Op::fsub, 1, Op::fnma)];
+    let expected = [
+        of(Op::fadd, 0, Op::fma),
+        of(Op::fadd, 1, Op::fma),
+        of(Op::fsub, 0, Op::fms),
+        of(Op::fsub, 1, Op::fnma),
+    ];
     assert_eq!(fusions(), expected);
 }
 

@@ -1,11 +1,13 @@
 //! `.contract on`: a product and the sum that alone uses it become one operation, with one rounding.
 //!
-//! What is fused depends on the source alone, never on what the scheduler makes of it, so that a program computes the same bits
-//! however it is scheduled. The product's operation goes; the fused one stands where the sum stood.
+//! What is fused depends on the source and the machine's latencies, never on what the scheduler makes of it, so that a program
+//! computes the same bits however it is scheduled. The product's operation goes; the fused one stands where the sum stood.
+
+mod choose;
 
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, runs};
 use smallvec::SmallVec;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use takt_isa::program::Location;
 use takt_isa::{Fusion, fusions};
 
@@ -32,13 +34,14 @@ pub(crate) struct Contracted {
 /// An operation: its bundle, and its number there.
 type Where = (usize, usize);
 
+/// By sum, the products that it could be fused with, in the order of the source.
+type Wishes = HashMap<Where, SmallVec<[(Where, Fusion); 2]>>;
+
 /// What a straight run has made of a register so far.
 #[derive(Clone, Default)]
 struct Current {
     /// How many operations have written it.
     version: u32,
-    /// The first cycle in which its value can be used, counted from the run's start.
-    ready: u32,
     /// The product whose value it is.
     product: Option<usize>,
 }
@@ -50,8 +53,6 @@ struct Product {
     /// The versions of its sources when it reads them, and of its result.
     versions: [u32; 2],
     version: u32,
-    /// When its operands are there.
-    issue: u32,
     /// Who reads it, as which source; of the second reader on it only matters that there is one.
     readers: SmallVec<[(Where, usize); 2]>,
     /// Whether nothing writes its register again before the run ends.
@@ -85,20 +86,15 @@ pub(crate) fn contract(ir: &mut Ir, is_on: impl Fn(usize) -> bool) -> Contracted
             let free = !(product.last && exposed[product.dest.index()]) && !product.stale;
             (wanted && free && has_place(ir, reader, fusion)).then_some((reader, **fusion))
         };
-        // By sum; of two products in one sum the one that is there later, for then the sum waits for one operation, not two.
-        let mut chosen: Vec<(Where, usize, Fusion)> = Vec::new();
-        for (index, product) in products.iter().enumerate() {
-            let Some((reader, fusion)) = fits(product) else { continue };
-            match chosen.iter_mut().find(|(sum, ..)| *sum == reader) {
-                Some((_, other, _)) if products[*other].issue > product.issue => {}
-                Some(taken) => *taken = (reader, index, fusion),
-                None => chosen.push((reader, index, fusion)),
+        let mut wishes = Wishes::new();
+        for product in &products {
+            if let Some((sum, fusion)) = fits(product) {
+                wishes.entry(sum).or_default().push((product.at, fusion));
             }
         }
-        chosen.sort_by_key(|(sum, ..)| *sum);
-        for (sum, index, fusion) in chosen {
-            contracted.contractions.push(fuse(ir, &products[index], sum, fusion));
-            contracted.gone.insert(products[index].dest);
+        for (sum, product, fusion) in choose::choose(ir, run, &wishes) {
+            contracted.gone.extend(at(ir, product).dest);
+            contracted.contractions.push(fuse(ir, product, sum, fusion));
         }
     }
     for operation in ir.operations() {
@@ -150,15 +146,13 @@ fn products(ir: &Ir, known: &[&Fusion], run: runs::Run, current: &mut [Current])
                 product.stale |= !factors.iter().zip(&product.versions).all(as_it_was);
             }
         }
-        let mut written: SmallVec<[(RegisterId, u32, Option<usize>); 4]> = SmallVec::new();
+        let mut written: SmallVec<[(RegisterId, Option<usize>); 4]> = SmallVec::new();
         for (number, operation) in operations() {
-            let issue = operation.reads().iter().map(|source| current[source.index()].ready).max().unwrap_or(0);
             let Some(dest) = operation.dest else { continue };
-            let host = ir.machine.host(operation.row().function);
-            let latency = host.map_or(0, |(slot, unit)| ir.machine.slots[slot].units[unit].latency);
             let register = ir.register(dest);
-            let free =
-                register.kind == RegisterKind::Plain && register.pinned.is_none() && register.preset.is_none();
+            let free = register.kind == RegisterKind::Plain
+                && register.pinned.is_none()
+                && register.preset.is_none();
             let is_product = free && known.iter().any(|fusion| fusion.product == operation.op);
             let product = is_product.then_some(products.len());
             if is_product {
@@ -168,20 +162,19 @@ fn products(ir: &Ir, known: &[&Fusion], run: runs::Run, current: &mut [Current])
                     dest,
                     versions: [version(0), version(1)],
                     version: current[dest.index()].version + 1,
-                    issue,
                     readers: SmallVec::new(),
                     last: true,
                     stale: false,
                 });
             }
-            written.push((dest, issue + latency, product));
+            written.push((dest, product));
         }
-        for (dest, ready, product) in written {
+        for (dest, product) in written {
             let register = &mut current[dest.index()];
             if let Some(old) = register.product {
                 products[old].last = false;
             }
-            *register = Current { version: register.version + 1, ready, product };
+            *register = Current { version: register.version + 1, product };
         }
     }
     products
@@ -192,26 +185,35 @@ fn has_place(ir: &Ir, (bundle, number): Where, fusion: &Fusion) -> bool {
     let Some((slot, _)) = ir.machine.host(fusion.fused.row().function) else { return false };
     let operations = &ir.bundles[bundle].operations;
     let dest = operations[number].dest;
-    let others = || operations.iter().enumerate().filter(|(other, _)| *other != number).map(|(_, other)| other);
+    let others =
+        || operations.iter().enumerate().filter(|(other, _)| *other != number).map(|(_, other)| other);
     let taken = others().any(|other| other.slot == Some(slot as u8));
     // A branch on what its own bundle computes cannot wait for a copy.
-    let branches = others().any(|other| other.redirects() && dest.is_some_and(|dest| other.reads().contains(&dest)));
+    let branches =
+        others().any(|other| other.redirects() && dest.is_some_and(|dest| other.reads().contains(&dest)));
     let place = dest.and_then(|dest| ir.register(dest).pinned);
     !taken && !branches && place.is_none_or(|address| ir.machine.slots[slot].bank.contains(address))
 }
 
 /// Puts the fused operation in the sum's place, and takes the product out.
-fn fuse(ir: &mut Ir, product: &Product, sum: Where, fusion: Fusion) -> Contraction {
-    let first = *at(ir, product.at);
+fn fuse(ir: &mut Ir, product: Where, sum: Where, fusion: Fusion) -> Contraction {
+    let first = *at(ir, product);
     let second = *at(ir, sum);
     let slot = ir.machine.host(fusion.fused.row().function).map(|(slot, _)| slot as u8);
     let [a, b, _] = first.sources;
     let sources = [a, b, second.sources[1 - fusion.source]];
     // No operand of the tree is one of its own: messages point at the sum.
     let written = (u32::MAX, 0);
-    ir.bundles[sum.0].operations[sum.1] =
-        Operation { op: fusion.fused, slot, sources, constant: Constant::None, made: true, written, ..second };
+    ir.bundles[sum.0].operations[sum.1] = Operation {
+        op: fusion.fused,
+        slot,
+        sources,
+        constant: Constant::None,
+        made: true,
+        written,
+        ..second
+    };
     // Taken out of its bundle once nothing counts on its place.
-    ir.bundles[product.at.0].operations[product.at.1] = Operation { made: true, ..first.idle() };
+    ir.bundles[product.0].operations[product.1] = Operation { made: true, ..first.idle() };
     Contraction { mnemonic: fusion.fused.row().mnemonic, product: first.location, sum: second.location }
 }

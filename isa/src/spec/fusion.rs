@@ -26,8 +26,14 @@ static FUSIONS: LazyLock<Vec<Fusion>> = LazyLock::new(|| {
     for product in of(Function::Multiply, Shape::Dab) {
         for sum in of(Function::Add, Shape::Dab) {
             for source in [0, 1] {
-                let fused = of(Function::Fused, Shape::Dabc).find(|fused| does_both(product, sum, source, fused));
-                fusions.extend(fused.map(|fused| Fusion { product: product.op, sum: sum.op, source, fused: fused.op }));
+                let fused =
+                    of(Function::Fused, Shape::Dabc).find(|fused| does_both(product, sum, source, fused));
+                fusions.extend(fused.map(|fused| Fusion {
+                    product: product.op,
+                    sum: sum.op,
+                    source,
+                    fused: fused.op,
+                }));
             }
         }
     }

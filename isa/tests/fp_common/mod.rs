@@ -290,7 +290,8 @@ impl Triples {
         // Half of these products are half the smallest subnormal number.
         let tiny = pairs.random.bits() & 1 == 0;
         if kind == 11 {
-            let (i, exponent) = (pairs.random.bits() & 7, pairs.random.between(1, if tiny { 102 } else { 254 }));
+            let (i, exponent) =
+                (pairs.random.bits() & 7, pairs.random.between(1, if tiny { 102 } else { 254 }));
             a = pairs.pack(exponent, i);
             let other = if tiny { 103 - exponent } else { pairs.random.between(80, 200) };
             b = pairs.pack(other, 0x0080_0000 - 2 * i);

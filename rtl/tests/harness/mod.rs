@@ -262,7 +262,12 @@ impl Simulation {
                     for (j, &b) in numbers.iter().enumerate() {
                         for &c in numbers.iter().skip((i + j) % step).step_by(step) {
                             let sources = [a, b, c];
-                            requests.push(Request { op: operation.op, code: operation.code, sources, idle: 0 });
+                            requests.push(Request {
+                                op: operation.op,
+                                code: operation.code,
+                                sources,
+                                idle: 0,
+                            });
                         }
                     }
                     self.check(&requests)?;
