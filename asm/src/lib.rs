@@ -54,7 +54,7 @@ pub use homes::{Adjustment, Made};
 pub use output::{disasm, image, listing, names};
 pub use report::diag::{Diagnostic, Diagnostics};
 pub use report::levels::Levels;
-pub use report::{diag, levels, source};
+pub use report::{diag, levels, nearest, source};
 pub use syntax::{Expression, expr};
 
 /// What the assembler is to do.
@@ -134,7 +134,7 @@ pub struct Assembled {
 }
 
 impl Assembled {
-    /// What a debugger wants to know of the program: for [`image::write_with`].
+    /// What a debugger needs to know of the program: for [`image::write_with`].
     pub fn debug_info(&self) -> names::DebugInfo {
         let files = self.sources.files().iter();
         names::DebugInfo {

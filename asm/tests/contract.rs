@@ -116,7 +116,7 @@ fn where_it_is_on() {
     };
     let count = |text: &str, machine, contract| {
         let assembled = assembled(text, machine, Schedule::AsWritten, contract);
-        let words = (0..assembled.program.bundles()).flat_map(|at| assembled.program.bundle(at));
+        let words = assembled.program.addresses().flat_map(|at| assembled.program.bundle(at));
         let operations = words.flat_map(|bundle| bundle.expect("it is legal"));
         let fused = operations.filter(|one| one.op.row().function == Function::Fused).count();
         assert_eq!(fused, assembled.contractions.len());

@@ -4,12 +4,12 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use takt_emu::Statistics;
-use takt_isa::timing::{Address, Cause};
-use takt_isa::{Function, Program, ROWS};
+use takt_isa::timing::Cause;
+use takt_isa::{BundleAddress, Function, Program, ROWS};
 
 /// How many of a program's operations round a product and a sum together.
 pub(crate) fn fused_operations(program: &Program) -> usize {
-    let bundles = (0..program.bundles()).filter_map(|address| program.bundle(address)?.ok());
+    let bundles = program.addresses().filter_map(|address| program.bundle(address)?.ok());
     bundles.flatten().filter(|instruction| instruction.op.row().function == Function::Fused).count()
 }
 
@@ -31,7 +31,7 @@ pub(crate) struct Account {
     pub(crate) operations: BTreeMap<&'static str, u64>,
     /// By kind of cause, all of them.
     stalls: BTreeMap<&'static str, u64>,
-    causes: Vec<((Address, Cause), u64)>,
+    causes: Vec<((BundleAddress, Cause), u64)>,
 }
 
 impl Account {

@@ -18,7 +18,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_emu::Emulator;
 use takt_isa::program::Port;
-use takt_isa::{Function, Machine, Program, T3};
+use takt_isa::{Function, Machine, Program, Register, T3};
 use takt_programs::arm::{
     Arm as OnArm, CONFIGURATIONS, Configuration, FORWARD_EXAMPLE, ForwardResult, GOOD, INVERSE_EXAMPLE,
     InverseResult, Pose, RoundTrip, Sweep, forward, inverse, square, sweep,
@@ -77,13 +77,13 @@ const PAPER_ARM_CLOCK: f64 = 50.0;
 /// A program with its ports in an order of ours.
 struct Ported {
     emulator: Emulator,
-    inputs: Vec<u16>,
-    outputs: Vec<u16>,
+    inputs: Vec<Register>,
+    outputs: Vec<Register>,
 }
 
 impl Ported {
     fn new(program: &Program, inputs: &[&str], outputs: &[&str]) -> Result<Ported> {
-        let registers = |ports: &[Port], names: &[&str]| -> Result<Vec<u16>> {
+        let registers = |ports: &[Port], names: &[&str]| -> Result<Vec<Register>> {
             let find = |name: &&str| ports.iter().find(|port| port.name == **name).map(|port| port.register);
             names
                 .iter()
@@ -105,8 +105,9 @@ impl Ported {
         if !report.nan_writes.is_empty() {
             bail!("a NaN was written to an output port");
         }
-        let value =
-            |register: &u16| self.emulator.output_bits(*register).context("an output port was not written");
+        let value = |register: &Register| {
+            self.emulator.output_bits(*register).context("an output port was not written")
+        };
         Ok((self.outputs.iter().map(value).collect::<Result<_>>()?, report.cycles))
     }
 }

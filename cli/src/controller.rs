@@ -7,7 +7,7 @@ use crate::select::suggest;
 use anyhow::{Result, anyhow, bail};
 use takt_emu::{Emulator, Event, PeriodError, PeriodReport, Statistics};
 use takt_isa::program::Port;
-use takt_isa::{Program, Type};
+use takt_isa::{Program, Register, Type};
 use takt_programs::hybrid::Outputs;
 use takt_programs::hybrid::closed_loop::{Inputs, TrackingController};
 use takt_programs::hybrid::ports::{INPUTS, OUTPUTS, Port as RobotPort, PortType};
@@ -18,8 +18,8 @@ const AXES: usize = 5;
 /// Registers of a program for the ports of the tracking algorithm.
 #[derive(Clone)]
 struct Binding {
-    inputs: [u16; INPUTS.len()],
-    outputs: [u16; OUTPUTS.len()],
+    inputs: [Register; INPUTS.len()],
+    outputs: [Register; OUTPUTS.len()],
 }
 
 impl Binding {
@@ -27,7 +27,8 @@ impl Binding {
         if let Some(port) = program.inputs.iter().find(|port| !is_among(&INPUTS, &port.name)) {
             bail!("this is no tracking program: nothing gives its input port `{}` a value", port.name);
         }
-        let mut binding = Binding { inputs: [0; INPUTS.len()], outputs: [0; OUTPUTS.len()] };
+        let mut binding =
+            Binding { inputs: [Register::ZERO; INPUTS.len()], outputs: [Register::ZERO; OUTPUTS.len()] };
         for (port, register) in INPUTS.iter().zip(&mut binding.inputs) {
             *register = find("input", port, &program.inputs, &INPUTS)?;
         }
@@ -43,7 +44,7 @@ fn is_among(ports: &[RobotPort], name: &str) -> bool {
 }
 
 /// The register of one of the algorithm's ports in a program.
-fn find(kind: &str, wanted: &RobotPort, have: &[Port], all: &[RobotPort]) -> Result<u16> {
+fn find(kind: &str, wanted: &RobotPort, have: &[Port], all: &[RobotPort]) -> Result<Register> {
     let name = wanted.name;
     let port = have.iter().find(|port| port.name == name).ok_or_else(|| {
         let others = have.iter().map(|port| port.name.as_str()).filter(|name| !is_among(all, name));
@@ -109,7 +110,7 @@ impl OnEmulator {
     }
 
     /// The registers of the algorithm's inputs, in their order.
-    pub(crate) fn inputs(&self) -> [u16; INPUTS.len()] {
+    pub(crate) fn inputs(&self) -> [Register; INPUTS.len()] {
         self.binding.inputs
     }
 

@@ -131,11 +131,7 @@ struct Ran {
     alone: bool,
 }
 
-fn run_rows(
-    program: &Program,
-    rows: &[Vec<(u16, u32)>],
-    simulation: Simulation,
-) -> Result<Ran, LockstepError> {
+fn run_rows(program: &Program, rows: &[ports::Row], simulation: Simulation) -> Result<Ran, LockstepError> {
     let first = rows.first().map(Vec::as_slice).unwrap_or_default();
     let mut lockstep = Lockstep::new(program, simulation, first)?;
     let mut periods = 0;

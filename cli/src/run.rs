@@ -35,7 +35,7 @@ pub(crate) struct Run {
     machine: OptionalMachine,
     #[command(flatten)]
     source: SourceArguments,
-    /// CSV with one named column for each input port and one row for each period; `-` is standard input.
+    /// CSV with one named column for each input port and one row for each period; other columns are ignored; `-` is standard input.
     #[arg(long, value_name = "CSV")]
     inputs: Option<PathBuf>,
     /// Where the output ports go, as CSV, one row for each period, with a column `cycles`; `-` is standard output, where
@@ -119,7 +119,7 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
     trace_file.map_or(Ok(()), Out::finish)?;
     let denials = watch.end(&emulator);
     let periods = match result {
-        // Who has stopped reading wants no summary; what happened until then counts.
+        // A reader that has gone needs no summary; what happened until then counts.
         Err(error) if output::is_closed_pipe(&error) => return denials.verdict(),
         result => result?,
     };

@@ -3,8 +3,8 @@
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use takt_asm::Contract;
-use takt_asm::diag::nearest;
 use takt_asm::levels::Wish;
+use takt_asm::nearest;
 use takt_isa::{MACHINES, Machine, Op, ROWS, Row};
 
 /// `--machine`.

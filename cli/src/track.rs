@@ -178,7 +178,7 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
     closed |= output::unless_closed(table.map_or(Ok(()), |Table(file)| file.finish()))?;
     let denials = closed_loop.controller().denials();
     if closed {
-        // Who has stopped reading wants no tables; what happened until then counts.
+        // A reader that has gone needs no tables; what happened until then counts.
         return denials.verdict();
     }
     if let Some((mut file, plot)) = drawing {

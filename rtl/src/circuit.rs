@@ -79,8 +79,8 @@ pub enum CircuitError {
          header of rtl/units/{0}.v, and what it computes below"
     )]
     Missing(&'static str, String),
-    /// The row wants of the circuit what it refuses.
-    #[error("unit `{unit}` has {} {value}; rtl/units/{unit}.v wants {limit}", limit.quantity)]
+    /// The row asks for what the circuit refuses.
+    #[error("unit `{unit}` has {} {value}; rtl/units/{unit}.v needs {limit}", limit.quantity)]
     Limit {
         /// The unit.
         unit: &'static str,
@@ -362,11 +362,11 @@ mod tests {
         use takt_isa::spec::units::{ALU_LATE, CONVERT, DIVIDE};
         assert_eq!(
             message(Unit { latency: 4, ..ADD }),
-            "unit `add` has latency 4; rtl/units/add.v wants latency 5"
+            "unit `add` has latency 4; rtl/units/add.v needs latency 5"
         );
         assert_eq!(
             message(Unit { interval: 13, ..DIVIDE }),
-            "unit `divide` has interval 13; rtl/units/divide.v wants interval 14 at least"
+            "unit `divide` has interval 13; rtl/units/divide.v needs interval 14 at least"
         );
         assert!(message(Unit { latency: 6, ..CONVERT }).ends_with("latency 4 or 5"));
         assert!(message(Unit { latency: 2, ..ALU_LATE }).ends_with("latency 3 to 16"));

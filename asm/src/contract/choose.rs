@@ -73,7 +73,7 @@ fn nodes(ir: &Ir, run: runs::Run, wishes: &Wishes) -> Vec<Node> {
 
 fn latency(ir: &Ir, op: Op) -> u32 {
     let host = ir.machine.host(op.row().function);
-    host.map_or(0, |(slot, unit)| ir.machine.slots[slot].units[unit].latency)
+    host.map_or(0, |(slot, unit)| ir.machine.slot(slot).units[unit].latency)
 }
 
 /// The operations that a fused one waits for: those of the product's factors and of what is added.

@@ -187,19 +187,19 @@ fn has_place(ir: &Ir, (bundle, number): Where, fusion: &Fusion) -> bool {
     let dest = operations[number].dest;
     let others =
         || operations.iter().enumerate().filter(|(other, _)| *other != number).map(|(_, other)| other);
-    let taken = others().any(|other| other.slot == Some(slot as u8));
+    let taken = others().any(|other| other.slot == Some(slot));
     // A branch on what its own bundle computes cannot wait for a copy.
     let branches =
         others().any(|other| other.redirects() && dest.is_some_and(|dest| other.reads().contains(&dest)));
     let place = dest.and_then(|dest| ir.register(dest).pinned);
-    !taken && !branches && place.is_none_or(|address| ir.machine.slots[slot].bank.contains(address))
+    !taken && !branches && place.is_none_or(|address| ir.machine.slot(slot).bank.contains(address))
 }
 
 /// Puts the fused operation in the sum's place, and takes the product out.
 fn fuse(ir: &mut Ir, product: Where, sum: Where, fusion: Fusion) -> Contraction {
     let first = *at(ir, product);
     let second = *at(ir, sum);
-    let slot = ir.machine.host(fusion.fused.row().function).map(|(slot, _)| slot as u8);
+    let slot = ir.machine.host(fusion.fused.row().function).map(|(slot, _)| slot);
     let [a, b, _] = first.sources;
     let sources = [a, b, second.sources[1 - fusion.source]];
     // No operand of the tree is one of its own: messages point at the sum.

@@ -61,6 +61,6 @@ units! {
     DIVIDE    divide    [Divide]      18/14 [] "Iterative radix-4 divider.";
     ROOT      root      [Root]        16/13 [] "Iterative square root, two bits a cycle.";
     SINE      sine      [Sine]        14/1 ["aligned" "multiple" "table" "multiple of π/2" "remainder" "segment" "coefficients" "slope's product" "polynomial" "product" "sums" "difference" "rounded"] "Sine and cosine: the distance from the nearest multiple of π/2, which comes from a table, and a piecewise quadratic; three 18x18 products.";
-    ARCTANGENT arctangent [Arctangent] 24/16 [] "Division by digits whose divisor turns with the angle already found; a table of arctangents; no multiplier.";
-    ARCCOSINE arccosine [Arccosine]   30/16 [] "Square root by digits, each of which adds its multiple of a function taken from a table; no multiplier.";
+    ARCTANGENT arctangent [Arctangent] 24/16 [] "Digit-by-digit division whose divisor grows with the digits found; a table of arctangents; no multiplier.";
+    ARCCOSINE arccosine [Arccosine]   30/16 [] "Digit-by-digit square root; each digit adds its multiple of a function from a table; no multiplier.";
 }
