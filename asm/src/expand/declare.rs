@@ -136,6 +136,19 @@ impl Expander<'_> {
         Ok(())
     }
 
+    /// The word of a directive that switches something on or off.
+    pub(crate) fn is_on(&mut self, at: At, word: Name, directive: &'static str) -> Result<bool, Reported> {
+        let name = self.context.name(at, word.name, word.span)?;
+        match self.context.scopes.text(name) {
+            "on" => Ok(true),
+            "off" => Ok(false),
+            other => {
+                let message = format!("`.{directive}` is `on` or `off`, not `{other}`");
+                Err(self.context.error(at.scope, directive, word.span, message))
+            }
+        }
+    }
+
     /// `.ports`: whether they are latched.
     pub(crate) fn ports(&mut self, at: At, word: Name) -> Result<(), Reported> {
         let name = self.context.name(at, word.name, word.span)?;

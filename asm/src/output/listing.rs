@@ -59,6 +59,11 @@ impl<'a> Lister<'a> {
             program.data.len(),
             program.constants.len()
         ));
+        match self.assembled.contractions.len() {
+            0 => {}
+            1 => self.line(format_args!("; 1 product fused into a sum")),
+            count => self.line(format_args!("; {count} products fused into sums")),
+        }
         self.line(format_args!("; addr  {heads}line            source"));
         let mut labels = program.symbols.iter().filter(|symbol| symbol.space == Space::Code).peekable();
         for address in program.addresses() {

@@ -44,6 +44,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         numbers: BTreeMap::new(),
         data: Vec::new(),
         raw: Vec::new(),
+        contracted: Vec::new(),
         files: Vec::new(),
         versions: Vec::new(),
     };
@@ -120,6 +121,7 @@ impl Resolver<'_> {
                 self.ir.loop_bounds.push(LoopBound { position: self.ir.bundles.len() as u32, most });
             }
             self.item(item);
+            self.ir.contracted.resize(self.ir.bundles.len(), item.contracted);
         }
         self.place_labels(section, u32::MAX);
     }

@@ -45,6 +45,8 @@ functions! {
     Convert,
     /// binary32 multiplication.
     Multiply,
+    /// binary32 product and sum with one rounding.
+    Fused,
     /// binary32 division.
     Divide,
     /// binary32 square root.
@@ -300,10 +302,14 @@ instructions! { [a b c]
     itof     0x52 Convert  Da    [F I]     { = A::itof(a) }                                      "d = float(a)" "From a signed integer, rounded to nearest even. No flags.";
     ftoi     0x53 Convert  Da    [I F]     { = A::ftoi(a) }                                      "d = integer(a)" "Rounded to nearest even, saturating at -2^31 and 2^31 - 1; NaN gives 2^31 - 1. Invalid where the value does not fit.";
 
-    // ---- 0x6_ binary32 multiplication, division, root, rounded to nearest even.
+    // ---- 0x6_ binary32 multiplication, division, root, and product and sum in one, rounded to nearest even.
     fmul     0x60 Multiply Dab   [F F F]   { = A::mul(a, b) }                                    "d = a · b"   "Invalid on 0 · ∞ and on a signaling NaN; overflow.";
     fdiv     0x61 Divide   Dab   [F F F]   { = A::div(a, b) }                                    "d = a / b"   "Invalid on 0/0, ∞/∞ and a signaling NaN; divide by zero on finite/0; overflow.";
     fsqrt    0x62 Root     Da    [F F]     { = A::sqrt(a) }                                      "d = √a"      "√-0.0 = -0.0. Invalid on a negative operand and on a signaling NaN.";
+    fma      0x64 Fused    Dabc  [F F F F] { = A::mul_add(a, b, c) }                             "d = a · b + c"    "Rounded once, as fms, fnma and fnms are: the product is exact. The letter n negates the product, s subtracts c (as in x86's names; RISC-V's fnmsub is fnma, its fnmadd fnms). Invalid on 0 · ∞ whatever c is, on ∞ - ∞ and on a signaling NaN; overflow.";
+    fms      0x65 Fused    Dabc  [F F F F] { = A::mul_add(a, b, fp::neg(c).bits) }               "d = a · b - c"    "As fma with -c.";
+    fnma     0x66 Fused    Dabc  [F F F F] { = A::mul_add(fp::neg(a).bits, b, c) }               "d = -(a · b) + c" "As fma with -a. What cancels exactly gives +0.";
+    fnms     0x67 Fused    Dabc  [F F F F] { = A::mul_add(fp::neg(a).bits, b, fp::neg(c).bits) } "d = -(a · b) - c" "As fma with -a and -c.";
 
     // ---- 0x7_ trigonometric functions, in radians.
     fsin     0x70 Sine       Da  [F F]   { = fp::sin(a) }                                      "d = sin(a)"  "At most 0.79499 ulp for |a| ≤ 2π·64 (0x43c90fda), measured over every such operand. Beyond, on ∞ and on a NaN: NaN and invalid.";

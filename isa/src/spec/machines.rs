@@ -156,6 +156,33 @@ T1 = Machine {
     refill: 6,
     resolve: 2,
 };
+
+/// The fast machine with fused multiply-add.
+T4 = Machine {
+    name: "t4",
+    text: "The fast machine with fused multiply-add: product and sum in one operation, with one rounding; division beside the ALU.",
+    slots: &[
+        Slot {
+            name: "mul",
+            bank: bank("m", 0, 256),
+            units: &[
+                Unit { functions: &[Function::Multiply, Function::Fused], ..FUSED },
+                SINE,
+                ARCTANGENT,
+                ARCCOSINE,
+            ],
+        },
+        Slot { name: "add", bank: bank("a", 256, 256), units: &[ADD] },
+        Slot { name: "aux", bank: bank("x", 512, 256), units: &[ALU, CONVERT, DIVROOT, MEMORY, SEQUENCER] },
+    ],
+    inputs: bank("i", 768, 256),
+    outputs_per_bank: 32,
+    code_depth: 1024,
+    data_depth: 1024,
+    stack_depth: 16,
+    refill: 6,
+    resolve: 2,
+};
 }
 
 impl Machine {
