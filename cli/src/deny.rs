@@ -96,7 +96,7 @@ struct Finding {
 #[derive(Clone)]
 pub(crate) struct Watch {
     findings: Vec<Finding>,
-    /// The period underway.
+    /// The current period.
     period: Option<u64>,
     /// The bundle that issued last.
     at: BundleAddress,
@@ -221,13 +221,13 @@ impl Watch {
         }
     }
 
-    /// What was denied and happened, with what issued together with the last `wait` and is still underway.
+    /// What was denied and happened, with what issued together with the last `wait` and is still in flight.
     pub(crate) fn end(&self, emulator: &Emulator) -> Denials {
         let program = emulator.program();
         let mut watch = self.clone();
         let is_float =
             |register| program.outputs.iter().any(|port| port.register == register && port.ty == Type::F);
-        for retire in emulator.underway() {
+        for retire in emulator.in_flight() {
             watch.raised(retire);
             if is_nan(retire.value) && retire.register.is_some_and(is_float) {
                 let operation = Some((retire.slot, retire.register));

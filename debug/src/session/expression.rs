@@ -87,7 +87,7 @@ impl Machine<'_> {
     /// What a bundle that issued in the cycle to come would read.
     pub(crate) fn register(&self, register: Register) -> Option<u32> {
         let now = self.emulator.now();
-        let due = self.emulator.underway().filter(|retire| retire.cycle == now);
+        let due = self.emulator.in_flight().filter(|retire| retire.cycle == now);
         due.filter(|retire| retire.register == Some(register))
             .map(|retire| retire.value)
             .next()
@@ -123,7 +123,7 @@ impl Machine<'_> {
     /// Cycles until the result in flight to a register is there, if there is one.
     pub(crate) fn arrives(&self, register: Register) -> Option<Cycle> {
         let now = self.emulator.now();
-        let flying = self.emulator.underway().filter(|retire| retire.register == Some(register));
+        let flying = self.emulator.in_flight().filter(|retire| retire.register == Some(register));
         flying.map(|retire| retire.cycle.saturating_sub(now)).filter(|left| *left > 0).max()
     }
 
