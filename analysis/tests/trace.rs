@@ -3,7 +3,7 @@
 use takt_analysis::{Trace, trace};
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_emu::Emulator;
-use takt_emu::testing::{self, INPUTS, Random, random_program};
+use takt_emu::testing::{self, Random, random_program};
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{MACHINES, Program};
 
@@ -27,8 +27,8 @@ fn traces_account_for_every_cycle() {
             let program = random_program(seed, machine, testing::Options::TAME);
             let mut emulator = Emulator::new(&program).unwrap();
             let mut random = Random::new(seed);
-            for i in 0..INPUTS {
-                emulator.set_input_bits(machine.inputs.base + i, random.word()).unwrap();
+            for input in testing::input_ports(machine) {
+                emulator.set_input_bits(input, random.word()).unwrap();
             }
             let once = trace(&mut emulator).unwrap();
             assert_eq!(once.cycles, emulator.now());

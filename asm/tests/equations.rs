@@ -357,7 +357,7 @@ fn period(declarations: &str, lines: &str) -> Vec<String> {
         ".input x, y, n:int\n.output a, b\n.reg t u v w\n{declarations}\n.once\n t, u, v, w = 0, 0, 0, 0\n wait period\n.period\nperiod:\n{lines}\n wait period\n"
     );
     let assembled = good(&source);
-    let start = assembled.program.sections[1].start as usize;
+    let start = assembled.program.sections[1].start.index();
     bundles(&assembled)[start..].to_vec()
 }
 

@@ -6,7 +6,7 @@
 
 use crate::context::{At, Binding, Reported};
 use crate::expand::{Expander, Frame, FrameKind};
-use crate::ir::{Register, RegisterId, RegisterKind};
+use crate::ir::{RegisterId, RegisterKind, VirtualRegister};
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
@@ -241,7 +241,7 @@ impl Expander<'_> {
     /// A register for a value that the source gives no name.
     fn register(&mut self, span: Span) -> RegisterId {
         let registers = &mut self.context.declared.registers;
-        registers.push(Register::unnamed(span));
+        registers.push(VirtualRegister::unnamed(span));
         RegisterId::new(registers.len() - 1)
     }
 
@@ -253,10 +253,10 @@ impl Expander<'_> {
     }
 }
 
-impl Register {
+impl VirtualRegister {
     /// One for a value that the source gives no name.
-    pub(crate) fn unnamed(span: Span) -> Register {
-        Register {
+    pub(crate) fn unnamed(span: Span) -> VirtualRegister {
+        VirtualRegister {
             name: String::new(),
             kind: RegisterKind::Plain,
             ty: Type::B,

@@ -6,7 +6,7 @@ use crate::context::{At, Reported, Wanted, type_name, words};
 use crate::expand::Item;
 use crate::expand::equation::Results;
 use crate::ir::given::Kind;
-use crate::ir::{Bundle, Constant, Operation, Register, RegisterId, RegisterKind};
+use crate::ir::{Bundle, Constant, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
@@ -18,7 +18,7 @@ use crate::syntax::expr::Value;
 use smallvec::SmallVec;
 use std::rc::Rc;
 use takt_isa::program::{Columns, Location};
-use takt_isa::{Op, Type};
+use takt_isa::{Op, SlotIndex, Type};
 
 /// What a part of an equation is.
 #[derive(Clone, Copy, Debug)]
@@ -265,7 +265,7 @@ impl Resolver<'_> {
             (Kind::Float, Kind::Int) => (Type::F, Type::I),
             _ => return Ok(()),
         };
-        let Register { name, span: declared, .. } = &self.context.declared.registers[target.index()];
+        let VirtualRegister { name, span: declared, .. } = &self.context.declared.registers[target.index()];
         let (name, declared) = (name.clone(), *declared);
         let message = format!("this is {}, and `{name}` {}", words(is), words(to));
         let written = self.context.reports.sources.text(term.span);
@@ -323,7 +323,7 @@ impl Resolver<'_> {
     /// A register without a name.
     pub(super) fn fresh(&mut self, span: Span) -> RegisterId {
         let registers = &mut self.context.declared.registers;
-        registers.push(Register::unnamed(span));
+        registers.push(VirtualRegister::unnamed(span));
         RegisterId::new(registers.len() - 1)
     }
 
@@ -333,7 +333,7 @@ impl Resolver<'_> {
         at: At,
         line: &Line,
         op: Op,
-        slot: Option<u8>,
+        slot: Option<SlotIndex>,
         sources: [RegisterId; 3],
         dest: RegisterId,
         span: Span,

@@ -2,7 +2,8 @@
 
 use crate::context::{At, Reported};
 use crate::ir::given::Kind;
-use crate::report::diag::{Diagnostic, nearest};
+use crate::report::diag::Diagnostic;
+use crate::report::nearest;
 use crate::report::source::Span;
 use crate::resolve::Resolver;
 use crate::resolve::equation::Term;

@@ -14,7 +14,8 @@ use crate::expand::load::Loader;
 use crate::expand::{self, Data, Flat, Item, Timing};
 use crate::ir::given::Kind;
 use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
-use crate::report::diag::{Diagnostic, nearest};
+use crate::report::diag::Diagnostic;
+use crate::report::nearest;
 use crate::report::source::Span;
 use crate::resolve::forms::Forms;
 use crate::resolve::sharing::Sharing;
@@ -24,7 +25,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 use takt_isa::program::{Columns, Location};
 use takt_isa::spec::instructions::Function;
-use takt_isa::{Op, ROWS, Type};
+use takt_isa::{Op, ROWS, SlotIndex, Type};
 
 /// The most cycles that a demand on ports can name: many times what a program memory holds.
 const MAX_CYCLES: u32 = 1 << 24;
@@ -36,7 +37,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         .iter()
         .map(|row| match row.function {
             Function::Idle => Host::Any,
-            function => machine.host(function).map_or(Host::None, |(slot, _)| Host::Slot(slot as u8)),
+            function => machine.host(function).map_or(Host::None, |(slot, _)| Host::Slot(slot)),
         })
         .collect();
     let ir = Ir {
@@ -51,6 +52,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         numbers: BTreeMap::new(),
         data: Vec::new(),
         raw: Vec::new(),
+        contracted: Vec::new(),
         files: Vec::new(),
         versions: Vec::new(),
     };
@@ -106,7 +108,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
 #[derive(Clone, Copy)]
 enum Host {
     Any,
-    Slot(u8),
+    Slot(SlotIndex),
     None,
 }
 
@@ -152,6 +154,7 @@ impl Resolver<'_> {
                 self.sharing.cut();
             }
             self.item(item);
+            self.ir.contracted.resize(self.ir.bundles.len(), item.contracted);
         }
         self.place_labels(section, u32::MAX);
     }
@@ -304,7 +307,7 @@ impl Resolver<'_> {
             let Some(first) = operations[..index].iter().find(|before| before.slot == Some(slot)) else {
                 continue;
             };
-            let name = machine.slots[slot as usize].name;
+            let name = machine.slot(slot).name;
             let message = format!("two operations of the bundle need slot `{name}`");
             let what = |operation: &Operation| match operation.constant {
                 Constant::Raw(_) => ".raw",
@@ -330,7 +333,7 @@ impl Resolver<'_> {
     }
 
     /// The slot that executes an instruction; none if any can.
-    fn slot(&mut self, at: At, op: Op, span: Span) -> Result<Option<u8>, Reported> {
+    fn slot(&mut self, at: At, op: Op, span: Span) -> Result<Option<SlotIndex>, Reported> {
         let row = op.row();
         match self.slots[op as usize] {
             Host::Any => Ok(None),
@@ -404,7 +407,8 @@ impl Resolver<'_> {
         let [slot, word] = operands else { return Err(Reported) };
         let slots = self.ir.machine.slots;
         let name = self.context.reports.sources.text(slot.span).to_owned();
-        let Some(index) = slots.iter().position(|slot| slot.name == name) else {
+        let mut numbered = self.ir.machine.numbered_slots();
+        let Some((index, _)) = numbered.find(|(_, slot)| slot.name == name) else {
             let names = slots.iter().map(|slot| slot.name);
             let message = format!("{} has no slot `{name}`", self.ir.machine.name);
             let meant = nearest(&name, names.clone());
@@ -422,7 +426,7 @@ impl Resolver<'_> {
         self.ir.raw.push(bits);
         Ok(Operation {
             op: Op::nop,
-            slot: Some(index as u8),
+            slot: Some(index),
             dest: None,
             sources: [RegisterId::ZERO; 3],
             constant: Constant::Raw(self.ir.raw.len() as u32 - 1),

@@ -309,6 +309,8 @@ pub(crate) enum DirectiveKind {
     Error(String),
     /// `.schedule` and `on` or `off`.
     Schedule(Name),
+    /// `.contract` and `on` or `off`.
+    Contract(Name),
     /// `.ports` and `latched` or `direct`.
     Ports(Name),
     /// `.loop_bound`.
@@ -381,6 +383,7 @@ directives! {
     Loc ".loc" "\"file\" line";
     Error ".error" "\"text\"";
     Schedule ".schedule" "on|off";
+    Contract ".contract" "on|off";
     Ports ".ports" "latched|direct";
     LoopBound ".loop_bound" "turns";
     Deadline ".deadline" "port, port = cycle";
