@@ -17,11 +17,11 @@
 //! The stages, each a folder:
 //!
 //! ```text
-//! text ─ syntax ─ tree ─ expand ─ flat list ─ resolve ─ ir ─ check ─ homes ─ schedule ─ emit ─ Program ─ output
+//! text ─ syntax ─ tree ─ expand ─ flat list ─ resolve ─ ir ─ check ─ contract ─ homes ─ schedule ─ emit ─ Program ─ output
 //! ```
 //!
 //! `syntax` reads a file; `expand` writes out macros, repetitions and includes, and declares; `resolve` gives every name its
-//! meaning; `check` looks at the whole program (types, who writes what); `homes` finds each value its place; `schedule` packs bundles;
+//! meaning; `check` looks at the whole program (types, who writes what); `contract` fuses products into sums; `homes` finds each value its place; `schedule` packs bundles;
 //! `emit` places registers and makes words; `output` is what can be made of the result. `context` is what the stages before
 //! `schedule` share, `report` how mistakes are told. A stage uses those before it, never one after it.
 //!
@@ -30,6 +30,7 @@
 
 mod check;
 mod context;
+mod contract;
 mod emit;
 mod expand;
 mod homes;
@@ -47,6 +48,7 @@ use report::source::Sources;
 use std::sync::Arc;
 use takt_isa::{Machine, Program, T3};
 
+pub use contract::Contraction;
 pub use expand::load::{FileLoader, LoadError, Loader, MemoryLoader, Search};
 pub use homes::{Adjustment, Made};
 pub use output::{disasm, image, listing, names};
@@ -62,6 +64,8 @@ pub struct Options {
     pub machine: &'static Machine,
     /// Which bundles the scheduler packs.
     pub schedule: Schedule,
+    /// Which products are fused into sums.
+    pub contract: Contract,
     /// How long it searches; 0 is one pass.
     pub effort: u32,
     /// What becomes of warnings.
@@ -80,11 +84,24 @@ pub enum Schedule {
     None,
 }
 
+/// Which products are fused into the sums that alone use them, on machines that have an operation for it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Contract {
+    /// Those that the source says (`.contract on`).
+    #[default]
+    AsWritten,
+    /// All.
+    All,
+    /// None.
+    None,
+}
+
 impl Default for Options {
     fn default() -> Options {
         Options {
             machine: &T3,
             schedule: Schedule::AsWritten,
+            contract: Contract::AsWritten,
             effort: schedule::DEFAULT_EFFORT,
             levels: Levels::default(),
         }
@@ -106,6 +123,8 @@ pub struct Assembled {
     pub blocks: Vec<schedule::BlockReport>,
     /// What is demanded of ports (`.deadline`, `.order`, `.late`) and how it is met.
     pub timing: Vec<schedule::TimingReport>,
+    /// Products that were fused into sums (`.contract on`), in the order of the sums.
+    pub contractions: Vec<Contraction>,
     /// What was done about registers that operations of several slots write.
     pub adjustments: Vec<Adjustment>,
     /// Words that a macro, a repetition or the assembler itself made: indices into the program's code, ascending.
@@ -161,7 +180,14 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
         emit::limits(&ir, &mut context.reports.sink);
         return Err(context.reports.sink.finish(Arc::new(context.reports.sources)));
     }
+    let marked = std::mem::take(&mut ir.contracted);
+    let contracted = contract::contract(&mut ir, |bundle| match options.contract {
+        Contract::AsWritten => marked.get(bundle).copied().unwrap_or(false),
+        Contract::All => true,
+        Contract::None => false,
+    });
     let mut homes = homes::choose(&mut ir);
+    homes.quiet.extend(contracted.gone);
     let values = values::split(&mut ir, &mut homes);
     copies::insert(&mut ir, &mut homes, &values);
     check::check(&mut context, &ir, &homes);
@@ -177,7 +203,8 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
     }
     let adjustments = copies::report(&ir, homes);
     let placement = place::place(&ir, &mut sink);
-    let emitted = emit::emit(&ir, &placement, &mut sink);
+    let mut emitted = emit::emit(&ir, &placement, &mut sink);
+    emitted.program.parts = names::parts(&sources, &emitted);
     let names = names::names(&context, &ir, &placement, &emitted);
     let report = sink.finish(Arc::clone(&sources));
     if report.has_errors() {
@@ -196,6 +223,7 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
         constants,
         blocks,
         timing,
+        contractions: contracted.contractions,
         adjustments,
         expanded: emitted.expanded,
         names,

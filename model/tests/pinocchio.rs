@@ -61,7 +61,6 @@ fn equations_are_right() {
         for (what, name, _) in What::ALL {
             // Angles that are taken for quarter turns are off by up to 3e-9 in these files.
             let error = error(&mut reference, &case, what, Rewrites::ALL, urdf::SNAP, states());
-            println!("{} {name}: {error:.1e}", case.name);
             assert!(error < 1e-6, "{}: {name}: {error:.1e}", case.name);
         }
     }

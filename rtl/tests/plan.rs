@@ -82,8 +82,8 @@ fn every_reason() {
             "slot `mul`: unit `divide` has interval 13; rtl/units/divide.v needs interval 14 at least",
         ),
         (
-            units(0, &[Unit { name: "fused", ..MULTIPLY }]),
-            "slot `mul`: unit `fused`: there is no circuit rtl/units/fused.v: write it and list it in rtl/src/files.rs",
+            units(0, &[Unit { name: "twofold", ..MULTIPLY }]),
+            "slot `mul`: unit `twofold`: there is no circuit rtl/units/twofold.v: write it and list it in rtl/src/files.rs",
         ),
         // A sine every other cycle, beside an adder.
         (

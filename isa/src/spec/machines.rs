@@ -135,7 +135,7 @@ T1 = Machine {
     slots: &[Slot {
         name: "one",
         bank: bank("r", 0, 512),
-        // A sine at most every nine cycles: then what is underway needs as many places as the other units' latency.
+        // A sine at most every nine cycles: then what is in flight needs as many places as the other units' latency.
         units: &[
             ADD,
             CONVERT,
@@ -151,6 +151,33 @@ T1 = Machine {
     inputs: bank("i", 768, 256),
     outputs_per_bank: 32,
     code_depth: 2048,
+    data_depth: 1024,
+    stack_depth: 16,
+    refill: 6,
+    resolve: 2,
+};
+
+/// The fast machine with fused multiply-add.
+T4 = Machine {
+    name: "t4",
+    text: "The fast machine with fused multiply-add: product and sum in one operation, with one rounding; division beside the ALU.",
+    slots: &[
+        Slot {
+            name: "mul",
+            bank: bank("m", 0, 256),
+            units: &[
+                Unit { functions: &[Function::Multiply, Function::Fused], ..FUSED },
+                SINE,
+                ARCTANGENT,
+                ARCCOSINE,
+            ],
+        },
+        Slot { name: "add", bank: bank("a", 256, 256), units: &[ADD] },
+        Slot { name: "aux", bank: bank("x", 512, 256), units: &[ALU, CONVERT, DIVROOT, MEMORY, SEQUENCER] },
+    ],
+    inputs: bank("i", 768, 256),
+    outputs_per_bank: 32,
+    code_depth: 1024,
     data_depth: 1024,
     stack_depth: 16,
     refill: 6,

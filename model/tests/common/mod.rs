@@ -1,7 +1,7 @@
 //! What Pinocchio and CasADi say, and the robots of `robots.json`.
 //!
 //! `cargo xtask test` installs them; TAKT_VENV names another environment that has them.
-#![allow(dead_code)]
+#![allow(dead_code, unreachable_pub)]
 
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Write};
