@@ -141,8 +141,8 @@ fn angle(text: &str) -> Result<f64, String> {
 
 /// What became of the source on the machine.
 struct Built {
-    cycles: Option<Cycle>,
-    bound: u32,
+    cycles: Cycle,
+    bound: Cycle,
     bundles: usize,
 }
 
@@ -169,13 +169,12 @@ pub(crate) fn run(arguments: &Model, color: bool, out: &mut Out) -> Result<()> {
     let name = arguments.output.clone().filter(|path| !files::is_dash(path));
     let name = name.unwrap_or_else(|| PathBuf::from("model.s"));
     let load = Load::new(machine, color);
-    let built = built(&load.finish(load.assemble(&name, source.into_bytes()))?);
+    let built = built(&load.finish(load.assemble(&name, source.into_bytes()))?)?;
     if arguments.json {
         return output::json(&result_json(arguments, &function, &count, chain, &built), out);
     }
     if !alone {
         let Built { cycles, bound, bundles } = built;
-        let cycles = cycles.map_or_else(|| "unbounded".to_owned(), |cycles| cycles.to_string());
         writeln!(
             out,
             "{cycles} cycles on {}, bound {bound}, chain {chain}; {bundles} bundles",
@@ -244,15 +243,13 @@ fn fits(function: &Function, machine: &Machine) -> Result<()> {
     Ok(())
 }
 
-fn built(assembled: &Assembled) -> Built {
+fn built(assembled: &Assembled) -> Result<Built> {
     let program = &assembled.program;
-    let bounds = takt_analysis::bound(program).ok();
-    let block = assembled.blocks.iter().map(|block| block.bound.cycles()).max();
-    Built {
-        cycles: bounds.and_then(|bounds| bounds.worst_period()),
-        bound: block.unwrap_or(0),
-        bundles: program.bundles() as usize,
-    }
+    let bounds = takt_analysis::bound(program).map_err(|error| anyhow!("no bound: {error}"))?;
+    let cycles = bounds.worst_period().unwrap_or(0);
+    // What the period takes beyond its blocks no schedule changes.
+    let above: u32 = assembled.blocks.iter().map(|block| block.cycles - block.bound.cycles()).sum();
+    Ok(Built { cycles, bound: cycles - Cycle::from(above), bundles: program.bundles() as usize })
 }
 
 fn write_counts(function: &Function, count: &Count, out: &mut Out) -> Result<()> {

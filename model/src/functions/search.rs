@@ -164,7 +164,7 @@ fn notes(robot: &Robot, attempt: &Attempt) -> Vec<String> {
         ));
     }
     if attempt.unit != 1.0 {
-        notes.push(format!("unit of length: {} m", attempt.unit));
+        notes.push(format!("unit of length: {:.6} m", attempt.unit));
     }
     notes
 }
