@@ -15,6 +15,7 @@ mod disasm;
 mod eval;
 mod fault;
 mod files;
+mod fmt;
 mod isa;
 mod load;
 mod machines;
@@ -73,6 +74,7 @@ enum Command {
     Analyse(analyse::Analyse),
     Bound(bound::Bound),
     Eval(eval::Eval),
+    Fmt(fmt::Fmt),
     Rtl(rtl::Rtl),
     Cosim(cosim::Cosim),
     Isa(isa::Isa),
@@ -92,6 +94,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Analyse(analyse) => analyse::run(analyse, color, out),
         Command::Bound(bound) => bound::run(bound, color, out),
         Command::Eval(eval) => eval::run(eval, out),
+        Command::Fmt(fmt) => fmt::run(fmt, out),
         Command::Rtl(rtl) => rtl::run(rtl, color, out),
         Command::Cosim(cosim) => cosim::run(cosim, color, out),
         Command::Isa(isa) => isa::run(isa, out),

@@ -353,7 +353,7 @@ impl<'l> Expander<'l> {
         let ast = &self.context.asts[at.ast as usize];
         let operation = ast.operations[first as usize];
         if count == 1 {
-            let Ok(name) = self.context.name(at, operation.mnemonic.name, operation.mnemonic.span) else {
+            let Ok(name) = self.context.spelled(at, operation.mnemonic.name, operation.mnemonic.span) else {
                 return;
             };
             // A macro cannot have an instruction's name.
@@ -382,6 +382,9 @@ impl<'l> Expander<'l> {
     fn call(&mut self, at: At, name: NameId, operation: Operation) {
         let Some(definition) = self.context.scopes.macros.get_mut(&name) else { return };
         definition.uses += 1;
+        if let Some(notes) = &mut self.context.notes {
+            notes.macro_use(operation.mnemonic.span, name);
+        }
         let MacroDefinition { ast, directive, start, uses } = *definition;
         let body = Rc::clone(&self.context.asts[ast as usize]);
         let DirectiveKind::Macro { parameters, end, name: defined, .. } =
@@ -484,7 +487,7 @@ impl<'l> Expander<'l> {
             }
             DirectiveKind::Rep { variable, first, last, end } => {
                 self.jump(*end + 1);
-                let variable = self.context.name(at, variable.name, variable.span)?;
+                let variable = self.context.spelled(at, variable.name, variable.span)?;
                 let from = self.context.integer(at, *first)?;
                 let to = self.context.integer(at, *last)?;
                 if to.saturating_sub(from) >= limits::REPETITIONS {
@@ -523,7 +526,7 @@ impl<'l> Expander<'l> {
             DirectiveKind::Include(path, library) => self.include(at, path, *library, span)?,
             DirectiveKind::Loc(places) => self.set_loc(at, places)?,
             DirectiveKind::Schedule(word) => {
-                let name = self.context.name(at, word.name, word.span)?;
+                let name = self.context.spelled(at, word.name, word.span)?;
                 match self.context.scopes.text(name) {
                     "on" => self.scheduled = true,
                     "off" => self.scheduled = false,
@@ -581,7 +584,7 @@ impl<'l> Expander<'l> {
         if at.scope != ScopeId::ROOT {
             return Err(Reported);
         }
-        let id = self.context.name(at, name.name, name.span)?;
+        let id = self.context.spelled(at, name.name, name.span)?;
         let text = self.context.scopes.text(id).to_owned();
         if id.op().is_some() {
             let error = Diagnostic::error("declared-twice", name.span, format!("`{text}` is an instruction"))

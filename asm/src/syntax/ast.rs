@@ -380,6 +380,8 @@ pub(crate) struct Ast {
     pub directives: Vec<DirectiveLine>,
     /// Names in lines that could not be read and may have declared them: that they are unknown is no further error.
     pub doubtful: BTreeSet<NameId>,
+    /// Lines, from 1, that could not be read.
+    pub broken: Vec<u32>,
 }
 
 /// A binary or unary operator.
