@@ -154,7 +154,8 @@ impl<'p> Graph<'p> {
     }
 }
 
-fn flow(instruction: &Instruction, known: &BTreeMap<u16, u32>) -> Flow {
+/// Where execution goes on after an instruction that redirects it; `known` holds the bits of registers that never change.
+pub(crate) fn flow(instruction: &Instruction, known: &BTreeMap<u16, u32>) -> Flow {
     let target = instruction.constant;
     let branch = |zero| {
         let value = known.get(&instruction.sources[0]);

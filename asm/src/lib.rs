@@ -48,7 +48,8 @@ use report::source::Sources;
 use std::sync::Arc;
 use takt_isa::{Machine, Program, T3};
 
-pub use expand::load::{FileLoader, LoadError, Loader, MemoryLoader, Search};
+pub use context::type_name;
+pub use expand::load::{FileLoader, LoadError, Loader, MemoryLoader, Open, Search};
 pub use homes::{Adjustment, Made};
 pub use output::{disasm, format, image, listing, names};
 pub use report::diag::{Diagnostic, Diagnostics};

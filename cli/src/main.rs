@@ -18,6 +18,7 @@ mod files;
 mod fmt;
 mod isa;
 mod load;
+mod lsp;
 mod machines;
 mod man;
 mod nan;
@@ -75,6 +76,7 @@ enum Command {
     Bound(bound::Bound),
     Eval(eval::Eval),
     Fmt(fmt::Fmt),
+    Lsp(lsp::Lsp),
     Rtl(rtl::Rtl),
     Cosim(cosim::Cosim),
     Isa(isa::Isa),
@@ -95,6 +97,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Bound(bound) => bound::run(bound, color, out),
         Command::Eval(eval) => eval::run(eval, out),
         Command::Fmt(fmt) => fmt::run(fmt, out),
+        Command::Lsp(lsp) => lsp::run(lsp),
         Command::Rtl(rtl) => rtl::run(rtl, color, out),
         Command::Cosim(cosim) => cosim::run(cosim, color, out),
         Command::Isa(isa) => isa::run(isa, out),

@@ -127,7 +127,7 @@ impl Context {
 }
 
 /// A type as the source writes it.
-pub(crate) const fn type_name(ty: Type) -> &'static str {
+pub const fn type_name(ty: Type) -> &'static str {
     match ty {
         Type::F => "float",
         Type::I => "int",
