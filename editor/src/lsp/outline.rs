@@ -31,6 +31,18 @@ fn sections(file: &File, lines: &[Vec<Token>]) -> Vec<(&'static str, std::ops::R
     found.into_iter().zip(ends).map(|((name, range, _), end)| (name, range, end)).collect()
 }
 
+/// The line, from 0, that a label begins, or that opens the section of that name.
+pub(crate) fn head_line(file: &File, name: &str) -> Option<u32> {
+    let text = &file.text.text;
+    let lines = tokens::lines(text);
+    let word =
+        |tokens: &[Token], index: usize| tokens.get(index).map_or("", |token| &text[token.range.clone()]);
+    let label = lines.iter().position(|tokens| word(tokens, 0) == name && word(tokens, 1) == ":");
+    let section = || sections(file, &lines).into_iter().find(|(section, ..)| section[1..] == *name);
+    let line = label.or_else(|| Some(file.text.line_of(section()?.1.start)));
+    line.map(|line| line as u32)
+}
+
 /// The symbols that a file declares, and its sections.
 #[allow(deprecated, reason = "the protocol's type has the field")]
 pub(crate) fn symbols(front: &Front, file: &File, encoding: Encoding) -> Vec<DocumentSymbol> {

@@ -296,7 +296,11 @@ impl Server<'_> {
             let command = Command { title, command: String::new(), arguments: None };
             Some(CodeLens { range: Range::new(position, position), command: Some(command), data: None })
         };
-        Ok(timing::lenses(counted, &self.settings, &here.file.name).into_iter().filter_map(lens).collect())
+        // Lines of the older text, as all that is counted; a label's is known as long as it has not moved.
+        let old = here.full.and_then(|full| full.files.named(&here.file.name));
+        let head = |name: &str| old.and_then(|file| outline::head_line(file, name));
+        let lenses = timing::lenses(counted, &self.settings, &here.file.name, &head);
+        Ok(lenses.into_iter().filter_map(lens).collect())
     }
 
     fn fixes(&self, params: &CodeActionParams) -> Vec<lsp_types::CodeAction> {

@@ -5,6 +5,7 @@ use crate::lsp::{Settings, plural};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use takt_analysis::StraightIssue;
+use takt_asm::schedule::BlockReport;
 use takt_isa::program::Location;
 use takt_isa::timing::Address;
 use takt_isa::{Instruction, Program};
@@ -89,7 +90,7 @@ fn short(counted: &Counted, words: &[Word]) -> String {
         && let Some(issue) = issue(counted, *address)
         && let Some(&(cause, cycles)) = issue.stalls.iter().max_by_key(|(_, cycles)| *cycles)
     {
-        let _ = write!(text, ", {} waits: {}", plural(u64::from(cycles), "cycle"), program.cause_text(cause));
+        let _ = write!(text, ", stalls {cycles}: {}", program.cause_text(cause));
     }
     text
 }
@@ -134,8 +135,13 @@ fn explained(counted: &Counted, words: &[Word]) -> String {
     text
 }
 
-/// What is said above a line of a file: lines from 0.
-pub(crate) fn lenses(counted: &Counted, settings: &Settings, file: &str) -> Vec<(u32, String)> {
+/// What is said above a line of a file: lines from 0. `head` knows the lines that labels and section directives stand on.
+pub(crate) fn lenses(
+    counted: &Counted,
+    settings: &Settings,
+    file: &str,
+    head: &dyn Fn(&str) -> Option<u32>,
+) -> Vec<(u32, String)> {
     let program = &counted.assembled.program;
     let line = |location: Option<Location>| {
         let location = location?;
@@ -147,43 +153,40 @@ pub(crate) fn lenses(counted: &Counted, settings: &Settings, file: &str) -> Vec<
     match &counted.bounds {
         Ok(bounds) => {
             for section in &bounds.sections {
-                let Some(line) = line(section.location) else { continue };
-                let span = if section.once { section.cycles } else { section.in_time };
-                let cycles = match span.best == span.worst {
-                    true => plural(span.worst, "cycle"),
-                    false => format!("{} to {}", span.best, plural(span.worst, "cycle")),
+                let Some(line) = head(&section.name).or_else(|| line(section.location)) else { continue };
+                let cycles = match section.cycles.best == section.cycles.worst {
+                    true => plural(section.cycles.worst, "cycle"),
+                    false => format!("{} to {}", section.cycles.best, plural(section.cycles.worst, "cycle")),
                 };
-                // The one block that a section is.
-                let mut of = blocks.iter().enumerate().filter(|(_, block)| {
-                    block.address == section.address
-                        && section.ends.contains(&(block.address + block.bundles - 1))
-                });
                 let mut text = format!("{}: {cycles}", section.name);
-                if let Some((number, block)) = of.next() {
-                    let _ = write!(text, ", bound {}", block.bound.cycles());
-                    told.push(number);
-                }
-                if let Some(deadline) = settings.deadline.filter(|_| !section.once) {
-                    match deadline.checked_sub(span.worst + 1) {
-                        Some(spare) => {
-                            let _ = write!(text, ", deadline kept by {}", grouped(spare));
-                        }
-                        None => {
-                            let _ =
-                                write!(text, ", deadline missed by {}", grouped(span.worst + 1 - deadline));
-                        }
+                if section.once {
+                    text.push_str(" from reset");
+                } else {
+                    // The one block that a period is.
+                    let whole = |block: &BlockReport| {
+                        block.address == section.address
+                            && section.ends.contains(&(block.address + block.bundles.saturating_sub(1)))
+                    };
+                    if let Some(number) = blocks.iter().position(whole) {
+                        let _ = write!(text, ", bound {}", blocks[number].bound.cycles());
+                        told.push(number);
+                    }
+                    // As `takt bound --deadline` has it.
+                    let worst = section.in_time.worst + 1;
+                    if let Some(deadline) = settings.deadline {
+                        let (what, by) = match deadline.checked_sub(worst) {
+                            Some(spare) => ("kept", spare),
+                            None => ("missed", worst - deadline),
+                        };
+                        let _ = write!(text, ", deadline {what} by {}", grouped(by));
                     }
                 }
                 lenses.entry(line).or_default().push(text);
             }
         }
         Err(error) => {
-            let at = program
-                .sections
-                .iter()
-                .find(|section| section.name == "period")
-                .map_or(0, |section| section.start);
-            if let Some(line) = line(program.location(at)) {
+            let period = program.sections.iter().find(|section| section.name == "period");
+            if let Some(line) = line(program.location(period.map_or(0, |section| section.start))) {
                 lenses.entry(line).or_default().push(format!("no bound: {error}"));
             }
         }
