@@ -143,7 +143,7 @@ pub(crate) fn index(context: &mut Context, ir: &Ir) -> Index {
     let labels = builder.labels(ir);
     let blocks = builder.blocks();
     let (macros, parameters) = builder.macros();
-    let context = &*builder.context;
+    let context = builder.context;
     let symbol = |scope, name: NameId| -> Option<u32> {
         match context.lookup(scope, name) {
             Binding::Register(id) => registers[id.index()],

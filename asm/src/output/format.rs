@@ -29,12 +29,12 @@ pub fn format(text: &str) -> String {
     // Of the statement at hand: whether it goes on, and whether it could not be read.
     let (mut continues, mut keep) = (false, false);
     for ((number, line), tokens) in (1..).zip(text.split('\n')).zip(lines(text)) {
-        let code = tokens.iter().filter(|token| token.kind != TokenKind::Comment);
+        let mut code = tokens.iter().filter(|token| token.kind != TokenKind::Comment);
         let begins = tokens.first().is_some_and(|token| token.kind != TokenKind::Comment) && !continues;
         if begins {
             keep = broken.contains(&number);
         }
-        let last = code.last().map(|token| token.kind);
+        let last = code.next_back().map(|token| token.kind);
         if number > 1 {
             out.push('\n');
         }

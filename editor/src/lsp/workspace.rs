@@ -97,7 +97,7 @@ impl Workspace {
         let mut seen = BTreeSet::from([path.to_owned()]);
         let mut left = vec![path.to_owned()];
         while let Some(file) = left.pop() {
-            let open = self.of_open.iter().map(|(from, to)| (from, to));
+            let open = self.of_open.iter();
             let on_disk = self.on_disk.iter().filter(|(from, _)| !self.of_open.contains_key(*from));
             let all = open.chain(on_disk.map(|(from, (_, to))| (from, to)));
             // A program's files lie in the folder of its first.
