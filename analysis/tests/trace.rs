@@ -3,7 +3,7 @@
 use takt_analysis::{Trace, straight, trace};
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_emu::Emulator;
-use takt_emu::testing::{self, INPUTS, Random, random_program};
+use takt_emu::testing::{self, Random, random_program};
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{MACHINES, Program};
 
@@ -27,8 +27,8 @@ fn traces_account_for_every_cycle() {
             let program = random_program(seed, machine, testing::Options::TAME);
             let mut emulator = Emulator::new(&program).unwrap();
             let mut random = Random::new(seed);
-            for i in 0..INPUTS {
-                emulator.set_input_bits(machine.inputs.base + i, random.word()).unwrap();
+            for input in testing::input_ports(machine) {
+                emulator.set_input_bits(input, random.word()).unwrap();
             }
             let once = trace(&mut emulator).unwrap();
             assert_eq!(once.cycles, emulator.now());
@@ -83,18 +83,18 @@ fn straight_lines_issue_as_scheduled() {
         let issues = straight(&assembled.program);
         assert_eq!(issues.len(), assembled.program.bundles() as usize);
         for block in assembled.blocks.iter().filter(|block| block.bundles > 1) {
-            let last = &issues[(block.address + block.bundles - 1) as usize];
+            let last = &issues[block.address.index() + block.bundles as usize - 1];
             if last.from == block.address {
                 assert_eq!(last.cycle, u64::from(block.cycles), "{} {:?}", machine.name, block.label);
             }
         }
         let period =
             assembled.program.sections.iter().find(|section| section.name == "period").expect("it has one");
-        assert!(issues[period.end as usize - 1].from == period.start);
+        assert!(issues[period.end.index() - 1].from == period.start);
         for issue in &issues {
             let stalled: u64 = issue.stalls.iter().map(|(_, cycles)| u64::from(*cycles)).sum();
             let before =
-                issues.get(issue.address.wrapping_sub(1) as usize).filter(|before| before.from == issue.from);
+                issues.get(issue.address.index().wrapping_sub(1)).filter(|before| before.from == issue.from);
             assert!(before.is_none_or(|before| before.cycle + stalled < issue.cycle));
         }
     }

@@ -11,8 +11,8 @@ use crate::syntax::ast::{Directive, DirectiveKind};
 use crate::syntax::expr::Value;
 use crate::syntax::name::NameId;
 use std::collections::HashMap;
-use takt_isa::Type;
 use takt_isa::program::Space;
+use takt_isa::{Register, Type};
 
 /// What a name is declared as.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -69,7 +69,7 @@ pub struct Symbol {
     /// Of a register or port: how its bits are read.
     pub ty: Option<Type>,
     /// Of a register or port: the address that the source gives it.
-    pub place: Option<u16>,
+    pub place: Option<Register>,
     /// Of a constant: its value, if it has one.
     pub value: Option<Value>,
     /// Of a label: word of data memory.

@@ -17,11 +17,11 @@
 //! The stages, each a folder:
 //!
 //! ```text
-//! text ─ syntax ─ tree ─ expand ─ flat list ─ resolve ─ ir ─ check ─ homes ─ schedule ─ emit ─ Program ─ output
+//! text ─ syntax ─ tree ─ expand ─ flat list ─ resolve ─ ir ─ check ─ contract ─ homes ─ schedule ─ emit ─ Program ─ output
 //! ```
 //!
 //! `syntax` reads a file; `expand` writes out macros, repetitions and includes, and declares; `resolve` gives every name its
-//! meaning; `check` looks at the whole program (types, who writes what); `homes` finds each value its place; `schedule` packs bundles;
+//! meaning; `check` looks at the whole program (types, who writes what); `contract` fuses products into sums; `homes` finds each value its place; `schedule` packs bundles;
 //! `emit` places registers and makes words; `output` is what can be made of the result. `context` is what the stages before
 //! `schedule` share, `report` how mistakes are told. A stage uses those before it, never one after it.
 //!
@@ -30,6 +30,7 @@
 
 mod check;
 mod context;
+mod contract;
 mod emit;
 mod expand;
 mod homes;
@@ -49,12 +50,13 @@ use std::sync::Arc;
 use takt_isa::{Machine, Program, T3};
 
 pub use context::type_name;
+pub use contract::Contraction;
 pub use expand::load::{FileLoader, LoadError, Loader, MemoryLoader, Open, Search};
 pub use homes::{Adjustment, Made};
 pub use output::{disasm, format, image, listing, names};
 pub use report::diag::{Diagnostic, Diagnostics};
 pub use report::levels::Levels;
-pub use report::{diag, levels, source};
+pub use report::{diag, levels, nearest, source};
 pub use syntax::ast::Directive;
 pub use syntax::{Expression, expr, tokens};
 
@@ -65,6 +67,8 @@ pub struct Options {
     pub machine: &'static Machine,
     /// Which bundles the scheduler packs.
     pub schedule: Schedule,
+    /// Which products are fused into sums.
+    pub contract: Contract,
     /// How long it searches; 0 is one pass.
     pub effort: u32,
     /// What becomes of warnings.
@@ -83,11 +87,24 @@ pub enum Schedule {
     None,
 }
 
+/// Which products are fused into the sums that alone use them, on machines that have an operation for it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Contract {
+    /// Those that the source says (`.contract on`).
+    #[default]
+    AsWritten,
+    /// All.
+    All,
+    /// None.
+    None,
+}
+
 impl Default for Options {
     fn default() -> Options {
         Options {
             machine: &T3,
             schedule: Schedule::AsWritten,
+            contract: Contract::AsWritten,
             effort: schedule::DEFAULT_EFFORT,
             levels: Levels::default(),
         }
@@ -109,6 +126,8 @@ pub struct Assembled {
     pub blocks: Vec<schedule::BlockReport>,
     /// What is demanded of ports (`.deadline`, `.order`, `.late`) and how it is met.
     pub timing: Vec<schedule::TimingReport>,
+    /// Products that were fused into sums (`.contract on`), in the order of the sums.
+    pub contractions: Vec<Contraction>,
     /// What was done about registers that operations of several slots write.
     pub adjustments: Vec<Adjustment>,
     /// Words that a macro, a repetition or the assembler itself made: indices into the program's code, ascending.
@@ -118,7 +137,7 @@ pub struct Assembled {
 }
 
 impl Assembled {
-    /// What a debugger wants to know of the program: for [`image::write_with`].
+    /// What a debugger needs to know of the program: for [`image::write_with`].
     pub fn debug_info(&self) -> names::DebugInfo {
         let files = self.sources.files().iter();
         names::DebugInfo {
@@ -155,8 +174,8 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
 pub struct Checked {
     context: context::Context,
     ir: ir::Ir,
-    /// None if the program cannot fit, which is reported.
-    homes: Option<homes::Homes>,
+    /// Where values live, and what was contracted. None if the program cannot fit, which is reported.
+    homes: Option<(homes::Homes, Vec<Contraction>)>,
     effort: u32,
     index: index::Index,
 }
@@ -185,11 +204,18 @@ fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, op
         emit::limits(&ir, &mut context.reports.sink);
         None
     } else {
+        let marked = std::mem::take(&mut ir.contracted);
+        let contracted = contract::contract(&mut ir, |bundle| match options.contract {
+            Contract::AsWritten => marked.get(bundle).copied().unwrap_or(false),
+            Contract::All => true,
+            Contract::None => false,
+        });
         let mut homes = homes::choose(&mut ir);
+        homes.quiet.extend(contracted.gone);
         let values = values::split(&mut ir, &mut homes);
         copies::insert(&mut ir, &mut homes, &values);
         check::check(&mut context, &ir, &homes);
-        Some(homes)
+        Some((homes, contracted.contractions))
     };
     Checked { context, ir, homes, effort: options.effort, index }
 }
@@ -220,7 +246,9 @@ impl Checked {
         let mut sink = std::mem::take(&mut context.reports.sink);
         let sources = Arc::new(std::mem::take(&mut context.reports.sources));
         // What follows would only report what follows from the errors there are.
-        let Some(homes) = homes.filter(|_| sink.errors == 0) else { return Err(sink.finish(sources)) };
+        let Some((homes, contractions)) = homes.filter(|_| sink.errors == 0) else {
+            return Err(sink.finish(sources));
+        };
         let schedule::Report { blocks, timing } = schedule::schedule(&mut ir, effort, &mut sink);
         if sink.errors > 0 {
             return Err(sink.finish(sources));
@@ -246,6 +274,7 @@ impl Checked {
             constants,
             blocks,
             timing,
+            contractions,
             adjustments,
             expanded: emitted.expanded,
             names,

@@ -3,16 +3,17 @@
 use crate::files::{self, Given, Out};
 use crate::load::Load;
 use crate::output::{self, Failure};
-use crate::select::{MachineArgument, SourceArguments};
+use crate::select::{MachineArgument, SourceArguments, When};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
 use takt_asm::schedule::DemandKind;
 use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, TimingReport};
-use takt_asm::{Adjustment, Assembled, Made, Schedule, image, listing};
+use takt_asm::{Adjustment, Assembled, Contraction, Made, Schedule, image, listing};
 use takt_isa::Program;
 use takt_rtl::header::{Cycles, Header, Language, Span};
 
@@ -50,7 +51,7 @@ pub(crate) struct Asm {
     /// Schedule everything: the same as --schedule on.
     #[arg(short = 'O', conflicts_with = "schedule")]
     optimise: bool,
-    /// Which operations the scheduler packs into bundles and orders.
+    /// Which operations the scheduler packs into bundles and orders: those under `.schedule on`, all, or none.
     #[arg(long, value_enum, value_name = "WHEN", default_value_t = When::Source)]
     schedule: When,
     /// How long the scheduler searches, up to 100000; 0 is the first passes only.
@@ -97,17 +98,6 @@ impl From<HeaderLanguage> for Language {
             HeaderLanguage::Svd => Language::Svd,
         }
     }
-}
-
-/// Which bundles to schedule.
-#[derive(Clone, Copy, ValueEnum)]
-enum When {
-    /// As the source says: `.schedule on`.
-    Source,
-    /// All, whatever the source says.
-    On,
-    /// None, whatever the source says.
-    Off,
 }
 
 impl From<When> for Schedule {
@@ -208,6 +198,7 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         )?;
         write_blocks(&assembled, out)?;
         write_timing(&assembled, out)?;
+        write_contractions(&assembled, out)?;
         write_adjustments(&assembled, out)?;
     }
     Ok(())
@@ -264,6 +255,25 @@ fn write_timing(assembled: &Assembled, out: &mut Out) -> Result<()> {
         let ports = report.ports.iter().map(cycles).collect::<Vec<_>>().join(", ");
         let (demand, result) = timing_text(report);
         writeln!(out, "  {demand}: {result}; cycles: {ports}")?;
+    }
+    Ok(())
+}
+
+/// How many products were fused into sums, by instruction.
+fn write_contractions(assembled: &Assembled, out: &mut Out) -> Result<()> {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for contraction in &assembled.contractions {
+        *counts.entry(contraction.mnemonic).or_default() += 1;
+    }
+    if !counts.is_empty() {
+        let counts: Vec<String> =
+            counts.iter().map(|(mnemonic, count)| format!("{count} {mnemonic}")).collect();
+        writeln!(
+            out,
+            "contracted: {} products fused into sums ({})",
+            assembled.contractions.len(),
+            counts.join(", ")
+        )?;
     }
     Ok(())
 }
@@ -382,6 +392,13 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
             "details": details,
         })
     };
+    let contraction = |one: &Contraction| {
+        json!({
+            "mnemonic": one.mnemonic,
+            "product": one.product.map(|at| program.place_text(at)),
+            "sum": one.sum.map(|at| program.place_text(at)),
+        })
+    };
     Ok(json!({
         "machine": program.machine.name,
         "image": image.map(|path| path.display().to_string()),
@@ -390,6 +407,7 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
         "constants": program.constants.len(),
         "data_words": program.data.len(),
         "blocks": assembled.blocks.iter().map(block).collect::<Vec<_>>(),
+        "contractions": assembled.contractions.iter().map(contraction).collect::<Vec<_>>(),
         "timing": assembled.timing.iter().map(timing).collect::<Vec<_>>(),
         "adjustments": assembled.adjustments.iter().map(adjustment).collect::<Vec<_>>(),
         "messages": messages(&assembled.warnings)?,

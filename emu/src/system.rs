@@ -5,9 +5,9 @@ use crate::event::{Event, PortWrite};
 use crate::fault::Fault;
 use std::collections::BTreeSet;
 use std::num::NonZeroU64;
-use takt_isa::Type;
 use takt_isa::program::Port;
-use takt_isa::timing::{self, Address, Cycle};
+use takt_isa::timing::{self, Cycle};
+use takt_isa::{BundleAddress, Register, Type};
 
 /// Ticks to come and ticks that came.
 #[derive(Clone, Debug, Default)]
@@ -168,7 +168,7 @@ pub enum PortError {
     #[error("register address {register} is no input port")]
     NoInput {
         /// The address.
-        register: u16,
+        register: Register,
     },
 }
 
@@ -176,13 +176,13 @@ pub enum PortError {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PeriodError {
     /// A fault.
-    #[error(transparent)]
+    #[error("{0}")]
     Fault(#[from] Fault),
     /// An input could not be set; nothing has run.
     #[error(transparent)]
     Port(#[from] PortError),
     /// The machine has halted.
-    #[error("the machine has halted")]
+    #[error("the machine has halted; each period must end with `wait`")]
     Halted,
 }
 
@@ -214,7 +214,7 @@ impl Emulator {
     ///
     /// # Errors
     /// If the machine has no such port.
-    pub fn set_input_bits(&mut self, register: u16, bits: u32) -> Result<(), PortError> {
+    pub fn set_input_bits(&mut self, register: Register, bits: u32) -> Result<(), PortError> {
         if !self.machine().is_input(register) {
             return Err(PortError::NoInput { register });
         }
@@ -224,7 +224,7 @@ impl Emulator {
 
     /// What the outside sees on an output port, by its register: what was last written there, or, if ports are latched, what
     /// was last published. `None` if nothing ever was, or if there is no such port.
-    pub fn output_bits(&self, register: u16) -> Option<u32> {
+    pub fn output_bits(&self, register: Register) -> Option<u32> {
         self.machine().is_output(register).then(|| self.state.output(register))?
     }
 
@@ -239,7 +239,7 @@ impl Emulator {
         Ok(self.output_bits(port.register).map(|bits| Number::of(port.ty, bits)))
     }
 
-    fn input_for(&self, name: &str, value: Number) -> Result<u16, PortError> {
+    fn input_for(&self, name: &str, value: Number) -> Result<Register, PortError> {
         let Some(port) = self.input_port(name) else {
             return Err(PortError::Unknown { name: name.to_owned(), kind: "input" });
         };
@@ -316,7 +316,7 @@ impl Emulator {
     }
 
     /// A `wait` has issued in `cycle`, after the tick, if any, was seen.
-    pub(crate) fn wait_issued(&mut self, cycle: Cycle, address: Address, target: Address) {
+    pub(crate) fn wait_issued(&mut self, cycle: Cycle, address: BundleAddress, target: BundleAddress) {
         if self.ticks.waited.is_none() {
             self.ticks.start(cycle);
         }

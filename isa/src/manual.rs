@@ -1,4 +1,4 @@
-//! The manual: the tables as a reader wants them. Text for the terminal, Markdown for `docs/isa.md`, plain data for JSON.
+//! The manual: the tables for a reader. Text for the terminal, Markdown for `docs/isa.md`, plain data for JSON.
 
 use crate::shape::{Field, OPCODE, Shape, WORD_BITS};
 use crate::spec::instructions::{Function, ROWS, Row, Type};
@@ -63,7 +63,7 @@ fn timing(row: &Row, machine: &'static Machine) -> Option<Timing> {
         return Some(Timing { machine: machine.name, slot: "any", unit: "", latency: 0, interval: 1 });
     }
     let (s, u) = machine.host(row.function)?;
-    let (slot, unit) = (&machine.slots[s], &machine.slots[s].units[u]);
+    let (slot, unit) = (machine.slot(s), &machine.slot(s).units[u]);
     let latency = if row.shape.has_dest() { unit.latency } else { 0 };
     Some(Timing { machine: machine.name, slot: slot.name, unit: unit.name, latency, interval: unit.interval })
 }
@@ -202,9 +202,9 @@ pub fn markdown() -> String {
     );
     let _ = writeln!(
         out,
-        "A word has {WORD_BITS} bits; a bundle holds one word for each slot of the machine. Arithmetic is IEEE 754 binary32, rounded to nearest even,\n\
-         subnormals included, with one canonical NaN (0x7fc00000). Three exceptions are kept, sticky: invalid, divide by zero, overflow.\n\
-         Underflow and inexact are deliberately not kept.\n"
+        "A word has {WORD_BITS} bits; a bundle holds one word for each slot of the machine. Arithmetic is IEEE 754 binary32,\n\
+         rounded to nearest even, subnormals included, with one canonical NaN (0x7fc00000). There are three sticky exception flags:\n\
+         invalid, divide by zero and overflow. Underflow and inexact are deliberately left out.\n"
     );
 
     out.push_str("## Instructions\n\n| instruction | meaning | opcode | types |");
@@ -243,7 +243,7 @@ pub fn markdown() -> String {
         let _ = writeln!(out, "| `{syntax}` | {} |", fields.join(", "));
     }
     out.push_str(
-        "\nAll other bits are zero; a word in which they are not, or whose opcode is in no row, is refused by name. `d` is an index into the bank of the slot\n\
+        "\nAll other bits are zero; a word in which they are not, or whose opcode is in no row, is illegal. `d` is an index into the bank of the slot\n\
          that holds the word; `a`, `b`, `c` are addresses in the register space.\n\n",
     );
 

@@ -1,7 +1,7 @@
 // takt_source: one source operand of a slot, from match to the operand register of the units: banks, forwarding, hazards.
 //
 // Stages: match (m_), read (r_), issue (i_); operand stands in the cycle after issue. In read the banks' copies deliver
-// the register; while a bundle waits there it is read anew in every cycle. While it waits in issue, what is written to
+// the register; while a bundle waits there it is read again in every cycle. While it waits in issue, what is written to
 // its register is taken from the bus.
 //
 // Contract

@@ -165,7 +165,7 @@ fn fuzz(minutes: u32) -> Result<()> {
     }
     seed()?;
     for target in ["assemble", "image"] {
-        // cargo-fuzz wants unstable compiler flags; the variable admits them on the stable compiler.
+        // cargo-fuzz needs unstable compiler flags; the variable admits them on the stable compiler.
         run(cargo().env("RUSTC_BOOTSTRAP", "1").args(["fuzz", "run", target, "--"]).args([
             format!("-max_total_time={}", 60 * minutes),
             "-max_len=65536".to_owned(),

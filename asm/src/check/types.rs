@@ -9,7 +9,7 @@ use crate::check::{dest_span, source_span, text};
 use crate::context::{Context, ScopeId, type_name};
 use crate::ir::given::{Given, GivenTypes, Kind, Part, What};
 use crate::ir::runs::{Run, runs};
-use crate::ir::{Ir, LabelId, Operation, Register, RegisterId, RegisterKind};
+use crate::ir::{Ir, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::syntax::expr::Value;
@@ -426,7 +426,7 @@ fn wrong_register(
     context: &mut Context,
     ir: &Ir,
     operation: &Operation,
-    register: &Register,
+    register: &VirtualRegister,
     ty: Type,
     result: Typed,
 ) {

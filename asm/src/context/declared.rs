@@ -3,13 +3,13 @@
 use crate::context::At;
 use crate::context::scopes::{Binding, ScopeId};
 use crate::ir::given::GivenTypes;
-use crate::ir::{Label, Register, RegisterId, RegisterKind};
+use crate::ir::{Label, RegisterId, RegisterKind, VirtualRegister};
 use crate::report::source::Span;
 use crate::syntax::ast::{Operand, Section};
 use crate::syntax::expr::Value;
 use crate::syntax::name::NameId;
 use std::collections::{BTreeMap, HashMap, HashSet};
-use takt_isa::{Type, ZERO};
+use takt_isa::{Register, Type};
 
 #[derive(Clone, Debug)]
 pub(crate) struct NamedConstant {
@@ -33,9 +33,9 @@ pub(crate) struct Argument {
 
 /// Everything that the source declares, by number.
 pub(crate) struct Declared {
-    pub(crate) registers: Vec<Register>,
+    pub(crate) registers: Vec<VirtualRegister>,
     /// Registers with a given address.
-    pub(crate) by_address: HashMap<u16, RegisterId>,
+    pub(crate) by_address: HashMap<Register, RegisterId>,
     /// Outputs with a given number.
     pub(crate) numbered: BTreeMap<u16, RegisterId>,
     /// Registers that are declared with a type, rather than as floats by default.
@@ -57,17 +57,17 @@ pub(crate) struct Declared {
 impl Declared {
     /// Nothing but the register `zero`.
     pub(crate) fn new() -> Declared {
-        let zero = Register {
+        let zero = VirtualRegister {
             name: "zero".to_owned(),
             kind: RegisterKind::Zero,
             ty: Type::B,
-            pinned: Some(ZERO),
+            pinned: Some(Register::ZERO),
             preset: None,
             span: Span::default(),
         };
         Declared {
             registers: vec![zero],
-            by_address: HashMap::from([(ZERO, RegisterId::ZERO)]),
+            by_address: HashMap::from([(Register::ZERO, RegisterId::ZERO)]),
             numbered: BTreeMap::new(),
             typed: HashSet::new(),
             given: GivenTypes::default(),

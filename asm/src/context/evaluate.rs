@@ -2,7 +2,8 @@
 
 use crate::context::{Argument, At, Binding, Context, Reported, ScopeId, Wanted, type_name};
 use crate::limits;
-use crate::report::diag::{Diagnostic, nearest};
+use crate::report::diag::Diagnostic;
+use crate::report::nearest;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
 use crate::syntax::expr::{self, BUILTINS, EvalError, Fault, Function, Value};

@@ -4,7 +4,8 @@
 use crate::context::{Binding, Context, HAS, Reported, ScopeId};
 use crate::ir::RegisterKind;
 use crate::limits;
-use crate::report::diag::{Diagnostic, Severity, nearest};
+use crate::report::diag::{Diagnostic, Severity};
+use crate::report::nearest;
 use crate::report::source::Span;
 use crate::syntax::ast::Ast;
 use crate::syntax::name::NameId;

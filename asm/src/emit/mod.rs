@@ -9,7 +9,7 @@ use crate::report::diag::{Diagnostic, Sink};
 use crate::report::source::Span;
 use std::collections::{BTreeMap, HashSet};
 use takt_isa::program::{LoopBound, Port, Section, Space, Symbol};
-use takt_isa::{Instruction, Program, ZERO};
+use takt_isa::{BundleAddress, Instruction, Program, Register, SlotIndex};
 
 /// A program, and which of its words a macro, a repetition or the assembler itself made (as indices into its code, ascending).
 pub(crate) struct Emitted {
@@ -29,23 +29,12 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
     let mut origins = vec![None; ir.bundles.len() * slots];
     for (address, bundle) in ir.bundles.iter().enumerate() {
         let words = address * slots..(address + 1) * slots;
-        let mut free = 0;
+        // What any slot takes goes to the first that no other operation of the bundle claims.
+        let claims = |slot: SlotIndex| bundle.operations.iter().any(|other| other.slot == Some(slot));
+        let mut free = ir.machine.numbered_slots().map(|(slot, _)| slot).filter(|slot| !claims(*slot));
         for operation in &bundle.operations {
-            // What any slot takes goes to the first that no other operation of the bundle claims.
-            let slot = match operation.slot {
-                Some(slot) => slot as usize,
-                None => {
-                    while bundle.operations.iter().any(|other| other.slot == Some(free)) {
-                        free += 1;
-                    }
-                    free += 1;
-                    free as usize - 1
-                }
-            };
-            let index = words.start + slot;
-            if slot >= slots {
-                continue;
-            }
+            let Some(slot) = operation.slot.or_else(|| free.next()) else { continue };
+            let index = words.start + slot.index();
             code[index] = word(ir, operation, slot, placement, sink);
             lines[index] = operation.location;
             origins[index] = operation.location.map(|_| (operation.order, operation.expansion));
@@ -75,10 +64,9 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
     Emitted { program, expanded, origins }
 }
 
-fn word(ir: &Ir, operation: &Operation, slot: usize, placement: &Placement, sink: &mut Sink) -> u64 {
+fn word(ir: &Ir, operation: &Operation, slot: SlotIndex, placement: &Placement, sink: &mut Sink) -> u64 {
     // A register without a place is reported by the stage that found none.
-    let address = |id: crate::ir::RegisterId| placement.addresses[id.index()].unwrap_or(ZERO);
-    let base = ir.machine.slots[slot].bank.base;
+    let address = |id: crate::ir::RegisterId| placement.addresses[id.index()].unwrap_or(Register::ZERO);
     let constant = match operation.constant {
         Constant::None => 0,
         Constant::Value(value) => value,
@@ -86,7 +74,11 @@ fn word(ir: &Ir, operation: &Operation, slot: usize, placement: &Placement, sink
         Constant::Raw(index) => return ir.raw[index as usize],
     };
     let mut instruction = Instruction::bare(operation.op);
-    instruction.dest = operation.dest.map_or(0, |dest| address(dest).wrapping_sub(base));
+    if let Some(dest) = operation.dest {
+        // A register without a place, or out of reach, has been reported.
+        let Some(dest) = ir.machine.slot(slot).bank.index(address(dest)) else { return 0 };
+        instruction.dest = dest;
+    }
     for (source, id) in instruction.sources.iter_mut().zip(operation.reads()) {
         *source = address(*id);
     }
@@ -94,10 +86,7 @@ fn word(ir: &Ir, operation: &Operation, slot: usize, placement: &Placement, sink
     match instruction.encode() {
         Ok(word) => word,
         Err(error) => {
-            // A register without a place, or out of reach, has been reported.
-            if error.field != takt_isa::Field::Dest {
-                sink.push(Diagnostic::error("range", operation.span, error.to_string()));
-            }
+            sink.push(Diagnostic::error("range", operation.span, error.to_string()));
             0
         }
     }
@@ -130,8 +119,8 @@ pub(crate) fn limits(ir: &Ir, sink: &mut Sink) {
     }
 }
 
-fn constants(ir: &Ir, placement: &Placement) -> Vec<(u16, u32)> {
-    let mut constants: Vec<(u16, u32)> = ir
+fn constants(ir: &Ir, placement: &Placement) -> Vec<(Register, u32)> {
+    let mut constants: Vec<(Register, u32)> = ir
         .registers
         .iter()
         .zip(&placement.addresses)
@@ -175,6 +164,7 @@ fn symbols(ir: &Ir) -> Vec<Symbol> {
 fn sections(ir: &Ir) -> Vec<Section> {
     let end = ir.bundles.len() as u32;
     [("once", 0, ir.period), ("period", ir.period, end)]
+        .map(|(name, start, end)| (name, BundleAddress::new(start), BundleAddress::new(end)))
         .into_iter()
         .filter(|(_, start, end)| start < end)
         .map(|(name, start, end)| Section { name: name.to_owned(), start, end })
@@ -188,7 +178,10 @@ fn loop_bounds(ir: &Ir) -> Vec<LoopBound> {
         let most = bounds.entry(bound.position).or_default();
         *most = bound.most.max(*most);
     }
-    bounds.into_iter().map(|(address, most)| LoopBound { address, most }).collect()
+    bounds
+        .into_iter()
+        .map(|(address, most)| LoopBound { address: BundleAddress::new(address), most })
+        .collect()
 }
 
 /// Gives every named thing a name of its own. The source's names are; those that the assembler makes, of a macro's locals and

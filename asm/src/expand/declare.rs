@@ -3,12 +3,12 @@
 
 use crate::context::{At, Binding, Context, Reported};
 use crate::expand::{Data, Expander};
-use crate::ir::{Register, RegisterId, RegisterKind};
+use crate::ir::{RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
-use takt_isa::{Machine, Type, ZERO};
+use takt_isa::{Machine, Register, Type};
 
 impl Expander<'_> {
     pub(crate) fn data_section(&mut self, at: At, span: Span) -> Result<(), Reported> {
@@ -53,7 +53,7 @@ impl Expander<'_> {
         self.context.declare(at, id, span, Binding::Register(register))?;
         // From here on the name is known: a mistake in its type or place is reported and the rest stands.
         let name = self.context.scopes.full_name(at.scope, id);
-        self.context.declared.registers.push(Register {
+        self.context.declared.registers.push(VirtualRegister {
             name,
             kind,
             ty: Type::F,
@@ -115,8 +115,10 @@ impl Expander<'_> {
                 .note(format!("{what}s have the numbers 0 to {}", count - 1));
             return Err(self.context.report(at.scope, error));
         };
-        if what == "input" {
-            return self.pin(at, register, machine.inputs.base + number, span);
+        if what == "input"
+            && let Some(port) = machine.inputs.registers().nth(number.into())
+        {
+            return self.pin(at, register, port, span);
         }
         self.take_number(at, register, number, span)
     }
@@ -124,7 +126,7 @@ impl Expander<'_> {
     /// Takes the number of an output port for it.
     fn take_number(&mut self, at: At, register: RegisterId, number: u16, span: Span) -> Result<(), Reported> {
         if let Some(other) = self.context.declared.numbered.get(&number) {
-            let Register { name, span: first, .. } = &self.context.declared.registers[other.index()];
+            let VirtualRegister { name, span: first, .. } = &self.context.declared.registers[other.index()];
             let error = Diagnostic::error("place", span, format!("output {number} is taken"))
                 .also(*first, format!("by `{name}`"))
                 .note("an output has one number, whichever slot writes it");
@@ -132,6 +134,19 @@ impl Expander<'_> {
         }
         self.context.declared.numbered.insert(number, register);
         Ok(())
+    }
+
+    /// The word of a directive that switches something on or off.
+    pub(crate) fn is_on(&mut self, at: At, word: Name, directive: &'static str) -> Result<bool, Reported> {
+        let name = self.context.spelled(at, word.name, word.span)?;
+        match self.context.scopes.text(name) {
+            "on" => Ok(true),
+            "off" => Ok(false),
+            other => {
+                let message = format!("`.{directive}` is `on` or `off`, not `{other}`");
+                Err(self.context.error(at.scope, directive, word.span, message))
+            }
+        }
     }
 
     /// `.ports`: whether they are latched.
@@ -158,11 +173,13 @@ impl Expander<'_> {
         }
     }
 
-    fn pin(&mut self, at: At, register: RegisterId, address: u16, span: Span) -> Result<(), Reported> {
+    fn pin(&mut self, at: At, register: RegisterId, address: Register, span: Span) -> Result<(), Reported> {
         let machine = self.context.machine;
         let place = machine.register_name(address).unwrap_or_default();
         let wrong = match self.context.declared.registers[register.index()].kind {
-            _ if address == ZERO => Some("`zero` is never written: nothing can be placed there".to_owned()),
+            _ if address == Register::ZERO => {
+                Some("`zero` is never written: nothing can be placed there".to_owned())
+            }
             RegisterKind::Input if !machine.is_input(address) => {
                 Some(format!("`{place}` is not an input port"))
             }
@@ -182,7 +199,8 @@ impl Expander<'_> {
             return Err(self.context.report(at.scope, Diagnostic::error("place", span, message).note(note)));
         }
         if let Some(other) = self.context.declared.by_address.get(&address).copied() {
-            let Register { name, span: first, .. } = self.context.declared.registers[other.index()].clone();
+            let VirtualRegister { name, span: first, .. } =
+                self.context.declared.registers[other.index()].clone();
             let what = if name.is_empty() { "preset" } else { &name };
             let error = Diagnostic::error("place", span, format!("`{place}` is taken"))
                 .also(first, format!("by `{what}`"));
@@ -198,7 +216,7 @@ impl Expander<'_> {
 }
 
 /// The address of a register by its canonical name.
-pub(crate) fn address(context: &mut Context, at: At, place: Name) -> Result<u16, Reported> {
+pub(crate) fn address(context: &mut Context, at: At, place: Name) -> Result<Register, Reported> {
     let id = context.spelled(at, place.name, place.span)?;
     let text = context.scopes.text(id).to_owned();
     let machine = context.machine;
@@ -213,13 +231,13 @@ pub(crate) fn address(context: &mut Context, at: At, place: Name) -> Result<u16,
 }
 
 /// The register at an address: the one the source names, or else one without a name.
-pub(crate) fn register_at(context: &mut Context, address: u16, span: Span) -> RegisterId {
+pub(crate) fn register_at(context: &mut Context, address: Register, span: Span) -> RegisterId {
     if let Some(register) = context.declared.by_address.get(&address) {
         return *register;
     }
     let register = RegisterId::new(context.declared.registers.len());
     let (kind, ty) = (RegisterKind::Plain, Type::B);
-    context.declared.registers.push(Register {
+    context.declared.registers.push(VirtualRegister {
         name: String::new(),
         kind,
         ty,

@@ -33,6 +33,8 @@ pub(crate) struct Item {
     pub(crate) loc: u32,
     /// Whether `.schedule on` is in force.
     pub(crate) scheduled: bool,
+    /// Whether `.contract on` is in force.
+    pub(crate) contracted: bool,
 }
 
 /// Words of data memory.
@@ -144,6 +146,8 @@ pub(crate) struct Expander<'l> {
     pub(crate) bytes: usize,
     /// Whether what follows is scheduled.
     scheduled: bool,
+    /// Whether products of what follows are fused into sums.
+    contracted: bool,
     pub(crate) include_depth: usize,
     pub(crate) includes: usize,
     macro_depth: usize,
@@ -173,6 +177,7 @@ impl<'l> Expander<'l> {
             section: Section::Once,
             loc: 0,
             scheduled: false,
+            contracted: false,
             data_words: 0,
             statements: 0,
             files: HashMap::new(),
@@ -372,7 +377,8 @@ impl<'l> Expander<'l> {
                 return;
             }
         };
-        items.push(Item { at, statement: index, loc: self.loc, scheduled: self.scheduled });
+        let (loc, scheduled, contracted) = (self.loc, self.scheduled, self.contracted);
+        items.push(Item { at, statement: index, loc, scheduled, contracted });
         if self.flat.once.len() + self.flat.period.len() > limits::OPERATIONS {
             let message = format!("the program expands to more than {} bundles", limits::OPERATIONS);
             self.limit(at.scope, operation.span, message);
@@ -525,17 +531,8 @@ impl<'l> Expander<'l> {
             DirectiveKind::Broken(_, end) => self.jump(*end + 1),
             DirectiveKind::Include(path, library) => self.include(at, path, *library, span)?,
             DirectiveKind::Loc(places) => self.set_loc(at, places)?,
-            DirectiveKind::Schedule(word) => {
-                let name = self.context.spelled(at, word.name, word.span)?;
-                match self.context.scopes.text(name) {
-                    "on" => self.scheduled = true,
-                    "off" => self.scheduled = false,
-                    other => {
-                        let message = format!("`.schedule` is `on` or `off`, not `{other}`");
-                        return Err(self.context.error(at.scope, "schedule", word.span, message));
-                    }
-                }
-            }
+            DirectiveKind::Schedule(word) => self.scheduled = self.is_on(at, *word, "schedule")?,
+            DirectiveKind::Contract(word) => self.contracted = self.is_on(at, *word, "contract")?,
             DirectiveKind::Ports(word) => self.ports(at, *word)?,
             DirectiveKind::LoopBound(most) => self.loop_bound(at, *most, span)?,
             DirectiveKind::Deadline(..) | DirectiveKind::Order(_) | DirectiveKind::Late(..) => {

@@ -21,7 +21,7 @@ use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
 use takt_isa::program::{Location, Space};
-use takt_isa::{Machine, Op, Operand, Row, Type};
+use takt_isa::{Machine, Op, Operand, Register, Row, SlotIndex, Type};
 
 /// A register of [`Ir::registers`].
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
@@ -68,9 +68,9 @@ pub enum RegisterKind {
     Zero,
 }
 
-/// A register.
+/// A register of the source, before it has a place in the machine.
 #[derive(Clone, Debug)]
-pub struct Register {
+pub struct VirtualRegister {
     /// Its name; empty for a constant's and for one that the source names by its place alone.
     pub name: String,
     /// What it is for.
@@ -78,7 +78,7 @@ pub struct Register {
     /// How its bits are shown.
     pub ty: Type,
     /// The address that the source gives it.
-    pub pinned: Option<u16>,
+    pub pinned: Option<Register>,
     /// What the loader writes there, if the source says so. A constant's bits stand in its kind.
     pub preset: Option<u32>,
     /// Where it is declared, or for a constant first used.
@@ -104,7 +104,7 @@ pub struct Operation {
     /// The instruction; `nop` where the word is given bit by bit.
     pub op: Op,
     /// The slot that executes it; `None` if any can, as a `nop`.
-    pub slot: Option<u8>,
+    pub slot: Option<SlotIndex>,
     /// The register that it writes.
     pub dest: Option<RegisterId>,
     /// The registers that it reads: as many as the instruction's shape has sources, the rest zero.
@@ -257,7 +257,7 @@ pub struct Ir {
     /// The machine that it is for.
     pub machine: &'static Machine,
     /// The registers; the first is `zero`. Those that nothing uses get no address.
-    pub registers: Vec<Register>,
+    pub registers: Vec<VirtualRegister>,
     /// The bundles: those of `once`, then those of `period`.
     pub bundles: Vec<Bundle>,
     /// Index of the first bundle of `period`.
@@ -276,6 +276,8 @@ pub struct Ir {
     pub data: Vec<u32>,
     /// Words given bit by bit.
     pub raw: Vec<u64>,
+    /// By bundle, as the source has them: whether `.contract on` is in force there.
+    pub contracted: Vec<bool>,
     /// Source files that [`Operation::location`] names.
     pub files: Vec<String>,
     /// Values with registers of their own, by [`Version::after`] for each name.
@@ -285,7 +287,7 @@ pub struct Ir {
 impl Ir {
     /// A register.
     #[inline]
-    pub fn register(&self, id: RegisterId) -> &Register {
+    pub fn register(&self, id: RegisterId) -> &VirtualRegister {
         &self.registers[id.index()]
     }
 

@@ -4,10 +4,9 @@ use crate::Assembled;
 use crate::report::source::Lines;
 use crate::syntax::expr::Value;
 use serde::Serialize;
-use std::collections::HashMap;
 use std::fmt::Write as _;
 use takt_isa::program::{Location, Port, Space};
-use takt_isa::{Instruction, Program, Type};
+use takt_isa::{BundleAddress, Instruction, Program, SlotIndex, Type};
 
 /// The listing of an assembled program: for each bundle its address, its words in the order of the slots, and the source
 /// lines that they come from. An operation that a macro, a repetition or the assembler made is shown as what it became, behind a `+`.
@@ -60,13 +59,18 @@ impl<'a> Lister<'a> {
             program.data.len(),
             program.constants.len()
         ));
+        match self.assembled.contractions.len() {
+            0 => {}
+            1 => self.line(format_args!("; 1 product fused into a sum")),
+            count => self.line(format_args!("; {count} products fused into sums")),
+        }
         self.line(format_args!("; addr  {heads}line            source"));
         let mut labels = program.symbols.iter().filter(|symbol| symbol.space == Space::Code).peekable();
-        for address in 0..program.bundles() {
+        for address in program.addresses() {
             if let Some(section) = program.sections.iter().find(|section| section.start == address) {
                 self.line(format_args!("\n.{}", section.name));
             }
-            let first = address as usize * slots.len();
+            let first = address.index() * slots.len();
             let range = first..first + slots.len();
             let mut words = String::new();
             for (word, line) in program.code[range.clone()].iter().zip(&program.lines[range]) {
@@ -76,13 +80,13 @@ impl<'a> Lister<'a> {
             }
             let mut rows = self.rows(first).into_iter();
             let head = rows.next().unwrap_or_default();
-            while let Some(label) = labels.next_if(|label| label.address <= address) {
+            while let Some(label) = labels.next_if(|label| label.address <= address.get()) {
                 // Not where the source line shows it already.
                 if !head.1.starts_with(&format!("{}:", label.name)) {
                     self.line(format_args!("{}:", label.name));
                 }
             }
-            self.line(format_args!("  {address:04x}  {words}{:<15} {}", head.0, head.1));
+            self.line(format_args!("  {:04x}  {words}{:<15} {}", address.get(), head.0, head.1));
             let indent = 8 + words.len();
             for (place, text) in rows {
                 self.line(format_args!("{:indent$}{place:<15} {text}", ""));
@@ -98,8 +102,8 @@ impl<'a> Lister<'a> {
         let program = self.program;
         let mut rows: Vec<(String, String)> = Vec::new();
         let slots = program.machine.slots.len();
-        for slot in 0..slots {
-            let index = first + slot;
+        for (slot, _) in program.machine.numbered_slots() {
+            let index = first + slot.index();
             let row = match program.lines[index] {
                 None if program.code[index] == self.filler => continue,
                 None => (String::new(), self.operation(index, slot)),
@@ -129,12 +133,12 @@ impl<'a> Lister<'a> {
     }
 
     /// An operation as what it became.
-    fn operation(&self, index: usize, slot: usize) -> String {
+    fn operation(&self, index: usize, slot: SlotIndex) -> String {
         let program = self.program;
         let word = program.code[index];
         match Instruction::decode(word) {
             Ok(instruction) => {
-                let target = |address: u32| match program.nearest_label(address) {
+                let target = |address: BundleAddress| match program.nearest_label(address) {
                     Some((label, 0)) => label.to_owned(),
                     _ => address.to_string(),
                 };
@@ -145,7 +149,7 @@ impl<'a> Lister<'a> {
     }
 
     /// The source's name of a register, or the value of the constant that it holds.
-    fn register(&self, register: u16) -> String {
+    fn register(&self, register: takt_isa::Register) -> String {
         let constants = &self.program.constants;
         let named = self.program.registers.iter().any(|port| port.register == register);
         match constants.binary_search_by_key(&register, |constant| constant.0) {
@@ -227,7 +231,7 @@ pub struct Register {
     /// Its canonical name.
     pub place: String,
     /// Its address.
-    pub address: u16,
+    pub address: takt_isa::Register,
     /// Of a port: its number.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub number: Option<u16>,
@@ -318,15 +322,13 @@ pub fn readmemh(program: &Program) -> Vec<(String, String)> {
         files.push((format!("code_{}.hex", slot.name), words.map(|word| format!("{word:012x}\n")).collect()));
     }
     files.push(("data.hex".to_owned(), program.data.iter().map(|word| format!("{word:08x}\n")).collect()));
-    let mut by_bank: HashMap<u16, String> = HashMap::new();
-    for (register, bits) in &program.constants {
-        if let Some(bank) = program.machine.banks().find(|bank| bank.contains(*register)) {
-            let text = by_bank.entry(bank.base).or_default();
-            let _ = writeln!(text, "@{:03x} {bits:08x}", register - bank.base);
-        }
-    }
     for bank in program.machine.banks() {
-        let contents = by_bank.remove(&bank.base).unwrap_or_default();
+        let mut contents = String::new();
+        for (register, bits) in &program.constants {
+            if let Some(index) = bank.index(*register) {
+                let _ = writeln!(contents, "@{:03x} {bits:08x}", index.get());
+            }
+        }
         files.push((format!("constants_{}.hex", bank.name), contents));
     }
     files

@@ -11,8 +11,7 @@ use crate::emit::place::Placement;
 use crate::ir::{Ir, RegisterId};
 use crate::syntax::expr::Value;
 use std::collections::{BTreeMap, HashMap, HashSet};
-use takt_isa::Type;
-use takt_isa::timing::Address;
+use takt_isa::{BundleAddress, Register, Type};
 
 /// What a debugger knows of a program beyond what the machine loads: an image carries it, unless it is stripped.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,8 +37,8 @@ pub struct Names {
 
 impl Names {
     /// The position of the line that a bundle shows: of its first operation that has one, or else of a bundle before.
-    pub fn at_hand(&self, slots: usize, address: Address) -> Position {
-        let end = (address as usize + 1).saturating_mul(slots).min(self.positions.len());
+    pub fn at_hand(&self, slots: usize, address: BundleAddress) -> Position {
+        let end = (address.index() + 1).saturating_mul(slots).min(self.positions.len());
         let bundles = self.positions[..end].rchunks(slots.max(1));
         bundles.flat_map(|words| words.iter().flatten()).next().copied().unwrap_or_default()
     }
@@ -71,7 +70,7 @@ pub struct NamedValue {
     /// The value's own name: `t.1`, or that of the source for the last one of a straight run, which later runs may read.
     pub label: String,
     /// Its register.
-    pub register: u16,
+    pub register: Register,
     /// How its bits are read.
     pub ty: Type,
     /// The name means it for lines with an order above the first and up to the second. `None`: for all lines for which it means
@@ -79,7 +78,7 @@ pub struct NamedValue {
     pub orders: Option<(u32, u32)>,
     /// The first bundle that writes it and the last one that uses it, if it lives only there: its register may have other
     /// values elsewhere.
-    pub bundles: Option<(Address, Address)>,
+    pub bundles: Option<(BundleAddress, BundleAddress)>,
 }
 
 /// What the names of a program stand for.
@@ -132,7 +131,7 @@ fn values(ir: &Ir, placement: &Placement, emitted: &Emitted) -> Vec<NamedValue> 
         split.entry(id).or_default();
     }
     let ranges = ranges(ir);
-    let own_names: HashMap<u16, &str> =
+    let own_names: HashMap<Register, &str> =
         emitted.program.registers.iter().map(|port| (port.register, port.name.as_str())).collect();
     let mut values = Vec::new();
     for (original, mut versions) in split {
@@ -158,9 +157,9 @@ fn values(ir: &Ir, placement: &Placement, emitted: &Emitted) -> Vec<NamedValue> 
 }
 
 /// For each register the first bundle that writes it and the last one that uses it.
-fn ranges(ir: &Ir) -> Vec<Option<(Address, Address)>> {
-    let mut ranges: Vec<Option<(Address, Address)>> = vec![None; ir.registers.len()];
-    for (address, bundle) in (0..).zip(&ir.bundles) {
+fn ranges(ir: &Ir) -> Vec<Option<(BundleAddress, BundleAddress)>> {
+    let mut ranges: Vec<Option<(BundleAddress, BundleAddress)>> = vec![None; ir.registers.len()];
+    for (address, bundle) in (0..).map(BundleAddress::new).zip(&ir.bundles) {
         for operation in &bundle.operations {
             for source in operation.reads() {
                 if let Some((_, last)) = &mut ranges[source.index()] {

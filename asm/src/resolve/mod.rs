@@ -8,7 +8,8 @@ use crate::context::{At, Context, Reported};
 use crate::expand::load::Loader;
 use crate::expand::{self, Data, Flat, Item, Timing};
 use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
-use crate::report::diag::{Diagnostic, nearest};
+use crate::report::diag::Diagnostic;
+use crate::report::nearest;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
 use smallvec::SmallVec;
@@ -16,7 +17,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 use takt_isa::program::Location;
 use takt_isa::spec::instructions::Function;
-use takt_isa::{Op, ROWS, Type};
+use takt_isa::{Op, ROWS, SlotIndex, Type};
 
 /// The most cycles that a demand on ports can name: many times what a program memory holds.
 const MAX_CYCLES: u32 = 1 << 24;
@@ -28,7 +29,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         .iter()
         .map(|row| match row.function {
             Function::Idle => Host::Any,
-            function => machine.host(function).map_or(Host::None, |(slot, _)| Host::Slot(slot as u8)),
+            function => machine.host(function).map_or(Host::None, |(slot, _)| Host::Slot(slot)),
         })
         .collect();
     let ir = Ir {
@@ -43,6 +44,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         numbers: BTreeMap::new(),
         data: Vec::new(),
         raw: Vec::new(),
+        contracted: Vec::new(),
         files: Vec::new(),
         versions: Vec::new(),
     };
@@ -83,7 +85,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
 #[derive(Clone, Copy)]
 enum Host {
     Any,
-    Slot(u8),
+    Slot(SlotIndex),
     None,
 }
 
@@ -119,6 +121,7 @@ impl Resolver<'_> {
                 self.ir.loop_bounds.push(LoopBound { position: self.ir.bundles.len() as u32, most });
             }
             self.item(item);
+            self.ir.contracted.resize(self.ir.bundles.len(), item.contracted);
         }
         self.place_labels(section, u32::MAX);
     }
@@ -217,7 +220,7 @@ impl Resolver<'_> {
             let Some(first) = operations[..index].iter().find(|before| before.slot == Some(slot)) else {
                 continue;
             };
-            let name = machine.slots[slot as usize].name;
+            let name = machine.slot(slot).name;
             let message = format!("two operations of the bundle need slot `{name}`");
             let what = |operation: &Operation| match operation.constant {
                 Constant::Raw(_) => ".raw",
@@ -310,7 +313,8 @@ impl Resolver<'_> {
         let [slot, word] = operands else { return Err(Reported) };
         let slots = self.ir.machine.slots;
         let name = self.context.reports.sources.text(slot.span).to_owned();
-        let Some(index) = slots.iter().position(|slot| slot.name == name) else {
+        let mut numbered = self.ir.machine.numbered_slots();
+        let Some((index, _)) = numbered.find(|(_, slot)| slot.name == name) else {
             let names = slots.iter().map(|slot| slot.name);
             let message = format!("{} has no slot `{name}`", self.ir.machine.name);
             let meant = nearest(&name, names.clone());
@@ -328,7 +332,7 @@ impl Resolver<'_> {
         self.ir.raw.push(bits);
         Ok(Operation {
             op: Op::nop,
-            slot: Some(index as u8),
+            slot: Some(index),
             dest: None,
             sources: [RegisterId::ZERO; 3],
             constant: Constant::Raw(self.ir.raw.len() as u32 - 1),

@@ -5,8 +5,9 @@ use crate::context::{Argument, At, Binding, Reported};
 use crate::expand::load::Loader;
 use crate::expand::{address, register_at};
 use crate::ir::given::{Given, Kind, Part, What};
-use crate::ir::{Constant, Label, LabelId, Operation, Register, RegisterId, RegisterKind};
-use crate::report::diag::{Diagnostic, nearest};
+use crate::ir::{Constant, Label, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
+use crate::report::diag::Diagnostic;
+use crate::report::nearest;
 use crate::report::source::Span;
 use crate::resolve::Resolver;
 use crate::syntax::ast::*;
@@ -150,7 +151,8 @@ impl Resolver<'_> {
                 return Err(self.context.report(at.scope, error));
             }
         };
-        let Register { kind, name, span, pinned, .. } = &self.context.declared.registers[register.index()];
+        let VirtualRegister { kind, name, span, pinned, .. } =
+            &self.context.declared.registers[register.index()];
         let machine = self.ir.machine;
         let input = *kind == RegisterKind::Input || pinned.is_some_and(|address| machine.is_input(address));
         let error = match kind {
@@ -287,7 +289,7 @@ impl Resolver<'_> {
         }
         let registers = &mut self.context.declared.registers;
         *self.pool.entry(bits).or_insert_with(|| {
-            registers.push(Register {
+            registers.push(VirtualRegister {
                 name: String::new(),
                 kind: RegisterKind::Constant(bits),
                 ty: Type::B,

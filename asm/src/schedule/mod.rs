@@ -21,7 +21,7 @@ use smallvec::{SmallVec, smallvec};
 use solve::{Edge, Part, Problem, Task};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use takt_isa::program::{Location, Space};
-use takt_isa::{Effect, Function, Machine};
+use takt_isa::{BundleAddress, Effect, Function, Machine, SlotIndex};
 
 /// How long the scheduler searches unless told otherwise.
 pub const DEFAULT_EFFORT: u32 = 20;
@@ -34,7 +34,7 @@ pub struct BlockReport {
     /// The label at the block's start, if there is one.
     pub label: Option<String>,
     /// Address of its first bundle.
-    pub address: u32,
+    pub address: BundleAddress,
     /// Operations.
     pub operations: u32,
     /// Bundles that they are packed into.
@@ -94,7 +94,7 @@ pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
         report.blocks.push(BlockReport {
             location: old.first().and_then(|bundle| bundle.operations.first()?.location),
             label: label_at(ir, run.start as u32),
-            address,
+            address: BundleAddress::new(address),
             operations: block.problem.tasks.iter().map(|task| task.parts.len() as u32).sum(),
             bundles: packed.len() as u32,
             cycles: solution.length,
@@ -135,7 +135,7 @@ fn label_at(ir: &Ir, position: u32) -> Option<String> {
 /// Which unit of a machine an operation uses, by slot.
 fn part(machine: &Machine, operation: &Operation) -> Part {
     let function = operation.row().function;
-    let slot = usize::from(operation.slot.unwrap_or(0)).min(machine.slots.len() - 1);
+    let slot = operation.slot.unwrap_or(SlotIndex::FIRST).index();
     let before: usize = machine.slots[..slot].iter().map(|slot| slot.units.len()).sum();
     match machine.slots[slot].unit_for(function).filter(|_| function != Function::Idle) {
         Some(unit) => {

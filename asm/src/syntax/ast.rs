@@ -279,6 +279,8 @@ pub(crate) enum DirectiveKind {
     Error(String),
     /// `.schedule` and `on` or `off`.
     Schedule(Name),
+    /// `.contract` and `on` or `off`.
+    Contract(Name),
     /// `.ports` and `latched` or `direct`.
     Ports(Name),
     /// `.loop_bound`.
@@ -356,6 +358,7 @@ directives! {
     Loc ".loc" "\"file\" line" "What follows is attributed to that line of that file.";
     Error ".error" "\"text\"" "An error with that text.";
     Schedule ".schedule" "on|off" "Whether the assembler packs what follows into bundles and orders it.";
+    Contract ".contract" "on|off" "Whether a product that only one sum uses becomes a fused operation with it.";
     Ports ".ports" "latched|direct" "Whether inputs are taken together at the tick and outputs published together at `wait`.";
     LoopBound ".loop_bound" "turns" "The bundle that follows heads a loop of at most so many iterations.";
     Deadline ".deadline" "port, port = cycle" "Each output is written for the last time in that cycle or before.";

@@ -590,6 +590,9 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
     let schedule = is(Directive::Schedule)
         .ignore_then(name.clone().labelled("`on` or `off`"))
         .map(DirectiveKind::Schedule);
+    let contract = is(Directive::Contract)
+        .ignore_then(name.clone().labelled("`on` or `off`"))
+        .map(DirectiveKind::Contract);
     let latched = is(Directive::Ports)
         .ignore_then(name.clone().labelled("`latched` or `direct`"))
         .map(DirectiveKind::Ports);
@@ -621,7 +624,7 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
         .map(DirectiveKind::Loc);
     choice((
         bare, declare, float, word, constant, preset, space, branch, elif, rep, macro_, include, error, loc,
-        schedule, latched, loop_bound, deadline, order, late,
+        schedule, contract, latched, loop_bound, deadline, order, late,
     ))
     .map_with(|kind, e| Body::Directive(kind, e.span()))
 }

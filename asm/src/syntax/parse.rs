@@ -4,7 +4,8 @@
 //! mistakes of every line.
 
 use crate::limits;
-use crate::report::diag::{Diagnostic, Severity, Sink, nearest};
+use crate::report::diag::{Diagnostic, Severity, Sink};
+use crate::report::nearest;
 use crate::report::source::{Source, Span};
 use crate::syntax::ast::Operator;
 use crate::syntax::ast::*;

@@ -11,7 +11,7 @@ use takt_asm::tokens::{self, TokenKind};
 use takt_asm::{Directive, type_name};
 use takt_debug::session::{Shown, ulp_distance};
 use takt_isa::program::Space;
-use takt_isa::{Op, Row, Type, manual};
+use takt_isa::{BundleAddress, Op, Register, Row, Type, manual};
 
 /// Symbols of a place in a macro or a repetition that are told one by one.
 const TOLD: usize = 8;
@@ -182,7 +182,7 @@ fn symbol_text(settings: &Settings, front: &Front, counted: Option<&Counted>, sy
 /// Where a register lies, and when which of its values does.
 fn register(settings: &Settings, counted: Option<&Counted>, symbol: &Symbol, text: &mut String) {
     let machine = settings.machine;
-    let place = |address: u16| {
+    let place = |address: Register| {
         let name = machine.register_name(address).unwrap_or_default();
         let bank = machine.slots.iter().find(|slot| slot.bank.contains(address));
         let writer =
@@ -226,9 +226,9 @@ fn register(settings: &Settings, counted: Option<&Counted>, symbol: &Symbol, tex
 }
 
 /// The bundles that write and read a register.
-fn uses(program: &takt_isa::Program, register: u16) -> String {
+fn uses(program: &takt_isa::Program, register: Register) -> String {
     let (mut written, mut read) = (Vec::new(), Vec::new());
-    for address in 0..program.bundles() {
+    for address in program.addresses() {
         let Some(Ok(instructions)) = program.bundle(address) else { continue };
         for (instruction, slot) in instructions.iter().zip(program.machine.slots) {
             if instruction.writes(slot) == Some(register) {
@@ -239,7 +239,7 @@ fn uses(program: &takt_isa::Program, register: u16) -> String {
             }
         }
     }
-    let list = |what: &str, bundles: &[u32]| match bundles {
+    let list = |what: &str, bundles: &[BundleAddress]| match bundles {
         [] => String::new(),
         [one] => format!(", {what} in bundle {one}"),
         [first, .., last] => format!(", {what} in {} bundles, {first} to {last}", bundles.len()),

@@ -7,8 +7,7 @@ use std::fmt::Write as _;
 use takt_analysis::StraightIssue;
 use takt_asm::schedule::BlockReport;
 use takt_isa::program::Location;
-use takt_isa::timing::Address;
-use takt_isa::{Instruction, Program};
+use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
 
 /// Cycles of a line that are listed; of more the first and the last are.
 const LISTED: usize = 4;
@@ -26,18 +25,19 @@ pub(crate) struct Hint {
 }
 
 /// A word of the code: its bundle and its slot.
-type Word = (Address, usize);
+type Word = (BundleAddress, SlotIndex);
 
 /// The words of each line of a file, in the order of their bundles.
 fn words(program: &Program, file: &str) -> BTreeMap<u32, Vec<Word>> {
-    let slots = program.machine.slots.len();
     let mut words: BTreeMap<u32, Vec<Word>> = BTreeMap::new();
     let Some(number) = program.files.iter().position(|name| name == file) else { return words };
-    for (index, location) in program.lines.iter().enumerate() {
-        if let Some(Location { file, line }) = location
-            && *file as usize == number
-        {
-            words.entry(*line).or_default().push(((index / slots) as Address, index % slots));
+    for address in program.addresses() {
+        for (location, slot) in program.locations(address).iter().zip(SlotIndex::all()) {
+            if let Some(Location { file, line }) = location
+                && *file as usize == number
+            {
+                words.entry(*line).or_default().push((address, slot));
+            }
         }
     }
     words
@@ -57,8 +57,8 @@ pub(crate) fn hints(counted: &Counted, file: &str) -> Vec<Hint> {
         .collect()
 }
 
-fn issue(counted: &Counted, address: Address) -> Option<&StraightIssue> {
-    counted.issues.get(address as usize)
+fn issue(counted: &Counted, address: BundleAddress) -> Option<&StraightIssue> {
+    counted.issues.get(address.index())
 }
 
 /// A cycle, and from where it counts where that is not the beginning of a section.
@@ -76,7 +76,7 @@ fn short(counted: &Counted, words: &[Word]) -> String {
     let program = &counted.assembled.program;
     let shown = |(address, slot): &Word| {
         let cycle = cycle(program, issue(counted, *address)?);
-        Some(format!("{cycle} · {}", program.machine.slots[*slot].name))
+        Some(format!("{cycle} · {}", program.machine.slots[slot.index()].name))
     };
     let mut text = if words.len() <= LISTED {
         words.iter().filter_map(shown).collect::<Vec<_>>().join(", ")
@@ -100,7 +100,7 @@ fn explained(counted: &Counted, words: &[Word]) -> String {
     let mut text = String::new();
     for &(address, slot) in words.iter().take(EXPLAINED) {
         let Some(issue) = issue(counted, address) else { continue };
-        let word = program.words(address).and_then(|words| words.get(slot).copied());
+        let word = program.words(address).and_then(|words| words.get(slot.index()).copied());
         let Some(instruction) = word.and_then(|word| Instruction::decode(word).ok()) else { continue };
         let name = |register| program.register_text(register);
         let operation = instruction.text_with(program.machine, slot, name, |target| {
@@ -109,13 +109,13 @@ fn explained(counted: &Counted, words: &[Word]) -> String {
                 _ => target.to_string(),
             }
         });
-        let slot_name = program.machine.slots[slot].name;
+        let slot_name = program.machine.slots[slot.index()].name;
         let _ = write!(
             text,
             "- cycle {}, bundle {address}, slot {slot_name}: `{operation}`",
             cycle(program, issue)
         );
-        if let Some((register, ready, producer)) = issue.awaits[slot] {
+        if let Some((register, ready, producer)) = issue.awaits[slot.index()] {
             let from = program.bundle_text(producer);
             let _ = write!(text, "; `{}` is there from cycle {ready} on, from {from}", name(register));
         }
@@ -165,7 +165,7 @@ pub(crate) fn lenses(
                     // The one block that a period is.
                     let whole = |block: &BlockReport| {
                         block.address == section.address
-                            && section.ends.contains(&(block.address + block.bundles.saturating_sub(1)))
+                            && section.ends.contains(&block.address.offset(block.bundles.saturating_sub(1)))
                     };
                     if let Some(number) = blocks.iter().position(whole) {
                         let _ = write!(text, ", bound {}", blocks[number].bound.cycles());
@@ -186,7 +186,9 @@ pub(crate) fn lenses(
         }
         Err(error) => {
             let period = program.sections.iter().find(|section| section.name == "period");
-            if let Some(line) = line(program.location(period.map_or(0, |section| section.start))) {
+            if let Some(line) =
+                line(program.location(period.map_or(BundleAddress::RESET, |section| section.start)))
+            {
                 lenses.entry(line).or_default().push(format!("no bound: {error}"));
             }
         }

@@ -191,6 +191,9 @@ pub trait Arithmetic {
     fn mul(a: u32, b: u32) -> Value;
     /// `a / b`.
     fn div(a: u32, b: u32) -> Value;
+    /// `a · b + c`, rounded once. `0 · ∞` is invalid whatever `c` is, a quiet NaN too (as RISC-V and x86 have it; IEEE 754
+    /// leaves it open).
+    fn mul_add(a: u32, b: u32, c: u32) -> Value;
     /// `√a`; `√−0 = −0`, invalid below.
     fn sqrt(a: u32) -> Value;
     /// The two's-complement integer `a`, rounded to binary32.

@@ -45,6 +45,8 @@ functions! {
     Convert,
     /// binary32 multiplication.
     Multiply,
+    /// binary32 product and sum with one rounding.
+    Fused,
     /// binary32 division.
     Divide,
     /// binary32 square root.
@@ -254,9 +256,9 @@ instructions! { [a b c]
     jmp      0x02 Control  T     []        { do Jump }          "continue at target"                      "";
     bz       0x03 Control  At    [B]       { do BranchZero }    "if a = 0, continue at target"            "Tests all 32 bits as an integer; a comparison's result is 0 or 1. (-0.0 is not zero here.)";
     bnz      0x04 Control  At    [B]       { do BranchNonzero } "if a ≠ 0, continue at target"            "Tests all 32 bits as an integer.";
-    call     0x05 Control  T     []        { do Call }          "push return address, continue at target" "The return stack is hardware, of the depth the machine states; a full stack is a fault.";
+    call     0x05 Control  T     []        { do Call }          "push return address, continue at target" "The return stack is hardware; its depth belongs to the machine. A full stack is a fault.";
     ret      0x06 Control  None  []        { do Return }        "pop return address, continue there"      "An empty stack is a fault.";
-    wait     0x07 Control  T     []        { do Wait }          "end of period; at the tick, continue at target" "Issues when every earlier result is written, so that all outputs of the period stand. If the next tick has come already, the deadline was missed: the event is recorded and execution goes on at once.";
+    wait     0x07 Control  T     []        { do Wait }          "end of period; at the tick, continue at target" "Issues when every earlier result is written, so that all outputs of the period are written. If the next tick has come already, the deadline was missed: the event is recorded and execution continues at once.";
     halt     0x08 Control  None  []        { do Halt }          "stop"                                    "Issues when every earlier result is written. Only a reset restarts the machine.";
 
     // ---- 0x1_ data memory: words of 32 bits, addressed by word.
@@ -300,15 +302,19 @@ instructions! { [a b c]
     itof     0x52 Convert  Da    [F I]     { = A::itof(a) }                                      "d = float(a)" "From a signed integer, rounded to nearest even. No flags.";
     ftoi     0x53 Convert  Da    [I F]     { = A::ftoi(a) }                                      "d = integer(a)" "Rounded to nearest even, saturating at -2^31 and 2^31 - 1; NaN gives 2^31 - 1. Invalid where the value does not fit.";
 
-    // ---- 0x6_ binary32 multiplication, division, root, rounded to nearest even.
+    // ---- 0x6_ binary32 multiplication, division, root, and product and sum in one, rounded to nearest even.
     fmul     0x60 Multiply Dab   [F F F]   { = A::mul(a, b) }                                    "d = a · b"   "Invalid on 0 · ∞ and on a signaling NaN; overflow.";
     fdiv     0x61 Divide   Dab   [F F F]   { = A::div(a, b) }                                    "d = a / b"   "Invalid on 0/0, ∞/∞ and a signaling NaN; divide by zero on finite/0; overflow.";
     fsqrt    0x62 Root     Da    [F F]     { = A::sqrt(a) }                                      "d = √a"      "√-0.0 = -0.0. Invalid on a negative operand and on a signaling NaN.";
+    fma      0x64 Fused    Dabc  [F F F F] { = A::mul_add(a, b, c) }                             "d = a · b + c"    "Rounded once, as fms, fnma and fnms are: the product is exact. The letter n negates the product, s subtracts c (as in x86's names; RISC-V's fnmsub is fnma, its fnmadd fnms). Invalid on 0 · ∞ whatever c is, on ∞ - ∞ and on a signaling NaN; overflow.";
+    fms      0x65 Fused    Dabc  [F F F F] { = A::mul_add(a, b, fp::neg(c).bits) }               "d = a · b - c"    "As fma with -c.";
+    fnma     0x66 Fused    Dabc  [F F F F] { = A::mul_add(fp::neg(a).bits, b, c) }               "d = -(a · b) + c" "As fma with -a. What cancels exactly gives +0.";
+    fnms     0x67 Fused    Dabc  [F F F F] { = A::mul_add(fp::neg(a).bits, b, fp::neg(c).bits) } "d = -(a · b) - c" "As fma with -a and -c.";
 
     // ---- 0x7_ trigonometric functions, in radians.
     fsin     0x70 Sine       Da  [F F]   { = fp::sin(a) }                                      "d = sin(a)"  "At most 0.79499 ulp for |a| ≤ 2π·64 (0x43c90fda), measured over every such operand. Beyond, on ∞ and on a NaN: NaN and invalid.";
     fcos     0x71 Sine       Da  [F F]   { = fp::cos(a) }                                      "d = cos(a)"  "At most 0.78306 ulp for |a| ≤ 2π·64 (0x43c90fda), measured over every such operand. Beyond, on ∞ and on a NaN: NaN and invalid.";
-    fatan2   0x72 Arctangent Dab [F F F] { = fp::atan2(a, b) }                                 "d = angle of the point (b, a)" "The arctangent of a/b in [-π, π], by the signs of both. Less than 0.75 ulp: over 10⁹ random pairs of all kinds, at most 0.6444. Zeros have sides: (+0, -0) gives π, (-0, -1) gives -π; infinities lie on the axes and diagonals (IEEE 754-2019, 9.2.1). NaN and invalid on a NaN.";
+    fatan2   0x72 Arctangent Dab [F F F] { = fp::atan2(a, b) }                                 "d = angle of the point (b, a)" "The arctangent of a/b in [-π, π], in the quadrant that the signs of both give. Less than 0.75 ulp: over 10⁹ random pairs of all kinds, at most 0.6444. The signs of zeros count: (+0, -0) gives π, (-0, -1) gives -π; infinities lie on the axes and diagonals (IEEE 754-2019, 9.2.1). NaN and invalid on a NaN.";
     facos    0x73 Arccosine  Da  [F F]   { = fp::acos(a) }                                     "d = arccosine of a" "In [0, π]. At most 0.73241 ulp, measured over every operand in [-1, 1]. Beyond, and on a NaN: NaN and invalid.";
 }
 

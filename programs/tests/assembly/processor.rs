@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex};
 use takt_asm::{Assembled, MemoryLoader, Options, Schedule};
 use takt_emu::{Emulator, PeriodError, PeriodReport};
-use takt_isa::{Machine, Program, Type};
+use takt_isa::{Machine, Program, Register, Type};
 use takt_programs::SOURCES;
 use takt_programs::hybrid::ports::{INPUTS, OUTPUTS, PortType};
 use takt_programs::hybrid::{Inputs, Outputs, TrackingController};
@@ -53,8 +53,8 @@ pub(crate) fn floats<const N: usize>(words: [u32; N]) -> [f32; N] {
 #[derive(Clone)]
 pub(crate) struct Processor {
     emulator: Emulator,
-    inputs: [u16; INPUTS.len()],
-    outputs: [u16; OUTPUTS.len()],
+    inputs: [Register; INPUTS.len()],
+    outputs: [Register; OUTPUTS.len()],
     /// The report of the last period.
     pub(crate) report: Option<PeriodReport>,
     /// NaNs written to output ports since reset.

@@ -110,7 +110,7 @@ fn places(slot: &SlotPlan, m: &mut Module) {
     m.wires([slot.flags()]);
 }
 
-/// The same for all slots at once, as operands want it.
+/// The same for all slots at once, as operands need it.
 fn together(plan: &Plan, m: &mut Module) {
     m.comment(format!("The same for all slots, slot 0 first, each padded to {} places.", plan.depth));
     let padded = |net: fn(&SlotPlan) -> Net, width: u32| {

@@ -30,14 +30,14 @@ pub enum PlanError {
         /// Why.
         error: CircuitError,
     },
-    /// The core wants a data memory.
+    /// The core needs a data memory.
     #[error("machine `{machine}`: no slot hosts the data memory (function Memory), which the core has")]
     NoMemory {
         /// The machine.
         machine: &'static str,
     },
     /// A depth that is no power of two, or 1.
-    #[error("machine `{machine}`: {what} is {value}; the circuit wants a power of two from 2 to {most}")]
+    #[error("machine `{machine}`: {what} is {value}; the circuit needs a power of two from 2 to {most}")]
     PowerOfTwo {
         /// The machine.
         machine: &'static str,
@@ -50,7 +50,7 @@ pub enum PlanError {
     },
     /// A bank does not begin where its indices do.
     #[error(
-        "machine `{machine}`: bank `{bank}` begins at {base}; the circuit wants a multiple of {multiple}{}",
+        "machine `{machine}`: bank `{bank}` begins at {base}; the circuit needs a multiple of {multiple}{}",
         if *.inputs { ", its depth" } else { ", the depth of the deepest bank" }
     )]
     Base {
@@ -67,7 +67,7 @@ pub enum PlanError {
     },
     /// A unit is too fast for the circuit's scoreboard.
     #[error(
-        "machine `{machine}`: slot `{slot}`: unit `{unit}` has latency {latency}; the circuit wants 2 at least"
+        "machine `{machine}`: slot `{slot}`: unit `{unit}` has latency {latency}; the circuit needs 2 at least"
     )]
     Fast {
         /// The machine.
@@ -82,7 +82,7 @@ pub enum PlanError {
     /// A unit that works on one operation at a time is not slower than the slot's pipelined units by what the circuit needs.
     #[error(
         "machine `{machine}`: slot `{slot}`: unit `{unit}` has latency {latency} and interval {interval}; beside results that are \
-         in flight for {depth} cycles, a unit of interval above 1 wants a latency of {} and an interval of 3 at least",
+         in flight for {depth} cycles, a unit of interval above 1 needs a latency of {} and an interval of 3 at least",
         depth + 2
     )]
     Late {
@@ -100,7 +100,7 @@ pub enum PlanError {
         depth: u32,
     },
     /// A part of the core does not do what the row says.
-    #[error("machine `{machine}`: {what} is {value}; rtl/core/{part}.v wants {limit}")]
+    #[error("machine `{machine}`: {what} is {value}; rtl/core/{part}.v needs {limit}")]
     Part {
         /// The machine.
         machine: &'static str,
@@ -181,7 +181,7 @@ impl Plan {
             return Err(error.into());
         }
         check_windows(machine)?;
-        let host = |function| machine.host(function).map(|(slot, _)| slot);
+        let host = |function| machine.host(function).map(|(slot, _)| slot.index());
         let control_slot = host(Function::Control).unwrap_or(0);
         let memory_slot = host(Function::Memory).ok_or(PlanError::NoMemory { machine: machine.name })?;
         check_parts(machine)?;

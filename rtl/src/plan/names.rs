@@ -80,7 +80,7 @@ impl Plan {
         Net::named(format!("output_{}_value", bank.name)).wide(32)
     }
 
-    /// Port: the number of the output port that the outside wants to see.
+    /// Port: the number of the output port that the outside looks at.
     pub fn read_output(&self) -> Net {
         Net::bus("read_output", self.port_bits)
     }

@@ -1,9 +1,10 @@
 //! The metadata of an image: what ELF has no place for, as JSON.
 
+use super::validate::{NO_BANK, wrong_port};
 use super::{ImageError, VERSION};
 use serde::{Deserialize, Serialize};
 use takt_isa::program::{Location, Port, Section, Symbol};
-use takt_isa::{Machine, Program, Type};
+use takt_isa::{BundleAddress, Machine, Program, Register, Type};
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -50,8 +51,8 @@ pub(super) enum MetaType {
 #[serde(deny_unknown_fields)]
 struct MetaSection {
     name: String,
-    start: u32,
-    end: u32,
+    start: BundleAddress,
+    end: BundleAddress,
 }
 
 impl From<Type> for MetaType {
@@ -79,7 +80,7 @@ impl Meta {
         let ports = |ports: &[Port]| {
             let port = |port: &Port| MetaPort {
                 name: port.name.clone(),
-                register: port.register,
+                register: port.register.get(),
                 ty: port.ty.into(),
             };
             ports.iter().map(port).collect()
@@ -124,11 +125,15 @@ impl Meta {
         machine: &'static Machine,
         code: Vec<u64>,
         data: Vec<u32>,
-        constants: Vec<(u16, u32)>,
+        constants: Vec<(Register, u32)>,
         symbols: Vec<Symbol>,
     ) -> Result<Program, ImageError> {
-        let ports = |ports: Vec<MetaPort>| {
-            let port = |MetaPort { name, register, ty }| Port { name, register, ty: ty.into() };
+        let ports = |kind, ports: Vec<MetaPort>| -> Result<Vec<Port>, ImageError> {
+            let port = |MetaPort { name, register, ty }| {
+                let known = Register::new(register.into());
+                let register = known.ok_or_else(|| wrong_port(kind, &name, register, NO_BANK))?;
+                Ok(Port { name, register, ty: ty.into() })
+            };
             ports.into_iter().map(port).collect()
         };
         let section = |MetaSection { name, start, end }| Section { name, start, end };
@@ -137,10 +142,10 @@ impl Meta {
             code,
             data,
             constants,
-            inputs: ports(self.inputs),
-            outputs: ports(self.outputs),
+            inputs: ports("input", self.inputs)?,
+            outputs: ports("output", self.outputs)?,
             latched: self.latched,
-            registers: ports(self.registers),
+            registers: ports("register", self.registers)?,
             symbols,
             loop_bounds: Vec::new(),
             sections: self.sections.into_iter().map(section).collect(),

@@ -4,21 +4,18 @@ use super::ImageError;
 use crate::limits;
 use std::collections::HashSet;
 use takt_isa::program::{LoopBound, Port, Space};
-use takt_isa::{Machine, Program, ZERO};
+use takt_isa::{BundleAddress, Machine, Program, Register};
 
 /// The longest name of a source file.
 pub(super) const FILE_NAME: usize = 4096;
 
 /// Register addresses and bits, from the words of their section.
-pub(super) fn constants(words: &[u32], machine: &Machine) -> Result<Vec<(u16, u32)>, ImageError> {
-    let mut constants: Vec<(u16, u32)> = Vec::with_capacity(words.len() / 2);
+pub(super) fn constants(words: &[u32], machine: &Machine) -> Result<Vec<(Register, u32)>, ImageError> {
+    let mut constants: Vec<(Register, u32)> = Vec::with_capacity(words.len() / 2);
     for &[address, bits] in words.as_chunks::<2>().0 {
         let wrong = |reason| ImageError::Register { what: "a constant".to_owned(), address, reason };
-        let register = u16::try_from(address).map_err(|_| wrong("it is in no bank"))?;
-        if !in_bank(machine, register) {
-            return Err(wrong("it is in no bank"));
-        }
-        if register == ZERO {
+        let register = register(machine, address).ok_or_else(|| wrong(NO_BANK))?;
+        if register == Register::ZERO {
             return Err(wrong("nothing can be written there"));
         }
         if constants.last().is_some_and(|(last, _)| *last >= register) {
@@ -29,8 +26,17 @@ pub(super) fn constants(words: &[u32], machine: &Machine) -> Result<Vec<(u16, u3
     Ok(constants)
 }
 
-pub(super) fn in_bank(machine: &Machine, register: u16) -> bool {
-    machine.banks().any(|bank| bank.contains(register))
+/// Why an address names no register.
+pub(super) const NO_BANK: &str = "it is in no bank";
+
+/// The register that a machine has at an address of an image.
+pub(super) fn register(machine: &Machine, address: u32) -> Option<Register> {
+    Register::new(address as usize).filter(|register| machine.has_register(*register))
+}
+
+/// That a named register of an image is none.
+pub(super) fn wrong_port(kind: &str, name: &str, address: u16, reason: &'static str) -> ImageError {
+    ImageError::Register { what: format!("{kind} `{name}`"), address: address.into(), reason }
 }
 
 /// Whether a name has the letters of one, and no more than `limit`. (Those that a macro's use gives may be longer than a
@@ -70,7 +76,7 @@ fn loops(program: &Program) -> Result<(), ImageError> {
     let mut last = None;
     for &LoopBound { address, most } in &program.loop_bounds {
         let reason = match () {
-            () if address >= program.bundles() => "there is no such bundle",
+            () if address.get() >= program.bundles() => "there is no such bundle",
             () if most == 0 => "a loop that is entered turns at least once",
             () if last.is_some_and(|last| last >= address) => "bounds are not in ascending order",
             () => "",
@@ -87,12 +93,9 @@ fn ports(program: &Program) -> Result<(), ImageError> {
     let machine = program.machine;
     let mut seen = HashSet::new();
     let mut check = |what: &str, port: &Port, fits: bool| {
-        let wrong = |reason| {
-            let what = format!("{what} `{}`", port.name);
-            Err(ImageError::Register { what, address: port.register.into(), reason })
-        };
-        if !in_bank(machine, port.register) || port.register == ZERO {
-            return wrong("it is in no bank");
+        let wrong = |reason| Err(wrong_port(what, &port.name, port.register.get(), reason));
+        if !machine.has_register(port.register) || port.register == Register::ZERO {
+            return wrong(NO_BANK);
         }
         if !fits {
             return wrong("it does not lie where such registers lie");
@@ -110,9 +113,8 @@ fn ports(program: &Program) -> Result<(), ImageError> {
         let number = machine.output_number(port.register);
         check("output", port, number.is_some())?;
         if !numbers.insert(number) {
-            let (what, address) = (format!("output `{}`", port.name), port.register.into());
-            let reason = "another output has the same number, in another bank: assemble its source anew";
-            return Err(ImageError::Register { what, address, reason });
+            let reason = "another output has the same number, in another bank: assemble its source again";
+            return Err(wrong_port("output", &port.name, port.register.get(), reason));
         }
     }
     for port in &program.registers {
@@ -168,18 +170,18 @@ fn labels(program: &Program) -> Result<(), ImageError> {
 
 fn sections(program: &Program) -> Result<(), ImageError> {
     let bundles = program.bundles();
-    let wrong = ImageError::Sections { bundles };
-    let mut at = 0;
+    let (wrong, end) = (ImageError::Sections { bundles }, BundleAddress::new(bundles));
+    let mut at = BundleAddress::RESET;
     let mut allowed: &[&str] = &["once", "period"];
     for section in &program.sections {
         let Some(position) = allowed.iter().position(|name| *name == section.name) else { return Err(wrong) };
         allowed = &allowed[position + 1..];
-        if section.start != at || section.end <= section.start || section.end > bundles {
+        if section.start != at || section.end <= section.start || section.end > end {
             return Err(wrong);
         }
         at = section.end;
     }
-    if at == bundles { Ok(()) } else { Err(wrong) }
+    if at == end { Ok(()) } else { Err(wrong) }
 }
 
 fn lines(program: &Program) -> Result<(), ImageError> {
