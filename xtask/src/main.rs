@@ -92,7 +92,7 @@ fn works(program: &str, argument: &str) -> bool {
 }
 
 /// What the tests call, how to ask whether it works, and the Debian package that has it.
-const TOOLS: [(&str, &str, &str); 6] = [
+const TOOLS: [(&str, &str, &str); 7] = [
     // Berkeley SoftFloat, the reference arithmetic, is C.
     ("cc", "--version", "gcc"),
     // The circuit runs in Verilator, which builds with make and a C++ compiler, and in Icarus Verilog.
@@ -100,6 +100,8 @@ const TOOLS: [(&str, &str, &str); 6] = [
     ("make", "--version", "make"),
     ("verilator", "--version", "verilator"),
     ("iverilog", "-V", "iverilog"),
+    // The language server is used by the client of an editor.
+    ("nvim", "--version", "neovim"),
     // The page of `takt analyse` is opened in a browser.
     ("chromium", "--version", "chromium"),
 ];
