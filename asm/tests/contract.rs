@@ -6,7 +6,7 @@ mod random_source;
 use common::{bad, bundles};
 use random_source::Random;
 use std::fmt::Write as _;
-use takt_asm::{Assembled, Contract, MemoryLoader, Options, Schedule, listing};
+use takt_asm::{Assembled, Contract, MemoryLoader, Options, Schedule, Search, listing};
 use takt_emu::{Emulator, Event};
 use takt_isa::{Function, Machine, T1, T3, T4};
 
@@ -165,6 +165,23 @@ fn what_is_said_of_it() {
 
     let wrong = bad(&format!("{HEAD}.contract yes\n.period\np: wait p\n"), &T4).render(false);
     assert!(wrong.contains("`.contract` is `on` or `off`, not `yes`"), "{wrong}");
+}
+
+/// The library's functions keep their operations, and with them their error bounds.
+#[test]
+fn the_library_stays() {
+    let library = [("f.s", ".macro muladd d, a, b, c\n.reg t\n fmul t, a, b\n fadd d, t, c\n.endm\n")];
+    let text = format!(
+        "{HEAD}.include <f.s>\n.contract on\n.period\np: muladd F, a, b, c\n fmul t, a, b\n fadd G, t, d\n wait p\n"
+    );
+    for contract in [Contract::AsWritten, Contract::All] {
+        let options = Options { machine: &T4, contract, ..Options::default() };
+        let loader = Search::new(MemoryLoader::of("test.s", text.as_str())).library(&library);
+        let assembled = takt_asm::assemble("test.s", &loader, &options);
+        let assembled = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false)));
+        assert_eq!(bundles(&assembled)[2], "fma G, a, b, d");
+        assert_eq!(assembled.contractions.len(), 1);
+    }
 }
 
 /// A period of sums and products of few names, in runs that branches part, in which products are sometimes used elsewhere.

@@ -33,8 +33,8 @@ pub(crate) struct Item {
     pub(crate) loc: u32,
     /// Whether `.schedule on` is in force.
     pub(crate) scheduled: bool,
-    /// Whether `.contract on` is in force.
-    pub(crate) contracted: bool,
+    /// Whether `.contract on` is in force; none in the library, whose error bounds are those of its operations as they stand.
+    pub(crate) contracted: Option<bool>,
 }
 
 /// Words of data memory.
@@ -367,6 +367,7 @@ impl<'l> Expander<'l> {
                 return;
             }
         }
+        let contracted = (!self.is_in_library(at.ast)).then_some(self.contracted);
         let items = match self.section {
             Section::Once => &mut self.flat.once,
             Section::Period => &mut self.flat.period,
@@ -377,7 +378,7 @@ impl<'l> Expander<'l> {
                 return;
             }
         };
-        let (loc, scheduled, contracted) = (self.loc, self.scheduled, self.contracted);
+        let (loc, scheduled) = (self.loc, self.scheduled);
         items.push(Item { at, statement: index, loc, scheduled, contracted });
         if self.flat.once.len() + self.flat.period.len() > limits::OPERATIONS {
             let message = format!("the program expands to more than {} bundles", limits::OPERATIONS);

@@ -549,8 +549,12 @@ fn loading() -> &'static str {
 /// What other processors have and Takt has not, though an instruction of a like name may do something else.
 fn absent(name: &str) -> Option<&'static str> {
     Some(match name {
-        "fma" | "fmadd" | "fmac" | "fmla" | "fnma" | "fms" | "fmsub" | "mac" | "madd" => {
-            "there is no fused operation: `fmul`, then `fadd` or `fsub`"
+        "fmadd" | "fmac" | "fmla" | "mac" | "madd" => {
+            "`fma d, a, b, c` is a · b + c, on machines that have it (`has.fma`)"
+        }
+        "fmsub" | "fmls" => "`fms` is a · b - c, `fnma` is c - a · b, on machines that have them (`has.fms`)",
+        "fnmadd" | "fnmsub" => {
+            "by RISC-V's names `fnmsub` is `fnma`, c - a · b, and `fnmadd` is `fnms`, -(a · b) - c, on machines that have them"
         }
         "imul" | "idiv" | "imod" | "irem" | "imin" | "imax" | "iabs" | "ineg" => {
             "of integers there are sums, shifts, logic and comparisons: `itof` converts, and `ishl` multiplies by a power of two"
