@@ -205,10 +205,12 @@ fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, op
         None
     } else {
         let marked = std::mem::take(&mut ir.contracted);
-        let contracted = contract::contract(&mut ir, |bundle| match options.contract {
-            Contract::AsWritten => marked.get(bundle).copied().unwrap_or(false),
-            Contract::All => true,
-            Contract::None => false,
+        let contracted = contract::contract(&mut ir, |bundle| {
+            marked.get(bundle).copied().flatten().is_some_and(|on| match options.contract {
+                Contract::AsWritten => on,
+                Contract::All => true,
+                Contract::None => false,
+            })
         });
         let mut homes = homes::choose(&mut ir);
         homes.quiet.extend(contracted.gone);

@@ -35,6 +35,12 @@ pub(crate) enum Unread {
 }
 
 impl Expander<'_> {
+    /// Whether a tree is that of a file of the library in memory.
+    pub(crate) fn is_in_library(&self, ast: u32) -> bool {
+        let place = self.origins.get(ast as usize).and_then(|origin| origin.place);
+        place.is_some_and(|place| !self.loader.places()[place].takes_quoted())
+    }
+
     /// Reads and parses a file, or finds it among those read.
     pub(crate) fn load(&mut self, id: &FileId) -> Result<(u32, usize), Unread> {
         if let Some(known) = self.files.get(id) {

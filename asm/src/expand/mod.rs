@@ -38,8 +38,8 @@ pub(crate) struct Item {
     pub(crate) loc: u32,
     /// Whether `.schedule on` is in force.
     pub(crate) scheduled: bool,
-    /// Whether `.contract on` is in force.
-    pub(crate) contracted: bool,
+    /// Whether `.contract on` is in force; none in the library, whose error bounds are those of its operations as they stand.
+    pub(crate) contracted: Option<bool>,
 }
 
 /// Words of data memory.
@@ -388,6 +388,7 @@ impl<'l> Expander<'l> {
 
     /// Adds a bundle, an equation or a piece of one to the section.
     pub(crate) fn push(&mut self, at: At, statement: u32, piece: Option<u32>, span: Span) {
+        let contracted = (!self.is_in_library(at.ast)).then_some(self.contracted);
         let items = match self.section {
             Section::Once => &mut self.flat.once,
             Section::Period => &mut self.flat.period,
@@ -402,7 +403,7 @@ impl<'l> Expander<'l> {
                 return;
             }
         };
-        let (loc, scheduled, contracted) = (self.loc, self.scheduled, self.contracted);
+        let (loc, scheduled) = (self.loc, self.scheduled);
         items.push(Item { at, statement, piece, loc, scheduled, contracted });
         if self.flat.once.len() + self.flat.period.len() > limits::OPERATIONS {
             let message = format!("the program expands to more than {} bundles", limits::OPERATIONS);
