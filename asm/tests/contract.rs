@@ -168,20 +168,24 @@ fn what_is_said_of_it() {
     assert!(wrong.contains("`.contract` is `on` or `off`, not `yes`"), "{wrong}");
 }
 
-/// The library's functions keep their operations, and with them their error bounds.
+/// A file of the library that says so keeps its operations, and with them its error bounds, wherever its macros are used.
 #[test]
-fn the_library_stays() {
-    let library = [("f.s", ".macro muladd d, a, b, c\n.reg t\n fmul t, a, b\n fadd d, t, c\n.endm\n")];
+fn the_library_speaks_for_itself() {
+    let body = ".macro muladd d, a, b, c\n.reg t\n fmul t, a, b\n fadd d, t, c\n.endm\n";
     let text = format!(
-        "{HEAD}.include <f.s>\n.contract on\n.period\np: muladd F, a, b, c\n fmul t, a, b\n fadd G, t, d\n wait p\n"
+        "{HEAD}.contract on\n.include <f.s>\n.period\np: muladd F, a, b, c\n fmul t, a, b\n fadd G, t, d\n wait p\n"
     );
-    for contract in [Contract::AsWritten, Contract::All] {
-        let options = Options { machine: &T4, contract, ..Options::default() };
-        let loader = Search::new(MemoryLoader::of("test.s", text.as_str())).library(&library);
-        let assembled = takt_asm::assemble("test.s", &loader, &options);
-        let assembled = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false)));
-        assert_eq!(bundles(&assembled)[2], "fma G, a, b, d");
-        assert_eq!(assembled.contractions.len(), 1);
+    for (head, fused) in [("", 2), (".contract off\n", 1)] {
+        let file = format!("{head}{body}");
+        for contract in [Contract::AsWritten, Contract::All] {
+            let options = Options { machine: &T4, contract, ..Options::default() };
+            let loader =
+                Search::new(MemoryLoader::of("test.s", text.as_str())).library(&[("f.s", file.as_str())]);
+            let assembled = takt_asm::assemble("test.s", &loader, &options);
+            let assembled = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false)));
+            assert_eq!(bundles(&assembled)[3 - fused], "fma G, a, b, d");
+            assert_eq!(assembled.contractions.len(), fused);
+        }
     }
 }
 

@@ -1,12 +1,13 @@
 //! `takt analyse`: where the cycles of one period went, bundle by bundle, and what would make it shorter.
 
+use crate::fault;
 use crate::files::{self, Out};
 use crate::load::Load;
 use crate::number;
 use crate::output;
 use crate::ports::{self, Rows};
 use crate::select::{OptionalMachine, SourceArguments};
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::{Value, json};
 use std::cmp::Reverse;
@@ -71,13 +72,15 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
     }
     files::check(&reads, &writes)?;
     let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
-    let program = load.program(&arguments.file)?;
-    let rows = read_inputs(arguments, &program)?;
-    let (trace, period) = follow(arguments, &program, &rows)?;
+    let loaded = load.with_source(&arguments.file)?;
+    let program = &loaded.program;
+    let rows = read_inputs(arguments, program)?;
+    let followed = follow(arguments, program, &rows);
+    let (trace, period) = followed.map_err(|error| fault::told(error, &loaded, color))?;
     let analysis = Analysis {
-        chain: trace.critical_path(&program),
-        faster: faster(arguments, &load, &program, &trace, &rows),
-        program: &program,
+        chain: trace.critical_path(program),
+        faster: faster(arguments, &load, program, &trace, &rows),
+        program,
         name: files::input_name(&arguments.file),
         period,
         trace,
@@ -126,16 +129,16 @@ fn follow(arguments: &Analyse, program: &Program, rows: &Rows) -> Result<(Trace,
         Ok(())
     };
     set(&mut emulator, 0)?;
-    let mut trace = takt_analysis::trace(&mut emulator).map_err(|error| anyhow!("{error}"))?;
+    let mut trace = takt_analysis::trace(&mut emulator)?;
     let mut period = 0;
     while period < wanted && !matches!(emulator.status(), Status::Halted { .. }) {
         period += 1;
         set(&mut emulator, period)?;
-        let failed = |error: &dyn std::fmt::Display| anyhow!("period {period}: {error}");
+        let which = || format!("period {period}");
         if period < wanted {
-            emulator.run_period(&[]).map_err(|error| failed(&error))?;
+            emulator.run_period(&[]).with_context(which)?;
         } else {
-            trace = takt_analysis::trace(&mut emulator).map_err(|error| failed(&error))?;
+            trace = takt_analysis::trace(&mut emulator).with_context(which)?;
         }
     }
     if period < wanted && (arguments.periods.is_some() || period > 0) {
@@ -294,12 +297,11 @@ impl Analysis<'_> {
             Some((label, 0)) => label.to_owned(),
             _ => address.to_string(),
         };
-        let place = program.operation_location(address, s);
         Some(json!({
             "slot": slot.name,
             "unit": unit.name,
             "text": instruction.text_with(program.machine, s, |register| program.register_text(register), target),
-            "place": place.map(|place| program.place_text(place)),
+            "place": program.operation_place(address, s),
             "latency": instruction.writes(slot).map(|_| unit.latency),
         }))
     }
@@ -313,13 +315,12 @@ impl Analysis<'_> {
                 Cause::Branch { from } => Some(from),
                 _ => None,
             };
-            let line = producer.and_then(|address| program.location(address));
             json!({
                 "cause": cause.name(),
                 "cycles": cycles,
                 "text": program.cause_text(*cause),
                 "producer": producer,
-                "producer_place": line.map(|line| program.place_text(line)),
+                "producer_place": producer.and_then(|address| program.bundle_place(address)),
             })
         };
         let bundle = |(i, issue): (usize, &Issued)| {
@@ -328,7 +329,7 @@ impl Analysis<'_> {
             json!({
                 "address": issue.address,
                 "cycle": self.cycle(i),
-                "place": program.location(issue.address).map(|place| program.place_text(place)),
+                "place": program.bundle_place(issue.address),
                 "stalls": issue.stalls.iter().map(stall).collect::<Vec<_>>(),
                 "critical": critical.contains(&i),
                 "operations": operations

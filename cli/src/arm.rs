@@ -1,9 +1,9 @@
 //! `takt arm`: the six-axis arm's kinematics, on the paper's examples, random poses and a path.
 
 use crate::account::{fused_operations, rounding};
-use crate::fault::explain;
+use crate::fault;
 use crate::files::{self, Given, Out};
-use crate::load::Load;
+use crate::load::{Load, Loaded};
 use crate::number;
 use crate::plot::ArmPlot;
 use crate::run::PERIOD_LIMIT;
@@ -18,7 +18,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_emu::Emulator;
 use takt_isa::program::Port;
-use takt_isa::{Function, Machine, Program, Register, T3};
+use takt_isa::{Function, Machine, Register, T3};
 use takt_programs::arm::{
     Arm as OnArm, CONFIGURATIONS, Configuration, FORWARD_EXAMPLE, ForwardResult, GOOD, INVERSE_EXAMPLE,
     InverseResult, Pose, RoundTrip, Sweep, forward, inverse, square, sweep,
@@ -76,13 +76,16 @@ const PAPER_ARM_CLOCK: f64 = 50.0;
 
 /// A program with its ports in an order of ours.
 struct Ported {
+    loaded: Loaded,
+    color: bool,
     emulator: Emulator,
     inputs: Vec<Register>,
     outputs: Vec<Register>,
 }
 
 impl Ported {
-    fn new(program: &Program, inputs: &[&str], outputs: &[&str]) -> Result<Ported> {
+    fn new(loaded: Loaded, color: bool, inputs: &[&str], outputs: &[&str]) -> Result<Ported> {
+        let program = &loaded.program;
         let registers = |ports: &[Port], names: &[&str]| -> Result<Vec<Register>> {
             let find = |name: &&str| ports.iter().find(|port| port.name == **name).map(|port| port.register);
             names
@@ -91,7 +94,7 @@ impl Ported {
                 .collect()
         };
         let (inputs, outputs) = (registers(&program.inputs, inputs)?, registers(&program.outputs, outputs)?);
-        Ok(Ported { emulator: Emulator::new(program)?, inputs, outputs })
+        Ok(Ported { emulator: Emulator::new(program)?, loaded, color, inputs, outputs })
     }
 
     /// Values of the outputs, and cycles.
@@ -101,7 +104,7 @@ impl Ported {
         }
         self.emulator.set_cycle_limit(self.emulator.now() + PERIOD_LIMIT);
         let report = self.emulator.run_period(&[]);
-        let report = report.map_err(|error| anyhow::anyhow!(explain(&error)))?;
+        let report = report.map_err(|error| fault::told(error.into(), &self.loaded, self.color))?;
         if !report.nan_writes.is_empty() {
             bail!("a NaN was written to an output port");
         }
@@ -128,7 +131,7 @@ impl OnEmulator {
         let (pose, joints) =
             ([&POSE[..], &CONFIGURATION, &["status"]].concat(), [&JOINTS[..], &["status"]].concat());
         let ported = |path, inputs: &[&str], outputs: &[&str]| {
-            let mut ported = Ported::new(&load.builtin(path)?.program, inputs, outputs)?;
+            let mut ported = Ported::new(load.builtin(path)?, load.color, inputs, outputs)?;
             // What runs once belongs to no period.
             let zeros = vec![0; inputs.len()];
             ported.period(zeros.into_iter())?;

@@ -1,7 +1,6 @@
 //! A program on the emulator as the controller of the hybrid robot.
 
 use crate::deny::{Denials, Watch};
-use crate::fault::explain;
 use crate::run::PERIOD_LIMIT;
 use crate::select::suggest;
 use anyhow::{Result, anyhow, bail};
@@ -148,17 +147,21 @@ impl OnEmulator {
 
 /// Why the program cannot control the robot any further.
 #[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub(crate) struct ControllerError(String);
+pub(crate) enum ControllerError {
+    /// It has stopped, or a port cannot be set.
+    #[error("{0}")]
+    Period(#[from] PeriodError),
+    /// An output port, by its name, was not written.
+    #[error("the program has not written output port `{0}`")]
+    Unwritten(&'static str),
+}
 
 impl TrackingController for OnEmulator {
     type Error = ControllerError;
 
     fn step(&mut self, inputs: &Inputs) -> Result<Outputs<f64>, ControllerError> {
         for (register, bits) in self.binding.inputs.iter().zip(inputs.to_words()) {
-            self.emulator
-                .set_input_bits(*register, bits)
-                .map_err(|error| ControllerError(error.to_string()))?;
+            self.emulator.set_input_bits(*register, bits).map_err(PeriodError::from)?;
         }
         self.emulator.set_cycle_limit(self.emulator.now() + PERIOD_LIMIT);
         let is_last = self.until_detail == 0;
@@ -167,15 +170,12 @@ impl TrackingController for OnEmulator {
         } else {
             self.watch.run_period(&mut self.emulator, None, None)
         };
-        let report = report.map_err(|error| ControllerError(explain(&error)))?;
         self.until_detail = self.until_detail.wrapping_sub(1);
-        self.report = Some(report);
+        self.report = Some(report?);
         let mut values = [0.0; OUTPUTS.len()];
         for ((value, register), port) in values.iter_mut().zip(&self.binding.outputs).zip(&OUTPUTS) {
             let bits = self.emulator.output_bits(*register);
-            let unwritten =
-                || ControllerError(format!("the program has not written output port `{}`", port.name));
-            let bits = bits.ok_or_else(unwritten)?;
+            let bits = bits.ok_or(ControllerError::Unwritten(port.name))?;
             *value = f64::from(f32::from_bits(bits));
         }
         Ok(Outputs::from_array(values))

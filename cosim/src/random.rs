@@ -91,16 +91,7 @@ pub fn run(
         }
     }
     if let Some(fault) = lockstep.fault() {
-        coverage.faults.insert(match fault.kind {
-            takt_emu::FaultKind::IllegalWord(_) => "illegal word",
-            takt_emu::FaultKind::ProgramCounter { .. } => "program counter",
-            takt_emu::FaultKind::DataAddress { .. } => "data address",
-            takt_emu::FaultKind::UnwrittenRegister { .. } => "unwritten register",
-            takt_emu::FaultKind::StackOverflow { .. } => "return stack full",
-            takt_emu::FaultKind::StackUnderflow => "return stack empty",
-            takt_emu::FaultKind::LoopBound { .. } => "loop bound",
-            takt_emu::FaultKind::CycleLimit { .. } => "cycle limit",
-        });
+        coverage.faults.insert(fault.kind.name());
     }
     Ok(lockstep.into_simulation())
 }

@@ -52,7 +52,7 @@ impl Named {
     }
 }
 
-/// An operation underway.
+/// An operation in flight.
 #[derive(Clone, Debug)]
 pub struct Flying {
     /// Cycles until its result is there.
@@ -97,7 +97,7 @@ pub struct Panes {
     pub inputs: Vec<Named>,
     /// Output ports.
     pub outputs: Vec<Named>,
-    /// Operations underway.
+    /// Operations in flight.
     pub flight: Vec<Flying>,
     /// Why nothing issues in the cycle to come.
     pub cause: Option<String>,
@@ -158,7 +158,7 @@ pub(crate) fn head(session: &mut Session) -> String {
     let program = session.program();
     let what = match session.emulator().status() {
         Status::Halted { .. } => format!("halted at {}", program.bundle_text(address)),
-        Status::Faulted(fault) => fault.to_string(),
+        Status::Faulted(fault) => fault.show(program).to_string(),
         Status::Waiting { address, .. } => {
             format!("waits for the tick, since {}", program.bundle_text(*address))
         }
@@ -236,7 +236,7 @@ fn used(session: &Session) -> BTreeSet<Register> {
     used
 }
 
-/// Operations underway.
+/// Operations in flight.
 pub(crate) fn flight(session: &Session) -> Vec<Flying> {
     let program = session.program();
     let flying = session.in_flight().into_iter().map(|(retire, left)| Flying {

@@ -63,6 +63,22 @@ pub enum FaultKind {
     },
 }
 
+impl FaultKind {
+    /// Its name, in a word or two.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            FaultKind::IllegalWord(_) => "illegal word",
+            FaultKind::ProgramCounter { .. } => "program counter",
+            FaultKind::DataAddress { .. } => "data address",
+            FaultKind::UnwrittenRegister { .. } => "unwritten register",
+            FaultKind::StackOverflow { .. } => "return stack full",
+            FaultKind::StackUnderflow => "return stack empty",
+            FaultKind::LoopBound { .. } => "loop bound",
+            FaultKind::CycleLimit { .. } => "cycle limit",
+        }
+    }
+}
+
 impl Fault {
     /// The fault in words, for the program that was running.
     pub fn show<'a>(&'a self, program: &'a Program) -> ShownFault<'a> {
@@ -97,7 +113,8 @@ impl ShownFault<'_> {
         match &self.fault.kind {
             FaultKind::IllegalWord(reason) => format!("illegal word: {reason}"),
             FaultKind::ProgramCounter { bundles } => {
-                format!("execution left the program, which has {bundles} bundles")
+                let plural = if *bundles == 1 { "" } else { "s" };
+                format!("execution left the program, which has {bundles} bundle{plural}")
             }
             FaultKind::DataAddress { address, depth, store } => {
                 let does = if *store { "writes" } else { "reads" };
@@ -115,10 +132,16 @@ impl ShownFault<'_> {
             }
             FaultKind::StackUnderflow => "return with the return stack empty".to_owned(),
             FaultKind::LoopBound { most } => {
-                format!("the loop turns more than the {most} times that its .loop_bound promises")
+                format!("the loop iterates more often than its `.loop_bound {most}` allows")
             }
             FaultKind::CycleLimit { limit } => format!("limit of {limit} cycles reached"),
         }
+    }
+
+    /// Where in the source it happened: `pd.s:12`.
+    fn source(&self, program: &Program) -> Option<String> {
+        let own = self.fault.slot.and_then(|slot| program.operation_place(self.fault.address, slot));
+        own.or_else(|| program.bundle_place(self.fault.address))
     }
 
     /// Where and when it happened: `bundle 12, slot add, cycle 44`.
@@ -136,9 +159,9 @@ impl ShownFault<'_> {
 impl std::fmt::Display for ShownFault<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         if let Some(program) = self.program
-            && let Some(location) = self.fault.location(program)
+            && let Some(place) = self.source(program)
         {
-            write!(f, "{}: ", program.place_text(location))?;
+            write!(f, "{place}: ")?;
         }
         write!(f, "{}: {}", self.place(), self.message())
     }

@@ -59,7 +59,7 @@ impl Ticks {
     }
 }
 
-/// A period underway.
+/// The current period.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Period {
     tick: Cycle,
@@ -176,13 +176,13 @@ pub enum PortError {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PeriodError {
     /// A fault.
-    #[error(transparent)]
+    #[error("{0}")]
     Fault(#[from] Fault),
     /// An input could not be set; nothing has run.
     #[error(transparent)]
     Port(#[from] PortError),
     /// The machine has halted.
-    #[error("the machine has halted")]
+    #[error("the machine has halted; each period must end with `wait`")]
     Halted,
 }
 

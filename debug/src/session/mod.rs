@@ -28,6 +28,7 @@ use std::collections::BTreeSet;
 use std::num::NonZeroU64;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use takt_asm::diag::Diagnostics;
 use takt_asm::expr::Value;
 use takt_asm::names::Names;
 use takt_emu::{Emulator, Fault, LoadError, PeriodReport, Retire, Status};
@@ -270,6 +271,11 @@ impl Session {
         self.program().location(address)
     }
 
+    /// A fault of this program, at its source line.
+    pub fn diagnose(&self, fault: &Fault) -> Diagnostics {
+        crate::fault::diagnose(fault, self.program(), &self.options.sources)
+    }
+
     /// The text of a source line, without its end.
     pub fn source_line(&self, location: Location) -> Option<&str> {
         self.source(location.file)?.lines().nth(location.line.checked_sub(1)? as usize)
@@ -321,7 +327,7 @@ impl Session {
     /// one whose result is there for the bundle that issues next but one. What is there already is left out.
     pub fn in_flight(&self) -> Vec<(Retire, Cycle)> {
         let now = self.cycle();
-        let pending = self.core.emulator.underway().filter(|retire| retire.cycle > now);
+        let pending = self.core.emulator.in_flight().filter(|retire| retire.cycle > now);
         let mut pending: Vec<_> = pending.map(|retire| (*retire, retire.cycle - now)).collect();
         pending.sort_by_key(|(retire, left)| (*left, retire.slot));
         pending
