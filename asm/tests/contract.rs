@@ -50,6 +50,22 @@ fn sums_and_differences() {
     becomes(" fmul t, a, a\n fadd s, s, t\n mov F, s", " fma s, a, a, s\n mov F, s");
 }
 
+/// An equation's products, and a fused operation that an equation asks for, with or without contraction.
+#[test]
+fn equations() {
+    let period = |contract: &str, body: &str| {
+        let assembled = on_t4(&format!("{HEAD}.contract {contract}\n.period\np:\n{body}\n wait p\n"));
+        bundles(&assembled)[0].clone()
+    };
+    assert_eq!(period("on", " F = a*b + c"), "fma F, a, b, c");
+    assert_eq!(period("on", " F = c - a*b"), "fnma F, a, b, c");
+    for contract in ["on", "off"] {
+        assert_eq!(period(contract, " F = fms(a, b, c)"), "fms F, a, b, c");
+        assert_eq!(period(contract, " fnms F, a, b, c"), "fnms F, a, b, c");
+    }
+    assert!(period("off", " F = a*b + c").starts_with("fmul"));
+}
+
 /// One name for several values, a factor that has the product's own name, operations between.
 #[test]
 fn names_that_are_used_again() {
