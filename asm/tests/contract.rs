@@ -50,6 +50,22 @@ fn sums_and_differences() {
     becomes(" fmul t, a, a\n fadd s, s, t\n mov F, s", " fma s, a, a, s\n mov F, s");
 }
 
+/// An equation's products, and a fused operation that an equation asks for, with or without contraction.
+#[test]
+fn equations() {
+    let period = |contract: &str, body: &str| {
+        let assembled = on_t4(&format!("{HEAD}.contract {contract}\n.period\np:\n{body}\n wait p\n"));
+        bundles(&assembled)[0].clone()
+    };
+    assert_eq!(period("on", " F = a*b + c"), "fma F, a, b, c");
+    assert_eq!(period("on", " F = c - a*b"), "fnma F, a, b, c");
+    for contract in ["on", "off"] {
+        assert_eq!(period(contract, " F = fms(a, b, c)"), "fms F, a, b, c");
+        assert_eq!(period(contract, " fnms F, a, b, c"), "fnms F, a, b, c");
+    }
+    assert!(period("off", " F = a*b + c").starts_with("fmul"));
+}
+
 /// One name for several values, a factor that has the product's own name, operations between.
 #[test]
 fn names_that_are_used_again() {
@@ -168,20 +184,24 @@ fn what_is_said_of_it() {
     assert!(wrong.contains("`.contract` is `on` or `off`, not `yes`"), "{wrong}");
 }
 
-/// The library's functions keep their operations, and with them their error bounds.
+/// A file of the library that says so keeps its operations, and with them its error bounds, wherever its macros are used.
 #[test]
-fn the_library_stays() {
-    let library = [("f.s", ".macro muladd d, a, b, c\n.reg t\n fmul t, a, b\n fadd d, t, c\n.endm\n")];
+fn the_library_speaks_for_itself() {
+    let body = ".macro muladd d, a, b, c\n.reg t\n fmul t, a, b\n fadd d, t, c\n.endm\n";
     let text = format!(
-        "{HEAD}.include <f.s>\n.contract on\n.period\np: muladd F, a, b, c\n fmul t, a, b\n fadd G, t, d\n wait p\n"
+        "{HEAD}.contract on\n.include <f.s>\n.period\np: muladd F, a, b, c\n fmul t, a, b\n fadd G, t, d\n wait p\n"
     );
-    for contract in [Contract::AsWritten, Contract::All] {
-        let options = Options { machine: &T4, contract, ..Options::default() };
-        let loader = Search::new(MemoryLoader::of("test.s", text.as_str())).library(&library);
-        let assembled = takt_asm::assemble("test.s", &loader, &options);
-        let assembled = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false)));
-        assert_eq!(bundles(&assembled)[2], "fma G, a, b, d");
-        assert_eq!(assembled.contractions.len(), 1);
+    for (head, fused) in [("", 2), (".contract off\n", 1)] {
+        let file = format!("{head}{body}");
+        for contract in [Contract::AsWritten, Contract::All] {
+            let options = Options { machine: &T4, contract, ..Options::default() };
+            let loader =
+                Search::new(MemoryLoader::of("test.s", text.as_str())).library(&[("f.s", file.as_str())]);
+            let assembled = takt_asm::assemble("test.s", &loader, &options);
+            let assembled = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false)));
+            assert_eq!(bundles(&assembled)[3 - fused], "fma G, a, b, d");
+            assert_eq!(assembled.contractions.len(), fused);
+        }
     }
 }
 

@@ -22,7 +22,7 @@ use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
 use crate::syntax::name::NameId;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 use takt_isa::Type;
 use takt_isa::program::{Columns, Location};
@@ -38,7 +38,7 @@ pub(crate) struct Item {
     pub(crate) loc: u32,
     /// Whether `.schedule on` is in force.
     pub(crate) scheduled: bool,
-    /// Whether `.contract on` is in force; none in the library, whose error bounds are those of its operations as they stand.
+    /// Whether `.contract on` is in force; none if the file, of the library, excludes it for what it defines.
     pub(crate) contracted: Option<bool>,
 }
 
@@ -156,6 +156,8 @@ pub(crate) struct Expander<'l> {
     scheduled: bool,
     /// Whether products of what follows are fused into sums.
     contracted: bool,
+    /// Files of the library of whose operations none is fused.
+    uncontracted: HashSet<u32>,
     pub(crate) include_depth: usize,
     pub(crate) includes: usize,
     macro_depth: usize,
@@ -187,6 +189,7 @@ impl<'l> Expander<'l> {
             loc: 0,
             scheduled: false,
             contracted: false,
+            uncontracted: HashSet::new(),
             data_words: 0,
             statements: 0,
             files: HashMap::new(),
@@ -388,7 +391,7 @@ impl<'l> Expander<'l> {
 
     /// Adds a bundle, an equation or a piece of one to the section.
     pub(crate) fn push(&mut self, at: At, statement: u32, piece: Option<u32>, span: Span) {
-        let contracted = (!self.is_in_library(at.ast)).then_some(self.contracted);
+        let contracted = (!self.uncontracted.contains(&at.ast)).then_some(self.contracted);
         let items = match self.section {
             Section::Once => &mut self.flat.once,
             Section::Period => &mut self.flat.period,
@@ -567,7 +570,13 @@ impl<'l> Expander<'l> {
             DirectiveKind::Include(path, library) => self.include(at, path, *library, span)?,
             DirectiveKind::Loc(places) => self.set_loc(at, places)?,
             DirectiveKind::Schedule(word) => self.scheduled = self.is_on(at, *word, "schedule")?,
-            DirectiveKind::Contract(word) => self.contracted = self.is_on(at, *word, "contract")?,
+            DirectiveKind::Contract(word) => match self.is_on(at, *word, "contract")? {
+                // A file of the library speaks for itself, wherever its macros are used.
+                false if self.is_in_library(at.ast) => {
+                    self.uncontracted.insert(at.ast);
+                }
+                on => self.contracted = on,
+            },
             DirectiveKind::Ports(word) => self.ports(at, *word)?,
             DirectiveKind::LoopBound(most) => self.loop_bound(at, *most, span)?,
             DirectiveKind::Deadline(..) | DirectiveKind::Order(_) | DirectiveKind::Late(..) => {
