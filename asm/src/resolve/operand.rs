@@ -668,8 +668,8 @@ fn loading() -> &'static str {
 /// What other processors have and Takt has not, though an instruction of a like name may do something else.
 fn absent(name: &str) -> Option<&'static str> {
     Some(match name {
-        "fma" | "fmadd" | "fmac" | "fmla" | "fnma" | "fms" | "fmsub" | "mac" | "madd" => {
-            "there is no fused operation: `fmul`, then `fadd` or `fsub`"
+        "fmadd" | "fmac" | "fmla" | "fmsub" | "mac" | "madd" => {
+            "`fma` and `fms`, where the machine has them; elsewhere `fmul`, then `fadd` or `fsub`"
         }
         "imul" | "idiv" | "imod" | "irem" | "imin" | "imax" | "iabs" | "ineg" => {
             "of integers there are sums, shifts, logic and comparisons: `itof` converts, and `ishl` multiplies by a power of two"
@@ -728,7 +728,7 @@ mod tests {
     #[test]
     fn advice_names_instructions() {
         let known = |name: &str| ROWS.iter().any(|row| row.mnemonic == name);
-        for name in ["fma", "imul", "fgt", "igt", "fne", "beq", "not"] {
+        for name in ["fmadd", "imul", "fgt", "igt", "fne", "beq", "not"] {
             assert!(!known(name));
             let help = absent(name).expect("there is advice");
             assert!(help.split('`').skip(1).step_by(2).all(known), "{help}");

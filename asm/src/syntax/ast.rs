@@ -311,6 +311,8 @@ pub(crate) enum DirectiveKind {
     Schedule(Name),
     /// `.contract` and `on` or `off`.
     Contract(Name),
+    /// `.fast` and what it allows, or `off`.
+    Fast(Vec<Name>),
     /// `.ports` and `latched` or `direct`.
     Ports(Name),
     /// `.loop_bound`.
@@ -384,6 +386,7 @@ directives! {
     Error ".error" "\"text\"";
     Schedule ".schedule" "on|off";
     Contract ".contract" "on|off";
+    Fast ".fast" "reassociate reciprocal|off";
     Ports ".ports" "latched|direct";
     LoopBound ".loop_bound" "turns";
     Deadline ".deadline" "port, port = cycle";
