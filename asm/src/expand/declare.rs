@@ -2,7 +2,7 @@
 //! the program has, rather than where it goes.
 
 use crate::context::{Array, At, Binding, Context, Reported};
-use crate::expand::{Data, Expander};
+use crate::expand::{Data, Expander, Fast};
 use crate::ir::{RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
 use crate::report::diag::Diagnostic;
@@ -10,6 +10,7 @@ use crate::report::source::Span;
 use crate::syntax::ast::*;
 use crate::syntax::name::NameId;
 use smallvec::SmallVec;
+use takt_isa::program::{Columns, Location};
 use takt_isa::{Machine, Register, Type};
 
 impl Expander<'_> {
@@ -255,6 +256,70 @@ impl Expander<'_> {
                 Err(self.context.error(at.scope, directive, word.span, message))
             }
         }
+    }
+
+    /// `.fast`: what it allows from here on.
+    pub(crate) fn allowed(&mut self, at: At, words: &[Name]) -> Result<Fast, Reported> {
+        let mut fast = Fast::default();
+        for word in words {
+            let name = self.context.name(at, word.name, word.span)?;
+            match self.context.scopes.text(name) {
+                "reassociate" => fast.reassociate = true,
+                "reciprocal" => fast.reciprocal = true,
+                "off" if words.len() == 1 => {}
+                other => {
+                    let message =
+                        format!("`.fast` is `reassociate`, `reciprocal`, both, or `off`, not `{other}`");
+                    return Err(self.context.error(at.scope, "fast", word.span, message));
+                }
+            }
+        }
+        Ok(fast)
+    }
+
+    fn columns(&mut self, at: At, first: Expr, last: Expr) -> Result<Columns, Reported> {
+        let span = first.span.to(last.span);
+        let (first, last) = (self.context.integer(at, first)?, self.context.integer(at, last)?);
+        match (u32::try_from(first), u32::try_from(last)) {
+            (Ok(first), Ok(last)) if 0 < first && first <= last => Ok(Columns { first, last }),
+            _ => {
+                let message = format!("there are no columns {first} to {last}: they count from 1");
+                Err(self.context.error(at.scope, "range", span, message))
+            }
+        }
+    }
+
+    pub(crate) fn set_loc(&mut self, at: At, places: &[Loc]) -> Result<(), Reported> {
+        let mut locations = Vec::with_capacity(places.len());
+        for place in places {
+            locations.push(match place {
+                Loc::None(name) => {
+                    let text = self.context.reports.sources.text(name.span);
+                    if text != "none" {
+                        let message =
+                            format!("`{text}` is not a place: a file in `\"` and a line, or `none`");
+                        return Err(self.context.error(at.scope, "syntax", name.span, message));
+                    }
+                    None
+                }
+                Loc::At(file, line, columns) => {
+                    let number = self.context.integer(at, *line)?;
+                    let Some(number) = u32::try_from(number).ok().filter(|number| *number > 0) else {
+                        let message = format!("there is no line {number}: lines count from 1");
+                        return Err(self.context.error(at.scope, "range", line.span, message));
+                    };
+                    let columns = match columns {
+                        Some((first, last)) => Some(self.columns(at, *first, *last)?),
+                        None => None,
+                    };
+                    let file = self.flat.file(file);
+                    Some((Location { file, line: number }, columns))
+                }
+            });
+        }
+        self.flat.locs.push(locations);
+        self.loc = self.flat.locs.len() as u32 - 1;
+        Ok(())
     }
 
     /// `.ports`: whether they are latched.

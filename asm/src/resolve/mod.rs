@@ -3,6 +3,7 @@
 mod address;
 pub(crate) mod equation;
 mod expression;
+mod fast;
 pub(crate) mod forms;
 mod mismatch;
 mod operand;

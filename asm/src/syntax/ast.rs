@@ -311,6 +311,8 @@ pub(crate) enum DirectiveKind {
     Schedule(Name),
     /// `.contract` and `on` or `off`.
     Contract(Name),
+    /// `.fast` and what it allows, or `off`.
+    Fast(Vec<Name>),
     /// `.ports` and `latched` or `direct`.
     Ports(Name),
     /// `.loop_bound`.
@@ -389,6 +391,7 @@ directives! {
     Error ".error" "\"text\"" "An error with that text.";
     Schedule ".schedule" "on|off" "Whether the assembler packs what follows into bundles and orders it.";
     Contract ".contract" "on|off" "Whether a product that only one sum uses becomes a fused operation with it.";
+    Fast ".fast" "reassociate reciprocal|off" "What equations may do beyond what is written.";
     Ports ".ports" "latched|direct" "Whether inputs are taken together at the tick and outputs published together at `wait`.";
     LoopBound ".loop_bound" "turns" "The bundle that follows heads a loop of at most so many iterations.";
     Deadline ".deadline" "port, port = cycle" "Each output is written for the last time in that cycle or before.";
