@@ -255,7 +255,8 @@ impl Checked {
         }
         let adjustments = copies::report(&ir, homes);
         let placement = place::place(&ir, &mut sink);
-        let emitted = emit::emit(&ir, &placement, &mut sink);
+        let mut emitted = emit::emit(&ir, &placement, &mut sink);
+        emitted.program.parts = names::parts(&sources, &emitted);
         let names = names::names(&context, &ir, &placement, &emitted);
         let report = sink.finish(Arc::clone(&sources));
         if report.has_errors() {

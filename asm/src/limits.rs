@@ -13,6 +13,12 @@ pub const EXPRESSION_DEPTH: usize = 128;
 pub const EVALUATION_DEPTH: usize = EXPRESSION_DEPTH + 32;
 /// Operands and operators of one expression.
 pub const EXPRESSION_NODES: usize = 1 << 16;
+/// Elements of one array of registers, and of all arrays together.
+pub const ARRAY_ELEMENTS: usize = 1 << 16;
+/// Indices of an array.
+pub const ARRAY_INDICES: usize = 8;
+/// Registers that a statement writes, as `a, b = …`.
+pub const EQUATION_TARGETS: usize = 64;
 /// `.include` within `.include`.
 pub const INCLUDE_DEPTH: usize = 32;
 /// `.include`s met during expansion.

@@ -97,6 +97,23 @@ fn soup() -> impl Strategy<Value = String> {
         "\n wait l\n",
         "\n fadd a, b, 1\n",
         "\n mov c, a || fmul b, a, x1\n",
+        "\n.reg P[2,2] v[3]\n",
+        "\n.loc \"f\" 3[1,2]\n",
+        "\na = ",
+        "\nb, F = ",
+        "\nv[i] = ",
+        "\nP[1,2] = ",
+        "\nF = x1*x1 + ",
+        "?",
+        " ? a : b",
+        "v[2]",
+        "P[i,1]",
+        "sqrt(",
+        "min(a, ",
+        "sum(i, 1, 3, ",
+        "m(a)",
+        "itof(n)",
+        "has.fatan2",
         "\u{e9}",
         "\0",
     ];
@@ -262,6 +279,7 @@ prop_compose! {
                 .collect(),
             files: files.clone(),
             lines,
+            parts: Vec::new(),
         }
     }
 }

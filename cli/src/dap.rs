@@ -125,8 +125,22 @@ enum Kind {
 
 /// Fields of a configuration that editors add, or that the adapter reads itself.
 const OTHERS: [&str; 16] = [
-    "program", "cwd", "stopOnEntry", "name", "type", "request", "noDebug", "restart", "presentation", "preLaunchTask",
-    "postDebugTask", "internalConsoleOptions", "debugServer", "serverReadyAction", "trace", "suppressMultipleSessionWarning",
+    "program",
+    "cwd",
+    "stopOnEntry",
+    "name",
+    "type",
+    "request",
+    "noDebug",
+    "restart",
+    "presentation",
+    "preLaunchTask",
+    "postDebugTask",
+    "internalConsoleOptions",
+    "debugServer",
+    "serverReadyAction",
+    "trace",
+    "suppressMultipleSessionWarning",
 ];
 
 /// The arguments of `takt debug` that a configuration stands for.
@@ -137,7 +151,9 @@ fn arguments(configuration: &Value, folder: Option<&Path>) -> Result<Vec<String>
     let wrong = |name: &str, what: &str| format!("`{name}` in the launch configuration is {what}");
     // Paths are relative to `cwd`, if that is given.
     let path = |text: &str| match folder {
-        Some(folder) if text != "tracking" && text != "tracking_literal" => folder.join(text).display().to_string(),
+        Some(folder) if text != "tracking" && text != "tracking_literal" => {
+            folder.join(text).display().to_string()
+        }
         _ => text.to_owned(),
     };
     let mut list = Vec::new();
@@ -152,11 +168,14 @@ fn arguments(configuration: &Value, folder: Option<&Path>) -> Result<Vec<String>
                 continue;
             }
             let known = FIELDS.iter().map(|field| field.0).chain(OTHERS);
-            let meant = takt_asm::nearest(name, known).map_or(String::new(), |meant| format!("; did you mean `{meant}`?"));
+            let meant = takt_asm::nearest(name, known)
+                .map_or(String::new(), |meant| format!("; did you mean `{meant}`?"));
             return Err(format!("a launch configuration has no `{name}`{meant}"));
         };
         let is_path = matches!(*name.as_str(), *"inputs" | *"gcode" | *"include");
-        let mut push = |text: &str| list.push(format!("{option}={}", if is_path { path(text) } else { text.to_owned() }));
+        let mut push = |text: &str| {
+            list.push(format!("{option}={}", if is_path { path(text) } else { text.to_owned() }))
+        };
         match kind {
             Kind::Text => push(value.as_str().ok_or_else(|| wrong(name, "a text"))?),
             Kind::Texts => {
@@ -183,7 +202,8 @@ impl Launcher for CommandLine {
         let parsed = Launch::try_parse_from(&list).map_err(|error| {
             // The first line says it; the rest is about a command line that nobody typed.
             let text = error.to_string();
-            let text = text.lines().take_while(|line| !line.starts_with("Usage:")).collect::<Vec<_>>().join("\n");
+            let text =
+                text.lines().take_while(|line| !line.starts_with("Usage:")).collect::<Vec<_>>().join("\n");
             text.trim().trim_start_matches("error: ").to_owned()
         })?;
         let (session, note) = debug::open(&parsed.debug, control, false).map_err(|error| describe(&error))?;

@@ -63,7 +63,10 @@ fn a_broken_configuration_is_told() {
         (json!({ "program": "wrong.s" }), "there is no instruction or macro `fad`"),
         (json!({ "program": "sum.s", "machine": "t9" }), "there is no such machine"),
         (json!({ "program": "sum.s", "machina": "t1" }), "no `machina`; did you mean `machine`?"),
-        (json!({ "program": "sum.s", "tick": "soon" }), "`tick` in the launch configuration is a whole number"),
+        (
+            json!({ "program": "sum.s", "tick": "soon" }),
+            "`tick` in the launch configuration is a whole number",
+        ),
         (json!({ "program": "sum.s", "tick": 0 }), "less than 1"),
         (json!({ "program": "sum.s", "inputs": "none.csv" }), "none.csv"),
         (json!({ "track": "yes" }), "`true` or `false`"),
@@ -116,9 +119,18 @@ fn nonsense_is_told_and_survived() {
         assert!(refused, "{command} {arguments}: {answer}");
     }
     for (command, arguments) in [
-        ("disassemble", json!({ "memoryReference": "0x0", "instructionOffset": i64::MIN, "instructionCount": 3 })),
-        ("disassemble", json!({ "memoryReference": "0xffffffff", "instructionOffset": i64::MAX, "instructionCount": huge })),
-        ("readMemory", json!({ "memoryReference": "0xffffffff", "offset": i64::MAX - (1 << 40), "count": huge })),
+        (
+            "disassemble",
+            json!({ "memoryReference": "0x0", "instructionOffset": i64::MIN, "instructionCount": 3 }),
+        ),
+        (
+            "disassemble",
+            json!({ "memoryReference": "0xffffffff", "instructionOffset": i64::MAX, "instructionCount": huge }),
+        ),
+        (
+            "readMemory",
+            json!({ "memoryReference": "0xffffffff", "offset": i64::MAX - (1 << 40), "count": huge }),
+        ),
         ("stackTrace", json!({ "startFrame": huge, "levels": huge })),
         ("completions", json!({ "text": "i", "column": huge })),
     ] {
@@ -133,7 +145,8 @@ fn it_goes_forward_and_back() {
     folder.write("sum.s", SUM);
     let path = folder.path().join("sum.s");
     let mut client = launched(&folder, json!({ "program": "sum.s" }));
-    let breakpoints = json!({ "source": { "path": path }, "breakpoints": [{ "line": 12, "condition": "i == 1" }] });
+    let breakpoints =
+        json!({ "source": { "path": path }, "breakpoints": [{ "line": 12, "condition": "i == 1" }] });
     let answer = ok(&mut client, "setBreakpoints", breakpoints);
     assert_eq!(answer["breakpoints"][0]["verified"], true);
     assert_eq!(start(&mut client)["reason"], "entry");
@@ -189,7 +202,9 @@ fn what_runs_can_be_paused() {
 #[test]
 fn exceptions_stop_where_they_are_raised() {
     let folder = Folder::new();
-    folder.write("nan.s", "\
+    folder.write(
+        "nan.s",
+        "\
 .input x
 .output y
 .reg n:int t
@@ -200,7 +215,8 @@ turn:   isub    n, n, 1
         mov     y, t
         fmul    t, 3e38, 10.0
         halt
-");
+",
+    );
     let mut client = launched(&folder, json!({ "program": "nan.s" }));
     let filters = json!({ "filters": ["invalid", "overflow", "nan"] });
     ok(&mut client, "setExceptionBreakpoints", filters);
@@ -231,7 +247,10 @@ turn:   isub    n, n, 1
 #[test]
 fn a_missed_deadline_stops() {
     let folder = Folder::new();
-    folder.write("slow.s", ".output y\n.period\nperiod: mov y, 1.0\n nop\n nop\n nop\n nop\n nop\n wait period\n");
+    folder.write(
+        "slow.s",
+        ".output y\n.period\nperiod: mov y, 1.0\n nop\n nop\n nop\n nop\n nop\n wait period\n",
+    );
     let mut client = launched(&folder, json!({ "program": "slow.s", "tick": 6 }));
     ok(&mut client, "setExceptionBreakpoints", json!({ "filters": ["missed"] }));
     start(&mut client);
@@ -270,7 +289,8 @@ fn it_listens_on_a_socket() {
     // One client after the other.
     for _ in 0..2 {
         let mut stream = std::net::TcpStream::connect(&address).unwrap();
-        let text = json!({ "seq": 1, "type": "request", "command": "initialize", "arguments": {} }).to_string();
+        let text =
+            json!({ "seq": 1, "type": "request", "command": "initialize", "arguments": {} }).to_string();
         let bye = json!({ "seq": 2, "type": "request", "command": "disconnect" }).to_string();
         for text in [text, bye] {
             write!(stream, "Content-Length: {}\r\n\r\n{text}", text.len()).unwrap();

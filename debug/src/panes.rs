@@ -52,7 +52,7 @@ impl Named {
     }
 }
 
-/// An operation underway.
+/// An operation in flight.
 #[derive(Clone, Debug)]
 pub struct Flying {
     /// Cycles until its result is there.
@@ -97,7 +97,7 @@ pub struct Panes {
     pub inputs: Vec<Named>,
     /// Output ports.
     pub outputs: Vec<Named>,
-    /// Operations underway.
+    /// Operations in flight.
     pub flight: Vec<Flying>,
     /// Why nothing issues in the cycle to come.
     pub cause: Option<String>,
@@ -236,7 +236,7 @@ fn used(session: &Session) -> BTreeSet<Register> {
     used
 }
 
-/// Operations underway.
+/// Operations in flight.
 pub fn flight(session: &Session) -> Vec<Flying> {
     let program = session.program();
     let flying = session.in_flight().into_iter().map(|(retire, left)| Flying {

@@ -37,6 +37,8 @@ pub struct Entry {
     pub summary: &'static str,
     /// Special cases, flags, error bound.
     pub text: &'static str,
+    /// How equations write it, in the letters of its sources.
+    pub forms: &'static [&'static str],
     /// Bit fields: name, least significant bit, width.
     pub fields: Vec<(&'static str, u32, u32)>,
     /// Where it issues and what it costs, one entry for each machine that has a unit for it.
@@ -78,6 +80,7 @@ pub fn manual() -> Manual {
         types: row.types,
         summary: row.summary,
         text: row.text,
+        forms: row.forms,
         fields: row
             .shape
             .fields()
@@ -115,6 +118,9 @@ pub fn entry_text(entry: &Entry) -> String {
     let mut out = format!("{}\n    {}\n", entry.assembly(), entry.summary);
     if !entry.text.is_empty() {
         let _ = writeln!(out, "    {}", entry.text);
+    }
+    if !entry.forms.is_empty() {
+        let _ = writeln!(out, "    in equations: {}", entry.forms.join(", "));
     }
     let _ = write!(out, "    opcode 0x{:02x}", entry.opcode);
     for (name, low, width) in &entry.fields {

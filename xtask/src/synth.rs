@@ -527,8 +527,7 @@ RAMs 18 kbit.\n",
         }
     }
     if placed(&units) {
-        text +=
-            "\n## Units\n\nEach unit alone, between registers that are not counted. `cargo xtask synth --unit all`.\n";
+        text += "\n## Units\n\nEach unit alone, between registers that are not counted. `cargo xtask synth --unit all`.\n";
         text += &table(&units);
     }
     let counted: Vec<_> = rows.iter().filter(|row| row.grade.is_none()).collect();

@@ -7,7 +7,7 @@ mod reports;
 mod scopes;
 mod unknown;
 
-pub(crate) use declared::{Argument, Declared, NamedConstant};
+pub(crate) use declared::{Argument, Array, Declared, NamedConstant};
 pub(crate) use notes::Notes;
 pub(crate) use reports::Reports;
 pub(crate) use scopes::{Binding, MacroDefinition, ScopeId, ScopeKind, Scopes};
@@ -131,6 +131,15 @@ pub const fn type_name(ty: Type) -> &'static str {
     match ty {
         Type::F => "float",
         Type::I => "int",
+        Type::B => "bits",
+    }
+}
+
+/// A type in words.
+pub(crate) const fn words(ty: Type) -> &'static str {
+    match ty {
+        Type::F => "a float",
+        Type::I => "an integer",
         Type::B => "bits",
     }
 }

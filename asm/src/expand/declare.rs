@@ -1,13 +1,15 @@
 //! Declarations: registers and their places, presets, data. The part of [`expand`](crate::expand) that writes down what
 //! the program has, rather than where it goes.
 
-use crate::context::{At, Binding, Context, Reported};
+use crate::context::{Array, At, Binding, Context, Reported};
 use crate::expand::{Data, Expander};
 use crate::ir::{RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
+use crate::syntax::name::NameId;
+use smallvec::SmallVec;
 use takt_isa::{Machine, Register, Type};
 
 impl Expander<'_> {
@@ -43,6 +45,17 @@ impl Expander<'_> {
     ) -> Result<(), Reported> {
         let Name { name, span } = declaration.name;
         let id = self.context.name(at, name, span)?;
+        self.declare_name(at, what, declaration, id)
+    }
+
+    fn declare_name(
+        &mut self,
+        at: At,
+        what: Declares,
+        declaration: &Declaration,
+        id: NameId,
+    ) -> Result<(), Reported> {
+        let span = declaration.name.span;
         let kind = match what {
             Declares::Register => RegisterKind::Plain,
             Declares::State => RegisterKind::State,
@@ -69,6 +82,101 @@ impl Expander<'_> {
             Some(place) => self.place(at, register, place),
             None => Ok(()),
         }
+    }
+
+    /// Declares an array of registers.
+    pub(crate) fn declare_array(
+        &mut self,
+        at: At,
+        what: Declares,
+        declaration: &Declaration,
+        sizes: &[Expr],
+    ) -> Result<(), Reported> {
+        let Name { name, span } = declaration.name;
+        let id = self.context.name(at, name, span)?;
+        let text = self.context.scopes.full_name(at.scope, id);
+        let kind = match what {
+            Declares::Register => RegisterKind::Plain,
+            Declares::State => RegisterKind::State,
+            Declares::Input | Declares::Output => {
+                let error = Diagnostic::error("array", span, "ports have a name each, not an array")
+                    .help(format!("declare them in a repetition, as `{text}{{i}}`"));
+                return Err(self.context.report(at.scope, error));
+            }
+        };
+        // With a place it is one element that is declared: what disassembly says of an array.
+        if declaration.place.is_some() {
+            let mut indices = Vec::with_capacity(sizes.len());
+            for size in sizes {
+                let index = self.context.integer(at, *size)?;
+                if index < 1 {
+                    let message = format!("there is no element {index}: indices count from 1");
+                    return Err(self.context.error(at.scope, "range", size.span, message));
+                }
+                indices.push(index.to_string());
+            }
+            if let Binding::Array(_) = self.context.lookup(at.scope, id) {
+                let message = format!("`{text}` is declared already, as an array without places");
+                return Err(self.context.error(at.scope, "declared-twice", span, message));
+            }
+            let element = format!("{}[{}]", self.context.scopes.text(id), indices.join(","));
+            let id = self.context.scopes.names_mut().intern(&element);
+            return self.declare_name(at, what, declaration, id);
+        }
+        if sizes.len() > limits::ARRAY_INDICES {
+            let message = format!("an array has at most {} indices", limits::ARRAY_INDICES);
+            return Err(self.context.error(at.scope, "limit", span, message));
+        }
+        let most = (limits::ARRAY_ELEMENTS - self.context.declared.elements) as i64;
+        let mut count = 1u32;
+        let mut shape = SmallVec::new();
+        for size in sizes {
+            let value = self.context.integer(at, *size)?;
+            if value < 1 {
+                let message = format!("{value} elements: an array has 1 or more in each direction");
+                return Err(self.context.error(at.scope, "range", size.span, message));
+            }
+            if value.saturating_mul(i64::from(count)) > most {
+                let message = format!("arrays of more than {} elements in all", limits::ARRAY_ELEMENTS);
+                return Err(self.context.error(at.scope, "limit", size.span, message));
+            }
+            // Not beyond the limit, which 32 bits hold.
+            count *= value as u32;
+            shape.push(value as u32);
+        }
+        let ty = match declaration.ty {
+            Some(ty) => Some(self.context.type_named(at, ty)?),
+            None => None,
+        };
+        let number = self.context.declared.arrays.len() as u32;
+        self.context.declare(at, id, span, Binding::Array(number))?;
+        self.context.declared.elements += count as usize;
+        let first = RegisterId::new(self.context.declared.registers.len());
+        let mut indices: SmallVec<[u32; 2]> = SmallVec::from_elem(1, shape.len());
+        for _ in 0..count {
+            let texts: Vec<String> = indices.iter().map(u32::to_string).collect();
+            let name = format!("{text}[{}]", texts.join(","));
+            let register = RegisterId::new(self.context.declared.registers.len());
+            self.context.declared.typed.extend(ty.map(|_| register));
+            let ty = ty.unwrap_or(Type::F);
+            self.context.declared.registers.push(VirtualRegister {
+                name,
+                kind,
+                ty,
+                pinned: None,
+                preset: None,
+                span,
+            });
+            for (index, size) in indices.iter_mut().zip(&shape).rev() {
+                *index += 1;
+                if *index <= *size {
+                    break;
+                }
+                *index = 1;
+            }
+        }
+        self.context.declared.arrays.push(Array { name: text, first, sizes: shape, span });
+        Ok(())
     }
 
     /// What follows the `@` of a declaration: a register's canonical name, or a port's number.

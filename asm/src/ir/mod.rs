@@ -20,7 +20,7 @@ use crate::report::source::Span;
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
-use takt_isa::program::{Location, Space};
+use takt_isa::program::{Columns, Location, Space};
 use takt_isa::{Machine, Op, Operand, Register, Row, SlotIndex, Type};
 
 /// A register of [`Ir::registers`].
@@ -85,6 +85,12 @@ pub struct VirtualRegister {
     pub span: Span,
 }
 
+/// A name with something behind it, and that before the indices if it is an element's: `t.1`, `P.1[2,3]`.
+pub(crate) fn numbered(name: &str, number: &str) -> String {
+    let (head, indices) = name.split_at(name.find('[').unwrap_or(name.len()));
+    format!("{head}{number}{indices}")
+}
+
 /// What an operation carries beyond registers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Constant {
@@ -113,6 +119,8 @@ pub struct Operation {
     pub constant: Constant,
     /// The source line that it is attributed to.
     pub location: Option<Location>,
+    /// The part of that line, where the source says it (`.loc`).
+    pub columns: Option<Columns>,
     /// Its place in the source.
     pub span: Span,
     /// Which use of a macro, or turn of a repetition, made it; 0 if it stands in the source as it is.
@@ -121,11 +129,20 @@ pub struct Operation {
     pub made: bool,
     /// Its place in the order of the source: the index of its bundle before any was moved.
     pub order: u32,
-    /// Where it is written: the tree, and the operation of the tree. For messages that point at an operand.
+    /// Where it is written: the tree, and the operation of the tree; [`Operation::COMPUTED`] if it is a part of an equation.
+    /// For messages that point at an operand.
     pub(crate) written: (u32, u32),
 }
 
 impl Operation {
+    /// In [`Operation::written`] the operation that no tree has: one that computes a part of an equation, where its span is.
+    pub(crate) const COMPUTED: u32 = u32::MAX;
+
+    /// Whether it computes a part of an equation.
+    pub(crate) fn is_computed(&self) -> bool {
+        self.written.1 == Operation::COMPUTED
+    }
+
     /// The instruction's row.
     #[inline]
     pub fn row(&self) -> &'static Row {
@@ -162,6 +179,7 @@ impl Operation {
             sources: [RegisterId::ZERO; 3],
             constant: Constant::None,
             location: None,
+            columns: None,
             expansion: 0,
             ..*self
         }

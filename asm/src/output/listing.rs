@@ -5,11 +5,12 @@ use crate::report::source::Lines;
 use crate::syntax::expr::Value;
 use serde::Serialize;
 use std::fmt::Write as _;
-use takt_isa::program::{Location, Port, Space};
+use takt_isa::program::{Columns, Location, Port, Space};
 use takt_isa::{BundleAddress, Instruction, Program, SlotIndex, Type};
 
 /// The listing of an assembled program: for each bundle its address, its words in the order of the slots, and the source
-/// lines that they come from. An operation that a macro, a repetition or the assembler made is shown as what it became, behind a `+`.
+/// lines that they come from. An operation that a macro, a repetition or the assembler made is shown as what it became, behind a `+`;
+/// so is one that computes a part of an equation, with that part.
 pub fn listing(assembled: &Assembled) -> String {
     let mut lister = Lister::new(assembled);
     lister.code();
@@ -110,6 +111,12 @@ impl<'a> Lister<'a> {
                 Some(location) => {
                     let expanded = self.assembled.expanded.binary_search(&(index as u32)).is_ok();
                     let place = program.place_text(location);
+                    if let Some(Columns { first, last }) = program.part(index) {
+                        let part = self.columns(location, first, last);
+                        let operation = self.operation(index, slot);
+                        rows.push((place + "+", format!("{operation:<31} ; {part}")));
+                        continue;
+                    }
                     match self.source(location) {
                         // Of a bundle that issues one after another each operation is shown by itself.
                         Some(text) if !(expanded || slots == 1 && text.contains("||")) => (place, text),
@@ -123,6 +130,14 @@ impl<'a> Lister<'a> {
             }
         }
         rows
+    }
+
+    /// A part of a source line.
+    fn columns(&self, location: Location, first: u32, last: u32) -> String {
+        let line = self.files.get(location.file as usize).and_then(Option::as_ref);
+        let line = line.and_then(|(text, lines)| lines.text(text, location.line)).unwrap_or("");
+        let part = line.chars().skip(first as usize - 1).take((last - first + 1).min(160) as usize);
+        part.map(|c| if c == '\t' { ' ' } else { c }).collect()
     }
 
     fn source(&self, location: Location) -> Option<String> {

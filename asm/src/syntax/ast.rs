@@ -49,6 +49,10 @@ pub enum NodeKind {
     Infix(Operator),
     /// A function, by name, of as many arguments as precede the node.
     Call(NameId, u32),
+    /// `c ? a : b` of the three operands that precede the node.
+    Choice,
+    /// `name[i, j]`: an index into [`Ast::elements`].
+    Element(u32),
 }
 
 /// An expression: a range of nodes.
@@ -105,6 +109,28 @@ pub(crate) enum OperandKind {
     Memory(u32),
     /// `register:type`: an index into [`Ast::casts`].
     Cast(u32),
+    /// `name[i, j]`: an index into [`Ast::elements`].
+    Element(u32),
+}
+
+/// `name[i, j]`: an element of an array of registers.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Element {
+    /// The array.
+    pub name: Name,
+    /// The nodes of each index.
+    pub indices: Vec<Vec<Node>>,
+}
+
+/// `target, … = value, …`: computed when the program runs.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Equation {
+    /// What is written.
+    pub targets: Vec<Operand>,
+    /// What is written there.
+    pub values: Vec<Expr>,
+    /// All of it.
+    pub span: Span,
 }
 
 /// `register:type`: its bits are taken as another type.
@@ -160,6 +186,8 @@ pub(crate) enum StatementKind {
     Bundle(u32, u32),
     /// A directive: its index in [`Ast::directives`].
     Directive(u32),
+    /// An equation: its index in [`Ast::equations`].
+    Equation(u32),
 }
 
 /// What a declaration declares.
@@ -180,6 +208,8 @@ pub(crate) enum Declares {
 pub(crate) struct Declaration {
     /// The name.
     pub name: Name,
+    /// Of an array, how many elements it has in each direction: where they begin in [`Ast::sizes`], and how many there are.
+    pub sizes: (u32, u32),
     /// What follows its colon.
     pub ty: Option<Name>,
     /// What follows its `@`: a name, of a register, or the number of a port.
@@ -298,8 +328,8 @@ pub(crate) enum DirectiveKind {
 pub(crate) enum Loc {
     /// `none`, or another name by mistake.
     None(Name),
-    /// A file and a line.
-    At(String, Expr),
+    /// A file, a line, and perhaps the first and the last column of a part of it.
+    At(String, Expr, Option<(Expr, Expr)>),
 }
 
 macro_rules! directives {
@@ -334,8 +364,8 @@ macro_rules! directives {
 }
 
 directives! {
-    Reg ".reg" "a, b:int, c @ m3" "Registers, placed by the assembler or with `@`.";
-    State ".state" "a, b:int, c @ m3" "Registers whose value outlives the period.";
+    Reg ".reg" "a, b:int, c @ m3, P[4,4]" "Registers, placed by the assembler or with `@`.";
+    State ".state" "a, b:int, c @ m3, P[4,4]" "Registers whose value outlives the period.";
     Input ".input" "a, b:int" "Input ports; `@ 4` gives one its number.";
     Output ".output" "a, b:int" "Output ports; `@ 3` gives one its number.";
     Const ".const" "NAME = expression" "A named constant, evaluated in binary64 or as an integer, rounded once where it is used.";
@@ -382,6 +412,12 @@ pub(crate) struct Ast {
     pub memories: Vec<Memory>,
     /// Operands with a type.
     pub casts: Vec<Cast>,
+    /// Elements of arrays.
+    pub elements: Vec<Element>,
+    /// Equations.
+    pub equations: Vec<Equation>,
+    /// Sizes of declared arrays.
+    pub sizes: Vec<Expr>,
     /// Name templates.
     pub templates: Vec<Template>,
     /// Directives.

@@ -115,7 +115,11 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
 }
 
 /// The session that the command line asks for, and why it begins where it does, if there is a reason.
-pub(crate) fn open(arguments: &Debug, control: &Arc<Control>, color: bool) -> Result<(Session, Option<String>)> {
+pub(crate) fn open(
+    arguments: &Debug,
+    control: &Arc<Control>,
+    color: bool,
+) -> Result<(Session, Option<String>)> {
     let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
     if arguments.closed_loop.track {
         let recording = arguments.closed_loop.record(arguments.file.as_deref(), load, ROWS)?;

@@ -3,6 +3,7 @@
 //! | written | means |
 //! |---|---|
 //! | `x` | what the source line at hand would read: the port or register of that name, or the label's address, or the constant |
+//! | `P[2,3]` | the element of an array of registers |
 //! | `@m12` | the register at that place (`m12` too, if nothing else is named so) |
 //! | `table[i]`, `4[i]`, `[i]` | the data word at that offset and index, as binary32 |
 //! | `x:int`, `@m12:bits`, `[i]:float` | the same bits as a value of that type |
@@ -87,7 +88,7 @@ impl Machine<'_> {
     /// What a bundle that issued in the cycle to come would read.
     pub(crate) fn register(&self, register: Register) -> Option<u32> {
         let now = self.emulator.now();
-        let due = self.emulator.underway().filter(|retire| retire.cycle == now);
+        let due = self.emulator.in_flight().filter(|retire| retire.cycle == now);
         due.filter(|retire| retire.register == Some(register))
             .map(|retire| retire.value)
             .next()
@@ -123,7 +124,7 @@ impl Machine<'_> {
     /// Cycles until the result in flight to a register is there, if there is one.
     pub(crate) fn arrives(&self, register: Register) -> Option<Cycle> {
         let now = self.emulator.now();
-        let flying = self.emulator.underway().filter(|retire| retire.register == Some(register));
+        let flying = self.emulator.in_flight().filter(|retire| retire.register == Some(register));
         flying.map(|retire| retire.cycle.saturating_sub(now)).filter(|left| *left > 0).max()
     }
 
@@ -441,6 +442,15 @@ fn parse(text: &str, known: Known<'_>, depth: usize) -> Result<Live, String> {
                 format!("{} has no register {head} (registers: {})", machine.name, banks.join(" "))
             })?;
             operand = Some(Operand::Register(register, Type::F));
+        } else if bytes.get(at) == Some(&b'[') {
+            let end = closing(bytes, at).ok_or_else(|| format!("`{}`: a `]` is missing", &text[at..]))?;
+            let element = text[start..=end].replace(' ', "");
+            if meanings(&element, known).is_some() {
+                operand = Some(name(&element, known)?);
+                at = end + 1;
+            }
+        }
+        if operand.is_some() {
         } else if bytes.get(at) == Some(&b'[') {
             let end = closing(bytes, at).ok_or_else(|| format!("`{}`: a `]` is missing", &text[at..]))?;
             let part = |text: &str| parse(text, known, depth - 1).map(Box::new);

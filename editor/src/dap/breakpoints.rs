@@ -92,7 +92,9 @@ impl Debugged {
             answers.push(match made {
                 Ok(((stop, place), hits, log)) => {
                     let condition = match &stop {
-                        Stop::Watch { .. } => string("condition").filter(|text| test(&self.console.session, text).is_none()),
+                        Stop::Watch { .. } => {
+                            string("condition").filter(|text| test(&self.console.session, text).is_none())
+                        }
                         Stop::Break { .. } => None,
                     };
                     let condition = condition.map(str::to_owned);
@@ -113,7 +115,8 @@ impl Debugged {
 
     pub(super) fn set_lines(&mut self, arguments: &Value, from_one: bool) -> Answer {
         let source = &arguments["source"];
-        let path = source["path"].as_str().or(source["name"].as_str()).ok_or("`source` has a `path`")?.to_owned();
+        let path =
+            source["path"].as_str().or(source["name"].as_str()).ok_or("`source` has a `path`")?.to_owned();
         let number = source["sourceReference"].as_u64().filter(|number| *number > 0);
         let file = match number {
             Some(number) => self.session().program().files.get(number as usize - 1).cloned(),
@@ -143,7 +146,8 @@ impl Debugged {
     pub(super) fn set_instructions(&mut self, arguments: &Value) -> Answer {
         let make = |session: &Session, one: &Value| {
             let reference = text(one, "instructionReference")?;
-            let address = address(reference).ok_or_else(|| format!("`{reference}` is no bundle's address"))?;
+            let address =
+                address(reference).ok_or_else(|| format!("`{reference}` is no bundle's address"))?;
             let address = i64::from(address.get()) + one["offset"].as_i64().unwrap_or(0);
             let at = Where::parse(&format!("bundle {address}"), session.program())?;
             Ok((break_at(session, at, one, format!("bundle {address}"))?, None))
@@ -154,7 +158,10 @@ impl Debugged {
     pub(super) fn data_info(&mut self, arguments: &Value) -> Answer {
         let name = text(arguments, "name")?;
         let session = self.session();
-        match session.parse(name).and_then(|live| session.evaluate(&live).map(|_| live).or_else(|_| session.parse(name))) {
+        match session
+            .parse(name)
+            .and_then(|live| session.evaluate(&live).map(|_| live).or_else(|_| session.parse(name)))
+        {
             Ok(_) => Ok(json!({
                 "dataId": name,
                 "description": format!("{name} (conditions: `nan`, `subnormal`, `== e`, `> e`, or an expression)"),
@@ -186,7 +193,9 @@ impl Debugged {
 
 /// What a data breakpoint's condition waits for, if it is no expression.
 fn test(session: &Session, condition: &str) -> Option<Result<Test, String>> {
-    let with = |rest: &str, make: fn(Box<takt_debug::session::Live>) -> Test| Some(session.parse(rest).map(|live| make(Box::new(live))));
+    let with = |rest: &str, make: fn(Box<takt_debug::session::Live>) -> Test| {
+        Some(session.parse(rest).map(|live| make(Box::new(live))))
+    };
     match condition {
         "nan" => Some(Ok(Test::Nan)),
         "subnormal" => Some(Ok(Test::Subnormal)),
@@ -207,7 +216,8 @@ fn file_of(program: &Program, path: &Path) -> Option<String> {
     let parts: Vec<Component<'_>> = path.components().collect();
     let ends = |name: &&String| {
         let bare = name.trim_start_matches('<').trim_end_matches('>');
-        let name: Vec<Component<'_>> = Path::new(bare).components().filter(|part| *part != Component::CurDir).collect();
+        let name: Vec<Component<'_>> =
+            Path::new(bare).components().filter(|part| *part != Component::CurDir).collect();
         parts.ends_with(&name)
     };
     program.files.iter().filter(ends).max_by_key(|name| name.len()).cloned()

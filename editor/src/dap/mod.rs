@@ -157,8 +157,10 @@ impl Server<'_> {
         self.then = Then::Nothing;
         // A mistake of ours in one answer is no reason to end the session.
         let answer = catch_unwind(AssertUnwindSafe(|| self.answer(command, &message["arguments"], launcher)));
-        let answer = answer.unwrap_or_else(|_| Err(format!("a defect in Takt: `{command}` could not be answered")));
-        let mut response = json!({ "type": "response", "request_seq": seq, "command": command, "success": answer.is_ok() });
+        let answer =
+            answer.unwrap_or_else(|_| Err(format!("a defect in Takt: `{command}` could not be answered")));
+        let mut response =
+            json!({ "type": "response", "request_seq": seq, "command": command, "success": answer.is_ok() });
         match answer {
             Ok(body) => response["body"] = body,
             Err(text) => {

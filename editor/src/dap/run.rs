@@ -32,7 +32,8 @@ impl Filters {
     pub(super) fn of(arguments: &Value) -> Result<Filters, String> {
         let mut filters = Filters::default();
         let names = arguments["filters"].as_array().ok_or("`filters` is a list")?;
-        let options = arguments["filterOptions"].as_array().into_iter().flatten().map(|option| &option["filterId"]);
+        let options =
+            arguments["filterOptions"].as_array().into_iter().flatten().map(|option| &option["filterId"]);
         for name in names.iter().chain(options) {
             match name.as_str() {
                 Some("invalid") => filters.invalid = true,
@@ -88,7 +89,8 @@ impl Met {
         if self.missed > before.missed {
             return Some(("missed".to_owned(), "a tick came before the program waited for it".to_owned()));
         }
-        (self.nan && !before.nan).then(|| ("nan".to_owned(), "a NaN was written to an output port".to_owned()))
+        (self.nan && !before.nan)
+            .then(|| ("nan".to_owned(), "a NaN was written to an output port".to_owned()))
     }
 }
 
@@ -201,7 +203,11 @@ impl Server<'_> {
             Why::Halted | Why::InputsEnd if over => self.event("terminated", json!({})),
             Why::Halted | Why::InputsEnd => {
                 debugged.over = true;
-                let what = if why == Why::Halted { "the program has halted" } else { "the recorded inputs end here" };
+                let what = if why == Why::Halted {
+                    "the program has halted"
+                } else {
+                    "the recorded inputs end here"
+                };
                 self.output(what);
                 self.stopped("pause", Some(what.to_owned()), None);
             }
@@ -252,12 +258,20 @@ impl Debugged {
     /// Whether an operation of the program clears the flags.
     fn clears_flags(&self) -> bool {
         let words = self.console.session.program().code.iter();
-        words.filter_map(|word| Instruction::decode(*word).ok()).any(|instruction| instruction.effect() == Effect::ClearFlags)
+        words
+            .filter_map(|word| Instruction::decode(*word).ok())
+            .any(|instruction| instruction.effect() == Effect::ClearFlags)
     }
 }
 
 /// Goes to the first position at which there is an exception that was not there before: it is there at `end`, not at `start`.
-fn first(session: &mut Session, filters: Filters, before: &Met, start: Cycle, end: Cycle) -> Option<(String, String)> {
+fn first(
+    session: &mut Session,
+    filters: Filters,
+    before: &Met,
+    start: Cycle,
+    end: Cycle,
+) -> Option<(String, String)> {
     let (mut none, mut there) = (start, end);
     while there - none > 1 {
         let middle = none + (there - none) / 2;

@@ -32,7 +32,9 @@ const VIEWS: u64 = 64;
 pub(super) fn value_text(value: Value) -> String {
     match value {
         Value::Int(value) => value.to_string(),
-        Value::Real(value) if f64::from(value as f32).to_bits() == value.to_bits() => format!("{:?}", value as f32),
+        Value::Real(value) if f64::from(value as f32).to_bits() == value.to_bits() => {
+            format!("{:?}", value as f32)
+        }
         Value::Real(value) => format!("{value:?}"),
     }
 }
@@ -52,7 +54,9 @@ impl Debugged {
         let name = self.console.session.program().files.get(file as usize).cloned().unwrap_or_default();
         match self.path_of(file) {
             Some(path) => json!({ "name": name, "path": path }),
-            None if self.console.session.source(file).is_some() => json!({ "name": name, "sourceReference": file + 1 }),
+            None if self.console.session.source(file).is_some() => {
+                json!({ "name": name, "sourceReference": file + 1 })
+            }
             None => json!({ "name": name }),
         }
     }
@@ -74,7 +78,10 @@ impl Debugged {
         frames.extend(calls.map(|call| (call, program.location(call))));
         let total = frames.len();
         let start = arguments["startFrame"].as_u64().unwrap_or(0) as usize;
-        let levels = arguments["levels"].as_u64().filter(|levels| *levels > 0).map_or(usize::MAX, |levels| levels as usize);
+        let levels = arguments["levels"]
+            .as_u64()
+            .filter(|levels| *levels > 0)
+            .map_or(usize::MAX, |levels| levels as usize);
         let frame = |(id, (at, location)): (usize, (BundleAddress, Option<Location>))| {
             let name = match program.nearest_label(at) {
                 Some((label, 0)) => label.to_owned(),
@@ -99,9 +106,7 @@ impl Debugged {
 
     pub(super) fn scopes(&self) -> Json {
         let program = self.console.session.program();
-        let scope = |name: &str, reference: u64, count: usize, expensive: bool| {
-            json!({ "name": name, "variablesReference": reference, "namedVariables": count, "expensive": expensive })
-        };
+        let scope = |name: &str, reference: u64, count: usize, expensive: bool| json!({ "name": name, "variablesReference": reference, "namedVariables": count, "expensive": expensive });
         let mut scopes = vec![
             scope("Registers", NAMED, program.registers.len(), false),
             scope("Inputs", INPUTS, program.inputs.len(), false),
@@ -138,46 +143,70 @@ impl Debugged {
         let ports = |ports: &[Port]| -> Vec<Json> {
             ports.iter().map(|port| debugged.register_row(&port.name, port.register, port.ty, hex)).collect()
         };
-        let plain = |name: String, value: String| json!({ "name": name, "value": value, "variablesReference": 0 });
+        let plain =
+            |name: String, value: String| json!({ "name": name, "value": value, "variablesReference": 0 });
         let rows: Vec<Json> = match reference {
             INPUTS => ports(&program.inputs),
             OUTPUTS => ports(&program.outputs),
             NAMED => ports(&program.registers),
-            FLIGHT => flight(session).into_iter().map(|one| {
-                let register = if one.register.is_empty() { one.mnemonic.to_owned() } else { one.register };
-                let cycles = if one.left == 1 { "cycle" } else { "cycles" };
-                plain(register, format!("{} {cycles} to go: {} of {}", one.left, one.mnemonic, one.from))
-            }).collect(),
-            STALLS => stalls(session).into_iter().map(|(cycles, what)| plain(what, cycles.to_string())).collect(),
+            FLIGHT => flight(session)
+                .into_iter()
+                .map(|one| {
+                    let register =
+                        if one.register.is_empty() { one.mnemonic.to_owned() } else { one.register };
+                    let cycles = if one.left == 1 { "cycle" } else { "cycles" };
+                    plain(register, format!("{} {cycles} to go: {} of {}", one.left, one.mnemonic, one.from))
+                })
+                .collect(),
+            STALLS => {
+                stalls(session).into_iter().map(|(cycles, what)| plain(what, cycles.to_string())).collect()
+            }
             MACHINE => {
                 let emulator = session.emulator();
-                let flags: Vec<&str> = takt_isa::fp::Flags::NAMES.iter()
-                    .filter(|(flag, _)| emulator.flags().contains(*flag)).map(|(_, name)| *name).collect();
+                let flags: Vec<&str> = takt_isa::fp::Flags::NAMES
+                    .iter()
+                    .filter(|(flag, _)| emulator.flags().contains(*flag))
+                    .map(|(_, name)| *name)
+                    .collect();
                 let cause = |cause: Cause| program.cause_text(cause);
                 vec![
                     plain("machine".to_owned(), program.machine.name.to_owned()),
                     plain("cycle".to_owned(), session.cycle().to_string()),
                     plain("period".to_owned(), session.period().to_string()),
-                    plain("flags".to_owned(), if flags.is_empty() { "none".to_owned() } else { flags.join(" ") }),
+                    plain(
+                        "flags".to_owned(),
+                        if flags.is_empty() { "none".to_owned() } else { flags.join(" ") },
+                    ),
                     plain("next bundle".to_owned(), program.bundle_text(emulator.next_address())),
                     plain("stalled".to_owned(), stall.map_or("no".to_owned(), cause)),
                     plain("missed deadlines".to_owned(), emulator.statistics().missed.to_string()),
                 ]
             }
             BANKS..VIEWS => {
-                let bank = program.machine.banks().nth((reference - BANKS) as usize).ok_or("there is no such bank")?;
+                let bank = program
+                    .machine
+                    .banks()
+                    .nth((reference - BANKS) as usize)
+                    .ok_or("there is no such bank")?;
                 let start = arguments["start"].as_u64().unwrap_or(0) as usize;
-                let count = arguments["count"].as_u64().filter(|count| *count > 0).map_or(VARIABLES, |count| count as usize);
-                let registers = Register::all().filter(|register| bank.contains(*register)).skip(start).take(count);
-                registers.map(|register| {
-                    let place = program.machine.register_name(register).unwrap_or_default();
-                    debugged.register_row(&format!("@{place}"), register, Type::B, hex)
-                }).collect()
+                let count = arguments["count"]
+                    .as_u64()
+                    .filter(|count| *count > 0)
+                    .map_or(VARIABLES, |count| count as usize);
+                let registers =
+                    Register::all().filter(|register| bank.contains(*register)).skip(start).take(count);
+                registers
+                    .map(|register| {
+                        let place = program.machine.register_name(register).unwrap_or_default();
+                        debugged.register_row(&format!("@{place}"), register, Type::B, hex)
+                    })
+                    .collect()
             }
             _ => {
                 let register = usize::try_from(reference - reference.min(VIEWS)).ok().and_then(Register::new);
                 let register = register.filter(|_| reference >= VIEWS);
-                let register = register.ok_or_else(|| format!("there is no list of variables {reference}"))?;
+                let register =
+                    register.ok_or_else(|| format!("there is no list of variables {reference}"))?;
                 debugged.views(register)
             }
         };
@@ -191,7 +220,8 @@ impl Debugged {
         let float = views.float;
         // The distance to the next number: what one unit in the last place is here.
         let ulp = f64::from(f32::from_bits(float.abs().to_bits().saturating_add(1))) - f64::from(float.abs());
-        let row = |name: &str, value: String| json!({ "name": name, "value": value, "variablesReference": 0 });
+        let row =
+            |name: &str, value: String| json!({ "name": name, "value": value, "variablesReference": 0 });
         vec![
             row("float", views.text.clone()),
             row("hex float", views.hex_float.clone()),
@@ -216,7 +246,9 @@ impl Debugged {
             Place::Register(register) => VIEWS + u64::from(register.get()),
             Place::Word(_) => 0,
         };
-        Ok(json!({ "value": shown(ty, Some(bits), false), "type": takt_asm::type_name(ty), "variablesReference": reference }))
+        Ok(
+            json!({ "value": shown(ty, Some(bits), false), "type": takt_asm::type_name(ty), "variablesReference": reference }),
+        )
     }
 
     pub(super) fn evaluate(&mut self, arguments: &Json) -> Answer {
@@ -225,7 +257,9 @@ impl Debugged {
         let session = self.session();
         let result = session.parse(&written).and_then(|live| {
             let (reference, ty, value) = match session.place(&live)? {
-                Some((Place::Register(register), ty, bits)) => (VIEWS + u64::from(register.get()), Some(ty), shown(ty, bits, hex)),
+                Some((Place::Register(register), ty, bits)) => {
+                    (VIEWS + u64::from(register.get()), Some(ty), shown(ty, bits, hex))
+                }
                 Some((Place::Word(_), ty, bits)) => (0, Some(ty), shown(ty, bits, hex)),
                 None => (0, None, value_text(session.evaluate(&live)?)),
             };
@@ -239,7 +273,19 @@ impl Debugged {
             })),
             // In the console, the debugger's own commands that only look.
             Err(error) if arguments["context"] == "repl" => {
-                let looks = ["print", "info", "ulp", "registers", "ports", "memory", "flight", "stalls", "list", "where", "help"];
+                let looks = [
+                    "print",
+                    "info",
+                    "ulp",
+                    "registers",
+                    "ports",
+                    "memory",
+                    "flight",
+                    "stalls",
+                    "list",
+                    "where",
+                    "help",
+                ];
                 let word = written.split_whitespace().next().unwrap_or("");
                 if !looks.contains(&word) {
                     return Err(error);
@@ -253,33 +299,46 @@ impl Debugged {
 
     pub(super) fn completions(&mut self, arguments: &Json) -> Answer {
         let written = text(arguments, "text")?;
-        let end = arguments["column"].as_u64().map_or(written.len(), |column| (column as usize).saturating_sub(1));
+        let end =
+            arguments["column"].as_u64().map_or(written.len(), |column| (column as usize).saturating_sub(1));
         let before: String = written.chars().take(end).collect();
-        let start = before.rfind(|c: char| !(c.is_ascii_alphanumeric() || c == '_' || c == '.')).map_or(0, |at| at + 1);
+        let start = before
+            .rfind(|c: char| !(c.is_ascii_alphanumeric() || c == '_' || c == '.'))
+            .map_or(0, |at| at + 1);
         let names = self.session().names(before.get(start..).unwrap_or(""));
-        let targets: Vec<Json> = names.into_iter().take(200).map(|name| {
-            json!({ "label": name, "start": start, "length": before.len() - start })
-        }).collect();
+        let targets: Vec<Json> = names
+            .into_iter()
+            .take(200)
+            .map(|name| json!({ "label": name, "start": start, "length": before.len() - start }))
+            .collect();
         Ok(json!({ "targets": targets }))
     }
 
     pub(super) fn disassemble(&mut self, arguments: &Json, from_one: bool) -> Answer {
         let reference = text(arguments, "memoryReference")?;
         let first = address(reference).ok_or_else(|| format!("`{reference}` is no bundle's address"))?;
-        let offset = arguments["instructionOffset"].as_i64().unwrap_or(0) + arguments["offset"].as_i64().unwrap_or(0);
+        let offset =
+            arguments["instructionOffset"].as_i64().unwrap_or(0) + arguments["offset"].as_i64().unwrap_or(0);
         let count = number(arguments, "instructionCount")?.min(BUNDLES);
         let session = &self.console.session;
         let program = session.program();
         let mut rows = Vec::new();
-        for number in (0..count as i64).map(|index| i64::from(first.get()).saturating_add(offset).saturating_add(index)) {
-            let address = u32::try_from(number).ok().filter(|number| *number < program.bundles()).map(BundleAddress::new);
+        for number in
+            (0..count as i64).map(|index| i64::from(first.get()).saturating_add(offset).saturating_add(index))
+        {
+            let address = u32::try_from(number)
+                .ok()
+                .filter(|number| *number < program.bundles())
+                .map(BundleAddress::new);
             let Some(at) = address else {
                 rows.push(json!({ "address": format!("0x{:x}", number.max(0)), "instruction": "(no bundle)", "presentationHint": "invalid" }));
                 continue;
             };
             let slots = program.machine.slots.iter().zip(session.bundle(at));
-            let operations: Vec<String> = slots.filter_map(|(slot, text)| Some(format!("{}: {}", slot.name, text?))).collect();
-            let words: Vec<String> = program.words(at).unwrap_or_default().iter().map(|word| format!("{word:012x}")).collect();
+            let operations: Vec<String> =
+                slots.filter_map(|(slot, text)| Some(format!("{}: {}", slot.name, text?))).collect();
+            let words: Vec<String> =
+                program.words(at).unwrap_or_default().iter().map(|word| format!("{word:012x}")).collect();
             let mut row = json!({
                 "address": format!("0x{:x}", at.get()),
                 "instructionBytes": words.join(" "),
@@ -320,7 +379,8 @@ fn base64(bytes: &[u8]) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for chunk in bytes.chunks(3) {
-        let group = chunk.iter().fold(0u32, |group, byte| group << 8 | u32::from(*byte)) << (8 * (3 - chunk.len()));
+        let group =
+            chunk.iter().fold(0u32, |group, byte| group << 8 | u32::from(*byte)) << (8 * (3 - chunk.len()));
         for digit in 0..4 {
             let index = (group >> (18 - 6 * digit)) as usize & 63;
             text.push(if digit <= chunk.len() { char::from(DIGITS[index]) } else { '=' });
@@ -333,7 +393,9 @@ fn base64(bytes: &[u8]) -> String {
 mod tests {
     #[test]
     fn base_64() {
-        for (bytes, text) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")] {
+        for (bytes, text) in
+            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")]
+        {
             assert_eq!(super::base64(bytes.as_bytes()), text);
         }
     }

@@ -135,7 +135,7 @@ T1 = Machine {
     slots: &[Slot {
         name: "one",
         bank: bank("r", 0, 512),
-        // A sine at most every nine cycles: then what is underway needs as many places as the other units' latency.
+        // A sine at most every nine cycles: then what is in flight needs as many places as the other units' latency.
         units: &[
             ADD,
             CONVERT,
