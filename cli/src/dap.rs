@@ -172,7 +172,7 @@ fn arguments(configuration: &Value, folder: Option<&Path>) -> Result<Vec<String>
                 .map_or(String::new(), |meant| format!("; did you mean `{meant}`?"));
             return Err(format!("a launch configuration has no `{name}`{meant}"));
         };
-        let is_path = matches!(*name.as_str(), *"inputs" | *"gcode" | *"include");
+        let is_path = matches!(name.as_str(), "inputs" | "gcode" | "include");
         let mut push = |text: &str| {
             list.push(format!("{option}={}", if is_path { path(text) } else { text.to_owned() }))
         };

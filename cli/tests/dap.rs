@@ -3,7 +3,7 @@
 mod common;
 
 use common::protocol::Client;
-use common::{Folder, SUM, source};
+use common::{Folder, SUM};
 use serde_json::{Value, json};
 use std::process::Command;
 
@@ -275,7 +275,6 @@ fn it_attaches_to_the_closed_loop() {
     go(&mut client, "takt/gotoPeriod", json!({ "period": 2 }));
     assert_eq!(value(&mut client, "period"), "2");
     end(client);
-    let _ = source;
 }
 
 #[test]
