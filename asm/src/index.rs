@@ -21,6 +21,8 @@ pub enum SymbolKind {
     Register,
     /// `.state`.
     State,
+    /// An array of registers.
+    Array,
     /// `.input`.
     Input,
     /// `.output`.
@@ -45,6 +47,7 @@ impl SymbolKind {
         match self {
             SymbolKind::Register => "register",
             SymbolKind::State => "state",
+            SymbolKind::Array => "array of registers",
             SymbolKind::Input => "input port",
             SymbolKind::Output => "output port",
             SymbolKind::Constant => "constant",
@@ -74,6 +77,8 @@ pub struct Symbol {
     pub value: Option<Value>,
     /// Of a label: word of data memory.
     pub word: Option<u32>,
+    /// Of an array: how many elements it has in each direction.
+    pub sizes: Vec<u32>,
     /// Of a macro: its parameters.
     pub parameters: Vec<String>,
     /// Of a parameter: its macro.
@@ -141,13 +146,21 @@ pub(crate) fn index(context: &mut Context, ir: &Ir) -> Index {
     let registers = builder.registers(ir);
     let constants = builder.constants();
     let labels = builder.labels(ir);
-    let blocks = builder.blocks();
+    let arrays = builder.arrays();
+    let mut blocks = builder.blocks();
+    for (sum, variable, name) in &notes.sums {
+        if !blocks.contains_key(sum) {
+            let text = builder.context.scopes.text(*name).to_owned();
+            builder.add(text, SymbolKind::Count, *variable);
+            blocks.insert(*sum, builder.last());
+        }
+    }
     let (macros, parameters) = builder.macros();
     let context = builder.context;
     let symbol = |scope, name: NameId| -> Option<u32> {
         match context.lookup(scope, name) {
             Binding::Register(id) => registers[id.index()],
-            Binding::Array(id) => registers[context.declared.arrays[id as usize].first.index()],
+            Binding::Array(id) => arrays.get(id as usize).copied(),
             Binding::Constant(id) => constants.get(id as usize).copied(),
             Binding::Code(id) | Binding::Data(id) => labels.get(id.0 as usize).copied(),
             Binding::Argument(_) => match context.scopes.scope(context.scopes.scope(scope).owner).kind {
@@ -203,6 +216,7 @@ impl Builder<'_> {
             place: None,
             value: None,
             word: None,
+            sizes: Vec::new(),
             parameters: Vec::new(),
             of: None,
         });
@@ -216,18 +230,7 @@ impl Builder<'_> {
 
     fn registers(&mut self, ir: &Ir) -> Vec<Option<u32>> {
         let mut numbers = Vec::with_capacity(ir.registers.len());
-        // The elements of an array are one symbol, by the array's name.
-        let arrays: HashMap<usize, (usize, String)> = (self.context.declared.arrays.iter())
-            .flat_map(|array| {
-                array.elements().map(|id| (id.index(), (array.first.index(), array.name.clone())))
-            })
-            .collect();
-        for (index, register) in ir.registers.iter().enumerate() {
-            let array = arrays.get(&index);
-            if let Some(first) = array.map(|(first, _)| *first).filter(|first| *first < index) {
-                numbers.push(numbers[first]);
-                continue;
-            }
+        for register in &ir.registers {
             let kind = match register.kind {
                 _ if register.name.is_empty() => None,
                 RegisterKind::Plain => Some(SymbolKind::Register),
@@ -237,8 +240,7 @@ impl Builder<'_> {
                 RegisterKind::Constant(_) | RegisterKind::Zero => None,
             };
             numbers.push(kind.map(|kind| {
-                let name = array.map_or(&register.name, |(_, name)| name).clone();
-                let symbol = self.add(name, kind, register.span);
+                let symbol = self.add(register.name.clone(), kind, register.span);
                 (symbol.ty, symbol.place) = (Some(register.ty), register.pinned);
                 self.last()
             }));
@@ -250,6 +252,15 @@ impl Builder<'_> {
         let mut numbers = Vec::new();
         for constant in &self.context.declared.constants {
             self.add(constant.name.clone(), SymbolKind::Constant, constant.span).value = constant.value;
+            numbers.push(self.last());
+        }
+        numbers
+    }
+
+    fn arrays(&mut self) -> Vec<u32> {
+        let mut numbers = Vec::new();
+        for array in &self.context.declared.arrays {
+            self.add(array.name.clone(), SymbolKind::Array, array.span).sizes = array.sizes.to_vec();
             numbers.push(self.last());
         }
         numbers

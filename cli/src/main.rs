@@ -9,6 +9,7 @@ mod bound;
 mod completions;
 mod controller;
 mod cosim;
+mod dap;
 mod debug;
 mod deny;
 mod disasm;
@@ -77,6 +78,7 @@ enum Command {
     Eval(eval::Eval),
     Fmt(fmt::Fmt),
     Lsp(lsp::Lsp),
+    Dap(dap::Dap),
     Rtl(rtl::Rtl),
     Cosim(cosim::Cosim),
     Isa(isa::Isa),
@@ -98,6 +100,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Eval(eval) => eval::run(eval, out),
         Command::Fmt(fmt) => fmt::run(fmt, out),
         Command::Lsp(lsp) => lsp::run(lsp),
+        Command::Dap(dap) => dap::run(dap),
         Command::Rtl(rtl) => rtl::run(rtl, color, out),
         Command::Cosim(cosim) => cosim::run(cosim, color, out),
         Command::Isa(isa) => isa::run(isa, out),

@@ -12,6 +12,8 @@ pub(crate) struct Notes {
     pub(crate) names: Vec<(Span, ScopeId, NameId)>,
     /// Uses of macros.
     pub(crate) macros: Vec<(Span, NameId)>,
+    /// Sums of equations: where each stands, and where what it counts with.
+    pub(crate) sums: Vec<(Span, Span, NameId)>,
     /// `.include`s, and which of the sources each means.
     pub(crate) includes: Vec<(Span, usize)>,
     /// More was met than is kept.
@@ -23,6 +25,14 @@ impl Notes {
     pub(crate) fn name(&mut self, span: Span, scope: ScopeId, name: NameId) {
         if self.names.len() < limits::REFERENCES {
             self.names.push((span, scope, name));
+        } else {
+            self.cut = true;
+        }
+    }
+
+    pub(crate) fn sum(&mut self, sum: Span, variable: Span, name: NameId) {
+        if self.sums.len() < limits::REFERENCES {
+            self.sums.push((sum, variable, name));
         } else {
             self.cut = true;
         }

@@ -135,16 +135,21 @@ impl Line<'_> {
     }
 
     fn operation(&self, tokens: &[Token], aligned: bool, out: &mut String) {
+        // An equation: nothing of it has a column.
+        if tokens.iter().any(|token| token.kind == TokenKind::Assign) {
+            return self.operands(tokens, false, out);
+        }
         let head = head(tokens);
         let (mnemonic, operands) = tokens.split_at(head);
         let start = width(out);
         self.copy(mnemonic, out);
-        let Some(first) = operands.first() else { return };
-        let is_operand = first.kind != TokenKind::Assign;
+        if operands.is_empty() {
+            return;
+        }
         // Arguments of a macro may be tables; an instruction's operands are a list.
         let is_list =
             matches!(mnemonic, [name] if Op::from_mnemonic(&self.text[name.range.clone()]).is_some());
-        pad(out, if aligned && is_operand { start + CODE } else { 0 }, 1);
+        pad(out, if aligned { start + CODE } else { 0 }, 1);
         self.operands(operands, is_list, out);
     }
 
@@ -159,29 +164,30 @@ impl Line<'_> {
         self.operands(operands, false, out);
     }
 
-    /// Operands: of a list with single blanks, of what may be a table with those that there are. Within braces, blanks are no
+    /// Operands: of a list with single blanks, of what may be a table with those that there are. Within brackets, blanks are no
     /// business of columns.
     fn operands(&self, operands: &[Token], is_list: bool, out: &mut String) {
-        let (mut before, mut braces): (Option<&Token>, u32) = (None, 0);
+        let (mut before, mut depth): (Option<&Token>, u32) = (None, 0);
         for token in operands {
             if let Some(before) = before {
                 let blanks = columns(&self.text[before.range.end..token.range.start]);
                 let around = |kind| before.kind == kind || token.kind == kind;
                 let blanks = match token.kind {
-                    _ if braces > 0 => blanks,
+                    _ if depth > 0 => blanks,
                     TokenKind::Comma => 0,
                     _ if before.kind == TokenKind::Comma || around(TokenKind::Assign) => blanks.max(1),
                     _ => blanks,
                 };
                 out.extend(std::iter::repeat_n(
                     ' ',
-                    if is_list && braces == 0 { blanks.min(1) } else { blanks },
+                    if is_list && depth == 0 { blanks.min(1) } else { blanks },
                 ));
             }
-            out.push_str(&self.text[token.range.clone()]);
-            match token.kind {
-                TokenKind::TemplateBegin => braces += 1,
-                TokenKind::TemplateEnd => braces = braces.saturating_sub(1),
+            let text = &self.text[token.range.clone()];
+            out.push_str(text);
+            match (token.kind, text) {
+                (TokenKind::TemplateBegin, _) | (_, "(" | "[") => depth += 1,
+                (TokenKind::TemplateEnd, _) | (_, ")" | "]") => depth = depth.saturating_sub(1),
                 _ => {}
             }
             before = Some(token);

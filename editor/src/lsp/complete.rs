@@ -200,7 +200,8 @@ pub(crate) fn complete(
     }
 }
 
-const ANY: [SymbolKind; 9] = [
+const ANY: [SymbolKind; 10] = [
+    SymbolKind::Array,
     SymbolKind::Register,
     SymbolKind::State,
     SymbolKind::Input,

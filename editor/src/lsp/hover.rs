@@ -170,6 +170,11 @@ fn symbol_text(settings: &Settings, front: &Front, counted: Option<&Counted>, sy
         SymbolKind::Register | SymbolKind::State | SymbolKind::Input | SymbolKind::Output => {
             register(settings, counted, symbol, &mut text);
         }
+        SymbolKind::Array => {
+            let sizes: Vec<String> = symbol.sizes.iter().map(u32::to_string).collect();
+            let _ = write!(text, "\n\n`{name}[{}]`, indices from 1", sizes.join(","));
+            elements(counted, name, &mut text);
+        }
         SymbolKind::Parameter | SymbolKind::Count => {}
     }
     let declared = declaration_line(front, symbol.span);
@@ -177,6 +182,18 @@ fn symbol_text(settings: &Settings, front: &Front, counted: Option<&Counted>, sy
         let _ = write!(text, "\n\n{declared}");
     }
     text
+}
+
+/// Where an array's elements lie.
+fn elements(counted: Option<&Counted>, name: &str, text: &mut String) {
+    let Some(program) = counted.map(|counted| &counted.assembled.program) else { return };
+    let of = |port: &&takt_isa::program::Port| {
+        port.name.strip_prefix(name).is_some_and(|rest| rest.starts_with('['))
+    };
+    for port in program.registers.iter().filter(of).take(TOLD) {
+        let place = program.machine.register_name(port.register).unwrap_or_default();
+        let _ = write!(text, "\n- `{}` in `{place}`", port.name);
+    }
 }
 
 /// Where a register lies, and when which of its values does.
