@@ -22,7 +22,7 @@ use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
 use crate::syntax::name::NameId;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 use takt_isa::Type;
 use takt_isa::program::{Columns, Location};
@@ -38,8 +38,19 @@ pub(crate) struct Item {
     pub(crate) loc: u32,
     /// Whether `.schedule on` is in force.
     pub(crate) scheduled: bool,
-    /// Whether `.contract on` is in force.
-    pub(crate) contracted: bool,
+    /// Whether `.contract on` is in force; none if the file, of the library, excludes it for what it defines.
+    pub(crate) contracted: Option<bool>,
+    /// What `.fast` allows.
+    pub(crate) fast: Fast,
+}
+
+/// What `.fast` allows of equations beyond what is written.
+#[derive(Clone, Copy, Default, Debug)]
+pub(crate) struct Fast {
+    /// The order of a sum and of a product may change.
+    pub(crate) reassociate: bool,
+    /// A division by a constant may be a multiplication by its inverse.
+    pub(crate) reciprocal: bool,
 }
 
 /// Words of data memory.
@@ -143,7 +154,7 @@ pub(crate) struct Expander<'l> {
     pub(crate) flat: Flat,
     pub(crate) frames: Vec<Frame>,
     pub(crate) section: Section,
-    loc: u32,
+    pub(crate) loc: u32,
     pub(crate) data_words: usize,
     statements: usize,
     /// Files read: the tree and the index in the sources.
@@ -156,6 +167,9 @@ pub(crate) struct Expander<'l> {
     scheduled: bool,
     /// Whether products of what follows are fused into sums.
     contracted: bool,
+    /// Files of the library of whose operations none is fused.
+    uncontracted: HashSet<u32>,
+    fast: Fast,
     pub(crate) include_depth: usize,
     pub(crate) includes: usize,
     macro_depth: usize,
@@ -187,6 +201,8 @@ impl<'l> Expander<'l> {
             loc: 0,
             scheduled: false,
             contracted: false,
+            uncontracted: HashSet::new(),
+            fast: Fast::default(),
             data_words: 0,
             statements: 0,
             files: HashMap::new(),
@@ -374,7 +390,7 @@ impl<'l> Expander<'l> {
         let ast = &self.context.asts[at.ast as usize];
         let operation = ast.operations[first as usize];
         if count == 1 {
-            let Ok(name) = self.context.name(at, operation.mnemonic.name, operation.mnemonic.span) else {
+            let Ok(name) = self.context.spelled(at, operation.mnemonic.name, operation.mnemonic.span) else {
                 return;
             };
             // A macro cannot have an instruction's name.
@@ -388,6 +404,7 @@ impl<'l> Expander<'l> {
 
     /// Adds a bundle, an equation or a piece of one to the section.
     pub(crate) fn push(&mut self, at: At, statement: u32, piece: Option<u32>, span: Span) {
+        let contracted = (!self.uncontracted.contains(&at.ast)).then_some(self.contracted);
         let items = match self.section {
             Section::Once => &mut self.flat.once,
             Section::Period => &mut self.flat.period,
@@ -402,8 +419,8 @@ impl<'l> Expander<'l> {
                 return;
             }
         };
-        let (loc, scheduled, contracted) = (self.loc, self.scheduled, self.contracted);
-        items.push(Item { at, statement, piece, loc, scheduled, contracted });
+        let (loc, scheduled, fast) = (self.loc, self.scheduled, self.fast);
+        items.push(Item { at, statement, piece, loc, scheduled, contracted, fast });
         if self.flat.once.len() + self.flat.period.len() > limits::OPERATIONS {
             let message = format!("the program expands to more than {} bundles", limits::OPERATIONS);
             self.limit(at.scope, span, message);
@@ -426,6 +443,9 @@ impl<'l> Expander<'l> {
             let error = Diagnostic::error("arguments", operation.span, message).also(defined, "defined here");
             self.context.report(at.scope, error);
             return;
+        }
+        if let Some(notes) = &mut self.context.notes {
+            notes.macro_use(operation.mnemonic.span, name);
         }
         self.enter_macro(at, name, operation.span, &given);
     }
@@ -524,7 +544,7 @@ impl<'l> Expander<'l> {
             }
             DirectiveKind::Rep { variable, first, last, end } => {
                 self.jump(*end + 1);
-                let variable = self.context.name(at, variable.name, variable.span)?;
+                let variable = self.context.spelled(at, variable.name, variable.span)?;
                 let from = self.context.integer(at, *first)?;
                 let to = self.context.integer(at, *last)?;
                 if to.saturating_sub(from) >= limits::REPETITIONS {
@@ -563,7 +583,14 @@ impl<'l> Expander<'l> {
             DirectiveKind::Include(path, library) => self.include(at, path, *library, span)?,
             DirectiveKind::Loc(places) => self.set_loc(at, places)?,
             DirectiveKind::Schedule(word) => self.scheduled = self.is_on(at, *word, "schedule")?,
-            DirectiveKind::Contract(word) => self.contracted = self.is_on(at, *word, "contract")?,
+            DirectiveKind::Contract(word) => match self.is_on(at, *word, "contract")? {
+                // A file of the library speaks for itself, wherever its macros are used.
+                false if self.is_in_library(at.ast) => {
+                    self.uncontracted.insert(at.ast);
+                }
+                on => self.contracted = on,
+            },
+            DirectiveKind::Fast(words) => self.fast = self.allowed(at, words)?,
             DirectiveKind::Ports(word) => self.ports(at, *word)?,
             DirectiveKind::LoopBound(most) => self.loop_bound(at, *most, span)?,
             DirectiveKind::Deadline(..) | DirectiveKind::Order(_) | DirectiveKind::Late(..) => {
@@ -612,7 +639,7 @@ impl<'l> Expander<'l> {
         if at.scope != ScopeId::ROOT {
             return Err(Reported);
         }
-        let id = self.context.name(at, name.name, name.span)?;
+        let id = self.context.spelled(at, name.name, name.span)?;
         let text = self.context.scopes.text(id).to_owned();
         if id.op().is_some() {
             let error = Diagnostic::error("declared-twice", name.span, format!("`{text}` is an instruction"))
@@ -641,51 +668,6 @@ impl<'l> Expander<'l> {
             }
         }
         self.context.scopes.macros.insert(id, MacroDefinition { ast: at.ast, directive, start, uses: 0 });
-        Ok(())
-    }
-
-    fn columns(&mut self, at: At, first: Expr, last: Expr) -> Result<Columns, Reported> {
-        let span = first.span.to(last.span);
-        let (first, last) = (self.context.integer(at, first)?, self.context.integer(at, last)?);
-        match (u32::try_from(first), u32::try_from(last)) {
-            (Ok(first), Ok(last)) if 0 < first && first <= last => Ok(Columns { first, last }),
-            _ => {
-                let message = format!("there are no columns {first} to {last}: they count from 1");
-                Err(self.context.error(at.scope, "range", span, message))
-            }
-        }
-    }
-
-    fn set_loc(&mut self, at: At, places: &[Loc]) -> Result<(), Reported> {
-        let mut locations = Vec::with_capacity(places.len());
-        for place in places {
-            locations.push(match place {
-                Loc::None(name) => {
-                    let text = self.context.reports.sources.text(name.span);
-                    if text != "none" {
-                        let message =
-                            format!("`{text}` is not a place: a file in `\"` and a line, or `none`");
-                        return Err(self.context.error(at.scope, "syntax", name.span, message));
-                    }
-                    None
-                }
-                Loc::At(file, line, columns) => {
-                    let number = self.context.integer(at, *line)?;
-                    let Some(number) = u32::try_from(number).ok().filter(|number| *number > 0) else {
-                        let message = format!("there is no line {number}: lines count from 1");
-                        return Err(self.context.error(at.scope, "range", line.span, message));
-                    };
-                    let columns = match columns {
-                        Some((first, last)) => Some(self.columns(at, *first, *last)?),
-                        None => None,
-                    };
-                    let file = self.flat.file(file);
-                    Some((Location { file, line: number }, columns))
-                }
-            });
-        }
-        self.flat.locs.push(locations);
-        self.loc = self.flat.locs.len() as u32 - 1;
         Ok(())
     }
 }
