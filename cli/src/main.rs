@@ -9,14 +9,17 @@ mod bound;
 mod completions;
 mod controller;
 mod cosim;
+mod dap;
 mod debug;
 mod deny;
 mod disasm;
 mod eval;
 mod fault;
 mod files;
+mod fmt;
 mod isa;
 mod load;
+mod lsp;
 mod machines;
 mod man;
 mod nan;
@@ -73,6 +76,9 @@ enum Command {
     Analyse(analyse::Analyse),
     Bound(bound::Bound),
     Eval(eval::Eval),
+    Fmt(fmt::Fmt),
+    Lsp(lsp::Lsp),
+    Dap(dap::Dap),
     Rtl(rtl::Rtl),
     Cosim(cosim::Cosim),
     Isa(isa::Isa),
@@ -92,6 +98,9 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Analyse(analyse) => analyse::run(analyse, color, out),
         Command::Bound(bound) => bound::run(bound, color, out),
         Command::Eval(eval) => eval::run(eval, out),
+        Command::Fmt(fmt) => fmt::run(fmt, out),
+        Command::Lsp(lsp) => lsp::run(lsp),
+        Command::Dap(dap) => dap::run(dap),
         Command::Rtl(rtl) => rtl::run(rtl, color, out),
         Command::Cosim(cosim) => cosim::run(cosim, color, out),
         Command::Isa(isa) => isa::run(isa, out),

@@ -1,7 +1,7 @@
 ; Macros for matrices and vectors, which are arrays of registers (`.reg A[3,3] v[3]`): `.include <matrix.s>`.
 ;
-; Sizes are the last arguments. Every sum is added up in the order of its index, each operation rounded once. What a macro writes
-; must be none of what it reads, unless a comment allows it: elements are written as they are computed.
+; Sizes are the last arguments. Sums are added up in the order of the index, each operation rounded once (under `.contract on` with
+; its product). What a macro writes must be none of what it reads, unless a comment allows it: elements are written as computed.
 
 ; ---- Functions: `d = dot(a, b, 3)` or, as an instruction, `dot d, a, b, 3` --------------------------------------------
 

@@ -187,7 +187,7 @@ impl Expander<'_> {
             _ => None,
         };
         if let Some(name) = name {
-            let id = self.context.name(at, name.name, name.span)?;
+            let id = self.context.spelled(at, name.name, name.span)?;
             let is_register = self.context.machine.register_address(self.context.scopes.text(id)).is_some();
             let binding = self.context.lookup(at.scope, id);
             // What is neither a register nor a number is taken for a register's name misspelt.
@@ -247,7 +247,7 @@ impl Expander<'_> {
 
     /// The word of a directive that switches something on or off.
     pub(crate) fn is_on(&mut self, at: At, word: Name, directive: &'static str) -> Result<bool, Reported> {
-        let name = self.context.name(at, word.name, word.span)?;
+        let name = self.context.spelled(at, word.name, word.span)?;
         match self.context.scopes.text(name) {
             "on" => Ok(true),
             "off" => Ok(false),
@@ -324,7 +324,7 @@ impl Expander<'_> {
 
     /// `.ports`: whether they are latched.
     pub(crate) fn ports(&mut self, at: At, word: Name) -> Result<(), Reported> {
-        let name = self.context.name(at, word.name, word.span)?;
+        let name = self.context.spelled(at, word.name, word.span)?;
         let latched = match self.context.scopes.text(name) {
             "latched" => true,
             "direct" => false,
@@ -390,7 +390,7 @@ impl Expander<'_> {
 
 /// The address of a register by its canonical name.
 pub(crate) fn address(context: &mut Context, at: At, place: Name) -> Result<Register, Reported> {
-    let id = context.name(at, place.name, place.span)?;
+    let id = context.spelled(at, place.name, place.span)?;
     let text = context.scopes.text(id).to_owned();
     let machine = context.machine;
     machine.register_address(&text).ok_or_else(|| {

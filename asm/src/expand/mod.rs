@@ -22,7 +22,7 @@ use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
 use crate::syntax::name::NameId;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 use takt_isa::Type;
 use takt_isa::program::{Columns, Location};
@@ -38,8 +38,8 @@ pub(crate) struct Item {
     pub(crate) loc: u32,
     /// Whether `.schedule on` is in force.
     pub(crate) scheduled: bool,
-    /// Whether `.contract on` is in force.
-    pub(crate) contracted: bool,
+    /// Whether `.contract on` is in force; none if the file, of the library, excludes it for what it defines.
+    pub(crate) contracted: Option<bool>,
     /// What `.fast` allows.
     pub(crate) fast: Fast,
 }
@@ -167,6 +167,8 @@ pub(crate) struct Expander<'l> {
     scheduled: bool,
     /// Whether products of what follows are fused into sums.
     contracted: bool,
+    /// Files of the library of whose operations none is fused.
+    uncontracted: HashSet<u32>,
     fast: Fast,
     pub(crate) include_depth: usize,
     pub(crate) includes: usize,
@@ -199,6 +201,7 @@ impl<'l> Expander<'l> {
             loc: 0,
             scheduled: false,
             contracted: false,
+            uncontracted: HashSet::new(),
             fast: Fast::default(),
             data_words: 0,
             statements: 0,
@@ -387,7 +390,7 @@ impl<'l> Expander<'l> {
         let ast = &self.context.asts[at.ast as usize];
         let operation = ast.operations[first as usize];
         if count == 1 {
-            let Ok(name) = self.context.name(at, operation.mnemonic.name, operation.mnemonic.span) else {
+            let Ok(name) = self.context.spelled(at, operation.mnemonic.name, operation.mnemonic.span) else {
                 return;
             };
             // A macro cannot have an instruction's name.
@@ -401,6 +404,7 @@ impl<'l> Expander<'l> {
 
     /// Adds a bundle, an equation or a piece of one to the section.
     pub(crate) fn push(&mut self, at: At, statement: u32, piece: Option<u32>, span: Span) {
+        let contracted = (!self.uncontracted.contains(&at.ast)).then_some(self.contracted);
         let items = match self.section {
             Section::Once => &mut self.flat.once,
             Section::Period => &mut self.flat.period,
@@ -415,7 +419,7 @@ impl<'l> Expander<'l> {
                 return;
             }
         };
-        let (loc, scheduled, contracted, fast) = (self.loc, self.scheduled, self.contracted, self.fast);
+        let (loc, scheduled, fast) = (self.loc, self.scheduled, self.fast);
         items.push(Item { at, statement, piece, loc, scheduled, contracted, fast });
         if self.flat.once.len() + self.flat.period.len() > limits::OPERATIONS {
             let message = format!("the program expands to more than {} bundles", limits::OPERATIONS);
@@ -439,6 +443,9 @@ impl<'l> Expander<'l> {
             let error = Diagnostic::error("arguments", operation.span, message).also(defined, "defined here");
             self.context.report(at.scope, error);
             return;
+        }
+        if let Some(notes) = &mut self.context.notes {
+            notes.macro_use(operation.mnemonic.span, name);
         }
         self.enter_macro(at, name, operation.span, &given);
     }
@@ -537,7 +544,7 @@ impl<'l> Expander<'l> {
             }
             DirectiveKind::Rep { variable, first, last, end } => {
                 self.jump(*end + 1);
-                let variable = self.context.name(at, variable.name, variable.span)?;
+                let variable = self.context.spelled(at, variable.name, variable.span)?;
                 let from = self.context.integer(at, *first)?;
                 let to = self.context.integer(at, *last)?;
                 if to.saturating_sub(from) >= limits::REPETITIONS {
@@ -576,7 +583,13 @@ impl<'l> Expander<'l> {
             DirectiveKind::Include(path, library) => self.include(at, path, *library, span)?,
             DirectiveKind::Loc(places) => self.set_loc(at, places)?,
             DirectiveKind::Schedule(word) => self.scheduled = self.is_on(at, *word, "schedule")?,
-            DirectiveKind::Contract(word) => self.contracted = self.is_on(at, *word, "contract")?,
+            DirectiveKind::Contract(word) => match self.is_on(at, *word, "contract")? {
+                // A file of the library speaks for itself, wherever its macros are used.
+                false if self.is_in_library(at.ast) => {
+                    self.uncontracted.insert(at.ast);
+                }
+                on => self.contracted = on,
+            },
             DirectiveKind::Fast(words) => self.fast = self.allowed(at, words)?,
             DirectiveKind::Ports(word) => self.ports(at, *word)?,
             DirectiveKind::LoopBound(most) => self.loop_bound(at, *most, span)?,
@@ -626,7 +639,7 @@ impl<'l> Expander<'l> {
         if at.scope != ScopeId::ROOT {
             return Err(Reported);
         }
-        let id = self.context.name(at, name.name, name.span)?;
+        let id = self.context.spelled(at, name.name, name.span)?;
         let text = self.context.scopes.text(id).to_owned();
         if id.op().is_some() {
             let error = Diagnostic::error("declared-twice", name.span, format!("`{text}` is an instruction"))

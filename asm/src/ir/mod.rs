@@ -294,8 +294,8 @@ pub struct Ir {
     pub data: Vec<u32>,
     /// Words given bit by bit.
     pub raw: Vec<u64>,
-    /// By bundle, as the source has them: whether `.contract on` is in force there.
-    pub contracted: Vec<bool>,
+    /// By bundle, as the source has them: whether `.contract on` is in force there; none where it has no effect.
+    pub contracted: Vec<Option<bool>>,
     /// Source files that [`Operation::location`] names.
     pub files: Vec<String>,
     /// Values with registers of their own, by [`Version::after`] for each name.

@@ -181,10 +181,14 @@ impl Resolver<'_> {
                     span: nodes[last as usize].span,
                 };
                 let NodeKind::Name(variable) = nodes[index as usize].kind else { return Err(Reported) };
-                let variable = self.context.name(at, variable, nodes[index as usize].span)?;
+                let counts = nodes[index as usize].span;
+                let variable = self.context.spelled(at, variable, counts)?;
                 let from = self.context.integer(at, expression(operands[1]))?;
                 let last = self.context.integer(at, expression(operands[2]))?;
                 let span = nodes[sum as usize].span;
+                if let Some(notes) = &mut self.context.notes {
+                    notes.sum(span, counts, variable);
+                }
                 if from > last {
                     stack.push(constant(Value::Int(0), index, sum, span));
                     continue;

@@ -360,7 +360,7 @@ impl Resolver<'_> {
         location: Option<(Location, Option<Columns>)>,
     ) -> Result<Operation, Reported> {
         let written = &ast.operations[number as usize];
-        let name = self.context.name(at, written.mnemonic.name, written.mnemonic.span)?;
+        let name = self.context.spelled(at, written.mnemonic.name, written.mnemonic.span)?;
         let operands = &ast.operands[written.first as usize..(written.first + written.count) as usize];
         let Some(op) = name.op() else {
             if name.directive() == Some(Directive::Raw) {

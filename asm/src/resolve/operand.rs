@@ -668,8 +668,10 @@ fn loading() -> &'static str {
 /// What other processors have and Takt has not, though an instruction of a like name may do something else.
 fn absent(name: &str) -> Option<&'static str> {
     Some(match name {
-        "fmadd" | "fmac" | "fmla" | "fmsub" | "mac" | "madd" => {
-            "`fma` and `fms`, where the machine has them; elsewhere `fmul`, then `fadd` or `fsub`"
+        "fmadd" | "fmac" | "fmla" | "mac" | "madd" => "`fma` is a · b + c; a machine may lack it",
+        "fmsub" | "fmls" => "`fms` is a · b - c, `fnma` is c - a · b; a machine may lack them",
+        "fnmadd" | "fnmsub" => {
+            "RISC-V's fnmsub is `fnma`, c - a · b, and its fnmadd is `fnms`, -(a · b) - c; a machine may lack them"
         }
         "imul" | "idiv" | "imod" | "irem" | "imin" | "imax" | "iabs" | "ineg" => {
             "of integers there are sums, shifts, logic and comparisons: `itof` converts, and `ishl` multiplies by a power of two"
@@ -728,7 +730,7 @@ mod tests {
     #[test]
     fn advice_names_instructions() {
         let known = |name: &str| ROWS.iter().any(|row| row.mnemonic == name);
-        for name in ["fmadd", "imul", "fgt", "igt", "fne", "beq", "not"] {
+        for name in ["fmadd", "fmsub", "fnmadd", "imul", "fgt", "igt", "fne", "beq", "not"] {
             assert!(!known(name));
             let help = absent(name).expect("there is advice");
             assert!(help.split('`').skip(1).step_by(2).all(known), "{help}");

@@ -160,7 +160,7 @@ T1 = Machine {
 /// The fast machine with fused multiply-add.
 T4 = Machine {
     name: "t4",
-    text: "The fast machine with fused multiply-add: product and sum in one operation, with one rounding; division beside the ALU.",
+    text: "The fast machine with fused multiply-add: product and sum in one operation, with one rounding; division beside the adder, conversion beside the ALU.",
     slots: &[
         Slot {
             name: "mul",
@@ -172,8 +172,8 @@ T4 = Machine {
                 ARCCOSINE,
             ],
         },
-        Slot { name: "add", bank: bank("a", 256, 256), units: &[ADD] },
-        Slot { name: "aux", bank: bank("x", 512, 256), units: &[ALU, CONVERT, DIVROOT, MEMORY, SEQUENCER] },
+        Slot { name: "add", bank: bank("a", 256, 256), units: &[ADD, DIVROOT] },
+        Slot { name: "aux", bank: bank("x", 512, 256), units: &[ALU, CONVERT, MEMORY, SEQUENCER] },
     ],
     inputs: bank("i", 768, 256),
     outputs_per_bank: 32,
