@@ -19,6 +19,7 @@ mod isa;
 mod load;
 mod machines;
 mod man;
+mod monte_carlo;
 mod nan;
 mod number;
 mod output;
