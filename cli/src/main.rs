@@ -5,6 +5,7 @@ mod account;
 mod analyse;
 mod arm;
 mod asm;
+mod batch;
 mod bound;
 mod completions;
 mod controller;

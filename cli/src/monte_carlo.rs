@@ -202,11 +202,7 @@ impl<'a> MonteCarlo<'a> {
 }
 
 /// What a lane commands, and the ticks that it missed.
-fn outputs(
-    batch: &Batch,
-    lane: usize,
-    binding: &Binding,
-) -> Result<(Outputs<f64>, u64), ControllerError> {
+fn outputs(batch: &Batch, lane: usize, binding: &Binding) -> Result<(Outputs<f64>, u64), ControllerError> {
     let report = batch.outcome(lane).unwrap_or(Err(PeriodError::Halted))?;
     let outputs = binding.outputs(|register| batch.output_bits(lane, register))?;
     Ok((outputs, u64::from(report.missed) + report.lost))
@@ -257,8 +253,7 @@ impl Drives<'_> {
         let drive = |drive: &Drive| {
             json!({
                 "seed": drive.seed,
-                "cutting_error": drive.cutting,
-                "overall_error": drive.overall,
+                "tracking_error_m": {"cutting": drive.cutting, "overall": drive.overall},
                 "period": drive.period,
                 "deadlines_missed": drive.missed,
                 "failure": drive.failure,
@@ -272,12 +267,14 @@ impl Drives<'_> {
             "robots": self.all.len(),
             "first_seed": self.of.first,
             "spread": self.of.spread,
-            "requirement": REQUIREMENT,
+            "requirement_m": REQUIREMENT,
             "kept": self.kept(),
             "failed": self.failed(),
             "periods_apart": self.apart,
-            "cutting_error": quantiles(&self.sorted(|drive| drive.cutting)),
-            "overall_error": quantiles(&self.sorted(|drive| drive.overall)),
+            "tracking_error_m": {
+                "cutting": quantiles(&self.sorted(|drive| drive.cutting)),
+                "overall": quantiles(&self.sorted(|drive| drive.overall)),
+            },
             "worst": self.worst().into_iter().map(drive).collect::<Vec<_>>(),
             "drives": self.all.iter().map(drive).collect::<Vec<_>>(),
         })
@@ -296,7 +293,8 @@ impl Drives<'_> {
         if !cutting.is_empty() {
             writeln!(out, "{:<34}{:>12}{:>12}", "largest tracking error, µm", "cutting", "overall")?;
             let mut row = |name: &str, cutting: Option<f64>, overall: Option<f64>| {
-                let show = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{:.2}", value * 1e6));
+                let show =
+                    |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{:.2}", value * 1e6));
                 writeln!(out, "  {name:<32}{:>12}{:>12}", show(cutting), show(overall))
             };
             row("best robot", cutting.first().copied(), overall.first().copied())?;
@@ -330,7 +328,10 @@ impl Drives<'_> {
                 )?,
             }
         }
-        writeln!(out, "`takt track --seed S` drives one of them, `takt debug --track --seed S` looks into it")?;
+        writeln!(
+            out,
+            "`takt track --seed S` drives one of them, `takt debug --track --seed S` looks into it"
+        )?;
         Ok(())
     }
 

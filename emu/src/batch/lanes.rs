@@ -11,7 +11,7 @@ use takt_isa::{Register, compute, compute_lanes};
 
 /// Lanes of a group: vectors as wide as the widest hosts', several of them, so that choosing what to do costs little beside
 /// doing it.
-pub(crate) const LANES: usize = 16;
+pub(crate) const LANES: usize = 32;
 
 /// One word of every lane.
 pub(crate) type Row = [u32; LANES];

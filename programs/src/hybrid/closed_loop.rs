@@ -132,13 +132,7 @@ impl<'t, C: TrackingController> ClosedLoop<'t, C> {
 
     /// The same with another robot, which is to stand at the trajectory's start.
     pub fn with(robot: Robot, trajectory: &'t Trajectory, controller: C) -> Self {
-        Self {
-            samples: trajectory.samples(),
-            robot,
-            controller,
-            period: 0,
-            failed: false,
-        }
+        Self { samples: trajectory.samples(), robot, controller, period: 0, failed: false }
     }
 
     /// The controller, to inspect it between periods.

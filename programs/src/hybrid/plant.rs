@@ -186,8 +186,8 @@ impl Plant {
         let load = self.parameters.table_gravity(self.angle[0]);
         let inertia = self.parameters.table_inertia;
         std::array::from_fn(|i| {
-            let friction =
-                self.parameters.table_coulomb[i] * (self.angular_velocity[i] / params::TABLE_COULOMB_SPEED).tanh();
+            let friction = self.parameters.table_coulomb[i]
+                * (self.angular_velocity[i] / params::TABLE_COULOMB_SPEED).tanh();
             (self.effort[3 + i] - load[i] - friction) / inertia[i]
         })
     }

@@ -1,7 +1,7 @@
 //! Robots that differ: parameters, sensors and clock drawn at random, as a series of them would come out of a factory.
 
-use super::plant::{Parameters, Plant};
 use super::params;
+use super::plant::{Parameters, Plant};
 use crate::path::Pose;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_pcg::Pcg64;
