@@ -18,5 +18,5 @@ pub use program::Program;
 pub use shape::{Field, Operand, Shape};
 pub use spec::check::{MachineError, MachineReason};
 pub use spec::instructions::{Effect, Function, Op, ROWS, Row, Type, compute};
-pub use spec::machines::{Bank, MACHINES, Machine, Slot, T1, T3, ZERO};
+pub use spec::machines::{Bank, MACHINES, Machine, Slot, Slots, T1, T3, ZERO};
 pub use spec::units::{UNITS, Unit};

@@ -11,6 +11,7 @@ use takt_isa::{Instruction, Program, Type};
 
 /// The listing of an assembled program: for each bundle its address, its words in the order of the slots, and the source
 /// lines that they come from. An operation that a macro, a repetition or the assembler made is shown as what it became, behind a `+`.
+/// Before a line stand the slots of those of its operations that another slot could have taken.
 pub fn listing(assembled: &Assembled) -> String {
     let mut lister = Lister::new(assembled);
     lister.code();
@@ -96,7 +97,7 @@ impl<'a> Lister<'a> {
     /// The source lines of a bundle, whose words begin at `first`: place and text.
     fn rows(&self, first: usize) -> Vec<(String, String)> {
         let program = self.program;
-        let mut rows: Vec<(String, String)> = Vec::new();
+        let mut rows: Vec<(String, String, Vec<&str>)> = Vec::new();
         let slots = program.machine.slots.len();
         for slot in 0..slots {
             let index = first + slot;
@@ -114,11 +115,25 @@ impl<'a> Lister<'a> {
                 }
             };
             // A line with several operations is shown once.
-            if !rows.contains(&row) {
-                rows.push(row);
-            }
+            let at = rows.iter().position(|(place, text, _)| (place, text) == (&row.0, &row.1));
+            let at = at.unwrap_or_else(|| {
+                rows.push((row.0, row.1, Vec::new()));
+                rows.len() - 1
+            });
+            rows[at].2.extend(self.chosen(index, slot));
         }
-        rows
+        let shown = |(place, text, slots): (String, String, Vec<&str>)| match slots.is_empty() {
+            true => (place, text),
+            false => (place, format!("{:<8}{text}", slots.join(" "))),
+        };
+        rows.into_iter().map(shown).collect()
+    }
+
+    /// The slot of an operation, if another could have taken it.
+    fn chosen(&self, index: usize, slot: usize) -> Option<&'a str> {
+        let machine = self.program.machine;
+        let function = Instruction::decode(self.program.code[index]).ok()?.op.row().function;
+        (machine.hosts(function).len() > 1).then(|| machine.slots[slot].name)
     }
 
     fn source(&self, location: Location) -> Option<String> {

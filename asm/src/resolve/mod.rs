@@ -3,12 +3,13 @@
 mod address;
 mod operand;
 pub(crate) mod serialise;
+mod slots;
 
 use crate::context::{At, Context, Reported};
 use crate::expand::load::Loader;
 use crate::expand::{self, Data, Flat, Item, Timing};
 use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
-use crate::report::diag::{Diagnostic, nearest};
+use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
 use smallvec::SmallVec;
@@ -16,7 +17,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 use takt_isa::program::Location;
 use takt_isa::spec::instructions::Function;
-use takt_isa::{Op, ROWS, Type};
+use takt_isa::{Op, ROWS, Slots, Type};
 
 /// The most cycles that a demand on ports can name: many times what a program memory holds.
 const MAX_CYCLES: u32 = 1 << 24;
@@ -28,7 +29,9 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         .iter()
         .map(|row| match row.function {
             Function::Idle => Host::Any,
-            function => machine.host(function).map_or(Host::None, |(slot, _)| Host::Slot(slot as u8)),
+            function => Some(machine.hosts(function))
+                .filter(|slots| !slots.is_empty())
+                .map_or(Host::None, Host::Slots),
         })
         .collect();
     let ir = Ir {
@@ -79,11 +82,11 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
     ir
 }
 
-/// Which slot executes an instruction.
+/// Which slots execute an instruction.
 #[derive(Clone, Copy)]
 enum Host {
     Any,
-    Slot(u8),
+    Slots(Slots),
     None,
 }
 
@@ -169,7 +172,7 @@ impl Resolver<'_> {
                     self.context.report(item.at.scope, diagnostic);
                 }
             }
-        } else if self.check_slots(item.at, &operations).is_ok() {
+        } else if self.assign_slots(item.at, &mut operations).is_ok() {
             if let Some(diagnostic) = serialise::twice(&operations) {
                 let diagnostic = diagnostic(&self.context.declared.registers, self.ir.machine);
                 self.context.report(item.at.scope, diagnostic);
@@ -208,40 +211,6 @@ impl Resolver<'_> {
         Some(Location { file, line: operation.line })
     }
 
-    /// Two operations of a bundle that need one slot are a mistake.
-    fn check_slots(&mut self, at: At, operations: &[Operation]) -> Result<(), Reported> {
-        let machine = self.ir.machine;
-        let mut result = Ok(());
-        for (index, operation) in operations.iter().enumerate() {
-            let Some(slot) = operation.slot else { continue };
-            let Some(first) = operations[..index].iter().find(|before| before.slot == Some(slot)) else {
-                continue;
-            };
-            let name = machine.slots[slot as usize].name;
-            let message = format!("two operations of the bundle need slot `{name}`");
-            let what = |operation: &Operation| match operation.constant {
-                Constant::Raw(_) => ".raw",
-                _ => operation.row().mnemonic,
-            };
-            let error = Diagnostic::error("slot-conflict", operation.span, message)
-                .here(format!("`{}` needs it", what(operation)))
-                .also(first.span, format!("so does `{}`", what(first)))
-                .help("write them as two bundles");
-            result = Err(self.context.report(at.scope, error));
-        }
-        if operations.len() > machine.slots.len() && result.is_ok() {
-            let message = format!(
-                "{} operations, and {} has {} slots",
-                operations.len(),
-                machine.name,
-                machine.slots.len()
-            );
-            let last = operations[operations.len() - 1].span;
-            result = Err(self.context.error(at.scope, "slot-conflict", last, message));
-        }
-        result
-    }
-
     fn operation(
         &mut self,
         at: At,
@@ -253,16 +222,25 @@ impl Resolver<'_> {
         let written = &ast.operations[number as usize];
         let name = self.context.name(at, written.mnemonic.name, written.mnemonic.span)?;
         let operands = &ast.operands[written.first as usize..(written.first + written.count) as usize];
-        let Some(op) = name.op() else {
-            if name.directive() == Some(Directive::Raw) {
+        let (op, pinned) = match name.op() {
+            Some(op) => (op, None),
+            None if name.directive() == Some(Directive::Raw) => {
                 return self.raw(at, number, written, operands, location);
             }
-            return Err(self.unknown_mnemonic(at, name, written, of));
+            None => match self.pinned(at, name, written.mnemonic.span)? {
+                Some((op, slot)) => (op, Some(slot)),
+                None => return Err(self.unknown_mnemonic(at, name, written, of)),
+            },
         };
         let row = op.row();
-        let slot = match self.slots[op as usize] {
-            Host::Any => None,
-            Host::Slot(slot) => Some(slot),
+        let slots = match self.slots[op as usize] {
+            Host::Any => pinned.unwrap_or_default(),
+            Host::Slots(slots) => match pinned {
+                Some(pinned) if pinned.and(slots).is_empty() => {
+                    return Err(self.not_hosted(at, row, slots, pinned, written.mnemonic.span));
+                }
+                pinned => pinned.unwrap_or(slots),
+            },
             Host::None => {
                 let message = format!("{} has no unit for `{}`", self.ir.machine.name, row.mnemonic);
                 let having = takt_isa::MACHINES.iter().find(|machine| machine.host(row.function).is_some());
@@ -279,7 +257,8 @@ impl Resolver<'_> {
         }
         let mut operation = Operation {
             op,
-            slot,
+            slots,
+            slot: slots.first(),
             dest: None,
             sources: [RegisterId::ZERO; 3],
             constant: Constant::None,
@@ -295,6 +274,13 @@ impl Resolver<'_> {
             // All operands are looked at, whatever is wrong with one.
             failed |= self.operand(at, row, *place, *operand, &mut operation).is_err();
         }
+        // A register that has its place is written by the one slot that can, if that may execute the operation.
+        let place = operation.dest.and_then(|dest| self.context.declared.registers[dest.index()].pinned);
+        if let Some(writer) = place.map(|place| self.ir.machine.writers(place).and(operation.slots))
+            && !writer.is_empty()
+        {
+            (operation.slots, operation.slot) = (writer, writer.first());
+        }
         if failed { Err(Reported) } else { Ok(operation) }
     }
 
@@ -308,17 +294,8 @@ impl Resolver<'_> {
         location: Option<Location>,
     ) -> Result<Operation, Reported> {
         let [slot, word] = operands else { return Err(Reported) };
-        let slots = self.ir.machine.slots;
         let name = self.context.reports.sources.text(slot.span).to_owned();
-        let Some(index) = slots.iter().position(|slot| slot.name == name) else {
-            let names = slots.iter().map(|slot| slot.name);
-            let message = format!("{} has no slot `{name}`", self.ir.machine.name);
-            let meant = nearest(&name, names.clone());
-            let error = Diagnostic::error("operand", slot.span, message)
-                .note(format!("slots: {}", names.collect::<Vec<_>>().join(" ")))
-                .did_you_mean(meant);
-            return Err(self.context.report(at.scope, error));
-        };
+        let index = self.slot(at, &name, slot.span)?;
         let value = self.operand_value(at, *word)?;
         let Some(bits) =
             value.integer().ok().and_then(|value| u64::try_from(value).ok()).filter(|value| value >> 48 == 0)
@@ -328,7 +305,8 @@ impl Resolver<'_> {
         self.ir.raw.push(bits);
         Ok(Operation {
             op: Op::nop,
-            slot: Some(index as u8),
+            slots: Slots::of(index),
+            slot: Some(index),
             dest: None,
             sources: [RegisterId::ZERO; 3],
             constant: Constant::Raw(self.ir.raw.len() as u32 - 1),

@@ -49,6 +49,65 @@ impl Slot {
     }
 }
 
+/// A set of slots of a machine, which has [`MAX_SLOTS`](super::check::MAX_SLOTS) at most.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default, Debug)]
+pub struct Slots(u8);
+
+impl Slots {
+    /// The set of one slot.
+    pub const fn of(slot: u8) -> Slots {
+        Slots(1 << slot)
+    }
+
+    /// Whether a slot is in it.
+    pub const fn contains(self, slot: u8) -> bool {
+        self.0 >> slot & 1 == 1
+    }
+
+    /// Whether no slot is in it.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// How many slots are in it.
+    pub const fn len(self) -> usize {
+        self.0.count_ones() as usize
+    }
+
+    /// The first slot of it.
+    pub const fn first(self) -> Option<u8> {
+        if self.is_empty() { None } else { Some(self.0.trailing_zeros() as u8) }
+    }
+
+    /// The slots that are in both.
+    #[must_use]
+    pub const fn and(self, other: Slots) -> Slots {
+        Slots(self.0 & other.0)
+    }
+
+    /// The slots that are in either.
+    #[must_use]
+    pub const fn or(self, other: Slots) -> Slots {
+        Slots(self.0 | other.0)
+    }
+
+    /// Whether all its slots are in another set.
+    pub const fn is_within(self, other: Slots) -> bool {
+        self.0 & !other.0 == 0
+    }
+
+    /// Its slots, ascending.
+    pub fn iter(self) -> impl DoubleEndedIterator<Item = u8> {
+        (0..u8::BITS as u8).filter(move |slot| self.contains(*slot))
+    }
+}
+
+impl FromIterator<u8> for Slots {
+    fn from_iter<I: IntoIterator<Item = u8>>(slots: I) -> Slots {
+        slots.into_iter().fold(Slots::default(), |set, slot| set.or(Slots::of(slot)))
+    }
+}
+
 /// One row of the table.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct Machine {
@@ -150,6 +209,20 @@ impl Machine {
     /// The first slot that hosts a unit for `function`, and that unit's index in the slot. Idle operations have none: every slot takes them.
     pub fn host(&self, function: Function) -> Option<(usize, usize)> {
         self.slots.iter().enumerate().find_map(|(s, slot)| slot.unit_for(function).map(|u| (s, u)))
+    }
+
+    /// The slots that host a unit for `function`. None do for idle operations: every slot takes them.
+    pub fn hosts(&self, function: Function) -> Slots {
+        (0u8..)
+            .zip(self.slots)
+            .filter(|(_, slot)| slot.unit_for(function).is_some())
+            .map(|(s, _)| s)
+            .collect()
+    }
+
+    /// The slots whose bank has the register at an address: one at most.
+    pub fn writers(&self, address: u16) -> Slots {
+        (0u8..).zip(self.slots).filter(|(_, slot)| slot.bank.contains(address)).map(|(s, _)| s).collect()
     }
 
     /// The banks: one for each slot, in slot order, then the inputs.
