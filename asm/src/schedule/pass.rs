@@ -118,32 +118,42 @@ impl Plan {
     }
 }
 
+/// Which choice of slots each task takes, of several that have room.
+#[derive(Clone, Debug)]
+pub(super) struct Lean {
+    /// The one that it leans toward.
+    pub(super) toward: Vec<u8>,
+    /// How much longer it waits for that: so many quarters of the time until it is due. None: it takes that of two as early.
+    pub(super) quarters: u32,
+    /// When it is due in a forward pass, and in a backward one.
+    pub(super) due: [Vec<i64>; 2],
+}
+
+impl Lean {
+    /// How many cycles later the choice that a task leans toward may be than another that has room in a cycle.
+    #[inline]
+    fn patience(&self, direction: Direction, task: usize, cycle: u32) -> u32 {
+        if self.quarters == 0 {
+            return 0;
+        }
+        let left = self.due[direction as usize][task] - i64::from(cycle);
+        left.max(0) as u32 * self.quarters / 4
+    }
+}
+
 /// The problem with its edges sorted by either end.
 pub(super) struct Graph<'p> {
     pub(super) problem: &'p Problem,
     pub(super) preds: Vec<Vec<Arc>>,
     pub(super) succs: Vec<Vec<Arc>>,
-    /// For each task its choices, the one first that is to be taken of equals: that of slots which fewer operations depend on.
-    preferred: Vec<Vec<u8>>,
 }
 
 impl<'p> Graph<'p> {
     pub(super) fn new(problem: &'p Problem) -> Graph<'p> {
-        let mut demand = vec![0u32; problem.slots];
-        for task in problem.tasks.iter().filter(|task| task.choices() == 1) {
-            task.parts.iter().for_each(|part| demand[part.slot] += 1);
-        }
-        let preferred = |task: &Task| {
-            let load = |choice: &u8| task.choice(*choice).iter().map(|part| demand[part.slot]).sum::<u32>();
-            let mut choices: Vec<u8> = (0..task.choices() as u8).collect();
-            choices.sort_by_key(load);
-            choices
-        };
         let mut graph = Graph {
             problem,
             preds: vec![Vec::new(); problem.tasks.len()],
             succs: vec![Vec::new(); problem.tasks.len()],
-            preferred: problem.tasks.iter().map(preferred).collect(),
         };
         for &Edge { from, to, distance, latency_of, .. } in &problem.edges {
             let latency_of = latency_of.map_or(FIXED, |index| index as u32);
@@ -160,6 +170,19 @@ impl<'p> Graph<'p> {
             FIXED => arc.distance,
             index => self.problem.tasks[from].choice(choice)[index as usize].writes.unwrap_or(arc.distance),
         }
+    }
+
+    /// For each task the choice whose slots fewest operations depend on that have no other.
+    pub(super) fn lightest(&self) -> Vec<u8> {
+        let mut demand = vec![0u32; self.problem.slots];
+        for task in self.problem.tasks.iter().filter(|task| task.choices() == 1) {
+            task.parts.iter().for_each(|part| demand[part.slot] += 1);
+        }
+        let lightest = |task: &Task| {
+            let load = |choice: &u8| task.choice(*choice).iter().map(|part| demand[part.slot]).sum::<u32>();
+            (0..task.choices() as u8).min_by_key(load).unwrap_or(0)
+        };
+        self.problem.tasks.iter().map(lightest).collect()
     }
 
     pub(super) fn chains(&self) -> Chains {
@@ -192,11 +215,13 @@ impl<'p> Graph<'p> {
     }
 
     /// Places every task, in an order that respects the edges and otherwise follows `key` (small first), in the first
-    /// cycle that has room and is not before its `release`, on the slots that have its results first.
+    /// cycle that has room and is not before its `release`; of several choices of slots, that which has its results first,
+    /// unless it leans toward another.
     pub(super) fn pass(
         &self,
         direction: Direction,
         key: &[u64],
+        lean: &Lean,
         release: impl Fn(&Task) -> u32,
         table: &mut Reservations,
         plan: &mut Plan,
@@ -217,7 +242,9 @@ impl<'p> Graph<'p> {
             let i = i as usize;
             let task = &self.problem.tasks[i];
             let mut best: Option<(u32, u32, u8)> = None;
-            for &choice in &self.preferred[i] {
+            let toward = lean.toward[i];
+            let others = (0..task.choices() as u8).filter(|choice| *choice != toward);
+            for choice in std::iter::once(toward).chain(others) {
                 let after = |arc: &Arc| {
                     let other = arc.task as usize;
                     let distance = match direction {
@@ -236,8 +263,10 @@ impl<'p> Graph<'p> {
                     Direction::Forward => parts.iter().filter_map(|part| part.writes).max().unwrap_or(0),
                     Direction::Backward => 0,
                 };
-                if best.is_none_or(|(done, start, _)| (cycle + written, cycle) < (done, start)) {
-                    best = Some((cycle + written, cycle, choice));
+                let done = cycle + written;
+                let patience = if choice == toward { 0 } else { lean.patience(direction, i, cycle) };
+                if best.is_none_or(|(other, start, _)| (done + patience, cycle + patience) < (other, start)) {
+                    best = Some((done, cycle, choice));
                 }
             }
             let (_, cycle, choice) = best.unwrap_or_default();

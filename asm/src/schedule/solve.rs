@@ -8,7 +8,7 @@
 //! write. The same problem always has the same solution.
 
 use super::bound::{self, Bound};
-use super::pass::{Direction, Graph, Plan, Reservations};
+use super::pass::{Direction, Graph, Lean, Plan, Reservations};
 use super::problem::{Problem, Task};
 
 /// A schedule.
@@ -47,6 +47,12 @@ impl Random {
         self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) % below.max(1)
     }
 }
+
+/// By turns, how long a task waits for the slots that it leans toward, in quarters of the time until it is due.
+const QUARTERS: [u32; 4] = [0, 1, 2, 4];
+
+/// One in so many tasks leans toward other slots than the best schedule's.
+const STRAY: u64 = 32;
 
 /// Edges that cost as much as placing a task: more than an operation has but for loads and stores in great number.
 const EDGES: usize = 16;
@@ -104,6 +110,11 @@ struct Search<'p> {
     /// Up to this length it does not matter.
     allowed: u32,
     best: Option<(Cost, Plan)>,
+    /// Whether any task has a choice of slots, and the choice whose slots fewer operations depend on.
+    has_choices: bool,
+    lightest: Vec<u8>,
+    /// The earliest cycle of each task.
+    heads: Vec<u32>,
 }
 
 impl Search<'_> {
@@ -123,11 +134,11 @@ impl Search<'_> {
 
     /// A schedule from priorities (small first), and its improvement forward and backward until two rounds bring nothing. Late
     /// tasks issue in cycle `release` or later. Returns whether the budget lasts for more.
-    fn descend(&mut self, mut key: Vec<u64>, release: u32) -> bool {
+    fn descend(&mut self, (mut key, lean): (Vec<u64>, Lean), release: u32) -> bool {
         let n = self.graph.problem.tasks.len();
         let (mut plan, mut start) = (Plan::new(self.graph.problem), vec![0; n]);
         let forward = |task: &Task| if task.late { release } else { 0 };
-        self.graph.pass(Direction::Forward, &key, forward, &mut self.table, &mut plan);
+        self.graph.pass(Direction::Forward, &key, &lean, forward, &mut self.table, &mut plan);
         let (mut spent, mut settled, mut least) = (0, 0, None);
         loop {
             let length = self.graph.issue(&plan, &mut self.table, &mut start);
@@ -144,9 +155,9 @@ impl Search<'_> {
             }
             key = start.iter().map(|start| u64::from(u32::MAX - start)).collect();
             let backward = |task: &Task| task.latest.map_or(0, |latest| (length - 1).saturating_sub(latest));
-            self.graph.pass(Direction::Backward, &key, backward, &mut self.table, &mut plan);
+            self.graph.pass(Direction::Backward, &key, &lean, backward, &mut self.table, &mut plan);
             key = plan.start.iter().map(|start| u64::from(u32::MAX - start)).collect();
-            self.graph.pass(Direction::Forward, &key, forward, &mut self.table, &mut plan);
+            self.graph.pass(Direction::Forward, &key, &lean, forward, &mut self.table, &mut plan);
             spent += 2;
         }
         // Where an operation has very many to wait for, that is the work.
@@ -156,8 +167,9 @@ impl Search<'_> {
         lasts
     }
 
-    /// Priorities for a round: most urgent first, with noise; by turns the best schedule's own order, with noise.
-    fn priorities(&mut self, round: usize) -> Vec<u64> {
+    /// Priorities for a round: most urgent first, with noise; by turns the best schedule's own order, with noise. Also the slots
+    /// that tasks lean toward.
+    fn priorities(&mut self, round: usize) -> (Vec<u64>, Lean) {
         let best = self.best.as_ref().filter(|_| round % 2 == 1);
         let (urgency, noise): (Vec<i64>, u64) = match best {
             Some((_, best)) => {
@@ -173,7 +185,28 @@ impl Search<'_> {
         };
         let least = urgency.iter().copied().min().unwrap_or(0);
         let key = urgency.iter().map(|urgency| ((urgency - least) as u64) << 8);
-        key.map(|key| key + self.random.next(noise << 8)).collect()
+        let key = key.map(|key| key + self.random.next(noise << 8)).collect();
+        (key, self.lean(round))
+    }
+
+    /// Toward which slots the tasks of a round lean: first toward those that others do not depend on, then by turns toward those
+    /// of the best schedule, but for a few tasks; and how much.
+    fn lean(&mut self, round: usize) -> Lean {
+        let mut lean = Lean { toward: self.lightest.clone(), quarters: 0, due: [Vec::new(), Vec::new()] };
+        let Some((cost, best)) = self.best.as_ref().filter(|_| self.has_choices) else { return lean };
+        lean.quarters = QUARTERS[round / 8 % QUARTERS.len()];
+        let last = i64::from(cost.length) - 1;
+        let backward = self.heads.iter().map(|head| last - i64::from(*head)).collect();
+        lean.due = [self.graph.due(cost.length, 0), backward];
+        if round % 2 == 1 {
+            lean.toward.clone_from(&best.choice);
+            for (task, toward) in self.graph.problem.tasks.iter().zip(&mut lean.toward) {
+                if task.choices() > 1 && self.random.next(STRAY) == 0 {
+                    *toward = self.random.next(task.choices() as u64) as u8;
+                }
+            }
+        }
+        lean
     }
 
     /// Lets late tasks begin later and later, within the length that is allowed for it.
@@ -203,14 +236,18 @@ impl Search<'_> {
 /// Schedules a block. `effort` bounds the search; 0 is the first forward and backward passes only.
 pub(super) fn solve(problem: &Problem, effort: u32) -> Solution {
     let graph = Graph::new(problem);
+    let chains = graph.chains();
     let mut search = Search {
-        bound: bound::bound(problem, &graph.chains()),
+        bound: bound::bound(problem, &chains),
         window: problem.watched(),
         table: Reservations::new(problem),
         random: Random(0x9e37_79b9_7f4a_7c15),
         budget: u64::from(effort) * TASKS_PER_EFFORT,
         allowed: 0,
         best: None,
+        has_choices: problem.tasks.iter().any(|task| task.choices() > 1),
+        lightest: graph.lightest(),
+        heads: chains.head,
         graph,
     };
     let mut round = 0;
