@@ -337,7 +337,7 @@ fn choices(ir: &Ir, bundle: &Bundle, banks: Option<&Banks>) -> Vec<Vec<Option<u8
     let Some(banks) = banks else { return vec![present] };
     let placed = || bundle.operations.iter().filter(|operation| operation.slot.is_some());
     let sets: Vec<Slots> = placed().map(|operation| banks.able(ir, operation)).collect();
-    if sets.iter().all(|set| set.len() < 2) {
+    if sets.iter().copied().eq(present.iter().flatten().map(|slot| Slots::of(*slot))) {
         return vec![present];
     }
     let mut all = Vec::new();
