@@ -1,6 +1,7 @@
 //! Whatever the input: no panic; and what the disassembler writes, the assembler reads back.
 
 mod common;
+mod rows;
 
 use proptest::prelude::*;
 use takt_asm::{Expression, disasm, image};
@@ -96,6 +97,8 @@ fn soup() -> impl Strategy<Value = String> {
         "\n jmp l\n",
         "\n wait l\n",
         "\n fadd a, b, 1\n",
+        "\n fadd.aux a, b, 1\n",
+        "\n fadd a, b, 1 || fadd b, x1, 2\n",
         "\n mov c, a || fmul b, a, x1\n",
         "\u{e9}",
         "\0",
@@ -106,7 +109,8 @@ fn soup() -> impl Strategy<Value = String> {
 }
 
 fn machine() -> impl Strategy<Value = &'static Machine> {
-    prop::sample::select(MACHINES.to_vec())
+    let shared = ["second_adder", "second_multiplier", "two_alus", "four"].map(rows::named);
+    prop::sample::select([MACHINES, &shared].concat())
 }
 
 /// Whatever comes out can be rendered and goes through image and disassembly.

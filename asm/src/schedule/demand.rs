@@ -293,9 +293,16 @@ impl<'a> Demands<'a> {
                 (None, Some(unit)) => Some(Resources::Units(vec![unit])),
                 (None, None) => shared().map(|shared| shared.resources.clone()),
             };
-            let what = resources.as_ref().map_or(String::new(), |of| of.text(self.ir.machine));
-            let count = resources.map_or(0, |resources| Bound::operations(&part, &resources));
-            error = error.note(format!("{what}: {count} operations to issue for it"));
+            if let Some(resources) = resources {
+                let count = Bound::operations(&part, &resources);
+                let text = resources.text(self.ir.machine);
+                let (kind, names) = text.split_once(' ').unwrap_or_default();
+                let (has, how) = match kind.strip_suffix('s') {
+                    None => ("has", ", one after another"),
+                    Some(_) => ("have", ""),
+                };
+                error = error.note(format!("{kind} `{names}` {has} {count} operations to issue for it{how}"));
+            }
             error = error.also(last.span, "written here");
         }
         sink.push(error.help(later(cycles)));
