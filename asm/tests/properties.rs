@@ -119,11 +119,13 @@ fn exercise(text: &str, machine: &'static Machine) -> Result<(), TestCaseError> 
         Ok(assembled) => {
             let _ = takt_asm::listing::listing(&assembled);
             let _ = assembled.warnings.render(true);
-            let debug = assembled.debug_info();
-            let read = image::read_with(
-                &image::write_with(&assembled.program, Some(&debug)).expect("an image holds it"),
-            );
-            prop_assert_eq!(read.map(|(_, read)| read.map(|read| read.names)), Ok(Some(debug.names)));
+            if has_images(machine) {
+                let debug = assembled.debug_info();
+                let read = image::read_with(
+                    &image::write_with(&assembled.program, Some(&debug)).expect("an image holds it"),
+                );
+                prop_assert_eq!(read.map(|(_, read)| read.map(|read| read.names)), Ok(Some(debug.names)));
+            }
             round_trip(&assembled.program)
         }
         Err(report) => {
@@ -135,16 +137,24 @@ fn exercise(text: &str, machine: &'static Machine) -> Result<(), TestCaseError> 
     }
 }
 
+/// An image names its machine, so its reader must know that.
+fn has_images(machine: &Machine) -> bool {
+    Machine::from_name(machine.name).is_some()
+}
+
 /// Program to text to program, and to image and back.
 fn round_trip(program: &Program) -> Result<(), TestCaseError> {
-    let bytes = image::write(program).expect("an image holds it");
-    let read = image::read(&bytes);
-    prop_assert_eq!(read.as_ref(), Ok(program));
+    if has_images(program.machine) {
+        let bytes = image::write(program).expect("an image holds it");
+        let read = image::read(&bytes);
+        prop_assert_eq!(read.as_ref(), Ok(program));
+    }
     let text = disasm::disassemble(program);
     match common::assemble(&text, program.machine) {
         Ok(again) => {
             prop_assert_eq!(&again.program, program, "{}", text);
-            prop_assert_eq!(image::write(&again.program).expect("an image holds it"), bytes);
+            let image = |program| image::write(program).expect("an image holds it");
+            prop_assert_eq!(image(&again.program), image(program));
             Ok(())
         }
         Err(report) => Err(TestCaseError::fail(format!("{}\n{text}", report.render(false)))),

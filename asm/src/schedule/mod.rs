@@ -269,10 +269,9 @@ impl Block {
             }
             if effects().any(Effect::redirects) {
                 let drains = effects().any(Effect::drains);
-                for from in 0..to {
+                for (from, earlier) in tasks.iter().enumerate() {
                     if drains {
-                        (0..tasks[from].operations)
-                            .for_each(|operation| after(from, Wait::Written(operation)));
+                        (0..earlier.operations).for_each(|index| after(from, Wait::Written(index)));
                     } else {
                         after(from, Wait::Cycles(0));
                     }
