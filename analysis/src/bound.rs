@@ -6,12 +6,12 @@
 //! is made of what a delay does to what follows. `docs/analysis.md` has the argument.
 
 use crate::error::{BoundError, Refusal, place};
-use crate::graph::{Edge, Flow, Graph};
+use crate::graph::{Edge, Graph};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
-use takt_isa::Program;
 use takt_isa::program::Location;
-use takt_isa::timing::{self, Address, Cycle, Residue, Scoreboard};
+use takt_isa::timing::{self, Cycle, Residue, Scoreboard};
+use takt_isa::{BundleAddress, Flow, Program};
 
 /// Straight runs of bundles and turns of loops that are gone through at most, each from each state in which it is entered.
 pub const MAX_STEPS: u64 = 1 << 20;
@@ -52,11 +52,11 @@ pub struct SectionBounds {
     /// The label that it begins at; of what runs once, `once`.
     pub name: String,
     /// Its first bundle.
-    pub address: Address,
+    pub address: BundleAddress,
     /// Its place in the source.
     pub location: Option<Location>,
     /// The bundles that end it: `wait`s and `halt`s, ascending.
-    pub ends: Vec<Address>,
+    pub ends: Vec<BundleAddress>,
     /// Whether it begins with reset, not with a tick.
     pub once: bool,
     /// Cycles that it takes: of what runs once, from reset to the issue of the `wait`, both included; of a period, from the cycle after
@@ -95,9 +95,9 @@ pub fn bound(program: &Program) -> Result<Bounds, BoundError> {
     let mut explorer =
         Explorer { graph, known: HashMap::new(), orders: HashMap::new(), active: Vec::new(), steps: 0 };
     // Tick in time or not, and what is pending when the section's first bundle is delivered.
-    let mut sections: BTreeMap<(bool, Address), SectionBounds> = BTreeMap::new();
+    let mut sections: BTreeMap<(bool, BundleAddress), SectionBounds> = BTreeMap::new();
     let mut seen = BTreeSet::new();
-    let mut left = vec![(true, 0, Residue::default())];
+    let mut left = vec![(true, BundleAddress::RESET, Residue::default())];
     while let Some((once, address, residue)) = left.pop() {
         if !seen.insert((once, address, residue.clone())) {
             continue;
@@ -146,7 +146,7 @@ pub fn bound(program: &Program) -> Result<Bounds, BoundError> {
                 let section = sections.entry((!once, address)).or_insert_with(|| SectionBounds {
                     name: name(program, once, address),
                     address,
-                    location: (address < program.bundles()).then(|| program.location(address)).flatten(),
+                    location: program.location(address),
                     ends: Vec::new(),
                     once,
                     cycles: plain,
@@ -167,7 +167,7 @@ pub fn bound(program: &Program) -> Result<Bounds, BoundError> {
     Ok(Bounds { sections: sections.into_values().collect(), steps: explorer.steps })
 }
 
-fn name(program: &Program, once: bool, address: Address) -> String {
+fn name(program: &Program, once: bool, address: BundleAddress) -> String {
     match program.nearest_label(address) {
         _ if once => "once".to_owned(),
         Some((label, 0)) => label.to_owned(),
@@ -179,11 +179,11 @@ fn name(program: &Program, once: bool, address: Address) -> String {
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 enum Region {
     /// From its first bundle to a return, a `wait`, a `halt`; a section is one too.
-    Subroutine(Address),
+    Subroutine(BundleAddress),
     /// All turns of the counted loop with this head.
-    Loop(Address),
+    Loop(BundleAddress),
     /// One turn of it.
-    Turn(Address),
+    Turn(BundleAddress),
 }
 
 /// How a region is left. Residues are those at the delivery of the next bundle, which is also up to when cycles are counted; for `wait`,
@@ -196,17 +196,17 @@ enum Outcome {
         residue: Residue,
     },
     Return {
-        at: Address,
+        at: BundleAddress,
         residue: Residue,
     },
     /// The residue is that at the earliest delivery of the target.
     Wait {
-        at: Address,
-        target: Address,
+        at: BundleAddress,
+        target: BundleAddress,
         residue: Residue,
     },
     Halt {
-        at: Address,
+        at: BundleAddress,
     },
 }
 
@@ -232,17 +232,17 @@ struct Explorer<'p> {
     graph: Graph<'p>,
     known: HashMap<(Region, Residue), Rc<Summary>>,
     /// For each region, its bundles so that each comes before those that follow it.
-    orders: HashMap<Region, Rc<HashMap<Address, usize>>>,
+    orders: HashMap<Region, Rc<HashMap<BundleAddress, usize>>>,
     active: Vec<Region>,
     steps: u64,
 }
 
 impl Explorer<'_> {
-    fn error(&self, address: Address, refusal: Refusal) -> BoundError {
+    fn error(&self, address: BundleAddress, refusal: Refusal) -> BoundError {
         BoundError::new(self.graph.program, address, refusal)
     }
 
-    fn step(&mut self, address: Address) -> Result<(), BoundError> {
+    fn step(&mut self, address: BundleAddress) -> Result<(), BoundError> {
         self.steps += 1;
         if self.steps > MAX_STEPS {
             return Err(
@@ -277,7 +277,7 @@ impl Explorer<'_> {
     }
 
     /// All turns of a loop.
-    fn turns(&mut self, head: Address, entry: &Residue) -> Result<Summary, BoundError> {
+    fn turns(&mut self, head: BundleAddress, entry: &Residue) -> Result<Summary, BoundError> {
         let (most, again) = (self.graph.loops[&head].most, Edge { to: head, back: true });
         let mut summary = Summary::default();
         let mut heads = BTreeMap::from([(entry.clone(), Span::NONE)]);
@@ -316,7 +316,12 @@ impl Explorer<'_> {
     }
 
     /// All ways through a subroutine, or through one turn of a loop.
-    fn ways(&mut self, region: Region, entry: Address, residue: &Residue) -> Result<Summary, BoundError> {
+    fn ways(
+        &mut self,
+        region: Region,
+        entry: BundleAddress,
+        residue: &Residue,
+    ) -> Result<Summary, BoundError> {
         let order = self.order(region, entry)?;
         let mut summary = Summary::default();
         let mut left =
@@ -348,7 +353,7 @@ impl Explorer<'_> {
     }
 
     /// Whether a bundle belongs to a region, other than as the head of the turn after.
-    fn stays(&self, region: Region, to: Address) -> bool {
+    fn stays(&self, region: Region, to: BundleAddress) -> bool {
         match region {
             Region::Turn(head) => to != head && self.graph.loops[&head].body.contains(&to),
             Region::Subroutine(_) | Region::Loop(_) => true,
@@ -356,18 +361,18 @@ impl Explorer<'_> {
     }
 
     /// The straight run from a bundle to where ways part or meet.
-    fn run(&mut self, entry: Address, residue: &Residue) -> Result<Summary, BoundError> {
+    fn run(&mut self, entry: BundleAddress, residue: &Residue) -> Result<Summary, BoundError> {
         let machine = self.graph.program.machine;
         let mut scoreboard = Scoreboard::resume(machine, residue);
         let (mut address, mut delivered) = (entry, 0);
         let mut summary = Summary::default();
-        let (at, cycle, flow) = loop {
+        let (at, cycle, flow, taken) = loop {
             let node = self.graph.node(address)?;
             let cycle = scoreboard.issue(&node.timing, address, delivered).cycle;
-            if node.flow != Flow::Next || self.graph.is_leader(address + 1) {
-                break (address, cycle, node.flow);
+            if node.flow != Flow::Next || self.graph.is_leader(address.next()) {
+                break (address, cycle, node.flow, node.taken);
             }
-            (address, delivered) = (address + 1, timing::after_sequential(cycle));
+            (address, delivered) = (address.next(), timing::after_sequential(cycle));
         };
         let exactly = |cycles| Span { best: cycles, worst: cycles };
         let mut go = |to, back, delivered| {
@@ -376,14 +381,14 @@ impl Explorer<'_> {
         };
         let redirected = timing::after_redirect(machine, cycle);
         match flow {
-            Flow::Next => go(at + 1, false, timing::after_sequential(cycle)),
+            Flow::Next => go(at.next(), false, timing::after_sequential(cycle)),
             Flow::Jump(target) => go(target, target <= at, redirected),
-            Flow::Branch { target, taken } => {
+            Flow::Branch { target, .. } => {
                 if taken != Some(false) {
                     go(target, target <= at, redirected);
                 }
                 if taken != Some(true) {
-                    go(at + 1, false, timing::after_not_taken(machine, cycle));
+                    go(at.next(), false, timing::after_not_taken(machine, cycle));
                 }
             }
             Flow::Call(target) => {
@@ -395,9 +400,10 @@ impl Explorer<'_> {
                 summary.calls = callee.calls + 1;
                 for (outcome, span) in &callee.outcomes {
                     let outcome = match outcome {
-                        Outcome::Return { residue, .. } => {
-                            Outcome::Go { edge: Edge { to: at + 1, back: false }, residue: residue.clone() }
-                        }
+                        Outcome::Return { residue, .. } => Outcome::Go {
+                            edge: Edge { to: at.next(), back: false },
+                            residue: residue.clone(),
+                        },
                         Outcome::Wait { at, .. } => return Err(self.error(*at, Refusal::WaitInSubroutine)),
                         Outcome::Halt { .. } | Outcome::Go { .. } => outcome.clone(),
                     };
@@ -412,17 +418,21 @@ impl Explorer<'_> {
                 let residue = scoreboard.residue(redirected);
                 summary.add(Outcome::Wait { at, target, residue }, exactly(cycle));
             }
-            Flow::Halt | Flow::Two => summary.add(Outcome::Halt { at }, exactly(cycle)),
+            Flow::Halt => summary.add(Outcome::Halt { at }, exactly(cycle)),
         }
         Ok(summary)
     }
 
     /// Numbers the bundles of a region so that every way leads upwards. Counted loops within it are passed over as wholes.
-    fn order(&mut self, region: Region, entry: Address) -> Result<Rc<HashMap<Address, usize>>, BoundError> {
+    fn order(
+        &mut self,
+        region: Region,
+        entry: BundleAddress,
+    ) -> Result<Rc<HashMap<BundleAddress, usize>>, BoundError> {
         if let Some(known) = self.orders.get(&region) {
             return Ok(Rc::clone(known));
         }
-        let follow = |address: Address| -> Result<Vec<Address>, BoundError> {
+        let follow = |address: BundleAddress| -> Result<Vec<BundleAddress>, BoundError> {
             let inner = self.graph.loops.get(&address).filter(|_| region != Region::Turn(address));
             let edges: Vec<Edge> = match inner {
                 Some(inner) => inner.exits.iter().copied().collect(),

@@ -1,15 +1,14 @@
 //! Why a program has no bound.
 
-use takt_isa::Program;
 use takt_isa::program::Location;
-use takt_isa::timing::Address;
+use takt_isa::{BundleAddress, Program};
 
 /// Why no bound can be given, and where.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{place}: {refusal}")]
 pub struct BoundError {
     /// The bundle.
-    pub address: Address,
+    pub address: BundleAddress,
     /// Its place in the source, as far as the program knows it.
     pub location: Option<Location>,
     /// What is the matter.
@@ -32,7 +31,7 @@ pub enum Refusal {
     },
     /// A loop whose head is reached again in a way that the bound does not count.
     #[error(
-        "this loop has a bound, but {from} leads to it again in a way that begins the count anew: let a backward \
+        "this loop has a bound, but {from} leads to it again in a way that restarts the count: let a backward \
          jump or branch close the loop"
     )]
     Uncounted {
@@ -73,9 +72,6 @@ pub enum Refusal {
         /// Why.
         reason: String,
     },
-    /// Two operations of a bundle that continue elsewhere.
-    #[error("two operations of this bundle continue elsewhere: which one wins is not known")]
-    TwoRedirections,
     /// Execution leaves the program.
     #[error("execution goes on past the end of the program, which has {bundles} bundles")]
     LeavesProgram {
@@ -93,15 +89,14 @@ pub enum Refusal {
 }
 
 impl BoundError {
-    pub(crate) fn new(program: &Program, address: Address, refusal: Refusal) -> BoundError {
-        // Program::location slices, which an address far outside would overflow.
-        let location = (address < program.bundles()).then(|| program.location(address)).flatten();
+    pub(crate) fn new(program: &Program, address: BundleAddress, refusal: Refusal) -> BoundError {
+        let location = program.location(address);
         BoundError { address, location, refusal, place: place(program, address) }
     }
 }
 
 /// `tracking.s:40: bundle 12 (loop)`: a bundle, its line and its label.
-pub(crate) fn place(program: &Program, address: Address) -> String {
+pub(crate) fn place(program: &Program, address: BundleAddress) -> String {
     let mut text = format!("bundle {address}");
     if let Some((label, distance)) = program.nearest_label(address) {
         text.push_str(&if distance == 0 {
@@ -110,8 +105,8 @@ pub(crate) fn place(program: &Program, address: Address) -> String {
             format!(" ({label} + {distance})")
         });
     }
-    match (address < program.bundles()).then(|| program.location(address)).flatten() {
-        Some(location) => format!("{}: {text}", program.place_text(location)),
+    match program.bundle_place(address) {
+        Some(place) => format!("{place}: {text}"),
         None => text,
     }
 }

@@ -2,8 +2,8 @@
 
 use takt_emu::{Emulator, Fault, Status, Step};
 use takt_isa::spec::instructions::Function;
-use takt_isa::timing::{Address, Bundle, Cause, Cycle, Scoreboard};
-use takt_isa::{Instruction, Program};
+use takt_isa::timing::{Bundle, Cause, Cycle, Scoreboard};
+use takt_isa::{BundleAddress, Instruction, Program, Register, Slot, SlotIndex};
 
 /// Bundles that a trace holds at most.
 pub const MAX_ISSUES: usize = 1 << 16;
@@ -12,7 +12,7 @@ pub const MAX_ISSUES: usize = 1 << 16;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Issued {
     /// Its address.
-    pub address: Address,
+    pub address: BundleAddress,
     /// The cycle of its issue.
     pub cycle: Cycle,
     /// What the cycles before it were charged to, and how many; in time order.
@@ -30,15 +30,15 @@ pub struct Trace {
     pub cycles: Cycle,
     /// The bundles, in order.
     pub issues: Vec<Issued>,
-    /// The bundle that waited for the tick, and the cycle of its issue: what issued with it may still be underway.
-    before: Option<(Address, Cycle)>,
+    /// The bundle that waited for the tick, and the cycle of its issue: what issued with it may still be in flight.
+    before: Option<(BundleAddress, Cycle)>,
 }
 
 /// Why there is no trace.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TraceError {
     /// The program faulted.
-    #[error(transparent)]
+    #[error("{0}")]
     Fault(#[from] Fault),
     /// It has halted before.
     #[error("the program has halted: there is no further period")]
@@ -103,12 +103,12 @@ pub enum LinkKind {
     /// It reads, or overwrites, a result of the other: the latency of the other's unit.
     Result {
         /// The register.
-        register: u16,
+        register: Register,
     },
     /// It uses a unit that the other keeps busy.
     Unit {
         /// Slot of the machine.
-        slot: u8,
+        slot: SlotIndex,
         /// Unit of the slot.
         unit: u8,
     },
@@ -117,7 +117,7 @@ pub enum LinkKind {
     /// Its result would be written in the same cycle as the other's.
     WritePort {
         /// The slot whose bank it is.
-        slot: u8,
+        slot: SlotIndex,
     },
     /// The other redirected the fetch, or decided a branch.
     FrontEnd,
@@ -142,7 +142,7 @@ pub struct Link {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WhatIf {
     /// The unit, by slot and index; `None` is the front end.
-    pub unit: Option<(u8, u8)>,
+    pub unit: Option<(SlotIndex, u8)>,
     /// Cycles that the trace would then take.
     pub cycles: Cycle,
     /// How many more cycles would be stalled, by kind of cause ([`Cause::KINDS`]), the front end left out: why more cycles, if they are more.
@@ -154,11 +154,11 @@ pub type Stalls = [i64; Cause::KINDS.len()];
 
 /// An operation as the rules see it.
 struct Part {
-    slot: u8,
+    slot: SlotIndex,
     unit: u8,
     latency: Cycle,
-    dest: Option<u16>,
-    sources: Vec<u16>,
+    dest: Option<Register>,
+    sources: Vec<Register>,
 }
 
 impl Trace {
@@ -183,7 +183,7 @@ impl Trace {
         let earlier = |wanted: &dyn Fn(&Part, Cycle) -> bool| {
             (0..to).rev().find(|&from| parts[from].iter().any(|part| wanted(part, self.issues[from].cycle)))
         };
-        let just_written = |register: u16| {
+        let just_written = |register: Register| {
             earlier(&|part, cycle| part.dest == Some(register) && cycle + part.latency == issue.cycle)
         };
         let found = match issue.stalls.last() {
@@ -218,10 +218,10 @@ impl Trace {
     }
 
     /// What one cycle less would bring: of the latency (and interval) of each unit that the trace uses, and of the front end's refill. The bundles stay as they
-    /// are; the rules are applied anew.
+    /// are; the rules are applied again.
     pub fn what_if(&self, program: &Program) -> Vec<WhatIf> {
         let machine = program.machine;
-        let mut used: Vec<(u8, u8)> = self
+        let mut used: Vec<(SlotIndex, u8)> = self
             .issues
             .iter()
             .flat_map(|issue| parts(program, issue.address))
@@ -236,7 +236,7 @@ impl Trace {
             stalls: std::array::from_fn(|kind| stalls[kind] - today[kind]),
         };
         let faster = used.into_iter().filter_map(|(slot, unit)| {
-            let row = &machine.slots[usize::from(slot)].units[usize::from(unit)];
+            let row = &machine.slot(slot).units[usize::from(unit)];
             // Less than a cycle is no latency; a unit that writes nothing has none.
             (row.latency > 1).then_some(())?;
             let interval = row.interval.saturating_sub(1).max(1);
@@ -247,12 +247,12 @@ impl Trace {
         faster.chain([front].into_iter().filter(|_| machine.refill > 0)).collect()
     }
 
-    /// The rules applied anew to the bundles as they are: [`Trace::cycles`] again, unless the emulator has another idea of the rules.
+    /// The cycles by the rules alone: equal to [`Trace::cycles`], or else the emulator and the rules disagree.
     pub fn replayed(&self, program: &Program) -> Cycle {
         self.replay(program, |bundle| bundle, 0).0
     }
 
-    /// The cycles of the trace and what they were stalled for, the rules applied anew to changed bundles, with so many cycles of refill fewer.
+    /// The cycles of the trace and what they were stalled for, the rules applied again to changed bundles, with so many cycles of refill fewer.
     fn replay(&self, program: &Program, change: impl Fn(Bundle) -> Bundle, sooner: Cycle) -> (Cycle, Stalls) {
         let bundle = |address| {
             let instructions = program.bundle(address).and_then(Result::ok).unwrap_or_default();
@@ -291,19 +291,18 @@ impl Trace {
 }
 
 /// The operations of a bundle that use a unit.
-fn parts(program: &Program, address: Address) -> Vec<Part> {
+fn parts(program: &Program, address: BundleAddress) -> Vec<Part> {
     let instructions: Vec<Instruction> = program.bundle(address).and_then(Result::ok).unwrap_or_default();
-    let part = |(s, instruction): (usize, &Instruction)| {
-        let slot = &program.machine.slots[s];
+    let part = |((s, slot), instruction): ((SlotIndex, &Slot), &Instruction)| {
         let function = instruction.op.row().function;
         let unit = slot.unit_for(function).filter(|_| function != Function::Idle)?;
         Some(Part {
-            slot: s as u8,
+            slot: s,
             unit: unit as u8,
             latency: slot.units[unit].latency.into(),
             dest: instruction.writes(slot),
             sources: instruction.reads().to_vec(),
         })
     };
-    instructions.iter().enumerate().filter_map(part).collect()
+    program.machine.numbered_slots().zip(&instructions).filter_map(part).collect()
 }

@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 use std::num::NonZeroU64;
 use takt_analysis::{Bounds, Refusal, SectionBounds, bound};
 use takt_asm::{MemoryLoader, Options, assemble};
-use takt_emu::testing::{self, INPUTS, Random, random_program};
+use takt_emu::testing::{self, Random, input_ports, random_program};
 use takt_emu::{Emulator, FaultKind, PeriodError, PeriodReport, Stop};
-use takt_isa::timing::{Address, Cycle};
-use takt_isa::{MACHINES, Machine, Program, T3};
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, MACHINES, Machine, Program, T3};
 
 fn shipped(name: &str, machine: &'static Machine) -> Program {
     let loader = MemoryLoader::new(takt_programs::SOURCES);
@@ -31,7 +31,7 @@ enum Entered {
 
 #[derive(Clone, Copy, Debug)]
 struct Measured {
-    address: Address,
+    address: BundleAddress,
     entered: Entered,
     cycles: Cycle,
 }
@@ -47,7 +47,7 @@ fn measure(emulator: &mut Emulator, periods: u32, mut inputs: impl FnMut(&mut Em
             emulator.now() - 1
         }
     };
-    all.push(Measured { address: 0, entered: Entered::Reset, cycles: waited + 1 });
+    all.push(Measured { address: BundleAddress::RESET, entered: Entered::Reset, cycles: waited + 1 });
     for _ in 0..periods {
         inputs(emulator);
         // Where the `wait` leads, whether or not it had a tick to take.
@@ -124,7 +124,7 @@ fn shipped_programs_take_exactly_their_bounds() {
                 }
                 // The first period begins elsewhere than the others.
                 let periods = bounds.sections.iter().filter(|section| !section.once);
-                let measured: BTreeSet<Address> = measured[1..].iter().map(|one| one.address).collect();
+                let measured: BTreeSet<BundleAddress> = measured[1..].iter().map(|one| one.address).collect();
                 assert!(measured.into_iter().eq(periods.map(|section| section.address)));
                 // A deadline beyond the worst is kept; one that is not is missed, if only by and by: each late period
                 // leaves less of the refill hidden in the next.
@@ -141,8 +141,8 @@ fn shipped_programs_take_exactly_their_bounds() {
 /// Random inputs before every period.
 fn random_inputs(random: &mut Random) -> impl FnMut(&mut Emulator) + use<'_> {
     |emulator| {
-        for i in 0..INPUTS {
-            emulator.set_input_bits(emulator.machine().inputs.base + i, random.word()).unwrap();
+        for input in input_ports(emulator.machine()) {
+            emulator.set_input_bits(input, random.word()).unwrap();
         }
     }
 }
@@ -177,7 +177,7 @@ fn straight_programs_take_exactly_their_bounds() {
     random_programs(options, 300, |seed, program, bounds, measured| {
         for &one in measured {
             let exact = check(bounds, one, program.machine.refill);
-            // A period that begins with what the `wait`'s own bundle left underway may depend on when the tick comes.
+            // A period that begins with what the `wait`'s own bundle left in flight may depend on when the tick comes.
             let section = section(bounds, one);
             if one.entered == Entered::Reset {
                 assert!(exact, "seed {seed}");
@@ -227,7 +227,7 @@ fn what_cannot_be_bounded_is_refused() {
         (".input n\nloop: nop\n bnz n, loop\n halt\n", "test.s:2: bundle 0 (loop): a loop begins here"),
         (".input n\n.loop_bound 3\nloop: nop\n bz n, on\n jmp loop\non: halt\n nop\n", ""),
         (".loop_bound 3\n nop\n halt\n", "test.s:2: bundle 0: .loop_bound stands here"),
-        // Falling into the head counts anew.
+        // Falling into the head restarts the count.
         (
             ".input n\n jmp head\na: jmp head\n.loop_bound 3\nhead: bz n, a\n bnz n, head\n halt\n",
             "test.s:5: bundle 2 (head): this loop has a bound, but test.s:3: bundle 1 (a) leads to it again",
@@ -278,7 +278,8 @@ fn counted_loops_are_bounded_by_their_turns() {
                     emulator.set_blocks(blocks);
                     let fault = emulator.run().unwrap_err();
                     assert_eq!(fault.kind, FaultKind::LoopBound { most: turns - 1 });
-                    assert!(fault.to_string().starts_with("test.s:6: bundle 1"), "{fault}");
+                    let shown = fault.show(&program).to_string();
+                    assert!(shown.starts_with("test.s:6: bundle 1"), "{shown}");
                 }
             }
         }

@@ -89,8 +89,12 @@ fn memories_for_verilog() {
     for (bank, (_, text)) in program.machine.banks().zip(&files[4..]) {
         for line in text.lines() {
             let (address, bits) = line[1..].split_once(' ').expect("address and bits");
-            let address = u16::from_str_radix(address, 16).expect("hexadecimal");
-            constants.push((bank.base + address, u32::from_str_radix(bits, 16).expect("hexadecimal")));
+            let index = usize::from_str_radix(address, 16).expect("hexadecimal");
+            let register = takt_isa::BankIndex::new(index).and_then(|index| bank.register(index));
+            constants.push((
+                register.expect("it is in the bank"),
+                u32::from_str_radix(bits, 16).expect("hexadecimal"),
+            ));
         }
     }
     assert_eq!(constants, program.constants);

@@ -167,7 +167,7 @@ fn period(text: &str) -> (Vec<String>, Assembled) {
     let assembled = good(text);
     let start =
         assembled.program.sections.iter().find(|section| section.name == "period").expect("it has one").start;
-    (bundles(&assembled)[start as usize..].to_vec(), assembled)
+    (bundles(&assembled)[start.index()..].to_vec(), assembled)
 }
 
 #[test]

@@ -7,7 +7,7 @@ use object::{LittleEndian as LE, elf};
 use proptest::prelude::*;
 use takt_asm::image::{self, ImageError};
 use takt_asm::names::{DebugInfo, Position};
-use takt_isa::Program;
+use takt_isa::{BundleAddress, Program, Register};
 
 fn program() -> Program {
     common::good(
@@ -154,9 +154,11 @@ fn what_a_debugger_knows_fits_the_program() {
         ("`?` is not a name", |info| info.names.scopes[1].parameters[0].1 = "?".to_owned()),
         ("`t!` is not a name", |info| info.names.values[0].label = "t!".to_owned()),
         ("`` is not a name", |info| info.names.values[0].name.clear()),
-        ("register address 1023", |info| info.names.values[0].register = 1023),
+        ("register address 1023", |info| info.names.values[0].register = Register::ZERO),
         ("is read from 5 to 4", |info| info.names.values[0].orders = Some((5, 4))),
-        ("lives in bundles 2 to 99", |info| info.names.values[0].bundles = Some((2, 99))),
+        ("lives in bundles 2 to 99", |info| {
+            info.names.values[0].bundles = Some([2, 99].map(BundleAddress::new).into())
+        }),
     ];
     for (expected, change) in defects {
         let mut info = info.clone();
@@ -285,7 +287,8 @@ fn ports_in_images() {
     assert_eq!(image::read(&bytes).as_ref(), Ok(&program));
     assert!(!bytes.windows(7).any(|window| window == b"latched"));
     // Two outputs of one number, in two banks.
-    program.outputs[1].register = program.machine.output_register(1, 0);
+    program.outputs[1].register =
+        program.machine.output_registers(&program.machine.slots[1]).next().expect("a port");
     let error =
         image::read(&image::write(&program).expect("an image holds it")).expect_err("one number twice");
     assert!(error.to_string().contains("output `G`") && error.to_string().contains("same number"), "{error}");

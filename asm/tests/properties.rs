@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use takt_asm::{Expression, disasm, image};
 use takt_isa::program::{Location, LoopBound, Port, Section, Space, Symbol};
 use takt_isa::shape::Field;
-use takt_isa::{Instruction, MACHINES, Machine, Program, ROWS, Type, ZERO};
+use takt_isa::{BankIndex, BundleAddress, Instruction, MACHINES, Machine, Program, ROWS, Register, Type};
 
 /// Pieces that sources are made of, in any order.
 fn soup() -> impl Strategy<Value = String> {
@@ -100,6 +100,23 @@ fn soup() -> impl Strategy<Value = String> {
         "\n fadd.aux a, b, 1\n",
         "\n fadd a, b, 1 || fadd b, x1, 2\n",
         "\n mov c, a || fmul b, a, x1\n",
+        "\n.reg P[2,2] v[3]\n",
+        "\n.loc \"f\" 3[1,2]\n",
+        "\na = ",
+        "\nb, F = ",
+        "\nv[i] = ",
+        "\nP[1,2] = ",
+        "\nF = x1*x1 + ",
+        "?",
+        " ? a : b",
+        "v[2]",
+        "P[i,1]",
+        "sqrt(",
+        "min(a, ",
+        "sum(i, 1, 3, ",
+        "m(a)",
+        "itof(n)",
+        "has.fatan2",
         "\u{e9}",
         "\0",
     ];
@@ -161,15 +178,25 @@ fn round_trip(program: &Program) -> Result<(), TestCaseError> {
     }
 }
 
+/// Any register.
+fn register() -> impl Strategy<Value = Register> + Clone {
+    (0..Register::COUNT).prop_map(|number| Register::new(number).expect("in range"))
+}
+
+/// Any register but `zero`.
+fn writable() -> impl Strategy<Value = Register> + Clone {
+    register().prop_filter("writable", |register| *register != Register::ZERO)
+}
+
 /// A word: legal for its slot, legal somewhere, or any bits.
 fn word(machine: &'static Machine) -> impl Strategy<Value = u64> {
     let register = prop_oneof![
-        4 => (0..1024u16).prop_filter("in a bank", |register| MACHINES[0].banks().any(|bank| bank.contains(*register))),
-        1 => 0..1024u16,
-        1 => Just(ZERO),
+        4 => register().prop_filter("in a bank", |register| MACHINES[0].has_register(*register)),
+        1 => register(),
+        1 => Just(Register::ZERO),
     ];
     let sources = [register.clone(), register.clone(), register];
-    let instruction = (prop::sample::select(ROWS), 0..256u16, sources, any::<u32>()).prop_map(
+    let instruction = (prop::sample::select(ROWS), 0..256usize, sources, any::<u32>()).prop_map(
         |(row, dest, sources, constant)| {
             let mut constant = constant;
             for field in row.shape.fields() {
@@ -177,6 +204,7 @@ fn word(machine: &'static Machine) -> impl Strategy<Value = u64> {
                     constant &= field.bits().max();
                 }
             }
+            let dest = BankIndex::new(dest).expect("in range");
             Instruction { op: row.op, dest, sources, constant }.encode().unwrap_or(0)
         },
     );
@@ -195,8 +223,8 @@ prop_compose! {
         code in prop::collection::vec(word(machine), 0..30usize),
         once in 0..12usize,
         data in prop::collection::vec(prop_oneof![any::<u32>(), Just(0)], 0..40),
-        constants in prop::collection::btree_map(0..1023u16, any::<u32>(), 0..8),
-        ports in prop::collection::btree_map(0..1023u16, 0..3usize, 0..12),
+        constants in prop::collection::btree_map(writable(), any::<u32>(), 0..8),
+        ports in prop::collection::btree_map(writable(), 0..3usize, 0..12),
         labels in prop::collection::vec((any::<bool>(), any::<prop::sample::Index>()), 0..8),
         files in prop::sample::subsequence(vec!["a.s", "b \"c\".s", "dir/d.s", "\\e\n"], 0..=4).prop_shuffle(),
         loops in prop::collection::btree_map(0..30u32, 1..=u32::MAX, 0..4),
@@ -225,7 +253,7 @@ prop_compose! {
                 continue;
             }
             // Names that look like places, but of other registers.
-            let name = if register % 3 == 0 { format!("m{register}") } else { format!("r.{register}_") };
+            let name = if register.get() % 3 == 0 { format!("m{register}") } else { format!("r.{register}_") };
             list.insert(0, Port { name, register, ty: types[ty] });
         }
         let mut symbols: Vec<Symbol> = labels.iter().enumerate().map(|(i, (code, index))| {
@@ -233,7 +261,8 @@ prop_compose! {
             Symbol { name: format!("label{i}"), space, address: index.index(end + 1) as u32 }
         }).collect();
         symbols.sort_by_key(|symbol| (symbol.space, symbol.address));
-        let sections = [("once", 0, once), ("period", once, bundles as u32)];
+        let sections = [("once", 0, once), ("period", once, bundles as u32)]
+            .map(|(name, start, end)| (name, BundleAddress::new(start), BundleAddress::new(end)));
         let files: Vec<String> = files.into_iter().map(str::to_owned).collect();
         let location = |line: &Option<(prop::sample::Index, u32)>| match line {
             Some((index, line)) if !files.is_empty() => {
@@ -260,10 +289,11 @@ prop_compose! {
             loop_bounds: loops
                 .into_iter()
                 .filter(|(address, _)| (*address as usize) < bundles)
-                .map(|(address, most)| LoopBound { address, most })
+                .map(|(address, most)| LoopBound { address: BundleAddress::new(address), most })
                 .collect(),
             files: files.clone(),
             lines,
+            parts: Vec::new(),
         }
     }
 }

@@ -173,7 +173,7 @@ fn refusal(errors: &Diagnostics) -> Message {
 }
 
 /// The cycles of a period in which a port's register is read or written, from 1.
-fn seen_cycles(program: &Program, register: u16) -> Vec<u32> {
+fn seen_cycles(program: &Program, register: takt_isa::Register) -> Vec<u32> {
     let mut emulator = Emulator::new(program).expect("it fits");
     for port in &program.inputs {
         emulator.set_input_bits(port.register, 1.5f32.to_bits()).expect("it is an input");

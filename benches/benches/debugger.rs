@@ -5,7 +5,7 @@ use criterion::Criterion;
 use takt_asm::{MemoryLoader, Options as AsmOptions};
 use takt_benches::Measured;
 use takt_debug::session::{Options, Session, Stop, Unit, Where, Why};
-use takt_isa::Program;
+use takt_isa::{BundleAddress, Program};
 
 /// The loop's turn takes as long as it does; a branch is taken, and never the one to `rare`.
 const SOURCE: &str = ".output n:int rare_seen\n.reg t:int\n        mov n, zero\nloop:   iadd n, n, 1\n        ieq t, n, zero\n        \
@@ -38,7 +38,11 @@ fn main() {
         rows.push((format!("go anywhere, back a {name}"), seconds));
     }
     assert_eq!(there.go_to(CYCLES), Why::Done);
-    there.add_stop(Stop::Break { at: Where::Bundle(rare), condition: None, text: String::new() });
+    there.add_stop(Stop::Break {
+        at: Where::Bundle(BundleAddress::new(rare)),
+        condition: None,
+        text: String::new(),
+    });
     let seconds = group.seconds("reverse through 10^8 cycles", CYCLES, || {
         there.go_to(CYCLES);
         assert_eq!(there.resume_back(), Why::Start);

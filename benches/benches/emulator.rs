@@ -5,7 +5,7 @@ use criterion::Criterion;
 use takt_asm::{MemoryLoader, Options};
 use takt_benches::Measured;
 use takt_emu::Emulator;
-use takt_isa::MACHINES;
+use takt_isa::{MACHINES, Register};
 use takt_programs::hybrid::closed_loop::{ClosedLoop, Inputs};
 use takt_programs::hybrid::{Controller, ports};
 use takt_programs::trajectory::Trajectory;
@@ -48,7 +48,7 @@ fn main() {
             let path = format!("hybrid/{program}.s");
             let assembled = takt_asm::assemble(&path, &loader, &options).expect("the program is ours");
             let mut emulator = Emulator::new(&assembled.program).expect("it fits the machine");
-            let registers: Vec<u16> = ports::INPUTS
+            let registers: Vec<Register> = ports::INPUTS
                 .iter()
                 .map(|port| emulator.input_port(port.name).expect("it has the ports").register)
                 .collect();

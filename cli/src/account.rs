@@ -4,8 +4,23 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use takt_emu::Statistics;
-use takt_isa::timing::{Address, Cause};
-use takt_isa::{Program, ROWS};
+use takt_isa::timing::Cause;
+use takt_isa::{BundleAddress, Function, Program, ROWS};
+
+/// How many of a program's operations round a product and a sum together.
+pub(crate) fn fused_operations(program: &Program) -> usize {
+    let bundles = program.addresses().filter_map(|address| program.bundle(address)?.ok());
+    bundles.flatten().filter(|instruction| instruction.op.row().function == Function::Fused).count()
+}
+
+/// The same, to be read behind "of the program".
+pub(crate) fn rounding(fused: usize) -> String {
+    match fused {
+        0 => "no operation rounds a product and a sum together".to_owned(),
+        1 => "1 operation rounds a product and a sum together (fused multiply-add)".to_owned(),
+        fused => format!("{fused} operations round a product and a sum together (fused multiply-add)"),
+    }
+}
 
 /// Counts over a run or a period. `cycles = bundles + Σ stalls`.
 #[derive(Clone, Debug)]
@@ -16,7 +31,7 @@ pub(crate) struct Account {
     pub(crate) operations: BTreeMap<&'static str, u64>,
     /// By kind of cause, all of them.
     stalls: BTreeMap<&'static str, u64>,
-    causes: Vec<((Address, Cause), u64)>,
+    causes: Vec<((BundleAddress, Cause), u64)>,
 }
 
 impl Account {

@@ -1,12 +1,13 @@
 //! `takt analyse`: where the cycles of one period went, bundle by bundle, and what would make it shorter.
 
+use crate::fault;
 use crate::files::{self, Out};
 use crate::load::Load;
 use crate::number;
 use crate::output;
 use crate::ports::{self, Rows};
 use crate::select::{OptionalMachine, SourceArguments};
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::{Value, json};
 use std::cmp::Reverse;
@@ -19,7 +20,7 @@ use takt_emu::{Emulator, Status};
 use takt_isa::program::Location;
 use takt_isa::spec::instructions::Function;
 use takt_isa::timing::{Cause, Cycle};
-use takt_isa::{Instruction, Machine, Program};
+use takt_isa::{BundleAddress, Instruction, Machine, Program, SlotIndex};
 
 /// Show where the cycles of a period went: every bundle, every stall, the chain that sets the time.
 ///
@@ -71,13 +72,15 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
     }
     files::check(&reads, &writes)?;
     let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
-    let program = load.program(&arguments.file)?;
-    let rows = read_inputs(arguments, &program)?;
-    let (trace, period) = follow(arguments, &program, &rows)?;
+    let loaded = load.with_source(&arguments.file)?;
+    let program = &loaded.program;
+    let rows = read_inputs(arguments, program)?;
+    let followed = follow(arguments, program, &rows);
+    let (trace, period) = followed.map_err(|error| fault::told(error, &loaded, color))?;
     let analysis = Analysis {
-        chain: trace.critical_path(&program),
-        faster: faster(arguments, &load, &program, &trace, &rows),
-        program: &program,
+        chain: trace.critical_path(program),
+        faster: faster(arguments, &load, program, &trace, &rows),
+        program,
         name: files::input_name(&arguments.file),
         period,
         trace,
@@ -126,16 +129,16 @@ fn follow(arguments: &Analyse, program: &Program, rows: &Rows) -> Result<(Trace,
         Ok(())
     };
     set(&mut emulator, 0)?;
-    let mut trace = takt_analysis::trace(&mut emulator).map_err(|error| anyhow!("{error}"))?;
+    let mut trace = takt_analysis::trace(&mut emulator)?;
     let mut period = 0;
     while period < wanted && !matches!(emulator.status(), Status::Halted { .. }) {
         period += 1;
         set(&mut emulator, period)?;
-        let failed = |error: &dyn std::fmt::Display| anyhow!("period {period}: {error}");
+        let which = || format!("period {period}");
         if period < wanted {
-            emulator.run_period(&[]).map_err(|error| failed(&error))?;
+            emulator.run_period(&[]).with_context(which)?;
         } else {
-            trace = takt_analysis::trace(&mut emulator).map_err(|error| failed(&error))?;
+            trace = takt_analysis::trace(&mut emulator).with_context(which)?;
         }
     }
     if period < wanted && (arguments.periods.is_some() || period > 0) {
@@ -144,14 +147,14 @@ fn follow(arguments: &Analyse, program: &Program, rows: &Rows) -> Result<(Trace,
     Ok((trace, period))
 }
 
-/// What a faster unit would bring: to the program as it is, and assembled anew for a machine that has it.
+/// What a faster unit would bring: to the program as it is, and assembled for a machine that has it.
 struct Faster {
     what: WhatIf,
-    anew: Option<Anew>,
+    reassembled: Option<Reassembled>,
 }
 
 /// The program assembled for a machine with a faster unit.
-struct Anew {
+struct Reassembled {
     cycles: Cycle,
     /// What no schedule of its blocks can be shorter than.
     least: Cycle,
@@ -161,25 +164,25 @@ fn faster(arguments: &Analyse, load: &Load, program: &Program, trace: &Trace, ro
     // Standard input has been read; an image has no source.
     let source = Some(&arguments.file).filter(|file| !files::is_dash(file));
     let source = source.and_then(|file| Load::source(file).ok());
-    let anew = |what: &WhatIf| {
+    let reassembled = |what: &WhatIf| {
         let machine = Some(quicker(program.machine, what.unit));
         let assembled = Load { machine, ..load.clone() }.assemble(&arguments.file, source.clone()?).ok()?;
         let found = follow(arguments, &assembled.program, rows).ok()?.0;
         let visits = |address| found.issues.iter().filter(|issue| issue.address == address).count() as Cycle;
         let spare = |block: &BlockReport| Cycle::from(block.cycles.saturating_sub(block.bound.cycles()));
         let spare: Cycle = assembled.blocks.iter().map(|block| visits(block.address) * spare(block)).sum();
-        Some(Anew { cycles: found.cycles, least: found.cycles.saturating_sub(spare) })
+        Some(Reassembled { cycles: found.cycles, least: found.cycles.saturating_sub(spare) })
     };
-    trace.what_if(program).into_iter().map(|what| Faster { anew: anew(&what), what }).collect()
+    trace.what_if(program).into_iter().map(|what| Faster { reassembled: reassembled(&what), what }).collect()
 }
 
 /// A machine with one cycle less in a unit, or in the front end. It is never given back: there are as many as units.
-fn quicker(machine: &Machine, unit: Option<(u8, u8)>) -> &'static Machine {
+fn quicker(machine: &Machine, unit: Option<(SlotIndex, u8)>) -> &'static Machine {
     let mut slots = machine.slots.to_vec();
     let mut refill = machine.refill;
     match unit {
         Some((slot, unit)) => {
-            let slot = &mut slots[usize::from(slot)];
+            let slot = &mut slots[slot.index()];
             let mut units = slot.units.to_vec();
             let row = &mut units[usize::from(unit)];
             row.latency -= 1;
@@ -202,10 +205,8 @@ struct Analysis<'p> {
 }
 
 impl Analysis<'_> {
-    fn unit(&self, unit: Option<(u8, u8)>) -> &'static str {
-        unit.map_or("front end", |(slot, unit)| {
-            self.program.machine.slots[usize::from(slot)].units[usize::from(unit)].name
-        })
+    fn unit(&self, unit: Option<(SlotIndex, u8)>) -> &'static str {
+        unit.map_or("front end", |(slot, unit)| self.program.machine.slot(slot).units[usize::from(unit)].name)
     }
 
     fn bundle(&self, issue: usize) -> Vec<Instruction> {
@@ -234,7 +235,7 @@ impl Analysis<'_> {
             LinkKind::Unit { slot, unit } => format!("{} busy", self.unit(Some((slot, unit)))),
             LinkKind::Drain => "drain".to_owned(),
             LinkKind::WritePort { slot } => {
-                format!("write port of bank {}", machine.slots[usize::from(slot)].bank.name)
+                format!("write port of bank {}", machine.slot(slot).bank.name)
             }
             LinkKind::FrontEnd => "front end".to_owned(),
             LinkKind::Order => "order of issue".to_owned(),
@@ -283,21 +284,24 @@ impl Analysis<'_> {
         counts
     }
 
-    fn operation_json(&self, address: u32, s: usize, instruction: &Instruction) -> Option<Value> {
-        let (program, slot) = (self.program, &self.program.machine.slots[s]);
+    fn operation_json(
+        &self,
+        address: BundleAddress,
+        s: SlotIndex,
+        instruction: &Instruction,
+    ) -> Option<Value> {
+        let (program, slot) = (self.program, self.program.machine.slot(s));
         let function = instruction.op.row().function;
         let unit = &slot.units[slot.unit_for(function).filter(|_| function != Function::Idle)?];
-        let target = |address: u32| match program.nearest_label(address) {
+        let target = |address: BundleAddress| match program.nearest_label(address) {
             Some((label, 0)) => label.to_owned(),
             _ => address.to_string(),
         };
-        let word = address as usize * program.machine.slots.len() + s;
-        let place = program.lines.get(word).copied().flatten();
         Some(json!({
             "slot": slot.name,
             "unit": unit.name,
             "text": instruction.text_with(program.machine, s, |register| program.register_text(register), target),
-            "place": place.map(|place| program.place_text(place)),
+            "place": program.operation_place(address, s),
             "latency": instruction.writes(slot).map(|_| unit.latency),
         }))
     }
@@ -311,22 +315,21 @@ impl Analysis<'_> {
                 Cause::Branch { from } => Some(from),
                 _ => None,
             };
-            let line = producer.and_then(|address| program.location(address));
             json!({
                 "cause": cause.name(),
                 "cycles": cycles,
                 "text": program.cause_text(*cause),
                 "producer": producer,
-                "producer_place": line.map(|line| program.place_text(line)),
+                "producer_place": producer.and_then(|address| program.bundle_place(address)),
             })
         };
         let bundle = |(i, issue): (usize, &Issued)| {
             let operations = self.bundle(i);
-            let operations = operations.iter().enumerate();
+            let operations = SlotIndex::all().zip(&operations);
             json!({
                 "address": issue.address,
                 "cycle": self.cycle(i),
-                "place": program.location(issue.address).map(|place| program.place_text(place)),
+                "place": program.bundle_place(issue.address),
                 "stalls": issue.stalls.iter().map(stall).collect::<Vec<_>>(),
                 "critical": critical.contains(&i),
                 "operations": operations
@@ -345,12 +348,12 @@ impl Analysis<'_> {
             })
         };
         let faster = |faster: &Faster| {
-            let anew = faster.anew.as_ref();
+            let reassembled = faster.reassembled.as_ref();
             json!({
                 "unit": self.unit(faster.what.unit),
                 "as_it_is": faster.what.cycles,
-                "assembled_anew": anew.map(|anew| anew.cycles),
-                "least_anew": anew.map(|anew| anew.least),
+                "reassembled": reassembled.map(|reassembled| reassembled.cycles),
+                "reassembled_least": reassembled.map(|reassembled| reassembled.least),
                 "stalls": gained(&faster.what).map(|(kind, more)| (kind.to_owned(), json!(more))).collect::<Value>(),
             })
         };
@@ -413,11 +416,12 @@ impl Analysis<'_> {
     /// What a faster unit would bring; where that is more cycles than today, why.
     fn faster_text(&self, out: &mut Out) -> Result<()> {
         let today = self.trace.cycles;
-        writeln!(out, "\none cycle less in      as it is   assembled anew")?;
+        writeln!(out, "\none cycle less in      as it is      reassembled")?;
         let gain = |new: Cycle| format!("{new} ({:+})", new.cast_signed() - today.cast_signed());
-        for Faster { what, anew } in &self.faster {
-            let anew = anew.as_ref().map_or_else(|| "-".to_owned(), |anew| gain(anew.cycles));
-            writeln!(out, "  {:<16} {:>12} {anew:>16}", self.unit(what.unit), gain(what.cycles))?;
+        for Faster { what, reassembled } in &self.faster {
+            let reassembled =
+                reassembled.as_ref().map_or_else(|| "-".to_owned(), |reassembled| gain(reassembled.cycles));
+            writeln!(out, "  {:<16} {:>12} {reassembled:>16}", self.unit(what.unit), gain(what.cycles))?;
         }
         let worse: Vec<&WhatIf> =
             self.faster.iter().map(|faster| &faster.what).filter(|what| what.cycles > today).collect();
@@ -431,13 +435,21 @@ impl Analysis<'_> {
             let stalls: Vec<String> = gained(what).map(|(kind, more)| format!("{kind} {more:+}")).collect();
             writeln!(out, "  {:<16} stalled cycles: {}", self.unit(what.unit), stalls.join(", "))?;
         }
-        let worse = || self.faster.iter().filter_map(|faster| Some((faster, faster.anew.as_ref()?)));
-        let worse = || worse().filter(|(_, anew)| anew.cycles > today);
+        let worse = || self.faster.iter().filter_map(|faster| Some((faster, faster.reassembled.as_ref()?)));
+        let worse = || worse().filter(|(_, reassembled)| reassembled.cycles > today);
         if worse().next().is_some() {
-            writeln!(out, "more anew: the search ended with a longer schedule, which proves nothing")?;
+            writeln!(
+                out,
+                "more when reassembled: the search ended with a longer schedule, which proves nothing"
+            )?;
         }
-        for (faster, anew) in worse() {
-            writeln!(out, "  {:<16} none takes fewer than {}", self.unit(faster.what.unit), anew.least)?;
+        for (faster, reassembled) in worse() {
+            writeln!(
+                out,
+                "  {:<16} none takes fewer than {}",
+                self.unit(faster.what.unit),
+                reassembled.least
+            )?;
         }
         Ok(())
     }

@@ -1,12 +1,13 @@
 //! `takt arm`: the six-axis arm's kinematics, on the paper's examples, random poses and a path.
 
-use crate::fault::explain;
+use crate::account::{fused_operations, rounding};
+use crate::fault;
 use crate::files::{self, Given, Out};
-use crate::load::Load;
+use crate::load::{Load, Loaded};
 use crate::number;
 use crate::plot::ArmPlot;
 use crate::run::PERIOD_LIMIT;
-use crate::select;
+use crate::select::{self, ContractArgument, SourceArguments};
 use crate::track::progress;
 use crate::{output, ports};
 use anyhow::{Context, Result, bail};
@@ -17,7 +18,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_emu::Emulator;
 use takt_isa::program::Port;
-use takt_isa::{Function, Machine, Program, T3};
+use takt_isa::{Function, Machine, Register, T3};
 use takt_programs::arm::{
     Arm as OnArm, CONFIGURATIONS, Configuration, FORWARD_EXAMPLE, ForwardResult, GOOD, INVERSE_EXAMPLE,
     InverseResult, Pose, RoundTrip, Sweep, forward, inverse, square, sweep,
@@ -33,6 +34,8 @@ pub(crate) struct Arm {
     /// The machine, one with arctangents.
     #[arg(long, short, value_name = "MACHINE", default_value = T3.name, value_parser = select::machine)]
     machine: &'static Machine,
+    #[command(flatten)]
+    contract: ContractArgument,
     /// Random poses.
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = number::count, allow_hyphen_values = true)]
     poses: u64,
@@ -73,14 +76,17 @@ const PAPER_ARM_CLOCK: f64 = 50.0;
 
 /// A program with its ports in an order of ours.
 struct Ported {
+    loaded: Loaded,
+    color: bool,
     emulator: Emulator,
-    inputs: Vec<u16>,
-    outputs: Vec<u16>,
+    inputs: Vec<Register>,
+    outputs: Vec<Register>,
 }
 
 impl Ported {
-    fn new(program: &Program, inputs: &[&str], outputs: &[&str]) -> Result<Ported> {
-        let registers = |ports: &[Port], names: &[&str]| -> Result<Vec<u16>> {
+    fn new(loaded: Loaded, color: bool, inputs: &[&str], outputs: &[&str]) -> Result<Ported> {
+        let program = &loaded.program;
+        let registers = |ports: &[Port], names: &[&str]| -> Result<Vec<Register>> {
             let find = |name: &&str| ports.iter().find(|port| port.name == **name).map(|port| port.register);
             names
                 .iter()
@@ -88,7 +94,7 @@ impl Ported {
                 .collect()
         };
         let (inputs, outputs) = (registers(&program.inputs, inputs)?, registers(&program.outputs, outputs)?);
-        Ok(Ported { emulator: Emulator::new(program)?, inputs, outputs })
+        Ok(Ported { emulator: Emulator::new(program)?, loaded, color, inputs, outputs })
     }
 
     /// Values of the outputs, and cycles.
@@ -98,12 +104,13 @@ impl Ported {
         }
         self.emulator.set_cycle_limit(self.emulator.now() + PERIOD_LIMIT);
         let report = self.emulator.run_period(&[]);
-        let report = report.map_err(|error| anyhow::anyhow!(explain(&error)))?;
+        let report = report.map_err(|error| fault::told(error.into(), &self.loaded, self.color))?;
         if !report.nan_writes.is_empty() {
             bail!("a NaN was written to an output port");
         }
-        let value =
-            |register: &u16| self.emulator.output_bits(*register).context("an output port was not written");
+        let value = |register: &Register| {
+            self.emulator.output_bits(*register).context("an output port was not written")
+        };
         Ok((self.outputs.iter().map(value).collect::<Result<_>>()?, report.cycles))
     }
 }
@@ -124,7 +131,7 @@ impl OnEmulator {
         let (pose, joints) =
             ([&POSE[..], &CONFIGURATION, &["status"]].concat(), [&JOINTS[..], &["status"]].concat());
         let ported = |path, inputs: &[&str], outputs: &[&str]| {
-            let mut ported = Ported::new(&load.builtin(path)?.program, inputs, outputs)?;
+            let mut ported = Ported::new(load.builtin(path)?, load.color, inputs, outputs)?;
             // What runs once belongs to no period.
             let zeros = vec![0; inputs.len()];
             ported.period(zeros.into_iter())?;
@@ -215,7 +222,8 @@ pub(crate) fn run(arguments: &Arm, color: bool, out: &mut Out) -> Result<()> {
     if machine.host(Function::Arctangent).is_none() {
         bail!("{} has no arctangent, which the arm's programs need; {} has", machine.name, T3.name);
     }
-    let mut arm = OnEmulator::new(Load::new(machine, color))?;
+    let source = SourceArguments { contract: arguments.contract, ..SourceArguments::default() };
+    let mut arm = OnEmulator::new(Load::new(machine, color).with(&source))?;
     let mut table = arguments.csv.as_deref().map(Out::create).transpose()?;
     let mut picture = arguments.plot.as_deref().map(Out::create).transpose()?;
     let drawn = if draws { Some(draw_square(&mut arm)?) } else { None };
@@ -246,7 +254,8 @@ pub(crate) fn run(arguments: &Arm, color: bool, out: &mut Out) -> Result<()> {
     })?;
     bar.finish_and_clear();
     let examples = Examples::run(&mut arm)?;
-    let report = Report { arguments, found, examples, drawn };
+    let fused = [&arm.forward, &arm.inverse].map(|ported| fused_operations(ported.emulator.program()));
+    let report = Report { arguments, found, examples, drawn, fused };
     if arguments.json {
         output::json(&report.json(), out)?;
     } else if !writes.iter().any(|(_, path)| files::is_dash(path)) {
@@ -277,6 +286,8 @@ struct Report<'a> {
     found: Sweep,
     examples: Examples,
     drawn: Option<Drawn>,
+    /// Operations that round product and sum together, forward and inverse.
+    fused: [usize; 2],
 }
 
 impl Report<'_> {
@@ -287,7 +298,7 @@ impl Report<'_> {
     }
 
     fn write(&self, out: &mut String) -> std::fmt::Result {
-        let Report { arguments, found, examples, drawn } = self;
+        let Report { arguments, found, examples, drawn, .. } = self;
         let (machine, clock) = (arguments.machine.name, arguments.clock);
         writeln!(
             out,
@@ -310,6 +321,8 @@ impl Report<'_> {
         error("forward: position, mm", PAPER_FORWARD_MM, found.forward_mm)?;
         error("forward: orientation, °", PAPER_FORWARD_DEG, found.forward_deg)?;
         error("inverse: joints, °", PAPER_INVERSE_DEG, found.inverse_deg)?;
+        let fused = rounding(self.fused.iter().sum());
+        writeln!(out, "  of both programs together, {fused}")?;
         writeln!(
             out,
             "  over {} poses and {} solutions at least 10° from the singularities; {} closer ones do not count, {} \
@@ -364,7 +377,7 @@ impl Report<'_> {
     }
 
     fn json(&self) -> Value {
-        let Report { arguments, found, examples, drawn } = self;
+        let Report { arguments, found, examples, drawn, fused: [forward_fused, inverse_fused] } = self;
         let cycles = |cycles: Option<(u64, u64)>| {
             let (shortest, longest) = cycles.unwrap_or_default();
             json!({"min": shortest, "max": longest})
@@ -388,6 +401,7 @@ impl Report<'_> {
             "poses": arguments.poses,
             "forward": {
                 "cycles": cycles(found.forward_cycles),
+                "fused_operations": forward_fused,
                 "time_us": time(found.forward_cycles),
                 "max_error_mm": found.forward_mm,
                 "max_error_deg": found.forward_deg,
@@ -402,6 +416,7 @@ impl Report<'_> {
             },
             "inverse": {
                 "cycles": cycles(found.inverse_cycles),
+                "fused_operations": inverse_fused,
                 "time_us": time(found.inverse_cycles),
                 "max_error_deg": found.inverse_deg,
                 "compared": found.inverse_solutions,

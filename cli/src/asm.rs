@@ -3,17 +3,18 @@
 use crate::files::{self, Given, Out};
 use crate::load::Load;
 use crate::output::{self, Failure};
-use crate::select::{MachineArgument, SourceArguments};
+use crate::select::{MachineArgument, SourceArguments, When};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
 use takt_asm::schedule::DemandKind;
 use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, Resources, SharedBound, TimingReport};
-use takt_asm::{Adjustment, Assembled, Made, Schedule, image, listing};
-use takt_isa::{Program, Slots};
+use takt_asm::{Adjustment, Assembled, Contraction, Made, Schedule, image, listing};
+use takt_isa::{Program, SlotIndex, Slots};
 use takt_rtl::header::{Cycles, Header, Language, Span};
 
 /// Assemble a source into an image.
@@ -50,7 +51,7 @@ pub(crate) struct Asm {
     /// Schedule everything: the same as --schedule on.
     #[arg(short = 'O', conflicts_with = "schedule")]
     optimise: bool,
-    /// Which operations the scheduler packs into bundles and orders.
+    /// Which operations the scheduler packs into bundles and orders: those under `.schedule on`, all, or none.
     #[arg(long, value_enum, value_name = "WHEN", default_value_t = When::Source)]
     schedule: When,
     /// How long the scheduler searches, up to 100000; 0 is the first passes only.
@@ -97,17 +98,6 @@ impl From<HeaderLanguage> for Language {
             HeaderLanguage::Svd => Language::Svd,
         }
     }
-}
-
-/// Which bundles to schedule.
-#[derive(Clone, Copy, ValueEnum)]
-enum When {
-    /// As the source says: `.schedule on`.
-    Source,
-    /// All, whatever the source says.
-    On,
-    /// None, whatever the source says.
-    Off,
 }
 
 impl From<When> for Schedule {
@@ -208,6 +198,7 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         )?;
         write_blocks(&assembled, out)?;
         write_timing(&assembled, out)?;
+        write_contractions(&assembled, out)?;
         write_adjustments(&assembled, out)?;
     }
     Ok(())
@@ -268,6 +259,25 @@ fn write_timing(assembled: &Assembled, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
+/// How many products were fused into sums, by instruction.
+fn write_contractions(assembled: &Assembled, out: &mut Out) -> Result<()> {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for contraction in &assembled.contractions {
+        *counts.entry(contraction.mnemonic).or_default() += 1;
+    }
+    if !counts.is_empty() {
+        let counts: Vec<String> =
+            counts.iter().map(|(mnemonic, count)| format!("{count} {mnemonic}")).collect();
+        writeln!(
+            out,
+            "contracted: {} products fused into sums ({})",
+            assembled.contractions.len(),
+            counts.join(", ")
+        )?;
+    }
+    Ok(())
+}
+
 /// What became of operations whose slot does not write the bank that their register lies in.
 fn write_adjustments(assembled: &Assembled, out: &mut Out) -> Result<()> {
     let adjustments = &assembled.adjustments;
@@ -322,7 +332,8 @@ fn bounds_text(block: &BlockReport, program: &Program) -> String {
 /// What each resource bounds a block by: slots, units, then several together.
 fn resources(block: &BlockReport) -> Vec<(Resources, u32)> {
     let bound = &block.bound;
-    let slots = (0u8..).zip(&bound.slots).map(|(slot, cycles)| (Resources::Slots(Slots::of(slot)), *cycles));
+    let slots = SlotIndex::all().zip(&bound.slots);
+    let slots = slots.map(|(slot, cycles)| (Resources::Slots(Slots::of(slot)), *cycles));
     let units = (0..).zip(&bound.units).map(|(unit, cycles)| (Resources::Units(vec![unit]), *cycles));
     let shared = bound.shared.iter().map(|shared| (shared.resources.clone(), shared.cycles));
     slots.chain(units).chain(shared).collect()
@@ -392,6 +403,13 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
             "details": details,
         })
     };
+    let contraction = |one: &Contraction| {
+        json!({
+            "mnemonic": one.mnemonic,
+            "product": one.product.map(|at| program.place_text(at)),
+            "sum": one.sum.map(|at| program.place_text(at)),
+        })
+    };
     Ok(json!({
         "machine": program.machine.name,
         "image": image.map(|path| path.display().to_string()),
@@ -400,6 +418,7 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
         "constants": program.constants.len(),
         "data_words": program.data.len(),
         "blocks": assembled.blocks.iter().map(block).collect::<Vec<_>>(),
+        "contractions": assembled.contractions.iter().map(contraction).collect::<Vec<_>>(),
         "timing": assembled.timing.iter().map(timing).collect::<Vec<_>>(),
         "adjustments": assembled.adjustments.iter().map(adjustment).collect::<Vec<_>>(),
         "messages": messages(&assembled.warnings)?,

@@ -1,13 +1,12 @@
 //! A program on the emulator as the controller of the hybrid robot.
 
 use crate::deny::{Denials, Watch};
-use crate::fault::explain;
 use crate::run::PERIOD_LIMIT;
 use crate::select::suggest;
 use anyhow::{Result, anyhow, bail};
 use takt_emu::{Emulator, Event, PeriodError, PeriodReport, Statistics};
 use takt_isa::program::Port;
-use takt_isa::{Program, Type};
+use takt_isa::{Program, Register, Type};
 use takt_programs::hybrid::Outputs;
 use takt_programs::hybrid::closed_loop::{Inputs, TrackingController};
 use takt_programs::hybrid::ports::{INPUTS, OUTPUTS, Port as RobotPort, PortType};
@@ -18,8 +17,8 @@ const AXES: usize = 5;
 /// Registers of a program for the ports of the tracking algorithm.
 #[derive(Clone)]
 struct Binding {
-    inputs: [u16; INPUTS.len()],
-    outputs: [u16; OUTPUTS.len()],
+    inputs: [Register; INPUTS.len()],
+    outputs: [Register; OUTPUTS.len()],
 }
 
 impl Binding {
@@ -27,7 +26,8 @@ impl Binding {
         if let Some(port) = program.inputs.iter().find(|port| !is_among(&INPUTS, &port.name)) {
             bail!("this is no tracking program: nothing gives its input port `{}` a value", port.name);
         }
-        let mut binding = Binding { inputs: [0; INPUTS.len()], outputs: [0; OUTPUTS.len()] };
+        let mut binding =
+            Binding { inputs: [Register::ZERO; INPUTS.len()], outputs: [Register::ZERO; OUTPUTS.len()] };
         for (port, register) in INPUTS.iter().zip(&mut binding.inputs) {
             *register = find("input", port, &program.inputs, &INPUTS)?;
         }
@@ -43,7 +43,7 @@ fn is_among(ports: &[RobotPort], name: &str) -> bool {
 }
 
 /// The register of one of the algorithm's ports in a program.
-fn find(kind: &str, wanted: &RobotPort, have: &[Port], all: &[RobotPort]) -> Result<u16> {
+fn find(kind: &str, wanted: &RobotPort, have: &[Port], all: &[RobotPort]) -> Result<Register> {
     let name = wanted.name;
     let port = have.iter().find(|port| port.name == name).ok_or_else(|| {
         let others = have.iter().map(|port| port.name.as_str()).filter(|name| !is_among(all, name));
@@ -109,7 +109,7 @@ impl OnEmulator {
     }
 
     /// The registers of the algorithm's inputs, in their order.
-    pub(crate) fn inputs(&self) -> [u16; INPUTS.len()] {
+    pub(crate) fn inputs(&self) -> [Register; INPUTS.len()] {
         self.binding.inputs
     }
 
@@ -147,17 +147,21 @@ impl OnEmulator {
 
 /// Why the program cannot control the robot any further.
 #[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub(crate) struct ControllerError(String);
+pub(crate) enum ControllerError {
+    /// It has stopped, or a port cannot be set.
+    #[error("{0}")]
+    Period(#[from] PeriodError),
+    /// An output port, by its name, was not written.
+    #[error("the program has not written output port `{0}`")]
+    Unwritten(&'static str),
+}
 
 impl TrackingController for OnEmulator {
     type Error = ControllerError;
 
     fn step(&mut self, inputs: &Inputs) -> Result<Outputs<f64>, ControllerError> {
         for (register, bits) in self.binding.inputs.iter().zip(inputs.to_words()) {
-            self.emulator
-                .set_input_bits(*register, bits)
-                .map_err(|error| ControllerError(error.to_string()))?;
+            self.emulator.set_input_bits(*register, bits).map_err(PeriodError::from)?;
         }
         self.emulator.set_cycle_limit(self.emulator.now() + PERIOD_LIMIT);
         let is_last = self.until_detail == 0;
@@ -166,15 +170,12 @@ impl TrackingController for OnEmulator {
         } else {
             self.watch.run_period(&mut self.emulator, None, None)
         };
-        let report = report.map_err(|error| ControllerError(explain(&error)))?;
         self.until_detail = self.until_detail.wrapping_sub(1);
-        self.report = Some(report);
+        self.report = Some(report?);
         let mut values = [0.0; OUTPUTS.len()];
         for ((value, register), port) in values.iter_mut().zip(&self.binding.outputs).zip(&OUTPUTS) {
             let bits = self.emulator.output_bits(*register);
-            let unwritten =
-                || ControllerError(format!("the program has not written output port `{}`", port.name));
-            let bits = bits.ok_or_else(unwritten)?;
+            let bits = bits.ok_or(ControllerError::Unwritten(port.name))?;
             *value = f64::from(f32::from_bits(bits));
         }
         Ok(Outputs::from_array(values))

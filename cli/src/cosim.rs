@@ -1,5 +1,6 @@
 //! `takt cosim`: a program on the circuit and on the emulator, in lockstep.
 
+use crate::fault;
 use crate::files::{self, Out};
 use crate::load::Load;
 use crate::number;
@@ -12,6 +13,7 @@ use serde_json::{Value, json};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_cosim::{Difference, Lockstep, LockstepError, Model, Simulation, cache_folder, random};
+use takt_emu::Fault;
 use takt_isa::{MACHINES, Machine, Program};
 use takt_rtl::{Design, Library, export};
 
@@ -85,14 +87,15 @@ fn model(machine: &'static Machine, latched: u16) -> Result<(Design, Model)> {
 
 /// A program from a file.
 fn one(arguments: &Cosim, file: &Path, color: bool, out: &mut Out) -> Result<()> {
-    let program = Load::new(arguments.machine.machine, color).with(&arguments.source).program(file)?;
+    let loaded = Load::new(arguments.machine.machine, color).with(&arguments.source).with_source(file)?;
+    let program = &loaded.program;
     let rows = ports::rows(arguments.inputs.as_deref(), arguments.periods, PERIODS, &program.inputs)?;
     let (design, model) = model(program.machine, program.latched_inputs())?;
-    let ran = run_rows(&program, &rows, model.start(&[])?);
+    let ran = run_rows(program, &rows, model.start(&[])?);
     let result = match ran {
         Ok(result) => result,
         Err(error) => {
-            let again = |simulation| run_rows(&program, &rows, simulation).map(|_| ());
+            let again = |simulation| run_rows(program, &rows, simulation).map(|_| ());
             return report(arguments, &design, error, None, out, again);
         }
     };
@@ -103,7 +106,11 @@ fn one(arguments: &Cosim, file: &Path, color: bool, out: &mut Out) -> Result<()>
                 "periods": result.periods,
                 "cycles": result.cycles,
                 "events": result.events,
-                "stopped": result.stopped,
+                "stopped": match &result.stopped {
+                    Stopped::No => None,
+                    Stopped::Halt => Some("halt".to_owned()),
+                    Stopped::Fault(fault) => Some(fault.show(program).to_string()),
+                },
                 "difference": Value::Null,
             }),
             out,
@@ -114,10 +121,15 @@ fn one(arguments: &Cosim, file: &Path, color: bool, out: &mut Out) -> Result<()>
         "{} periods on {}, {} cycles: {} events, no difference",
         result.periods, program.machine.name, result.cycles, result.events
     )?;
-    if let Some(stopped) = result.stopped {
-        let who =
-            if result.alone { "the emulator, of what the circuit does not look at," } else { "both sides" };
-        writeln!(out, "  {who} stopped: {stopped}")?;
+    match &result.stopped {
+        Stopped::No => {}
+        Stopped::Halt => writeln!(out, "  both sides stopped: halt")?,
+        Stopped::Fault(fault) => {
+            let both = takt_cosim::circuit_stops(fault);
+            let who = if both { "both sides" } else { "the emulator, of what the circuit does not look at," };
+            writeln!(out, "  {who} stopped:")?;
+            out.write_all(fault::rendered(fault, &loaded, "", false).as_bytes())?;
+        }
     }
     Ok(())
 }
@@ -126,16 +138,17 @@ struct Ran {
     periods: u64,
     cycles: u64,
     events: u64,
-    stopped: Option<String>,
-    /// The circuit did not stop.
-    alone: bool,
+    stopped: Stopped,
 }
 
-fn run_rows(
-    program: &Program,
-    rows: &[Vec<(u16, u32)>],
-    simulation: Simulation,
-) -> Result<Ran, LockstepError> {
+/// Why a run ended before its rows did.
+enum Stopped {
+    No,
+    Halt,
+    Fault(Fault),
+}
+
+fn run_rows(program: &Program, rows: &[ports::Row], simulation: Simulation) -> Result<Ran, LockstepError> {
     let first = rows.first().map(Vec::as_slice).unwrap_or_default();
     let mut lockstep = Lockstep::new(program, simulation, first)?;
     let mut periods = 0;
@@ -149,9 +162,12 @@ fn run_rows(
     }
     lockstep.finish()?;
     let halted = matches!(lockstep.emulator().status(), takt_emu::Status::Halted { .. });
-    let stopped = lockstep.fault().map(ToString::to_string).or(halted.then(|| "halt".to_owned()));
-    let alone = lockstep.fault().is_some_and(|fault| !takt_cosim::circuit_stops(fault));
-    let ran = Ran { periods, cycles: lockstep.emulator().now(), events: lockstep.compared(), stopped, alone };
+    let stopped = match lockstep.fault() {
+        Some(fault) => Stopped::Fault(fault.clone()),
+        None if halted => Stopped::Halt,
+        None => Stopped::No,
+    };
+    let ran = Ran { periods, cycles: lockstep.emulator().now(), events: lockstep.compared(), stopped };
     lockstep.into_simulation().finish();
     Ok(ran)
 }

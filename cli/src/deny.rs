@@ -9,8 +9,8 @@ use serde_json::{Value, json};
 use takt_debug::trace::Also;
 use takt_emu::{Emulator, Event, PeriodError, PeriodReport, Retire, Stop};
 use takt_isa::fp::{Flags, is_nan};
-use takt_isa::timing::{Address, Cycle};
-use takt_isa::{Program, Type};
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Program, Register, SlotIndex, Type};
 
 /// Something that can be denied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,9 +79,9 @@ struct First {
     period: Option<u64>,
     cycle: Cycle,
     /// The bundle that did it; for a missed deadline the one that had issued last.
-    address: Address,
+    address: BundleAddress,
     /// The operation that did it, where it was one: its slot, and the register that it wrote.
-    operation: Option<(u8, Option<u16>)>,
+    operation: Option<(SlotIndex, Option<Register>)>,
 }
 
 /// How often something denied happened.
@@ -96,10 +96,10 @@ struct Finding {
 #[derive(Clone)]
 pub(crate) struct Watch {
     findings: Vec<Finding>,
-    /// The period underway.
+    /// The current period.
     period: Option<u64>,
     /// The bundle that issued last.
-    at: Address,
+    at: BundleAddress,
 }
 
 impl DenyArguments {
@@ -121,7 +121,7 @@ impl Finding {
         let bundle = format!("bundle {}{place}", first.address);
         let Some((slot, register)) = first.operation else { return format!("after {bundle}") };
         let instructions = program.bundle(first.address).and_then(Result::ok).unwrap_or_default();
-        let mnemonic = instructions.get(usize::from(slot)).map_or("?", |found| found.op.row().mnemonic);
+        let mnemonic = instructions.get(slot.index()).map_or("?", |found| found.op.row().mnemonic);
         match (self.what, register) {
             (What::Nan, Some(register)) => {
                 format!("to {} by {mnemonic} in {bundle}", program.register_text(register))
@@ -138,18 +138,16 @@ impl Finding {
     }
 }
 
-/// `file:line` of the operation, or else of its bundle.
+/// `file:line`, and the columns of a part of an equation, of the operation, or else of its bundle.
 fn location(program: &Program, first: &First) -> Option<String> {
-    let slots = program.machine.slots.len();
-    let word = first.operation.map(|(slot, _)| first.address as usize * slots + usize::from(slot));
-    let own = word.and_then(|word| *program.lines.get(word)?);
-    own.or_else(|| program.location(first.address)).map(|location| program.place_text(location))
+    let own = first.operation.and_then(|(slot, _)| program.operation_place(first.address, slot));
+    own.or_else(|| program.bundle_place(first.address))
 }
 
 impl Watch {
     /// One that denies nothing.
     pub(crate) fn idle() -> Watch {
-        Watch { findings: Vec::new(), period: None, at: 0 }
+        Watch { findings: Vec::new(), period: None, at: BundleAddress::RESET }
     }
 
     /// As [`Emulator::run_period`] with the inputs as they are, while `also` hears everything too. Every run that
@@ -213,8 +211,8 @@ impl Watch {
     fn note(
         &mut self,
         cycle: Cycle,
-        address: Address,
-        operation: Option<(u8, Option<u16>)>,
+        address: BundleAddress,
+        operation: Option<(SlotIndex, Option<Register>)>,
         happened: impl Fn(What) -> bool,
     ) {
         for finding in self.findings.iter_mut().filter(|finding| happened(finding.what)) {
@@ -223,13 +221,13 @@ impl Watch {
         }
     }
 
-    /// What was denied and happened, with what issued together with the last `wait` and is still underway.
+    /// What was denied and happened, with what issued together with the last `wait` and is still in flight.
     pub(crate) fn end(&self, emulator: &Emulator) -> Denials {
         let program = emulator.program();
         let mut watch = self.clone();
         let is_float =
             |register| program.outputs.iter().any(|port| port.register == register && port.ty == Type::F);
-        for retire in emulator.underway() {
+        for retire in emulator.in_flight() {
             watch.raised(retire);
             if is_nan(retire.value) && retire.register.is_some_and(is_float) {
                 let operation = Some((retire.slot, retire.register));

@@ -62,6 +62,7 @@ impl Load {
         Options {
             machine: self.machine.unwrap_or(MACHINES[0]),
             schedule: self.schedule,
+            contract: self.source.contract.into(),
             effort: self.effort,
             levels: self.source.warnings.iter().copied().collect(),
         }

@@ -15,8 +15,10 @@ mod disasm;
 mod eval;
 mod fault;
 mod files;
+mod fmt;
 mod isa;
 mod load;
+mod lsp;
 mod machines;
 mod man;
 mod nan;
@@ -73,6 +75,8 @@ enum Command {
     Analyse(analyse::Analyse),
     Bound(bound::Bound),
     Eval(eval::Eval),
+    Fmt(fmt::Fmt),
+    Lsp(lsp::Lsp),
     Rtl(rtl::Rtl),
     Cosim(cosim::Cosim),
     Isa(isa::Isa),
@@ -92,6 +96,8 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Analyse(analyse) => analyse::run(analyse, color, out),
         Command::Bound(bound) => bound::run(bound, color, out),
         Command::Eval(eval) => eval::run(eval, out),
+        Command::Fmt(fmt) => fmt::run(fmt, out),
+        Command::Lsp(lsp) => lsp::run(lsp),
         Command::Rtl(rtl) => rtl::run(rtl, color, out),
         Command::Cosim(cosim) => cosim::run(cosim, color, out),
         Command::Isa(isa) => isa::run(isa, out),

@@ -5,8 +5,8 @@ use crate::select::suggest;
 use anyhow::{Context, Result, anyhow, bail};
 use std::io::{self, Read, Write};
 use std::path::Path;
-use takt_isa::Type;
 use takt_isa::program::Port;
+use takt_isa::{Register, Type};
 
 /// A value as CSV and as JSON have it.
 pub(crate) use takt_debug::value::{json, text as format};
@@ -60,7 +60,7 @@ fn shown(text: &str) -> String {
 }
 
 /// Values of the input ports, register and bits.
-pub(crate) type Row = Vec<(u16, u32)>;
+pub(crate) type Row = Vec<(Register, u32)>;
 /// Those of each period.
 pub(crate) type Rows = Vec<Row>;
 
@@ -138,7 +138,7 @@ impl Table {
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(source);
         let header = reader.headers().map_err(|error| explain(&name, error))?.clone();
         if header.is_empty() {
-            bail!("{name} is empty: it wants a header with a column for each input port");
+            bail!("{name} is empty: it needs a header with a column for each input port");
         }
         let columns = |port: &Port| -> Vec<usize> {
             header.iter().enumerate().filter(|(_, title)| *title == port.name).map(|(i, _)| i).collect()

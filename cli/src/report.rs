@@ -1,6 +1,6 @@
 //! `takt track`'s tables: ours beside the founding paper's.
 
-use crate::account::Account;
+use crate::account::{Account, fused_operations, rounding};
 use crate::select::PAPER_CLOCK;
 use crate::track::Tracking;
 use serde_json::{Value, json};
@@ -84,7 +84,7 @@ pub(crate) fn text(tracking: &Tracking) -> String {
     );
     time_table(tracking, &mut out);
     operation_table(&tracking.account, &mut out);
-    error_table(&totals.accuracy.errors, &mut out);
+    error_table(&totals.accuracy.errors, fused_operations(program), &mut out);
 
     let _ = writeln!(out, "\nLargest tracking error of the tool{:>11}", "µm");
     for (name, error) in [("while cutting", totals.error.cutting), ("over everything", totals.error.overall)]
@@ -165,7 +165,7 @@ fn operation_table(account: &Account, out: &mut String) {
 }
 
 /// Table 3.
-fn error_table(errors: &[MaxError], out: &mut String) {
+fn error_table(errors: &[MaxError], fused: usize, out: &mut String) {
     let _ = writeln!(
         out,
         "\nLargest |binary32 - binary64|{:>12}{:>8}{:>12}{:>12}{:>12}",
@@ -184,6 +184,7 @@ fn error_table(errors: &[MaxError], out: &mut String) {
         let ours = largest(errors[rows].iter().map(|error| error.absolute));
         row(&format!("largest {kind}"), ours, None, paper);
     }
+    let _ = writeln!(out, "  Of the program, {}.", rounding(fused));
     out.push_str(
         "  ulp: of the largest value that the output takes. The paper's arm lengths are unknown: compare the largest of a\n  \
          kind. Angles are the reference as it comes in, rounded to binary32; the paper's are unknown (ours reach π).\n",
@@ -215,6 +216,7 @@ pub(crate) fn json(tracking: &Tracking) -> Value {
         "denied": tracking.denials.json,
         "operations": tracking.account.operations,
         "bundles": tracking.account.bundles,
+        "fused_operations": fused_operations(&tracking.program),
         "max_error": by_name(|error| error.absolute),
         "max_error_ulp": by_name(MaxError::ulps_of_largest),
         "tracking_error_m": {"cutting": totals.error.cutting, "overall": totals.error.overall},

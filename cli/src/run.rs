@@ -2,7 +2,7 @@
 
 use crate::account::Account;
 use crate::deny::{Denials, DenyArguments, Watch};
-use crate::fault::explain;
+use crate::fault;
 use crate::files::{self, Out};
 use crate::load::Load;
 use crate::nan::NanWrites;
@@ -11,7 +11,7 @@ use crate::output::{self, Failure};
 use crate::ports::{self, Inputs};
 use crate::select::{OptionalMachine, SourceArguments};
 use crate::trace::{Trace, TraceArguments};
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::{Value, json};
 use std::io::Write;
@@ -35,7 +35,7 @@ pub(crate) struct Run {
     machine: OptionalMachine,
     #[command(flatten)]
     source: SourceArguments,
-    /// CSV with one named column for each input port and one row for each period; `-` is standard input.
+    /// CSV with one named column for each input port and one row for each period; other columns are ignored; `-` is standard input.
     #[arg(long, value_name = "CSV")]
     inputs: Option<PathBuf>,
     /// Where the output ports go, as CSV, one row for each period, with a column `cycles`; `-` is standard output, where
@@ -101,9 +101,10 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
         .into());
     }
 
-    let program =
-        Load::new(arguments.machine.machine, color).with(&arguments.source).program(&arguments.file)?;
-    let mut emulator = Emulator::new(&program)?;
+    let loaded =
+        Load::new(arguments.machine.machine, color).with(&arguments.source).with_source(&arguments.file)?;
+    let program = &loaded.program;
+    let mut emulator = Emulator::new(program)?;
     emulator.set_tick_period(arguments.tick);
     let mut trace_file = arguments.trace.create()?;
     let mut trace = trace_file.as_mut().map(|file| arguments.trace.begin(&emulator, file)).transpose()?;
@@ -113,18 +114,19 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
     } else {
         run_to_halt(arguments, &mut emulator, trace.as_mut(), &mut observers).map(|()| None)
     };
+    let result = result.map_err(|error| fault::told(error, &loaded, color));
     let Observers { nans, watch } = observers;
     // What led to a fault is what a trace is for: it is kept.
     trace.map_or(Ok(()), |trace| trace.finish(&emulator, color))?;
     trace_file.map_or(Ok(()), Out::finish)?;
     let denials = watch.end(&emulator);
     let periods = match result {
-        // Who has stopped reading wants no summary; what happened until then counts.
+        // A reader that has gone needs no summary; what happened until then counts.
         Err(error) if output::is_closed_pipe(&error) => return denials.verdict(),
         result => result?,
     };
     let statistics = emulator.statistics();
-    nans.warn(&program, statistics.nan_writes, color);
+    nans.warn(program, statistics.nan_writes, color);
 
     let account = Account::of(&statistics);
     let ran = Ran { arguments, emulator: &emulator, periods, account, denials };
@@ -156,7 +158,7 @@ fn run_to_halt(
     emulator.set_cycle_limit(arguments.max_cycles.unwrap_or(PERIOD_LIMIT));
     let stop = observers.watch.run(emulator, trace);
     observers.nans.add(&emulator.take_nan_writes());
-    match stop.map_err(|error| anyhow!(explain(&error)))? {
+    match stop? {
         Stop::Idle => bail!("the program waits for the tick: give it periods with --inputs or --periods"),
         _ => Ok(()),
     }
@@ -200,7 +202,7 @@ fn run_periods(
     {
         emulator.set_cycle_limit(arguments.max_cycles.unwrap_or(emulator.now() + PERIOD_LIMIT));
         let report = observers.watch.run_period(emulator, trace.as_deref_mut(), None);
-        let report = report.map_err(|error| anyhow!("period {}: {}", periods.count, explain(&error)))?;
+        let report = report.with_context(|| format!("period {}", periods.count))?;
         if trace.as_ref().is_some_and(|trace| trace.has_failed()) {
             break;
         }

@@ -1,9 +1,10 @@
 //! Options that several commands share, and did-you-mean.
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
-use takt_asm::diag::nearest;
+use takt_asm::Contract;
 use takt_asm::levels::Wish;
+use takt_asm::nearest;
 use takt_isa::{MACHINES, Machine, Op, ROWS, Row};
 
 /// `--machine`.
@@ -22,9 +23,42 @@ pub(crate) struct OptionalMachine {
     pub(crate) machine: Option<&'static Machine>,
 }
 
+/// Of what the assembler does as the source says, whether it is to do it everywhere or nowhere.
+#[derive(Clone, Copy, Default, ValueEnum)]
+pub(crate) enum When {
+    /// As the source says.
+    #[default]
+    Source,
+    /// Everywhere, whatever the source says.
+    On,
+    /// Nowhere, whatever the source says.
+    Off,
+}
+
+/// `--contract`.
+#[derive(Args, Clone, Copy, Default)]
+pub(crate) struct ContractArgument {
+    /// Whether a product is fused into the sum that alone uses it, with one rounding, on machines that can: under `.contract on`,
+    /// everywhere, or nowhere. It changes results in their last places.
+    #[arg(long, value_enum, value_name = "WHEN", default_value_t = When::Source)]
+    pub(crate) contract: When,
+}
+
+impl From<ContractArgument> for Contract {
+    fn from(argument: ContractArgument) -> Contract {
+        match argument.contract {
+            When::Source => Contract::AsWritten,
+            When::On => Contract::All,
+            When::Off => Contract::None,
+        }
+    }
+}
+
 /// What every command takes that assembles a source.
 #[derive(Args, Clone, Default)]
 pub(crate) struct SourceArguments {
+    #[command(flatten)]
+    pub(crate) contract: ContractArgument,
     /// Look in this folder too for what a source includes; may be given several times.
     #[arg(short = 'I', long = "include", value_name = "DIR", value_parser = folder)]
     pub(crate) folders: Vec<PathBuf>,

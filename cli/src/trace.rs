@@ -29,14 +29,14 @@ pub(crate) struct TraceArguments {
 }
 
 fn cycles(text: &str) -> Result<Range<u64>, String> {
-    let wanted = "wants two numbers of cycles as in 1000..2000";
+    let wanted = "takes two numbers of cycles as in 1000..2000";
     let (start, end) = text.split_once("..").ok_or(wanted)?;
     let number = |text: &str, missing| if text.is_empty() { Some(missing) } else { text.parse().ok() };
     let range = number(start, 0).ok_or(wanted)?..number(end, u64::MAX).ok_or(wanted)?;
     if range.is_empty() { Err("has no cycle between its ends".to_owned()) } else { Ok(range) }
 }
 
-/// A trace underway.
+/// A trace that is being written.
 pub(crate) struct Trace<'o> {
     tracer: Tracer<'o>,
     name: String,

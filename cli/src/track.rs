@@ -3,6 +3,7 @@
 use crate::account::Account;
 use crate::controller::{Latency, OnEmulator, port_type};
 use crate::deny::{Denials, DenyArguments, Watch};
+use crate::fault;
 use crate::files::{self, Given, Out};
 use crate::load::{Load, Loaded};
 use crate::nan::NanWrites;
@@ -144,9 +145,9 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
     let (path, trajectory) = trajectory(arguments.gcode.as_deref())?;
     let (name, loaded) =
         program(&arguments.program, Load::new(arguments.machine.machine, color).with(&arguments.source))?;
-    let program = loaded.program;
+    let program = &loaded.program;
     let periods = arguments.periods.unwrap_or(u64::MAX).min(trajectory.periods());
-    let mut emulator = Emulator::new(&program)?;
+    let mut emulator = Emulator::new(program)?;
     emulator.set_tick_period(period_cycles(arguments.clock));
     let controller = OnEmulator::new(emulator, arguments.deny.watch(), periods - 1);
     let mut closed_loop = ClosedLoop::new(&trajectory, controller.with_context(|| name.clone())?);
@@ -160,7 +161,8 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
     let mut nans = NanWrites::default();
     let mut closed = false;
     while !closed && totals.periods < periods {
-        let record = closed_loop.next().context("the path ended early")?.with_context(|| path.clone())?;
+        let record = closed_loop.next().context("the path ended early")?.with_context(|| path.clone());
+        let record = record.map_err(|error| fault::told(error, &loaded, color))?;
         let report = closed_loop.controller().report.as_ref().context("a period has no report")?;
         totals.add(&record, report);
         nans.add(&report.nan_writes);
@@ -178,7 +180,7 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
     closed |= output::unless_closed(table.map_or(Ok(()), |Table(file)| file.finish()))?;
     let denials = closed_loop.controller().denials();
     if closed {
-        // Who has stopped reading wants no tables; what happened until then counts.
+        // A reader that has gone needs no tables; what happened until then counts.
         return denials.verdict();
     }
     if let Some((mut file, plot)) = drawing {
@@ -188,9 +190,10 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
 
     let detail = closed_loop.controller().detail.as_ref().context("the last period was not looked at")?;
     let nan_writes = detail.after.nan_writes;
-    nans.warn(&program, nan_writes, color);
+    nans.warn(program, nan_writes, color);
     let account = Account::between(&detail.before, &detail.after);
     let (clock, latency) = (arguments.clock, detail.latency);
+    let program = loaded.program;
     let tracking = Tracking { name, program, path, clock, totals, nan_writes, account, latency, denials };
     if arguments.json {
         output::json(&report::json(&tracking), out)?;
@@ -229,6 +232,7 @@ pub(crate) struct Recording {
 impl ClosedLoopArguments {
     /// Drives the loop, of at most so many periods, with a program by name or from a file; without one, the loop's own.
     pub(crate) fn record(&self, file: Option<&Path>, load: Load, most: usize) -> Result<Recording> {
+        let color = load.color;
         let (name, loaded) = program(file.unwrap_or(Path::new("tracking")), load)?;
         let (path, trajectory) = trajectory(self.gcode.as_deref())?;
         let periods = self.periods.unwrap_or(u64::MAX).min(trajectory.periods());
@@ -245,7 +249,8 @@ impl ClosedLoopArguments {
         let (mut inputs, mut worst) = (Vec::new(), (0, -1.0, false));
         let progress = progress(periods, "periods", false);
         for _ in 0..periods {
-            let record = closed_loop.next().context("the path ended early")?.with_context(|| path.clone())?;
+            let record = closed_loop.next().context("the path ended early")?.with_context(|| path.clone());
+            let record = record.map_err(|error| fault::told(error, &loaded, color))?;
             inputs.push(registers.iter().copied().zip(record.inputs.to_words()).collect::<Vec<_>>());
             if record.tool_error > worst.1 {
                 worst = (record.period, record.tool_error, record.sample.cutting);

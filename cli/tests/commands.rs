@@ -263,7 +263,7 @@ fn where_the_cycles_of_a_period_go() {
     let text = folder.line(&format!("analyse {}", source("tracking.s"))).ok();
     folder.line(&format!("asm {} -m t1 -o small", source("tracking.s"))).ok();
     insta::assert_snapshot!("analyse", format!("{text}\n{}", folder.line("analyse small").ok()));
-    // The same cycles as the run counts, on recorded inputs; an image has no source to assemble anew.
+    // The same cycles as the run counts, on recorded inputs; an image has no source to assemble again.
     folder.line("track --periods 4 --csv rec.csv -q").ok();
     folder.line(&format!("asm {} -o image", source("tracking.s"))).ok();
     let run: serde_json::Value =
@@ -272,7 +272,7 @@ fn where_the_cycles_of_a_period_go() {
         let json = folder.line(&format!("analyse image --inputs rec.csv --json {periods}")).ok();
         let json: serde_json::Value = serde_json::from_str(&json).unwrap();
         assert_eq!(json["cycles"], run["cycles"][cycles], "{periods}");
-        assert_eq!(json["one_cycle_less"][0]["assembled_anew"], serde_json::Value::Null);
+        assert_eq!(json["one_cycle_less"][0]["reassembled"], serde_json::Value::Null);
     }
     // What would take more cycles is said to, and why: every cycle more is a stall of some kind.
     let json: serde_json::Value = serde_json::from_str(&folder.line("analyse small --json").ok()).unwrap();

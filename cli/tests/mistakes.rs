@@ -68,6 +68,8 @@ fn workshop() -> Folder {
     let image = folder.read("pd.takt");
     folder.write("cut.takt", &image[..image.len() / 2]);
     folder.write("stub.takt", &image[..10]);
+    folder.line("asm unwritten.s -o unwritten.takt").ok_with("unwritten.takt: ");
+    folder.line("asm unwritten.s --strip -o stripped.takt").ok_with("stripped.takt: ");
     folder
 }
 
@@ -148,6 +150,9 @@ fn programs_that_go_wrong() {
             "run spins.s --max-cycles 1000000",
             "run spins.s",
             "run unwritten.s",
+            "run unwritten.takt",
+            "run stripped.takt",
+            "run unwritten.s --periods 1",
             "run pd.s",
             "run halts.s --inputs ok.csv",
         ],
@@ -200,11 +205,6 @@ fn controllers_that_go_wrong() {
     let folder = Folder::new();
     folder.write("robot.s", std::fs::read(source("robot.s")).unwrap());
     for (text, message) in [
-        (
-            "p: jmp p",
-            "agh.ngc: period 0: controller failed: bad.s:5: bundle 1, cycle 1000000000: limit of 1000000000 cycles reached; \
-             does the program come to its `wait` or `halt`? (`takt run --max-cycles` sets the limit)",
-        ),
         ("p: wait p", "agh.ngc: period 0: controller failed: the program has not written output port `F1`"),
         (
             "p: fdiv F1, zero, zero\n fdiv F2, zero, zero\n halt",
@@ -222,6 +222,13 @@ fn controllers_that_go_wrong() {
         assert_eq!(done.stderr.lines().last(), Some(format!("error: {message}").as_str()));
         assert_eq!(folder.list(), ["bad.s", "robot.s"]);
     }
+    // A fault is shown at its line.
+    folder.write("bad.s", ".include \"robot.s\"\n.once\n wait p\n.period\np: ret\n");
+    let done = folder.line("track --program bad.s --csv out.csv");
+    done.mistake("ret");
+    let fault = &done.stderr[done.stderr.find("error").unwrap()..];
+    insta::assert_snapshot!("controller", fault);
+    assert_eq!(folder.list(), ["bad.s", "robot.s"]);
     // A force that is no number: every output is written, once.
     let outputs = "F1 F2 F3 tau4 tau5 l1d l2d l3d v1d v2d v3d a1d a2d a3d th4d th5d om4d om5d ep4d ep5d";
     let writes: String = outputs.split(' ').map(|port| format!(" fdiv {port}, zero, zero\n")).collect();

@@ -98,7 +98,7 @@ period: fdiv F, 1.0, a
 /// After which what hangs is taken to hang.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// `takt run` underway.
+/// A running `takt run`.
 struct Running {
     child: Child,
     stdin: Option<ChildStdin>,
@@ -178,7 +178,7 @@ fn a_row_that_is_wrong_ends_the_run() {
     assert_eq!(running.end(), (Some(1), String::new(), error.to_owned()));
     // A plant that says nothing at all.
     let running = Running::new(&folder, "");
-    let error = "error: standard input is empty: it wants a header with a column for each input port\n";
+    let error = "error: standard input is empty: it needs a header with a column for each input port\n";
     assert_eq!(running.end(), (Some(1), "F,k,cycles\n".to_owned(), error.to_owned()));
 }
 

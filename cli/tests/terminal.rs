@@ -187,9 +187,9 @@ fn full_screen_wants_a_terminal() {
     folder.write("sum.s", SUM);
     let done = folder.line("debug sum.s --tui");
     assert_eq!((done.status, done.stdout.as_str()), (Some(2), ""));
-    assert!(done.stderr.contains("--tui wants a terminal"), "{}", done.stderr);
+    assert!(done.stderr.contains("--tui needs a terminal"), "{}", done.stderr);
     let mut terminal = Terminal::new(&folder, "takt debug sum.s --tui | cat", 24, 80);
-    terminal.shows("--tui wants a terminal");
+    terminal.shows("--tui needs a terminal");
     terminal.ends();
 }
 

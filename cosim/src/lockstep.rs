@@ -4,9 +4,9 @@ use crate::model::{CircuitEvent, EventKind, ModelError, Pin, Simulation};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use takt_emu::{Emulator, Event, Fault, FaultKind, LoadError, PortWrite, Status, Stop};
-use takt_isa::Program;
 use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Program, Register, SlotIndex};
 use takt_rtl::export::{INPUT_DELAY, LATCHED_INPUT_DELAY, TICK_DELAY};
 use thiserror::Error;
 
@@ -23,9 +23,9 @@ pub enum LockstepError {
     #[error(transparent)]
     Model(#[from] ModelError),
     /// The circuit's ports are not the program's.
-    #[error("the program's ports are {}, and the circuit was built with {circuit} latched inputs, where it wants {program}", if *.program > 0 { "latched" } else { "not latched" })]
+    #[error("the program's ports are {}, and the circuit was built with {circuit} latched inputs, where it needs {program}", if *.program > 0 { "latched" } else { "not latched" })]
     Ports {
-        /// Latched inputs that the program wants.
+        /// Latched inputs that the program needs.
         program: u16,
         /// Those of the circuit.
         circuit: u16,
@@ -86,7 +86,7 @@ impl Lockstep {
     pub fn new(
         program: &Program,
         mut simulation: Simulation,
-        inputs: &[(u16, u32)],
+        inputs: &[(Register, u32)],
     ) -> Result<Lockstep, LockstepError> {
         let (wanted, circuit) = (program.latched_inputs(), simulation.latched());
         if wanted > circuit || (wanted == 0) != (circuit == 0) {
@@ -143,10 +143,10 @@ impl Lockstep {
     /// Sets an input port, by its register: bundles that issue from now on see the value; if ports are latched, those of the
     /// period whose tick comes from now on. Inputs that are set at the same
     /// time reach the circuit one a cycle; returns the cycle in which this one does.
-    pub fn set_input(&mut self, register: u16, bits: u32) -> Cycle {
-        let index = register.wrapping_sub(self.emulator.machine().inputs.base);
+    pub fn set_input(&mut self, register: Register, bits: u32) -> Cycle {
         let pin = self.emulator.now().saturating_sub(self.input_delay).max(self.free_pin);
-        if self.emulator.set_input_bits(register, bits).is_ok() {
+        let number = self.emulator.machine().input_number(register);
+        if let Some(index) = number.filter(|_| self.emulator.set_input_bits(register, bits).is_ok()) {
             self.free_pin = pin + 1;
             self.pins.push((pin, Pin::Input { index, value: bits }));
         }
@@ -160,7 +160,7 @@ impl Lockstep {
 
     /// Sets inputs, raises the tick as soon as the circuit has them and the front end is refilled, and lets the emulator run
     /// until the next `wait` issues; false if it stopped before. The first call also runs the part before the first `wait`.
-    pub fn run_period(&mut self, inputs: &[(u16, u32)]) -> bool {
+    pub fn run_period(&mut self, inputs: &[(Register, u32)]) -> bool {
         let limit = self.emulator.now() + 1_000_000;
         self.emulator.set_cycle_limit(limit);
         if matches!(self.emulator.status(), Status::Running)
@@ -234,11 +234,11 @@ impl Lockstep {
                 event.cycle <= cycle || !matches!(event.kind, EventKind::Missed | EventKind::Lost)
             }),
             (None, _) => self.check(|event| event.cycle < now),
-            // What issued before the fault is still written, and nothing else; the emulator leaves it underway.
+            // What issued before the fault is still written, and nothing else; the emulator leaves it in flight.
             (Some(fault), _) if fault_code(&fault.kind).is_some() => {
                 let cycle = fault.cycle;
                 let machine = self.emulator.machine();
-                for &retire in self.emulator.underway() {
+                for &retire in self.emulator.in_flight() {
                     self.expected.extend(expect(&Event::Retire(retire)));
                     if let Some(register) = retire.register.filter(|&register| machine.is_output(register)) {
                         let (cycle, slot, address, value) =
@@ -304,7 +304,7 @@ impl Lockstep {
             )
         {
             let slot = (event.kind == EventKind::Retire).then_some(event.slot);
-            instruction = describe(program, event.address, slot);
+            instruction = describe(program, BundleAddress::new(event.address), slot);
         }
         let side =
             |event: Option<&CircuitEvent>| event.map_or("nothing".to_owned(), |event| show(program, event));
@@ -316,15 +316,12 @@ impl Lockstep {
 }
 
 /// `bundle 12 (tracking.s:40): fadd a1, a2, a3`, with one slot's instruction or all.
-fn describe(program: &Program, address: u32, slot: Option<u8>) -> String {
-    let mut text = format!("bundle {address}");
-    if let Some(location) = (address < program.bundles()).then(|| program.location(address)).flatten() {
-        let _ = write!(text, " ({})", program.place_text(location));
-    }
+fn describe(program: &Program, address: BundleAddress, slot: Option<u8>) -> String {
+    let mut text = program.bundle_text(address);
     let machine = program.machine;
-    let words = program.words(address).unwrap_or_default().iter().enumerate();
+    let words = SlotIndex::all().zip(program.words(address).unwrap_or_default());
     let shown: Vec<String> = words
-        .filter(|(s, _)| slot.is_none_or(|slot| usize::from(slot) == *s))
+        .filter(|(s, _)| slot.is_none_or(|slot| slot == s.get()))
         .map(|(s, &word)| match takt_isa::Instruction::decode(word) {
             Ok(instruction) => instruction.text(machine, s),
             Err(_) => format!("0x{word:012x}"),
@@ -337,7 +334,10 @@ fn describe(program: &Program, address: u32, slot: Option<u8>) -> String {
 }
 
 fn show(program: &Program, event: &CircuitEvent) -> String {
-    let name = || program.register_text(event.register);
+    let name = || {
+        let register = Register::new(event.register.into());
+        register.map_or_else(|| format!("?{}", event.register), |register| program.register_text(register))
+    };
     let slot = || program.machine.slots.get(usize::from(event.slot)).map_or("?", |slot| slot.name);
     let flags = takt_isa::fp::Flags::from_bits(event.flags);
     match event.kind {
@@ -394,12 +394,14 @@ fn bare(kind: EventKind, cycle: Cycle) -> CircuitEvent {
 /// What the circuit is expected to show of an event of the emulator.
 fn expect(event: &Event) -> Option<CircuitEvent> {
     Some(match *event {
-        Event::Issue { cycle, address } => CircuitEvent { address, ..bare(EventKind::Issue, cycle) },
+        Event::Issue { cycle, address } => {
+            CircuitEvent { address: address.get(), ..bare(EventKind::Issue, cycle) }
+        }
         Event::Retire(retire) => match (retire.register, retire.memory) {
             (Some(register), _) => CircuitEvent {
-                slot: retire.slot,
-                address: retire.address,
-                register,
+                slot: retire.slot.get(),
+                address: retire.address.get(),
+                register: register.get(),
                 value: retire.value,
                 flags: retire.flags.bits(),
                 ..bare(EventKind::Retire, retire.cycle)
@@ -410,8 +412,8 @@ fn expect(event: &Event) -> Option<CircuitEvent> {
             (None, None) => return None,
         },
         Event::PortWrite(write) => CircuitEvent {
-            slot: write.slot,
-            register: write.register,
+            slot: write.slot.get(),
+            register: write.register.get(),
             value: write.value,
             ..bare(EventKind::Port, write.cycle)
         },
@@ -419,8 +421,8 @@ fn expect(event: &Event) -> Option<CircuitEvent> {
         Event::TickLost { cycle } => bare(EventKind::Lost, cycle),
         Event::Halt { cycle, .. } => bare(EventKind::Halt, cycle),
         Event::Fault(ref fault) => CircuitEvent {
-            slot: fault.slot.unwrap_or(0),
-            address: fault.address,
+            slot: fault.slot.map_or(0, SlotIndex::get),
+            address: fault.address.get(),
             register: fault_code(&fault.kind)?,
             ..bare(EventKind::Fault, fault.cycle)
         },

@@ -8,8 +8,8 @@ use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::{Mutex, PoisonError};
-use takt_isa::Program;
 use takt_isa::timing::Cycle;
+use takt_isa::{Program, Register};
 use takt_rtl::Design;
 use takt_rtl::bench::{LoadRecord, Space, load_records};
 use takt_rtl::export::RESET_CYCLES;
@@ -110,7 +110,7 @@ impl Model {
     /// # Errors
     /// If Verilator or a C++ compiler is missing or fails.
     pub fn build(design: &Design, folder: &Path, trace: bool) -> Result<Model, ModelError> {
-        // Threads that want the same design build it once.
+        // Threads that need the same design build it once.
         static ONE: Mutex<()> = Mutex::new(());
         let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
         let version = run("verilator", "verilator", Command::new("verilator").arg("--version"))?;
@@ -285,13 +285,11 @@ impl Simulation {
     ///
     /// # Errors
     /// If the process has ended.
-    pub fn load(&mut self, program: &Program, inputs: &[(u16, u32)]) -> Result<(), ModelError> {
-        let base = program.machine.inputs.base;
-        let first = inputs.iter().map(|&(register, bits)| LoadRecord {
-            space: Space::Input,
-            slot: 0,
-            address: register.saturating_sub(base),
-            value: bits.into(),
+    pub fn load(&mut self, program: &Program, inputs: &[(Register, u32)]) -> Result<(), ModelError> {
+        let bank = &program.machine.inputs;
+        let first = inputs.iter().filter_map(|&(register, bits)| {
+            let address = bank.index(register)?.get();
+            Some(LoadRecord { space: Space::Input, slot: 0, address, value: bits.into() })
         });
         let records: Vec<LoadRecord> = load_records(program).into_iter().chain(first).collect();
         let mut words = vec![1, records.len() as u32];

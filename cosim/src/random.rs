@@ -3,10 +3,10 @@
 use crate::lockstep::{Lockstep, LockstepError};
 use crate::model::Simulation;
 use std::collections::BTreeSet;
-use takt_emu::testing::{INPUTS, Options, Random, random_program};
+use takt_emu::testing::{INPUTS, Options, Random, input_ports, random_program};
 use takt_isa::encode::WORD_MASK;
 use takt_isa::timing::{Cause, Cycle};
-use takt_isa::{Machine, Op, Program, ROWS};
+use takt_isa::{BundleAddress, Machine, Op, Program, ROWS, Register};
 
 /// Cycles that a random program runs, unless it stops before.
 pub const CYCLES: Cycle = 1500;
@@ -54,8 +54,8 @@ pub fn run(
 ) -> Result<Simulation, LockstepError> {
     let program = Program { latched: simulation.latched() > 0, ..program(seed, machine) };
     let mut random = Random::new(!seed);
-    let port = |random: &mut Random| machine.inputs.base + random.below(INPUTS.into()) as u16;
-    let first: Vec<(u16, u32)> = (0..INPUTS).map(|i| (machine.inputs.base + i, random.word())).collect();
+    let first: Vec<(Register, u32)> = input_ports(machine).map(|port| (port, random.word())).collect();
+    let port = |random: &mut Random| first[random.below(INPUTS as u32) as usize].0;
     let mut lockstep = Lockstep::new(&program, simulation, &first)?;
     let mut cycle = 0;
     while cycle < CYCLES {
@@ -91,22 +91,19 @@ pub fn run(
         }
     }
     if let Some(fault) = lockstep.fault() {
-        coverage.faults.insert(match fault.kind {
-            takt_emu::FaultKind::IllegalWord(_) => "illegal word",
-            takt_emu::FaultKind::ProgramCounter { .. } => "program counter",
-            takt_emu::FaultKind::DataAddress { .. } => "data address",
-            takt_emu::FaultKind::UnwrittenRegister { .. } => "unwritten register",
-            takt_emu::FaultKind::StackOverflow { .. } => "return stack full",
-            takt_emu::FaultKind::StackUnderflow => "return stack empty",
-            takt_emu::FaultKind::LoopBound { .. } => "loop bound",
-            takt_emu::FaultKind::CycleLimit { .. } => "cycle limit",
-        });
+        coverage.faults.insert(fault.kind.name());
     }
     Ok(lockstep.into_simulation())
 }
 
 /// Notes which instruction waited for which.
-fn hazard(program: &Program, address: u32, register: u16, producer: u32, coverage: &mut Coverage) {
+fn hazard(
+    program: &Program,
+    address: BundleAddress,
+    register: Register,
+    producer: BundleAddress,
+    coverage: &mut Coverage,
+) {
     let bundle = |address| program.bundle(address).and_then(Result::ok).unwrap_or_default();
     let slots = program.machine.slots;
     let producers: Vec<Op> = bundle(producer)

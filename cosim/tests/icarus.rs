@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use takt_emu::{Emulator, Event};
-use takt_isa::{Program, T3};
+use takt_isa::{Program, Register, T3};
 use takt_rtl::{Design, Library, bench, export};
 
 const PERIODS: usize = 4;
@@ -37,7 +37,7 @@ fn tracking(latched: bool) {
     let mut emulator = Emulator::new(&program).expect("it fits");
     let mut periods = Vec::new();
     let mut expected = Vec::new();
-    drive(&program, PERIODS, |inputs| -> Result<Vec<(u16, u32)>, takt_emu::PeriodError> {
+    drive(&program, PERIODS, |inputs| -> Result<Vec<(Register, u32)>, takt_emu::PeriodError> {
         let mut writes = Vec::new();
         let mut sink = |event: &Event| {
             if let Event::PortWrite(write) = event {

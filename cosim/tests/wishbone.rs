@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use takt_emu::Emulator;
-use takt_isa::{Machine, Program, T1, T3};
+use takt_isa::{Machine, Program, Register, T1, T3};
 use takt_rtl::bench::{Space, load_records};
 use takt_rtl::wishbone::{INPUTS, OUTPUTS, REGISTERS};
 use takt_rtl::{Library, bench, export};
@@ -119,7 +119,7 @@ impl Bus {
     }
 
     /// Writes inputs, by register, ticks, and waits for the end of the period.
-    fn period(&mut self, machine: &Machine, inputs: &[(u16, u32)]) {
+    fn period(&mut self, machine: &Machine, inputs: &[(Register, u32)]) {
         for &(register, bits) in inputs {
             self.put(1, INPUTS + machine.input_number(register).expect("an input"), bits);
         }
@@ -169,7 +169,7 @@ fn register(name: &str) -> u16 {
 }
 
 /// The address of an output port on the bus.
-fn output(machine: &Machine, register: u16) -> u16 {
+fn output(machine: &Machine, register: Register) -> u16 {
     OUTPUTS + machine.output_number(register).expect("an output")
 }
 
@@ -180,7 +180,7 @@ fn tracking(machine: &'static Machine) {
     bus.load(&program);
     bus.write("control", 1);
     bus.until_waiting();
-    // A reset asked for briefly, while the program runs, lasts its time. A constant loaded at once waits for what is underway.
+    // A reset asked for briefly, while the program runs, lasts its time. A constant loaded at once waits for what is in flight.
     let kept = load_records(&program).into_iter().find(|record| record.space == Space::Register);
     let kept = kept.expect("the program has constants");
     bus.write("load_place", u32::from(kept.address) | (Space::Register as u32) << 16);
@@ -198,8 +198,8 @@ fn tracking(machine: &'static Machine) {
     bus.put(1, INPUTS + 0x300, 0x7fc0_0000);
     bus.put(1, INPUTS + machine.inputs.depth - 1, 1);
     bus.read(OUTPUTS + machine.outputs_per_bank, 0);
-    let outputs: Vec<u16> = program.outputs.iter().map(|port| port.register).collect();
-    drive(&program, PERIODS, |inputs| -> Result<Vec<(u16, u32)>, takt_emu::PeriodError> {
+    let outputs: Vec<Register> = program.outputs.iter().map(|port| port.register).collect();
+    drive(&program, PERIODS, |inputs| -> Result<Vec<(Register, u32)>, takt_emu::PeriodError> {
         for &(register, bits) in inputs {
             emulator.set_input_bits(register, bits).expect("an input");
         }

@@ -5,8 +5,8 @@ use crate::info;
 use crate::panes::{self, Flying, Kind, Panes};
 use crate::session::{Live, Place, Session, Shown, Stop, Test, Unit, Where, Why, hex_float, ulp_distance};
 use std::fmt::Write as _;
-use takt_asm::diag::nearest;
 use takt_asm::expr::Value;
+use takt_asm::nearest;
 use takt_isa::Type;
 use takt_isa::program::Space;
 
@@ -60,7 +60,7 @@ commands! {
     "registers" "r" "[PATTERN]" Completion::Names, |c, a| Ok(c.registers(a)), "Named registers; `*` stands for any characters.";
     "ports" "" "" Completion::None, |c, _| Ok(c.ports()), "Input and output ports.";
     "memory" "m" "EXPR [COUNT]" Completion::Names, Console::memory, "Data words from an address on.";
-    "flight" "f" "" Completion::None, |c, _| Ok(c.flight()), "Operations underway, with the cycles until their results are there.";
+    "flight" "f" "" Completion::None, |c, _| Ok(c.flight()), "Operations in flight, with the cycles until their results are there.";
     "stalls" "" "" Completion::None, |c, _| Ok(c.stalls()), "Where the cycles since reset went.";
     "list" "l" "[LINE]" Completion::None, Console::list, "Source lines around this position, or a line.";
     "where" "" "" Completion::None, |c, _| Ok(c.place()), "This position; the calls that lead to it.";
@@ -251,7 +251,7 @@ impl Console {
             Why::Start => "the beginning of the run\n".to_owned(),
             Why::Halted => "the program has halted\n".to_owned(),
             Why::InputsEnd => "the recorded inputs end here\n".to_owned(),
-            Why::Fault(_) => "the program has stopped with a fault\n".to_owned(),
+            Why::Fault(fault) => self.session.diagnose(&fault).render(false),
             Why::Limit(cycles) => format!("nothing to stop at in {cycles} cycles\n"),
             Why::Interrupted => "interrupted\n".to_owned(),
         };
@@ -309,7 +309,7 @@ impl Console {
                     _ => self.session.go_to_period(number),
                 }
             }
-            _ => return Err("goto wants `cycle N`, `period N` or `start`".to_owned()),
+            _ => return Err("goto takes `cycle N`, `period N` or `start`".to_owned()),
         };
         self.arrive(why)
     }
@@ -423,7 +423,7 @@ impl Console {
     }
 
     fn set(&mut self, arguments: &str) -> Result<String, String> {
-        let (target, value) = arguments.split_once('=').ok_or("set wants `place = expression`")?;
+        let (target, value) = arguments.split_once('=').ok_or("set takes `place = expression`")?;
         let target = self.session.parse(target)?;
         let (place, ty, _) = self
             .session
@@ -436,7 +436,7 @@ impl Console {
     }
 
     fn ulp(&mut self, arguments: &str) -> Result<String, String> {
-        let [a, b] = parts(arguments)[..] else { return Err("ulp wants two expressions".to_owned()) };
+        let [a, b] = parts(arguments)[..] else { return Err("ulp takes two expressions".to_owned()) };
         let value = |text| self.session.evaluate(&self.session.parse(text)?).map(Value::real);
         let distance = ulp_distance(value(a)?, value(b)?);
         let steps = match distance.steps {
@@ -518,7 +518,7 @@ impl Console {
             let cycles = if left == 1 { "cycle" } else { "cycles" };
             let _ = writeln!(text, "{left:>3} {cycles:<6}  {register:<width$} {mnemonic} of {from}");
         }
-        if text.is_empty() { "nothing is underway\n".to_owned() } else { text }
+        if text.is_empty() { "nothing is in flight\n".to_owned() } else { text }
     }
 
     fn stalls(&self) -> String {

@@ -3,7 +3,7 @@
 use crate::session::{Life, Session, Where};
 use std::fmt::Write as _;
 use takt_asm::expr::Value;
-use takt_isa::{Program, Type};
+use takt_isa::{BundleAddress, Program, Register, Type};
 
 /// Bundles that are listed of those that write or read a register.
 const LISTED: usize = 6;
@@ -22,7 +22,7 @@ pub(crate) fn info(session: &Session, name: &str) -> Result<String, String> {
         let symbol = program.symbols.iter().find(|symbol| symbol.name == live.text());
         let _ = match (symbol, value) {
             (Some(symbol), _) if symbol.space == takt_isa::program::Space::Code => {
-                writeln!(text, "{name} is {}", program.bundle_text(symbol.address))
+                writeln!(text, "{name} is {}", program.bundle_text(BundleAddress::new(symbol.address)))
             }
             (Some(symbol), _) => writeln!(text, "{name} is data word {}", symbol.address),
             (None, Value::Int(value)) => writeln!(text, "{name} is {value}"),
@@ -53,7 +53,7 @@ fn place(program: &Program, life: &Life) -> String {
     program.machine.register_name(life.register).unwrap_or_default()
 }
 
-fn kind(program: &Program, register: u16) -> &'static str {
+fn kind(program: &Program, register: Register) -> &'static str {
     let among = |ports: &[takt_isa::program::Port]| ports.iter().any(|port| port.register == register);
     match () {
         () if among(&program.inputs) => "an input port",
@@ -73,14 +73,14 @@ const fn type_name(ty: Type) -> &'static str {
 /// Where a value is written and read, each bundle with the line of the operation that does so.
 fn lifetime(program: &Program, life: &Life) -> String {
     let (mut written, mut read) = (Vec::new(), Vec::new());
-    let (first, last) = life.bundles.unwrap_or((0, program.bundles().saturating_sub(1)));
-    for address in first..=last {
+    let end = BundleAddress::new(program.bundles());
+    let (first, last) = life.bundles.unwrap_or((BundleAddress::RESET, end.previous()));
+    for address in first.until(last.next()) {
         let Some(Ok(instructions)) = program.bundle(address) else { continue };
-        let slots = program.machine.slots;
-        for ((instruction, slot), number) in instructions.iter().zip(slots).zip(0..) {
+        for (instruction, (number, slot)) in instructions.iter().zip(program.machine.numbered_slots()) {
             let place = || {
-                let line = program.lines.get(address as usize * slots.len() + number).copied().flatten();
-                let line = line.map_or(String::new(), |line| format!(" ({})", program.place_text(line)));
+                let line = program.operation_place(address, number);
+                let line = line.map_or(String::new(), |line| format!(" ({line})"));
                 format!("bundle {address}{line}")
             };
             // Where registers are shared, the bundle of a value's last use may write the next one.

@@ -1,6 +1,7 @@
 //! What an engineer looks at a running program with: traces, and debug sessions. Plain data in and out; nothing here prints.
 
 pub mod console;
+pub mod fault;
 mod info;
 pub mod panes;
 pub mod session;

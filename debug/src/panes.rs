@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 use takt_emu::Status;
 use takt_isa::timing::{Cause, Cycle};
-use takt_isa::{Program, Type};
+use takt_isa::{Register, Type};
 
 /// Source lines before and after the next one that are at hand.
 const LINES: u32 = 1000;
@@ -52,7 +52,7 @@ impl Named {
     }
 }
 
-/// An operation underway.
+/// An operation in flight.
 #[derive(Clone, Debug)]
 pub struct Flying {
     /// Cycles until its result is there.
@@ -97,7 +97,7 @@ pub struct Panes {
     pub inputs: Vec<Named>,
     /// Output ports.
     pub outputs: Vec<Named>,
-    /// Operations underway.
+    /// Operations in flight.
     pub flight: Vec<Flying>,
     /// Why nothing issues in the cycle to come.
     pub cause: Option<String>,
@@ -158,7 +158,7 @@ pub(crate) fn head(session: &mut Session) -> String {
     let program = session.program();
     let what = match session.emulator().status() {
         Status::Halted { .. } => format!("halted at {}", program.bundle_text(address)),
-        Status::Faulted(fault) => fault.to_string(),
+        Status::Faulted(fault) => fault.show(program).to_string(),
         Status::Waiting { address, .. } => {
             format!("waits for the tick, since {}", program.bundle_text(*address))
         }
@@ -193,7 +193,7 @@ pub(crate) fn bundle(session: &Session) -> Vec<(&'static str, Option<String>)> {
 /// The bundles that called, the last one first.
 pub(crate) fn calls(session: &Session) -> impl Iterator<Item = String> {
     let calls = session.emulator().stack().iter().rev();
-    calls.map(|address| session.program().bundle_text(address.saturating_sub(1)))
+    calls.map(|address| session.program().bundle_text(address.previous()))
 }
 
 /// Ports or registers of the source, in the order of their declaration.
@@ -222,7 +222,7 @@ pub(crate) fn values(session: &Session) -> Vec<Option<u32>> {
 }
 
 /// The registers that the next bundle reads or writes.
-fn used(session: &Session) -> BTreeSet<u16> {
+fn used(session: &Session) -> BTreeSet<Register> {
     let program = session.program();
     let Some(Ok(instructions)) = program.bundle(session.emulator().next_address()) else {
         return BTreeSet::new();
@@ -236,7 +236,7 @@ fn used(session: &Session) -> BTreeSet<u16> {
     used
 }
 
-/// Operations underway.
+/// Operations in flight.
 pub(crate) fn flight(session: &Session) -> Vec<Flying> {
     let program = session.program();
     let flying = session.in_flight().into_iter().map(|(retire, left)| Flying {
@@ -271,7 +271,8 @@ pub(crate) fn lines(session: &Session, file: u32, range: RangeInclusive<u32>) ->
     let of_file = |line: u32| {
         move |location: &takt_isa::program::Location| location.file == file && location.line == line
     };
-    let part = parts(program, session.emulator().next_address());
+    // The source places of the next bundle's operations.
+    let part = program.locations(session.emulator().next_address());
     let stops: Vec<_> = session
         .stops()
         .iter()
@@ -287,15 +288,8 @@ pub(crate) fn lines(session: &Session, file: u32, range: RangeInclusive<u32>) ->
         number,
         text: text.trim_end().to_owned(),
         next: here.is_some_and(|here| here.line == number),
-        part: part.iter().any(of_file(number)),
+        part: part.iter().flatten().any(of_file(number)),
         stop: stops.iter().any(of_file(number)),
     });
     Some(rows.collect())
-}
-
-/// The source places of a bundle's operations.
-fn parts(program: &Program, address: u32) -> Vec<takt_isa::program::Location> {
-    let slots = program.machine.slots.len();
-    let start = address as usize * slots;
-    program.lines.get(start..start + slots).into_iter().flatten().copied().flatten().collect()
 }

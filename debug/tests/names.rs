@@ -8,7 +8,7 @@ use takt_asm::{Assembled, MemoryLoader, Options as AsmOptions, assemble, image};
 use takt_debug::console::Console;
 use takt_debug::session::{Options, Place, Session, Unit, Why};
 use takt_emu::testing::Random;
-use takt_isa::{MACHINES, Machine, T3};
+use takt_isa::{MACHINES, Machine, Register, T3};
 
 fn assembled(source: &str, machine: &'static Machine) -> Assembled {
     let files = [("a.s", source)];
@@ -26,7 +26,7 @@ fn session(assembled: &Assembled, periods: usize) -> Session {
     let (program, debug) = image::read_with(&bytes).unwrap();
     let DebugInfo { sources, constants, names } = debug.unwrap();
     let ports = program.inputs.iter().zip(1u16..);
-    let row: Vec<(u16, u32)> = ports.map(|(port, i)| (port.register, f32::from(i).to_bits())).collect();
+    let row: Vec<(Register, u32)> = ports.map(|(port, i)| (port.register, f32::from(i).to_bits())).collect();
     let inputs = Some(Arc::new(vec![row; periods]));
     Session::new(&program, Options { inputs, sources, constants, names, ..Options::default() }).unwrap()
 }
@@ -81,8 +81,7 @@ fn a_name_is_what_the_line_at_hand_reads() {
             let address = session.emulator().next_address();
             let Some(location) = session.location() else { continue };
             let line = session.source_line(location).unwrap().to_owned();
-            let slots = program.machine.slots.len();
-            let words = &program.lines[address as usize * slots..][..slots];
+            let words = program.locations(address);
             let slot = words.iter().position(|place| *place == Some(location)).unwrap();
             let instruction = &program.bundle(address).unwrap().unwrap()[slot];
             for (name, register) in read_names(&line).into_iter().zip(instruction.reads()) {

@@ -4,11 +4,11 @@ use std::num::NonZeroU64;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 use takt_debug::session::{Options, Rows, Session, Stop, Test, Unit, Why};
-use takt_emu::testing::{INPUTS, Options as ProgramOptions, Random, random_program};
+use takt_emu::testing::{Options as ProgramOptions, Random, input_ports, random_program};
 use takt_emu::{Emulator, Event, PeriodError};
 use takt_isa::program::Location;
-use takt_isa::timing::{Address, Cycle};
-use takt_isa::{Effect, Instruction, MACHINES, Program};
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Effect, Instruction, MACHINES, Program, Register};
 
 /// Periods of a run.
 const PERIODS: u64 = 4;
@@ -44,9 +44,9 @@ fn program(seed: u64, bare: bool) -> Program {
 struct Recording {
     program: Program,
     /// Bundles that issued, by cycle.
-    issues: Vec<(Cycle, Address)>,
+    issues: Vec<(Cycle, BundleAddress)>,
     /// Values that registers took, by the first position that shows them.
-    writes: Vec<(Cycle, u16, u32)>,
+    writes: Vec<(Cycle, Register, u32)>,
     /// Values that data words took, likewise.
     stores: Vec<(Cycle, u32, u32)>,
     /// Cycles that passed.
@@ -115,7 +115,7 @@ impl Recording {
         (0..=self.end).map(at).collect()
     }
 
-    fn register(&self, register: u16) -> Vec<Option<u32>> {
+    fn register(&self, register: Register) -> Vec<Option<u32>> {
         self.history(&self.writes, register, None)
     }
 
@@ -129,7 +129,7 @@ impl Recording {
         let last = self.issues.last().unwrap().0;
         let at = |position| {
             while issues.next_if(|(cycle, _)| *cycle < position).is_some() {}
-            issues.peek().map(|(_, address)| *address)
+            issues.peek().map(|(_, address)| address.get())
         };
         (0..=last).map(at).collect()
     }
@@ -172,8 +172,7 @@ fn runs(seeds: RangeInclusive<u64>) -> impl Iterator<Item = (String, Session, Re
     cases.map(|(seed, bare, tick)| {
         let (program, tick) = (program(seed, bare), NonZeroU64::new(tick));
         let mut random = Random::new(seed);
-        let first = program.machine.inputs.base;
-        let mut row = || (0..INPUTS).map(|i| (first + i, random.word())).collect::<Vec<_>>();
+        let mut row = || input_ports(program.machine).map(|port| (port, random.word())).collect::<Vec<_>>();
         let rows: Rows = (0..PERIODS).map(|_| row()).collect();
         let recording = Recording::new(&program, &rows, tick);
         let options = Options { inputs: Some(Arc::new(rows)), tick, ..Options::default() };
@@ -200,8 +199,8 @@ fn steps_are_all_issues() {
         let issues: Vec<Cycle> = recording.issues.iter().map(|(cycle, _)| *cycle).collect();
         for (unit, expected) in [(Unit::Bundle, issues), (Unit::Line, recording.lines())] {
             session.go_to(0);
-            let forth = all(&mut session, |session| session.step(unit));
-            assert_eq!(forth, expected, "{run}, {unit:?}");
+            let forward = all(&mut session, |session| session.step(unit));
+            assert_eq!(forward, expected, "{run}, {unit:?}");
             assert_eq!(session.go_to(recording.end), Why::Done, "{run}");
             let mut back = all(&mut session, |session| session.step_back(unit));
             back.reverse();
@@ -245,10 +244,10 @@ fn calls_are_passed_over() {
 fn watched(recording: &Recording, random: &mut Random) -> Vec<(String, Vec<Option<u32>>)> {
     let machine = recording.program.machine;
     let name = |register| format!("@{}:bits", machine.register_name(register).unwrap());
-    let written: Vec<u16> = recording.writes.iter().map(|(_, register, _)| *register).collect();
+    let written: Vec<Register> = recording.writes.iter().map(|(_, register, _)| *register).collect();
     let mut all: Vec<(String, Vec<Option<u32>>)> = (0..3)
         .map(|_| written[random.below(written.len() as u32) as usize])
-        .chain([machine.inputs.base])
+        .chain(machine.inputs.registers().take(1))
         .map(|register| (name(register), recording.register(register)))
         .collect();
     if let Some((_, word, _)) = recording.stores.first() {
@@ -275,8 +274,8 @@ fn watch_and_until_see_every_change() {
             session.go_to(0);
             let stop = Stop::Watch { what: Box::new(what), test: Test::Changed, text: String::new() };
             let id = session.add_stop(stop);
-            let forth = all(&mut session, Session::resume);
-            assert_eq!(within(forth), changes, "{run}, watch {text}");
+            let forward = all(&mut session, Session::resume);
+            assert_eq!(within(forward), changes, "{run}, watch {text}");
             let mut back = all(&mut session, Session::resume_back);
             back.reverse();
             assert_eq!(within(back), changes, "{run}, watch {text}, back");

@@ -1,11 +1,11 @@
-//! Sessions against the run that they are of: wherever one goes, forth or back, everything is as it was there.
+//! Sessions against the run that they are of: wherever one goes, forward or back, everything is as it was there.
 
 use std::sync::Arc;
 use takt_asm::{MemoryLoader, Options as AsmOptions, assemble};
 use takt_debug::console::Console;
 use takt_debug::session::{CHECKPOINTS, Options, Place, Session, Stop, Test, Unit, Where, Why};
-use takt_emu::testing::{INPUTS, Options as ProgramOptions, Random, random_program};
-use takt_isa::{MACHINES, Program, T3};
+use takt_emu::testing::{Options as ProgramOptions, Random, input_ports, random_program};
+use takt_isa::{BundleAddress, MACHINES, Program, Register, T3};
 
 /// A random program with inputs for some periods; with `subroutines` it has calls.
 fn random_session(seed: u64, index: usize, periods: u64) -> Session {
@@ -15,15 +15,15 @@ fn random_session(seed: u64, index: usize, periods: u64) -> Session {
 
 fn session(program: &Program, seed: u64, periods: u64) -> Session {
     let mut random = Random::new(seed);
-    let first = program.machine.inputs.base;
-    let row = |random: &mut Random| (0..INPUTS).map(|i| (first + i, random.word())).collect::<Vec<_>>();
+    let ports = || input_ports(program.machine);
+    let row = |random: &mut Random| ports().map(|port| (port, random.word())).collect::<Vec<_>>();
     let rows = (0..periods).map(|_| row(&mut random)).collect();
     Session::new(program, Options { inputs: Some(Arc::new(rows)), ..Options::default() }).unwrap()
 }
 
 /// All that can be seen at a position.
 fn fingerprint(session: &mut Session) -> String {
-    let registers: Vec<Option<u32>> = (0..1024).map(|register| session.register(register)).collect();
+    let registers: Vec<Option<u32>> = Register::all().map(|register| session.register(register)).collect();
     let (next, stall, flight) = (session.next_issue(), session.stall(), session.in_flight());
     let emulator = session.emulator();
     format!(
@@ -67,10 +67,9 @@ fn anywhere() {
         session.go_to(end);
         let mut emulator = takt_emu::Emulator::new(session.program()).unwrap();
         let mut random = Random::new(seed);
-        let first = session.program().machine.inputs.base;
         for _ in 0..session.period() {
-            for i in 0..INPUTS {
-                emulator.set_input_bits(first + i, random.word()).unwrap();
+            for input in input_ports(session.program().machine) {
+                emulator.set_input_bits(input, random.word()).unwrap();
             }
             emulator.run_period(&[]).unwrap();
         }
@@ -81,8 +80,8 @@ fn anywhere() {
     }
 }
 
-/// Positions at which stepping forth by a unit stops, from the beginning to the end.
-fn forth(session: &mut Session, unit: Unit) -> Vec<u64> {
+/// Positions at which stepping forward by a unit stops, from the beginning to the end.
+fn forward(session: &mut Session, unit: Unit) -> Vec<u64> {
     session.go_to(0);
     let mut positions = vec![0];
     while session.step(unit) == Why::Done {
@@ -96,7 +95,7 @@ fn back_is_forth_reversed() {
     for seed in 0..16 {
         let mut session = random_session(seed, seed as usize, 3);
         for unit in [Unit::Bundle, Unit::Line, Unit::Period] {
-            let forth = forth(&mut session, unit);
+            let forward = forward(&mut session, unit);
             let mut back = vec![];
             loop {
                 let why = session.step_back(unit);
@@ -109,9 +108,9 @@ fn back_is_forth_reversed() {
             }
             back.reverse();
             // The end of the run may itself be such a position.
-            let end = if forth.len() > back.len() { back.len() } else { forth.len() };
-            assert_eq!(back[..end], forth[..end], "seed {seed} {unit:?}");
-            assert!(forth.len() - end <= 1);
+            let end = if forward.len() > back.len() { back.len() } else { forward.len() };
+            assert_eq!(back[..end], forward[..end], "seed {seed} {unit:?}");
+            assert!(forward.len() - end <= 1);
         }
     }
 }
@@ -187,18 +186,18 @@ fn stops_forth_and_back() {
         let mut console = console(SOURCE);
         let kind = stop.split(' ').next().unwrap();
         console.execute(stop).unwrap();
-        let mut forth = vec![];
+        let mut forward = vec![];
         while matches!(console.session.resume(), Why::Stop { id: 1, .. }) {
-            forth.push((console.session.cycle(), fingerprint(&mut console.session)));
+            forward.push((console.session.cycle(), fingerprint(&mut console.session)));
         }
         let mut back = vec![];
         while matches!(console.session.resume_back(), Why::Stop { id: 1, .. }) {
             back.push((console.session.cycle(), fingerprint(&mut console.session)));
         }
         back.reverse();
-        assert_eq!(forth.len(), expected, "{stop}");
+        assert_eq!(forward.len(), expected, "{stop}");
         assert!(
-            forth == back,
+            forward == back,
             "{kind} {stop}: {:?}",
             back.iter().map(|(cycle, _)| cycle).collect::<Vec<_>>()
         );
@@ -242,8 +241,9 @@ fn stops_are_complete() {
         let mut session = random_session(seed, seed as usize, 3);
         let (program, end) = (session.program().clone(), all(&mut session).len() as u64 - 1);
         let mut random = Random::new(seed);
-        let address = random.below(program.bundles());
-        let register = program.machine.slots[0].bank.base + 8 + random.below(4) as u16;
+        let address = BundleAddress::new(random.below(program.bundles()));
+        let mut registers = program.machine.slots[0].bank.registers();
+        let register = registers.nth(8 + random.below(4) as usize).unwrap();
         let (mut issues, mut changes) = (vec![], vec![]);
         for cycle in 1..=end {
             let before = session.go_to(cycle - 1);
@@ -299,7 +299,7 @@ fn what_is_set_belongs_to_the_run() {
     console.execute("set table[1] = 1").unwrap();
     console.execute("goto cycle 100000").unwrap_or_default();
     assert_eq!(value(&console, "sum"), 0.5 + 1.0 - 1.75);
-    assert!(console.session.set(Place::Register(takt_isa::ZERO), 1).is_err());
+    assert!(console.session.set(Place::Register(Register::ZERO), 1).is_err());
     assert!(console.session.set(Place::Word(1 << 20), 1).is_err());
 }
 
@@ -358,7 +358,7 @@ fn a_long_run() {
     let loader = MemoryLoader::new(takt_programs::SOURCES);
     let options = AsmOptions { machine: &T3, effort: 0, ..AsmOptions::default() };
     let program = assemble("hybrid/tracking.s", &loader, &options).unwrap().program;
-    let zeros: Vec<(u16, u32)> = program.inputs.iter().map(|port| (port.register, 0)).collect();
+    let zeros: Vec<(Register, u32)> = program.inputs.iter().map(|port| (port.register, 0)).collect();
     let rows = Some(Arc::new(vec![zeros; 10_000]));
     let options = Options { inputs: rows, tick: std::num::NonZeroU64::new(12_500), ..Options::default() };
     let mut session = Session::new(&program, options).unwrap();

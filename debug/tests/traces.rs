@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::rc::Rc;
 use takt_asm::{MemoryLoader, Options as AsmOptions, assemble};
 use takt_debug::trace::{Format, Options, SignalError, Summary, Tracer};
-use takt_emu::testing::{INPUTS, Options as ProgramOptions, Random, random_program};
+use takt_emu::testing::{Options as ProgramOptions, Random, input_ports, random_program};
 use takt_emu::{Emulator, Event, Retire, Step};
 use takt_isa::timing::Cycle;
 use takt_isa::{MACHINES, Program, T1, T3, Type};
@@ -53,8 +53,8 @@ fn loaded(program: &Program, seed: u64) -> Emulator {
         };
         emulator.set_input_bits(port.register, bits).unwrap();
     }
-    for i in 0..INPUTS {
-        emulator.set_input_bits(program.machine.inputs.base + i, random.word()).unwrap();
+    for input in input_ports(program.machine) {
+        emulator.set_input_bits(input, random.word()).unwrap();
     }
     emulator
 }
@@ -310,7 +310,7 @@ fn retire_log() {
     for (line, retire) in logged.into_iter().zip(retires) {
         assert_eq!(line["cycle"], retire.cycle);
         assert_eq!(line["issued"], retire.issued);
-        assert_eq!(line["bundle"], retire.address);
+        assert_eq!(line["bundle"], retire.address.get());
         assert_eq!(line["op"], retire.op.row().mnemonic);
         assert!(line["source"].as_str().unwrap().starts_with("hybrid/tracking.s:"));
         if let Some(register) = retire.register {
@@ -412,11 +412,13 @@ fn konata() {
                 arrows += 1;
             }
         }
-        // Operations underway at the end are in the log to their end.
+        // Operations in flight at the end are in the log to their end.
         shown.retain(|(done, ..)| *done < summary.cycles.end);
         shown.sort_unstable();
-        let mut real: Vec<_> =
-            retires(&program).iter().map(|retire| (retire.cycle, retire.issued, retire.address)).collect();
+        let mut real: Vec<_> = retires(&program)
+            .iter()
+            .map(|retire| (retire.cycle, retire.issued, retire.address.get()))
+            .collect();
         real.retain(|(done, ..)| *done < summary.cycles.end);
         real.sort_unstable();
         assert_eq!(shown, real);

@@ -8,7 +8,7 @@ use std::time::Instant;
 use takt_emu::Emulator;
 use takt_emu::testing::Random;
 use takt_isa::program::Port;
-use takt_isa::{Function, Instruction, Op, Operand, Program, ROWS, T3, Type};
+use takt_isa::{BankIndex, Function, Instruction, Op, Operand, Program, ROWS, T3, Type};
 
 /// Operations of the period by the function of their unit, as counted for the tracking step.
 const MIX: [(Function, u32); 6] = [
@@ -70,13 +70,17 @@ fn period() -> Program {
             .map(|row| row.op)
             .collect();
         for i in 0..count {
-            let at = random.below(queues[slot].len() as u32 + 1) as usize;
-            queues[slot].insert(at, rows[i as usize % rows.len()]);
+            let at = random.below(queues[slot.index()].len() as u32 + 1) as usize;
+            queues[slot.index()].insert(at, rows[i as usize % rows.len()]);
         }
     }
     queues[0].push(Op::fsin);
 
-    let register = |slot: usize, index: u32| T3.slots[slot].bank.base + index as u16;
+    let register = |slot: usize, index: u32| {
+        let bank = &T3.slots[slot].bank;
+        BankIndex::new(index as usize).and_then(|index| bank.register(index)).expect("the bank has it")
+    };
+    let input = T3.inputs.registers().next().expect("the bank is not empty");
     let mut constants = Vec::new();
     for slot in 0..T3.slots.len() {
         constants.extend((0..64).map(|i| (register(slot, i), (1.0 + i as f32 * 1e-3).to_bits())));
@@ -98,14 +102,14 @@ fn period() -> Program {
             let mut instruction = Instruction::bare(op);
             for operand in op.row().shape.operands() {
                 match *operand {
-                    Operand::Dest => instruction.dest = 32 + index % 32,
+                    Operand::Dest => instruction.dest = BankIndex::new(32 + index % 32).expect("in range"),
                     // Upper registers are written, lower ones are constants. Every second operation starts from a
                     // constant, so that numbers stay where they are, period after period.
                     Operand::Source(0) => {
                         let index = if random.once_in(2) { 32 } else { 0 } + random.below(32);
                         instruction.sources[0] = register(random.below(3) as usize, index);
                     }
-                    Operand::Source(_) => instruction.sources[1] = T3.inputs.base,
+                    Operand::Source(_) => instruction.sources[1] = input,
                     Operand::Immediate | Operand::Target | Operand::Memory => {}
                 }
             }
@@ -121,11 +125,12 @@ fn period() -> Program {
         code,
         data: Vec::new(),
         constants,
-        inputs: vec![Port { name: "x".to_owned(), register: T3.inputs.base, ty: Type::F }],
+        inputs: vec![Port { name: "x".to_owned(), register: input, ty: Type::F }],
         outputs: Vec::new(),
         registers: Vec::new(),
         symbols: Vec::new(),
         loop_bounds: Vec::new(),
+        parts: Vec::new(),
         latched: false,
         sections: Vec::new(),
         files: Vec::new(),

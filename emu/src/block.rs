@@ -7,16 +7,16 @@
 
 use crate::code::{Code, Decoded};
 use crate::machine::RegisterSet;
-use crate::micro::{Check, Emitter, Ending, Late, Micro};
+use crate::micro::{Check, Emitter, Late, Micro};
 use crate::statistics::Tally;
 use std::collections::HashMap;
 use takt_isa::spec::units::MAX_LATENCY;
-use takt_isa::timing::{self, Address, Cause, Cycle, Scoreboard};
-use takt_isa::{Op, ROWS, ZERO};
+use takt_isa::timing::{self, Cause, Cycle, Scoreboard};
+use takt_isa::{BundleAddress, Flow, Op, ROWS, Register};
 
 /// Bundles in a block at most: longer lines are cut.
 const MAX_BUNDLES: usize = 1024;
-/// Micros in all blocks together; when there are more, the cache starts anew. (16 bytes each.)
+/// Micros in all blocks together; when there are more, the cache starts again from empty. (16 bytes each.)
 const MAX_MICROS: usize = 1 << 20;
 /// Blocks at most, for the same reason.
 const MAX_BLOCKS: usize = 1 << 14;
@@ -26,18 +26,18 @@ const MAX_EDGES: usize = 8;
 /// The block that follows when execution goes to `target`, delivered `distance` cycles after the last issue.
 #[derive(Clone, Copy, Debug)]
 struct Edge {
-    target: Address,
+    target: BundleAddress,
     distance: u8,
     id: u32,
 }
 
 /// Bundles issued of late, in order, each with the number of cycles since.
-pub(crate) type Ages = Box<[(Address, u8)]>;
+pub(crate) type Ages = Box<[(BundleAddress, u8)]>;
 
 /// A straight line of bundles. Offsets are cycles from the entry, the first cycle in which the first bundle may issue.
 #[derive(Clone, Debug)]
 pub(crate) struct Block {
-    pub(crate) entry: Address,
+    pub(crate) entry: BundleAddress,
     /// Its bundles follow each other from `entry` on.
     pub(crate) bundles: u32,
     pub(crate) micros: Box<[Micro]>,
@@ -45,7 +45,9 @@ pub(crate) struct Block {
     pub(crate) split: usize,
     /// Offset of the last bundle's issue.
     pub(crate) last: u32,
-    pub(crate) ending: Ending,
+    /// What its last bundle does. ([`Flow::Next`] too where the line was cut, or the next bundle cannot execute.) What that
+    /// bundle computes is late, so that a branch's register still has its old value when the micros have run.
+    pub(crate) flow: Flow,
     /// Registers that must have been written before.
     pub(crate) required: RegisterSet,
     /// Registers that it writes, without those of late results.
@@ -54,7 +56,7 @@ pub(crate) struct Block {
     /// unwritten again.
     pub(crate) verified: bool,
     /// If it can fault in the middle, the registers to be restored then.
-    pub(crate) restore: Option<Box<[u16]>>,
+    pub(crate) restore: Option<Box<[Register]>>,
     pub(crate) late: Box<[Late]>,
     pub(crate) checks: Box<[Check]>,
     /// The recent bundles, at the cycle of the last issue.
@@ -64,16 +66,16 @@ pub(crate) struct Block {
     /// How often it ran.
     pub(crate) runs: u64,
     /// What each run adds to the statistics.
-    stalls: Box<[(Address, Cause, u32)]>,
+    stalls: Box<[(BundleAddress, Cause, u32)]>,
     operations: Box<[(Op, u32)]>,
     /// Cycles for which the front end kept it waiting, by the bundle that redirected.
-    entered: Vec<(Address, u64)>,
+    entered: Vec<(BundleAddress, u64)>,
 }
 
 impl Block {
     /// Charges cycles before its entry to the front end.
     #[inline]
-    pub(crate) fn enter(&mut self, from: Address, cycles: u64) {
+    pub(crate) fn enter(&mut self, from: BundleAddress, cycles: u64) {
         if cycles == 0 {
             return;
         }
@@ -83,10 +85,16 @@ impl Block {
         }
     }
 
+    /// The bundle after the last.
+    #[inline]
+    pub(crate) fn end(&self) -> BundleAddress {
+        self.entry.offset(self.bundles)
+    }
+
     fn count(&self, tally: &mut Tally) {
         tally.bundles += self.runs * u64::from(self.bundles);
-        for address in self.entry..self.entry + self.bundles {
-            tally.visits[address as usize] += self.runs;
+        for address in self.entry.until(self.end()) {
+            tally.visits[address.index()] += self.runs;
         }
         for &(address, cause, cycles) in &self.stalls {
             tally.stall(address, cause, self.runs * u64::from(cycles));
@@ -104,13 +112,13 @@ impl Block {
 #[derive(Clone, Default)]
 pub(crate) struct Cache {
     pub(crate) blocks: Vec<Block>,
-    ids: HashMap<(Address, Ages), u32>,
+    ids: HashMap<(BundleAddress, Ages), u32>,
     micros: usize,
 }
 
 impl Cache {
     /// The bundles that were recent when a block's last bundle issued.
-    pub(crate) fn recent(&self, id: u32) -> &[(Address, u8)] {
+    pub(crate) fn recent(&self, id: u32) -> &[(BundleAddress, u8)] {
         &self.blocks[id as usize].recent
     }
 
@@ -119,7 +127,7 @@ impl Cache {
         self.blocks.iter().for_each(|block| block.count(tally));
     }
 
-    /// Whether it is time to start anew.
+    /// Whether it is time to start again from empty.
     pub(crate) fn is_full(&self) -> bool {
         self.micros >= MAX_MICROS || self.blocks.len() >= MAX_BLOCKS
     }
@@ -129,13 +137,13 @@ impl Cache {
     pub(crate) fn successor(
         &mut self,
         code: &Code,
-        pauses: &[Address],
+        pauses: &[BundleAddress],
         id: u32,
         last: Cycle,
-        entry: Address,
+        entry: BundleAddress,
         at: Cycle,
     ) -> Option<u32> {
-        // However much later, nothing is underway any more.
+        // However much later, nothing is in flight any more.
         let distance = (at - last).min(Cycle::from(MAX_LATENCY)) as u8;
         let edges = &self.blocks[id as usize].edges;
         if let Some(edge) = edges.iter().find(|edge| edge.target == entry && edge.distance == distance) {
@@ -154,16 +162,22 @@ impl Cache {
     pub(crate) fn after(
         &mut self,
         code: &Code,
-        pauses: &[Address],
-        recent: &[(Address, Cycle)],
-        entry: Address,
+        pauses: &[BundleAddress],
+        recent: &[(BundleAddress, Cycle)],
+        entry: BundleAddress,
         at: Cycle,
     ) -> Option<u32> {
         let recent = recent.iter().map(|&(address, cycle)| (address, (at - cycle).min(u8::MAX.into()) as u8));
         self.find(code, pauses, entry, ages(code, recent))
     }
 
-    fn find(&mut self, code: &Code, pauses: &[Address], entry: Address, recent: Ages) -> Option<u32> {
+    fn find(
+        &mut self,
+        code: &Code,
+        pauses: &[BundleAddress],
+        entry: BundleAddress,
+        recent: Ages,
+    ) -> Option<u32> {
         // Before these bundles the stepper looks whether they issue.
         if pauses.binary_search(&entry).is_ok() {
             return None;
@@ -182,7 +196,7 @@ impl Cache {
 }
 
 /// Keeps the bundles that can still hold up one that issues now.
-fn ages(code: &Code, recent: impl Iterator<Item = (Address, u8)>) -> Ages {
+pub(crate) fn ages(code: &Code, recent: impl Iterator<Item = (BundleAddress, u8)>) -> Ages {
     recent
         .filter(|&(address, age)| code.legal(address).is_some_and(|decoded| decoded.reach > age.into()))
         .collect()
@@ -190,14 +204,14 @@ fn ages(code: &Code, recent: impl Iterator<Item = (Address, u8)>) -> Ages {
 
 /// One bundle of a block, with its offset.
 struct Placed<'a> {
-    address: Address,
+    address: BundleAddress,
     offset: u32,
     decoded: &'a Decoded,
 }
 
 /// The block from `entry` on, entered after the bundles `recent`, up to one of `pauses`; `None` if the first bundle cannot
 /// execute.
-fn compile(code: &Code, pauses: &[Address], entry: Address, recent: &Ages) -> Option<Block> {
+fn compile(code: &Code, pauses: &[BundleAddress], entry: BundleAddress, recent: &Ages) -> Option<Block> {
     // Offset 0 is this cycle of the scoreboard's.
     const BASE: Cycle = MAX_LATENCY as Cycle;
     let mut scoreboard = Scoreboard::new(code.machine);
@@ -218,11 +232,11 @@ fn compile(code: &Code, pauses: &[Address], entry: Address, recent: &Ages) -> Op
         let issue = scoreboard.issue(&decoded.timing, address, earliest);
         stalls.extend(issue.stalls().iter().map(|&(cause, cycles)| (address, cause, cycles)));
         placed.push(Placed { address, offset: (issue.cycle - BASE) as u32, decoded });
-        if decoded.redirect().is_some() {
+        if decoded.flow != Flow::Next {
             break;
         }
         earliest = timing::after_sequential(issue.cycle);
-        address += 1;
+        address = address.next();
     }
     let last = placed.last()?.offset;
 
@@ -241,7 +255,7 @@ fn compile(code: &Code, pauses: &[Address], entry: Address, recent: &Ages) -> Op
     for Placed { address, offset, decoded } in &placed {
         emitter.bundle(*address, *offset, &decoded.operations);
     }
-    let ending = Emitter::ending(&placed.last()?.decoded.operations);
+    let flow = placed.last()?.decoded.flow;
     let Emitter { micros, late, checks, split, writes, can_fault, .. } = emitter;
 
     let age = |offset: u32| u8::try_from(last - offset).unwrap_or(u8::MAX);
@@ -252,9 +266,9 @@ fn compile(code: &Code, pauses: &[Address], entry: Address, recent: &Ages) -> Op
         bundles: placed.len() as u32,
         split: split.unwrap_or(micros.len()),
         last,
-        ending,
+        flow,
         required,
-        restore: can_fault.then(|| (0..=ZERO).filter(|&r| writes.contains(r)).collect()),
+        restore: can_fault.then(|| Register::all().filter(|&r| writes.contains(r)).collect()),
         writes,
         verified: false,
         late: late.into(),

@@ -2,21 +2,19 @@
 
 use crate::fault::LoadError;
 use takt_isa::program::{IllegalWord, LoopBound};
-use takt_isa::timing::{Address, Bundle};
-use takt_isa::{Effect, Machine, Op, Program, Type, ZERO};
-
-/// The most slots that the emulator handles; it bounds the registers that a block borrows for its own use.
-pub const MAX_SLOTS: usize = 8;
+use takt_isa::spec::check::MAX_SLOTS;
+use takt_isa::timing::Bundle;
+use takt_isa::{BundleAddress, Effect, Flow, Machine, Op, Program, Register, SlotIndex, Type};
 
 /// An operation in its slot, with what its unit and its operands are.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Operation {
-    pub(crate) slot: u8,
+    pub(crate) slot: SlotIndex,
     pub(crate) op: Op,
     pub(crate) effect: Effect,
-    pub(crate) sources: [u16; 3],
+    pub(crate) sources: [Register; 3],
     pub(crate) source_count: u8,
-    pub(crate) dest: Option<u16>,
+    pub(crate) dest: Option<Register>,
     pub(crate) latency: u32,
     pub(crate) constant: u32,
     /// Whether the destination is an output port.
@@ -26,7 +24,7 @@ pub(crate) struct Operation {
 }
 
 impl Operation {
-    pub(crate) fn reads(&self) -> &[u16] {
+    pub(crate) fn reads(&self) -> &[Register] {
         &self.sources[..self.source_count.into()]
     }
 }
@@ -35,22 +33,16 @@ impl Operation {
 #[derive(Clone, Debug)]
 pub(crate) struct Decoded {
     pub(crate) operations: Box<[Operation]>,
+    pub(crate) flow: Flow,
     pub(crate) timing: Bundle,
     /// For how many cycles from its issue it can hold others up: its longest latency or interval.
     pub(crate) reach: u32,
 }
 
-impl Decoded {
-    /// The operation that may continue elsewhere.
-    pub(crate) fn redirect(&self) -> Option<&Operation> {
-        self.operations.iter().find(|operation| operation.effect.redirects())
-    }
-}
-
 /// Every bundle of a program: executable, or the slot and the reason why not.
 pub(crate) struct Code {
     pub(crate) machine: &'static Machine,
-    bundles: Vec<Result<Decoded, (u8, IllegalWord)>>,
+    bundles: Vec<Result<Decoded, (SlotIndex, IllegalWord)>>,
     /// Loops whose turns are counted, by ascending address of their heads.
     pub(crate) loops: Vec<LoopBound>,
 }
@@ -59,11 +51,11 @@ impl Code {
     pub(crate) fn new(program: &Program) -> Result<Code, LoadError> {
         let machine = program.machine;
         check(program)?;
-        let bundles = (0..program.bundles()).map_while(|address| program.bundle(address)).map(|bundle| {
-            let instructions = bundle.map_err(|(slot, reason)| (slot as u8, reason))?;
+        let bundles = program.addresses().map_while(|address| program.bundle(address)).map(|bundle| {
+            let instructions = bundle?;
             let mut reach = 0;
             let mut operations = Vec::with_capacity(instructions.len());
-            for (s, (instruction, slot)) in instructions.iter().zip(machine.slots).enumerate() {
+            for (instruction, (s, slot)) in instructions.iter().zip(machine.numbered_slots()) {
                 let row = instruction.op.row();
                 let Some(unit) = slot.unit_for(row.function) else { continue };
                 let (latency, interval) = (slot.units[unit].latency, slot.units[unit].interval);
@@ -72,7 +64,7 @@ impl Code {
                 let output = dest.is_some_and(|register| machine.is_output(register));
                 let ty = program.outputs.iter().find(|port| Some(port.register) == dest).map(|port| port.ty);
                 operations.push(Operation {
-                    slot: s as u8,
+                    slot: s,
                     op: instruction.op,
                     effect: row.effect,
                     sources: instruction.sources,
@@ -84,7 +76,8 @@ impl Code {
                     float: output && ty.unwrap_or(row.result_type()) == Type::F,
                 });
             }
-            Ok(Decoded { operations: operations.into(), timing: Bundle::new(machine, &instructions), reach })
+            let (flow, timing) = (Flow::of(&instructions), Bundle::new(machine, &instructions));
+            Ok(Decoded { operations: operations.into(), flow, timing, reach })
         });
         Ok(Code { machine, bundles: bundles.collect(), loops: program.loop_bounds.clone() })
     }
@@ -95,13 +88,13 @@ impl Code {
     }
 
     /// The bundle at an address; `None` past the end.
-    pub(crate) fn get(&self, address: Address) -> Option<&Result<Decoded, (u8, IllegalWord)>> {
-        self.bundles.get(address as usize)
+    pub(crate) fn get(&self, address: BundleAddress) -> Option<&Result<Decoded, (SlotIndex, IllegalWord)>> {
+        self.bundles.get(address.index())
     }
 
     /// The index of the counted loop that the bundle at an address heads.
     #[inline]
-    pub(crate) fn head(&self, address: Address) -> Option<usize> {
+    pub(crate) fn head(&self, address: BundleAddress) -> Option<usize> {
         if self.loops.is_empty() {
             return None;
         }
@@ -109,7 +102,7 @@ impl Code {
     }
 
     /// The bundle at an address, if it can execute.
-    pub(crate) fn legal(&self, address: Address) -> Option<&Decoded> {
+    pub(crate) fn legal(&self, address: BundleAddress) -> Option<&Decoded> {
         self.get(address)?.as_ref().ok()
     }
 }
@@ -132,7 +125,7 @@ fn check(program: &Program) -> Result<(), LoadError> {
         return Err(LoadError::Data { words: program.data.len(), machine: name, depth: machine.data_depth });
     }
     for &(register, _) in &program.constants {
-        if register == ZERO || !machine.banks().any(|bank| bank.contains(register)) {
+        if register == Register::ZERO || !machine.has_register(register) {
             return Err(LoadError::Constant { register, machine: name });
         }
     }

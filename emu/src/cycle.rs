@@ -4,11 +4,12 @@
 
 use crate::emulator::{Emulator, Recent, Sink, Status, Step, Upcoming, emit};
 use crate::event::Event;
-use crate::execute::{self, Flow};
+use crate::execute;
 use crate::fault::{Fault, FaultKind};
 use std::sync::Arc;
 use takt_isa::spec::units::MAX_LATENCY;
-use takt_isa::timing::{self, Address, Cause, Cycle, Scoreboard};
+use takt_isa::timing::{self, Cause, Cycle, Scoreboard};
+use takt_isa::{BundleAddress, Flow};
 
 /// When the list of recent bundles is this long, those that are not recent any more are dropped.
 const RECENT: usize = 4 * MAX_LATENCY as usize;
@@ -57,7 +58,7 @@ impl Emulator {
     }
 
     /// What keeps the next bundle from issuing in this cycle, if anything.
-    fn stall(&mut self, address: Address, sink: &mut Sink<'_>) -> Result<Option<Cause>, Fault> {
+    fn stall(&mut self, address: BundleAddress, sink: &mut Sink<'_>) -> Result<Option<Cause>, Fault> {
         let (now, delivered) = (self.now, self.front.delivered);
         if now < delivered {
             return Ok(Some(Cause::Branch { from: self.front.from }));
@@ -80,7 +81,7 @@ impl Emulator {
     }
 
     /// Applies the rules to the next bundle.
-    fn plan(&mut self, address: Address) {
+    fn plan(&mut self, address: BundleAddress) {
         let code = Arc::clone(&self.code);
         if let Some(decoded) = code.legal(address) {
             let delivered = self.front.delivered;
@@ -88,7 +89,7 @@ impl Emulator {
         }
     }
 
-    /// The rules applied to everything issued, made anew where blocks have run since.
+    /// The rules applied to everything issued, rebuilt where blocks have run since.
     pub(crate) fn scoreboard(&mut self) -> &mut Scoreboard {
         let scoreboard = self.scoreboard.take().unwrap_or_else(|| {
             self.list_recent();
@@ -107,43 +108,61 @@ impl Emulator {
     }
 
     /// Issues the next bundle.
-    fn issue(&mut self, address: Address, sink: &mut Sink<'_>) -> Result<(), Fault> {
+    fn issue(&mut self, address: BundleAddress, sink: &mut Sink<'_>) -> Result<(), Fault> {
         let (now, machine) = (self.now, self.code.machine);
         let Some(decoded) = self.code.legal(address) else { return Ok(()) };
         if let Some(most) = self.beyond_bound() {
             return Err(self.fault(address, None, FaultKind::LoopBound { most }, sink));
         }
-        if let Some((slot, kind)) = execute::check(decoded, &self.state, machine, &self.program) {
+        if let Some((slot, kind)) = execute::check(decoded, &self.state, machine) {
             return Err(self.fault(address, Some(slot), kind, sink));
         }
         emit(sink, || Event::Issue { cycle: now, address });
-        let flow = execute::issue(decoded, &mut self.state, address, now, |retire| {
+        let flow = decoded.flow;
+        execute::issue(decoded, &mut self.state, address, now, |retire| {
             emit(sink, || Event::Retire(retire));
         });
         self.tally.issue(address, decoded.operations.iter().map(|operation| operation.op));
         self.planned = None;
         self.push_recent(address, now);
-        match flow {
-            Flow::Sequential => self.continue_at(address + 1, timing::after_sequential(now), address),
-            Flow::NotTaken => self.continue_at(address + 1, timing::after_not_taken(machine, now), address),
-            Flow::Jump(target) => self.jump_to(target, timing::after_redirect(machine, now), address),
-            Flow::Redirect(target) => {
-                self.continue_at(target, timing::after_redirect(machine, now), address);
-            }
-            Flow::Wait(target) => {
-                emit(sink, || Event::Wait { cycle: now, address });
-                self.wait_issued(now, address, target);
-            }
-            Flow::Halt => {
-                emit(sink, || Event::Halt { cycle: now, address });
-                self.halt_issued(now, address, sink);
-            }
-        }
+        self.follow(flow, address, now, sink);
         Ok(())
     }
 
+    /// Goes on as the flow of the bundle at `address` says, which issued in `cycle`. Registers are as that bundle read them:
+    /// what it computes itself is not written back yet.
+    #[inline]
+    pub(crate) fn follow(&mut self, flow: Flow, address: BundleAddress, cycle: Cycle, sink: &mut Sink<'_>) {
+        let machine = self.code.machine;
+        let redirected = timing::after_redirect(machine, cycle);
+        match flow {
+            Flow::Next => self.continue_at(address.next(), timing::after_sequential(cycle), address),
+            Flow::Branch { register, zero, .. } if (self.state.get(register) == 0) != zero => {
+                self.continue_at(address.next(), timing::after_not_taken(machine, cycle), address);
+            }
+            Flow::Jump(target) | Flow::Branch { target, .. } => self.jump_to(target, redirected, address),
+            Flow::Call(target) => {
+                self.state.stack.push(address.next());
+                self.continue_at(target, redirected, address);
+            }
+            Flow::Return => {
+                // An empty stack is a fault, which has been looked for.
+                let target = self.state.stack.pop().unwrap_or(address.next());
+                self.continue_at(target, redirected, address);
+            }
+            Flow::Wait(target) => {
+                emit(sink, || Event::Wait { cycle, address });
+                self.wait_issued(cycle, address, target);
+            }
+            Flow::Halt => {
+                emit(sink, || Event::Halt { cycle, address });
+                self.halt_issued(cycle, address, sink);
+            }
+        }
+    }
+
     /// Where execution goes on, other than by a jump: the first turn of a loop, if it is the head of one.
-    pub(crate) fn continue_at(&mut self, next: Address, delivered: Cycle, from: Address) {
+    pub(crate) fn continue_at(&mut self, next: BundleAddress, delivered: Cycle, from: BundleAddress) {
         (self.front.next, self.front.delivered, self.front.from) = (next, delivered, from);
         if let Some(head) = self.code.head(next) {
             self.turns[head] = 1;
@@ -151,7 +170,7 @@ impl Emulator {
     }
 
     /// Where a jump or a taken branch leads: a further turn of a loop, if it leads back to the head of one.
-    pub(crate) fn jump_to(&mut self, target: Address, delivered: Cycle, from: Address) {
+    pub(crate) fn jump_to(&mut self, target: BundleAddress, delivered: Cycle, from: BundleAddress) {
         let turns = self.code.head(target).map_or(0, |head| self.turns[head]);
         self.continue_at(target, delivered, from);
         if let Some(head) = self.code.head(target).filter(|_| target <= from) {
@@ -168,7 +187,7 @@ impl Emulator {
 
     /// Stops the machine. What issued together with `halt` is still written back: nothing else can happen any more, so
     /// it is done at once.
-    pub(crate) fn halt_issued(&mut self, cycle: Cycle, address: Address, sink: &mut Sink<'_>) {
+    pub(crate) fn halt_issued(&mut self, cycle: Cycle, address: BundleAddress, sink: &mut Sink<'_>) {
         self.status = Status::Halted { cycle, address };
         self.front.next = address;
         let last = self.state.pending.iter().map(|pending| pending.retire.cycle).max().unwrap_or(0);
@@ -191,7 +210,7 @@ impl Emulator {
         }
     }
 
-    fn push_recent(&mut self, address: Address, cycle: Cycle) {
+    fn push_recent(&mut self, address: BundleAddress, cycle: Cycle) {
         self.list_recent();
         if let Recent::List(recent) = &mut self.recent {
             if recent.len() >= RECENT {

@@ -11,8 +11,8 @@ use crate::system::{Period, PeriodReport, Ticks};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use takt_isa::fp::Flags;
-use takt_isa::timing::{self, Address, Cause, Cycle, Issue, Scoreboard};
-use takt_isa::{Machine, Program, ZERO};
+use takt_isa::timing::{self, Cause, Cycle, Issue, Scoreboard};
+use takt_isa::{BundleAddress, Machine, Program, Register, SlotIndex};
 
 /// The cycle limit that always holds, so that cycle arithmetic cannot overflow: a thousand years at 125 MHz.
 pub const MAX_CYCLE: Cycle = 1 << 62;
@@ -27,14 +27,14 @@ pub enum Status {
         /// The cycle in which `wait` issued.
         since: Cycle,
         /// Its bundle.
-        address: Address,
+        address: BundleAddress,
     },
     /// Stopped by `halt`.
     Halted {
         /// The cycle in which it issued.
         cycle: Cycle,
         /// Its bundle.
-        address: Address,
+        address: BundleAddress,
     },
     /// Stopped by a fault.
     Faulted(Fault),
@@ -48,14 +48,14 @@ pub enum Step {
         /// In this cycle.
         cycle: Cycle,
         /// The bundle.
-        address: Address,
+        address: BundleAddress,
     },
     /// Nothing issued.
     Stalled {
         /// In this cycle.
         cycle: Cycle,
         /// The bundle that could not; for [`Cause::Wait`] the one that waits.
-        address: Address,
+        address: BundleAddress,
         /// Why.
         cause: Cause,
     },
@@ -71,14 +71,14 @@ pub enum Stop {
         /// In this cycle.
         cycle: Cycle,
         /// The bundle.
-        address: Address,
+        address: BundleAddress,
     },
     /// A `wait` issued ([`Emulator::run_to_wait`]).
     Wait {
         /// In this cycle.
         cycle: Cycle,
         /// Its bundle.
-        address: Address,
+        address: BundleAddress,
     },
     /// The program waits and no tick is going to come.
     Idle,
@@ -94,11 +94,11 @@ pub enum Stop {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Upcoming {
     /// The bundle.
-    pub address: Address,
+    pub address: BundleAddress,
     /// The first cycle in which the front end has it ready.
     pub delivered: Cycle,
     /// The bundle that redirected the fetch to it, which the cycles before `delivered` are charged to.
-    pub from: Address,
+    pub from: BundleAddress,
     /// Its issue, and what the cycles from `delivered` on are charged to.
     pub issue: Issue,
 }
@@ -122,18 +122,25 @@ impl Upcoming {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Front {
     /// The bundle that issues next.
-    pub(crate) next: Address,
+    pub(crate) next: BundleAddress,
     /// The first cycle in which it may.
     pub(crate) delivered: Cycle,
     /// The bundle that redirected the fetch to it.
-    pub(crate) from: Address,
+    pub(crate) from: BundleAddress,
+}
+
+impl Front {
+    fn after_reset(program: &Program) -> Front {
+        let (next, delivered) = (BundleAddress::RESET, timing::after_reset(program.machine));
+        Front { next, delivered, from: next }
+    }
 }
 
 /// The bundles issued of late that may still hold others up.
 #[derive(Clone, Debug)]
 pub(crate) enum Recent {
     /// These, each with its cycle of issue, in that order.
-    List(Vec<(Address, Cycle)>),
+    List(Vec<(BundleAddress, Cycle)>),
     /// Those of a block, the last bundle of which issued in `cycle`.
     Block { id: u32, cycle: Cycle },
 }
@@ -151,7 +158,7 @@ pub struct Emulator {
     /// For each counted loop, the turns of its present run.
     pub(crate) turns: Vec<u32>,
     pub(crate) recent: Recent,
-    /// The rules applied to everything issued; `None` when blocks have run since and it must be made anew.
+    /// The rules applied to everything issued; `None` when blocks have run since and it must be rebuilt.
     pub(crate) scoreboard: Option<Box<Scoreboard>>,
     /// How the next bundle issues. There only while it stalls for another reason than the front end.
     pub(crate) planned: Option<Issue>,
@@ -165,7 +172,7 @@ pub struct Emulator {
     pub(crate) cycle_limit: Cycle,
     pub(crate) blocks_enabled: bool,
     /// Bundles before whose issue runs pause, ascending.
-    pub(crate) pauses: Arc<[Address]>,
+    pub(crate) pauses: Arc<[BundleAddress]>,
 }
 
 /// Where events go.
@@ -193,7 +200,7 @@ pub(crate) struct Goal {
 
 /// The turns counted at reset, which leads to bundle 0.
 fn first_turns(program: &Program) -> Vec<u32> {
-    program.loop_bounds.iter().map(|bound| u32::from(bound.address == 0)).collect()
+    program.loop_bounds.iter().map(|bound| u32::from(bound.address == BundleAddress::RESET)).collect()
 }
 
 impl Emulator {
@@ -208,7 +215,7 @@ impl Emulator {
             state: State::new(program),
             status: Status::Running,
             now: 0,
-            front: Front { next: 0, delivered: timing::after_reset(program.machine), from: 0 },
+            front: Front::after_reset(program),
             turns: first_turns(program),
             recent: Recent::List(Vec::new()),
             scoreboard: None,
@@ -227,13 +234,13 @@ impl Emulator {
         })
     }
 
-    /// Loads the program anew and resets the machine: everything is as [`Emulator::new`] made it, except the settings
+    /// Reloads the program and resets the machine: everything is as [`Emulator::new`] made it, except the settings
     /// (cycle limit, tick period, pauses).
     pub fn reset(&mut self) {
         self.state = State::new(&self.program);
         self.status = Status::Running;
         self.now = 0;
-        self.front = Front { next: 0, delivered: timing::after_reset(self.program.machine), from: 0 };
+        self.front = Front::after_reset(&self.program);
         self.turns = first_turns(&self.program);
         self.recent = Recent::List(Vec::new());
         self.scoreboard = None;
@@ -269,8 +276,8 @@ impl Emulator {
 
     /// Lets runs pause at these bundles: once a cycle has passed, wherever the cycle to come is the one in which one of them
     /// issues. ([`Emulator::step_cycle`], [`Emulator::step_bundle`] and [`Emulator::run_period`] go on.)
-    pub fn set_pauses(&mut self, bundles: impl IntoIterator<Item = Address>) {
-        let bundles: BTreeSet<Address> = bundles.into_iter().collect();
+    pub fn set_pauses(&mut self, bundles: impl IntoIterator<Item = BundleAddress>) {
+        let bundles: BTreeSet<BundleAddress> = bundles.into_iter().collect();
         if !self.pauses.iter().eq(&bundles) {
             self.pauses = bundles.into_iter().collect();
             // Blocks end before them.
@@ -418,7 +425,7 @@ impl Emulator {
 
     /// The bundle that issues next; while the program waits, the one that issues after the tick. In a machine that has
     /// stopped, the bundle that halted or faulted.
-    pub fn next_address(&self) -> Address {
+    pub fn next_address(&self) -> BundleAddress {
         self.front.next
     }
 
@@ -440,7 +447,7 @@ impl Emulator {
     }
 
     /// The bundle that issued last; `None` if none has since reset.
-    pub fn last_issued(&self) -> Option<Address> {
+    pub fn last_issued(&self) -> Option<BundleAddress> {
         match self.status {
             Status::Waiting { address, .. } | Status::Halted { address, .. } => Some(address),
             _ => self.has_issued().then_some(self.front.from),
@@ -453,16 +460,16 @@ impl Emulator {
 
     /// A register's bits; `None` if it was never written. A result appears in the cycle of its writeback. What the outside sees
     /// on an output port is [`Emulator::output_bits`].
-    pub fn register(&self, register: u16) -> Option<u32> {
-        (register <= ZERO && self.state.written.contains(register)).then(|| self.state.get(register))
+    pub fn register(&self, register: Register) -> Option<u32> {
+        self.state.written.contains(register).then(|| self.state.get(register))
     }
 
     /// Sets a register (a debugger's way in; ports have their own): what issues in the next cycle reads `bits`. A result whose
-    /// writeback is in that very cycle gives way, those underway for longer still arrive.
+    /// writeback is in that very cycle gives way, those in flight for longer still arrive.
     ///
     /// Returns false, and does nothing, for `zero` and for an address where the machine has no register.
-    pub fn set_register(&mut self, register: u16, bits: u32) -> bool {
-        let exists = register != ZERO && self.machine().banks().any(|bank| bank.contains(register));
+    pub fn set_register(&mut self, register: Register, bits: u32) -> bool {
+        let exists = register != Register::ZERO && self.machine().has_register(register);
         if exists {
             self.state.set(register, bits);
             let mut due = self.state.pending.iter_mut().filter(|pending| pending.retire.cycle == self.now);
@@ -484,7 +491,7 @@ impl Emulator {
     }
 
     /// The return stack, oldest entry first.
-    pub fn stack(&self) -> &[Address] {
+    pub fn stack(&self) -> &[BundleAddress] {
         &self.state.stack
     }
 
@@ -493,8 +500,8 @@ impl Emulator {
         self.state.flags
     }
 
-    /// Operations underway: issued, and to be written back in the cycle that each one names.
-    pub fn underway(&self) -> impl Iterator<Item = &Retire> {
+    /// Operations in flight: issued, and to be written back in the cycle that each one names.
+    pub fn in_flight(&self) -> impl Iterator<Item = &Retire> {
         self.state.pending.iter().map(|pending| &pending.retire)
     }
 
@@ -525,13 +532,13 @@ impl Emulator {
 
     pub(crate) fn fault(
         &mut self,
-        address: Address,
-        slot: Option<u8>,
+        address: BundleAddress,
+        slot: Option<SlotIndex>,
         kind: FaultKind,
         sink: &mut Sink<'_>,
     ) -> Fault {
         let stops = !matches!(kind, FaultKind::CycleLimit { .. });
-        let fault = Fault::new(&self.program, self.now, address, slot, kind);
+        let fault = Fault { cycle: self.now, address, slot, kind };
         emit(sink, || Event::Fault(fault.clone()));
         if stops {
             self.status = Status::Faulted(fault.clone());

@@ -4,9 +4,9 @@
 //! port's event), then the issue of a bundle with what it does at once (operations without a destination, in slot order).
 
 use crate::fault::Fault;
-use takt_isa::Op;
 use takt_isa::fp::Flags;
-use takt_isa::timing::{Address, Cycle};
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Op, Register, SlotIndex};
 
 /// One event.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -16,7 +16,7 @@ pub enum Event {
         /// In this cycle.
         cycle: Cycle,
         /// The bundle.
-        address: Address,
+        address: BundleAddress,
     },
     /// An operation completed.
     Retire(Retire),
@@ -42,14 +42,14 @@ pub enum Event {
         /// The cycle in which `wait` issued.
         cycle: Cycle,
         /// Its bundle.
-        address: Address,
+        address: BundleAddress,
     },
     /// The machine stopped for good.
     Halt {
         /// The cycle in which `halt` issued.
         cycle: Cycle,
         /// Its bundle.
-        address: Address,
+        address: BundleAddress,
     },
     /// The machine stopped with a fault.
     Fault(Fault),
@@ -63,13 +63,13 @@ pub struct Retire {
     /// The cycle of its issue.
     pub issued: Cycle,
     /// Its bundle.
-    pub address: Address,
+    pub address: BundleAddress,
     /// Its slot.
-    pub slot: u8,
+    pub slot: SlotIndex,
     /// The operation.
     pub op: Op,
     /// The register that it wrote.
-    pub register: Option<u16>,
+    pub register: Option<Register>,
     /// What it wrote to the register, or to memory if it is a store; otherwise 0.
     pub value: u32,
     /// The flags that it raised.
@@ -84,11 +84,11 @@ pub struct PortWrite {
     /// The cycle of the writeback.
     pub cycle: Cycle,
     /// The slot whose bank the port belongs to.
-    pub slot: u8,
+    pub slot: SlotIndex,
     /// The bundle that computed the value.
-    pub address: Address,
+    pub address: BundleAddress,
     /// The port's register.
-    pub register: u16,
+    pub register: Register,
     /// The value's bits.
     pub value: u32,
     /// Whether the value is a number gone wrong: a NaN on a port that carries binary32.

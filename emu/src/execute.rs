@@ -5,25 +5,8 @@ use crate::event::Retire;
 use crate::fault::FaultKind;
 use crate::machine::{Pending, State};
 use takt_isa::fp::{Host, Value};
-use takt_isa::timing::{Address, Cycle};
-use takt_isa::{Effect, Machine, Program, compute};
-
-/// Where execution continues.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Flow {
-    /// At the next bundle; nothing in the bundle could redirect.
-    Sequential,
-    /// At the next bundle, a conditional branch not having been taken.
-    NotTaken,
-    /// At the target of a jump or of a branch that is taken.
-    Jump(Address),
-    /// At the target of a call, or where a return leads.
-    Redirect(Address),
-    /// At the target, on the tick.
-    Wait(Address),
-    /// Nowhere.
-    Halt,
-}
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Effect, Flow, Machine, SlotIndex, compute};
 
 /// The data word that a load or store addresses: its unsigned offset and the signed base added. The memory is far
 /// smaller than 2^31 words, so that a sum modulo 2^32 lies in it exactly if the true sum does.
@@ -33,27 +16,17 @@ pub(crate) fn data_address(offset: u32, base: u32) -> usize {
 }
 
 /// The first fault, in slot order, that a bundle would raise if it issued now.
-pub(crate) fn check(
-    decoded: &Decoded,
-    state: &State,
-    machine: &Machine,
-    program: &Program,
-) -> Option<(u8, FaultKind)> {
+pub(crate) fn check(decoded: &Decoded, state: &State, machine: &Machine) -> Option<(SlotIndex, FaultKind)> {
     decoded.operations.iter().find_map(|operation| {
-        let kind = check_operation(operation, state, machine, program)?;
+        let kind = check_operation(operation, decoded.flow, state, machine)?;
         Some((operation.slot, kind))
     })
 }
 
-fn check_operation(
-    operation: &Operation,
-    state: &State,
-    machine: &Machine,
-    program: &Program,
-) -> Option<FaultKind> {
+fn check_operation(operation: &Operation, flow: Flow, state: &State, machine: &Machine) -> Option<FaultKind> {
     let unwritten = operation.reads().iter().find(|&&register| !state.written.contains(register));
     if let Some(&register) = unwritten {
-        return Some(FaultKind::UnwrittenRegister { register, name: program.register_text(register) });
+        return Some(FaultKind::UnwrittenRegister { register });
     }
     match operation.effect {
         Effect::Load | Effect::Store => {
@@ -63,33 +36,40 @@ fn check_operation(
             let outside = data_address(operation.constant, base) >= state.memory.len();
             outside.then_some(FaultKind::DataAddress { address, depth, store })
         }
-        Effect::Call => {
-            let depth = machine.stack_depth;
-            (state.stack.len() >= depth as usize).then_some(FaultKind::StackOverflow { depth })
-        }
-        Effect::Return => state.stack.is_empty().then_some(FaultKind::StackUnderflow),
+        // It is this operation whose flow the bundle's is.
+        effect if effect.redirects() => stack_fault(flow, state, machine),
         _ => None,
     }
 }
 
-/// Issues a bundle that [`check`] has passed. Results join `state.pending`; operations that write no register are
-/// complete at once and are handed to `retired`, in slot order.
+/// The fault that a bundle's flow would raise on the return stack.
+#[inline]
+pub(crate) fn stack_fault(flow: Flow, state: &State, machine: &Machine) -> Option<FaultKind> {
+    match flow {
+        Flow::Call(_) => {
+            let depth = machine.stack_depth;
+            (state.stack.len() >= depth as usize).then_some(FaultKind::StackOverflow { depth })
+        }
+        Flow::Return => state.stack.is_empty().then_some(FaultKind::StackUnderflow),
+        Flow::Next | Flow::Jump(_) | Flow::Branch { .. } | Flow::Wait(_) | Flow::Halt => None,
+    }
+}
+
+/// Issues the operations of a bundle that [`check`] has passed, all but its flow. Results join `state.pending`; operations
+/// that write no register are complete at once and are handed to `retired`, in slot order.
 pub(crate) fn issue(
     decoded: &Decoded,
     state: &mut State,
-    address: Address,
+    address: BundleAddress,
     cycle: Cycle,
     mut retired: impl FnMut(Retire),
-) -> Flow {
-    let mut flow = Flow::Sequential;
+) {
     // Results are written back later, so that reading and executing one operation after another reads old values only.
     for operation in &decoded.operations {
         let [a, b, c] = operation.sources.map(|register| state.get(register));
         let mut memory = None;
-        let target = operation.constant;
         let value = match operation.effect {
             Effect::Compute => compute::<Host>(operation.op, a, b, c),
-            Effect::Nothing => Value::exact(0),
             Effect::Immediate => Value::exact(operation.constant),
             Effect::Load => {
                 let word = data_address(operation.constant, a);
@@ -109,32 +89,9 @@ pub(crate) fn issue(
                 state.flags = takt_isa::fp::Flags::NONE;
                 Value::exact(0)
             }
-            Effect::Jump => {
-                flow = Flow::Jump(target);
-                Value::exact(0)
-            }
-            Effect::BranchZero | Effect::BranchNonzero => {
-                let taken = (a == 0) == (operation.effect == Effect::BranchZero);
-                flow = if taken { Flow::Jump(target) } else { Flow::NotTaken };
-                Value::exact(0)
-            }
-            Effect::Call => {
-                state.stack.push(address + 1);
-                flow = Flow::Redirect(target);
-                Value::exact(0)
-            }
-            Effect::Return => {
-                flow = state.stack.pop().map_or(Flow::Sequential, Flow::Redirect);
-                Value::exact(0)
-            }
-            Effect::Wait => {
-                flow = Flow::Wait(target);
-                Value::exact(0)
-            }
-            Effect::Halt => {
-                flow = Flow::Halt;
-                Value::exact(0)
-            }
+            // What these do is the bundle's flow.
+            Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => Value::exact(0),
+            Effect::Call | Effect::Return | Effect::Wait | Effect::Halt | Effect::Nothing => Value::exact(0),
         };
         let latency = if operation.dest.is_some() { operation.latency } else { 0 };
         let retire = Retire {
@@ -156,5 +113,4 @@ pub(crate) fn issue(
             None => retired(retire),
         }
     }
-    flow
 }

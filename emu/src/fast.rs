@@ -4,10 +4,12 @@
 use crate::block::Block;
 use crate::emulator::{Emulator, Recent, Status};
 use crate::event::Retire;
-use crate::machine::{Pending, RegisterSet, State};
-use crate::micro::{self, Context, Ending, LATE, Late, Outside};
+use crate::execute::stack_fault;
+use crate::machine::{Pending, RegisterSet, State, Word};
+use crate::micro::{self, Context, Late, Outside};
 use takt_isa::fp::Flags;
-use takt_isa::timing::{self, Address, Cycle};
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Flow, Register};
 
 /// Why no further block runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,7 +17,7 @@ pub(crate) enum Fast {
     /// The stepper must take over, up to this cycle.
     Step { until: Cycle },
     /// A `wait` has issued.
-    Wait { cycle: Cycle, address: Address },
+    Wait { cycle: Cycle, address: BundleAddress },
     /// The machine has halted.
     Halted,
 }
@@ -23,7 +25,7 @@ pub(crate) enum Fast {
 /// What is kept to undo a block, and buffers.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Journal {
-    registers: Vec<(u16, u32)>,
+    registers: Vec<(Register, u32)>,
     pending: Vec<Pending>,
     written: RegisterSet,
     flags: Flags,
@@ -99,13 +101,8 @@ impl Emulator {
             }
             self.begin_cycle();
             let block = &mut self.cache.blocks[id as usize];
-            let (state, ending) = (&mut self.state, block.ending);
-            let stack_fault = match ending {
-                Ending::Call(_) => state.stack.len() >= self.code.machine.stack_depth as usize,
-                Ending::Return => state.stack.is_empty(),
-                _ => false,
-            };
-            if stack_fault
+            let (state, flow) = (&mut self.state, block.flow);
+            if stack_fault(flow, state, self.code.machine).is_some()
                 || beyond_bound
                 || !(block.verified || has_required(state, block, last))
                 || !run(block, state, journal, entered)
@@ -114,11 +111,7 @@ impl Emulator {
             }
             block.enter(self.front.from, entered - self.now);
             block.runs += 1;
-            let address = entry + block.bundles - 1;
-            let taken = match ending {
-                Ending::Branch { register, zero, .. } => (state.get(register) == 0) == zero,
-                _ => true,
-            };
+            let address = block.end().previous();
 
             self.now = last + 1;
             self.recent = Recent::Block { id, cycle: last };
@@ -127,33 +120,13 @@ impl Emulator {
                 self.ticks.take(tick);
                 self.see_tick(tick, &mut None);
             }
-            let machine = self.code.machine;
-            match ending {
-                Ending::Sequential => self.continue_at(address + 1, timing::after_sequential(last), address),
-                Ending::Branch { .. } if !taken => {
-                    self.continue_at(address + 1, timing::after_not_taken(machine, last), address);
+            self.follow(flow, address, last, &mut None);
+            match flow {
+                Flow::Wait(_) if stop_at_wait || self.status != Status::Running => {
+                    return Fast::Wait { cycle: last, address };
                 }
-                Ending::Jump(target) | Ending::Branch { target, .. } => {
-                    self.jump_to(target, timing::after_redirect(machine, last), address);
-                }
-                Ending::Call(target) => {
-                    self.state.stack.push(address + 1);
-                    self.continue_at(target, timing::after_redirect(machine, last), address);
-                }
-                Ending::Return => {
-                    let target = self.state.stack.pop().unwrap_or_default();
-                    self.continue_at(target, timing::after_redirect(machine, last), address);
-                }
-                Ending::Wait(target) => {
-                    self.wait_issued(last, address, target);
-                    if stop_at_wait || self.status != Status::Running {
-                        return Fast::Wait { cycle: last, address };
-                    }
-                }
-                Ending::Halt => {
-                    self.halt_issued(last, address, &mut None);
-                    return Fast::Halted;
-                }
+                Flow::Halt => return Fast::Halted,
+                _ => {}
             }
         }
     }
@@ -161,7 +134,7 @@ impl Emulator {
 
 /// Whether everything that a block requires has been written, counting what is written back by its last issue. (What is
 /// not, the block cannot read.)
-fn has_required(state: &State, block: &Block, last: Cycle) -> bool {
+pub(crate) fn has_required(state: &State, block: &Block, last: Cycle) -> bool {
     let mut written = state.written;
     let pending = state.pending.iter().filter(|pending| pending.retire.cycle <= last);
     pending.for_each(|pending| written.insert(pending.register));
@@ -199,7 +172,7 @@ fn run(block: &mut Block, state: &mut State, journal: &mut Journal, entered: Cyc
             slot: operation.slot,
             op: operation.op,
             register: Some(register),
-            value: state.get(LATE + i as u16),
+            value: state.get(Word::late(i)),
             flags,
             memory,
         };

@@ -1,40 +1,36 @@
 //! Faults: why the machine stopped where no program means it to.
 
-use takt_isa::Program;
 use takt_isa::program::{IllegalWord, Location};
-use takt_isa::timing::{Address, Cycle};
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Program, Register, SlotIndex};
 
 /// A fault. The bundle that it names did not execute, and the state from before it stays to be inspected.
+///
+/// It is plain data. [`Fault::show`] puts it into words with the names and places of the program; its own `Display` has numbers
+/// in their place.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
     /// The cycle in which the bundle would have issued; for [`FaultKind::CycleLimit`] the limit.
     pub cycle: Cycle,
     /// The bundle.
-    pub address: Address,
+    pub address: BundleAddress,
     /// The slot whose operation is at fault, where it is one operation's.
-    pub slot: Option<u8>,
-    /// The operation's place in the source, as far as the program knows it.
-    pub location: Option<Location>,
+    pub slot: Option<SlotIndex>,
     /// What happened.
     pub kind: FaultKind,
-    /// Where it happened, in words.
-    place: Box<str>,
 }
 
 /// What a [`Fault`] is about.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FaultKind {
     /// A word of the bundle is no instruction, or none that its slot can execute.
-    #[error("illegal word: {0}")]
     IllegalWord(Box<IllegalWord>),
     /// Execution left the program.
-    #[error("execution left the program, which has {bundles} bundles")]
     ProgramCounter {
         /// Bundles in the program.
         bundles: u32,
     },
     /// A load or store outside the data memory.
-    #[error("{} data word {address}, but the data memory has words 0 to {}", if *.store { "writes" } else { "reads" }, depth - 1)]
     DataAddress {
         /// The word address, offset and signed register added.
         address: i64,
@@ -44,73 +40,130 @@ pub enum FaultKind {
         store: bool,
     },
     /// An operation reads a register that neither the loader, nor the host, nor an operation has written.
-    #[error("reads {name}, which was never written")]
     UnwrittenRegister {
         /// The register.
-        register: u16,
-        /// Its name in the source.
-        name: String,
+        register: Register,
     },
     /// A call with the return stack full.
-    #[error("call with the return stack full ({depth} entries)")]
     StackOverflow {
         /// Entries of the stack.
         depth: u32,
     },
     /// A return with the return stack empty.
-    #[error("return with the return stack empty")]
     StackUnderflow,
     /// The head of a loop is reached more often in one run of the loop than the source promises.
-    #[error("the loop turns more than the {most} times that its .loop_bound promises")]
     LoopBound {
         /// Turns at most.
         most: u32,
     },
     /// The machine has run for as many cycles as it may.
-    #[error("limit of {limit} cycles reached")]
     CycleLimit {
         /// The limit.
         limit: Cycle,
     },
 }
 
-impl Fault {
-    pub(crate) fn new(
-        program: &Program,
-        cycle: Cycle,
-        address: Address,
-        slot: Option<u8>,
-        kind: FaultKind,
-    ) -> Fault {
-        let slots = program.machine.slots;
-        let own = slot.and_then(|slot| {
-            *program.lines.get((address as usize).checked_mul(slots.len())?.checked_add(slot.into())?)?
-        });
-        let location = own.or_else(|| {
-            // Program::location slices, which an address far outside would overflow.
-            (address < program.bundles()).then(|| program.location(address)).flatten()
-        });
-        let mut place = match location {
-            Some(location) => format!("{}: bundle {address}", program.place_text(location)),
-            None => format!("bundle {address}"),
-        };
-        if let Some(slot) = slot.and_then(|slot| slots.get(usize::from(slot))) {
-            place.push_str(", slot ");
-            place.push_str(slot.name);
+impl FaultKind {
+    /// Its name, in a word or two.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            FaultKind::IllegalWord(_) => "illegal word",
+            FaultKind::ProgramCounter { .. } => "program counter",
+            FaultKind::DataAddress { .. } => "data address",
+            FaultKind::UnwrittenRegister { .. } => "unwritten register",
+            FaultKind::StackOverflow { .. } => "return stack full",
+            FaultKind::StackUnderflow => "return stack empty",
+            FaultKind::LoopBound { .. } => "loop bound",
+            FaultKind::CycleLimit { .. } => "cycle limit",
         }
-        Fault { cycle, address, slot, location, kind, place: place.into() }
+    }
+}
+
+impl Fault {
+    /// The fault in words, for the program that was running.
+    pub fn show<'a>(&'a self, program: &'a Program) -> ShownFault<'a> {
+        ShownFault { fault: self, program: Some(program) }
+    }
+
+    /// The place of the operation at fault in the source, or else that of its bundle, as far as the program knows it.
+    pub fn location(&self, program: &Program) -> Option<Location> {
+        let own = self.slot.and_then(|slot| program.operation_location(self.address, slot));
+        own.or_else(|| program.location(self.address))
     }
 }
 
 impl std::fmt::Display for Fault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}, cycle {}: {}", self.place, self.cycle, self.kind)
+        ShownFault { fault: self, program: None }.fmt(f)
     }
 }
 
-impl std::error::Error for Fault {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        Some(&self.kind)
+impl std::error::Error for Fault {}
+
+/// A [`Fault`] in words: in one line, `FILE:LINE: PLACE: MESSAGE`, or its parts.
+#[derive(Clone, Copy, Debug)]
+pub struct ShownFault<'a> {
+    fault: &'a Fault,
+    program: Option<&'a Program>,
+}
+
+impl ShownFault<'_> {
+    /// What happened.
+    pub fn message(&self) -> String {
+        match &self.fault.kind {
+            FaultKind::IllegalWord(reason) => format!("illegal word: {reason}"),
+            FaultKind::ProgramCounter { bundles } => {
+                let plural = if *bundles == 1 { "" } else { "s" };
+                format!("execution left the program, which has {bundles} bundle{plural}")
+            }
+            FaultKind::DataAddress { address, depth, store } => {
+                let does = if *store { "writes" } else { "reads" };
+                format!("{does} data word {address}, but the data memory has words 0 to {}", depth - 1)
+            }
+            FaultKind::UnwrittenRegister { register } => {
+                let name = match self.program {
+                    Some(program) => program.register_text(*register),
+                    None => format!("register {register}"),
+                };
+                format!("reads {name}, which was never written")
+            }
+            FaultKind::StackOverflow { depth } => {
+                format!("call with the return stack full ({depth} entries)")
+            }
+            FaultKind::StackUnderflow => "return with the return stack empty".to_owned(),
+            FaultKind::LoopBound { most } => {
+                format!("the loop iterates more often than its `.loop_bound {most}` allows")
+            }
+            FaultKind::CycleLimit { limit } => format!("limit of {limit} cycles reached"),
+        }
+    }
+
+    /// Where in the source it happened: `pd.s:12`.
+    fn source(&self, program: &Program) -> Option<String> {
+        let own = self.fault.slot.and_then(|slot| program.operation_place(self.fault.address, slot));
+        own.or_else(|| program.bundle_place(self.fault.address))
+    }
+
+    /// Where and when it happened: `bundle 12, slot add, cycle 44`.
+    pub fn place(&self) -> String {
+        let Fault { cycle, address, slot, .. } = *self.fault;
+        let slot = match (slot, self.program) {
+            (Some(slot), Some(program)) => format!(", slot {}", program.machine.slot(slot).name),
+            (Some(slot), None) => format!(", slot {slot}"),
+            (None, _) => String::new(),
+        };
+        format!("bundle {address}{slot}, cycle {cycle}")
+    }
+}
+
+impl std::fmt::Display for ShownFault<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if let Some(program) = self.program
+            && let Some(place) = self.source(program)
+        {
+            write!(f, "{place}: ")?;
+        }
+        write!(f, "{}: {}", self.place(), self.message())
     }
 }
 
@@ -146,10 +199,10 @@ pub enum LoadError {
         depth: u32,
     },
     /// A constant for a register that the loader cannot set.
-    #[error("constant for register address {register}, which {machine} {}", if *.register == takt_isa::ZERO { "keeps at zero" } else { "does not have" })]
+    #[error("constant for register address {register}, which {machine} {}", if *.register == Register::ZERO { "keeps at zero" } else { "does not have" })]
     Constant {
         /// The register.
-        register: u16,
+        register: Register,
         /// The machine.
         machine: &'static str,
     },
@@ -159,7 +212,7 @@ pub enum LoadError {
         /// The port's name.
         name: String,
         /// The register.
-        register: u16,
+        register: Register,
         /// The machine.
         machine: &'static str,
         /// `input` or `output`.

@@ -8,10 +8,11 @@
 //! cycle by the rules of [`takt_isa::timing`], which `docs/timing.md` says in prose. *Blocks* (`block`, `fast`) rest on
 //! what the machine promises: a straight line of bundles takes the same cycles every time. Each line's timing is found
 //! once, and from then on running it is arithmetic only. Whatever is out of the ordinary in a block (a fault, the cycle
-//! limit, somebody who observes) is left to the stepper. `tests/agreement.rs` holds the two against each other.
+//! limit, somebody who observes) is left to the stepper. `tests/agreement.rs` compares the two.
 //!
 //! Within both, instructions are known by their effects; none is named.
 
+mod batch;
 mod block;
 mod code;
 mod cycle;
@@ -27,10 +28,10 @@ mod system;
 #[cfg(feature = "testing")]
 pub mod testing;
 
-pub use code::MAX_SLOTS;
+pub use batch::Batch;
 pub use emulator::{Emulator, MAX_CYCLE, Observed, Status, Step, Stop, Upcoming};
 pub use event::{Event, PortWrite, Retire};
-pub use fault::{Fault, FaultKind, LoadError};
+pub use fault::{Fault, FaultKind, LoadError, ShownFault};
 pub use machine::MAX_NAN_WRITES;
 pub use statistics::Statistics;
 pub use system::{Number, PeriodError, PeriodReport, PortError};

@@ -2,26 +2,77 @@
 
 use crate::event::{PortWrite, Retire};
 use takt_isa::fp::{Flags, is_nan};
-use takt_isa::spec::machines::REGISTER_SPACE;
-use takt_isa::timing::{Address, Cycle};
-use takt_isa::{Machine, Program, ZERO};
+use takt_isa::spec::check::MAX_SLOTS;
+use takt_isa::spec::units::MAX_LATENCY;
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Machine, Program, Register, SlotIndex};
 
 /// Words of the register array: the register space, then the words that blocks use for themselves (`block`).
-pub(crate) const WORDS: usize = 2 * REGISTER_SPACE;
+pub(crate) const WORDS: usize = 2 * Register::COUNT;
+/// The first of the scratch words, one for each slot, for bundles that exchange registers.
+const SCRATCH: u16 = Register::COUNT as u16;
+/// The first of the words of late results: each bank is written at most once a cycle, at most [`MAX_LATENCY`] cycles after
+/// issue.
+const LATE: u16 = SCRATCH + MAX_SLOTS as u16;
+const _: () = assert!(WORDS.is_power_of_two(), "the mask of an index is all ones");
+const _: () = assert!(
+    LATE as usize + MAX_SLOTS * MAX_LATENCY as usize <= WORDS,
+    "late results overflow the register array"
+);
 /// NaNs on output ports that are kept until somebody takes them; more are only counted.
 pub const MAX_NAN_WRITES: usize = 256;
 
-/// A set of registers.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub(crate) struct RegisterSet([u64; REGISTER_SPACE / 64]);
+/// A word of the register array: a register, or one of those behind the registers.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Word(u16);
 
-impl RegisterSet {
-    pub(crate) fn insert(&mut self, register: u16) {
-        self.0[usize::from(register) / 64 % 16] |= 1 << (register % 64);
+impl Word {
+    /// The word of a slot, for a bundle that exchanges registers.
+    pub(crate) const fn scratch(slot: SlotIndex) -> Word {
+        Word(SCRATCH + slot.get() as u16)
     }
 
-    pub(crate) fn contains(&self, register: u16) -> bool {
-        self.0[usize::from(register) / 64 % 16] >> (register % 64) & 1 != 0
+    /// The word of a block's late result of this number, which is below `MAX_SLOTS * MAX_LATENCY`.
+    pub(crate) const fn late(number: usize) -> Word {
+        Word(LATE + number as u16)
+    }
+
+    /// The number of the late result whose word it is.
+    #[inline(always)]
+    pub(crate) const fn late_number(self) -> Option<usize> {
+        if self.0 >= LATE { Some((self.0 - LATE) as usize) } else { None }
+    }
+
+    /// As an index of the register array. (The mask changes nothing, but leaves the check of bounds out.)
+    #[inline(always)]
+    pub(crate) const fn index(self) -> usize {
+        self.0 as usize & (WORDS - 1)
+    }
+}
+
+impl From<Register> for Word {
+    #[inline(always)]
+    fn from(register: Register) -> Word {
+        Word(register.get())
+    }
+}
+
+/// A set of registers.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(crate) struct RegisterSet([u64; Register::COUNT / 64]);
+
+impl RegisterSet {
+    pub(crate) fn insert(&mut self, register: Register) {
+        self.0[register.index() / 64] |= 1 << (register.index() % 64);
+    }
+
+    pub(crate) fn contains(&self, register: Register) -> bool {
+        self.0[register.index() / 64] >> (register.index() % 64) & 1 != 0
+    }
+
+    /// How many there are.
+    pub(crate) fn len(&self) -> u32 {
+        self.0.iter().map(|word| word.count_ones()).sum()
     }
 
     pub(crate) fn insert_all(&mut self, other: &RegisterSet) {
@@ -38,7 +89,7 @@ impl RegisterSet {
 pub(crate) struct Pending {
     /// The operation, complete; `register` is always there.
     pub(crate) retire: Retire,
-    pub(crate) register: u16,
+    pub(crate) register: Register,
     pub(crate) output: bool,
     /// Whether a NaN is to be reported.
     pub(crate) float: bool,
@@ -66,7 +117,7 @@ pub(crate) struct State {
     pub(crate) registers: Box<[u32; WORDS]>,
     pub(crate) written: RegisterSet,
     pub(crate) memory: Vec<u32>,
-    pub(crate) stack: Vec<Address>,
+    pub(crate) stack: Vec<BundleAddress>,
     pub(crate) flags: Flags,
     /// In the order of issue.
     pub(crate) pending: Vec<Pending>,
@@ -79,12 +130,12 @@ pub(crate) struct State {
 #[derive(Clone, Debug)]
 pub(crate) struct Latches {
     /// The inputs as the host has set them.
-    inputs: [u32; REGISTER_SPACE],
+    pub(crate) inputs: [u32; Register::COUNT],
     /// The outputs as they were published, and which of them were ever written.
-    outputs: [u32; REGISTER_SPACE],
-    published: RegisterSet,
+    pub(crate) outputs: [u32; Register::COUNT],
+    pub(crate) published: RegisterSet,
     /// Inputs that were set since they were last taken.
-    changed: Vec<u16>,
+    pub(crate) changed: Vec<Register>,
     /// Whether they are to be taken at the beginning of the cycle to come.
     pub(crate) take: bool,
 }
@@ -93,8 +144,8 @@ impl Latches {
     /// After reset: what the loader wrote to outputs stands there, and inputs are taken before the first cycle.
     fn new(state: &State, machine: &Machine) -> Latches {
         let mut latches = Latches {
-            inputs: [0; REGISTER_SPACE],
-            outputs: [0; REGISTER_SPACE],
+            inputs: [0; Register::COUNT],
+            outputs: [0; Register::COUNT],
             published: RegisterSet::default(),
             changed: Vec::new(),
             take: true,
@@ -104,13 +155,10 @@ impl Latches {
     }
 
     fn publish(&mut self, state: &State, machine: &Machine) {
-        for slot in 0..machine.slots.len() {
-            for number in 0..machine.outputs_per_bank {
-                let register = machine.output_register(slot, number);
-                if state.written.contains(register) {
-                    self.outputs[usize::from(register)] = state.get(register);
-                    self.published.insert(register);
-                }
+        for register in machine.slots.iter().flat_map(|slot| machine.output_registers(slot)) {
+            if state.written.contains(register) {
+                self.outputs[register.index()] = state.get(register);
+                self.published.insert(register);
             }
         }
     }
@@ -131,7 +179,7 @@ impl State {
             nan_writes: NanWrites::default(),
             latches: None,
         };
-        state.written.insert(ZERO);
+        state.written.insert(Register::ZERO);
         for &(register, bits) in &program.constants {
             state.set(register, bits);
         }
@@ -142,9 +190,9 @@ impl State {
     }
 
     /// The host sets an input port.
-    pub(crate) fn set_input(&mut self, register: u16, bits: u32) {
+    pub(crate) fn set_input(&mut self, register: Register, bits: u32) {
         let Some(latches) = &mut self.latches else { return self.set(register, bits) };
-        latches.inputs[usize::from(register) % REGISTER_SPACE] = bits;
+        latches.inputs[register.index()] = bits;
         if !latches.changed.contains(&register) {
             latches.changed.push(register);
         }
@@ -155,8 +203,7 @@ impl State {
         let Some(latches) = &mut self.latches else { return };
         latches.take = false;
         for register in latches.changed.drain(..) {
-            let place = usize::from(register) % REGISTER_SPACE;
-            self.registers[place] = latches.inputs[place];
+            self.registers[register.index()] = latches.inputs[register.index()];
             self.written.insert(register);
         }
     }
@@ -177,25 +224,22 @@ impl State {
     }
 
     /// What the outside sees on an output port; `None` if nothing was ever written there.
-    pub(crate) fn output(&self, register: u16) -> Option<u32> {
+    pub(crate) fn output(&self, register: Register) -> Option<u32> {
         match &self.latches {
             None => self.written.contains(register).then(|| self.get(register)),
-            Some(latches) => {
-                let place = usize::from(register) % REGISTER_SPACE;
-                latches.published.contains(register).then(|| latches.outputs[place])
-            }
+            Some(latches) => latches.published.contains(register).then(|| latches.outputs[register.index()]),
         }
     }
 
     #[inline]
-    pub(crate) fn get(&self, register: u16) -> u32 {
-        self.registers[usize::from(register) % WORDS]
+    pub(crate) fn get(&self, word: impl Into<Word>) -> u32 {
+        self.registers[word.into().index()]
     }
 
     /// Writes a register for all to see.
     #[inline]
-    pub(crate) fn set(&mut self, register: u16, bits: u32) {
-        self.registers[usize::from(register) % WORDS] = bits;
+    pub(crate) fn set(&mut self, register: Register, bits: u32) {
+        self.registers[register.index()] = bits;
         self.written.insert(register);
     }
 

@@ -1,28 +1,17 @@
 //! Micros: a block's operations as a flat list, one after the other, that does what its bundles do.
 //!
-//! Micros write registers at once, although the results are underway for some cycles yet. Nobody can tell, as the
-//! interlocks keep every operation from reading or overwriting a register with a result underway; except at the block's
-//! end, where somebody may look. So results that are still underway then (*late* ones) go to words of their own in the
+//! Micros write registers at once, although the results are in flight for some cycles yet. Nobody can tell, as the
+//! interlocks keep every operation from reading or overwriting a register with a result in flight; except at the block's
+//! end, where somebody may look. So results that are still in flight then (*late* ones) go to words of their own in the
 //! register array, from which they become [`crate::machine::Pending`].
 
-use crate::code::{MAX_SLOTS, Operation};
+use crate::code::Operation;
 use crate::event::PortWrite;
 use crate::execute::data_address;
-use crate::machine::{RegisterSet, WORDS};
+use crate::machine::{RegisterSet, WORDS, Word};
 use takt_isa::fp::{Flags, Host, Value, is_nan};
-use takt_isa::spec::machines::REGISTER_SPACE;
-use takt_isa::spec::units::MAX_LATENCY;
-use takt_isa::timing::{Address, Cycle};
-use takt_isa::{Effect, Op, ZERO, compute};
-
-/// Scratch words, one for each slot, for bundles that exchange registers.
-const SCRATCH: u16 = REGISTER_SPACE as u16;
-/// The words of late results: each bank is written at most once a cycle, at most [`MAX_LATENCY`] cycles after issue.
-pub(crate) const LATE: u16 = SCRATCH + MAX_SLOTS as u16;
-const _: () = assert!(
-    LATE as usize + MAX_SLOTS * MAX_LATENCY as usize <= WORDS,
-    "late results overflow the register array"
-);
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Effect, Op, Register, SlotIndex, compute};
 
 /// What a micro does.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -48,28 +37,28 @@ pub(crate) enum Kind {
 /// A pre-decoded operation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Micro {
-    kind: Kind,
-    op: Op,
-    dest: u16,
-    a: u16,
-    b: u16,
-    c: u16,
-    constant: u32,
+    pub(crate) kind: Kind,
+    pub(crate) op: Op,
+    pub(crate) dest: Word,
+    pub(crate) a: Word,
+    pub(crate) b: Word,
+    pub(crate) c: Word,
+    pub(crate) constant: u32,
 }
 
 impl Micro {
-    fn new(kind: Kind, operation: &Operation, dest: u16) -> Micro {
-        let [a, b, c] = operation.sources;
+    fn new(kind: Kind, operation: &Operation, dest: Word) -> Micro {
+        let [a, b, c] = operation.sources.map(Word::from);
         Micro { kind, op: operation.op, dest, a, b, c, constant: operation.constant }
     }
 }
 
-/// A result that is underway at the block's end.
+/// A result that is in flight at the block's end.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Late {
     pub(crate) operation: Operation,
-    pub(crate) register: u16,
-    pub(crate) address: Address,
+    pub(crate) register: Register,
+    pub(crate) address: BundleAddress,
     /// Cycle of its issue, from the block's entry.
     pub(crate) offset: u32,
 }
@@ -77,9 +66,9 @@ pub(crate) struct Late {
 /// A write to an output port that carries binary32.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Check {
-    slot: u8,
-    register: u16,
-    address: Address,
+    slot: SlotIndex,
+    register: Register,
+    address: BundleAddress,
     /// Cycle of its writeback, from the block's entry.
     offset: u32,
 }
@@ -90,26 +79,6 @@ impl Check {
         let Check { slot, register, address, offset } = *self;
         PortWrite { cycle: entered + Cycle::from(offset), slot, address, register, value, nan: true }
     }
-}
-
-/// How a block ends.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Ending {
-    /// The line was cut, or the next bundle cannot execute: at the next bundle.
-    Sequential,
-    /// At the target.
-    Jump(Address),
-    /// At the target if the register is zero, or is not zero; else at the next bundle. (What its own bundle computes is
-    /// late, so that the register still has its old value when the micros have run.)
-    Branch { register: u16, zero: bool, target: Address },
-    /// At the target, the next address pushed.
-    Call(Address),
-    /// At the address popped.
-    Return,
-    /// At the target, on the tick.
-    Wait(Address),
-    /// Nowhere.
-    Halt,
 }
 
 /// Makes micros of bundles.
@@ -141,7 +110,7 @@ impl Emitter {
     }
 
     /// Appends the micros of a bundle.
-    pub(crate) fn bundle(&mut self, address: Address, offset: u32, operations: &[Operation]) {
+    pub(crate) fn bundle(&mut self, address: BundleAddress, offset: u32, operations: &[Operation]) {
         let first_check = self.checks.len();
         let start = self.micros.len();
         let mut bundle = Vec::with_capacity(operations.len());
@@ -151,7 +120,7 @@ impl Emitter {
                 Some(register) if late => {
                     self.split.get_or_insert(start);
                     self.late.push(Late { operation: *operation, register, address, offset });
-                    LATE + (self.late.len() - 1) as u16
+                    Word::late(self.late.len() - 1)
                 }
                 Some(register) => {
                     self.writes.insert(register);
@@ -159,9 +128,9 @@ impl Emitter {
                         let offset = offset + operation.latency;
                         self.checks.push(Check { slot: operation.slot, register, address, offset });
                     }
-                    register
+                    register.into()
                 }
-                None => ZERO,
+                None => Register::ZERO.into(),
             };
             let kind = match operation.effect {
                 Effect::Compute => Kind::Compute,
@@ -170,20 +139,21 @@ impl Emitter {
                 Effect::Store => Kind::Store,
                 Effect::ReadFlags => Kind::ReadFlags,
                 Effect::ClearFlags => Kind::ClearFlags,
-                // These are the block's ending.
+                // These are the block's ending, its flow.
                 Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => continue,
                 Effect::Call | Effect::Return | Effect::Wait | Effect::Halt | Effect::Nothing => continue,
             };
             if matches!(kind, Kind::Load | Kind::Store) {
-                let fixed = operation.sources[0] == ZERO && operation.constant < self.depth;
+                let fixed = operation.sources[0] == Register::ZERO && operation.constant < self.depth;
                 self.can_fault |= !fixed;
             }
             bundle.push((operation, Micro::new(kind, operation, dest)));
         }
         self.order(bundle);
         for (i, check) in self.checks.iter().enumerate().skip(first_check) {
-            let (kind, a, constant) = (Kind::Check, check.register, i as u32);
-            self.micros.push(Micro { kind, op: Op::nop, dest: ZERO, a, b: 0, c: 0, constant });
+            let (kind, a, constant) = (Kind::Check, check.register.into(), i as u32);
+            let zero = Register::ZERO.into();
+            self.micros.push(Micro { kind, op: Op::nop, dest: zero, a, b: zero, c: zero, constant });
         }
     }
 
@@ -197,49 +167,23 @@ impl Emitter {
             let flags_left = bundle.iter().any(|(_, micro)| on_flags(micro));
             let candidates = || (0..bundle.len()).filter(|&i| !flags_left || on_flags(&bundle[i].1));
             let is_read = |i: usize| {
-                let dest = bundle[i].1.dest;
-                let others = bundle.iter().enumerate().filter(|&(j, _)| j != i);
-                let writes = bundle[i].0.dest.is_some();
-                writes && others.into_iter().any(|(_, (operation, _))| operation.reads().contains(&dest))
+                let (operation, micro) = &bundle[i];
+                // A late result goes to a word that nobody reads.
+                let dest = operation.dest.filter(|&register| micro.dest == register.into());
+                let mut others = bundle.iter().enumerate().filter(|&(j, _)| j != i);
+                dest.is_some_and(|dest| others.any(|(_, (operation, _))| operation.reads().contains(&dest)))
             };
             if let Some(i) = candidates().find(|&i| !is_read(i)) {
                 self.micros.push(bundle.remove(i).1);
             } else if let Some(i) = candidates().next() {
                 let (operation, mut micro) = bundle.remove(i);
-                let scratch = SCRATCH + u16::from(operation.slot);
+                let scratch = Word::scratch(operation.slot);
                 moves.push(Micro { kind: Kind::Move, a: scratch, ..micro });
                 micro.dest = scratch;
                 self.micros.push(micro);
             }
         }
         self.micros.append(&mut moves);
-    }
-
-    /// The ending of a block with these operations in its last bundle.
-    pub(crate) fn ending(operations: &[Operation]) -> Ending {
-        let Some(operation) = operations.iter().find(|operation| operation.effect.redirects()) else {
-            return Ending::Sequential;
-        };
-        let target = operation.constant;
-        match operation.effect {
-            Effect::Jump => Ending::Jump(target),
-            Effect::BranchZero | Effect::BranchNonzero => Ending::Branch {
-                register: operation.sources[0],
-                zero: operation.effect == Effect::BranchZero,
-                target,
-            },
-            Effect::Call => Ending::Call(target),
-            Effect::Return => Ending::Return,
-            Effect::Wait => Ending::Wait(target),
-            Effect::Halt => Ending::Halt,
-            Effect::Compute
-            | Effect::Nothing
-            | Effect::Immediate
-            | Effect::Load
-            | Effect::Store
-            | Effect::ReadFlags
-            | Effect::ClearFlags => Ending::Sequential,
-        }
     }
 }
 
@@ -266,7 +210,7 @@ pub(crate) fn run<const TAIL: bool>(micros: &[Micro], context: &mut Context<'_>)
     let mut flags = context.flags;
     let registers = &mut *context.registers;
     for micro in micros {
-        let [a, b, c] = [micro.a, micro.b, micro.c].map(|word| registers[usize::from(word) % WORDS]);
+        let [a, b, c] = [micro.a, micro.b, micro.c].map(|word| registers[word.index()]);
         let value = match micro.kind {
             Kind::Compute => compute::<Host>(micro.op, a, b, c),
             Kind::Immediate => Value::exact(micro.constant),
@@ -295,9 +239,9 @@ pub(crate) fn run<const TAIL: bool>(micros: &[Micro], context: &mut Context<'_>)
                 continue;
             }
         };
-        registers[usize::from(micro.dest) % WORDS] = value.bits;
-        if TAIL && micro.dest >= LATE {
-            if let Some(late) = context.late.get_mut(usize::from(micro.dest - LATE)) {
+        registers[micro.dest.index()] = value.bits;
+        if TAIL && let Some(number) = micro.dest.late_number() {
+            if let Some(late) = context.late.get_mut(number) {
                 let word = (micro.kind == Kind::Load).then(|| data_address(micro.constant, a) as u32);
                 *late = (value.flags, word);
             }

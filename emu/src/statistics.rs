@@ -1,8 +1,8 @@
 //! Where the cycles went.
 
 use std::collections::{BTreeMap, HashMap};
-use takt_isa::timing::{Address, Cause, Cycle};
-use takt_isa::{Op, ROWS};
+use takt_isa::timing::{Cause, Cycle};
+use takt_isa::{BundleAddress, Op, ROWS};
 
 /// Everything counted since reset. `cycles = bundles + stalled()`, always.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -17,7 +17,7 @@ pub struct Statistics {
     pub visits: Vec<u64>,
     /// Stalled cycles, by the bundle that could not issue and the cause. For [`Cause::Wait`] that is the waiting bundle
     /// itself.
-    pub causes: BTreeMap<(Address, Cause), u64>,
+    pub causes: BTreeMap<(BundleAddress, Cause), u64>,
     /// Ticks seen.
     pub ticks: u64,
     /// Of these, how many came before the program waited, and were remembered.
@@ -60,7 +60,7 @@ pub(crate) struct Tally {
     pub(crate) bundles: u64,
     pub(crate) operations: [u64; ROWS.len()],
     pub(crate) visits: Vec<u64>,
-    pub(crate) causes: HashMap<(Address, Cause), u64>,
+    pub(crate) causes: HashMap<(BundleAddress, Cause), u64>,
     /// Cycles waited, by the address of the `wait`: apart because every period adds to one of them.
     pub(crate) waits: Vec<u64>,
 }
@@ -76,28 +76,29 @@ impl Tally {
         }
     }
 
-    pub(crate) fn stall(&mut self, address: Address, cause: Cause, cycles: u64) {
+    pub(crate) fn stall(&mut self, address: BundleAddress, cause: Cause, cycles: u64) {
         if cycles > 0 {
             *self.causes.entry((address, cause)).or_default() += cycles;
         }
     }
 
-    pub(crate) fn wait(&mut self, address: Address, cycles: u64) {
-        self.waits[address as usize] += cycles;
+    pub(crate) fn wait(&mut self, address: BundleAddress, cycles: u64) {
+        self.waits[address.index()] += cycles;
     }
 
-    pub(crate) fn issue(&mut self, address: Address, operations: impl Iterator<Item = Op>) {
+    pub(crate) fn issue(&mut self, address: BundleAddress, operations: impl Iterator<Item = Op>) {
         self.bundles += 1;
-        self.visits[address as usize] += 1;
+        self.visits[address.index()] += 1;
         for op in operations {
             self.operations[op as usize] += 1;
         }
     }
 
     /// The causes as a sorted table, waiting included.
-    pub(crate) fn causes(&self) -> BTreeMap<(Address, Cause), u64> {
-        let waits = self.waits.iter().enumerate().filter(|&(_, &cycles)| cycles > 0);
-        let waits = waits.map(|(address, &cycles)| ((address as Address, Cause::Wait), cycles));
+    pub(crate) fn causes(&self) -> BTreeMap<(BundleAddress, Cause), u64> {
+        let addresses = (0..).map(BundleAddress::new);
+        let waits = addresses.zip(&self.waits).filter(|&(_, &cycles)| cycles > 0);
+        let waits = waits.map(|(address, &cycles)| ((address, Cause::Wait), cycles));
         self.causes.iter().map(|(&key, &cycles)| (key, cycles)).chain(waits).collect()
     }
 }

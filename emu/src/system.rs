@@ -5,9 +5,9 @@ use crate::event::{Event, PortWrite};
 use crate::fault::Fault;
 use std::collections::BTreeSet;
 use std::num::NonZeroU64;
-use takt_isa::Type;
 use takt_isa::program::Port;
-use takt_isa::timing::{self, Address, Cycle};
+use takt_isa::timing::{self, Cycle};
+use takt_isa::{BundleAddress, Register, Type};
 
 /// Ticks to come and ticks that came.
 #[derive(Clone, Debug, Default)]
@@ -53,19 +53,45 @@ impl Ticks {
         asked || regular
     }
 
+    /// The same ticks, each so many cycles later.
+    pub(crate) fn shifted(&self, by: i64) -> Ticks {
+        let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
+        Ticks {
+            asked: self.asked.iter().copied().map(shift).collect(),
+            regular: self.regular.map(shift),
+            remembered: self.remembered.map(shift),
+            waited: self.waited.map(shift),
+            ..*self
+        }
+    }
+
+    /// Whether the ticks to come, and one that is remembered, are the same.
+    pub(crate) fn agree(&self, other: &Ticks) -> bool {
+        let to_come = |ticks: &Ticks| (ticks.every, ticks.regular, ticks.remembered, ticks.waited.is_some());
+        to_come(self) == to_come(other) && self.asked == other.asked
+    }
+
     /// Sets the regular ticks going: the first is in the first cycle after `cycle` that is a multiple of their distance.
     fn start(&mut self, cycle: Cycle) {
         self.regular = self.every.map(|every| (cycle / every + 1).saturating_mul(every.get()));
     }
 }
 
-/// A period underway.
+/// The current period.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Period {
     tick: Cycle,
     start: Cycle,
     missed: u64,
     lost: u64,
+}
+
+impl Period {
+    /// The same period, so many cycles later.
+    pub(crate) fn shifted(self, by: i64) -> Period {
+        let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
+        Period { tick: shift(self.tick), start: shift(self.start), ..self }
+    }
 }
 
 /// A period that has ended.
@@ -86,6 +112,16 @@ pub struct PeriodReport {
     pub lost: u64,
     /// NaNs written to output ports since the last report.
     pub nan_writes: Vec<PortWrite>,
+}
+
+impl PeriodReport {
+    /// The same report, so many cycles later, with other NaNs.
+    pub(crate) fn shifted(&self, by: i64, nan_writes: &[PortWrite]) -> PeriodReport {
+        let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
+        let (tick, start, wait) = (shift(self.tick), shift(self.start), shift(self.wait));
+        let PeriodReport { cycles, missed, lost, .. } = *self;
+        PeriodReport { tick, start, wait, cycles, missed, lost, nan_writes: nan_writes.to_vec() }
+    }
 }
 
 /// A value for an input port.
@@ -137,7 +173,7 @@ impl Number {
     }
 
     /// Whether it may stand for a value of this type.
-    fn fits(self, ty: Type) -> bool {
+    pub(crate) fn fits(self, ty: Type) -> bool {
         matches!(
             (self, ty),
             (Number::Bits(_), _) | (_, Type::B) | (Number::Float(_), Type::F) | (Number::Integer(_), Type::I)
@@ -164,11 +200,19 @@ pub enum PortError {
         /// What it carries.
         ty: Type,
     },
+    /// Values for another number of lanes than the batch has ([`crate::Batch`]).
+    #[error("{given} values for {lanes} lanes")]
+    Lanes {
+        /// Values given.
+        given: usize,
+        /// Lanes of the batch.
+        lanes: usize,
+    },
     /// The machine has no input port at this address.
     #[error("register address {register} is no input port")]
     NoInput {
         /// The address.
-        register: u16,
+        register: Register,
     },
 }
 
@@ -176,13 +220,13 @@ pub enum PortError {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PeriodError {
     /// A fault.
-    #[error(transparent)]
+    #[error("{0}")]
     Fault(#[from] Fault),
     /// An input could not be set; nothing has run.
     #[error(transparent)]
     Port(#[from] PortError),
     /// The machine has halted.
-    #[error("the machine has halted")]
+    #[error("the machine has halted; each period must end with `wait`")]
     Halted,
 }
 
@@ -214,7 +258,7 @@ impl Emulator {
     ///
     /// # Errors
     /// If the machine has no such port.
-    pub fn set_input_bits(&mut self, register: u16, bits: u32) -> Result<(), PortError> {
+    pub fn set_input_bits(&mut self, register: Register, bits: u32) -> Result<(), PortError> {
         if !self.machine().is_input(register) {
             return Err(PortError::NoInput { register });
         }
@@ -224,7 +268,7 @@ impl Emulator {
 
     /// What the outside sees on an output port, by its register: what was last written there, or, if ports are latched, what
     /// was last published. `None` if nothing ever was, or if there is no such port.
-    pub fn output_bits(&self, register: u16) -> Option<u32> {
+    pub fn output_bits(&self, register: Register) -> Option<u32> {
         self.machine().is_output(register).then(|| self.state.output(register))?
     }
 
@@ -239,7 +283,7 @@ impl Emulator {
         Ok(self.output_bits(port.register).map(|bits| Number::of(port.ty, bits)))
     }
 
-    fn input_for(&self, name: &str, value: Number) -> Result<u16, PortError> {
+    fn input_for(&self, name: &str, value: Number) -> Result<Register, PortError> {
         let Some(port) = self.input_port(name) else {
             return Err(PortError::Unknown { name: name.to_owned(), kind: "input" });
         };
@@ -316,7 +360,7 @@ impl Emulator {
     }
 
     /// A `wait` has issued in `cycle`, after the tick, if any, was seen.
-    pub(crate) fn wait_issued(&mut self, cycle: Cycle, address: Address, target: Address) {
+    pub(crate) fn wait_issued(&mut self, cycle: Cycle, address: BundleAddress, target: BundleAddress) {
         if self.ticks.waited.is_none() {
             self.ticks.start(cycle);
         }

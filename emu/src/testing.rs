@@ -6,8 +6,10 @@
 
 use takt_isa::program::{LoopBound, Port, Section};
 use takt_isa::shape::WORD_BITS;
-use takt_isa::spec::machines::REGISTER_SPACE;
-use takt_isa::{Effect, Function, Instruction, Machine, Op, Operand, Program, ROWS, Row, Type, ZERO};
+use takt_isa::{
+    BankIndex, BundleAddress, Effect, Function, Instruction, Machine, Op, Operand, Program, ROWS, Register,
+    Row, SlotIndex, Type,
+};
 
 /// What a random program is like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,11 +95,11 @@ impl Random {
 
 /// Registers that random operations read and write, of each bank; and how many of its output ports.
 const POOL: u32 = 8;
-const OUTPUTS: u16 = 2;
-/// Input ports that are read, and to be set: `in0`, ….
-pub const INPUTS: u16 = 4;
+const OUTPUTS: usize = 2;
+/// How many input ports random programs read.
+pub const INPUTS: usize = 4;
 /// Registers at the start of the first slot's bank that hold word addresses and are never written.
-const BASES: u16 = 4;
+const BASES: usize = 4;
 
 /// The random program of a seed: the same for the same arguments. The host is to set its inputs before it runs.
 pub fn random_program(seed: u64, machine: &'static Machine, options: Options) -> Program {
@@ -109,38 +111,36 @@ struct Generator {
     machine: &'static Machine,
     options: Options,
     /// Readable registers.
-    sources: Vec<u16>,
+    sources: Vec<Register>,
     /// Registers of each slot that operations may write.
-    dests: Vec<Vec<u16>>,
-    bases: Vec<(u16, u32)>,
-    constants: Vec<(u16, u32)>,
+    dests: Vec<Vec<BankIndex>>,
+    bases: Vec<(Register, u32)>,
+    constants: Vec<(Register, u32)>,
     bundles: Vec<Vec<u64>>,
     /// Instructions that await the address of a subroutine: bundle, slot, which.
-    calls: Vec<(usize, usize)>,
+    calls: Vec<(usize, SlotIndex)>,
     loop_bounds: Vec<LoopBound>,
 }
 
 impl Generator {
     fn new(seed: u64, machine: &'static Machine, options: Options) -> Generator {
         let mut random = Random::new(seed);
-        let mut sources: Vec<u16> = (0..INPUTS).map(|i| machine.inputs.base + i).chain([ZERO]).collect();
+        let mut sources: Vec<Register> = input_ports(machine).chain([Register::ZERO]).collect();
         let mut constants = Vec::new();
         let mut dests = Vec::new();
-        let pool = 1 + random.below(POOL) as u16;
+        let pool = 1 + random.below(POOL) as usize;
         for slot in machine.slots {
             // The first registers are spared for bases and counters.
-            let ordinary = (0..pool).map(|i| slot.bank.base + 2 * BASES + i);
-            let outputs =
-                (0..OUTPUTS).map(|i| slot.bank.base + slot.bank.depth - machine.outputs_per_bank + i);
-            let all: Vec<u16> = ordinary.chain(outputs).collect();
+            let ordinary = slot.bank.registers().skip(2 * BASES).take(pool);
+            let all: Vec<Register> = ordinary.chain(machine.output_registers(slot).take(OUTPUTS)).collect();
             constants.extend(all.iter().map(|&register| (register, random.word())));
             sources.extend(&all);
-            dests.push(all);
+            dests.push(all.iter().filter_map(|&register| slot.bank.index(register)).collect());
         }
-        let base = machine.slots[0].bank.base;
         let words = machine.data_depth.min(500);
-        let bases: Vec<(u16, u32)> =
-            (0..BASES).map(|i| (base + i, random.below(words + 50).wrapping_sub(50))).collect();
+        let bases = machine.slots[0].bank.registers().take(BASES);
+        let bases: Vec<(Register, u32)> =
+            bases.map(|base| (base, random.below(words + 50).wrapping_sub(50))).collect();
         constants.extend(&bases);
         Generator {
             random,
@@ -186,22 +186,23 @@ impl Generator {
             self.control(last, Effect::Return, 0, None);
         }
         for (bundle, slot) in std::mem::take(&mut self.calls) {
-            self.bundles[bundle][slot] = filler();
+            self.bundles[bundle][slot.index()] = filler();
         }
         if self.options.wild {
             self.derange();
         }
         let port = |name: String, register, ty| Port { name, register, ty };
-        let inputs = (0..INPUTS).map(|i| port(format!("in{i}"), machine.inputs.base + i, Type::B)).collect();
+        let inputs = input_ports(machine).enumerate();
+        let inputs = inputs.map(|(i, register)| port(format!("in{i}"), register, Type::B)).collect();
         // The second port of a bank is an integer's: no NaN there.
-        let outputs = self.dests.iter().flat_map(|bank| {
-            let ports = &bank[bank.len() - usize::from(OUTPUTS)..];
-            ports
-                .iter()
-                .zip([Type::F, Type::I])
-                .map(|(&register, ty)| port(format!("out{register}"), register, ty))
+        let outputs = machine.slots.iter().flat_map(|slot| {
+            let ports = machine.output_registers(slot).take(OUTPUTS).zip([Type::F, Type::I]);
+            ports.map(|(register, ty)| port(format!("out{register}"), register, ty))
         });
-        let section = |name: &str, start, end| Section { name: name.to_owned(), start, end };
+        let section = |name: &str, start, end| {
+            let (start, end) = (BundleAddress::new(start), BundleAddress::new(end));
+            Section { name: name.to_owned(), start, end }
+        };
         self.constants.sort_unstable();
         self.loop_bounds.sort_unstable_by_key(|bound| bound.address);
         Program {
@@ -214,6 +215,7 @@ impl Generator {
             registers: Vec::new(),
             symbols: Vec::new(),
             loop_bounds: self.loop_bounds,
+            parts: Vec::new(),
             latched: false,
             sections: vec![section("once", 0, period), section("period", period, end)],
             files: Vec::new(),
@@ -255,22 +257,24 @@ impl Generator {
 
     /// A loop of a few rounds, with branches and perhaps another loop in it. `depth` is 0 or 1: each depth counts in a
     /// register of its own.
-    fn repeat(&mut self, depth: u16) {
+    fn repeat(&mut self, depth: usize) {
         let Some((slot, _)) = self.machine.host(Op::isub.row().function) else { return };
-        let (index, one_index) = (BASES + 2 * depth, BASES + 1);
-        let [counter, one] = [index, one_index].map(|index| self.machine.slots[slot].bank.base + index);
+        let places = [BASES + 2 * depth, BASES + 1].map(BankIndex::new);
+        let bank = &self.machine.slot(slot).bank;
+        let [Some(index), Some(one_index)] = places else { return };
+        let (Some(counter), Some(one)) = (bank.register(index), bank.register(one_index)) else { return };
         let rounds = 1 + self.random.below(5);
         let set =
             |dest, constant| Instruction { dest, constant, ..Instruction::bare(op_with(Effect::Immediate)) };
         for (index, value) in [(index, rounds), (one_index, 1)] {
             let mut bundle = self.nops();
-            bundle[slot] = word(&set(index, value));
+            bundle[slot.index()] = word(&set(index, value));
             self.bundles.push(bundle);
         }
         let start = self.bundles.len() as u32;
         // A wild program may promise too little.
         let most = if self.options.wild { 1 + self.random.below(5) } else { rounds };
-        self.loop_bounds.push(LoopBound { address: start, most });
+        self.loop_bounds.push(LoopBound { address: BundleAddress::new(start), most });
         for _ in 0..1 + self.random.below(4) {
             match self.random.below(8) {
                 0 => self.skip(),
@@ -279,8 +283,9 @@ impl Generator {
             }
         }
         let mut bundle = self.nops();
-        bundle[slot] =
-            word(&Instruction { dest: index, sources: [counter, one, 0], ..Instruction::bare(Op::isub) });
+        let mut count = Instruction { dest: index, ..Instruction::bare(Op::isub) };
+        (count.sources[0], count.sources[1]) = (counter, one);
+        bundle[slot.index()] = word(&count);
         self.bundles.push(bundle);
         let at = self.bundles.len();
         self.plain();
@@ -328,10 +333,7 @@ impl Generator {
         let mut instruction = Instruction::bare(row.op);
         for operand in row.shape.operands() {
             match *operand {
-                Operand::Dest => {
-                    let bank = &self.machine.slots[slot].bank;
-                    instruction.dest = *self.random.pick(&self.dests[slot]) - bank.base;
-                }
+                Operand::Dest => instruction.dest = *self.random.pick(&self.dests[slot]),
                 Operand::Source(n) => instruction.sources[n] = *self.random.pick(&self.sources),
                 Operand::Immediate => instruction.constant = self.random.word(),
                 Operand::Target => {}
@@ -341,7 +343,7 @@ impl Generator {
                     let word = 60 + self.random.below(8);
                     let offset = word.wrapping_sub(value);
                     let near = offset < 4096;
-                    instruction.sources[0] = if near { base } else { ZERO };
+                    instruction.sources[0] = if near { base } else { Register::ZERO };
                     instruction.constant = if near { offset } else { word };
                 }
             }
@@ -350,7 +352,13 @@ impl Generator {
     }
 
     /// Puts an operation with this effect into a bundle; the slot that it went to.
-    fn control(&mut self, bundle: usize, effect: Effect, target: u32, source: Option<u16>) -> Option<usize> {
+    fn control(
+        &mut self,
+        bundle: usize,
+        effect: Effect,
+        target: u32,
+        source: Option<Register>,
+    ) -> Option<SlotIndex> {
         let op = op_with(effect);
         let (slot, _) = self.machine.host(op.row().function)?;
         let mut instruction = Instruction::bare(op);
@@ -358,16 +366,17 @@ impl Generator {
             instruction.constant = target;
         }
         if op.row().shape.sources() > 0 {
-            instruction.sources[0] = source.unwrap_or(ZERO);
+            instruction.sources[0] = source.unwrap_or(Register::ZERO);
         }
-        self.bundles[bundle][slot] = word(&instruction);
+        self.bundles[bundle][slot.index()] = word(&instruction);
         Some(slot)
     }
 
-    fn retarget(&mut self, bundle: usize, slot: usize, target: u32) {
-        if let Ok(mut instruction) = Instruction::decode(self.bundles[bundle][slot]) {
+    fn retarget(&mut self, bundle: usize, slot: SlotIndex, target: u32) {
+        let place = &mut self.bundles[bundle][slot.index()];
+        if let Ok(mut instruction) = Instruction::decode(*place) {
             instruction.constant = target;
-            self.bundles[bundle][slot] = word(&instruction);
+            *place = word(&instruction);
         }
     }
 
@@ -388,7 +397,7 @@ impl Generator {
                 _ => self.machine.data_depth.saturating_sub(2) + self.random.below(4),
             };
             instruction.sources[0] = match self.random.below(3) {
-                0 => ZERO,
+                0 => Register::ZERO,
                 1 => self.random.pick(&self.bases).0,
                 _ => *self.random.pick(&self.sources),
             };
@@ -402,7 +411,7 @@ impl Generator {
         for _ in 0..1 + self.random.below(3) {
             let (bundle, slot) = (self.random.below(bundles) as usize, self.random.below(slots) as usize);
             let (mut target, register) =
-                (self.random.below(bundles + 2), self.random.below(REGISTER_SPACE as u32) as u16);
+                (self.random.below(bundles + 2), self.random.below(Register::COUNT as u32) as usize);
             if self.random.once_in(8) {
                 // Where a program memory that ignores an address's upper bits would find a bundle.
                 target += self.machine.code_depth << self.random.below(4);
@@ -424,8 +433,10 @@ impl Generator {
                 13 | 14 => self.bundles[bundle][slot] ^= 1 << self.random.below(WORD_BITS),
                 _ => {
                     // Another source, or base: unwritten, or any value at all.
-                    let source =
-                        if self.random.once_in(2) { register } else { *self.random.pick(&self.sources) };
+                    let source = match Register::new(register).filter(|_| self.random.once_in(2)) {
+                        Some(register) => register,
+                        None => *self.random.pick(&self.sources),
+                    };
                     let words = self.bundles.iter_mut().flatten();
                     let with_source = |word: &&mut u64| {
                         Instruction::decode(**word).is_ok_and(|instruction| !instruction.reads().is_empty())
@@ -442,6 +453,11 @@ impl Generator {
             }
         }
     }
+}
+
+/// The input ports that random programs read, and that are to be set: `in0`, ….
+pub fn input_ports(machine: &Machine) -> impl Iterator<Item = Register> {
+    machine.inputs.registers().take(INPUTS)
 }
 
 fn filler() -> u64 {

@@ -1,10 +1,10 @@
 //! Blocks and stepper do the same: random programs, run both ways in the same chunks, agree in all that can be seen.
 
 use std::num::NonZeroU64;
-use takt_emu::testing::{INPUTS, Options, Random, random_program};
+use takt_emu::testing::{INPUTS, Options, Random, input_ports, random_program};
 use takt_emu::{Emulator, Event, Fault, PeriodError, PeriodReport, Status, Stop};
 use takt_isa::timing::Cause;
-use takt_isa::{Effect, MACHINES, Program, ROWS, Row};
+use takt_isa::{BundleAddress, Effect, MACHINES, Program, ROWS, Register, Row};
 
 /// Programs of each kind and machine.
 const PROGRAMS: u64 = 1500;
@@ -16,7 +16,7 @@ fn assert_same(seed: u64, fast: &mut Emulator, step: &mut Emulator) {
     assert_eq!(fast.now(), step.now(), "{}", context("now"));
     assert_eq!(fast.status(), step.status(), "{}", context("status"));
     assert_eq!(fast.next_address(), step.next_address(), "{}", context("next"));
-    for register in 0..1024 {
+    for register in Register::all() {
         assert_eq!(
             fast.register(register),
             step.register(register),
@@ -24,19 +24,19 @@ fn assert_same(seed: u64, fast: &mut Emulator, step: &mut Emulator) {
             context(&format!("register {register}"))
         );
     }
-    for register in (0..1024).filter(|register| fast.machine().is_output(*register)) {
+    for register in Register::all().filter(|register| fast.machine().is_output(*register)) {
         let (fast, step) = (fast.output_bits(register), step.output_bits(register));
         assert_eq!(fast, step, "{}", context(&format!("output at {register}")));
     }
     assert_eq!(fast.memory(), step.memory(), "{}", context("memory"));
     assert_eq!(fast.stack(), step.stack(), "{}", context("stack"));
     assert_eq!(fast.flags(), step.flags(), "{}", context("flags"));
-    let underway = |emulator: &Emulator| {
-        let mut all: Vec<_> = emulator.underway().copied().collect();
+    let in_flight = |emulator: &Emulator| {
+        let mut all: Vec<_> = emulator.in_flight().copied().collect();
         all.sort_by_key(|retire| (retire.cycle, retire.slot));
         all
     };
-    assert_eq!(underway(fast), underway(step), "{}", context("underway"));
+    assert_eq!(in_flight(fast), in_flight(step), "{}", context("in_flight"));
     let statistics = fast.statistics();
     assert_eq!(statistics, step.statistics(), "{}", context("statistics"));
     assert_eq!(statistics.cycles, statistics.bundles + statistics.stalled(), "{}", context("accounting"));
@@ -50,9 +50,9 @@ fn assert_same(seed: u64, fast: &mut Emulator, step: &mut Emulator) {
 /// The two emulators of a program, with random inputs. One input in some programs stays unset.
 fn pair(program: &Program, random: &mut Random, wild: bool) -> [Emulator; 2] {
     let mut fast = Emulator::new(program).unwrap();
-    for i in 0..INPUTS {
+    for input in input_ports(program.machine) {
         if !(wild && random.once_in(20)) {
-            fast.set_input_bits(program.machine.inputs.base + i, random.word()).unwrap();
+            fast.set_input_bits(input, random.word()).unwrap();
         }
     }
     let mut step = fast.clone();
@@ -81,14 +81,15 @@ fn compare_runs(seed: u64, program: &Program, wild: bool) -> Result<Stop, Fault>
     }
     loop {
         if random.once_in(10) {
-            let pauses: Vec<u32> = (0..random.below(4)).map(|_| random.below(program.bundles())).collect();
+            let pauses: Vec<BundleAddress> =
+                (0..random.below(4)).map(|_| BundleAddress::new(random.below(program.bundles()))).collect();
             for emulator in [&mut fast, &mut step] {
                 emulator.set_pauses(pauses.iter().copied());
             }
         }
         if random.once_in(4) {
-            let (port, bits) =
-                (program.machine.inputs.base + random.below(INPUTS.into()) as u16, random.word());
+            let port = input_ports(program.machine).nth(random.below(INPUTS as u32) as usize).unwrap();
+            let bits = random.word();
             for emulator in [&mut fast, &mut step] {
                 emulator.set_input_bits(port, bits).unwrap();
             }
@@ -167,7 +168,8 @@ fn pauses_are_complete() {
             let program = random_program(seed, machine, Options::TAME);
             let mut random = Random::new(seed);
             let [mut fast, mut step] = pair(&program, &mut random, false);
-            let pauses: Vec<u32> = (0..2).map(|_| random.below(program.bundles())).collect();
+            let pauses: Vec<BundleAddress> =
+                (0..2).map(|_| BundleAddress::new(random.below(program.bundles()))).collect();
             fast.set_pauses(pauses.iter().copied());
             for emulator in [&mut fast, &mut step] {
                 emulator.set_tick_period(NonZeroU64::new(500));
@@ -200,7 +202,8 @@ fn any_words_agree() {
         for seed in 0..PROGRAMS {
             let mut program = random_program(seed, machine, Options::TAME);
             let mut random = Random::new(seed);
-            let registers = (0..1023).filter(|&register| machine.banks().any(|bank| bank.contains(register)));
+            let registers = Register::all()
+                .filter(|&register| register != Register::ZERO && machine.has_register(register));
             program.constants = registers.map(|register| (register, random.word())).collect();
             program.data.truncate(random.below(machine.data_depth) as usize);
             for word in &mut program.code {
@@ -276,9 +279,9 @@ fn observed_runs_agree() {
             assert_eq!(count(|event| matches!(event, Event::Tick { .. })), statistics.ticks);
             assert_eq!(count(|event| matches!(event, Event::DeadlineMissed { .. })), statistics.missed);
             assert_eq!(count(|event| matches!(event, Event::TickLost { .. })), statistics.lost);
-            let underway = heard.underway().count() as u64;
+            let in_flight = heard.in_flight().count() as u64;
             assert_eq!(
-                count(|event| matches!(event, Event::Retire(_))) + underway,
+                count(|event| matches!(event, Event::Retire(_))) + in_flight,
                 statistics.total_operations(),
                 "seed {seed}"
             );

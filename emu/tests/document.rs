@@ -1,14 +1,14 @@
 //! The examples in `docs/timing.md` are what the emulator does. `TAKT_BLESS=1 cargo test -p takt-emu --test document`
-//! writes them anew.
+//! rewrites them.
 
 mod common;
 
-use common::program;
+use common::{input, program};
 use std::fmt::Write as _;
 use std::path::Path;
 use takt_emu::{Emulator, Event, Step};
 use takt_isa::timing::{Cause, Cycle};
-use takt_isa::{Machine, Program, T1, T3};
+use takt_isa::{BundleAddress, Machine, Program, SlotIndex, T1, T3};
 
 struct Example {
     name: &'static str,
@@ -83,20 +83,21 @@ fn describe(program: &Program, cause: Cause) -> String {
             format!("destination {} of bundle {producer}", program.register_text(register))
         }
         Cause::Unit { slot, unit } => {
-            format!("unit {}", program.machine.slots[usize::from(slot)].units[usize::from(unit)].name)
+            format!("unit {}", program.machine.slot(slot).units[usize::from(unit)].name)
         }
         Cause::WritePort { slot } => {
-            format!("write port of slot {}", program.machine.slots[usize::from(slot)].name)
+            format!("write port of slot {}", program.machine.slot(slot).name)
         }
         Cause::Drain => "drain".to_owned(),
         Cause::Wait => "wait".to_owned(),
     }
 }
 
-fn bundle_text(program: &Program, address: u32) -> String {
+fn bundle_text(program: &Program, address: BundleAddress) -> String {
     let instructions = program.bundle(address).unwrap().unwrap();
-    let texts =
-        instructions.iter().enumerate().map(|(slot, instruction)| instruction.text(program.machine, slot));
+    let texts = SlotIndex::all()
+        .zip(&instructions)
+        .map(|(slot, instruction)| instruction.text(program.machine, slot));
     let texts: Vec<String> = texts.filter(|text| text != "nop").collect();
     if texts.is_empty() { "nop".to_owned() } else { texts.join(" || ") }
 }
@@ -106,13 +107,13 @@ fn render(example: &Example) -> String {
     let program = program(example.machine, example.source);
     let mut emulator = Emulator::new(&program).unwrap();
     for i in 0..2 {
-        emulator.set_input_bits(example.machine.inputs.base + i, 1.0f32.to_bits()).unwrap();
+        emulator.set_input_bits(input(example.machine, i), 1.0f32.to_bits()).unwrap();
     }
     for &tick in example.ticks {
         emulator.tick_at(tick);
     }
     let mut text = format!("```text\n{}, bundle by bundle:\n", example.machine.name);
-    for address in 0..program.bundles() {
+    for address in program.addresses() {
         writeln!(text, "  {address:2}  {}", bundle_text(&program, address)).unwrap();
     }
     text.push_str("\ncycle\n");

@@ -2,9 +2,9 @@
 
 mod common;
 
-use common::{latency, program};
+use common::{at, input, latency, program};
 use takt_emu::{Emulator, Event, Fault, FaultKind, LoadError, Status, Step, Stop};
-use takt_isa::{Function, Program, T1, T3};
+use takt_isa::{Function, Program, Register, SlotIndex, T1, T3};
 
 /// Runs as blocks and by the stepper, which must agree, and returns the fault.
 fn fault(program: &Program) -> (Fault, Emulator) {
@@ -53,8 +53,8 @@ fn faults_say_where_and_what() {
             16 * (1 + refill),
             ":1: bundle 0, slot aux, cycle {}: call with the return stack full (16 entries)",
         ),
-        ("jmp 65535", 1 + refill, "bundle 65535, cycle {}: execution left the program, which has 1 bundles"),
-        ("nop", 1, "bundle 1, cycle {}: execution left the program, which has 1 bundles"),
+        ("jmp 65535", 1 + refill, "bundle 65535, cycle {}: execution left the program, which has 1 bundle"),
+        ("nop", 1, "bundle 1, cycle {}: execution left the program, which has 1 bundle"),
         // The operand's wait comes first: the address is known only then.
         (
             ".preset a0 5000\nmov x0, a0\nld x1, 0[x0]",
@@ -67,7 +67,7 @@ fn faults_say_where_and_what() {
         assert_eq!(fault.cycle, refill + cycle, "{source}");
         let text = text.replace("{}", &fault.cycle.to_string());
         let text = if text.starts_with(':') { format!("test.s{text}") } else { text };
-        assert_eq!(fault.to_string(), text);
+        assert_eq!(fault.show(emulator.program()).to_string(), text);
         assert_eq!(emulator.now(), fault.cycle);
         assert_eq!(emulator.next_address(), fault.address);
     }
@@ -96,15 +96,15 @@ fn illegal_words_fault_where_they_are_reached() {
     for (word, bits, text) in cases {
         let old = std::mem::replace(&mut program.code[word], bits);
         let (fault, _) = fault(&program);
-        assert!(fault.to_string().contains(text), "{fault}");
-        assert_eq!((fault.cycle, fault.address, fault.slot), (13, 2, Some((word % 3) as u8)));
+        assert!(fault.show(&program).to_string().contains(text), "{fault}");
+        assert_eq!((fault.cycle, fault.address, fault.slot), (13, at(2), SlotIndex::new(word % 3)));
         program.code[word] = old;
     }
     // One that is not reached does no harm.
     program.code[3] = 0;
     program.code[11] = 0;
     let (fault, _) = fault(&program);
-    assert_eq!(fault.address, 3);
+    assert_eq!(fault.address, at(3));
 }
 
 #[test]
@@ -117,20 +117,20 @@ fn a_faulting_bundle_does_nothing() {
                   mov x1, x9 || fadd a1, m0, m0
                   ld x2, 0[zero] || fadd a2, m9, m0";
     let (fault, emulator) = fault(&program(&T3, source));
-    assert_eq!((fault.address, fault.slot), (3, Some(1)));
+    assert_eq!((fault.address, fault.slot), (at(3), SlotIndex::new(1)));
     let register = |name| emulator.register(T3.register_address(name).unwrap());
     assert_eq!(register("x0"), Some(7));
     assert_eq!(emulator.memory()[3], 7);
     assert_eq!([register("x1"), register("m1"), register("a2"), register("x2")], [None; 4]);
-    let underway: Vec<_> = emulator.underway().map(|retire| retire.address).collect();
-    assert_eq!(underway, [0, 2, 2]);
+    let in_flight: Vec<_> = emulator.in_flight().map(|retire| retire.address).collect();
+    assert_eq!(in_flight, [0, 2, 2].map(at));
 }
 
 /// A block that ran ahead is undone: registers, memory, flags, NaNs that went out.
 #[test]
 fn a_fault_in_a_block_undoes_what_came_after() {
     // The block counts in memory, then divides by i1 and loads from i0: run twice, it would count twice; and when the
-    // load faults, the flag of the division is still underway.
+    // load faults, the flag of the division is still in flight.
     let source = ".output F x224
                   .preset x0 1
                   .preset m0 1.0
@@ -144,7 +144,7 @@ fn a_fault_in_a_block_undoes_what_came_after() {
                   ld x3, 0[i0]
                   wait 0";
     let mut blocks = Emulator::new(&program(&T3, source)).unwrap();
-    let [i0, i1] = [0, 1].map(|i| T3.inputs.base + i);
+    let [i0, i1] = [0, 1].map(|i| input(&T3, i));
     blocks.set_input_bits(i0, 0).unwrap();
     blocks.set_input_bits(i1, 1.0f32.to_bits()).unwrap();
     blocks.run_to_wait().unwrap();
@@ -163,10 +163,10 @@ fn a_fault_in_a_block_undoes_what_came_after() {
     assert_eq!(blocks.take_nan_writes().len(), 1);
     assert_eq!(blocks.memory(), stepper.memory());
     assert_eq!(blocks.statistics(), stepper.statistics());
-    assert_eq!(blocks.underway().count(), stepper.underway().count());
+    assert_eq!(blocks.in_flight().count(), stepper.in_flight().count());
 }
 
-/// As above for a result that was underway when the block began, and would have been written before the block's end.
+/// As above for a result that was in flight when the block began, and would have been written before the block's end.
 #[test]
 fn a_fault_in_a_block_undoes_results_of_earlier_blocks() {
     let source = ".preset m0 1.0
@@ -176,13 +176,13 @@ fn a_fault_in_a_block_undoes_results_of_earlier_blocks() {
                   mov x4, m1
                   halt";
     let mut emulator = Emulator::new(&program(&T3, source)).unwrap();
-    emulator.set_input_bits(T3.inputs.base, 5000).unwrap();
+    emulator.set_input_bits(input(&T3, 0), 5000).unwrap();
     let fault = emulator.run().unwrap_err();
-    assert_eq!((fault.address, fault.cycle), (2, 2 + 2 * u64::from(T3.refill)));
+    assert_eq!((fault.address, fault.cycle), (at(2), 2 + 2 * u64::from(T3.refill)));
     assert!(emulator.flags().is_empty());
     let m1 = T3.register_address("m1").unwrap();
     assert_eq!(emulator.register(m1), None);
-    assert_eq!(emulator.underway().map(|retire| retire.register).collect::<Vec<_>>(), [Some(m1)]);
+    assert_eq!(emulator.in_flight().map(|retire| retire.register).collect::<Vec<_>>(), [Some(m1)]);
 }
 
 #[test]
@@ -248,13 +248,20 @@ fn programs_that_do_not_fit_are_refused() {
     refuse(&|p| p.code = vec![0; 3 * 1025], "program of 1025 bundles; t3 holds 1024");
     refuse(&|p| p.code = vec![0; 4], "4 words are no whole number of bundles of 3");
     refuse(&|p| p.data = vec![0; 1025], "1025 words of data; t3 holds 1024");
-    refuse(&|p| p.constants = vec![(1023, 1)], "constant for register address 1023, which t3 keeps at zero");
-    refuse(&|p| p.constants = vec![(1024, 1)], "constant for register address 1024, which t3 does not have");
-    let port = |register| takt_isa::program::Port { name: "p".to_owned(), register, ty: takt_isa::Type::F };
-    refuse(&|p| p.inputs = vec![port(3)], "port p at register address 3, where t3 has no input port");
-    refuse(&|p| p.outputs = vec![port(3)], "port p at register address 3, where t3 has no output port");
+    let register = |name| T3.register_address(name).unwrap();
+    refuse(
+        &|p| p.constants = vec![(Register::ZERO, 1)],
+        "constant for register address 1023, which t3 keeps at zero",
+    );
+    let port = |name| takt_isa::program::Port {
+        name: "p".to_owned(),
+        register: register(name),
+        ty: takt_isa::Type::F,
+    };
+    refuse(&|p| p.inputs = vec![port("m3")], "port p at register address 3, where t3 has no input port");
+    refuse(&|p| p.outputs = vec![port("m3")], "port p at register address 3, where t3 has no output port");
     let mut on_t1 = good.clone();
-    (on_t1.machine, on_t1.constants) = (&T1, vec![(600, 1)]);
+    (on_t1.machine, on_t1.constants) = (&T1, vec![(register("x88"), 1)]);
     assert_eq!(
         Emulator::new(&on_t1).err().unwrap().to_string(),
         "constant for register address 600, which t1 does not have"
@@ -270,7 +277,7 @@ fn nonsense_in_a_program_does_not_panic() {
     let mut program = program(&T3, "ret");
     program.lines.clear();
     let (fault, _) = fault(&program);
-    assert_eq!(fault.location, None);
+    assert_eq!(fault.location(&program), None);
     program.lines = vec![Some(takt_isa::program::Location { file: 9, line: 1 }); 1];
     assert!(Emulator::new(&program).unwrap().run().is_err());
 }

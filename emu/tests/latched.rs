@@ -63,7 +63,7 @@ fn inputs_are_taken_at_reset_and_at_the_tick() {
         assert_eq!(outputs(emulator), [Some(1), Some(1)]);
         emulator.run_to_wait().unwrap();
         assert_eq!(outputs(emulator), [Some(3), Some(3)]);
-        // What is not set anew keeps its value.
+        // What is not set again keeps its value.
         emulator.run_period(&[]).unwrap();
         assert_eq!(outputs(emulator), [Some(4), Some(4)]);
         emulator.run_period(&[]).unwrap();
@@ -80,7 +80,7 @@ fn outputs_are_published_at_the_wait() {
         emulator.tick_at(tick);
         // Both registers have been written; the `wait` has not issued.
         emulator.run_until(tick + 4 + latency(&T3, Function::Alu)).unwrap();
-        assert_eq!(emulator.register(736), Some(2));
+        assert_eq!(emulator.register(T3.register_address("x224").unwrap()), Some(2));
         assert_eq!(outputs(emulator), [Some(1), Some(1)]);
         let before = emulator.now();
         emulator.run_to_wait().unwrap();

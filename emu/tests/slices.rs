@@ -1,14 +1,14 @@
 //! What debuggers and traces rest on: a run cut into slices at any cycle is the same run, and `upcoming` tells the truth.
 
-use takt_emu::testing::{INPUTS, Options, Random, random_program};
+use takt_emu::testing::{Options, Random, input_ports, random_program};
 use takt_emu::{Emulator, PeriodError, Step};
-use takt_isa::{MACHINES, Program};
+use takt_isa::{MACHINES, Program, Register};
 
 fn loaded(program: &Program, seed: u64) -> Emulator {
     let mut emulator = Emulator::new(program).unwrap();
     let mut random = Random::new(seed);
-    for i in 0..INPUTS {
-        emulator.set_input_bits(program.machine.inputs.base + i, random.word()).unwrap();
+    for input in input_ports(program.machine) {
+        emulator.set_input_bits(input, random.word()).unwrap();
     }
     emulator
 }
@@ -43,7 +43,9 @@ fn periods_in_slices() {
                 assert_eq!(report, again, "seed {seed} on {}", machine.name);
                 assert_eq!(whole.now(), sliced.now());
                 assert_eq!(whole.statistics(), sliced.statistics());
-                assert!((0..1024).all(|register| whole.register(register) == sliced.register(register)));
+                assert!(
+                    Register::all().all(|register| whole.register(register) == sliced.register(register))
+                );
             }
         }
     }
@@ -91,7 +93,7 @@ fn what_is_set_is_read() {
         for _ in 0..300 {
             let now = emulator.now();
             let due =
-                emulator.underway().find(|retire| retire.cycle == now).and_then(|retire| retire.register);
+                emulator.in_flight().find(|retire| retire.cycle == now).and_then(|retire| retire.register);
             if let Some(register) = due {
                 emulator.set_register(register, 0x1234_5678);
                 emulator.step_cycle().unwrap();

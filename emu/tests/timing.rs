@@ -5,18 +5,20 @@
 
 mod common;
 
-use common::{latency, program, unit};
+use common::{at, latency, program, unit};
 use std::collections::BTreeMap;
 use takt_emu::{Emulator, Event, Status, Step};
-use takt_isa::timing::{Address, Cause};
-use takt_isa::{Function, Instruction, MACHINES, Machine, Op, Program, ROWS, T1, T3};
+use takt_isa::timing::Cause;
+use takt_isa::{
+    BankIndex, BundleAddress, Function, Instruction, MACHINES, Machine, Op, Program, ROWS, Register, T1, T3,
+};
 
 /// Stalled cycles by the bundle that could not issue, and why.
-type Stalls = BTreeMap<(Address, Cause), u64>;
+type Stalls = BTreeMap<(BundleAddress, Cause), u64>;
 
 /// Runs a program to its end; returns cycles of issue, counted from the first bundle's, by bundle in the order of issue, and
 /// the stalls without those before it.
-fn run(program: &Program) -> (Vec<(Address, u64)>, Stalls) {
+fn run(program: &Program) -> (Vec<(BundleAddress, u64)>, Stalls) {
     let reset = u64::from(program.machine.refill);
     let mut stepper = Emulator::new(program).unwrap();
     let mut blocks = stepper.clone();
@@ -33,19 +35,19 @@ fn run(program: &Program) -> (Vec<(Address, u64)>, Stalls) {
     let statistics = stepper.statistics();
     assert_eq!(statistics.cycles, statistics.bundles + statistics.stalled());
     let mut causes = statistics.causes;
-    assert_eq!(causes.remove(&(0, Cause::Branch { from: 0 })), Some(reset), "the refill after reset");
+    assert_eq!(causes.remove(&(at(0), Cause::Branch { from: at(0) })), Some(reset), "the refill after reset");
     (issues, causes)
 }
 
 /// Checks the cycles of issue (from the first bundle's) of the bundles in order, and all stalls.
 #[track_caller]
-fn check(machine: &'static Machine, source: &str, cycles: &[u64], stalls: &[((Address, Cause), u64)]) {
+fn check(machine: &'static Machine, source: &str, cycles: &[u64], stalls: &[((BundleAddress, Cause), u64)]) {
     let (issues, causes) = run(&program(machine, source));
     assert_eq!(issues.iter().map(|issue| issue.1).collect::<Vec<_>>(), cycles, "{source}");
     assert_eq!(causes, stalls.iter().copied().collect(), "{source}");
 }
 
-fn register(machine: &Machine, name: &str) -> u16 {
+fn register(machine: &Machine, name: &str) -> Register {
     machine.register_address(name).unwrap()
 }
 
@@ -56,25 +58,32 @@ fn operand_distance_is_the_latency_of_every_unit() {
         let mut units = 0;
         for row in ROWS.iter().filter(|row| row.shape.has_dest()) {
             let Some((slot, unit)) = machine.host(row.function) else { continue };
-            let latency = u64::from(machine.slots[slot].units[unit].latency);
+            let latency = u64::from(machine.slot(slot).units[unit].latency);
             let (reader, _) = machine.host(Op::mov.row().function).unwrap();
-            let dest = machine.slots[slot].bank.base;
+            let dest = machine.slot(slot).bank.registers().next().unwrap();
             let mut code = vec![Instruction::NOP; 3 * machine.slots.len()];
-            let zero = [takt_isa::ZERO; 3];
-            let sources = [0, 1, 2].map(|i| if i < row.shape.sources() { zero[i] } else { 0 });
-            code[slot] = Instruction { sources, ..Instruction::bare(row.op) };
+            let mut instruction = Instruction::bare(row.op);
+            instruction.sources[..row.shape.sources()].fill(Register::ZERO);
+            code[slot.index()] = instruction;
             let slots = machine.slots.len();
-            code[slots + reader] =
-                Instruction { dest: 1, sources: [dest, 0, 0], ..Instruction::bare(Op::mov) };
-            code[2 * slots + reader] = Instruction::bare(Op::halt);
+            let mut read = Instruction { dest: BankIndex::new(1).unwrap(), ..Instruction::bare(Op::mov) };
+            read.sources[0] = dest;
+            code[slots + reader.index()] = read;
+            code[2 * slots + reader.index()] = Instruction::bare(Op::halt);
             let mut program = program(machine, "");
             program.lines = vec![None; code.len()];
             program.code = code.iter().map(|instruction| instruction.encode().unwrap()).collect();
 
             let (issues, causes) = run(&program);
-            assert_eq!(issues[1], (1, latency), "{} {}", machine.name, row.mnemonic);
-            let cause = Cause::Operand { register: dest, producer: 0 };
-            assert_eq!(causes.get(&(1, cause)), Some(&(latency - 1)), "{} {}", machine.name, row.mnemonic);
+            assert_eq!(issues[1], (at(1), latency), "{} {}", machine.name, row.mnemonic);
+            let cause = Cause::Operand { register: dest, producer: at(0) };
+            assert_eq!(
+                causes.get(&(at(1), cause)),
+                Some(&(latency - 1)),
+                "{} {}",
+                machine.name,
+                row.mnemonic
+            );
             units += 1;
         }
         assert!(units >= 30, "{}: {units} instructions", machine.name);
@@ -92,7 +101,7 @@ fn independent_bundles_issue_back_to_back() {
          nop
          fmul m3, m0, m0 || fadd a3, m0, m0 || halt",
         &[0, 1, 2, 2 + latency(&T3, Function::Multiply).max(latency(&T3, Function::Add)) - 1],
-        &[((3, Cause::Drain), latency(&T3, Function::Multiply).max(latency(&T3, Function::Add)) - 2)],
+        &[((at(3), Cause::Drain), latency(&T3, Function::Multiply).max(latency(&T3, Function::Add)) - 2)],
     );
 }
 
@@ -103,7 +112,7 @@ fn the_last_operand_is_charged() {
     // The product is on its bus in cycle `multiply`, the sum in 1 + add.
     let last = multiply.max(1 + add);
     let from = if 1 + add > multiply { ("a1", 1) } else { ("m1", 0) };
-    let cause = Cause::Operand { register: register(&T3, from.0), producer: from.1 };
+    let cause = Cause::Operand { register: register(&T3, from.0), producer: at(from.1) };
     check(
         &T3,
         ".preset m0 1.0
@@ -113,7 +122,7 @@ fn the_last_operand_is_charged() {
          jmp 4
          nop",
         &[0, 1, last, last + 1, last + 2 + u64::from(T3.refill)],
-        &[((2, cause), last - 2), ((4, Cause::Branch { from: 3 }), T3.refill.into())],
+        &[((at(2), cause), last - 2), ((at(4), Cause::Branch { from: at(3) }), T3.refill.into())],
     );
 }
 
@@ -131,10 +140,10 @@ fn ties_are_charged_in_operand_order() {
         };
         place(&mut bundles, second, "fmul m1, m0, m0");
         place(&mut bundles, first, "fadd a1, m0, m0");
-        let reader = bundles.len() as Address;
+        let reader = at(bundles.len());
         let source = format!(".preset m0 1.0\n{}\nflt x1, {operands}", bundles.join("\n"));
         let (_, causes) = run(&program(&T3, &source));
-        let cause = Cause::Operand { register: register(&T3, name), producer: producer as Address };
+        let cause = Cause::Operand { register: register(&T3, name), producer: at(producer) };
         assert!(causes.contains_key(&(reader, cause)), "{source}: {causes:?}");
     }
 }
@@ -143,7 +152,7 @@ fn ties_are_charged_in_operand_order() {
 #[test]
 fn issue_is_in_order_and_whole() {
     let multiply = latency(&T3, Function::Multiply);
-    let cause = Cause::Operand { register: register(&T3, "m1"), producer: 0 };
+    let cause = Cause::Operand { register: register(&T3, "m1"), producer: at(0) };
     check(
         &T3,
         ".preset m0 1.0
@@ -152,7 +161,7 @@ fn issue_is_in_order_and_whole() {
          mov x1, m0
          nop",
         &[0, multiply, multiply + 1, multiply + 2],
-        &[((1, cause), multiply - 1)],
+        &[((at(1), cause), multiply - 1)],
     );
 }
 
@@ -164,8 +173,8 @@ fn destination_waits_for_the_earlier_result() {
         (&T1, ".preset r1 2.0\nfdiv r0, r1, r1\nmov r0, r1\nnop", "r0"),
     ] {
         let divide = latency(machine, Function::Divide);
-        let cause = Cause::Destination { register: register(machine, register_name), producer: 0 };
-        check(machine, source, &[0, divide, divide + 1], &[((1, cause), divide - 1)]);
+        let cause = Cause::Destination { register: register(machine, register_name), producer: at(0) };
+        check(machine, source, &[0, divide, divide + 1], &[((at(1), cause), divide - 1)]);
     }
 }
 
@@ -175,7 +184,7 @@ fn unit_accepts_one_operation_every_interval() {
     let (_, interval) = unit(&T1, Function::Divide);
     assert!(interval > 1, "t1's divider is iterative");
     let (slot, divider) = T1.host(Function::Divide).unwrap();
-    let cause = Cause::Unit { slot: slot as u8, unit: divider as u8 };
+    let cause = Cause::Unit { slot, unit: divider as u8 };
     check(
         &T1,
         ".preset r0 2.0
@@ -185,7 +194,7 @@ fn unit_accepts_one_operation_every_interval() {
          nop",
         // The root's writeback, one cycle after the quotient's, is not in the way of the second quotient's.
         &[0, 1, interval, interval + 1],
-        &[((2, cause), interval - 2)],
+        &[((at(2), cause), interval - 2)],
     );
     // Fully pipelined on t3.
     check(&T3, ".preset m0 2.0\nfdiv m1, m0, m0\nfdiv m2, m0, m0\nnop", &[0, 1, 2], &[]);
@@ -207,7 +216,8 @@ fn write_port_takes_one_result_a_cycle() {
         nops(at - root_at - 1)
     );
     let cycles: Vec<u64> = (0..at).chain([at + 2, at + 3]).collect();
-    check(&T1, &source, &cycles, &[((at as Address, Cause::WritePort { slot: 0 }), 2)]);
+    let (slot, _) = T1.host(Function::Add).unwrap();
+    check(&T1, &source, &cycles, &[((common::at(at), Cause::WritePort { slot }), 2)]);
     // Banks have a port each.
     let at = latency(&T3, Function::Divide) - latency(&T3, Function::Add);
     let nops = "nop\n".repeat(at as usize - 1);
@@ -220,8 +230,8 @@ fn write_port_takes_one_result_a_cycle() {
 fn cycles_are_charged_in_the_order_of_the_rules() {
     let (add, (divide, interval)) = (latency(&T1, Function::Add), unit(&T1, Function::Divide));
     let (slot, divider) = T1.host(Function::Divide).unwrap();
-    let operand = Cause::Operand { register: register(&T1, "r2"), producer: 1 };
-    let busy = Cause::Unit { slot: slot as u8, unit: divider as u8 };
+    let operand = Cause::Operand { register: register(&T1, "r2"), producer: at(1) };
+    let busy = Cause::Unit { slot, unit: divider as u8 };
     check(
         &T1,
         ".preset r0 2.0
@@ -230,10 +240,10 @@ fn cycles_are_charged_in_the_order_of_the_rules() {
          fdiv r3, r0, r2
          nop",
         &[0, 1, interval, interval + 1],
-        &[((2, operand), add - 1), ((2, busy), interval - (1 + add))],
+        &[((at(2), operand), add - 1), ((at(2), busy), interval - (1 + add))],
     );
     // Destination before unit: the sum's register is free in 1 + add, the divider in `interval`.
-    let destination = Cause::Destination { register: register(&T1, "r2"), producer: 1 };
+    let destination = Cause::Destination { register: register(&T1, "r2"), producer: at(1) };
     check(
         &T1,
         ".preset r0 2.0
@@ -242,10 +252,10 @@ fn cycles_are_charged_in_the_order_of_the_rules() {
          fdiv r2, r0, r0
          nop",
         &[0, 1, interval, interval + 1],
-        &[((2, destination), add - 1), ((2, busy), interval - (1 + add))],
+        &[((at(2), destination), add - 1), ((at(2), busy), interval - (1 + add))],
     );
     // Operand before destination; the operand's wait covers that for the same register.
-    let operand = Cause::Operand { register: register(&T1, "r1"), producer: 0 };
+    let operand = Cause::Operand { register: register(&T1, "r1"), producer: at(0) };
     check(
         &T1,
         ".preset r0 2.0
@@ -253,7 +263,7 @@ fn cycles_are_charged_in_the_order_of_the_rules() {
          fadd r1, r1, r0
          nop",
         &[0, divide, divide + 1],
-        &[((1, operand), divide - 1)],
+        &[((at(1), operand), divide - 1)],
     );
 }
 
@@ -266,12 +276,12 @@ fn drain_waits_for_every_result() {
     let nops = "nop\n".repeat(at as usize - 1);
     let source = format!(".preset r0 2.0\nfdiv r1, r0, r0\n{nops}rdflags r2\nnop");
     let cycles: Vec<u64> = (0..at).chain([divide, divide + 1]).collect();
-    check(&T1, &source, &cycles, &[((at as Address, Cause::Drain), alu)]);
+    check(&T1, &source, &cycles, &[((common::at(at), Cause::Drain), alu)]);
     let divide = latency(&T3, Function::Divide);
     for (op, next) in [("clrflags", Some(divide + 1)), ("wait 0", None), ("halt", None)] {
         let source = format!(".preset m0 2.0\nfdiv m1, m0, m0 || mov x0, m0\n{op}\nnop");
         let cycles: Vec<u64> = [0, divide].into_iter().chain(next).collect();
-        check(&T3, &source, &cycles, &[((1, Cause::Drain), divide - 1)]);
+        check(&T3, &source, &cycles, &[((common::at(1), Cause::Drain), divide - 1)]);
     }
     // What issues together with it is not waited for.
     check(&T3, ".preset m0 2.0\nfdiv m1, m0, m0 || halt", &[0], &[]);
@@ -289,14 +299,14 @@ fn a_jump_refills() {
              on: nop
                  halt",
             &[0, 1 + taken, 2 + taken],
-            &[((2, Cause::Branch { from: 0 }), taken)],
+            &[((at(2), Cause::Branch { from: at(0) }), taken)],
         );
     }
 }
 
-fn with_input(machine: &'static Machine, source: &str, input: u32) -> (Vec<(Address, u64)>, Emulator) {
+fn with_input(machine: &'static Machine, source: &str, input: u32) -> (Vec<(BundleAddress, u64)>, Emulator) {
     let mut emulator = Emulator::new(&program(machine, source)).unwrap();
-    emulator.set_input_bits(machine.inputs.base, input).unwrap();
+    emulator.set_input_bits(common::input(machine, 0), input).unwrap();
     let mut blocks = emulator.clone();
     let mut issues = Vec::new();
     let end = emulator
@@ -325,12 +335,12 @@ fn branches_are_taken_by_all_32_bits() {
         ] {
             let (issues, emulator) = with_input(machine, &format!("{op} i0, on\nnop\non: halt"), input);
             let expected = if taken {
-                vec![(0, 0), (2, 1 + refill)]
+                vec![(at(0), 0), (at(2), 1 + refill)]
             } else {
-                vec![(0, 0), (1, 1 + resolve), (2, 2 + resolve)]
+                vec![(at(0), 0), (at(1), 1 + resolve), (at(2), 2 + resolve)]
             };
             assert_eq!(issues, expected, "{} {op} {input:#x}", machine.name);
-            let stalls = emulator.statistics().stalls()[Cause::Branch { from: 0 }.kind()];
+            let stalls = emulator.statistics().stalls()[Cause::Branch { from: at(0) }.kind()];
             assert_eq!(stalls, refill + if taken { refill } else { resolve });
         }
     }
@@ -341,7 +351,7 @@ fn branches_are_taken_by_all_32_bits() {
 fn a_branch_to_the_next_bundle_refills() {
     for (input, cost) in [(0, T3.refill), (1, T3.resolve)] {
         let (issues, _) = with_input(&T3, "bz i0, 1\nhalt", input);
-        assert_eq!(issues, [(0, 0), (1, 1 + u64::from(cost))]);
+        assert_eq!(issues, [(at(0), 0), (at(1), 1 + u64::from(cost))]);
     }
 }
 
@@ -358,7 +368,8 @@ fn calls_return_behind_themselves() {
         0,
     );
     let step = 1 + refill;
-    assert_eq!(issues, [(0, 0), (2, step), (4, 2 * step), (3, 3 * step), (1, 4 * step)]);
+    let expected = [(0, 0), (2, step), (4, 2 * step), (3, 3 * step), (1, 4 * step)];
+    assert_eq!(issues, expected.map(|(bundle, cycle)| (at(bundle), cycle)));
     assert!(emulator.stack().is_empty());
 }
 
@@ -380,7 +391,7 @@ fn a_bundle_reads_before_it_writes() {
         let value = |name| f32::from_bits(emulator.register(register(&T3, name)).unwrap());
         assert_eq!((value("a0"), value("m0")), (3.0, 0.0));
         // The branch saw the product that its own bundle overwrote.
-        assert!(matches!(emulator.status(), Status::Halted { address: 3, .. }));
+        assert!(matches!(*emulator.status(), Status::Halted { address, .. } if address == at(3)));
     }
 }
 
@@ -408,7 +419,7 @@ fn results_show_at_writeback() {
 #[test]
 fn memory_is_in_order() {
     for machine in MACHINES {
-        let bank = machine.slots[machine.host(Function::Memory).unwrap().0].bank.name;
+        let bank = machine.slot(machine.host(Function::Memory).unwrap().0).bank.name;
         let source =
             format!(".preset {bank}0 42\nst 7[zero], {bank}0\nld {bank}1, 7[zero]\nst 7[zero], zero\nhalt");
         let (issues, emulator) = with_input(machine, &source, 0);
@@ -427,7 +438,7 @@ fn inputs_show_to_later_bundles() {
     while !matches!(emulator.step_cycle().unwrap(), Step::Issued { .. }) {}
     emulator.set_input_bits(register(&T3, "i0"), 2).unwrap();
     emulator.run().unwrap();
-    assert_eq!([0, 1].map(|i| emulator.register(register(&T3, "x0") + i)), [Some(1), Some(2)]);
+    assert_eq!(["x0", "x1"].map(|name| emulator.register(register(&T3, name))), [Some(1), Some(2)]);
 }
 
 /// When the bundle after a `wait` issues, by the cycle of the tick; and what the cycles between are charged to.
@@ -447,13 +458,17 @@ fn a_wait_ends_with_the_tick() {
             assert_eq!(emulator.statistics(), blocks.statistics(), "tick {tick}");
 
             let issue = if missed(tick) { waited + 1 + refill } else { (waited + 1 + refill).max(tick + 1) };
-            assert_eq!(*emulator.status(), Status::Halted { cycle: issue + 1, address: 2 }, "tick {tick}");
+            assert_eq!(
+                *emulator.status(),
+                Status::Halted { cycle: issue + 1, address: at(2) },
+                "tick {tick}"
+            );
             assert_eq!(emulator.deadline_missed(), missed(tick), "tick {tick}");
             let statistics = emulator.statistics();
             let waiting = if missed(tick) { 0 } else { tick - waited };
-            assert_eq!(statistics.causes.get(&(0, Cause::Wait)).copied().unwrap_or(0), waiting);
+            assert_eq!(statistics.causes.get(&(at(0), Cause::Wait)).copied().unwrap_or(0), waiting);
             let refilling = issue - waited - 1 - waiting;
-            let branch = statistics.causes.get(&(1, Cause::Branch { from: 0 })).copied().unwrap_or(0);
+            let branch = statistics.causes.get(&(at(1), Cause::Branch { from: at(0) })).copied().unwrap_or(0);
             assert_eq!(branch, refilling, "tick {tick}");
         }
     }

@@ -1,5 +1,6 @@
 //! Between words and instructions. Both directions follow the table and the shapes; neither names an instruction.
 
+use crate::number::{BankIndex, BundleAddress, Register, SlotIndex};
 use crate::shape::{Field, OPCODE, Operand, WORD_BITS};
 use crate::spec::instructions::{Effect, Function, Op, Type};
 use crate::spec::machines::{Machine, Slot};
@@ -14,9 +15,9 @@ pub struct Instruction {
     /// The operation.
     pub op: Op,
     /// Destination: index into the bank of the slot that holds the instruction.
-    pub dest: u16,
+    pub dest: BankIndex,
     /// Source registers: addresses in the register space.
-    pub sources: [u16; 3],
+    pub sources: [Register; 3],
     /// Immediate, bundle address or word offset, as the shape has it.
     pub constant: u32,
 }
@@ -86,7 +87,7 @@ pub enum PlacementError {
         /// Its depth.
         depth: u16,
         /// The destination.
-        index: u16,
+        index: BankIndex,
     },
     /// A source address lies in no bank.
     #[error("source {} at address {address} is in no bank of {machine}", field.name())]
@@ -96,14 +97,19 @@ pub enum PlacementError {
         /// The operand.
         field: Field,
         /// The register address.
-        address: u16,
+        address: Register,
     },
 }
 
 impl Instruction {
     /// An instruction without operands.
     pub const fn bare(op: Op) -> Instruction {
-        Instruction { op, dest: 0, sources: [0; 3], constant: 0 }
+        Instruction {
+            op,
+            dest: BankIndex::from_low_bits(0),
+            sources: [Register::from_low_bits(0); 3],
+            constant: 0,
+        }
     }
 
     /// The filler of an empty slot.
@@ -113,22 +119,22 @@ impl Instruction {
     #[inline]
     pub fn field(&self, field: Field) -> u32 {
         match field {
-            Field::Dest => self.dest.into(),
-            Field::A => self.sources[0].into(),
-            Field::B => self.sources[1].into(),
-            Field::C => self.sources[2].into(),
+            Field::Dest => self.dest.get().into(),
+            Field::A => self.sources[0].get().into(),
+            Field::B => self.sources[1].get().into(),
+            Field::C => self.sources[2].get().into(),
             Field::Immediate | Field::Target | Field::Offset => self.constant,
         }
     }
 
-    /// Sets a field; bits that do not fit the field's type are lost, so check with [`Instruction::encode`].
+    /// Sets a field to the bits that a word has there.
     #[inline]
     fn set_field(&mut self, field: Field, value: u32) {
         match field {
-            Field::Dest => self.dest = value as u16,
-            Field::A => self.sources[0] = value as u16,
-            Field::B => self.sources[1] = value as u16,
-            Field::C => self.sources[2] = value as u16,
+            Field::Dest => self.dest = BankIndex::from_low_bits(value),
+            Field::A => self.sources[0] = Register::from_low_bits(value),
+            Field::B => self.sources[1] = Register::from_low_bits(value),
+            Field::C => self.sources[2] = Register::from_low_bits(value),
             Field::Immediate | Field::Target | Field::Offset => self.constant = value,
         }
     }
@@ -177,31 +183,31 @@ impl Instruction {
 
     /// The source registers that it reads.
     #[inline]
-    pub fn reads(&self) -> &[u16] {
+    pub fn reads(&self) -> &[Register] {
         &self.sources[..self.op.row().shape.sources()]
     }
 
-    /// The address of the register that it writes when it issues from `slot`.
+    /// The register that it writes when it issues from `slot`; `None` if it writes none, or the slot's bank has none there.
     #[inline]
-    pub fn writes(&self, slot: &Slot) -> Option<u16> {
-        self.op.row().shape.has_dest().then(|| slot.bank.base + self.dest)
+    pub fn writes(&self, slot: &Slot) -> Option<Register> {
+        slot.bank.register(self.dest).filter(|_| self.op.row().shape.has_dest())
     }
 
     /// Checks that the instruction may stand in slot `slot` of `machine`: a unit is there, and every register exists.
     ///
     /// # Errors
     /// If it may not: see [`PlacementError`].
-    pub fn place(&self, machine: &'static Machine, slot: usize) -> Result<(), PlacementError> {
-        let (row, host) = (self.op.row(), &machine.slots[slot]);
+    pub fn place(&self, machine: &'static Machine, slot: SlotIndex) -> Result<(), PlacementError> {
+        let (row, host) = (self.op.row(), machine.slot(slot));
         if row.function != Function::Idle && host.unit_for(row.function).is_none() {
             return Err(PlacementError::NoUnit {
                 machine: machine.name,
                 slot: host.name,
                 mnemonic: row.mnemonic,
-                host: machine.host(row.function).map(|(s, _)| machine.slots[s].name),
+                host: machine.host(row.function).map(|(s, _)| machine.slot(s).name),
             });
         }
-        if row.shape.has_dest() && self.dest >= host.bank.depth {
+        if row.shape.has_dest() && host.bank.register(self.dest).is_none() {
             return Err(PlacementError::DestOutOfReach {
                 machine: machine.name,
                 slot: host.name,
@@ -212,7 +218,7 @@ impl Instruction {
         }
         let fields = [Field::A, Field::B, Field::C];
         for (&address, field) in self.reads().iter().zip(fields) {
-            if !machine.banks().any(|bank| bank.contains(address)) {
+            if !machine.has_register(address) {
                 return Err(PlacementError::NoRegister { machine: machine.name, field, address });
             }
         }
@@ -221,8 +227,8 @@ impl Instruction {
 
     /// The instruction as source text with canonical register names, for slot `slot` of `machine`.
     /// Bundle addresses and offsets are numbers; registers that the machine lacks are written `?address`.
-    pub fn text(&self, machine: &Machine, slot: usize) -> String {
-        let name = |address: u16| machine.register_name(address).unwrap_or_else(|| format!("?{address}"));
+    pub fn text(&self, machine: &Machine, slot: SlotIndex) -> String {
+        let name = |register| machine.register_name(register).unwrap_or_else(|| format!("?{register}"));
         self.text_with(machine, slot, name, |target| target.to_string())
     }
 
@@ -230,19 +236,23 @@ impl Instruction {
     pub fn text_with(
         &self,
         machine: &Machine,
-        slot: usize,
-        register: impl Fn(u16) -> String,
-        target: impl Fn(u32) -> String,
+        slot: SlotIndex,
+        register: impl Fn(Register) -> String,
+        target: impl Fn(BundleAddress) -> String,
     ) -> String {
         let row = self.op.row();
         let mut text = row.mnemonic.to_owned();
         for (i, operand) in row.shape.operands().iter().enumerate() {
             text.push_str(if i == 0 { " " } else { ", " });
             match *operand {
-                Operand::Dest => text.push_str(&register(machine.slots[slot].bank.base + self.dest)),
+                Operand::Dest => {
+                    let bank = &machine.slot(slot).bank;
+                    let outside = || format!("{}{}", bank.name, self.dest);
+                    text.push_str(&bank.register(self.dest).map_or_else(outside, &register));
+                }
                 Operand::Source(n) => text.push_str(&register(self.sources[n])),
                 Operand::Immediate => write!(text, "0x{:08x}", self.constant).expect("a String takes all"),
-                Operand::Target => text.push_str(&target(self.constant)),
+                Operand::Target => text.push_str(&target(BundleAddress::new(self.constant))),
                 Operand::Memory => write!(text, "{}[{}]", self.constant, register(self.sources[0]))
                     .expect("a String takes all"),
             }

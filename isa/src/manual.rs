@@ -1,4 +1,4 @@
-//! The manual: the tables as a reader wants them. Text for the terminal, Markdown for `docs/isa.md`, plain data for JSON.
+//! The manual: the tables for a reader. Text for the terminal, Markdown for `docs/isa.md`, plain data for JSON.
 
 use crate::shape::{Field, OPCODE, Shape, WORD_BITS};
 use crate::spec::instructions::{Function, ROWS, Row, Type};
@@ -37,6 +37,8 @@ pub struct Entry {
     pub summary: &'static str,
     /// Special cases, flags, error bound.
     pub text: &'static str,
+    /// How equations write it, in the letters of its sources.
+    pub forms: &'static [&'static str],
     /// Bit fields: name, least significant bit, width.
     pub fields: Vec<(&'static str, u32, u32)>,
     /// Where it issues and what it costs, one entry for each machine that has a unit for it.
@@ -86,6 +88,7 @@ pub fn manual() -> Manual {
         types: row.types,
         summary: row.summary,
         text: row.text,
+        forms: row.forms,
         fields: row
             .shape
             .fields()
@@ -124,6 +127,9 @@ pub fn entry_text(entry: &Entry) -> String {
     let mut out = format!("{}\n    {}\n", entry.assembly(), entry.summary);
     if !entry.text.is_empty() {
         let _ = writeln!(out, "    {}", entry.text);
+    }
+    if !entry.forms.is_empty() {
+        let _ = writeln!(out, "    in equations: {}", entry.forms.join(", "));
     }
     let _ = write!(out, "    opcode 0x{:02x}", entry.opcode);
     for (name, low, width) in &entry.fields {
@@ -211,9 +217,9 @@ pub fn markdown() -> String {
     );
     let _ = writeln!(
         out,
-        "A word has {WORD_BITS} bits; a bundle holds one word for each slot of the machine. Arithmetic is IEEE 754 binary32, rounded to nearest even,\n\
-         subnormals included, with one canonical NaN (0x7fc00000). Three exceptions are kept, sticky: invalid, divide by zero, overflow.\n\
-         Underflow and inexact are deliberately not kept.\n"
+        "A word has {WORD_BITS} bits; a bundle holds one word for each slot of the machine. Arithmetic is IEEE 754 binary32,\n\
+         rounded to nearest even, subnormals included, with one canonical NaN (0x7fc00000). There are three sticky exception flags:\n\
+         invalid, divide by zero and overflow. Underflow and inexact are deliberately left out.\n"
     );
 
     out.push_str("## Instructions\n\n| instruction | meaning | opcode | types |");
@@ -252,7 +258,7 @@ pub fn markdown() -> String {
         let _ = writeln!(out, "| `{syntax}` | {} |", fields.join(", "));
     }
     out.push_str(
-        "\nAll other bits are zero; a word in which they are not, or whose opcode is in no row, is refused by name. `d` is an index into the bank of the slot\n\
+        "\nAll other bits are zero; a word in which they are not, or whose opcode is in no row, is illegal. `d` is an index into the bank of the slot\n\
          that holds the word; `a`, `b`, `c` are addresses in the register space.\n\n",
     );
 

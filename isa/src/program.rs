@@ -1,9 +1,10 @@
 //! A program ready to run: what the assembler makes, an image carries, and emulator and circuit load. Plain data.
 
 use crate::encode::{DecodeError, Instruction, PlacementError};
+use crate::number::{BundleAddress, Register, SlotIndex};
 use crate::spec::instructions::Type;
 use crate::spec::machines::Machine;
-use crate::timing::{Address, Cause};
+use crate::timing::Cause;
 
 /// A program for one machine.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,7 +16,7 @@ pub struct Program {
     /// Data memory, from word 0; the rest of the memory is zero.
     pub data: Vec<u32>,
     /// Registers that the loader sets, by address, ascending: constants. All others are unwritten at the start.
-    pub constants: Vec<(u16, u32)>,
+    pub constants: Vec<(Register, u32)>,
     /// Input ports, in the order of their declaration.
     pub inputs: Vec<Port>,
     /// Output ports, in the order of their declaration.
@@ -34,6 +35,17 @@ pub struct Program {
     pub files: Vec<String>,
     /// Where each operation comes from, parallel to `code`; `None` for filler.
     pub lines: Vec<Option<Location>>,
+    /// Of words that compute a part of an equation, what part of their line that is: index into `code`, ascending, and columns.
+    pub parts: Vec<(u32, Columns)>,
+}
+
+/// Columns of a line: its characters from `first` to `last`, from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Columns {
+    /// The first.
+    pub first: u32,
+    /// The last.
+    pub last: u32,
 }
 
 /// A named register: a port or a register of the source.
@@ -42,7 +54,7 @@ pub struct Port {
     /// Its name in the source.
     pub name: String,
     /// Its address.
-    pub register: u16,
+    pub register: Register,
     /// How its bits are read and shown.
     pub ty: Type,
 }
@@ -74,9 +86,9 @@ pub struct Section {
     /// Its name.
     pub name: String,
     /// First bundle.
-    pub start: Address,
+    pub start: BundleAddress,
     /// Bundle after the last.
-    pub end: Address,
+    pub end: BundleAddress,
 }
 
 /// How often a loop may turn: a promise of the source, on which static bounds of time rest and which the emulator checks.
@@ -87,7 +99,7 @@ pub struct Section {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LoopBound {
     /// The bundle that heads the loop.
-    pub address: Address,
+    pub address: BundleAddress,
     /// Turns of one run at most; at least 1.
     pub most: u32,
 }
@@ -133,28 +145,44 @@ impl Program {
     }
 
     /// The words of a bundle, in slot order; `None` past the end.
-    pub fn words(&self, address: Address) -> Option<&[u64]> {
-        self.code.chunks_exact(self.machine.slots.len()).nth(address as usize)
+    pub fn words(&self, address: BundleAddress) -> Option<&[u64]> {
+        self.code.chunks_exact(self.machine.slots.len()).nth(address.index())
     }
 
     /// The instructions of a bundle; `None` past the end, the slot and the reason where a word cannot run.
     #[allow(clippy::type_complexity)]
-    pub fn bundle(&self, address: Address) -> Option<Result<Vec<Instruction>, (usize, IllegalWord)>> {
-        let decode = |(slot, &word): (usize, &u64)| {
+    pub fn bundle(
+        &self,
+        address: BundleAddress,
+    ) -> Option<Result<Vec<Instruction>, (SlotIndex, IllegalWord)>> {
+        let decode = |(slot, &word): (SlotIndex, &u64)| {
             let checked = Instruction::decode(word).map_err(IllegalWord::from).and_then(|instruction| {
                 instruction.place(self.machine, slot)?;
                 Ok(instruction)
             });
             checked.map_err(|reason| (slot, reason))
         };
-        Some(self.words(address)?.iter().enumerate().map(decode).collect())
+        Some(SlotIndex::all().zip(self.words(address)?).map(decode).collect())
+    }
+
+    /// The addresses of the program's bundles, ascending.
+    pub fn addresses(&self) -> impl DoubleEndedIterator<Item = BundleAddress> + Clone + use<> {
+        BundleAddress::RESET.until(BundleAddress::new(self.bundles()))
+    }
+
+    /// Where the operations of a bundle come from, in slot order; none past the end.
+    pub fn locations(&self, address: BundleAddress) -> &[Option<Location>] {
+        self.lines.chunks(self.machine.slots.len()).nth(address.index()).unwrap_or_default()
+    }
+
+    /// Where the operation that a slot of a bundle executes comes from.
+    pub fn operation_location(&self, address: BundleAddress, slot: SlotIndex) -> Option<Location> {
+        *self.locations(address).get(slot.index())?
     }
 
     /// The source place of a bundle: that of its first operation that has one.
-    pub fn location(&self, address: Address) -> Option<Location> {
-        let slots = self.machine.slots.len();
-        let start = address as usize * slots;
-        self.lines.get(start..start + slots)?.iter().copied().flatten().next()
+    pub fn location(&self, address: BundleAddress) -> Option<Location> {
+        self.locations(address).iter().copied().flatten().next()
     }
 
     /// `file:line` of a location.
@@ -163,8 +191,35 @@ impl Program {
         format!("{file}:{}", location.line)
     }
 
+    /// The part of its line that a word computes, if that is a part of an equation.
+    pub fn part(&self, word: usize) -> Option<Columns> {
+        let found = self.parts.binary_search_by_key(&word, |(index, _)| *index as usize);
+        found.ok().map(|index| self.parts[index].1)
+    }
+
+    /// `file:line` of a word of the code, or of a part of an equation `file:line:columns`, as in `pd.s:12:9-14`.
+    pub fn word_place(&self, word: usize) -> Option<String> {
+        let mut place = self.place_text((*self.lines.get(word)?)?);
+        if let Some(Columns { first, last }) = self.part(word) {
+            place.push_str(&if first == last { format!(":{first}") } else { format!(":{first}-{last}") });
+        }
+        Some(place)
+    }
+
+    /// The place of a bundle: that of its first operation that has one.
+    pub fn bundle_place(&self, address: BundleAddress) -> Option<String> {
+        let start = address.index().checked_mul(self.machine.slots.len())?;
+        (0..self.locations(address).len()).find_map(|slot| self.word_place(start + slot))
+    }
+
+    /// The place of the operation that a slot of a bundle executes.
+    pub fn operation_place(&self, address: BundleAddress, slot: SlotIndex) -> Option<String> {
+        self.operation_location(address, slot)?;
+        self.word_place(address.index() * self.machine.slots.len() + slot.index())
+    }
+
     /// The source's name for a register: port, named register, or else the canonical name.
-    pub fn register_text(&self, register: u16) -> String {
+    pub fn register_text(&self, register: Register) -> String {
         self.outputs
             .iter()
             .chain(&self.inputs)
@@ -176,9 +231,9 @@ impl Program {
     }
 
     /// A bundle and its place: `bundle 12 (tracking.s:40)`.
-    pub fn bundle_text(&self, address: Address) -> String {
-        match self.location(address) {
-            Some(location) => format!("bundle {address} ({})", self.place_text(location)),
+    pub fn bundle_text(&self, address: BundleAddress) -> String {
+        match self.bundle_place(address) {
+            Some(place) => format!("bundle {address} ({place})"),
             None => format!("bundle {address}"),
         }
     }
@@ -198,11 +253,10 @@ impl Program {
                 )
             }
             Cause::Unit { slot, unit } => {
-                let slot = &self.machine.slots[usize::from(slot)];
-                format!("unit {} is busy", slot.units[usize::from(unit)].name)
+                format!("unit {} is busy", self.machine.slot(slot).units[usize::from(unit)].name)
             }
             Cause::WritePort { slot } => {
-                format!("write port of bank {} is taken", self.machine.slots[usize::from(slot)].bank.name)
+                format!("write port of bank {} is taken", self.machine.slot(slot).bank.name)
             }
             Cause::Drain => "earlier results must be written first".to_owned(),
             Cause::Wait => "waits for the tick".to_owned(),
@@ -210,11 +264,11 @@ impl Program {
     }
 
     /// The label at, or last before, a bundle, and the distance from it.
-    pub fn nearest_label(&self, address: Address) -> Option<(&str, u32)> {
+    pub fn nearest_label(&self, address: BundleAddress) -> Option<(&str, u32)> {
         self.symbols
             .iter()
-            .filter(|symbol| symbol.space == Space::Code && symbol.address <= address)
+            .filter(|symbol| symbol.space == Space::Code && symbol.address <= address.get())
             .max_by_key(|symbol| symbol.address)
-            .map(|symbol| (symbol.name.as_str(), address - symbol.address))
+            .map(|symbol| (symbol.name.as_str(), address.get() - symbol.address))
     }
 }

@@ -15,14 +15,13 @@
 //! that a bundle is never charged to both.)
 
 use crate::encode::Instruction;
+use crate::number::{BundleAddress, Register, SlotIndex};
 use crate::spec::instructions::Function;
-use crate::spec::machines::{Machine, REGISTER_SPACE};
+use crate::spec::machines::Machine;
 use crate::spec::units::MAX_LATENCY;
 
 /// A cycle's number; cycle 0 is the first after reset.
 pub type Cycle = u64;
-/// A bundle's address in the program memory.
-pub type Address = u32;
 
 /// Why a cycle issued nothing.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
@@ -30,26 +29,26 @@ pub enum Cause {
     /// The front end refills after a redirection or decides a conditional branch.
     Branch {
         /// The bundle that redirected (after reset: 0).
-        from: Address,
+        from: BundleAddress,
     },
     /// A source is not ready.
     Operand {
         /// The register.
-        register: u16,
+        register: Register,
         /// The bundle that computes it.
-        producer: Address,
+        producer: BundleAddress,
     },
     /// A destination still awaits an earlier result.
     Destination {
         /// The register.
-        register: u16,
+        register: Register,
         /// The bundle that computes the earlier result.
-        producer: Address,
+        producer: BundleAddress,
     },
     /// A unit accepts no operation yet.
     Unit {
         /// Slot of the machine.
-        slot: u8,
+        slot: SlotIndex,
         /// Unit of the slot.
         unit: u8,
     },
@@ -58,7 +57,7 @@ pub enum Cause {
     /// The bank's write port is taken in the cycle of this operation's writeback.
     WritePort {
         /// The slot whose bank it is.
-        slot: u8,
+        slot: SlotIndex,
     },
     /// The program waits for the tick.
     Wait,
@@ -98,15 +97,15 @@ impl Cause {
 /// One operation of a bundle, as the rules see it.
 #[derive(Clone, Copy, Debug)]
 struct Operation {
-    slot: u8,
+    slot: SlotIndex,
     unit: u8,
     latency: u32,
     interval: u32,
     /// Registers that it reads.
-    sources: [u16; 3],
+    sources: [Register; 3],
     source_count: u8,
     /// The register that it writes.
-    dest: Option<u16>,
+    dest: Option<Register>,
 }
 
 /// A bundle, as the rules see it: made once for each address of a program.
@@ -121,14 +120,13 @@ impl Bundle {
     /// [`Instruction::place`] accepts.
     pub fn new(machine: &Machine, instructions: &[Instruction]) -> Bundle {
         let mut bundle = Bundle::default();
-        for (s, instruction) in instructions.iter().enumerate() {
+        for ((s, slot), instruction) in machine.numbered_slots().zip(instructions) {
             let row = instruction.op.row();
-            let slot = &machine.slots[s];
             let Some(u) = slot.unit_for(row.function).filter(|_| row.function != Function::Idle) else {
                 continue;
             };
             bundle.operations.push(Operation {
-                slot: s as u8,
+                slot: s,
                 unit: u as u8,
                 latency: slot.units[u].latency,
                 interval: slot.units[u].interval,
@@ -142,7 +140,7 @@ impl Bundle {
     }
 
     /// The bundle on a machine that differs in one unit: what a unit of another speed would do to a program as it is.
-    pub fn with_unit(mut self, slot: u8, unit: u8, latency: u32, interval: u32) -> Bundle {
+    pub fn with_unit(mut self, slot: SlotIndex, unit: u8, latency: u32, interval: u32) -> Bundle {
         let same = |operation: &&mut Operation| (operation.slot, operation.unit) == (slot, unit);
         for operation in self.operations.iter_mut().filter(same) {
             (operation.latency, operation.interval) = (latency, interval);
@@ -151,7 +149,7 @@ impl Bundle {
     }
 
     /// The destinations, each with the cycles from issue to its writeback.
-    pub fn writebacks(&self) -> impl Iterator<Item = (u16, u32)> + '_ {
+    pub fn writebacks(&self) -> impl Iterator<Item = (Register, u32)> + '_ {
         self.operations.iter().filter_map(|operation| Some((operation.dest?, operation.latency)))
     }
 }
@@ -190,9 +188,9 @@ impl Issue {
 #[derive(Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Debug, Default)]
 pub struct Residue {
     /// Registers, ascending, and the cycles until their results are on the bus.
-    pending: Vec<(u16, u16)>,
+    pending: Vec<(Register, u16)>,
     /// Slots, units, ascending, and the cycles until they accept an operation.
-    busy: Vec<(u8, u8, u16)>,
+    busy: Vec<(SlotIndex, u8, u16)>,
 }
 
 impl Residue {
@@ -218,7 +216,7 @@ const PORT_WINDOW: usize = MAX_LATENCY as usize;
 #[derive(Clone, Debug)]
 pub struct Scoreboard {
     /// For each register, the cycle in which its pending result is on the bus, and who computes it.
-    ready: Box<[(Cycle, Address); REGISTER_SPACE]>,
+    ready: Box<[(Cycle, BundleAddress); Register::COUNT]>,
     /// For each slot and unit, the first cycle in which the unit accepts an operation.
     free: Vec<Vec<Cycle>>,
     /// For each slot, the cycles in which its bank is written: `booked[slot][cycle % PORT_WINDOW] == cycle`.
@@ -231,7 +229,9 @@ impl Scoreboard {
     /// Nothing pending.
     pub fn new(machine: &Machine) -> Scoreboard {
         Scoreboard {
-            ready: vec![(0, 0); REGISTER_SPACE].try_into().expect("the vector has that length"),
+            ready: vec![(0, BundleAddress::RESET); Register::COUNT]
+                .try_into()
+                .expect("the vector has that length"),
             free: machine.slots.iter().map(|slot| vec![0; slot.units.len()]).collect(),
             booked: vec![[0; PORT_WINDOW]; machine.slots.len()],
             drained: 0,
@@ -239,14 +239,14 @@ impl Scoreboard {
     }
 
     /// Issues a bundle from address `at` in the first cycle from `earliest` on that meets every rule.
-    pub fn issue(&mut self, bundle: &Bundle, at: Address, earliest: Cycle) -> Issue {
+    pub fn issue(&mut self, bundle: &Bundle, at: BundleAddress, earliest: Cycle) -> Issue {
         let issue = self.plan(bundle, earliest);
         for operation in &bundle.operations {
-            let (slot, unit) = (usize::from(operation.slot), usize::from(operation.unit));
+            let (slot, unit) = (operation.slot.index(), usize::from(operation.unit));
             self.free[slot][unit] = issue.cycle + Cycle::from(operation.interval);
             if let Some(dest) = operation.dest {
                 let writeback = issue.cycle + Cycle::from(operation.latency);
-                self.ready[usize::from(dest) % REGISTER_SPACE] = (writeback, at);
+                self.ready[dest.index()] = (writeback, at);
                 self.booked[slot][writeback as usize % PORT_WINDOW] = writeback;
                 self.drained = self.drained.max(writeback);
             }
@@ -258,9 +258,10 @@ impl Scoreboard {
     pub fn plan(&self, bundle: &Bundle, earliest: Cycle) -> Issue {
         let mut issue = Issue { cycle: earliest, stalls: [(Cause::Drain, 0); 5], count: 0 };
 
-        let last = |registers: &mut dyn Iterator<Item = u16>, ready: &[(Cycle, Address); REGISTER_SPACE]| {
-            registers.fold((0, 0, 0), |last: (Cycle, u16, Address), register| {
-                let (cycle, producer) = ready[usize::from(register) % REGISTER_SPACE];
+        let last = |registers: &mut dyn Iterator<Item = Register>,
+                    ready: &[(Cycle, BundleAddress); Register::COUNT]| {
+            registers.fold((0, Register::ZERO, BundleAddress::RESET), |last, register| {
+                let (cycle, producer) = ready[register.index()];
                 if cycle > last.0 { (cycle, register, producer) } else { last }
             })
         };
@@ -279,7 +280,7 @@ impl Scoreboard {
         let busiest = bundle
             .operations
             .iter()
-            .map(|operation| (self.free[usize::from(operation.slot)][usize::from(operation.unit)], operation))
+            .map(|operation| (self.free[operation.slot.index()][usize::from(operation.unit)], operation))
             .reduce(|last, next| if next.0 > last.0 { next } else { last });
         if let Some((cycle, &Operation { slot, unit, .. })) = busiest {
             issue.advance(cycle, Cause::Unit { slot, unit });
@@ -290,31 +291,33 @@ impl Scoreboard {
         }
 
         // A later cycle can only be free: bookings end MAX_LATENCY cycles after the last issue.
-        let mut cycle = issue.cycle;
+        let (mut cycle, mut last_taken) = (issue.cycle, None);
         let taken = |cycle: Cycle| {
             bundle.operations.iter().find(|operation| {
                 let writeback = cycle + Cycle::from(operation.latency);
                 operation.dest.is_some()
-                    && self.booked[usize::from(operation.slot)][writeback as usize % PORT_WINDOW] == writeback
+                    && self.booked[operation.slot.index()][writeback as usize % PORT_WINDOW] == writeback
             })
         };
-        let mut slot = 0;
-        while let Some(operation) = taken(cycle) {
-            (slot, cycle) = (operation.slot, cycle + 1);
+        while let Some(&Operation { slot, .. }) = taken(cycle) {
+            cycle += 1;
+            last_taken = Some(slot);
         }
-        issue.advance(cycle, Cause::WritePort { slot });
+        if let Some(slot) = last_taken {
+            issue.advance(cycle, Cause::WritePort { slot });
+        }
         issue
     }
 
     /// What of the past can still hold up bundles that are delivered in cycle `now`, which no bundle has issued in or after.
     pub fn residue(&self, now: Cycle) -> Residue {
-        let pending = self.ready.iter().enumerate().filter(|(_, (ready, _))| *ready > now);
-        let units = self.free.iter().enumerate().flat_map(|(s, units)| {
+        let pending = Register::all().zip(&self.ready[..]).filter(|(_, (ready, _))| *ready > now);
+        let units = SlotIndex::all().zip(&self.free).flat_map(|(s, units)| {
             units.iter().enumerate().filter(|(_, free)| **free > now).map(move |(u, free)| (s, u, free))
         });
         Residue {
-            pending: pending.map(|(register, (ready, _))| (register as u16, (ready - now) as u16)).collect(),
-            busy: units.map(|(slot, unit, free)| (slot as u8, unit as u8, (free - now) as u16)).collect(),
+            pending: pending.map(|(register, (ready, _))| (register, (ready - now) as u16)).collect(),
+            busy: units.map(|(slot, unit, free)| (slot, unit as u8, (free - now) as u16)).collect(),
         }
     }
 
@@ -323,14 +326,14 @@ impl Scoreboard {
         let mut scoreboard = Scoreboard::new(machine);
         for &(register, cycles) in &residue.pending {
             let writeback = Cycle::from(cycles);
-            scoreboard.ready[usize::from(register) % REGISTER_SPACE] = (writeback, 0);
+            scoreboard.ready[register.index()] = (writeback, BundleAddress::RESET);
             scoreboard.drained = scoreboard.drained.max(writeback);
             if let Some(slot) = machine.slots.iter().position(|slot| slot.bank.contains(register)) {
                 scoreboard.booked[slot][writeback as usize % PORT_WINDOW] = writeback;
             }
         }
         for &(slot, unit, cycles) in &residue.busy {
-            scoreboard.free[usize::from(slot)][usize::from(unit)] = cycles.into();
+            scoreboard.free[slot.index()][usize::from(unit)] = cycles.into();
         }
         scoreboard
     }
@@ -341,8 +344,8 @@ impl Scoreboard {
     }
 
     /// The cycle in which a register's last result is (or was) on its bus, and the bundle that computed it.
-    pub fn ready(&self, register: u16) -> (Cycle, Address) {
-        self.ready[usize::from(register) % REGISTER_SPACE]
+    pub fn ready(&self, register: Register) -> (Cycle, BundleAddress) {
+        self.ready[register.index()]
     }
 }
 

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use std::collections::HashSet;
 use takt_isa::shape::{OPCODE, WORD_BITS};
-use takt_isa::{DecodeError, Function, Instruction, MACHINES, Op, ROWS, UNITS};
+use takt_isa::{BankIndex, DecodeError, Function, Instruction, MACHINES, Op, ROWS, Register, UNITS};
 
 /// For every opcode of the space, over payloads of zeros, ones and single bits: a row's word decodes to that row, and every
 /// word that belongs to no row is refused by name.
@@ -60,7 +60,7 @@ fn every_row_runs_on_a_unit_and_a_machine() {
         let function = row.function.name();
         assert!(
             UNITS.iter().any(|unit| unit.functions.contains(&row.function)),
-            "`{}` wants a unit that offers {function}: isa/src/spec/units.rs has none",
+            "`{}` needs a unit that offers {function}: isa/src/spec/units.rs has none",
             row.mnemonic
         );
         assert!(
@@ -69,6 +69,36 @@ fn every_row_runs_on_a_unit_and_a_machine() {
             row.mnemonic
         );
     }
+}
+
+/// What equations write for instructions: sources that there are, each once, and no two instructions for one form and one
+/// choice of types.
+#[test]
+fn forms_of_equations_are_told_apart_by_their_types() {
+    let mut seen = HashSet::new();
+    for row in ROWS {
+        for (form, text) in row.forms().zip(row.forms) {
+            let mut sources = form.sources.clone();
+            sources.sort_unstable();
+            sources.dedup();
+            assert_eq!(sources.len(), form.sources.len(), "`{text}` has a source twice");
+            assert!(!sources.is_empty(), "`{text}` has no source");
+            assert!(
+                sources.iter().all(|source| *source < row.shape.sources()),
+                "`{text}` of {}",
+                row.mnemonic
+            );
+            assert!(row.shape.has_dest() && row.effect == takt_isa::Effect::Compute, "{}", row.mnemonic);
+            let types: Vec<String> =
+                form.sources.iter().map(|source| format!("{:?}", row.source_type(*source))).collect();
+            assert!(seen.insert((form.symbol, types)), "`{text}` means two instructions");
+        }
+    }
+    let forms = |op: Op| op.row().forms().map(|form| (form.symbol, form.sources)).collect::<Vec<_>>();
+    assert_eq!(forms(Op::flt), [("<".to_owned(), vec![0, 1]), (">".to_owned(), vec![1, 0])]);
+    assert_eq!(forms(Op::sel), [("?:".to_owned(), vec![0, 1, 2])]);
+    assert_eq!(forms(Op::fatan2), [("atan2".to_owned(), vec![0, 1])]);
+    assert_eq!(forms(Op::isub), [("-".to_owned(), vec![0, 1]), ("-".to_owned(), vec![1])]);
 }
 
 #[test]
@@ -92,9 +122,10 @@ fn banks_do_not_overlap_and_names_lead_back() {
     for machine in MACHINES {
         let mut seen = HashSet::new();
         for bank in machine.banks() {
-            for index in 0..bank.depth {
-                let address = bank.base + index;
+            for (place, address) in bank.registers().enumerate() {
                 assert!(seen.insert(address), "{}: address {address} in two banks", machine.name);
+                let index = bank.index(address).expect("it is in this bank");
+                assert_eq!((index.index(), bank.register(index)), (place, Some(address)));
                 let name = machine.register_name(address).expect("it is in a bank");
                 assert_eq!(machine.register_address(&name), Some(address));
             }
@@ -127,8 +158,15 @@ proptest! {
 
     /// decode(encode(x)) = x, and values that do not fit are refused.
     #[test]
-    fn decode_inverts_encode(row in 0..ROWS.len(), dest: u16, sources: [u16; 3], constant: u32) {
+    fn decode_inverts_encode(
+        row in 0..ROWS.len(),
+        dest in 0..BankIndex::COUNT,
+        sources in [0..Register::COUNT, 0..Register::COUNT, 0..Register::COUNT],
+        constant: u32,
+    ) {
         let op = ROWS[row].op;
+        let dest = BankIndex::new(dest).expect("in range");
+        let sources = sources.map(|source| Register::new(source).expect("in range"));
         let mut instruction = Instruction { op, dest, sources, constant };
         let fits = op.row().shape.fields().iter().all(|&field| instruction.field(field) <= field.bits().max());
         match instruction.encode() {

@@ -9,12 +9,26 @@ use takt_isa::fp::{Arithmetic, Host, Reference, Value};
 
 type Operation = fn(u32, u32) -> Value;
 
+/// An addend that follows from a pair: one time in four the negated product, else some bits of both.
+fn addend(a: u32, b: u32) -> u32 {
+    match (a ^ b) & 3 {
+        0 => Host::mul(a, b).bits ^ fp_common::SIGN,
+        _ => a.rotate_left(9) ^ b.rotate_left(20),
+    }
+}
+
 /// Name, host, reference, and the hash.
-const OPERATIONS: [(&str, Operation, Operation, u64); 10] = [
+const OPERATIONS: [(&str, Operation, Operation, u64); 11] = [
     ("add", |a, b| Host::add(a, b), Reference::add, 0x7728_5517_9459_b501),
     ("sub", |a, b| Host::sub(a, b), Reference::sub, 0xc3ad_6baf_593d_31fd),
     ("mul", |a, b| Host::mul(a, b), Reference::mul, 0x9882_dcdf_e626_3285),
     ("div", |a, b| Host::div(a, b), Reference::div, 0xedea_c4d2_d676_6cc1),
+    (
+        "mul_add",
+        |a, b| Host::mul_add(a, b, addend(a, b)),
+        |a, b| Reference::mul_add(a, b, addend(a, b)),
+        0xc993_7a2f_53e3_5429,
+    ),
     ("sqrt", |a, _| Host::sqrt(a), |a, _| Reference::sqrt(a), 0x19cc_8b25_28f7_3985),
     ("itof", |a, _| Host::itof(a), |a, _| Reference::itof(a), 0x8ac2_5e0d_ba81_2df5),
     ("ftoi", |a, _| Host::ftoi(a), |a, _| Reference::ftoi(a), 0x289e_6b2a_c742_8435),

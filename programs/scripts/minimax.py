@@ -6,7 +6,7 @@ power of two (2^-24 relative). Needs mpmath; takes about a minute.
     python3 programs/scripts/minimax.py
 
 Remez's exchange on the weighted error; then the coefficients are rounded one after the other, from the lowest, and the rest are
-found anew each time, so that they make up for the rounding.
+found again each time, so that they make up for the rounding.
 """
 
 import struct

@@ -3,7 +3,7 @@
 
 use takt_asm::{MemoryLoader, Options};
 use takt_emu::{Emulator, PeriodError};
-use takt_isa::{Program, T3};
+use takt_isa::{Program, Register, T3};
 use takt_programs::SOURCES;
 use takt_programs::arm::{
     Arm, Configuration, FORWARD_EXAMPLE, ForwardResult, GOOD, INVERSE_EXAMPLE, InverseResult, NO_ANGLE,
@@ -19,8 +19,8 @@ const INVERSE_CYCLES: u64 = 240;
 /// A program and its ports, in the order of its source.
 struct Ported {
     emulator: Emulator,
-    inputs: Vec<u16>,
-    outputs: Vec<u16>,
+    inputs: Vec<Register>,
+    outputs: Vec<Register>,
 }
 
 impl Ported {

@@ -9,15 +9,16 @@
 //! ```
 //!
 //! Several instructions may share a code. A unit with a single operation has no `op` port and writes `-` for the code. A
-//! unit around another one's module has that one's codes: `//@ as alu`. The remaining ports follow from the unit's row:
-//! operands `a`, `b`, `c` as many as its instructions have sources.
+//! unit around another one's module has that one's codes: `//@ as alu`. The remaining ports follow from the unit's row in the
+//! table of units: operands `a`, `b`, `c` as many as its instructions have sources. A machine's row may ask for a part of the
+//! unit's functions; the ports stay.
 
 use crate::files;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 use std::{fs, io};
-use takt_isa::{Effect, Op, ROWS, Row, Unit};
+use takt_isa::{Effect, Op, ROWS, Row, UNITS, Unit};
 use thiserror::Error;
 
 /// An instruction that a circuit executes.
@@ -38,7 +39,7 @@ pub struct Circuit {
     pub op_bits: u32,
     /// Number of operand ports.
     pub operands: usize,
-    /// What it executes, in the order of the table of instructions.
+    /// What it executes on its machine, in the order of the table of instructions.
     pub operations: Vec<Operation>,
     /// Whether the module has a parameter INTERVAL beside LATENCY.
     pub has_interval: bool,
@@ -78,8 +79,8 @@ pub enum CircuitError {
          header of rtl/units/{0}.v, and what it computes below"
     )]
     Missing(&'static str, String),
-    /// The row wants of the circuit what it refuses.
-    #[error("unit `{unit}` has {} {value}; rtl/units/{unit}.v wants {limit}", limit.quantity)]
+    /// The row asks for what the circuit refuses.
+    #[error("unit `{unit}` has {} {value}; rtl/units/{unit}.v needs {limit}", limit.quantity)]
     Limit {
         /// The unit.
         unit: &'static str,
@@ -192,7 +193,7 @@ impl Library {
         let (own_file, text) = file(own)?;
         let mut files = Vec::new();
         let inner = text.lines().find_map(|line| line.strip_prefix("//@ as "));
-        let (op_bits, operations) = match inner {
+        let Codes { op_bits, operands, operations } = match inner {
             None => codes(unit, text)?,
             Some(inner) => {
                 let (name, text) = file(inner.trim())?;
@@ -208,8 +209,6 @@ impl Library {
         }
         files.push(own_file);
         let files = self.with_common(files);
-        let operands =
-            operations.iter().map(|operation| operand_ports(operation.op.row())).max().unwrap_or(0);
         let has_interval = text.contains("parameter INTERVAL");
         Ok(Circuit { unit: *unit, op_bits, operands, operations, has_interval, files })
     }
@@ -248,10 +247,22 @@ impl Circuit {
     }
 }
 
-/// The width of the `op` port and the codes that a header states.
-fn codes(unit: &Unit, text: &str) -> Result<(u32, Vec<Operation>), CircuitError> {
+/// What a header states.
+struct Codes {
+    /// The width of the `op` port.
+    op_bits: u32,
+    /// Number of operand ports.
+    operands: usize,
+    /// Those of the codes that the unit's functions ask for.
+    operations: Vec<Operation>,
+}
+
+/// Reads a header.
+fn codes(unit: &Unit, text: &str) -> Result<Codes, CircuitError> {
     let mut operations: Vec<Operation> = Vec::new();
-    let mut width = None;
+    let (mut width, mut operands) = (None, 0);
+    // What it can compute, of which a machine may ask for less.
+    let whole = UNITS.iter().find(|row| row.name == unit.name).unwrap_or(unit);
     for line in text.lines().filter(|line| line.starts_with("//@")) {
         let syntax = || CircuitError::Syntax(line.to_owned());
         let mut words = line.strip_prefix("//@ op ").ok_or_else(syntax)?.split_whitespace();
@@ -261,8 +272,12 @@ fn codes(unit: &Unit, text: &str) -> Result<(u32, Vec<Operation>), CircuitError>
         }
         for name in words {
             let op = Op::from_mnemonic(name)
-                .filter(|op| computes(unit, op.row()))
+                .filter(|op| computes(whole, op.row()) || computes(unit, op.row()))
                 .ok_or_else(|| CircuitError::Foreign(name.to_owned(), unit.name))?;
+            operands = operands.max(operand_ports(op.row()));
+            if !computes(unit, op.row()) {
+                continue;
+            }
             if operations.iter().any(|operation| operation.op == op) {
                 return Err(CircuitError::Twice(op.row().mnemonic));
             }
@@ -277,7 +292,7 @@ fn codes(unit: &Unit, text: &str) -> Result<(u32, Vec<Operation>), CircuitError>
         return Err(CircuitError::Missing(unit.name, missing.join(" ")));
     }
     operations.sort_by_key(|operation| operation.op);
-    Ok((width.unwrap_or(0), operations))
+    Ok(Codes { op_bits: width.unwrap_or(0), operands, operations })
 }
 
 /// Operand ports that an instruction uses: its sources, or `a` for what the core puts there in a source's place (an
@@ -299,8 +314,8 @@ fn code(word: &str) -> Option<(u32, u32)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_isa::UNITS;
-    use takt_isa::spec::units::{ADD, MULTIPLY};
+    use takt_isa::Function;
+    use takt_isa::spec::units::{ADD, FUSED, MULTIPLY};
 
     fn parse(unit: &Unit, source: &str) -> Result<Vec<(&'static str, u32)>, String> {
         let mut library = Library::default();
@@ -315,6 +330,21 @@ mod tests {
     fn header() {
         assert_eq!(parse(&ADD, "//@ op 1'b1 fsub\n//@ op 1'b0 fadd"), Ok(vec![("fadd", 0), ("fsub", 1)]));
         assert_eq!(parse(&MULTIPLY, "//@ op - fmul"), Ok(vec![("fmul", 0)]));
+    }
+
+    /// A machine that asks for a part of a unit's functions: the codes are those of the part, the ports those of the unit.
+    #[test]
+    fn a_part_of_a_unit() {
+        let library = Library::builtin();
+        let products = Unit { functions: &[Function::Multiply], ..FUSED };
+        let circuit = library.circuit(&products).expect("it has a circuit");
+        assert_eq!((circuit.operations.len(), circuit.operands), (1, 3));
+        let whole = library.circuit(&FUSED).expect("it has a circuit");
+        assert!(whole.operations.contains(&circuit.operations[0]));
+        assert_eq!((circuit.op_bits, circuit.operands), (whole.op_bits, whole.operands));
+        let more = Unit { functions: &[Function::Multiply, Function::Divide], ..FUSED };
+        let error = library.circuit(&more).expect_err("it does not divide").to_string();
+        assert!(error.contains("no circuit for fdiv: unit `fused`"), "{error}");
     }
 
     #[test]
@@ -332,11 +362,11 @@ mod tests {
         use takt_isa::spec::units::{ALU_LATE, CONVERT, DIVIDE};
         assert_eq!(
             message(Unit { latency: 4, ..ADD }),
-            "unit `add` has latency 4; rtl/units/add.v wants latency 5"
+            "unit `add` has latency 4; rtl/units/add.v needs latency 5"
         );
         assert_eq!(
             message(Unit { interval: 13, ..DIVIDE }),
-            "unit `divide` has interval 13; rtl/units/divide.v wants interval 14 at least"
+            "unit `divide` has interval 13; rtl/units/divide.v needs interval 14 at least"
         );
         assert!(message(Unit { latency: 6, ..CONVERT }).ends_with("latency 4 or 5"));
         assert!(message(Unit { latency: 2, ..ALU_LATE }).ends_with("latency 3 to 16"));

@@ -20,6 +20,7 @@ pub(crate) const UNITS: &[File] = files!("units":
     "convert.v"
     "divide.v"
     "divroot.v"
+    "fused.v"
     "multiply.v"
     "root.v"
     "sine.v"
@@ -29,6 +30,7 @@ pub(crate) const UNITS: &[File] = files!("units":
     "common/takt_product.v"
     "common/takt_quarter_table.v"
     "common/takt_reciprocal_table.v"
+    "common/takt_significand_product.v"
     "common/takt_unpack.v"
     "common/takt_wave_table.v"
 );
@@ -52,7 +54,7 @@ pub(crate) const CORE: &[File] = files!("core":
     "takt_program.v"
     "takt_sequencer.v"
     "takt_source.v"
-    "takt_underway.v"
+    "takt_in_flight.v"
 );
 
 #[cfg(test)]

@@ -2,7 +2,6 @@
 
 use crate::export::{Design, RESET_CYCLES};
 use std::fmt::Write as _;
-use takt_isa::spec::machines::REGISTER_SPACE;
 
 /// A register of the slave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +39,7 @@ const CONTROL: Register = Register {
     address: 0,
     name: "control",
     access: "rw",
-    text: "While run is 0 the core is in reset and can be loaded; 0 after `rst_i`. A reset, however short it is asked for, lasts as long as the core wants; with RESTORE, what was loaded is written again in it.",
+    text: "While run is 0 the core is in reset and can be loaded; 0 after `rst_i`. A reset, however short it is asked for, lasts as long as the core needs; with RESTORE, what was loaded is written again in it.",
     fields: &[field("run", 0, 1, "The program runs.")],
 };
 const STATUS: Register = Register {
@@ -139,7 +138,7 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
     let port_bits = machine.outputs_per_bank.trailing_zeros();
     let input_bits = machine.inputs.depth.trailing_zeros();
     let data_bits = machine.data_depth.trailing_zeros();
-    let register_bits = REGISTER_SPACE.trailing_zeros();
+    let register_bits = takt_isa::Register::COUNT.trailing_zeros();
     let inputs_page = format!("{}'d{}", register_bits - input_bits, machine.inputs.base >> input_bits);
     // What is kept to be loaded again: data, then registers.
     let half = data_bits.max(register_bits);
@@ -168,14 +167,14 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
 //   adr_i counts words; addresses are hexadecimal:
 {table}//   {INPUTS:04x} + port  w  input port
 //   {OUTPUTS:04x} + port  r  output port: what was last written to it; if LATCHED, as of the last `wait`
-//   Accesses are acknowledged in the next cycle, but load_low and, with RESTORE, input ports only when a reset underway has
+//   Accesses are acknowledged in the next cycle, but load_low and, with RESTORE, input ports only when a reset in progress has
 //   lasted long enough. What is written nowhere is lost, what is read nowhere is 0.
 //   rst_i: for a cycle at least, after power-up.
 //   waiting: the program waits for the tick: the outputs of the period stand. It can serve as an interrupt.
 //   LATCHED: the core's.
 //   RESTORE: a reset writes again what was loaded into data memory and registers, and what was written to input ports, while run
 //   was 0: so the program starts again as it did first. It costs {words} words of 33 bits in block RAM and as many cycles of a reset.
-//   With 0, data memory and registers are after a reset as the program left them: load them anew before it runs again.
+//   With 0, data memory and registers are after a reset as the program left them: load them again before it runs again.
 
 module {name} #(
     parameter LATCHED = {latched},
@@ -196,7 +195,7 @@ module {name} #(
     // ---- registers
 
     reg         run, ticks, loads, writes_input;
-    reg  [6:0]  in_reset;     // cycles of reset so far; the core wants {RESET_CYCLES}
+    reg  [6:0]  in_reset;     // cycles of reset so far; the core needs {RESET_CYCLES}
     reg         done, settled;
     reg  [31:0] period, elapsed, value, low;
     reg  [15:0] place, load_address, high;

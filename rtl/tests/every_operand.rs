@@ -1,4 +1,4 @@
-//! Units with one operand, for all 2³² of it: hours for those that take an operation only every so many cycles, hence not among
+//! Units with one operand, for all 2³² of it: hours for those that take an operation only every so many cycles, so not among
 //! the usual tests.
 //!
 //! ```text

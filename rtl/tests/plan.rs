@@ -40,62 +40,62 @@ fn every_reason() {
         (units(2, &[ALU, SEQUENCER]), "no slot hosts the data memory (function Memory), which the core has"),
         (
             slot(1, |slot| slot.bank.depth = 192),
-            "the depth of bank `a` is 192; the circuit wants a power of two from 2 to 512",
+            "the depth of bank `a` is 192; the circuit needs a power of two from 2 to 512",
         ),
         (
             slot(1, |slot| slot.bank = Bank { base: 384, depth: 128, ..slot.bank }),
-            "bank `a` begins at 384; the circuit wants a multiple of 256, the depth of the deepest bank",
+            "bank `a` begins at 384; the circuit needs a multiple of 256, the depth of the deepest bank",
         ),
         (
             Machine { outputs_per_bank: 12, ..T3 },
-            "outputs_per_bank is 12; the circuit wants a power of two from 2 to 128",
+            "outputs_per_bank is 12; the circuit needs a power of two from 2 to 128",
         ),
         (
             Machine { outputs_per_bank: 256, ..T3 },
-            "outputs_per_bank is 256; the circuit wants a power of two from 2 to 128",
+            "outputs_per_bank is 256; the circuit needs a power of two from 2 to 128",
         ),
         (
             Machine { outputs_per_bank: 1, ..T3 },
-            "outputs_per_bank is 1; the circuit wants a power of two from 2 to 128",
+            "outputs_per_bank is 1; the circuit needs a power of two from 2 to 128",
         ),
         (
             Machine { code_depth: 1 << 16, ..T3 },
-            "code_depth is 65536; the circuit wants a power of two from 2 to 32768",
+            "code_depth is 65536; the circuit needs a power of two from 2 to 32768",
         ),
         (
             Machine { data_depth: 1000, ..T3 },
-            "data_depth is 1000; the circuit wants a power of two from 2 to 4096",
+            "data_depth is 1000; the circuit needs a power of two from 2 to 4096",
         ),
-        (Machine { refill: 5, ..T3 }, "refill is 5; rtl/core/takt_sequencer.v wants refill 6"),
-        (Machine { resolve: 1, ..T1 }, "resolve is 1; rtl/core/takt_sequencer.v wants resolve 2"),
-        (Machine { stack_depth: 32, ..T3 }, "stack_depth is 32; rtl/core/takt_sequencer.v wants stack 16"),
+        (Machine { refill: 5, ..T3 }, "refill is 5; rtl/core/takt_sequencer.v needs refill 6"),
+        (Machine { resolve: 1, ..T1 }, "resolve is 1; rtl/core/takt_sequencer.v needs resolve 2"),
+        (Machine { stack_depth: 32, ..T3 }, "stack_depth is 32; rtl/core/takt_sequencer.v needs stack 16"),
         (
             units(2, &[ALU, Unit { latency: 3, ..MEMORY }, SEQUENCER]),
-            "slot `aux`: the latency of unit `memory` is 3; rtl/core/takt_memory.v wants latency 4",
+            "slot `aux`: the latency of unit `memory` is 3; rtl/core/takt_memory.v needs latency 4",
         ),
         (
             units(1, &[Unit { latency: 4, ..ADD }, CONVERT]),
-            "slot `add`: unit `add` has latency 4; rtl/units/add.v wants latency 5",
+            "slot `add`: unit `add` has latency 4; rtl/units/add.v needs latency 5",
         ),
         (
             units(0, &[MULTIPLY, Unit { interval: 13, ..DIVIDE }]),
-            "slot `mul`: unit `divide` has interval 13; rtl/units/divide.v wants interval 14 at least",
+            "slot `mul`: unit `divide` has interval 13; rtl/units/divide.v needs interval 14 at least",
         ),
         (
-            units(0, &[Unit { name: "fused", ..MULTIPLY }]),
-            "slot `mul`: unit `fused`: there is no circuit rtl/units/fused.v: write it and list it in rtl/src/files.rs",
+            units(0, &[Unit { name: "twofold", ..MULTIPLY }]),
+            "slot `mul`: unit `twofold`: there is no circuit rtl/units/twofold.v: write it and list it in rtl/src/files.rs",
         ),
         // A sine every other cycle, beside an adder.
         (
             units(1, &[ADD, CONVERT, Unit { interval: 2, ..SINE }]),
             "slot `add`: unit `sine` has latency 14 and interval 2; beside results that are in flight for 12 cycles, a unit of \
-             interval above 1 wants a latency of 14 and an interval of 3 at least",
+             interval above 1 needs a latency of 14 and an interval of 3 at least",
         ),
         // An adder every third cycle beside a pipelined divider.
         (
             units(1, &[Unit { interval: 3, ..ADD }, DIVROOT]),
             "slot `add`: unit `add` has latency 5 and interval 3; beside results that are in flight for 10 cycles, a unit of \
-             interval above 1 wants a latency of 12 and an interval of 3 at least",
+             interval above 1 needs a latency of 12 and an interval of 3 at least",
         ),
     ];
     for (machine, message) in cases {

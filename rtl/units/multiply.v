@@ -51,20 +51,8 @@ module takt_multiply #(
     wire [23:0] a_significand = {~a_small, a[22:0]};
     wire [23:0] b_significand = {~b_small, b[22:0]};
 
-    // 24 = 6 + 18 bits.
-    wire [35:0] low_low, high_low, low_high;
-    takt_product u_low_low (.clk(clk), .a(a_significand[17:0]), .b(b_significand[17:0]), .p(low_low));
-    takt_product u_high_low (.clk(clk), .a({12'd0, a_significand[23:18]}), .b(b_significand[17:0]), .p(high_low));
-    takt_product u_low_high (.clk(clk), .a(a_significand[17:0]), .b({12'd0, b_significand[23:18]}), .p(low_high));
-
-    // The product of the upper 6 bits in logic, for a multiplier is too good for it: that of 5 bits of the fractions, row by
-    // row, and what the leading ones add to it. They come late, so the two are summed in the next stage.
-    wire [4:0]  x = a[22:18];
-    wire [4:0]  y = b[22:18];
-    wire [9:0]  high_product =
-        ({5'd0, x & {5{y[0]}}} + {4'd0, x & {5{y[1]}}, 1'd0}) +
-        ({3'd0, x & {5{y[2]}}, 2'd0} + {2'd0, x & {5{y[3]}}, 3'd0}) + {1'd0, x & {5{y[4]}}, 4'd0};
-    wire [6:0]  high_ones = {2'd0, x & {5{~b_small}}} + {1'd0, ~a_small & ~b_small, y & {5{~a_small}}};
+    wire [47:0] product;  // of the next stage
+    takt_significand_product u_product (.clk(clk), .a(a_significand), .b(b_significand), .p(product));
 
     // Zeros before the leading one of a subnormal's significand; of two subnormals, whose product is far below everything,
     // those of a.
@@ -84,15 +72,11 @@ module takt_multiply #(
     wire        b_zero    = b_small & b_empty;
     wire        improper  = (a_special & b_zero) | (a_zero & b_special);  // 0 · ∞, if there is no NaN
 
-    reg  [9:0]  high_product1;
-    reg  [6:0]  high_ones1;
     reg  [8:0]  exponents1;  // sum of the biased exponents; that of a subnormal is 1
     reg  [4:0]  zeros1;
     reg         sign1, nan1, infinite1, zero1, invalid1;
 
     always @(posedge clk) begin
-        high_product1 <= high_product;
-        high_ones1    <= high_ones;
         exponents1 <= {1'b0, a[30:24], a[23] | a_small} + {1'b0, b[30:24], b[23] | b_small};
         zeros1     <= a_small ? a_zeros : b_small ? b_zeros : 5'd0;
         sign1      <= a[31] ^ b[31];
@@ -104,11 +88,7 @@ module takt_multiply #(
 
     // =============================================================== 2: product; shift count
 
-    // 48 bits, the leading one of two normal significands in place 47 or 46. The sum's low 18 bits are those of low_low.
-    wire [29:0] upper =
-        {2'd0, high_product1, low_low[35:18]} + {high_ones1, 23'd0} + ({6'd0, high_low[23:0]} + {6'd0, low_high[23:0]});
-    wire        unused_high = |{high_low[35:24], low_high[35:24]};  // zero: 6 x 18 bits
-
+    // `product` has 48 bits, the leading one of two normal significands in place 47 or 46.
     // With the leading one in place 46 the exponent field is exponents - 127 - zeros; `field` is one less, for the leading one
     // adds itself (see 4). If that is negative, the result is subnormal: field 0, and the shift stops where the exponent is 1.
     // The shift is to the right, from 23 places further to the left: by 23 - zeros, or by 24 - (exponents - 127).
@@ -122,7 +102,7 @@ module takt_multiply #(
     reg         sign2, nan2, infinite2, zero2, invalid2;
 
     always @(posedge clk) begin
-        product2  <= {upper, low_low[17:0]};
+        product2  <= product;
         shift2    <= ~subnormal ? {1'b0, 5'd23 - zeros1} : |deep[9:6] ? 6'd63 : deep[5:0];
         field2    <= field[8:0] & {9{~subnormal}};
         sign2     <= sign1;

@@ -31,7 +31,7 @@ pub(crate) fn run(root: &Path, check: bool) -> Result<()> {
         }
     }
     if !stale.is_empty() {
-        bail!("stale: {}; `cargo xtask docs` writes it anew", stale.join(", "));
+        bail!("stale: {}; `cargo xtask docs` rewrites it", stale.join(", "));
     }
     Ok(())
 }

@@ -92,7 +92,7 @@ fn works(program: &str, argument: &str) -> bool {
 }
 
 /// What the tests call, how to ask whether it works, and the Debian package that has it.
-const TOOLS: [(&str, &str, &str); 6] = [
+const TOOLS: [(&str, &str, &str); 7] = [
     // Berkeley SoftFloat, the reference arithmetic, is C.
     ("cc", "--version", "gcc"),
     // The circuit runs in Verilator, which builds with make and a C++ compiler, and in Icarus Verilog.
@@ -100,6 +100,8 @@ const TOOLS: [(&str, &str, &str); 6] = [
     ("make", "--version", "make"),
     ("verilator", "--version", "verilator"),
     ("iverilog", "-V", "iverilog"),
+    // The language server is used by the client of an editor.
+    ("nvim", "--version", "neovim"),
     // The page of `takt analyse` is opened in a browser.
     ("chromium", "--version", "chromium"),
 ];
@@ -163,7 +165,7 @@ fn fuzz(minutes: u32) -> Result<()> {
     }
     seed()?;
     for target in ["assemble", "image"] {
-        // cargo-fuzz wants unstable compiler flags; the variable admits them on the stable compiler.
+        // cargo-fuzz needs unstable compiler flags; the variable admits them on the stable compiler.
         run(cargo().env("RUSTC_BOOTSTRAP", "1").args(["fuzz", "run", target, "--"]).args([
             format!("-max_total_time={}", 60 * minutes),
             "-max_len=65536".to_owned(),

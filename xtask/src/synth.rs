@@ -496,17 +496,18 @@ pub(crate) fn markdown(rows: &[Synthesis]) -> String {
     let mut text = String::from(
         "# Synthesis\n
 <!-- Written by `cargo xtask synth` and `cargo xtask docs` from synthesis.json. -->\n
-How fast the circuit is and how much of a device it takes, after place and route with open tools. `cargo xtask synth` measures anew
-and writes this file; the first run installs the tools (400 MB) in `.venv`, or in the folder that `TAKT_VENV` names.\n
-Clocks are nextpnr's, for the slowest conditions of the speed grade, with the seeds 1, 2, … (as many as stated; of an even number the lower one of the two in the middle); the median is the clock that the README and
-`takt track` count with. LUTs are nextpnr's TRELLIS_COMB: carry chains and memories in logic included. Multipliers are of 18 x 18 bits, block
-RAMs of 18 kbit.\n",
+How fast the circuit is and how much of a device it takes, after place and route with open tools. `cargo xtask synth`
+measures it and writes this file; the first run installs the tools (400 MB) in `.venv`, or in the folder that `TAKT_VENV` names.\n
+Clocks are nextpnr's, for the slowest conditions of the speed grade, with the seeds 1, 2, … up to the stated
+number. The median (of an even number, the lower of the two in the middle) is the clock that the README and `takt track`
+use. LUTs are nextpnr's TRELLIS_COMB, including carry chains and memories in logic. Multipliers have 18 x 18 bits, block
+RAMs 18 kbit.\n",
     );
     let is_machine = |row: &&Synthesis| MACHINES.iter().any(|machine| machine.name == row.design);
     let (machines, units): (Vec<_>, Vec<_>) = rows.iter().partition(is_machine);
     let placed = |rows: &[&Synthesis]| rows.iter().any(|row| row.grade.is_some());
     if placed(&machines) {
-        text += "\n## Machines\n\nWith their memories, and with the shift register and the parity that stand for pins (about 230 flip-flops, 30 LUT4). `cargo xtask synth --machine t3 --device 85k --grade 8`, and so on.\n";
+        text += "\n## Machines\n\nWith their memories, and with the shift register and the parity that replace pins (about 230 flip-flops, 30 LUT4).\n`cargo xtask synth --machine t3 --device 85k --grade 8`, and so on.\n";
         text += &table(&machines);
         let (clock, [luts, flip_flops, memory, multipliers]) = PAPER;
         let _ = writeln!(
@@ -526,15 +527,14 @@ RAMs of 18 kbit.\n",
         }
     }
     if placed(&units) {
-        text +=
-            "\n## Units\n\nEach alone between registers, without these. `cargo xtask synth --unit all`.\n";
+        text += "\n## Units\n\nEach unit alone, between registers that are not counted. `cargo xtask synth --unit all`.\n";
         text += &table(&units);
     }
     let counted: Vec<_> = rows.iter().filter(|row| row.grade.is_none()).collect();
     if !counted.is_empty() {
         text += "\n## Intel Cyclone V\n
-The nearest open relative of the paper's Stratix III. Resources after synthesis only; there is no open place and route. Multipliers are of up
-to 27 x 27 bits, block RAMs of 10 kbit. `cargo xtask synth --device cyclonev`.\n
+The nearest open relative of the paper's Stratix III. Resources after synthesis only; there is no open place and route.
+Multipliers have up to 27 x 27 bits, block RAMs 10 kbit. `cargo xtask synth --device cyclonev`.\n
 | design | ALUTs | flip-flops | multipliers | block RAMs | date |\n|---|---|---|---|---|---|\n";
         for row in counted {
             let Resources { luts, flip_flops, multipliers, block_rams } = row.resources;
@@ -550,7 +550,7 @@ to 27 x 27 bits, block RAMs of 10 kbit. `cargo xtask synth --device cyclonev`.\n
     if let Some(tools) = tools.first() {
         let _ = writeln!(
             text,
-            "\nTools: {tools}. Synthesis: `{MAPPING}; synth_lattice -family ecp5 {OPTIONS}`; place and route strive for {TARGET_MHZ} MHz."
+            "\nTools: {tools}. Synthesis: `{MAPPING}; synth_lattice -family ecp5 {OPTIONS}`; place and route aims at {TARGET_MHZ} MHz."
         );
     }
     text

@@ -4,12 +4,13 @@ pub(crate) mod types;
 
 use crate::context::{Context, ScopeId};
 use crate::homes::{Homeless, Homes};
-use crate::ir::{Constant, Ir, Operation, Register, RegisterId, RegisterKind};
-use crate::report::diag::{Diagnostic, Severity, nearest};
+use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, VirtualRegister};
+use crate::report::diag::{Diagnostic, Severity};
+use crate::report::nearest;
 use crate::report::source::Span;
 use crate::syntax::ast::Section;
 use takt_isa::program::Space;
-use takt_isa::{Effect, Field, Operand, ROWS};
+use takt_isa::{Effect, Field, Operand, ROWS, SlotIndex};
 
 /// An operation's place in the program: its bundle, and its index there.
 type Where = (u32, u32);
@@ -20,7 +21,7 @@ struct Use {
     /// The first operation that reads it, and as which of its sources.
     read: Option<(Where, usize)>,
     /// The first operation that writes it, and its slot.
-    written: Option<(Where, u8)>,
+    written: Option<(Where, SlotIndex)>,
     /// Whether an operation of `.once` writes it.
     once: bool,
     /// Slots, by bit, that write it though another does.
@@ -51,8 +52,8 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
                     }
                 }
                 // One report for each slot too many is enough.
-                Some((first, owner)) if owner != slot && found.conflicts & 1 << slot == 0 => {
-                    found.conflicts |= 1 << slot;
+                Some((first, owner)) if owner != slot && found.conflicts & 1 << slot.index() == 0 => {
+                    found.conflicts |= 1 << slot.index();
                     two_slots(context, ir, operation, (slot, owner), at(ir, first), homes.homeless(dest));
                 }
                 Some(_) => {}
@@ -76,7 +77,23 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
     }
     if !opaque {
         no_wait(context, ir);
-        for (register, used, _) in (0..uses.len()).map(found).filter(|(.., id)| !homes.quiet.contains(id)) {
+        let arrays = context.declared.arrays.clone();
+        let mut elements = vec![false; uses.len()];
+        for array in &arrays {
+            let all = || array.elements().map(|id| id.index());
+            all().for_each(|element| elements[element] = true);
+            // Of an array it is enough that one element is used.
+            let best =
+                all().max_by_key(|&element| (uses[element].read.is_some(), uses[element].written.is_some()));
+            if let Some(best) = best {
+                let register = VirtualRegister { name: array.name.clone(), ..ir.registers[best].clone() };
+                unused(context, &register, &uses[best]);
+            }
+        }
+        let single = |(_, _, id): &(&VirtualRegister, &Use, RegisterId)| {
+            !homes.quiet.contains(id) && !elements.get(id.index()).is_some_and(|element| *element)
+        };
+        for (register, used, _) in (0..uses.len()).map(found).filter(single) {
             unused(context, register, used);
         }
     }
@@ -126,13 +143,12 @@ fn two_slots(
     context: &mut Context,
     ir: &Ir,
     operation: &Operation,
-    (slot, owner): (u8, u8),
+    (slot, owner): (SlotIndex, SlotIndex),
     first: &Operation,
     homeless: Option<&Homeless>,
 ) {
     let Some(dest) = operation.dest else { return };
-    let slots = ir.machine.slots;
-    let (slot, owner) = (&slots[slot as usize], &slots[owner as usize]);
+    let (slot, owner) = (ir.machine.slot(slot), ir.machine.slot(owner));
     let message = format!(
         "`{}` is written by slot `{}` and by slot `{}`: no register is in both banks",
         text(ir, ir.register(dest)),
@@ -154,9 +170,9 @@ fn two_slots(
 }
 
 /// A register with a place must be in the bank of the slot that writes it.
-fn reach(context: &mut Context, ir: &Ir, operation: &Operation, dest: RegisterId, slot: u8) {
+fn reach(context: &mut Context, ir: &Ir, operation: &Operation, dest: RegisterId, slot: SlotIndex) {
     let register = ir.register(dest);
-    let slot = &ir.machine.slots[slot as usize];
+    let slot = ir.machine.slot(slot);
     let Some(address) = register.pinned.filter(|address| !slot.bank.contains(*address)) else { return };
     let place = ir.machine.register_name(address).unwrap_or_default();
     let message = format!("`{place}` is out of reach: slot `{}` writes bank {}", slot.name, slot.bank.name);
@@ -172,7 +188,7 @@ fn reach(context: &mut Context, ir: &Ir, operation: &Operation, dest: RegisterId
     context.report(ScopeId(operation.expansion), error.help(help));
 }
 
-pub(crate) fn text(ir: &Ir, register: &Register) -> String {
+pub(crate) fn text(ir: &Ir, register: &VirtualRegister) -> String {
     if !register.name.is_empty() {
         return register.name.clone();
     }
@@ -181,7 +197,7 @@ pub(crate) fn text(ir: &Ir, register: &Register) -> String {
 }
 
 /// Registers that are never used, outputs that are never written, and what is written and never read.
-fn unused(context: &mut Context, register: &Register, found: &Use) {
+fn unused(context: &mut Context, register: &VirtualRegister, found: &Use) {
     let name = &register.name;
     let (read, written) = (found.read.is_some(), is_written(register, found));
     let message = match register.kind {
@@ -206,12 +222,12 @@ fn unused(context: &mut Context, register: &Register, found: &Use) {
 }
 
 /// Whether a register gets a value: from an operation or the loader.
-fn is_written(register: &Register, found: &Use) -> bool {
+fn is_written(register: &VirtualRegister, found: &Use) -> bool {
     found.written.is_some() || register.preset.is_some()
 }
 
 /// A register that is read and that nothing writes. By giving it a place, one says that one knows.
-fn unwritten(context: &mut Context, ir: &Ir, register: &Register, found: &Use, uses: &[Use]) {
+fn unwritten(context: &mut Context, ir: &Ir, register: &VirtualRegister, found: &Use, uses: &[Use]) {
     let is_register = matches!(register.kind, RegisterKind::Plain | RegisterKind::State);
     let Some((place, which)) = found.read.filter(|_| is_register && !is_written(register, found)) else {
         return;
@@ -242,7 +258,7 @@ fn unwritten(context: &mut Context, ir: &Ir, register: &Register, found: &Use, u
 }
 
 /// A state must have a value before the first period.
-fn state(context: &mut Context, ir: &Ir, register: &Register, found: &Use) {
+fn state(context: &mut Context, ir: &Ir, register: &VirtualRegister, found: &Use) {
     let set = found.once || register.preset.is_some() || found.written.is_none();
     let (RegisterKind::State, false, Some((place, which))) = (register.kind, set, found.read) else { return };
     let (name, section) = (&register.name, Section::Once.name());

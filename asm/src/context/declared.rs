@@ -3,13 +3,14 @@
 use crate::context::At;
 use crate::context::scopes::{Binding, ScopeId};
 use crate::ir::given::GivenTypes;
-use crate::ir::{Label, Register, RegisterId, RegisterKind};
+use crate::ir::{Label, RegisterId, RegisterKind, VirtualRegister};
 use crate::report::source::Span;
 use crate::syntax::ast::{Operand, Section};
 use crate::syntax::expr::Value;
 use crate::syntax::name::NameId;
+use smallvec::SmallVec;
 use std::collections::{BTreeMap, HashMap, HashSet};
-use takt_isa::{Type, ZERO};
+use takt_isa::{Register, Type};
 
 #[derive(Clone, Debug)]
 pub(crate) struct NamedConstant {
@@ -20,6 +21,31 @@ pub(crate) struct NamedConstant {
     pub(crate) used: bool,
     /// Whether that it is never used is worth a warning.
     pub(crate) watched: bool,
+}
+
+/// An array of registers, which follow one another, the last index counting fastest.
+#[derive(Clone, Debug)]
+pub(crate) struct Array {
+    pub(crate) name: String,
+    /// Its first element.
+    pub(crate) first: RegisterId,
+    /// How many elements it has in each direction; indices count from 1.
+    pub(crate) sizes: SmallVec<[u32; 2]>,
+    pub(crate) span: Span,
+}
+
+impl Array {
+    /// Its elements.
+    pub(crate) fn elements(&self) -> impl Iterator<Item = RegisterId> + use<> {
+        let count = self.sizes.iter().product::<u32>() as usize;
+        (self.first.index()..self.first.index() + count).map(RegisterId::new)
+    }
+
+    /// Its sizes as the source writes them: `4,4`.
+    pub(crate) fn shape(&self) -> String {
+        let sizes: Vec<String> = self.sizes.iter().map(u32::to_string).collect();
+        sizes.join(",")
+    }
 }
 
 /// An argument of a macro's use.
@@ -33,15 +59,18 @@ pub(crate) struct Argument {
 
 /// Everything that the source declares, by number.
 pub(crate) struct Declared {
-    pub(crate) registers: Vec<Register>,
+    pub(crate) registers: Vec<VirtualRegister>,
     /// Registers with a given address.
-    pub(crate) by_address: HashMap<u16, RegisterId>,
+    pub(crate) by_address: HashMap<Register, RegisterId>,
     /// Outputs with a given number.
     pub(crate) numbered: BTreeMap<u16, RegisterId>,
     /// Registers that are declared with a type, rather than as floats by default.
     pub(crate) typed: HashSet<RegisterId>,
     /// What the source says of the types of operands that the instruction leaves open.
     pub(crate) given: GivenTypes,
+    pub(crate) arrays: Vec<Array>,
+    /// Elements of all arrays.
+    pub(crate) elements: usize,
     pub(crate) constants: Vec<NamedConstant>,
     pub(crate) arguments: Vec<Argument>,
     /// Parameters of macros' uses that stand for registers, as far as operations use them.
@@ -57,20 +86,22 @@ pub(crate) struct Declared {
 impl Declared {
     /// Nothing but the register `zero`.
     pub(crate) fn new() -> Declared {
-        let zero = Register {
+        let zero = VirtualRegister {
             name: "zero".to_owned(),
             kind: RegisterKind::Zero,
             ty: Type::B,
-            pinned: Some(ZERO),
+            pinned: Some(Register::ZERO),
             preset: None,
             span: Span::default(),
         };
         Declared {
             registers: vec![zero],
-            by_address: HashMap::from([(ZERO, RegisterId::ZERO)]),
+            by_address: HashMap::from([(Register::ZERO, RegisterId::ZERO)]),
             numbered: BTreeMap::new(),
             typed: HashSet::new(),
             given: GivenTypes::default(),
+            arrays: Vec::new(),
+            elements: 0,
             constants: Vec::new(),
             arguments: Vec::new(),
             parameters: HashMap::new(),
@@ -84,6 +115,7 @@ impl Declared {
     pub(crate) fn declaration(&self, binding: Binding) -> Option<Span> {
         match binding {
             Binding::Register(id) => Some(self.registers[id.index()].span),
+            Binding::Array(id) => Some(self.arrays[id as usize].span),
             Binding::Constant(id) => Some(self.constants[id as usize].span),
             Binding::Code(id) | Binding::Data(id) => Some(self.labels[id.0 as usize].span),
             Binding::Argument(id) => Some(self.arguments[id as usize].operand.span),
@@ -101,6 +133,7 @@ impl Declared {
                 _ => "a register",
             },
             Binding::Constant(_) | Binding::Builtin(_) | Binding::Has(_) => "a constant",
+            Binding::Array(_) => "an array of registers",
             Binding::Code(_) => "a code label",
             Binding::Data(_) => "a data label",
             Binding::Argument(_) => "a parameter",

@@ -3,13 +3,13 @@
 pub(crate) mod place;
 
 use crate::emit::place::Placement;
-use crate::ir::{Constant, Ir, Operation, RegisterKind};
+use crate::ir::{Constant, Ir, Operation, RegisterKind, numbered};
 use crate::limits::NAME_BYTES;
 use crate::report::diag::{Diagnostic, Sink};
 use crate::report::source::Span;
 use std::collections::{BTreeMap, HashSet};
 use takt_isa::program::{LoopBound, Port, Section, Space, Symbol};
-use takt_isa::{Instruction, Program, ZERO};
+use takt_isa::{BundleAddress, Instruction, Program, Register, SlotIndex};
 
 /// A program, and which of its words a macro, a repetition or the assembler itself made (as indices into its code, ascending).
 pub(crate) struct Emitted {
@@ -17,6 +17,8 @@ pub(crate) struct Emitted {
     pub(crate) expanded: Vec<u32>,
     /// For each word that has a source line, its operation's order and expansion.
     pub(crate) origins: Vec<Option<(u32, u32)>>,
+    /// Words that compute a part of an equation, and where that stands.
+    pub(crate) parts: Vec<(u32, Span)>,
 }
 
 /// Writes the program.
@@ -25,37 +27,34 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
     let filler = Instruction::NOP.encode().unwrap_or(0);
     let mut code = vec![filler; ir.bundles.len() * slots];
     let mut lines = vec![None; ir.bundles.len() * slots];
-    let mut expanded = Vec::new();
+    let (mut expanded, mut parts) = (Vec::new(), Vec::new());
+    let mut columns = Vec::new();
     let mut origins = vec![None; ir.bundles.len() * slots];
     for (address, bundle) in ir.bundles.iter().enumerate() {
         let words = address * slots..(address + 1) * slots;
-        let mut free = 0;
+        // What any slot takes goes to the first that no other operation of the bundle claims.
+        let claims = |slot: SlotIndex| bundle.operations.iter().any(|other| other.slot == Some(slot));
+        let mut free = ir.machine.numbered_slots().map(|(slot, _)| slot).filter(|slot| !claims(*slot));
         for operation in &bundle.operations {
-            // What any slot takes goes to the first that no other operation of the bundle claims.
-            let slot = match operation.slot {
-                Some(slot) => slot as usize,
-                None => {
-                    while bundle.operations.iter().any(|other| other.slot == Some(free)) {
-                        free += 1;
-                    }
-                    free += 1;
-                    free as usize - 1
-                }
-            };
-            let index = words.start + slot;
-            if slot >= slots {
-                continue;
-            }
+            let Some(slot) = operation.slot.or_else(|| free.next()) else { continue };
+            let index = words.start + slot.index();
             code[index] = word(ir, operation, slot, placement, sink);
             lines[index] = operation.location;
             origins[index] = operation.location.map(|_| (operation.order, operation.expansion));
-            if operation.expansion != 0 || operation.made {
+            columns.extend(
+                operation.columns.filter(|_| operation.location.is_some()).map(|part| (index as u32, part)),
+            );
+            if operation.is_computed() && operation.columns.is_none() {
+                parts.push((index as u32, operation.span));
+            }
+            if operation.expansion != 0 || operation.made || operation.is_computed() {
                 expanded.push(index as u32);
             }
         }
     }
     limits(ir, sink);
     expanded.sort_unstable();
+    parts.sort_unstable_by_key(|(word, _)| *word);
     let mut program = Program {
         machine: ir.machine,
         code,
@@ -70,15 +69,16 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
         loop_bounds: loop_bounds(ir),
         files: ir.files.clone(),
         lines,
+        // Those of equations are known where the sources are.
+        parts: columns,
     };
     distinguish(&mut program);
-    Emitted { program, expanded, origins }
+    Emitted { program, expanded, origins, parts }
 }
 
-fn word(ir: &Ir, operation: &Operation, slot: usize, placement: &Placement, sink: &mut Sink) -> u64 {
+fn word(ir: &Ir, operation: &Operation, slot: SlotIndex, placement: &Placement, sink: &mut Sink) -> u64 {
     // A register without a place is reported by the stage that found none.
-    let address = |id: crate::ir::RegisterId| placement.addresses[id.index()].unwrap_or(ZERO);
-    let base = ir.machine.slots[slot].bank.base;
+    let address = |id: crate::ir::RegisterId| placement.addresses[id.index()].unwrap_or(Register::ZERO);
     let constant = match operation.constant {
         Constant::None => 0,
         Constant::Value(value) => value,
@@ -86,7 +86,11 @@ fn word(ir: &Ir, operation: &Operation, slot: usize, placement: &Placement, sink
         Constant::Raw(index) => return ir.raw[index as usize],
     };
     let mut instruction = Instruction::bare(operation.op);
-    instruction.dest = operation.dest.map_or(0, |dest| address(dest).wrapping_sub(base));
+    if let Some(dest) = operation.dest {
+        // A register without a place, or out of reach, has been reported.
+        let Some(dest) = ir.machine.slot(slot).bank.index(address(dest)) else { return 0 };
+        instruction.dest = dest;
+    }
     for (source, id) in instruction.sources.iter_mut().zip(operation.reads()) {
         *source = address(*id);
     }
@@ -94,10 +98,7 @@ fn word(ir: &Ir, operation: &Operation, slot: usize, placement: &Placement, sink
     match instruction.encode() {
         Ok(word) => word,
         Err(error) => {
-            // A register without a place, or out of reach, has been reported.
-            if error.field != takt_isa::Field::Dest {
-                sink.push(Diagnostic::error("range", operation.span, error.to_string()));
-            }
+            sink.push(Diagnostic::error("range", operation.span, error.to_string()));
             0
         }
     }
@@ -130,8 +131,8 @@ pub(crate) fn limits(ir: &Ir, sink: &mut Sink) {
     }
 }
 
-fn constants(ir: &Ir, placement: &Placement) -> Vec<(u16, u32)> {
-    let mut constants: Vec<(u16, u32)> = ir
+fn constants(ir: &Ir, placement: &Placement) -> Vec<(Register, u32)> {
+    let mut constants: Vec<(Register, u32)> = ir
         .registers
         .iter()
         .zip(&placement.addresses)
@@ -175,6 +176,7 @@ fn symbols(ir: &Ir) -> Vec<Symbol> {
 fn sections(ir: &Ir) -> Vec<Section> {
     let end = ir.bundles.len() as u32;
     [("once", 0, ir.period), ("period", ir.period, end)]
+        .map(|(name, start, end)| (name, BundleAddress::new(start), BundleAddress::new(end)))
         .into_iter()
         .filter(|(_, start, end)| start < end)
         .map(|(name, start, end)| Section { name: name.to_owned(), start, end })
@@ -188,7 +190,10 @@ fn loop_bounds(ir: &Ir) -> Vec<LoopBound> {
         let most = bounds.entry(bound.position).or_default();
         *most = bound.most.max(*most);
     }
-    bounds.into_iter().map(|(address, most)| LoopBound { address, most }).collect()
+    bounds
+        .into_iter()
+        .map(|(address, most)| LoopBound { address: BundleAddress::new(address), most })
+        .collect()
 }
 
 /// Gives every named thing a name of its own. The source's names are; those that the assembler makes, of a macro's locals and
@@ -213,10 +218,12 @@ fn distinguish(program: &mut Program) {
             continue;
         }
         // ASCII throughout: a name can be cut anywhere.
-        let stem = name[..name.len().min(NAME_BYTES - 12)].to_owned();
+        let (head, indices) = name.split_at(name.find('[').unwrap_or(name.len()));
+        let room = (NAME_BYTES - 12).saturating_sub(indices.len());
+        let stem = format!("{}{indices}", &head[..head.len().min(room)]);
         let mut number = 2;
         *name = loop {
-            let candidate = format!("{stem}._{number}");
+            let candidate = numbered(&stem, &format!("._{number}"));
             if taken.insert(candidate.clone()) {
                 break candidate;
             }

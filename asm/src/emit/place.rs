@@ -9,22 +9,21 @@
 //! last use: it takes a register that is free for so long. While there are enough, each gets one of its own.
 
 use crate::ir::runs;
-use crate::ir::{Ir, Register, RegisterId, RegisterKind};
+use crate::ir::{Ir, RegisterId, RegisterKind, VirtualRegister};
 use crate::report::diag::{Diagnostic, Sink};
 use std::collections::{BTreeSet, HashMap, VecDeque};
-use takt_isa::spec::machines::REGISTER_SPACE;
-use takt_isa::{Bank, ZERO};
+use takt_isa::{Bank, Register, SlotIndex};
 
 /// Where each register of a program lies, by index; `None` for those that nothing uses.
 #[derive(Clone, Debug)]
 pub(crate) struct Placement {
     /// The addresses.
-    pub addresses: Vec<Option<u16>>,
+    pub addresses: Vec<Option<Register>>,
     /// Whether another register has the same address, at another time.
     pub shared: Vec<bool>,
 }
 
-/// The part of a bank that registers of a kind may take.
+/// The part of a bank that registers of a kind may take, as addresses.
 #[derive(Clone, Copy)]
 struct Window {
     first: u16,
@@ -35,7 +34,9 @@ impl Window {
     fn of(bank: &Bank, kind: RegisterKind, outputs: u16) -> Window {
         let split = bank.base + bank.depth - outputs.min(bank.depth);
         match kind {
-            RegisterKind::Input => Window { first: bank.base, end: (bank.base + bank.depth).min(ZERO) },
+            RegisterKind::Input => {
+                Window { first: bank.base, end: (bank.base + bank.depth).min(Register::ZERO.get()) }
+            }
             _ => Window { first: bank.base, end: split },
         }
     }
@@ -43,7 +44,7 @@ impl Window {
 
 /// The registers that are taken.
 struct Space {
-    taken: [bool; REGISTER_SPACE],
+    taken: [bool; Register::COUNT],
 }
 
 impl Space {
@@ -51,10 +52,10 @@ impl Space {
         self.taken[window.first as usize..window.end as usize].iter().filter(|taken| !**taken).count()
     }
 
-    fn take(&mut self, window: Window) -> Option<u16> {
+    fn take(&mut self, window: Window) -> Option<Register> {
         let free = self.taken[window.first as usize..window.end as usize].iter().position(|taken| !taken)?;
-        let address = window.first + free as u16;
-        self.taken[address as usize] = true;
+        let address = Register::new(window.first as usize + free)?;
+        self.taken[address.index()] = true;
         Some(address)
     }
 }
@@ -63,7 +64,7 @@ impl Space {
 pub(crate) fn place(ir: &Ir, sink: &mut Sink) -> Placement {
     let machine = ir.machine;
     // The slot that writes each register, and whether an operation uses it at all.
-    let mut writer: Vec<Option<u8>> = vec![None; ir.registers.len()];
+    let mut writer: Vec<Option<SlotIndex>> = vec![None; ir.registers.len()];
     let mut used = vec![false; ir.registers.len()];
     for operation in ir.operations() {
         for source in operation.reads() {
@@ -74,23 +75,23 @@ pub(crate) fn place(ir: &Ir, sink: &mut Sink) -> Placement {
             used[dest.index()] = true;
         }
     }
-    let mut space = Space { taken: [false; REGISTER_SPACE] };
-    let mut addresses: Vec<Option<u16>> = ir.registers.iter().map(|register| register.pinned).collect();
+    let mut space = Space { taken: [false; Register::COUNT] };
+    let mut addresses: Vec<Option<Register>> = ir.registers.iter().map(|register| register.pinned).collect();
     for address in addresses.iter().flatten() {
-        space.taken[*address as usize] = true;
+        space.taken[address.index()] = true;
     }
     outputs(ir, &writer, &mut space, &mut addresses, sink);
     let ranges = ranges(ir);
     let is_local = |index: usize| ranges[index].is_some() && addresses[index].is_none();
-    // The most registers that short-lived values want in each bank: room that constants leave if they can.
+    // The most registers that short-lived values need in each bank: room that constants leave if they can.
     let mut wanted_by_locals = vec![0; machine.slots.len()];
     for index in (0..ir.registers.len()).filter(|index| is_local(*index)) {
-        wanted_by_locals[usize::from(writer[index].unwrap_or(0))] += 1;
+        wanted_by_locals[writer[index].unwrap_or(SlotIndex::FIRST).index()] += 1;
     }
     let locals: Vec<usize> = (0..ir.registers.len()).filter(|index| is_local(*index)).collect();
     // Constants come after what has its bank: they go wherever there is room.
     let is_constant = |index: &usize| {
-        let register: &Register = &ir.registers[*index];
+        let register: &VirtualRegister = &ir.registers[*index];
         matches!(register.kind, RegisterKind::Constant(_))
             || (register.kind != RegisterKind::Input && writer[*index].is_none())
     };
@@ -102,12 +103,12 @@ pub(crate) fn place(ir: &Ir, sink: &mut Sink) -> Placement {
             && (used[*index] || register.kind == RegisterKind::Input || register.preset.is_some())
     });
     let (constants, registers): (Vec<usize>, Vec<usize>) = wanted.partition(is_constant);
-    let mut missing: Vec<(usize, Option<u8>)> = Vec::new();
+    let mut missing: Vec<(usize, Option<SlotIndex>)> = Vec::new();
     for index in registers {
         let kind = ir.registers[index].kind;
         let (bank, slot) = match (kind, writer[index]) {
             (RegisterKind::Input, _) => (&machine.inputs, None),
-            (_, slot) => (&machine.slots[slot.unwrap_or(0) as usize].bank, slot),
+            (_, slot) => (&machine.slot(slot.unwrap_or(SlotIndex::FIRST)).bank, slot),
         };
         match space.take(Window::of(bank, kind, machine.outputs_per_bank)) {
             Some(address) => addresses[index] = Some(address),
@@ -135,9 +136,9 @@ pub(crate) fn place(ir: &Ir, sink: &mut Sink) -> Placement {
 /// Gives every output its place.
 fn outputs(
     ir: &Ir,
-    writer: &[Option<u8>],
+    writer: &[Option<SlotIndex>],
     space: &mut Space,
-    addresses: &mut [Option<u16>],
+    addresses: &mut [Option<Register>],
     sink: &mut Sink,
 ) {
     let machine = ir.machine;
@@ -145,8 +146,9 @@ fn outputs(
     let given: HashMap<RegisterId, u16> = ir.numbers.iter().map(|(number, id)| (*id, *number)).collect();
     // What the source writes at an output's place without a name has its number.
     let unnamed = |number| {
-        let mut places = (0..machine.slots.len()).map(|slot| machine.output_register(slot, number));
-        places.any(|place| space.taken[usize::from(place)])
+        let mut places =
+            machine.slots.iter().filter_map(|slot| machine.output_registers(slot).nth(usize::from(number)));
+        places.any(|place| space.taken[place.index()])
     };
     let mut free: VecDeque<u16> =
         (0..count).filter(|number| !ir.numbers.contains_key(number) && !unnamed(*number)).collect();
@@ -161,8 +163,12 @@ fn outputs(
             missing.push(index);
             continue;
         };
-        let place = machine.output_register(usize::from(writer[index].unwrap_or(0)), number);
-        if space.taken[usize::from(place)] {
+        let slot = machine.slot(writer[index].unwrap_or(SlotIndex::FIRST));
+        let Some(place) = machine.output_registers(slot).nth(number.into()) else {
+            missing.push(index);
+            continue;
+        };
+        if space.taken[place.index()] {
             let name = machine.register_name(place).unwrap_or_default();
             let message = format!("output {number}, `{}`, lies at `{name}`, which is taken", register.name);
             let error = Diagnostic::error("place", register.span, message)
@@ -171,7 +177,7 @@ fn outputs(
             sink.push(error);
             continue;
         }
-        space.taken[usize::from(place)] = true;
+        space.taken[place.index()] = true;
         addresses[index] = Some(place);
     }
     if let Some(first) = missing.first() {
@@ -218,7 +224,7 @@ fn ranges(ir: &Ir) -> Vec<Option<(u32, u32)>> {
             }
         }
     }
-    let range = |(register, seen): (&Register, &Seen)| match *seen {
+    let range = |(register, seen): (&VirtualRegister, &Seen)| match *seen {
         Seen::In { first, last, .. }
             if register.kind == RegisterKind::Plain
                 && register.pinned.is_none()
@@ -237,19 +243,19 @@ fn share(
     ir: &Ir,
     locals: &[usize],
     ranges: &[Option<(u32, u32)>],
-    writer: &[Option<u8>],
+    writer: &[Option<SlotIndex>],
     space: &mut Space,
-    addresses: &mut [Option<u16>],
-    missing: &mut Vec<(usize, Option<u8>)>,
+    addresses: &mut [Option<Register>],
+    missing: &mut Vec<(usize, Option<SlotIndex>)>,
 ) -> Vec<bool> {
     let mut shared = vec![false; ir.registers.len()];
     let mut starting: Vec<(u32, u32, usize)> =
         locals.iter().filter_map(|&index| ranges[index].map(|(first, last)| (first, last, index))).collect();
     starting.sort_unstable_by_key(|&(first, _, index)| (first, index));
-    for (number, slot) in (0u8..).zip(ir.machine.slots) {
+    for (number, slot) in ir.machine.numbered_slots() {
         let window = Window::of(&slot.bank, RegisterKind::Plain, ir.machine.outputs_per_bank);
         // Free registers, the longest free first, and who had each before; values that end, soonest first.
-        let mut free: VecDeque<(u16, Option<usize>)> = VecDeque::new();
+        let mut free: VecDeque<(Register, Option<usize>)> = VecDeque::new();
         while let Some(address) = space.take(window) {
             free.push_back((address, None));
         }
@@ -277,27 +283,27 @@ fn share(
 /// One error for each bank that is full.
 fn report(
     ir: &Ir,
-    writer: &[Option<u8>],
-    missing: &[(usize, Option<u8>)],
+    writer: &[Option<SlotIndex>],
+    missing: &[(usize, Option<SlotIndex>)],
     homeless: &[usize],
-    addresses: &[Option<u16>],
+    addresses: &[Option<Register>],
     sink: &mut Sink,
 ) {
     let machine = ir.machine;
-    let mut rest: Vec<&(usize, Option<u8>)> = missing.iter().collect();
+    let mut rest: Vec<&(usize, Option<SlotIndex>)> = missing.iter().collect();
     while let Some(&&(first, slot)) = rest.first() {
         let kind = ir.registers[first].kind;
-        let same = |(_, other): &(usize, Option<u8>)| *other == slot;
+        let same = |(_, other): &(usize, Option<SlotIndex>)| *other == slot;
         let names: Vec<&str> = rest
             .iter()
             .filter(|entry| same(entry))
             .map(|entry| ir.registers[entry.0].name.as_str())
             .collect();
-        let bank = slot.map_or(&machine.inputs, |slot| &machine.slots[slot as usize].bank);
+        let bank = slot.map_or(&machine.inputs, |slot| &machine.slot(slot).bank);
         let window = Window::of(bank, kind, machine.outputs_per_bank);
         let available = usize::from(window.end - window.first);
-        let inside = |address: &Option<u16>| {
-            address.is_some_and(|address| (window.first..window.end).contains(&address))
+        let inside = |address: &Option<Register>| {
+            address.is_some_and(|address| (window.first..window.end).contains(&address.get()))
         };
         let needed = addresses.iter().filter(|address| inside(address)).count() + names.len();
         let what = match kind {
@@ -312,7 +318,7 @@ fn report(
         .here("no room for this one");
         error = error.note(format!("no room for: {}", few(&names)));
         if let Some(slot) = slot {
-            let slot = &machine.slots[slot as usize];
+            let slot = machine.slot(slot);
             error =
                 error.note(format!("bank {} is the one that slot `{}` writes", slot.bank.name, slot.name));
         }

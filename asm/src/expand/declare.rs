@@ -1,14 +1,16 @@
 //! Declarations: registers and their places, presets, data. The part of [`expand`](crate::expand) that writes down what
 //! the program has, rather than where it goes.
 
-use crate::context::{At, Binding, Context, Reported};
+use crate::context::{Array, At, Binding, Context, Reported};
 use crate::expand::{Data, Expander};
-use crate::ir::{Register, RegisterId, RegisterKind};
+use crate::ir::{RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
-use takt_isa::{Machine, Type, ZERO};
+use crate::syntax::name::NameId;
+use smallvec::SmallVec;
+use takt_isa::{Machine, Register, Type};
 
 impl Expander<'_> {
     pub(crate) fn data_section(&mut self, at: At, span: Span) -> Result<(), Reported> {
@@ -43,6 +45,17 @@ impl Expander<'_> {
     ) -> Result<(), Reported> {
         let Name { name, span } = declaration.name;
         let id = self.context.name(at, name, span)?;
+        self.declare_name(at, what, declaration, id)
+    }
+
+    fn declare_name(
+        &mut self,
+        at: At,
+        what: Declares,
+        declaration: &Declaration,
+        id: NameId,
+    ) -> Result<(), Reported> {
+        let span = declaration.name.span;
         let kind = match what {
             Declares::Register => RegisterKind::Plain,
             Declares::State => RegisterKind::State,
@@ -53,7 +66,7 @@ impl Expander<'_> {
         self.context.declare(at, id, span, Binding::Register(register))?;
         // From here on the name is known: a mistake in its type or place is reported and the rest stands.
         let name = self.context.scopes.full_name(at.scope, id);
-        self.context.declared.registers.push(Register {
+        self.context.declared.registers.push(VirtualRegister {
             name,
             kind,
             ty: Type::F,
@@ -71,6 +84,101 @@ impl Expander<'_> {
         }
     }
 
+    /// Declares an array of registers.
+    pub(crate) fn declare_array(
+        &mut self,
+        at: At,
+        what: Declares,
+        declaration: &Declaration,
+        sizes: &[Expr],
+    ) -> Result<(), Reported> {
+        let Name { name, span } = declaration.name;
+        let id = self.context.name(at, name, span)?;
+        let text = self.context.scopes.full_name(at.scope, id);
+        let kind = match what {
+            Declares::Register => RegisterKind::Plain,
+            Declares::State => RegisterKind::State,
+            Declares::Input | Declares::Output => {
+                let error = Diagnostic::error("array", span, "ports have a name each, not an array")
+                    .help(format!("declare them in a repetition, as `{text}{{i}}`"));
+                return Err(self.context.report(at.scope, error));
+            }
+        };
+        // With a place it is one element that is declared: what disassembly says of an array.
+        if declaration.place.is_some() {
+            let mut indices = Vec::with_capacity(sizes.len());
+            for size in sizes {
+                let index = self.context.integer(at, *size)?;
+                if index < 1 {
+                    let message = format!("there is no element {index}: indices count from 1");
+                    return Err(self.context.error(at.scope, "range", size.span, message));
+                }
+                indices.push(index.to_string());
+            }
+            if let Binding::Array(_) = self.context.lookup(at.scope, id) {
+                let message = format!("`{text}` is declared already, as an array without places");
+                return Err(self.context.error(at.scope, "declared-twice", span, message));
+            }
+            let element = format!("{}[{}]", self.context.scopes.text(id), indices.join(","));
+            let id = self.context.scopes.names_mut().intern(&element);
+            return self.declare_name(at, what, declaration, id);
+        }
+        if sizes.len() > limits::ARRAY_INDICES {
+            let message = format!("an array has at most {} indices", limits::ARRAY_INDICES);
+            return Err(self.context.error(at.scope, "limit", span, message));
+        }
+        let most = (limits::ARRAY_ELEMENTS - self.context.declared.elements) as i64;
+        let mut count = 1u32;
+        let mut shape = SmallVec::new();
+        for size in sizes {
+            let value = self.context.integer(at, *size)?;
+            if value < 1 {
+                let message = format!("{value} elements: an array has 1 or more in each direction");
+                return Err(self.context.error(at.scope, "range", size.span, message));
+            }
+            if value.saturating_mul(i64::from(count)) > most {
+                let message = format!("arrays of more than {} elements in all", limits::ARRAY_ELEMENTS);
+                return Err(self.context.error(at.scope, "limit", size.span, message));
+            }
+            // Not beyond the limit, which 32 bits hold.
+            count *= value as u32;
+            shape.push(value as u32);
+        }
+        let ty = match declaration.ty {
+            Some(ty) => Some(self.context.type_named(at, ty)?),
+            None => None,
+        };
+        let number = self.context.declared.arrays.len() as u32;
+        self.context.declare(at, id, span, Binding::Array(number))?;
+        self.context.declared.elements += count as usize;
+        let first = RegisterId::new(self.context.declared.registers.len());
+        let mut indices: SmallVec<[u32; 2]> = SmallVec::from_elem(1, shape.len());
+        for _ in 0..count {
+            let texts: Vec<String> = indices.iter().map(u32::to_string).collect();
+            let name = format!("{text}[{}]", texts.join(","));
+            let register = RegisterId::new(self.context.declared.registers.len());
+            self.context.declared.typed.extend(ty.map(|_| register));
+            let ty = ty.unwrap_or(Type::F);
+            self.context.declared.registers.push(VirtualRegister {
+                name,
+                kind,
+                ty,
+                pinned: None,
+                preset: None,
+                span,
+            });
+            for (index, size) in indices.iter_mut().zip(&shape).rev() {
+                *index += 1;
+                if *index <= *size {
+                    break;
+                }
+                *index = 1;
+            }
+        }
+        self.context.declared.arrays.push(Array { name: text, first, sizes: shape, span });
+        Ok(())
+    }
+
     /// What follows the `@` of a declaration: a register's canonical name, or a port's number.
     fn place(&mut self, at: At, register: RegisterId, place: Expr) -> Result<(), Reported> {
         let name = match self.context.asts[at.ast as usize].nodes[place.id.range()] {
@@ -78,7 +186,7 @@ impl Expander<'_> {
             _ => None,
         };
         if let Some(name) = name {
-            let id = self.context.name(at, name.name, name.span)?;
+            let id = self.context.spelled(at, name.name, name.span)?;
             let is_register = self.context.machine.register_address(self.context.scopes.text(id)).is_some();
             let binding = self.context.lookup(at.scope, id);
             // What is neither a register nor a number is taken for a register's name misspelt.
@@ -115,8 +223,10 @@ impl Expander<'_> {
                 .note(format!("{what}s have the numbers 0 to {}", count - 1));
             return Err(self.context.report(at.scope, error));
         };
-        if what == "input" {
-            return self.pin(at, register, machine.inputs.base + number, span);
+        if what == "input"
+            && let Some(port) = machine.inputs.registers().nth(number.into())
+        {
+            return self.pin(at, register, port, span);
         }
         self.take_number(at, register, number, span)
     }
@@ -124,7 +234,7 @@ impl Expander<'_> {
     /// Takes the number of an output port for it.
     fn take_number(&mut self, at: At, register: RegisterId, number: u16, span: Span) -> Result<(), Reported> {
         if let Some(other) = self.context.declared.numbered.get(&number) {
-            let Register { name, span: first, .. } = &self.context.declared.registers[other.index()];
+            let VirtualRegister { name, span: first, .. } = &self.context.declared.registers[other.index()];
             let error = Diagnostic::error("place", span, format!("output {number} is taken"))
                 .also(*first, format!("by `{name}`"))
                 .note("an output has one number, whichever slot writes it");
@@ -134,9 +244,22 @@ impl Expander<'_> {
         Ok(())
     }
 
+    /// The word of a directive that switches something on or off.
+    pub(crate) fn is_on(&mut self, at: At, word: Name, directive: &'static str) -> Result<bool, Reported> {
+        let name = self.context.spelled(at, word.name, word.span)?;
+        match self.context.scopes.text(name) {
+            "on" => Ok(true),
+            "off" => Ok(false),
+            other => {
+                let message = format!("`.{directive}` is `on` or `off`, not `{other}`");
+                Err(self.context.error(at.scope, directive, word.span, message))
+            }
+        }
+    }
+
     /// `.ports`: whether they are latched.
     pub(crate) fn ports(&mut self, at: At, word: Name) -> Result<(), Reported> {
-        let name = self.context.name(at, word.name, word.span)?;
+        let name = self.context.spelled(at, word.name, word.span)?;
         let latched = match self.context.scopes.text(name) {
             "latched" => true,
             "direct" => false,
@@ -158,11 +281,13 @@ impl Expander<'_> {
         }
     }
 
-    fn pin(&mut self, at: At, register: RegisterId, address: u16, span: Span) -> Result<(), Reported> {
+    fn pin(&mut self, at: At, register: RegisterId, address: Register, span: Span) -> Result<(), Reported> {
         let machine = self.context.machine;
         let place = machine.register_name(address).unwrap_or_default();
         let wrong = match self.context.declared.registers[register.index()].kind {
-            _ if address == ZERO => Some("`zero` is never written: nothing can be placed there".to_owned()),
+            _ if address == Register::ZERO => {
+                Some("`zero` is never written: nothing can be placed there".to_owned())
+            }
             RegisterKind::Input if !machine.is_input(address) => {
                 Some(format!("`{place}` is not an input port"))
             }
@@ -182,7 +307,8 @@ impl Expander<'_> {
             return Err(self.context.report(at.scope, Diagnostic::error("place", span, message).note(note)));
         }
         if let Some(other) = self.context.declared.by_address.get(&address).copied() {
-            let Register { name, span: first, .. } = self.context.declared.registers[other.index()].clone();
+            let VirtualRegister { name, span: first, .. } =
+                self.context.declared.registers[other.index()].clone();
             let what = if name.is_empty() { "preset" } else { &name };
             let error = Diagnostic::error("place", span, format!("`{place}` is taken"))
                 .also(first, format!("by `{what}`"));
@@ -198,8 +324,8 @@ impl Expander<'_> {
 }
 
 /// The address of a register by its canonical name.
-pub(crate) fn address(context: &mut Context, at: At, place: Name) -> Result<u16, Reported> {
-    let id = context.name(at, place.name, place.span)?;
+pub(crate) fn address(context: &mut Context, at: At, place: Name) -> Result<Register, Reported> {
+    let id = context.spelled(at, place.name, place.span)?;
     let text = context.scopes.text(id).to_owned();
     let machine = context.machine;
     machine.register_address(&text).ok_or_else(|| {
@@ -213,13 +339,13 @@ pub(crate) fn address(context: &mut Context, at: At, place: Name) -> Result<u16,
 }
 
 /// The register at an address: the one the source names, or else one without a name.
-pub(crate) fn register_at(context: &mut Context, address: u16, span: Span) -> RegisterId {
+pub(crate) fn register_at(context: &mut Context, address: Register, span: Span) -> RegisterId {
     if let Some(register) = context.declared.by_address.get(&address) {
         return *register;
     }
     let register = RegisterId::new(context.declared.registers.len());
     let (kind, ty) = (RegisterKind::Plain, Type::B);
-    context.declared.registers.push(Register {
+    context.declared.registers.push(VirtualRegister {
         name: String::new(),
         kind,
         ty,

@@ -4,6 +4,7 @@
 //! known, bundles and data, is listed for [`resolve`](crate::resolve). The walk has a stack of its own, not the thread's.
 
 mod declare;
+pub(crate) mod equation;
 mod files;
 pub(crate) mod load;
 
@@ -12,6 +13,7 @@ pub(crate) use declare::{address, register_at};
 use crate::context::{
     Argument, At, Binding, Context, MacroDefinition, NamedConstant, Reported, ScopeId, ScopeKind, space_of,
 };
+use crate::expand::equation::{Piece, Step};
 use crate::expand::files::FileId;
 use crate::expand::load::{Loader, include_path};
 use crate::ir::{Label, LabelId};
@@ -23,16 +25,21 @@ use crate::syntax::name::NameId;
 use std::collections::HashMap;
 use std::rc::Rc;
 use takt_isa::Type;
+use takt_isa::program::{Columns, Location};
 
-/// A bundle of the source where it is expanded.
+/// A bundle or an equation of the source where it is expanded.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Item {
     pub(crate) at: At,
     pub(crate) statement: u32,
+    /// Of an equation that uses macros, the part that is meant: an index into [`Flat::pieces`].
+    pub(crate) piece: Option<u32>,
     /// The `.loc` in force: an index into [`Flat::locs`].
     pub(crate) loc: u32,
     /// Whether `.schedule on` is in force.
     pub(crate) scheduled: bool,
+    /// Whether `.contract on` is in force; none in the library, whose error bounds are those of its operations as they stand.
+    pub(crate) contracted: Option<bool>,
 }
 
 /// Words of data memory.
@@ -78,6 +85,7 @@ pub(crate) struct Timing {
 pub(crate) struct Flat {
     pub(crate) once: Vec<Item>,
     pub(crate) period: Vec<Item>,
+    pub(crate) pieces: Vec<Piece>,
     pub(crate) data: Vec<Data>,
     pub(crate) presets: Vec<Preset>,
     pub(crate) loop_bounds: Vec<LoopBound>,
@@ -85,7 +93,7 @@ pub(crate) struct Flat {
     /// What `.ports` says, `latched` or not, and where.
     pub(crate) ports: Option<(bool, Span)>,
     /// What each `.loc` says; the first is none at all.
-    pub(crate) locs: Vec<Vec<Option<(u32, u32)>>>,
+    pub(crate) locs: Vec<Vec<Option<(Location, Option<Columns>)>>>,
     /// Files that `.loc` names, in order, then those whose own lines are code.
     pub(crate) files: Vec<String>,
     file_numbers: HashMap<String, u32>,
@@ -113,6 +121,8 @@ pub(crate) struct Frame {
 }
 
 pub(crate) enum FrameKind {
+    /// An equation that uses macros; its statement.
+    Equation(Rc<[Step]>, u32),
     /// A file, its path, and the `.loc` that was in force where it is included.
     File(usize, u32),
     Macro,
@@ -144,6 +154,8 @@ pub(crate) struct Expander<'l> {
     pub(crate) bytes: usize,
     /// Whether what follows is scheduled.
     scheduled: bool,
+    /// Whether products of what follows are fused into sums.
+    contracted: bool,
     pub(crate) include_depth: usize,
     pub(crate) includes: usize,
     macro_depth: usize,
@@ -156,6 +168,7 @@ impl<'l> Expander<'l> {
         let flat = Flat {
             once: Vec::new(),
             period: Vec::new(),
+            pieces: Vec::new(),
             data: Vec::new(),
             presets: Vec::new(),
             loop_bounds: Vec::new(),
@@ -173,6 +186,7 @@ impl<'l> Expander<'l> {
             section: Section::Once,
             loc: 0,
             scheduled: false,
+            contracted: false,
             data_words: 0,
             statements: 0,
             files: HashMap::new(),
@@ -206,7 +220,13 @@ impl<'l> Expander<'l> {
             if frame.next < frame.end {
                 let (at, index) = (frame.at, frame.next);
                 frame.next += 1;
-                self.statement(at, index);
+                match &frame.kind {
+                    FrameKind::Equation(steps, statement) => {
+                        let (steps, statement) = (Rc::clone(steps), *statement);
+                        self.step(at, statement, &steps[index as usize]);
+                    }
+                    _ => self.statement(at, index),
+                }
             } else {
                 self.leave();
             }
@@ -254,7 +274,7 @@ impl<'l> Expander<'l> {
 
     /// Counts a statement.
     #[inline]
-    fn count(&mut self, scope: ScopeId, span: Span) {
+    pub(crate) fn count(&mut self, scope: ScopeId, span: Span) {
         self.statements += 1;
         if self.statements > limits::STATEMENTS {
             self.limit(
@@ -278,7 +298,7 @@ impl<'l> Expander<'l> {
             let span = self.frames.iter().find_map(|frame| match frame.kind {
                 FrameKind::Rep { site, .. } => Some(site),
                 FrameKind::Macro => Some(self.context.scopes.scope(frame.at.scope).site),
-                FrameKind::File(..) => None,
+                FrameKind::File(..) | FrameKind::Equation(..) => None,
             });
             let message = format!("the program expands to more than {} statements", limits::STATEMENTS);
             self.limit(ScopeId::ROOT, span.unwrap_or_default(), message);
@@ -290,6 +310,7 @@ impl<'l> Expander<'l> {
         match kind {
             StatementKind::Empty => {}
             StatementKind::Bundle(first, count) => self.bundle(at, index, first, count),
+            StatementKind::Equation(equation) => self.equation(at, index, equation),
             StatementKind::Directive(directive) => {
                 let ast = Rc::clone(&self.context.asts[at.ast as usize]);
                 // What goes wrong is in the report; the walk goes on.
@@ -353,7 +374,7 @@ impl<'l> Expander<'l> {
         let ast = &self.context.asts[at.ast as usize];
         let operation = ast.operations[first as usize];
         if count == 1 {
-            let Ok(name) = self.context.name(at, operation.mnemonic.name, operation.mnemonic.span) else {
+            let Ok(name) = self.context.spelled(at, operation.mnemonic.name, operation.mnemonic.span) else {
                 return;
             };
             // A macro cannot have an instruction's name.
@@ -362,61 +383,78 @@ impl<'l> Expander<'l> {
                 return;
             }
         }
+        self.push(at, index, None, operation.span);
+    }
+
+    /// Adds a bundle, an equation or a piece of one to the section.
+    pub(crate) fn push(&mut self, at: At, statement: u32, piece: Option<u32>, span: Span) {
+        let contracted = (!self.is_in_library(at.ast)).then_some(self.contracted);
         let items = match self.section {
             Section::Once => &mut self.flat.once,
             Section::Period => &mut self.flat.period,
             Section::Data => {
-                let error = Diagnostic::error("section", operation.span, "an instruction in `.data`")
-                    .help("open `.once` or `.period` before it");
+                let what = match self.context.asts[at.ast as usize].statements[statement as usize].kind {
+                    StatementKind::Equation(_) => "an equation in `.data`",
+                    _ => "an instruction in `.data`",
+                };
+                let error =
+                    Diagnostic::error("section", span, what).help("open `.once` or `.period` before it");
                 self.context.report(at.scope, error);
                 return;
             }
         };
-        items.push(Item { at, statement: index, loc: self.loc, scheduled: self.scheduled });
+        let (loc, scheduled) = (self.loc, self.scheduled);
+        items.push(Item { at, statement, piece, loc, scheduled, contracted });
         if self.flat.once.len() + self.flat.period.len() > limits::OPERATIONS {
             let message = format!("the program expands to more than {} bundles", limits::OPERATIONS);
-            self.limit(at.scope, operation.span, message);
+            self.limit(at.scope, span, message);
         }
     }
 
     fn call(&mut self, at: At, name: NameId, operation: Operation) {
+        let first = operation.first as usize;
+        let operands = &self.context.asts[at.ast as usize].operands[first..first + operation.count as usize];
+        let given = operands.to_vec();
+        let Some(definition) = self.context.scopes.macros.get(&name) else { return };
+        let (parameters, defined) = definition.parameters(&self.context.asts);
+        if parameters != given.len() {
+            let plural = if parameters == 1 { "" } else { "s" };
+            let message = format!(
+                "macro `{}` takes {parameters} argument{plural}, not {}",
+                self.context.scopes.text(name),
+                operation.count
+            );
+            let error = Diagnostic::error("arguments", operation.span, message).also(defined, "defined here");
+            self.context.report(at.scope, error);
+            return;
+        }
+        if let Some(notes) = &mut self.context.notes {
+            notes.macro_use(operation.mnemonic.span, name);
+        }
+        self.enter_macro(at, name, operation.span, &given);
+    }
+
+    /// Goes on with a macro's body. There are as many operands as the macro has parameters.
+    pub(crate) fn enter_macro(&mut self, at: At, name: NameId, span: Span, given: &[Operand]) {
         let Some(definition) = self.context.scopes.macros.get_mut(&name) else { return };
         definition.uses += 1;
         let MacroDefinition { ast, directive, start, uses } = *definition;
         let body = Rc::clone(&self.context.asts[ast as usize]);
-        let DirectiveKind::Macro { parameters, end, name: defined, .. } =
-            &body.directives[directive as usize].kind
-        else {
+        let DirectiveKind::Macro { parameters, end, .. } = &body.directives[directive as usize].kind else {
             return;
         };
-        if parameters.len() != operation.count as usize {
-            let plural = if parameters.len() == 1 { "" } else { "s" };
-            let message = format!(
-                "macro `{}` takes {} argument{plural}, not {}",
-                self.context.scopes.text(name),
-                parameters.len(),
-                operation.count
-            );
-            let error =
-                Diagnostic::error("arguments", operation.span, message).also(defined.span, "defined here");
-            self.context.report(at.scope, error);
-            return;
-        }
         if self.macro_depth >= limits::MACRO_DEPTH {
             let message =
                 format!("macros are used within one another more than {} deep", limits::MACRO_DEPTH);
-            let error = Diagnostic::error("limit", operation.span, message)
+            let error = Diagnostic::error("limit", span, message)
                 .help("does the macro use itself without an `.if` that ends it?");
             self.context.report(at.scope, error);
             self.stop = true;
             return;
         }
-        let scope =
-            self.context.scopes.open(ScopeId::ROOT, at.scope, ScopeKind::Macro(name, uses), operation.span);
-        let first = operation.first as usize;
-        for (parameter, index) in parameters.iter().zip(first..) {
-            let mut operand = self.context.asts[at.ast as usize].operands[index];
-            let mut outer = at;
+        let scope = self.context.scopes.open(ScopeId::ROOT, at.scope, ScopeKind::Macro(name, uses), span);
+        for (parameter, operand) in parameters.iter().zip(given) {
+            let (mut operand, mut outer) = (*operand, at);
             // A parameter that is passed on as it is stands for its own argument.
             if let OperandKind::Name(passed) = operand.kind
                 && let Ok(passed) = passed.resolve()
@@ -440,6 +478,12 @@ impl<'l> Expander<'l> {
         match kind {
             DirectiveKind::Declare(what, names) => {
                 for declaration in names {
+                    let (first, count) = declaration.sizes;
+                    if count > 0 {
+                        let sizes = &ast.sizes[first as usize..(first + count) as usize];
+                        let _ = self.declare_array(at, *what, declaration, sizes);
+                        continue;
+                    }
                     // Each name is a declaration of its own: a mistake in one leaves the others.
                     let _ = self.declare(at, *what, declaration);
                 }
@@ -484,7 +528,7 @@ impl<'l> Expander<'l> {
             }
             DirectiveKind::Rep { variable, first, last, end } => {
                 self.jump(*end + 1);
-                let variable = self.context.name(at, variable.name, variable.span)?;
+                let variable = self.context.spelled(at, variable.name, variable.span)?;
                 let from = self.context.integer(at, *first)?;
                 let to = self.context.integer(at, *last)?;
                 if to.saturating_sub(from) >= limits::REPETITIONS {
@@ -522,17 +566,8 @@ impl<'l> Expander<'l> {
             DirectiveKind::Broken(_, end) => self.jump(*end + 1),
             DirectiveKind::Include(path, library) => self.include(at, path, *library, span)?,
             DirectiveKind::Loc(places) => self.set_loc(at, places)?,
-            DirectiveKind::Schedule(word) => {
-                let name = self.context.name(at, word.name, word.span)?;
-                match self.context.scopes.text(name) {
-                    "on" => self.scheduled = true,
-                    "off" => self.scheduled = false,
-                    other => {
-                        let message = format!("`.schedule` is `on` or `off`, not `{other}`");
-                        return Err(self.context.error(at.scope, "schedule", word.span, message));
-                    }
-                }
-            }
+            DirectiveKind::Schedule(word) => self.scheduled = self.is_on(at, *word, "schedule")?,
+            DirectiveKind::Contract(word) => self.contracted = self.is_on(at, *word, "contract")?,
             DirectiveKind::Ports(word) => self.ports(at, *word)?,
             DirectiveKind::LoopBound(most) => self.loop_bound(at, *most, span)?,
             DirectiveKind::Deadline(..) | DirectiveKind::Order(_) | DirectiveKind::Late(..) => {
@@ -581,7 +616,7 @@ impl<'l> Expander<'l> {
         if at.scope != ScopeId::ROOT {
             return Err(Reported);
         }
-        let id = self.context.name(at, name.name, name.span)?;
+        let id = self.context.spelled(at, name.name, name.span)?;
         let text = self.context.scopes.text(id).to_owned();
         if id.op().is_some() {
             let error = Diagnostic::error("declared-twice", name.span, format!("`{text}` is an instruction"))
@@ -613,6 +648,18 @@ impl<'l> Expander<'l> {
         Ok(())
     }
 
+    fn columns(&mut self, at: At, first: Expr, last: Expr) -> Result<Columns, Reported> {
+        let span = first.span.to(last.span);
+        let (first, last) = (self.context.integer(at, first)?, self.context.integer(at, last)?);
+        match (u32::try_from(first), u32::try_from(last)) {
+            (Ok(first), Ok(last)) if 0 < first && first <= last => Ok(Columns { first, last }),
+            _ => {
+                let message = format!("there are no columns {first} to {last}: they count from 1");
+                Err(self.context.error(at.scope, "range", span, message))
+            }
+        }
+    }
+
     fn set_loc(&mut self, at: At, places: &[Loc]) -> Result<(), Reported> {
         let mut locations = Vec::with_capacity(places.len());
         for place in places {
@@ -626,14 +673,18 @@ impl<'l> Expander<'l> {
                     }
                     None
                 }
-                Loc::At(file, line) => {
+                Loc::At(file, line, columns) => {
                     let number = self.context.integer(at, *line)?;
                     let Some(number) = u32::try_from(number).ok().filter(|number| *number > 0) else {
                         let message = format!("there is no line {number}: lines count from 1");
                         return Err(self.context.error(at.scope, "range", line.span, message));
                     };
+                    let columns = match columns {
+                        Some((first, last)) => Some(self.columns(at, *first, *last)?),
+                        None => None,
+                    };
                     let file = self.flat.file(file);
-                    Some((file, number))
+                    Some((Location { file, line: number }, columns))
                 }
             });
         }

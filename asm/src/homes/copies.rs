@@ -8,7 +8,7 @@ use crate::ir::{Bundle, Constant, Ir, Operation, RegisterId, RegisterKind};
 use crate::schedule;
 use smallvec::SmallVec;
 use takt_isa::program::Space;
-use takt_isa::{Effect, Op};
+use takt_isa::{BundleAddress, Effect, Op};
 
 /// A bundle of a run that copies are put into.
 #[derive(Clone)]
@@ -57,7 +57,7 @@ pub(crate) fn insert(ir: &mut Ir, homes: &mut Homes, copies: &[Copy]) {
             let cycles = put(ir, &mut places, run, copy, operation, limit);
             homes.copied.push((homes.adjustments.len(), copy.from));
             // Where it issues is known when everything is scheduled.
-            let made = Made::Copy { address: 0, alone: true, cycles };
+            let made = Made::Copy { address: BundleAddress::RESET, alone: true, cycles };
             homes.adjustments.push(homes::adjustment(ir, copy.to, home.slot, &from, made));
         }
         for Place { mut bundle, origin } in places {
@@ -165,7 +165,7 @@ pub(crate) fn report(ir: &Ir, homes: Homes) -> Vec<Adjustment> {
                 continue;
             };
             if let Made::Copy { address, alone, .. } = &mut adjustments[index].made {
-                *address = at;
+                *address = BundleAddress::new(at);
                 *alone = bundle.operations.iter().all(|operation| operation.made);
             }
         }

@@ -12,13 +12,13 @@ pub(crate) mod values;
 
 use crate::ir::flow::{self, Flow};
 use crate::ir::runs::{self, Run};
-use crate::ir::{Constant, Ir, Operation, Register, RegisterId, RegisterKind};
+use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::output::listing;
 use crate::report::source::Span;
 use std::collections::HashSet;
 use takt_isa::fp::Host;
 use takt_isa::program::Location;
-use takt_isa::{Effect, Machine, Op, ROWS, Row, Slots, Type, compute};
+use takt_isa::{BundleAddress, Effect, Machine, Op, ROWS, Register, Row, SlotIndex, Slots, Type, compute};
 
 /// What the assembler did about a register that operations of several slots write.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -45,7 +45,7 @@ pub enum Made {
     /// Its value is copied.
     Copy {
         /// The bundle that copies.
-        address: u32,
+        address: BundleAddress,
         /// Whether nothing else issues in that bundle.
         alone: bool,
         /// Cycles that its straight run of bundles takes longer for it, if these stay as they are written; else it is among what is scheduled.
@@ -78,7 +78,7 @@ impl std::fmt::Display for Made {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Home {
     /// The slot that writes it.
-    pub(crate) slot: u8,
+    pub(crate) slot: SlotIndex,
     /// What copies bits there, if anything.
     pub(crate) copier: Option<Op>,
 }
@@ -130,7 +130,7 @@ impl Homes {
 struct Write {
     bundle: usize,
     number: usize,
-    slot: u8,
+    slot: SlotIndex,
     /// Whether its value must come home: a port shows it, or it may be read after the run.
     live: bool,
     /// The bits that it writes, if they are known.
@@ -231,14 +231,14 @@ fn branch_that_reads(ir: &Ir, at: usize) -> Option<&Operation> {
 }
 
 /// The slot whose bank is the home that costs least. Where the register is `pinned`, the bank is given.
-fn best(ir: &Ir, flow: &Flow, writes: &[Write], pinned: Option<u16>) -> Option<u8> {
+fn best(ir: &Ir, flow: &Flow, writes: &[Write], pinned: Option<Register>) -> Option<SlotIndex> {
     let machine = ir.machine;
     // Of equals that of the first write.
     let live = || writes.iter().filter(|write| write.live);
     let favourite = live().next().or(writes.first()).map(|write| write.slot);
     let is_possible = |slot: &takt_isa::Slot| pinned.is_none_or(|address| slot.bank.contains(address));
-    let candidates = (0u8..).zip(machine.slots).filter(|(_, slot)| is_possible(slot));
-    let cost = |slot: u8| {
+    let candidates = machine.numbered_slots().filter(|(_, slot)| is_possible(slot));
+    let cost = |slot: SlotIndex| {
         let copier = copier(machine, slot);
         live().filter(|write| write.slot != slot).try_fold(0u64, |sum, write| {
             let weight = flow.weights[write.bundle];
@@ -260,12 +260,12 @@ fn best(ir: &Ir, flow: &Flow, writes: &[Write], pinned: Option<u16>) -> Option<u
 }
 
 /// Whether no operation of a write's bundle needs a slot.
-fn is_free(ir: &Ir, write: &Write, slot: u8) -> bool {
+fn is_free(ir: &Ir, write: &Write, slot: SlotIndex) -> bool {
     ir.bundles[write.bundle].operations.iter().all(|operation| operation.slot != Some(slot))
 }
 
 /// Brings a constant home.
-fn bring(ir: &mut Ir, id: RegisterId, slot: u8, write: &Write) -> Option<Adjustment> {
+fn bring(ir: &mut Ir, id: RegisterId, slot: SlotIndex, write: &Write) -> Option<Adjustment> {
     let bits = write.constant?;
     let old = ir.bundles[write.bundle].operations[write.number];
     let made = if write.initial {
@@ -294,10 +294,16 @@ fn bring(ir: &mut Ir, id: RegisterId, slot: u8, write: &Write) -> Option<Adjustm
     Some(adjustment(ir, id, slot, &old, made))
 }
 
-pub(crate) fn adjustment(ir: &Ir, id: RegisterId, slot: u8, from: &Operation, made: Made) -> Adjustment {
+pub(crate) fn adjustment(
+    ir: &Ir,
+    id: RegisterId,
+    slot: SlotIndex,
+    from: &Operation,
+    made: Made,
+) -> Adjustment {
     Adjustment {
         register: ir.register(id).name.clone(),
-        bank: ir.machine.slots[usize::from(slot)].bank.name,
+        bank: ir.machine.slot(slot).bank.name,
         mnemonic: from.row().mnemonic,
         location: from.location,
         made,
@@ -305,7 +311,7 @@ pub(crate) fn adjustment(ir: &Ir, id: RegisterId, slot: u8, from: &Operation, ma
 }
 
 /// What copies bits to the bank of a slot: the quickest.
-fn copier(machine: &Machine, slot: u8) -> Option<Op> {
+fn copier(machine: &Machine, slot: SlotIndex) -> Option<Op> {
     rows(machine, slot)
         .filter(|(_, row)| row.copies())
         .min_by_key(|(latency, _)| *latency)
@@ -313,14 +319,14 @@ fn copier(machine: &Machine, slot: u8) -> Option<Op> {
 }
 
 /// The slots that may execute an operation made to write a register.
-fn able(ir: &Ir, id: RegisterId, op: Op) -> Slots {
+pub(crate) fn able(ir: &Ir, id: RegisterId, op: Op) -> Slots {
     let hosts = ir.machine.hosts(op.row().function);
     ir.register(id).pinned.map_or(hosts, |place| hosts.and(ir.machine.writers(place)))
 }
 
 /// The instructions that a slot executes, with their latencies.
-fn rows(machine: &Machine, slot: u8) -> impl Iterator<Item = (u32, &'static Row)> + '_ {
-    let host = &machine.slots[usize::from(slot)];
+fn rows(machine: &Machine, slot: SlotIndex) -> impl Iterator<Item = (u32, &'static Row)> + '_ {
+    let host = machine.slot(slot);
     ROWS.iter().filter_map(move |row| Some((host.units[host.unit_for(row.function)?].latency, row)))
 }
 
@@ -347,7 +353,7 @@ fn constant(ir: &Ir, operation: &Operation) -> Option<u32> {
 
 /// An operation of a slot that gives these bits and raises no flag, and the bits of its sources: the quickest, with the
 /// simplest sources.
-fn giving(machine: &Machine, slot: u8, bits: u32) -> Option<(Op, [u32; 2])> {
+fn giving(machine: &Machine, slot: SlotIndex, bits: u32) -> Option<(Op, [u32; 2])> {
     let palette = [0, bits, (-0.0f32).to_bits(), 1.0f32.to_bits()];
     let sources = |row: &Row| {
         let pairs = || palette.iter().flat_map(|&a| palette.iter().map(move |&b| [a, b]));
@@ -369,7 +375,7 @@ fn giving(machine: &Machine, slot: u8, bits: u32) -> Option<(Op, [u32; 2])> {
 
 /// The register that holds these bits.
 fn holding(ir: &mut Ir, bits: u32, span: Span) -> RegisterId {
-    let holds = |register: &Register| match register.kind {
+    let holds = |register: &VirtualRegister| match register.kind {
         RegisterKind::Zero => bits == 0,
         RegisterKind::Constant(other) => other == bits,
         _ => false,
@@ -377,7 +383,7 @@ fn holding(ir: &mut Ir, bits: u32, span: Span) -> RegisterId {
     let found = ir.registers.iter().position(holds);
     let index = found.unwrap_or_else(|| {
         let kind = RegisterKind::Constant(bits);
-        ir.registers.push(Register {
+        ir.registers.push(VirtualRegister {
             name: String::new(),
             kind,
             ty: Type::B,
@@ -397,7 +403,7 @@ fn homeless(ir: &Ir, flow: &Flow, register: RegisterId, writes: &[Write]) -> Hom
     if found.pinned.is_some()
         && let Some(slot) = best(ir, flow, writes, None)
     {
-        let bank = ir.machine.slots[usize::from(slot)].bank.name;
+        let bank = ir.machine.slot(slot).bank.name;
         let help = format!("leave its place to the assembler, or place it in bank {bank}");
         return because_of(help, Some((found.span, "placed here".to_owned())));
     }

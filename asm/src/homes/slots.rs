@@ -13,7 +13,7 @@ use crate::ir::matching;
 use crate::ir::runs::{self, Run};
 use crate::ir::{Ir, Operation, RegisterId, RegisterKind};
 use std::collections::{BTreeMap, HashSet, VecDeque};
-use takt_isa::Slots;
+use takt_isa::{SlotIndex, Slots};
 
 /// An operation: its bundle, and which of its operations.
 type At = (usize, usize);
@@ -128,7 +128,7 @@ impl Choice {
             }
             for (index, variable) in variables.iter().enumerate() {
                 let before = sets[index];
-                let fits = |slot: &u8| {
+                let fits = |slot: &SlotIndex| {
                     let mut sets = sets.clone();
                     sets[index] = Slots::of(*slot);
                     matching::is_possible(&sets)
@@ -162,7 +162,7 @@ fn together(ir: &Ir, runs: &[Run], flow: &Flow, register: RegisterId, writers: &
         let slots = common(&lasting);
         return (lasting, slots);
     }
-    let weight = |slot: u8| -> u64 {
+    let weight = |slot: SlotIndex| -> u64 {
         lasting.iter().filter(|at| able(at).contains(slot)).map(|at| flow.weights[at.0]).sum()
     };
     let slots = lasting.iter().map(able).fold(Slots::default(), Slots::or);

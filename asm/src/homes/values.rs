@@ -7,7 +7,7 @@
 
 use crate::homes::Homes;
 use crate::ir::runs;
-use crate::ir::{Ir, Register, RegisterId, RegisterKind, Version};
+use crate::ir::{Ir, RegisterId, RegisterKind, Version, VirtualRegister, numbered};
 
 /// Registers that operations of different slots write, by index.
 pub(crate) fn contested(ir: &Ir) -> Vec<bool> {
@@ -91,8 +91,8 @@ pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
                     continue;
                 }
                 name.made += 1;
-                let fresh = Register {
-                    name: format!("{}.{}", original.name, name.made),
+                let fresh = VirtualRegister {
+                    name: numbered(&original.name, &format!(".{}", name.made)),
                     kind: RegisterKind::Plain,
                     pinned: None,
                     preset: None,
@@ -125,6 +125,6 @@ pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
 }
 
 /// Whether the register of a name may be any, and another for each value.
-fn is_free(register: &Register) -> bool {
+fn is_free(register: &VirtualRegister) -> bool {
     register.kind == RegisterKind::Plain && register.pinned.is_none() && register.preset.is_none()
 }

@@ -1,7 +1,7 @@
 //! Operations of a bundle to slots, of which each takes one.
 
-use takt_isa::Slots;
 use takt_isa::spec::check::MAX_SLOTS;
+use takt_isa::{SlotIndex, Slots};
 
 /// Operations that cannot all have a slot: fewer slots can take them than they are.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -17,13 +17,13 @@ pub(crate) struct Conflict {
 ///
 /// # Errors
 /// If there is none: the operations that are in one another's way, of which the last is the first that finds no slot.
-pub(crate) fn assign(sets: &[Slots]) -> Result<Vec<u8>, Conflict> {
+pub(crate) fn assign(sets: &[Slots]) -> Result<Vec<SlotIndex>, Conflict> {
     let mut owner = [None; MAX_SLOTS];
     for index in 0..sets.len() {
         let mut seen = Slots::default();
         if !place(sets, index, &mut owner, &mut seen) {
             let mut operations: Vec<usize> =
-                seen.iter().filter_map(|slot| owner[usize::from(slot)]).chain([index]).collect();
+                seen.iter().filter_map(|slot| owner[slot.index()]).chain([index]).collect();
             operations.sort_unstable();
             return Err(Conflict { operations, slots: seen });
         }
@@ -49,13 +49,13 @@ pub(crate) fn is_possible(sets: &[Slots]) -> bool {
 }
 
 /// Every way to give each operation a slot, up to so many.
-pub(crate) fn all(sets: &[Slots], most: usize) -> Vec<Vec<u8>> {
+pub(crate) fn all(sets: &[Slots], most: usize) -> Vec<Vec<SlotIndex>> {
     let mut found = Vec::new();
     extend(sets, &mut Vec::new(), most, &mut found);
     found
 }
 
-fn extend(sets: &[Slots], chosen: &mut Vec<u8>, most: usize, found: &mut Vec<Vec<u8>>) {
+fn extend(sets: &[Slots], chosen: &mut Vec<SlotIndex>, most: usize, found: &mut Vec<Vec<SlotIndex>>) {
     let Some(set) = sets.get(chosen.len()) else {
         found.push(chosen.clone());
         return;
@@ -76,9 +76,9 @@ fn place(sets: &[Slots], index: usize, owner: &mut [Option<usize>; MAX_SLOTS], s
             continue;
         }
         *seen = seen.or(Slots::of(slot));
-        let before = owner[usize::from(slot)];
+        let before = owner[slot.index()];
         if before.is_none_or(|other| place(sets, other, owner, seen)) {
-            owner[usize::from(slot)] = Some(index);
+            owner[slot.index()] = Some(index);
             return true;
         }
     }
@@ -89,16 +89,24 @@ fn place(sets: &[Slots], index: usize, owner: &mut [Option<usize>; MAX_SLOTS], s
 mod tests {
     use super::*;
 
+    fn slot(digit: char) -> SlotIndex {
+        digit.to_digit(10).and_then(|digit| SlotIndex::new(digit as usize)).expect("it is below 8")
+    }
+
     fn sets(text: &[&str]) -> Vec<Slots> {
-        text.iter().map(|set| set.bytes().map(|slot| slot - b'0').collect()).collect()
+        text.iter().map(|set| set.chars().map(slot).collect()).collect()
+    }
+
+    fn slots(text: &str) -> Result<Vec<SlotIndex>, Conflict> {
+        Ok(text.chars().map(slot).collect())
     }
 
     #[test]
     fn the_first_assignment_is_found_however_others_must_move() {
-        assert_eq!(assign(&sets(&["01", "0"])), Ok(vec![1, 0]));
-        assert_eq!(assign(&sets(&["012", "01", "0"])), Ok(vec![2, 1, 0]));
-        assert_eq!(assign(&sets(&["12", "012", "01"])), Ok(vec![1, 2, 0]));
-        assert_eq!(assign(&[]), Ok(Vec::new()));
+        assert_eq!(assign(&sets(&["01", "0"])), slots("10"));
+        assert_eq!(assign(&sets(&["012", "01", "0"])), slots("210"));
+        assert_eq!(assign(&sets(&["12", "012", "01"])), slots("120"));
+        assert_eq!(assign(&[]), slots(""));
     }
 
     #[test]
@@ -115,8 +123,11 @@ mod tests {
     #[test]
     fn assignments_and_conflicts_are_right() {
         for code in 0..1u32 << 12 {
-            let sets: Vec<Slots> =
-                (0..4).map(|i| (0..3u8).filter(|slot| code >> (3 * i + slot) & 1 == 1).collect()).collect();
+            let able = |i: u8| {
+                let takes = |slot: &SlotIndex| code >> (3 * i + slot.get()) & 1 == 1;
+                SlotIndex::all().take(3).filter(takes).collect()
+            };
+            let sets: Vec<Slots> = (0..4).map(able).collect();
             for sets in [&sets[..3], &sets[..]] {
                 let every = all(sets, usize::MAX);
                 assert_eq!(is_possible(sets), !every.is_empty());

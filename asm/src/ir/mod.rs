@@ -22,8 +22,8 @@ use crate::report::source::Span;
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
-use takt_isa::program::{Location, Space};
-use takt_isa::{Machine, Op, Operand, Row, Slots, Type};
+use takt_isa::program::{Columns, Location, Space};
+use takt_isa::{Machine, Op, Operand, Register, Row, SlotIndex, Slots, Type};
 
 /// A register of [`Ir::registers`].
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
@@ -70,9 +70,9 @@ pub enum RegisterKind {
     Zero,
 }
 
-/// A register.
+/// A register of the source, before it has a place in the machine.
 #[derive(Clone, Debug)]
-pub struct Register {
+pub struct VirtualRegister {
     /// Its name; empty for a constant's and for one that the source names by its place alone.
     pub name: String,
     /// What it is for.
@@ -80,11 +80,17 @@ pub struct Register {
     /// How its bits are shown.
     pub ty: Type,
     /// The address that the source gives it.
-    pub pinned: Option<u16>,
+    pub pinned: Option<Register>,
     /// What the loader writes there, if the source says so. A constant's bits stand in its kind.
     pub preset: Option<u32>,
     /// Where it is declared, or for a constant first used.
     pub span: Span,
+}
+
+/// A name with something behind it, and that before the indices if it is an element's: `t.1`, `P.1[2,3]`.
+pub(crate) fn numbered(name: &str, number: &str) -> String {
+    let (head, indices) = name.split_at(name.find('[').unwrap_or(name.len()));
+    format!("{head}{number}{indices}")
 }
 
 /// What an operation carries beyond registers.
@@ -108,7 +114,7 @@ pub struct Operation {
     /// The slots that may execute it: those that host its function, as far as the source leaves a choice. None if any can, as a `nop`.
     pub slots: Slots,
     /// The one of them that executes it, so far as it is known; `None` if any can.
-    pub slot: Option<u8>,
+    pub slot: Option<SlotIndex>,
     /// The register that it writes.
     pub dest: Option<RegisterId>,
     /// The registers that it reads: as many as the instruction's shape has sources, the rest zero.
@@ -117,6 +123,8 @@ pub struct Operation {
     pub constant: Constant,
     /// The source line that it is attributed to.
     pub location: Option<Location>,
+    /// The part of that line, where the source says it (`.loc`).
+    pub columns: Option<Columns>,
     /// Its place in the source.
     pub span: Span,
     /// Which use of a macro, or turn of a repetition, made it; 0 if it stands in the source as it is.
@@ -125,11 +133,20 @@ pub struct Operation {
     pub made: bool,
     /// Its place in the order of the source: the index of its bundle before any was moved.
     pub order: u32,
-    /// Where it is written: the tree, and the operation of the tree. For messages that point at an operand.
+    /// Where it is written: the tree, and the operation of the tree; [`Operation::COMPUTED`] if it is a part of an equation.
+    /// For messages that point at an operand.
     pub(crate) written: (u32, u32),
 }
 
 impl Operation {
+    /// In [`Operation::written`] the operation that no tree has: one that computes a part of an equation, where its span is.
+    pub(crate) const COMPUTED: u32 = u32::MAX;
+
+    /// Whether it computes a part of an equation.
+    pub(crate) fn is_computed(&self) -> bool {
+        self.written.1 == Operation::COMPUTED
+    }
+
     /// The instruction's row.
     #[inline]
     pub fn row(&self) -> &'static Row {
@@ -167,6 +184,7 @@ impl Operation {
             sources: [RegisterId::ZERO; 3],
             constant: Constant::None,
             location: None,
+            columns: None,
             expansion: 0,
             ..*self
         }
@@ -262,7 +280,7 @@ pub struct Ir {
     /// The machine that it is for.
     pub machine: &'static Machine,
     /// The registers; the first is `zero`. Those that nothing uses get no address.
-    pub registers: Vec<Register>,
+    pub registers: Vec<VirtualRegister>,
     /// The bundles: those of `once`, then those of `period`.
     pub bundles: Vec<Bundle>,
     /// Index of the first bundle of `period`.
@@ -281,6 +299,8 @@ pub struct Ir {
     pub data: Vec<u32>,
     /// Words given bit by bit.
     pub raw: Vec<u64>,
+    /// By bundle, as the source has them: whether `.contract on` is in force there; none where it has no effect.
+    pub contracted: Vec<Option<bool>>,
     /// Source files that [`Operation::location`] names.
     pub files: Vec<String>,
     /// Values with registers of their own, by [`Version::after`] for each name.
@@ -290,7 +310,7 @@ pub struct Ir {
 impl Ir {
     /// A register.
     #[inline]
-    pub fn register(&self, id: RegisterId) -> &Register {
+    pub fn register(&self, id: RegisterId) -> &VirtualRegister {
         &self.registers[id.index()]
     }
 

@@ -5,9 +5,9 @@
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
-use takt_isa::program::{Location, Port, Space};
+use takt_isa::program::{Columns, Location, Port, Space};
 use takt_isa::spec::instructions::Function;
-use takt_isa::{Effect, Instruction, Op, Program, Type, ZERO};
+use takt_isa::{BundleAddress, Effect, Instruction, Op, Program, Register, SlotIndex, Type};
 
 /// The source text of a program.
 ///
@@ -25,18 +25,21 @@ pub fn disassemble(program: &Program) -> String {
 #[derive(Clone, PartialEq, Eq)]
 enum Loc {
     /// All from one place.
-    One(Option<Location>),
+    One(Option<Place>),
     /// Each from its own.
-    Each(Vec<Option<Location>>),
+    Each(Vec<Option<Place>>),
 }
+
+/// A line, and what part of it.
+type Place = (Location, Option<Columns>);
 
 struct Writer<'p> {
     program: &'p Program,
     text: String,
     /// Names of registers, by address.
-    registers: HashMap<u16, &'p str>,
+    registers: HashMap<Register, &'p str>,
     /// The first label of each bundle.
-    targets: HashMap<u32, &'p str>,
+    targets: HashMap<BundleAddress, &'p str>,
     filler: u64,
 }
 
@@ -45,7 +48,7 @@ impl<'p> Writer<'p> {
         let ports = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
         let mut targets = HashMap::new();
         for symbol in program.symbols.iter().filter(|symbol| symbol.space == Space::Code) {
-            targets.entry(symbol.address).or_insert(symbol.name.as_str());
+            targets.entry(BundleAddress::new(symbol.address)).or_insert(symbol.name.as_str());
         }
         Writer {
             program,
@@ -62,7 +65,7 @@ impl<'p> Writer<'p> {
         self.text.push('\n');
     }
 
-    fn place(&self, register: u16) -> String {
+    fn place(&self, register: Register) -> String {
         self.program.machine.register_name(register).unwrap_or_default()
     }
 
@@ -98,18 +101,20 @@ impl<'p> Writer<'p> {
         let slots = program.machine.slots.len();
         let mut labels = program.symbols.iter().filter(|symbol| symbol.space == Space::Code).peekable();
         let mut loc = None;
-        for address in 0..program.bundles() {
+        for address in program.addresses() {
             if let Some(section) = program.sections.iter().find(|section| section.start == address) {
                 self.line(format_args!("\n.{}", section.name));
             }
-            while let Some(label) = labels.next_if(|label| label.address <= address) {
+            while let Some(label) = labels.next_if(|label| label.address <= address.get()) {
                 self.line(format_args!("{}:", label.name));
             }
             if let Some(bound) = program.loop_bounds.iter().find(|bound| bound.address == address) {
                 self.line(format_args!("        .loop_bound {}", bound.most));
             }
-            let words = address as usize * slots..(address as usize + 1) * slots;
-            let (text, places) = self.bundle(&program.code[words.clone()], &program.lines[words]);
+            let words = address.index() * slots..(address.index() + 1) * slots;
+            let lines: Vec<Option<Place>> =
+                words.clone().map(|word| Some((program.lines[word]?, program.part(word)))).collect();
+            let (text, places) = self.bundle(&program.code[words], &lines);
             let wanted = match places.as_slice() {
                 [first, rest @ ..] if rest.iter().all(|place| place == first) => Loc::One(*first),
                 _ => Loc::Each(places),
@@ -127,12 +132,11 @@ impl<'p> Writer<'p> {
     }
 
     fn loc(&self, loc: &Loc) -> String {
-        let place = |place: &Option<Location>| match place {
-            Some(Location { file, line }) => {
-                format!(
-                    "{} {line}",
-                    quoted(self.program.files.get(*file as usize).map_or("", String::as_str))
-                )
+        let place = |place: &Option<Place>| match place {
+            Some((Location { file, line }, columns)) => {
+                let file = quoted(self.program.files.get(*file as usize).map_or("", String::as_str));
+                let columns = columns.map_or(String::new(), |part| format!("[{},{}]", part.first, part.last));
+                format!("{file} {line}{columns}")
             }
             None => "none".to_owned(),
         };
@@ -143,39 +147,40 @@ impl<'p> Writer<'p> {
     }
 
     /// A bundle's text, and where its operations come from.
-    fn bundle(&self, words: &[u64], lines: &[Option<Location>]) -> (String, Vec<Option<Location>>) {
-        let is_filler = |slot: usize| words[slot] == self.filler && lines[slot].is_none();
-        let mut present: Vec<usize> = (0..words.len()).filter(|slot| !is_filler(*slot)).collect();
+    fn bundle(&self, words: &[u64], lines: &[Option<Place>]) -> (String, Vec<Option<Place>>) {
+        let slots = || self.program.machine.numbered_slots().map(|(slot, _)| slot);
+        let word = |slot: SlotIndex| words[slot.index()];
+        let is_filler = |slot: &SlotIndex| word(*slot) == self.filler && lines[slot.index()].is_none();
+        let mut present: Vec<SlotIndex> = slots().filter(|slot| !is_filler(slot)).collect();
         if present.is_empty() {
-            present.push(0);
+            present.push(SlotIndex::FIRST);
         }
         let mut texts: Vec<String> = Vec::with_capacity(present.len());
         let mut idle = Vec::new();
         for &slot in &present {
-            texts.push(self.operation(words[slot], slot).unwrap_or_else(|| {
-                if words[slot] == self.filler {
+            texts.push(self.operation(word(slot), slot).unwrap_or_else(|| {
+                if word(slot) == self.filler {
                     idle.push((texts.len(), slot));
                 }
-                self.raw(words[slot], slot)
+                self.raw(word(slot), slot)
             }));
         }
         // A `nop` takes the first slot that is free: where that is the right one for each, they are written as such.
-        let free = (0..words.len())
-            .filter(|slot| !present.contains(slot) || idle.iter().any(|(_, nop)| nop == slot));
+        let free = slots().filter(|slot| !present.contains(slot) || idle.iter().any(|(_, nop)| nop == slot));
         if free.zip(&idle).all(|(free, (_, slot))| free == *slot) {
             for (index, _) in &idle {
                 texts[*index] = Op::nop.row().mnemonic.to_owned();
             }
         }
-        (texts.join(" || "), present.iter().map(|slot| lines[*slot]).collect())
+        (texts.join(" || "), present.iter().map(|slot| lines[slot.index()]).collect())
     }
 
-    fn raw(&self, word: u64, slot: usize) -> String {
-        format!(".raw {} 0x{word:012x}", self.program.machine.slots[slot].name)
+    fn raw(&self, word: u64, slot: SlotIndex) -> String {
+        format!(".raw {} 0x{word:012x}", self.program.machine.slot(slot).name)
     }
 
     /// The text of a word, if the assembler would put that text's word into this slot.
-    fn operation(&self, word: u64, slot: usize) -> Option<String> {
+    fn operation(&self, word: u64, slot: SlotIndex) -> Option<String> {
         let machine = self.program.machine;
         let instruction = Instruction::decode(word).ok()?;
         instruction.place(machine, slot).ok()?;
@@ -184,15 +189,16 @@ impl<'p> Writer<'p> {
             return None;
         }
         let is_access = matches!(instruction.effect(), Effect::Load | Effect::Store);
-        if is_access && instruction.sources[0] == ZERO && instruction.constant >= machine.data_depth {
+        if is_access && instruction.sources[0] == Register::ZERO && instruction.constant >= machine.data_depth
+        {
             return None;
         }
-        let register = |address: u16| match self.registers.get(&address) {
+        let register = |register: Register| match self.registers.get(&register) {
             Some(name) => (*name).to_owned(),
-            None if address == ZERO => self.place(address),
-            None => format!("@{}", self.place(address)),
+            None if register == Register::ZERO => self.place(register),
+            None => format!("@{}", self.place(register)),
         };
-        let target = |address: u32| match self.targets.get(&address) {
+        let target = |address: BundleAddress| match self.targets.get(&address) {
             Some(name) => (*name).to_owned(),
             None => address.to_string(),
         };
@@ -202,7 +208,7 @@ impl<'p> Writer<'p> {
         }
         // Its slot is one of several.
         let (mnemonic, operands) = text.split_at(instruction.op.row().mnemonic.len());
-        Some(format!("{mnemonic}.{}{operands}", machine.slots[slot].name))
+        Some(format!("{mnemonic}.{}{operands}", machine.slot(slot).name))
     }
 
     fn data(&mut self) {

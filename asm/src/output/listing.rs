@@ -4,14 +4,14 @@ use crate::Assembled;
 use crate::report::source::Lines;
 use crate::syntax::expr::Value;
 use serde::Serialize;
-use std::collections::HashMap;
 use std::fmt::Write as _;
-use takt_isa::program::{Location, Port, Space};
-use takt_isa::{Instruction, Program, Type};
+use takt_isa::program::{Columns, Location, Port, Space};
+use takt_isa::{BundleAddress, Instruction, Program, SlotIndex, Type};
 
 /// The listing of an assembled program: for each bundle its address, its words in the order of the slots, and the source
-/// lines that they come from. An operation that a macro, a repetition or the assembler made is shown as what it became, behind a `+`.
-/// Before a line stand the slots of those of its operations that another slot could have taken.
+/// lines that they come from. An operation that a macro, a repetition or the assembler made is shown as what it became, behind a `+`;
+/// so is one that computes a part of an equation, with that part. Before a line stand the slots of those of its operations that
+/// another slot could have taken.
 pub fn listing(assembled: &Assembled) -> String {
     let mut lister = Lister::new(assembled);
     lister.code();
@@ -61,13 +61,18 @@ impl<'a> Lister<'a> {
             program.data.len(),
             program.constants.len()
         ));
+        match self.assembled.contractions.len() {
+            0 => {}
+            1 => self.line(format_args!("; 1 product fused into a sum")),
+            count => self.line(format_args!("; {count} products fused into sums")),
+        }
         self.line(format_args!("; addr  {heads}line            source"));
         let mut labels = program.symbols.iter().filter(|symbol| symbol.space == Space::Code).peekable();
-        for address in 0..program.bundles() {
+        for address in program.addresses() {
             if let Some(section) = program.sections.iter().find(|section| section.start == address) {
                 self.line(format_args!("\n.{}", section.name));
             }
-            let first = address as usize * slots.len();
+            let first = address.index() * slots.len();
             let range = first..first + slots.len();
             let mut words = String::new();
             for (word, line) in program.code[range.clone()].iter().zip(&program.lines[range]) {
@@ -77,13 +82,13 @@ impl<'a> Lister<'a> {
             }
             let mut rows = self.rows(first).into_iter();
             let head = rows.next().unwrap_or_default();
-            while let Some(label) = labels.next_if(|label| label.address <= address) {
+            while let Some(label) = labels.next_if(|label| label.address <= address.get()) {
                 // Not where the source line shows it already.
                 if !head.1.starts_with(&format!("{}:", label.name)) {
                     self.line(format_args!("{}:", label.name));
                 }
             }
-            self.line(format_args!("  {address:04x}  {words}{:<15} {}", head.0, head.1));
+            self.line(format_args!("  {:04x}  {words}{:<15} {}", address.get(), head.0, head.1));
             let indent = 8 + words.len();
             for (place, text) in rows {
                 self.line(format_args!("{:indent$}{place:<15} {text}", ""));
@@ -99,14 +104,24 @@ impl<'a> Lister<'a> {
         let program = self.program;
         let mut rows: Vec<(String, String, Vec<&str>)> = Vec::new();
         let slots = program.machine.slots.len();
-        for slot in 0..slots {
-            let index = first + slot;
+        for (slot, _) in program.machine.numbered_slots() {
+            let index = first + slot.index();
             let row = match program.lines[index] {
                 None if program.code[index] == self.filler => continue,
                 None => (String::new(), self.operation(index, slot)),
                 Some(location) => {
                     let expanded = self.assembled.expanded.binary_search(&(index as u32)).is_ok();
                     let place = program.place_text(location);
+                    if let Some(Columns { first, last }) = program.part(index) {
+                        let part = self.columns(location, first, last);
+                        let operation = self.operation(index, slot);
+                        rows.push((
+                            place + "+",
+                            format!("{operation:<31} ; {part}"),
+                            self.chosen(index, slot).into_iter().collect(),
+                        ));
+                        continue;
+                    }
                     match self.source(location) {
                         // Of a bundle that issues one after another each operation is shown by itself.
                         Some(text) if !(expanded || slots == 1 && text.contains("||")) => (place, text),
@@ -130,10 +145,18 @@ impl<'a> Lister<'a> {
     }
 
     /// The slot of an operation, if another could have taken it.
-    fn chosen(&self, index: usize, slot: usize) -> Option<&'a str> {
+    fn chosen(&self, index: usize, slot: SlotIndex) -> Option<&'a str> {
         let machine = self.program.machine;
         let function = Instruction::decode(self.program.code[index]).ok()?.op.row().function;
-        (machine.hosts(function).len() > 1).then(|| machine.slots[slot].name)
+        (machine.hosts(function).len() > 1).then(|| machine.slot(slot).name)
+    }
+
+    /// A part of a source line.
+    fn columns(&self, location: Location, first: u32, last: u32) -> String {
+        let line = self.files.get(location.file as usize).and_then(Option::as_ref);
+        let line = line.and_then(|(text, lines)| lines.text(text, location.line)).unwrap_or("");
+        let part = line.chars().skip(first as usize - 1).take((last - first + 1).min(160) as usize);
+        part.map(|c| if c == '\t' { ' ' } else { c }).collect()
     }
 
     fn source(&self, location: Location) -> Option<String> {
@@ -144,12 +167,12 @@ impl<'a> Lister<'a> {
     }
 
     /// An operation as what it became.
-    fn operation(&self, index: usize, slot: usize) -> String {
+    fn operation(&self, index: usize, slot: SlotIndex) -> String {
         let program = self.program;
         let word = program.code[index];
         match Instruction::decode(word) {
             Ok(instruction) => {
-                let target = |address: u32| match program.nearest_label(address) {
+                let target = |address: BundleAddress| match program.nearest_label(address) {
                     Some((label, 0)) => label.to_owned(),
                     _ => address.to_string(),
                 };
@@ -160,7 +183,7 @@ impl<'a> Lister<'a> {
     }
 
     /// The source's name of a register, or the value of the constant that it holds.
-    fn register(&self, register: u16) -> String {
+    fn register(&self, register: takt_isa::Register) -> String {
         let constants = &self.program.constants;
         let named = self.program.registers.iter().any(|port| port.register == register);
         match constants.binary_search_by_key(&register, |constant| constant.0) {
@@ -242,7 +265,7 @@ pub struct Register {
     /// Its canonical name.
     pub place: String,
     /// Its address.
-    pub address: u16,
+    pub address: takt_isa::Register,
     /// Of a port: its number.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub number: Option<u16>,
@@ -333,15 +356,13 @@ pub fn readmemh(program: &Program) -> Vec<(String, String)> {
         files.push((format!("code_{}.hex", slot.name), words.map(|word| format!("{word:012x}\n")).collect()));
     }
     files.push(("data.hex".to_owned(), program.data.iter().map(|word| format!("{word:08x}\n")).collect()));
-    let mut by_bank: HashMap<u16, String> = HashMap::new();
-    for (register, bits) in &program.constants {
-        if let Some(bank) = program.machine.banks().find(|bank| bank.contains(*register)) {
-            let text = by_bank.entry(bank.base).or_default();
-            let _ = writeln!(text, "@{:03x} {bits:08x}", register - bank.base);
-        }
-    }
     for bank in program.machine.banks() {
-        let contents = by_bank.remove(&bank.base).unwrap_or_default();
+        let mut contents = String::new();
+        for (register, bits) in &program.constants {
+            if let Some(index) = bank.index(*register) {
+                let _ = writeln!(contents, "@{:03x} {bits:08x}", index.get());
+            }
+        }
         files.push((format!("constants_{}.hex", bank.name), contents));
     }
     files

@@ -9,10 +9,11 @@ use crate::context::{Context, ScopeId};
 use crate::emit::Emitted;
 use crate::emit::place::Placement;
 use crate::ir::{Ir, RegisterId};
+use crate::report::source::{Lines, Sources, Span};
 use crate::syntax::expr::Value;
 use std::collections::{BTreeMap, HashMap, HashSet};
-use takt_isa::Type;
-use takt_isa::timing::Address;
+use takt_isa::program::Columns;
+use takt_isa::{BundleAddress, Register, Type};
 
 /// What a debugger knows of a program beyond what the machine loads: an image carries it, unless it is stripped.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,8 +39,8 @@ pub struct Names {
 
 impl Names {
     /// The position of the line that a bundle shows: of its first operation that has one, or else of a bundle before.
-    pub fn at_hand(&self, slots: usize, address: Address) -> Position {
-        let end = (address as usize + 1).saturating_mul(slots).min(self.positions.len());
+    pub fn at_hand(&self, slots: usize, address: BundleAddress) -> Position {
+        let end = (address.index() + 1).saturating_mul(slots).min(self.positions.len());
         let bundles = self.positions[..end].rchunks(slots.max(1));
         bundles.flat_map(|words| words.iter().flatten()).next().copied().unwrap_or_default()
     }
@@ -71,7 +72,7 @@ pub struct NamedValue {
     /// The value's own name: `t.1`, or that of the source for the last one of a straight run, which later runs may read.
     pub label: String,
     /// Its register.
-    pub register: u16,
+    pub register: Register,
     /// How its bits are read.
     pub ty: Type,
     /// The name means it for lines with an order above the first and up to the second. `None`: for all lines for which it means
@@ -79,7 +80,29 @@ pub struct NamedValue {
     pub orders: Option<(u32, u32)>,
     /// The first bundle that writes it and the last one that uses it, if it lives only there: its register may have other
     /// values elsewhere.
-    pub bundles: Option<(Address, Address)>,
+    pub bundles: Option<(BundleAddress, BundleAddress)>,
+}
+
+/// The columns of what words compute of their lines: of those that the program attributes to the lines where they stand.
+pub(crate) fn parts(sources: &Sources, emitted: &Emitted) -> Vec<(u32, Columns)> {
+    let mut lines: HashMap<usize, Lines> = HashMap::new();
+    let part = |&(word, span): &(u32, Span)| {
+        let number = sources.file_of(span.start);
+        let file = sources.files().get(number)?;
+        let lines = lines.entry(number).or_insert_with(|| Lines::of(&file.text));
+        let (start, end) = ((span.start - file.base) as usize, (span.end - file.base) as usize);
+        let index = lines.index(start as u32);
+        let location = emitted.program.lines.get(word as usize).copied().flatten()?;
+        let is_there = location.line as usize == index + 1
+            && emitted.program.files.get(location.file as usize).is_some_and(|name| **name == *file.name);
+        let before = file.text.get(lines.range(index)?.start..start)?.chars().count() as u32;
+        let within = file.text.get(start..end)?.chars().count() as u32;
+        (is_there && within > 0).then_some((word, Columns { first: before + 1, last: before + within }))
+    };
+    let mut parts: Vec<(u32, Columns)> = emitted.program.parts.clone();
+    parts.extend(emitted.parts.iter().filter_map(part));
+    parts.sort_unstable_by_key(|(word, _)| *word);
+    parts
 }
 
 /// What the names of a program stand for.
@@ -132,7 +155,7 @@ fn values(ir: &Ir, placement: &Placement, emitted: &Emitted) -> Vec<NamedValue> 
         split.entry(id).or_default();
     }
     let ranges = ranges(ir);
-    let own_names: HashMap<u16, &str> =
+    let own_names: HashMap<Register, &str> =
         emitted.program.registers.iter().map(|port| (port.register, port.name.as_str())).collect();
     let mut values = Vec::new();
     for (original, mut versions) in split {
@@ -158,9 +181,9 @@ fn values(ir: &Ir, placement: &Placement, emitted: &Emitted) -> Vec<NamedValue> 
 }
 
 /// For each register the first bundle that writes it and the last one that uses it.
-fn ranges(ir: &Ir) -> Vec<Option<(Address, Address)>> {
-    let mut ranges: Vec<Option<(Address, Address)>> = vec![None; ir.registers.len()];
-    for (address, bundle) in (0..).zip(&ir.bundles) {
+fn ranges(ir: &Ir) -> Vec<Option<(BundleAddress, BundleAddress)>> {
+    let mut ranges: Vec<Option<(BundleAddress, BundleAddress)>> = vec![None; ir.registers.len()];
+    for (address, bundle) in (0..).map(BundleAddress::new).zip(&ir.bundles) {
         for operation in &bundle.operations {
             for source in operation.reads() {
                 if let Some((_, last)) = &mut ranges[source.index()] {

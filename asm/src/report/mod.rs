@@ -2,4 +2,7 @@
 
 pub mod diag;
 pub mod levels;
+mod nearest;
 pub mod source;
+
+pub use nearest::nearest;

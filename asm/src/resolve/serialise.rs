@@ -1,12 +1,12 @@
 //! One after another: the operations of a bundle on a machine with one slot.
 
-use crate::ir::{Constant, Operation, Register, RegisterId};
+use crate::ir::{Constant, Operation, RegisterId, VirtualRegister};
 use crate::report::diag::Diagnostic;
 use takt_isa::Machine;
 use takt_isa::spec::instructions::Effect;
 
 /// What makes the diagnostic, once it is known to be wanted.
-pub(crate) type Explain<'o> = Box<dyn FnOnce(&[Register], &Machine) -> Diagnostic + 'o>;
+pub(crate) type Explain<'o> = Box<dyn FnOnce(&[VirtualRegister], &Machine) -> Diagnostic + 'o>;
 
 /// Why a bundle has no meaning: two of its operations write one register.
 pub(crate) fn twice(operations: &[Operation]) -> Option<Explain<'_>> {
@@ -77,7 +77,7 @@ fn precedes(first: &Operation, second: &Operation) -> bool {
         || (early(effects.0) && !early(effects.1))
 }
 
-fn text(registers: &[Register], machine: &Machine, id: RegisterId) -> String {
+fn text(registers: &[VirtualRegister], machine: &Machine, id: RegisterId) -> String {
     let register = &registers[id.index()];
     if !register.name.is_empty() {
         return register.name.clone();
@@ -86,7 +86,12 @@ fn text(registers: &[Register], machine: &Machine, id: RegisterId) -> String {
     place.map_or_else(|| "a constant".to_owned(), |place| format!("@{place}"))
 }
 
-fn cycle(operations: &[Operation], left: &[usize], registers: &[Register], machine: &Machine) -> Diagnostic {
+fn cycle(
+    operations: &[Operation],
+    left: &[usize],
+    registers: &[VirtualRegister],
+    machine: &Machine,
+) -> Diagnostic {
     let first = &operations[left[0]];
     let message =
         format!("{} has one slot, and there is no order for the operations of this bundle", machine.name);

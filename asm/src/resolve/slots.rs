@@ -1,20 +1,21 @@
 //! Slots that the source names, and the slots of a bundle's operations.
 
-use super::Resolver;
+use super::{Host, Resolver};
 use crate::context::{At, Reported};
 use crate::ir::matching::{self, Conflict};
-use crate::ir::{Constant, Operation};
-use crate::report::diag::{Diagnostic, nearest};
+use crate::ir::{Constant, Operation, RegisterId};
+use crate::report::diag::Diagnostic;
+use crate::report::nearest;
 use crate::report::source::Span;
 use crate::syntax::name::NameId;
-use takt_isa::{Op, Row, Slots};
+use takt_isa::{Op, Row, SlotIndex, Slots};
 
 impl Resolver<'_> {
     /// The slot of a name.
-    pub(super) fn slot(&mut self, at: At, name: &str, span: Span) -> Result<u8, Reported> {
+    pub(super) fn named_slot(&mut self, at: At, name: &str, span: Span) -> Result<SlotIndex, Reported> {
         let slots = self.ir.machine.slots;
-        if let Some(index) = slots.iter().position(|slot| slot.name == name) {
-            return Ok(index as u8);
+        if let Some((index, _)) = self.ir.machine.numbered_slots().find(|(_, slot)| slot.name == name) {
+            return Ok(index);
         }
         let names = slots.iter().map(|slot| slot.name);
         let message = format!("{} has no slot `{name}`", self.ir.machine.name);
@@ -39,13 +40,13 @@ impl Resolver<'_> {
         else {
             return Ok(None);
         };
-        Ok(Some((op, Slots::of(self.slot(at, &slot, span)?))))
+        Ok(Some((op, Slots::of(self.named_slot(at, &slot, span)?))))
     }
 
     /// Names of slots, as a message lists them.
     fn names(&self, slots: Slots) -> String {
         let names: Vec<String> =
-            slots.iter().map(|slot| format!("`{}`", self.ir.machine.slots[usize::from(slot)].name)).collect();
+            slots.iter().map(|slot| format!("`{}`", self.ir.machine.slot(slot).name)).collect();
         match &names[..] {
             [rest @ .., last] if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
             names => names.concat(),
@@ -65,6 +66,40 @@ impl Resolver<'_> {
         let plural = if hosts.len() == 1 { "slot" } else { "slots" };
         let note = format!("{}: {plural} {}", self.ir.machine.name, self.names(hosts));
         self.context.report(at.scope, Diagnostic::error("no-unit", span, message).note(note))
+    }
+
+    /// The slots that may execute an instruction, or the one that the source names; none if any can.
+    pub(super) fn hosting(
+        &mut self,
+        at: At,
+        op: Op,
+        named: Option<Slots>,
+        span: Span,
+    ) -> Result<Slots, Reported> {
+        let row = op.row();
+        match (self.slots[op as usize], named) {
+            (Host::Any, named) => Ok(named.unwrap_or_default()),
+            (Host::Slots(slots), Some(named)) if named.and(slots).is_empty() => {
+                Err(self.not_hosted(at, row, slots, named, span))
+            }
+            (Host::Slots(slots), named) => Ok(named.unwrap_or(slots)),
+            (Host::None, _) => {
+                let message = format!("{} has no unit for `{}`", self.ir.machine.name, row.mnemonic);
+                let having = takt_isa::MACHINES.iter().find(|machine| machine.host(row.function).is_some());
+                let mut error = Diagnostic::error("no-unit", span, message);
+                if let Some(machine) = having {
+                    error = error.note(format!("machine {} has one", machine.name));
+                }
+                Err(self.context.report(at.scope, error))
+            }
+        }
+    }
+
+    /// Of these slots the one that writes a register which has its place, if it is among them; otherwise all.
+    pub(super) fn writing(&self, slots: Slots, dest: Option<RegisterId>) -> Slots {
+        let place = dest.and_then(|dest| self.context.declared.registers[dest.index()].pinned);
+        let writer = place.map(|place| self.ir.machine.writers(place).and(slots));
+        writer.filter(|writer| !writer.is_empty()).unwrap_or(slots)
     }
 
     /// Gives each operation of a bundle a slot. More of them than there are slots for them is a mistake.

@@ -4,7 +4,7 @@
 use crate::ir::runs::Run;
 use crate::ir::{Bundle, Ir, Operation, RegisterId, RegisterKind};
 use std::collections::HashMap;
-use takt_isa::Slots;
+use takt_isa::{SlotIndex, Slots};
 
 /// For registers that several operations write, the slots that all of these may have.
 pub(super) struct Banks {
@@ -24,7 +24,7 @@ struct Writers {
     /// Whether one of them shares its bundle with others.
     bundled: bool,
     /// The slot that they have.
-    slot: u8,
+    slot: SlotIndex,
 }
 
 impl Banks {
@@ -67,7 +67,7 @@ impl Banks {
         if ir.register(dest).kind != RegisterKind::Output || slots.len() < 2 {
             return slots;
         }
-        let latency = |slot: &u8| super::part(ir.machine, operation, Some(*slot)).writes;
+        let latency = |slot: &SlotIndex| super::part(ir.machine, operation, Some(*slot)).writes;
         let least = slots.iter().map(|slot| latency(&slot)).min();
         slots.iter().filter(|slot| Some(latency(slot)) == least).collect()
     }

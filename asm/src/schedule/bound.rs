@@ -4,7 +4,7 @@ use super::pass::Chains;
 use super::problem::{Part, Problem, Task};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
-use takt_isa::{Machine, Slots};
+use takt_isa::{Machine, SlotIndex, Slots};
 
 /// Thresholds that the bound of a resource tries.
 const TAILS: usize = 128;
@@ -48,10 +48,8 @@ impl Resources {
     pub fn text(&self, machine: &Machine) -> String {
         match self {
             Resources::Slots(slots) => {
-                let names: Vec<&str> = slots
-                    .iter()
-                    .filter_map(|slot| Some(machine.slots.get(usize::from(slot))?.name))
-                    .collect();
+                let names: Vec<&str> =
+                    slots.iter().filter_map(|slot| Some(machine.slots.get(slot.index())?.name)).collect();
                 let plural = if names.len() == 1 { "slot" } else { "slots" };
                 format!("{plural} {}", names.join("+"))
             }
@@ -158,7 +156,7 @@ pub(super) fn bound(problem: &Problem, chains: &Chains) -> Bound {
     };
     let shared_slots = several(&by_slots).into_iter().map(|set| SharedBound {
         cycles: slots(&set),
-        resources: Resources::Slots(set.iter().map(|slot| *slot as u8).collect()),
+        resources: Resources::Slots(set.iter().filter_map(|slot| SlotIndex::new(*slot)).collect()),
     });
     let shared_units = several(&by_units).into_iter().map(|set| SharedBound {
         cycles: units(&set),

@@ -10,7 +10,7 @@ use crate::report::diag::{Diagnostic, Sink};
 use crate::report::source::Span;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use takt_isa::Slots;
+use takt_isa::SlotIndex;
 
 /// Pairs of reads and writes that the orders of a run may give: far beyond what a port is used for.
 const ORDER_EDGES: usize = 1 << 16;
@@ -289,7 +289,7 @@ impl<'a> Demands<'a> {
             let single = |bounds: &[u32]| bounds.iter().position(|bound| *bound == cycles);
             let shared = || bound.shared.iter().find(|shared| shared.cycles == cycles);
             let resources = match (single(&bound.slots), single(&bound.units)) {
-                (Some(slot), _) => Some(Resources::Slots(Slots::of(slot as u8))),
+                (Some(slot), _) => Some(Resources::Slots(SlotIndex::new(slot).into_iter().collect())),
                 (None, Some(unit)) => Some(Resources::Units(vec![unit])),
                 (None, None) => shared().map(|shared| shared.resources.clone()),
             };

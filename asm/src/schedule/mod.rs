@@ -28,7 +28,7 @@ use problem::{Edge, Part, Problem, Task};
 use smallvec::{SmallVec, smallvec};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use takt_isa::program::{Location, Space};
-use takt_isa::{Effect, Function, Machine, Slots};
+use takt_isa::{BundleAddress, Effect, Function, Machine, SlotIndex, Slots};
 
 /// How long the scheduler searches unless told otherwise.
 pub const DEFAULT_EFFORT: u32 = 20;
@@ -41,7 +41,7 @@ pub struct BlockReport {
     /// The label at the block's start, if there is one.
     pub label: Option<String>,
     /// Address of its first bundle.
-    pub address: u32,
+    pub address: BundleAddress,
     /// Operations.
     pub operations: u32,
     /// Bundles that they are packed into.
@@ -103,7 +103,7 @@ pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
         report.blocks.push(BlockReport {
             location: old.first().and_then(|bundle| bundle.operations.first()?.location),
             label: label_at(ir, run.start as u32),
-            address,
+            address: BundleAddress::new(address),
             operations: block.problem.tasks.iter().map(|task| task.operations as u32).sum(),
             bundles: packed.len() as u32,
             cycles: solution.length,
@@ -142,9 +142,9 @@ fn label_at(ir: &Ir, position: u32) -> Option<String> {
 }
 
 /// Which unit of a machine an operation uses on a slot.
-fn part(machine: &Machine, operation: &Operation, slot: Option<u8>) -> Part {
+fn part(machine: &Machine, operation: &Operation, slot: Option<SlotIndex>) -> Part {
     let function = operation.row().function;
-    let slot = usize::from(slot.unwrap_or(0)).min(machine.slots.len() - 1);
+    let slot = slot.unwrap_or(SlotIndex::FIRST).index();
     let before: usize = machine.slots[..slot].iter().map(|slot| slot.units.len()).sum();
     match machine.slots[slot].unit_for(function).filter(|_| function != Function::Idle) {
         Some(unit) => {
@@ -321,7 +321,7 @@ impl Block {
     ) -> impl Iterator<Item = Operation> + use<'_, 'b> {
         let parts = self.problem.tasks[task].choice(plan.choice[task]);
         old[self.origins[task]].operations.iter().zip(parts).map(|(operation, part)| {
-            let slot = operation.slot.map(|_| part.slot as u8);
+            let slot = operation.slot.and_then(|_| SlotIndex::new(part.slot));
             Operation { slot, ..*operation }
         })
     }
@@ -331,8 +331,8 @@ impl Block {
 const CHOICES: usize = 120;
 
 /// The ways to give the operations of a bundle slots, the present one first; the only one, if nothing says where registers may lie.
-fn choices(ir: &Ir, bundle: &Bundle, banks: Option<&Banks>) -> Vec<Vec<Option<u8>>> {
-    let present: Vec<Option<u8>> = bundle.operations.iter().map(|operation| operation.slot).collect();
+fn choices(ir: &Ir, bundle: &Bundle, banks: Option<&Banks>) -> Vec<Vec<Option<SlotIndex>>> {
+    let present: Vec<Option<SlotIndex>> = bundle.operations.iter().map(|operation| operation.slot).collect();
     let Some(banks) = banks else { return vec![present] };
     let placed = || bundle.operations.iter().filter(|operation| operation.slot.is_some());
     let sets: Vec<Slots> = placed().map(|operation| banks.able(ir, operation)).collect();
@@ -342,7 +342,8 @@ fn choices(ir: &Ir, bundle: &Bundle, banks: Option<&Banks>) -> Vec<Vec<Option<u8
     let mut all = Vec::new();
     for slots in matching::all(&sets, CHOICES) {
         let mut slots = slots.into_iter();
-        let choice: Vec<Option<u8>> = present.iter().map(|slot| slot.and_then(|_| slots.next())).collect();
+        let choice: Vec<Option<SlotIndex>> =
+            present.iter().map(|slot| slot.and_then(|_| slots.next())).collect();
         let first = if choice == present { 0 } else { all.len() };
         all.insert(first, choice);
     }

@@ -3,7 +3,7 @@
 use super::bound::Bound;
 use super::pass::{Chains, Graph, Plan, Reservations};
 use std::cmp::Reverse;
-use takt_isa::Slots;
+use takt_isa::{SlotIndex, Slots};
 
 /// One operation of a task on one of the slots that may execute it, as the resources see it.
 #[derive(Clone, Copy, Debug)]
@@ -53,7 +53,7 @@ impl Task {
 
     /// The slots that may execute an operation.
     pub(super) fn slots(&self, index: usize) -> Slots {
-        self.operation(index).map(|part| part.slot as u8).collect()
+        self.operation(index).filter_map(|part| SlotIndex::new(part.slot)).collect()
     }
 
     /// Cycles from its issue to the write of an operation's result, on the quickest of its slots.

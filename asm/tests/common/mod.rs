@@ -68,9 +68,8 @@ pub(crate) fn bundles(assembled: &Assembled) -> Vec<String> {
     let program = &assembled.program;
     let bundle = |address| {
         let instructions = program.bundle(address).expect("it is in the program").expect("it is legal");
-        let texts: Vec<String> = instructions
-            .iter()
-            .enumerate()
+        let texts: Vec<String> = takt_isa::SlotIndex::all()
+            .zip(&instructions)
             .filter(|(_, instruction)| instruction.op != takt_isa::Op::nop)
             .map(|(slot, instruction)| {
                 let register = |register| program.register_text(register);
@@ -79,5 +78,5 @@ pub(crate) fn bundles(assembled: &Assembled) -> Vec<String> {
             .collect();
         texts.join(" || ")
     };
-    (0..program.bundles()).map(bundle).collect()
+    program.addresses().map(bundle).collect()
 }

@@ -24,7 +24,7 @@ use std::time::Duration;
 use takt_debug::console::{Console, first_mistake};
 use takt_debug::session::{Control, Options, Rows, Session, Unit, Why};
 
-/// Step through a program, forth and back, and look at everything.
+/// Step through a program, forward and back, and look at everything.
 ///
 /// At the prompt, `help` lists the commands. They may also come from a script or from standard input; then the exit status
 /// is 1 if a command was wrong or a `check` failed.
@@ -89,7 +89,7 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
         return Err(Failure::Usage(text.to_owned()).into());
     }
     if arguments.tui && !(std::io::stdin().is_terminal() && std::io::stdout().is_terminal()) {
-        let text = "--tui wants a terminal as standard input and output; without one, commands come from --script or standard input";
+        let text = "--tui needs a terminal as standard input and output; without one, commands come from --script or standard input";
         return Err(Failure::Usage(text.to_owned()).into());
     }
 

@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 use takt_cosim::Model;
-use takt_isa::{Machine, Program};
+use takt_isa::{Machine, Program, Register};
 use takt_programs::gcode;
 use takt_programs::hybrid::closed_loop::{ClosedLoop, Inputs};
 use takt_programs::hybrid::{Outputs, ports};
@@ -40,7 +40,7 @@ pub(crate) fn assemble(machine: &'static Machine, source: &str) -> Program {
 pub(crate) fn drive<E: std::fmt::Display>(
     program: &Program,
     periods: usize,
-    mut period: impl FnMut(&[(u16, u32)]) -> Result<Vec<(u16, u32)>, E>,
+    mut period: impl FnMut(&[(Register, u32)]) -> Result<Vec<(Register, u32)>, E>,
 ) {
     let register = |name: &str| {
         let mut ports = program.inputs.iter().chain(&program.outputs);
@@ -51,7 +51,7 @@ pub(crate) fn drive<E: std::fmt::Display>(
     let moves = gcode::read_bytes(takt_programs::AGH.as_bytes()).expect("the letters are G-code");
     let trajectory = Trajectory::plan(&moves).expect("the letters can be driven");
     let controller = |values: &Inputs| -> Result<Outputs<f64>, E> {
-        let values: Vec<(u16, u32)> = inputs.into_iter().zip(values.to_words()).collect();
+        let values: Vec<(Register, u32)> = inputs.into_iter().zip(values.to_words()).collect();
         let ports = period(&values)?;
         let value = |register| ports.iter().find(|(port, _)| *port == register).expect("written").1;
         Ok(Outputs::from_array(outputs.map(|register| f64::from(f32::from_bits(value(register))))))

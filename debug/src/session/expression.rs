@@ -3,6 +3,7 @@
 //! | written | means |
 //! |---|---|
 //! | `x` | what the source line at hand would read: the port or register of that name, or the label's address, or the constant |
+//! | `P[2,3]` | the element of an array of registers |
 //! | `@m12` | the register at that place (`m12` too, if nothing else is named so) |
 //! | `table[i]`, `4[i]`, `[i]` | the data word at that offset and index, as binary32 |
 //! | `x:int`, `@m12:bits`, `[i]:float` | the same bits as a value of that type |
@@ -11,13 +12,14 @@
 use super::meaning::{At, Held, Life, Meaning, Name, held};
 use std::collections::BTreeSet;
 use takt_asm::Expression;
-use takt_asm::diag::{Diagnostics, nearest};
+use takt_asm::diag::Diagnostics;
 use takt_asm::expr::{BUILTINS, Value};
 use takt_asm::names::{Names, Position};
+use takt_asm::nearest;
 use takt_emu::Emulator;
 use takt_isa::program::{Location, Space};
-use takt_isa::timing::{Address, Cycle};
-use takt_isa::{Program, Type};
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Program, Register, Type};
 
 /// Values that a watched expression may have at one time; more is an error.
 const VARIANTS: usize = 64;
@@ -28,7 +30,7 @@ const NESTING: usize = 16;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// A register by address.
-    Register(u16),
+    Register(Register),
     /// A data word by address.
     Word(u32),
 }
@@ -36,7 +38,7 @@ pub enum Place {
 /// What an operand of an expression stands for.
 #[derive(Clone, Debug)]
 enum Operand {
-    Register(u16, Type),
+    Register(Register, Type),
     /// A name that stands for different things at different places; and the type that it is read as, if one is given.
     Name(Box<Name>, Option<Type>),
     /// One of the values of such a name.
@@ -56,7 +58,7 @@ enum Operand {
 /// What of the machine an expression reads.
 #[derive(Default)]
 pub(crate) struct Reads {
-    pub(crate) registers: BTreeSet<u16>,
+    pub(crate) registers: BTreeSet<Register>,
     pub(crate) memory: bool,
     /// What changes in every cycle.
     pub(crate) clock: bool,
@@ -84,9 +86,9 @@ pub(crate) struct Machine<'e> {
 
 impl Machine<'_> {
     /// What a bundle that issued in the cycle to come would read.
-    pub(crate) fn register(&self, register: u16) -> Option<u32> {
+    pub(crate) fn register(&self, register: Register) -> Option<u32> {
         let now = self.emulator.now();
-        let due = self.emulator.underway().filter(|retire| retire.cycle == now);
+        let due = self.emulator.in_flight().filter(|retire| retire.cycle == now);
         due.filter(|retire| retire.register == Some(register))
             .map(|retire| retire.value)
             .next()
@@ -96,8 +98,8 @@ impl Machine<'_> {
     /// The position of the source line at hand.
     pub(crate) fn at_hand(&self) -> Position {
         let (slots, next) = (self.emulator.machine().slots.len(), self.emulator.next_address());
-        let start = next as usize * slots;
-        let lines = self.emulator.program().lines.get(start..start + slots).unwrap_or_default();
+        let start = next.index() * slots;
+        let lines = self.emulator.program().locations(next);
         let word = lines.iter().position(|line| line.is_some() && *line == self.line);
         let position = word.and_then(|word| self.names.positions.get(start + word).copied().flatten());
         position.unwrap_or_else(|| self.names.at_hand(slots, next))
@@ -105,11 +107,12 @@ impl Machine<'_> {
 
     /// A bundle that is still to write a register although it comes before the line at hand in the source: what is there now
     /// is older than what that line would read.
-    pub(crate) fn writes_yet(&self, register: u16) -> Option<Address> {
+    pub(crate) fn writes_yet(&self, register: Register) -> Option<BundleAddress> {
         let program = self.emulator.program();
         let (position, slots) = (self.at_hand(), program.machine.slots);
-        (self.emulator.next_address()..program.bundles()).find(|address| {
-            let words = *address as usize * slots.len()..(*address as usize + 1) * slots.len();
+        let end = BundleAddress::new(program.bundles());
+        self.emulator.next_address().until(end).find(|address| {
+            let words = address.index() * slots.len()..(address.index() + 1) * slots.len();
             let Some(Ok(bundle)) = program.bundle(*address) else { return false };
             let positions = self.names.positions.get(words).unwrap_or_default();
             bundle.iter().zip(slots).zip(positions).any(|((instruction, slot), at)| {
@@ -119,9 +122,9 @@ impl Machine<'_> {
     }
 
     /// Cycles until the result in flight to a register is there, if there is one.
-    pub(crate) fn arrives(&self, register: u16) -> Option<Cycle> {
+    pub(crate) fn arrives(&self, register: Register) -> Option<Cycle> {
         let now = self.emulator.now();
-        let flying = self.emulator.underway().filter(|retire| retire.register == Some(register));
+        let flying = self.emulator.in_flight().filter(|retire| retire.register == Some(register));
         flying.map(|retire| retire.cycle.saturating_sub(now)).filter(|left| *left > 0).max()
     }
 
@@ -370,7 +373,7 @@ impl Live {
                 Operand::Constant(value) => Ok(*value),
                 Operand::Cycle => Ok(Value::Int(machine.emulator.now() as i64)),
                 Operand::Period => Ok(Value::Int(machine.periods as i64)),
-                Operand::Address => Ok(Value::Int(machine.emulator.next_address().into())),
+                Operand::Address => Ok(Value::Int(machine.emulator.next_address().get().into())),
                 Operand::Depth => Ok(Value::Int(machine.emulator.stack().len() as i64)),
             };
             // Any value will do: the fault is what is told.
@@ -439,6 +442,15 @@ fn parse(text: &str, known: Known<'_>, depth: usize) -> Result<Live, String> {
                 format!("{} has no register {head} (registers: {})", machine.name, banks.join(" "))
             })?;
             operand = Some(Operand::Register(register, Type::F));
+        } else if bytes.get(at) == Some(&b'[') {
+            let end = closing(bytes, at).ok_or_else(|| format!("`{}`: a `]` is missing", &text[at..]))?;
+            let element = text[start..=end].replace(' ', "");
+            if meanings(&element, known).is_some() {
+                operand = Some(name(&element, known)?);
+                at = end + 1;
+            }
+        }
+        if operand.is_some() {
         } else if bytes.get(at) == Some(&b'[') {
             let end = closing(bytes, at).ok_or_else(|| format!("`{}`: a `]` is missing", &text[at..]))?;
             let part = |text: &str| parse(text, known, depth - 1).map(Box::new);

@@ -6,8 +6,8 @@ use super::expression::Reads;
 use super::stops::{Stop, Test, Where};
 use std::collections::BTreeSet;
 use takt_emu::Emulator;
-use takt_isa::timing::{Address, Cycle};
-use takt_isa::{Effect, Program};
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Effect, Program};
 
 /// Positions that matter. Those where a period ends, inputs are set or something was set by hand always do.
 #[derive(Clone, Debug, Default)]
@@ -17,7 +17,7 @@ pub(super) struct Interest {
     /// Every position in which something can happen.
     every: bool,
     /// Those where these bundles are about to issue, and those behind until their results are there.
-    bundles: BTreeSet<Address>,
+    bundles: BTreeSet<BundleAddress>,
     /// Those in which so many cycles have passed.
     cycles: BTreeSet<Cycle>,
 }
@@ -29,7 +29,7 @@ impl Interest {
     }
 
     /// Where one of these bundles is about to issue.
-    pub(super) fn bundles(bundles: impl IntoIterator<Item = Address>) -> Interest {
+    pub(super) fn bundles(bundles: impl IntoIterator<Item = BundleAddress>) -> Interest {
         Interest { bundles: bundles.into_iter().collect(), ..Interest::default() }
     }
 
@@ -69,7 +69,7 @@ impl Interest {
         live.reads(&mut reads);
         self.clock |= reads.clock;
         self.every |= reads.every;
-        for address in 0..program.bundles() {
+        for address in program.addresses() {
             let Some(Ok(instructions)) = program.bundle(address) else { continue };
             let mut slots = instructions.iter().zip(program.machine.slots);
             let writes = slots.any(|(instruction, slot)| {
@@ -83,20 +83,20 @@ impl Interest {
     }
 
     /// The bundles to pause at.
-    pub(super) fn pauses(&self) -> impl Iterator<Item = Address> {
+    pub(super) fn pauses(&self) -> impl Iterator<Item = BundleAddress> {
         self.bundles.iter().copied().filter(|_| !self.every && !self.clock)
     }
 
     /// The next position that matters but for the pauses, at `until` at the latest; `issuing` is about to issue.
-    pub(super) fn next(&self, emulator: &Emulator, issuing: Option<Address>, until: Cycle) -> Cycle {
+    pub(super) fn next(&self, emulator: &Emulator, issuing: Option<BundleAddress>, until: Cycle) -> Cycle {
         let now = emulator.now();
         // While the program waits and nothing is in flight, nothing changes until the tick.
-        let idle = emulator.due_tick().filter(|_| emulator.underway().next().is_none());
-        let mut underway = emulator.underway().filter(|retire| retire.cycle > now);
+        let idle = emulator.due_tick().filter(|_| emulator.in_flight().next().is_none());
+        let mut in_flight = emulator.in_flight().filter(|retire| retire.cycle > now);
         let each = self.clock
             || self.every && idle.is_none()
             || issuing.is_some_and(|address| self.bundles.contains(&address))
-            || underway.any(|retire| self.bundles.contains(&retire.address));
+            || in_flight.any(|retire| self.bundles.contains(&retire.address));
         if each {
             return (now + 1).min(until);
         }

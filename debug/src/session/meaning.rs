@@ -8,8 +8,7 @@ use std::collections::HashMap;
 use takt_asm::expr::Value;
 use takt_asm::names::{NamedValue, Names};
 use takt_isa::program::Port;
-use takt_isa::timing::Address;
-use takt_isa::{Program, Type};
+use takt_isa::{BundleAddress, Program, Register, Type};
 
 /// What a name stands for in one scope.
 #[derive(Clone, Debug)]
@@ -25,14 +24,14 @@ pub(super) enum Meaning {
 pub(crate) struct Held {
     /// Its own name.
     pub(crate) label: String,
-    pub(crate) register: u16,
+    pub(crate) register: Register,
     pub(crate) ty: Type,
     /// As [`NamedValue::orders`].
     pub(crate) orders: Option<(u32, u32)>,
     /// As [`NamedValue::bundles`].
-    pub(crate) bundles: Option<(Address, Address)>,
+    pub(crate) bundles: Option<(BundleAddress, BundleAddress)>,
     /// Bundles that write the register for the first time for another value, with that value's name.
-    rivals: Vec<(Address, String)>,
+    rivals: Vec<(BundleAddress, String)>,
 }
 
 impl Held {
@@ -70,7 +69,7 @@ impl Held {
         if next <= first && (self.orders.is_some() || !self.is_alone()) {
             return Err(format!("{} is not computed yet: {} does", self.label, program.bundle_text(first)));
         }
-        let later = self.rivals.iter().filter(|(at, _)| (first + 1..next).contains(at)).max();
+        let later = self.rivals.iter().filter(|(at, _)| first < *at && *at < next).max();
         match later {
             Some((at, rival)) => {
                 let place = program.machine.register_name(self.register).unwrap_or_default();
@@ -93,11 +92,11 @@ pub struct Life {
     /// The value's own name: that of the source, or `t.1`.
     pub label: String,
     /// The register.
-    pub register: u16,
+    pub register: Register,
     /// How its bits are read.
     pub ty: Type,
     /// The first bundle that writes it and the last one that uses it, if it lives only there.
-    pub bundles: Option<(Address, Address)>,
+    pub bundles: Option<(BundleAddress, BundleAddress)>,
     /// Whether it is what the line at hand would read.
     pub at_hand: bool,
 }

@@ -1,4 +1,4 @@
-//! A debug session: a run that can be stopped anywhere, looked at, changed, and stepped forth and back, exactly to the cycle.
+//! A debug session: a run that can be stopped anywhere, looked at, changed, and stepped forward and back, exactly to the cycle.
 //!
 //! **Positions.** The session stands between two cycles: at position *n*, cycles 0 to *n* - 1 have passed. What it shows is
 //! what a bundle would read that issued in cycle *n*. Breakpoints stop where their bundle is about to issue, so that what
@@ -28,12 +28,13 @@ use std::collections::BTreeSet;
 use std::num::NonZeroU64;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use takt_asm::diag::Diagnostics;
 use takt_asm::expr::Value;
 use takt_asm::names::Names;
 use takt_emu::{Emulator, Fault, LoadError, PeriodReport, Retire, Status};
 use takt_isa::program::Location;
-use takt_isa::timing::{Address, Cause, Cycle};
-use takt_isa::{Program, Type, ZERO};
+use takt_isa::timing::{Cause, Cycle};
+use takt_isa::{BundleAddress, Program, Register, SlotIndex, Type};
 
 /// Checkpoints that are kept. At 10⁸ cycles they are at most 2¹⁹ cycles apart.
 pub const CHECKPOINTS: usize = 512;
@@ -47,7 +48,7 @@ const WINDOW: Cycle = 1 << 6;
 pub const RUN_LIMIT: Cycle = 1_000_000_000;
 
 /// Inputs of periods: for each, registers of input ports and their bits.
-pub type Rows = Vec<Vec<(u16, u32)>>;
+pub type Rows = Vec<Vec<(Register, u32)>>;
 
 /// What a session is about.
 #[derive(Clone, Default)]
@@ -246,7 +247,7 @@ impl Session {
     }
 
     /// The bundle that issues next, and the cycle in which it will if the program runs.
-    pub fn next_issue(&mut self) -> (Address, Option<Cycle>) {
+    pub fn next_issue(&mut self) -> (BundleAddress, Option<Cycle>) {
         let issue = self.core.emulator.upcoming().map(|upcoming| upcoming.issue.cycle);
         (self.core.emulator.next_address(), issue)
     }
@@ -267,7 +268,12 @@ impl Session {
             return Some(line);
         }
         let address = self.core.emulator.next_address();
-        (address < self.program().bundles()).then(|| self.program().location(address)).flatten()
+        self.program().location(address)
+    }
+
+    /// A fault of this program, at its source line.
+    pub fn diagnose(&self, fault: &Fault) -> Diagnostics {
+        crate::fault::diagnose(fault, self.program(), &self.options.sources)
     }
 
     /// The text of a source line, without its end.
@@ -282,19 +288,20 @@ impl Session {
     }
 
     /// The operations of a bundle as text, one for each slot; `None` for those that do nothing.
-    pub fn bundle(&self, address: Address) -> Vec<Option<String>> {
+    pub fn bundle(&self, address: BundleAddress) -> Vec<Option<String>> {
         let program = self.program();
         let Some(bundle) = program.bundle(address) else { return Vec::new() };
         match bundle {
-            Err((slot, reason)) => (0..program.machine.slots.len())
-                .map(|i| (i == slot).then(|| format!("(illegal word: {reason})")))
+            Err((slot, reason)) => program
+                .machine
+                .numbered_slots()
+                .map(|(number, _)| (number == slot).then(|| format!("(illegal word: {reason})")))
                 .collect(),
-            Ok(instructions) => instructions
-                .iter()
-                .enumerate()
+            Ok(instructions) => SlotIndex::all()
+                .zip(&instructions)
                 .map(|(slot, instruction)| {
                     let idle = instruction.op.row().function == takt_isa::Function::Idle;
-                    let target = |target: u32| match program.nearest_label(target) {
+                    let target = |target: BundleAddress| match program.nearest_label(target) {
                         Some((label, 0)) => label.to_owned(),
                         _ => target.to_string(),
                     };
@@ -312,7 +319,7 @@ impl Session {
     }
 
     /// What a bundle that issued in the cycle to come would read from a register.
-    pub fn register(&self, register: u16) -> Option<u32> {
+    pub fn register(&self, register: Register) -> Option<u32> {
         self.machine().register(register)
     }
 
@@ -320,7 +327,7 @@ impl Session {
     /// one whose result is there for the bundle that issues next but one. What is there already is left out.
     pub fn in_flight(&self) -> Vec<(Retire, Cycle)> {
         let now = self.cycle();
-        let pending = self.core.emulator.underway().filter(|retire| retire.cycle > now);
+        let pending = self.core.emulator.in_flight().filter(|retire| retire.cycle > now);
         let mut pending: Vec<_> = pending.map(|retire| (*retire, retire.cycle - now)).collect();
         pending.sort_by_key(|(retire, left)| (*left, retire.slot));
         pending
@@ -367,7 +374,7 @@ impl Session {
 
     /// A bundle that is still to write a register although it comes before the line at hand in the source: what the register
     /// holds is older than what that line would read.
-    pub fn writes_yet(&self, register: u16) -> Option<Address> {
+    pub fn writes_yet(&self, register: Register) -> Option<BundleAddress> {
         self.machine().writes_yet(register)
     }
 
@@ -377,7 +384,7 @@ impl Session {
     }
 
     /// Cycles until the result in flight to a register is there; `None` if none is.
-    pub fn arrives(&self, register: u16) -> Option<Cycle> {
+    pub fn arrives(&self, register: Register) -> Option<Cycle> {
         self.machine().arrives(register)
     }
 
@@ -396,7 +403,7 @@ impl Session {
     /// If there is no such place.
     pub fn set(&mut self, place: Place, bits: u32) -> Result<(), String> {
         match place {
-            Place::Register(ZERO) => return Err("`zero` is always zero".to_owned()),
+            Place::Register(Register::ZERO) => return Err("`zero` is always zero".to_owned()),
             Place::Register(register) if self.program().machine.register_name(register).is_none() => {
                 return Err(format!("{} has no register at {register}", self.program().machine.name));
             }

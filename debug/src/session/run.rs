@@ -1,4 +1,4 @@
-//! Going forth and back: to a cycle or a period, by steps, to where something is found.
+//! Going forward and back: to a cycle or a period, by steps, to where something is found.
 
 use super::expression::Machine;
 use super::interest::Interest;
@@ -6,9 +6,8 @@ use super::stops::{Stop, Watcher, Where};
 use super::{CHECKPOINTS, Core, Cycle, End, Live, SLICE, Session, Unit, WINDOW, Why};
 use std::sync::atomic::Ordering;
 use takt_emu::{PeriodError, Upcoming};
-use takt_isa::Effect;
 use takt_isa::program::Location;
-use takt_isa::timing::Address;
+use takt_isa::{BundleAddress, Flow};
 
 impl Session {
     /// Runs on to a cycle; less far if the run ends or is interrupted.
@@ -127,7 +126,7 @@ impl Session {
         &mut self,
         until: Cycle,
         interest: &Interest,
-        visit: &mut dyn FnMut(&Session, Option<Address>) -> Option<Why>,
+        visit: &mut dyn FnMut(&Session, Option<BundleAddress>) -> Option<Why>,
     ) -> Result<Why, End> {
         self.core.emulator.set_pauses(interest.pauses());
         let result = self.scan_positions(until, interest, visit);
@@ -139,7 +138,7 @@ impl Session {
         &mut self,
         until: Cycle,
         interest: &Interest,
-        visit: &mut dyn FnMut(&Session, Option<Address>) -> Option<Why>,
+        visit: &mut dyn FnMut(&Session, Option<BundleAddress>) -> Option<Why>,
     ) -> Result<Why, End> {
         self.make_edits();
         let mut upcoming = self.core.emulator.upcoming();
@@ -163,7 +162,7 @@ impl Session {
     fn forward(
         &mut self,
         interest: &Interest,
-        mut visit: impl FnMut(&Session, Option<Address>) -> Option<Why>,
+        mut visit: impl FnMut(&Session, Option<BundleAddress>) -> Option<Why>,
     ) -> Why {
         let until = self.cycle().saturating_add(self.run_limit);
         self.scan(until, interest, &mut visit).unwrap_or_else(|end| end)
@@ -171,7 +170,7 @@ impl Session {
 
     /// Goes to the last position before this one that `visit` finds; `begin` is told where each stretch begins. Interrupted,
     /// it stays here.
-    fn backward<V: FnMut(&Session, Option<Address>) -> Option<Why>>(
+    fn backward<V: FnMut(&Session, Option<BundleAddress>) -> Option<Why>>(
         &mut self,
         interest: &Interest,
         begin: impl Fn(&Session) -> V,
@@ -216,7 +215,7 @@ impl Session {
         Why::Start
     }
 
-    /// Steps forth.
+    /// Steps forward.
     pub fn step(&mut self, unit: Unit) -> Why {
         match unit {
             Unit::Cycle => return self.go_to(self.cycle() + 1),
@@ -228,7 +227,7 @@ impl Session {
         let next = self.core.emulator.next_address();
         let interest = match unit {
             // Nowhere else does it end that it is over.
-            Unit::Call if self.calls(next) => Interest::bundles([next, next + 1]),
+            Unit::Call if self.calls(next) => Interest::bundles([next, next.next()]),
             Unit::Out => Interest::bundles(caller),
             _ => Interest::everything(),
         };
@@ -236,11 +235,9 @@ impl Session {
     }
 
     /// Whether a bundle calls a subroutine.
-    fn calls(&self, address: Address) -> bool {
+    fn calls(&self, address: BundleAddress) -> bool {
         let bundle = self.program().bundle(address).and_then(Result::ok);
-        bundle.is_some_and(|bundle| {
-            bundle.iter().any(|instruction| instruction.op.row().effect == Effect::Call)
-        })
+        bundle.is_some_and(|bundle| matches!(Flow::of(&bundle), Flow::Call(_)))
     }
 
     /// Steps back.
@@ -264,7 +261,7 @@ impl Session {
     }
 
     /// Whether a step by `unit` that began `depth` calls deep ends here, where `issuing` is about to issue.
-    fn ends_step(&self, unit: Unit, depth: usize, issuing: Option<Address>) -> Option<Why> {
+    fn ends_step(&self, unit: Unit, depth: usize, issuing: Option<BundleAddress>) -> Option<Why> {
         let address = issuing?;
         let now = self.core.emulator.stack().len();
         let ends = match unit {

@@ -3,18 +3,18 @@
 use super::expression::{self, Live};
 use super::{Session, Why};
 use takt_asm::expr::Value;
-use takt_isa::Program;
 use takt_isa::program::{Location, Space};
-use takt_isa::timing::{Address, Cycle};
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Program};
 
 /// Where a breakpoint stops.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Where {
     /// Where this bundle is about to issue.
-    Bundle(Address),
+    Bundle(BundleAddress),
     /// Where a bundle with an operation of this line is about to issue; these have one. A line of a macro or a repetition has
     /// several.
-    Line(Location, Vec<Address>),
+    Line(Location, Vec<BundleAddress>),
     /// When so many cycles have passed.
     Cycle(Cycle),
     /// When so many periods have ended.
@@ -97,7 +97,7 @@ impl Where {
             return bundle(address.into(), program);
         }
         let labels = program.symbols.iter().filter(|symbol| symbol.space == Space::Code);
-        let near = takt_asm::diag::nearest(text, labels.map(|symbol| symbol.name.as_str()));
+        let near = takt_asm::nearest(text, labels.map(|symbol| symbol.name.as_str()));
         let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
         Err(format!(
             "no label is named `{text}`{near} (places: label, label+2, file.s:12, :12, bundle 3, cycle 100, period 5)"
@@ -109,7 +109,7 @@ fn bundle(number: u64, program: &Program) -> Result<Where, String> {
     let bundles = program.bundles();
     let address = u32::try_from(number).ok().filter(|address| *address < bundles);
     address
-        .map(Where::Bundle)
+        .map(|address| Where::Bundle(BundleAddress::new(address)))
         .ok_or_else(|| format!("bundle {number}: the program has bundles 0 to {}", bundles - 1))
 }
 
@@ -124,16 +124,15 @@ fn line_bundles(file: &str, line: u64, program: &Program) -> Result<Where, Strin
     let Some(file) = file else {
         return Err(format!("no such source (sources: {})", names().collect::<Vec<_>>().join(" ")));
     };
-    let slots = program.machine.slots.len();
     let places = || {
-        let locations = program.lines.iter().enumerate();
-        locations
-            .filter_map(|(i, location)| location.map(|location| ((i / slots) as u32, location)))
-            .filter(|(_, location)| location.file as usize == file)
+        let places = program.addresses().flat_map(|address| {
+            program.locations(address).iter().flatten().map(move |location| (address, *location))
+        });
+        places.filter(|(_, location)| location.file as usize == file)
     };
     let mut of_line = places().filter(|(_, place)| u64::from(place.line) == line).peekable();
     if let Some(&(_, place)) = of_line.peek() {
-        let mut bundles: Vec<Address> = of_line.map(|(address, _)| address).collect();
+        let mut bundles: Vec<BundleAddress> = of_line.map(|(address, _)| address).collect();
         bundles.dedup();
         return Ok(Where::Line(place, bundles));
     }
@@ -170,7 +169,7 @@ impl Watcher {
         Watcher { before: session.stops.iter().map(|(_, stop)| before(stop)).collect() }
     }
 
-    pub(super) fn visit(&mut self, session: &Session, issuing: Option<Address>) -> Option<Why> {
+    pub(super) fn visit(&mut self, session: &Session, issuing: Option<BundleAddress>) -> Option<Why> {
         let mut why = None;
         for ((id, stop), before) in session.stops.iter().zip(&mut self.before) {
             match stop {

@@ -7,20 +7,20 @@ use serde::Serialize;
 use serde_json::Value;
 use std::io::{self, Write};
 use takt_emu::{Emulator, Event, Retire};
-use takt_isa::timing::{Address, Cycle};
-use takt_isa::{Program, Type};
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Program, Register, Type};
 
 pub(super) struct JsonLines<'w> {
     target: Box<dyn Write + 'w>,
     /// Registers that are of interest.
-    registers: Vec<u16>,
+    registers: Vec<Register>,
     /// Whether what writes no register is of interest.
     rest: bool,
 }
 
 impl<'w> JsonLines<'w> {
     pub(super) fn new(program: &Program, signals: Vec<Signal>, target: Box<dyn Write + 'w>) -> JsonLines<'w> {
-        let named: Vec<u16> = signals
+        let named: Vec<Register> = signals
             .iter()
             .filter_map(|signal| match signal.source {
                 Source::Register(register) => Some(register),
@@ -40,14 +40,12 @@ impl<'w> JsonLines<'w> {
         }
         let row = retire.op.row();
         let machine = program.machine;
-        let index = retire.address as usize * machine.slots.len() + usize::from(retire.slot);
-        let location = program.lines.get(index).copied().flatten();
         Some(Line {
             issued: Some(retire.issued),
             bundle: Some(retire.address),
-            slot: Some(machine.slots[usize::from(retire.slot)].name),
+            slot: Some(machine.slot(retire.slot).name),
             op: Some(row.mnemonic),
-            source: location.map(|location| program.place_text(location)),
+            source: program.operation_place(retire.address, retire.slot),
             register: retire.register.map(|register| program.register_text(register)),
             bits: (retire.register.is_some() || retire.memory.is_some())
                 .then(|| format!("0x{:08x}", retire.value)),
@@ -70,7 +68,7 @@ struct Line {
     #[serde(skip_serializing_if = "Option::is_none")]
     issued: Option<Cycle>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    bundle: Option<Address>,
+    bundle: Option<BundleAddress>,
     #[serde(skip_serializing_if = "Option::is_none")]
     slot: Option<&'static str>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -115,7 +113,7 @@ impl Writer for JsonLines<'_> {
                 }
                 Event::Fault(fault) => Some(Line {
                     bundle: Some(fault.address),
-                    text: Some(fault.to_string()),
+                    text: Some(fault.show(program).to_string()),
                     ..Line::of(fault.cycle, "fault")
                 }),
             };

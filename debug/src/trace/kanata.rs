@@ -14,8 +14,8 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
 use std::io::{self, Write};
 use takt_emu::{Emulator, Event};
-use takt_isa::timing::{Address, Cause, Cycle};
-use takt_isa::{Function, Instruction, Program};
+use takt_isa::timing::{Cause, Cycle};
+use takt_isa::{BundleAddress, Function, Instruction, Program, Register, SlotIndex};
 
 /// Stages of waiting, in the order of [`Cause::KINDS`] (a bundle that waits for the tick is issued already).
 const WAITING: [&str; 7] = ["Fr", "Op", "De", "Un", "Dr", "Wp", "Ti"];
@@ -31,12 +31,12 @@ pub(super) struct Kanata<'w> {
     /// The bundle that waits to issue: its rows, each with its slot, the stage that they are in, and since when.
     front: Option<Front>,
     /// For each register, the row that writes it last, and when.
-    writers: HashMap<u16, (u64, Cycle)>,
+    writers: HashMap<Register, (u64, Cycle)>,
 }
 
 struct Front {
-    address: Address,
-    rows: Vec<(u64, usize, Option<Instruction>)>,
+    address: BundleAddress,
+    rows: Vec<(u64, SlotIndex, Option<Instruction>)>,
     stage: &'static str,
     since: Cycle,
 }
@@ -76,20 +76,25 @@ impl<'w> Kanata<'w> {
     }
 
     /// The rows of a bundle, which waits to issue from `cycle` on.
-    fn enter(&mut self, program: &Program, address: Address, cycle: Cycle, stage: &'static str) -> Front {
+    fn enter(
+        &mut self,
+        program: &Program,
+        address: BundleAddress,
+        cycle: Cycle,
+        stage: &'static str,
+    ) -> Front {
         let machine = program.machine;
         let instructions = match program.bundle(address) {
             Some(Ok(instructions)) => instructions,
             _ => Vec::new(),
         };
-        let mut operations: Vec<(usize, Option<Instruction>)> = instructions
-            .into_iter()
-            .enumerate()
+        let mut operations: Vec<(SlotIndex, Option<Instruction>)> = SlotIndex::all()
+            .zip(instructions)
             .filter(|(_, instruction)| instruction.op.row().function != Function::Idle)
             .map(|(slot, instruction)| (slot, Some(instruction)))
             .collect();
         if operations.is_empty() {
-            operations.push((0, None));
+            operations.push((SlotIndex::FIRST, None));
         }
         let label = match program.nearest_label(address) {
             Some((label, 0)) => format!("{label}: "),
@@ -100,7 +105,7 @@ impl<'w> Kanata<'w> {
             let id = self.next_id;
             self.next_id += 1;
             let text = instruction.as_ref().map_or("nop".to_owned(), |instruction| {
-                let target = |target: u32| match program.nearest_label(target) {
+                let target = |target: BundleAddress| match program.nearest_label(target) {
                     Some((label, 0)) => label.to_owned(),
                     _ => target.to_string(),
                 };
@@ -109,11 +114,10 @@ impl<'w> Kanata<'w> {
             self.line(cycle, format_args!("I\t{id}\t{id}\t0"));
             self.line(
                 cycle,
-                format_args!("L\t{id}\t0\t{address} {}: {label}{text}", machine.slots[slot].name),
+                format_args!("L\t{id}\t0\t{address} {}: {label}{text}", machine.slot(slot).name),
             );
-            let place = program.lines.get(address as usize * machine.slots.len() + slot);
-            if let Some(&Some(location)) = place {
-                self.line(cycle, format_args!("L\t{id}\t1\t{}", program.place_text(location)));
+            if let Some(place) = program.operation_place(address, slot) {
+                self.line(cycle, format_args!("L\t{id}\t1\t{place}"));
             }
             self.line(cycle, format_args!("S\t{id}\t0\t{stage}"));
             rows.push((id, slot, instruction));
@@ -123,7 +127,7 @@ impl<'w> Kanata<'w> {
 
     fn issue(&mut self, program: &Program, front: Front, cycle: Cycle) {
         for (id, slot, instruction) in &front.rows {
-            let slot = &program.machine.slots[*slot];
+            let slot = program.machine.slot(*slot);
             let reads = instruction.as_ref().map_or(&[][..], Instruction::reads);
             for register in reads {
                 if let Some(&(producer, ready)) = self.writers.get(register)
@@ -151,7 +155,7 @@ impl<'w> Kanata<'w> {
             self.line(writeback + 1, format_args!("E\t{id}\t0\t{stage}\nR\t{id}\t{retired}\t0"));
         }
         for (id, slot, instruction) in front.rows {
-            let slot = &program.machine.slots[slot];
+            let slot = program.machine.slot(slot);
             let Some(instruction) = instruction else { continue };
             if let (Some(dest), Some(unit)) =
                 (instruction.writes(slot), slot.unit_for(instruction.op.row().function))

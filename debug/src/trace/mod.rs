@@ -13,7 +13,8 @@ use std::io::{self, Write};
 use std::ops::Range;
 use std::rc::Rc;
 use takt_emu::{Emulator, Event, PeriodError, PeriodReport, Status};
-use takt_isa::timing::{Address, Cause, Cycle};
+use takt_isa::BundleAddress;
+use takt_isa::timing::{Cause, Cycle};
 
 pub use signal::SignalError;
 
@@ -62,9 +63,9 @@ pub struct Options {
 struct Record {
     cycle: Cycle,
     /// The bundle that issued.
-    issued: Option<Address>,
+    issued: Option<BundleAddress>,
     /// Otherwise the bundle that could not, and why; for [`Cause::Wait`] the one that waits.
-    stall: Option<(Address, Cause)>,
+    stall: Option<(BundleAddress, Cause)>,
     events: Vec<Event>,
 }
 

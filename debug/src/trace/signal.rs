@@ -2,10 +2,10 @@
 
 use super::Format;
 use crate::matches;
-use takt_asm::diag::nearest;
+use takt_asm::nearest;
 use takt_emu::Emulator;
 use takt_isa::timing::Cause;
-use takt_isa::{Program, Type};
+use takt_isa::{BundleAddress, Program, Register, Type};
 
 /// Where a signal's value comes from.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -21,7 +21,7 @@ pub(super) enum Source {
     /// Whether the cycle is charged to this kind of cause.
     Stall(usize),
     /// A register.
-    Register(u16),
+    Register(Register),
 }
 
 /// A signal.
@@ -69,7 +69,10 @@ impl Signal {
         let heard = |is: fn(&Event) -> bool| Some(record.events.iter().any(is).into());
         match self.source {
             Source::Issue => Some(record.issued.is_some().into()),
-            Source::Bundle => record.issued.or(record.stall.map(|(address, _)| address)),
+            Source::Bundle => {
+                let bundle = record.issued.or(record.stall.map(|(address, _)| address));
+                bundle.map(BundleAddress::get)
+            }
             Source::Tick => heard(|event| matches!(event, Event::Tick { .. })),
             Source::Missed => {
                 heard(|event| matches!(event, Event::DeadlineMissed { .. } | Event::TickLost { .. }))

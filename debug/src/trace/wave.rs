@@ -172,7 +172,7 @@ struct Fst<'w> {
     target: Box<dyn Write + 'w>,
 }
 
-/// An FST of these signals. It is made in memory, since its format wants to go back in its file and targets may be pipes.
+/// An FST of these signals. It is made in memory, since its format needs to go back in its file and targets may be pipes.
 pub(super) fn fst<'w>(
     emulator: &Emulator,
     signals: Vec<Signal>,

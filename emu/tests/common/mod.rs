@@ -7,7 +7,9 @@
 
 use std::collections::HashMap;
 use takt_isa::program::{Location, Port};
-use takt_isa::{Function, Instruction, Machine, Operand, Program, ROWS, Type};
+use takt_isa::{
+    BundleAddress, Function, Instruction, Machine, Operand, Program, ROWS, Register, SlotIndex, Type,
+};
 
 pub(crate) fn program(machine: &'static Machine, source: &str) -> Program {
     let mut program = Program {
@@ -20,6 +22,7 @@ pub(crate) fn program(machine: &'static Machine, source: &str) -> Program {
         registers: Vec::new(),
         symbols: Vec::new(),
         loop_bounds: Vec::new(),
+        parts: Vec::new(),
         latched: false,
         sections: Vec::new(),
         files: vec!["test.s".to_owned()],
@@ -58,6 +61,7 @@ pub(crate) fn program(machine: &'static Machine, source: &str) -> Program {
         let mut lines = vec![None; machine.slots.len()];
         for operation in bundle.split("||") {
             let (slot, instruction) = parse(machine, operation.trim(), &labels);
+            let slot = slot.index();
             words[slot] = instruction.encode().unwrap();
             lines[slot] = Some(Location { file: 0, line });
         }
@@ -68,10 +72,20 @@ pub(crate) fn program(machine: &'static Machine, source: &str) -> Program {
     program
 }
 
+/// The bundle of this number.
+pub(crate) fn at(number: impl TryInto<u32>) -> BundleAddress {
+    BundleAddress::new(number.try_into().ok().unwrap())
+}
+
+/// The input port of this number.
+pub(crate) fn input(machine: &Machine, number: usize) -> Register {
+    machine.inputs.registers().nth(number).unwrap()
+}
+
 /// Latency and interval of a machine's unit.
 pub(crate) fn unit(machine: &Machine, function: Function) -> (u64, u64) {
     let (slot, unit) = machine.host(function).unwrap();
-    let unit = &machine.slots[slot].units[unit];
+    let unit = &machine.slot(slot).units[unit];
     (unit.latency.into(), unit.interval.into())
 }
 
@@ -80,10 +94,10 @@ pub(crate) fn latency(machine: &Machine, function: Function) -> u64 {
     unit(machine, function).0
 }
 
-fn parse(machine: &Machine, text: &str, labels: &HashMap<&str, u32>) -> (usize, Instruction) {
+fn parse(machine: &Machine, text: &str, labels: &HashMap<&str, u32>) -> (SlotIndex, Instruction) {
     let (mnemonic, operands) = text.split_once(' ').unwrap_or((text, ""));
     let row = ROWS.iter().find(|row| row.mnemonic == mnemonic).unwrap_or_else(|| panic!("no {mnemonic}"));
-    let slot = machine.host(row.function).map_or(0, |(slot, _)| slot);
+    let slot = machine.host(row.function).map_or(SlotIndex::new(0).unwrap(), |(slot, _)| slot);
     let register = |name: &str| {
         machine.register_address(name.trim()).unwrap_or_else(|| panic!("no register {name} in {text}"))
     };
@@ -92,7 +106,7 @@ fn parse(machine: &Machine, text: &str, labels: &HashMap<&str, u32>) -> (usize, 
     assert_eq!(operands.len(), row.shape.operands().len(), "{text}");
     for (operand, text) in row.shape.operands().iter().zip(operands) {
         match *operand {
-            Operand::Dest => instruction.dest = register(text) - machine.slots[slot].bank.base,
+            Operand::Dest => instruction.dest = machine.slot(slot).bank.index(register(text)).unwrap(),
             Operand::Source(n) => instruction.sources[n] = register(text),
             Operand::Immediate => instruction.constant = value(text),
             Operand::Target => {

@@ -17,7 +17,7 @@ pub struct Host;
 
 /// Whether `bits` is an infinity or a NaN, the only results that can have raised a flag.
 #[inline(always)]
-const fn is_special(bits: u32) -> bool {
+pub(super) const fn is_special(bits: u32) -> bool {
     bits & INFINITY == INFINITY
 }
 
@@ -58,6 +58,39 @@ const fn special_quotient(a: u32, b: u32, result: u32) -> Value {
     }
 }
 
+/// Flags of a fused product and sum that is infinite or NaN.
+#[cold]
+const fn special_fused(a: u32, b: u32, c: u32, result: u32) -> Value {
+    let improper = is_infinite(a) && b & !SIGN == 0 || a & !SIGN == 0 && is_infinite(b);
+    if is_nan(result) {
+        let passed_on = is_nan(a) || is_nan(b) || is_nan(c);
+        let signaling = is_signaling(a) || is_signaling(b) || is_signaling(c);
+        let invalid = improper || signaling || !passed_on;
+        Value::new(CANONICAL_NAN, if invalid { Flags::INVALID } else { Flags::NONE })
+    } else if is_infinite(a) || is_infinite(b) || is_infinite(c) {
+        Value::exact(result)
+    } else {
+        Value::new(result, Flags::OVERFLOW)
+    }
+}
+
+/// `product + addend`, of which `sum` is the binary64 nearest: the sum cut off to binary64, with an odd last place if that lost
+/// something. From there, rounding to a format narrower by two places or more is right.
+#[inline(always)]
+pub(super) fn round_to_odd(product: f64, addend: f64, sum: f64) -> f64 {
+    // What the sum lost, exactly (Knuth's TwoSum): neither operand comes near the ends of binary64's range.
+    let of_addend = sum - product;
+    let lost = (product - (sum - of_addend)) + (addend - of_addend);
+    let bits = sum.to_bits();
+    if lost == 0.0 || lost.is_nan() || bits & 1 == 1 {
+        sum
+    } else if (lost > 0.0) == (sum > 0.0) {
+        f64::from_bits(bits + 1)
+    } else {
+        f64::from_bits(bits - 1)
+    }
+}
+
 /// A root that is infinite or NaN.
 #[cold]
 const fn special_root(a: u32, result: u32) -> Value {
@@ -75,6 +108,17 @@ const fn saturated_integer(a: u32) -> Value {
 #[cold]
 const fn unordered(signaling: bool) -> Value {
     Value::new(0, if signaling { Flags::INVALID } else { Flags::NONE })
+}
+
+/// The integer nearest to a binary32, ties to even, if it fits, and whether it does.
+#[inline(always)]
+pub(super) fn to_integer(a: u32) -> (u32, bool) {
+    // In binary64 the sum with 1.5·2⁵² is rounded at the units' place, ties to even, and its low word is the integer
+    // in two's complement.
+    const ROUND_TO_UNITS: f64 = 6_755_399_441_055_744.0;
+    const LIMIT: f32 = 2_147_483_648.0;
+    let x = f32::from_bits(a);
+    ((f64::from(x) + ROUND_TO_UNITS).to_bits() as u32, (-LIMIT..LIMIT).contains(&x))
 }
 
 impl Arithmetic for Host {
@@ -102,6 +146,22 @@ impl Arithmetic for Host {
         if is_special(bits) { special_quotient(a, b, bits) } else { Value::exact(bits) }
     }
 
+    /// Not the host's own fused operation: where the target is not known to have one, that is a call of the C library's.
+    #[inline(always)]
+    fn mul_add(a: u32, b: u32, c: u32) -> Value {
+        // Exact: 48 bits, and exponents far from binary64's limits.
+        let product = f64::from(f32::from_bits(a)) * f64::from(f32::from_bits(b));
+        let addend = f64::from(f32::from_bits(c));
+        let mut sum = product + addend;
+        // It is rounded twice, to binary64 and to binary32, which goes wrong only where the first lands halfway between two numbers
+        // of the second: these 28 bits are zero at every such place, those between subnormal numbers included.
+        if sum.to_bits() & 0x0fff_ffff == 0 {
+            sum = round_to_odd(product, addend, sum);
+        }
+        let bits = (sum as f32).to_bits();
+        if is_special(bits) { special_fused(a, b, c, bits) } else { Value::exact(bits) }
+    }
+
     #[inline(always)]
     fn sqrt(a: u32) -> Value {
         let bits = f32::from_bits(a).sqrt().to_bits();
@@ -115,15 +175,9 @@ impl Arithmetic for Host {
 
     #[inline(always)]
     fn ftoi(a: u32) -> Value {
-        // In binary64 the sum with 1.5·2⁵² is rounded at the units' place, ties to even, and its low word is the integer
-        // in two's complement.
-        const ROUND_TO_UNITS: f64 = 6_755_399_441_055_744.0;
-        const LIMIT: f32 = 2_147_483_648.0;
-        let x = f32::from_bits(a);
-        if (-LIMIT..LIMIT).contains(&x) {
-            Value::exact((f64::from(x) + ROUND_TO_UNITS).to_bits() as u32)
-        } else {
-            saturated_integer(a)
+        match to_integer(a) {
+            (bits, true) => Value::exact(bits),
+            _ => saturated_integer(a),
         }
     }
 

@@ -27,6 +27,7 @@ pub mod acos;
 pub mod atan;
 mod host;
 mod kernels;
+mod screened;
 pub mod sin;
 // Where `third_party/c99` fits and softfloat-sys has rules to build its C. The condition stands in Cargo.toml too.
 #[cfg(all(
@@ -57,6 +58,7 @@ pub use acos::{ACOS_MAX_ULP, acos};
 pub use atan::{ATAN2_MAX_ULP, atan2};
 pub use host::Host;
 pub use kernels::{abs, maximum, minimum, neg, saturate, sign};
+pub use screened::Screened;
 pub use sin::{COS_MAX_ULP, SIN_IDENTITY, SIN_LIMIT, SIN_MAX_ULP, cos, sin};
 pub use softfloat::*;
 
@@ -191,6 +193,9 @@ pub trait Arithmetic {
     fn mul(a: u32, b: u32) -> Value;
     /// `a / b`.
     fn div(a: u32, b: u32) -> Value;
+    /// `a · b + c`, rounded once. `0 · ∞` is invalid whatever `c` is, a quiet NaN too (as RISC-V and x86 have it; IEEE 754
+    /// leaves it open).
+    fn mul_add(a: u32, b: u32, c: u32) -> Value;
     /// `√a`; `√−0 = −0`, invalid below.
     fn sqrt(a: u32) -> Value;
     /// The two's-complement integer `a`, rounded to binary32.

@@ -48,6 +48,10 @@ impl Arithmetic for SoftFloat {
         flagged(|| number(a).div(number(b), TiesToEven).to_bits())
     }
 
+    fn mul_add(a: u32, b: u32, c: u32) -> Value {
+        flagged(|| number(a).fused_mul_add(number(b), number(c), TiesToEven).to_bits())
+    }
+
     fn sqrt(a: u32) -> Value {
         flagged(|| number(a).sqrt(TiesToEven).to_bits())
     }

@@ -4,19 +4,23 @@
 //! shows the message.
 
 use super::instructions::{Function, ROWS};
-use super::machines::{Bank, Machine, REGISTER_SPACE};
+use super::machines::{Bank, Machine};
 use super::units::{MAX_LATENCY, Unit};
+use crate::number::{Register, SlotIndex};
 use crate::shape::Field;
 use std::fmt;
 
 /// The most slots of a machine.
-pub const MAX_SLOTS: usize = 8;
+pub const MAX_SLOTS: usize = SlotIndex::COUNT;
 /// The most registers of a slot's bank: a destination is an index of this range.
 pub const MAX_BANK: u32 = Field::Dest.bits().max() + 1;
 /// The greatest depth of the program memory in bundles: what a branch can reach.
 pub const MAX_CODE: u32 = Field::Target.bits().max() + 1;
 /// The greatest depth of the data memory in words: what an offset can reach.
 pub const MAX_DATA: u32 = Field::Offset.bits().max() + 1;
+
+/// The last address of the register space.
+const LAST: u32 = Register::COUNT as u32 - 1;
 
 /// Why a row is no machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -159,7 +163,7 @@ impl MachineError {
                 .text(" to ")
                 .number(end - 1)
                 .text("; the register space ends at ")
-                .number(REGISTER_SPACE as u32 - 1),
+                .number(LAST),
             Overlap { bank, other, base, end } => m
                 .text("banks ")
                 .name(other)
@@ -175,7 +179,7 @@ impl MachineError {
                 .text(" ends at ")
                 .number(end - 1)
                 .text("; its last register is `zero`, ")
-                .number(REGISTER_SPACE as u32 - 1),
+                .number(LAST),
             Outputs { slot, bank, outputs, depth } => m
                 .slot(slot)
                 .text(": outputs_per_bank is ")
@@ -293,7 +297,7 @@ const fn bank_error(bank: &Bank, most: u32) -> Option<MachineReason> {
     if bank.depth == 0 || bank.depth as u32 > most {
         return Some(MachineReason::BankDepth { bank: bank.name, depth: bank.depth, most });
     }
-    if end(bank) > REGISTER_SPACE as u32 {
+    if end(bank) > Register::COUNT as u32 {
         return Some(MachineReason::RegisterSpace { bank: bank.name, base: bank.base, end: end(bank) });
     }
     None
@@ -403,7 +407,7 @@ impl Machine {
             }
             s += 1;
         }
-        if let Some(reason) = bank_error(&self.inputs, REGISTER_SPACE as u32) {
+        if let Some(reason) = bank_error(&self.inputs, Register::COUNT as u32) {
             return Some(reason);
         }
         let mut s = 0;
@@ -413,7 +417,7 @@ impl Machine {
             }
             s += 1;
         }
-        if end(&self.inputs) != REGISTER_SPACE as u32 {
+        if end(&self.inputs) != Register::COUNT as u32 {
             return Some(MachineReason::Zero { bank: self.inputs.name, end: end(&self.inputs) });
         }
         if let Some(reason) = self.shared(Function::Control) {

@@ -6,13 +6,9 @@
 
 use super::instructions::Function;
 use super::units::*;
+use crate::number::{BankIndex, Register, SlotIndex};
 
-/// Register addresses, over all banks.
-pub const REGISTER_SPACE: usize = 1024;
-/// The address of the register that always reads as zero.
-pub const ZERO: u16 = (REGISTER_SPACE - 1) as u16;
-
-/// A window of the register space.
+/// A window of the register space. Its numbers are those of a row of the table, which [`Machine::error`] checks.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
 pub struct Bank {
     /// Prefix of its registers' names: `m` has `m0`, `m1`, ….
@@ -24,10 +20,31 @@ pub struct Bank {
 }
 
 impl Bank {
-    /// Whether `address` lies in the window.
+    /// Whether a register lies in the window.
     #[inline]
-    pub const fn contains(&self, address: u16) -> bool {
-        address >= self.base && address - self.base < self.depth
+    pub const fn contains(&self, register: Register) -> bool {
+        self.index(register).is_some()
+    }
+
+    /// The place of a register in the window; `None` if it lies outside.
+    #[inline]
+    pub const fn index(&self, register: Register) -> Option<BankIndex> {
+        match register.get().checked_sub(self.base) {
+            Some(index) if index < self.depth => BankIndex::new(index as usize),
+            _ => None,
+        }
+    }
+
+    /// The register in a place of the window; `None` past its end.
+    #[inline]
+    pub const fn register(&self, index: BankIndex) -> Option<Register> {
+        if index.get() < self.depth { Register::new(self.base as usize + index.index()) } else { None }
+    }
+
+    /// The registers of the window, ascending.
+    pub fn registers(&self) -> impl DoubleEndedIterator<Item = Register> + Clone + use<> {
+        let base = usize::from(self.base);
+        (base..base + usize::from(self.depth)).filter_map(Register::new)
     }
 }
 
@@ -55,13 +72,13 @@ pub struct Slots(u8);
 
 impl Slots {
     /// The set of one slot.
-    pub const fn of(slot: u8) -> Slots {
-        Slots(1 << slot)
+    pub const fn of(slot: SlotIndex) -> Slots {
+        Slots(1 << slot.get())
     }
 
     /// Whether a slot is in it.
-    pub const fn contains(self, slot: u8) -> bool {
-        self.0 >> slot & 1 == 1
+    pub const fn contains(self, slot: SlotIndex) -> bool {
+        self.0 >> slot.get() & 1 == 1
     }
 
     /// Whether no slot is in it.
@@ -75,8 +92,8 @@ impl Slots {
     }
 
     /// The first slot of it.
-    pub const fn first(self) -> Option<u8> {
-        if self.is_empty() { None } else { Some(self.0.trailing_zeros() as u8) }
+    pub const fn first(self) -> Option<SlotIndex> {
+        SlotIndex::new(self.0.trailing_zeros() as usize)
     }
 
     /// The slots that are in both.
@@ -97,13 +114,13 @@ impl Slots {
     }
 
     /// Its slots, ascending.
-    pub fn iter(self) -> impl DoubleEndedIterator<Item = u8> {
-        (0..u8::BITS as u8).filter(move |slot| self.contains(*slot))
+    pub fn iter(self) -> impl DoubleEndedIterator<Item = SlotIndex> {
+        SlotIndex::all().filter(move |slot| self.contains(*slot))
     }
 }
 
-impl FromIterator<u8> for Slots {
-    fn from_iter<I: IntoIterator<Item = u8>>(slots: I) -> Slots {
+impl FromIterator<SlotIndex> for Slots {
+    fn from_iter<I: IntoIterator<Item = SlotIndex>>(slots: I) -> Slots {
         slots.into_iter().fold(Slots::default(), |set, slot| set.or(Slots::of(slot)))
     }
 }
@@ -177,7 +194,7 @@ T1 = Machine {
     slots: &[Slot {
         name: "one",
         bank: bank("r", 0, 512),
-        // A sine at most every nine cycles: then what is underway needs as many places as the other units' latency.
+        // A sine at most every nine cycles: then what is in flight needs as many places as the other units' latency.
         units: &[
             ADD,
             CONVERT,
@@ -198,6 +215,33 @@ T1 = Machine {
     refill: 6,
     resolve: 2,
 };
+
+/// The fast machine with fused multiply-add.
+T4 = Machine {
+    name: "t4",
+    text: "The fast machine with fused multiply-add: product and sum in one operation, with one rounding; division beside the adder, conversion beside the ALU.",
+    slots: &[
+        Slot {
+            name: "mul",
+            bank: bank("m", 0, 256),
+            units: &[
+                Unit { functions: &[Function::Multiply, Function::Fused], ..FUSED },
+                SINE,
+                ARCTANGENT,
+                ARCCOSINE,
+            ],
+        },
+        Slot { name: "add", bank: bank("a", 256, 256), units: &[ADD, DIVROOT] },
+        Slot { name: "aux", bank: bank("x", 512, 256), units: &[ALU, CONVERT, MEMORY, SEQUENCER] },
+    ],
+    inputs: bank("i", 768, 256),
+    outputs_per_bank: 32,
+    code_depth: 1024,
+    data_depth: 1024,
+    stack_depth: 16,
+    refill: 6,
+    resolve: 2,
+};
 }
 
 impl Machine {
@@ -207,22 +251,33 @@ impl Machine {
     }
 
     /// The first slot that hosts a unit for `function`, and that unit's index in the slot. Idle operations have none: every slot takes them.
-    pub fn host(&self, function: Function) -> Option<(usize, usize)> {
-        self.slots.iter().enumerate().find_map(|(s, slot)| slot.unit_for(function).map(|u| (s, u)))
+    pub fn host(&self, function: Function) -> Option<(SlotIndex, usize)> {
+        self.numbered_slots().find_map(|(s, slot)| slot.unit_for(function).map(|u| (s, u)))
+    }
+
+    /// A slot.
+    ///
+    /// # Panics
+    /// If the machine has none of this index.
+    pub fn slot(&self, index: SlotIndex) -> &'static Slot {
+        &self.slots[index.index()]
+    }
+
+    /// The slots with their indices, in the order of a bundle's words.
+    pub fn numbered_slots(
+        &self,
+    ) -> impl DoubleEndedIterator<Item = (SlotIndex, &'static Slot)> + Clone + use<> {
+        SlotIndex::all().zip(self.slots)
     }
 
     /// The slots that host a unit for `function`. None do for idle operations: every slot takes them.
     pub fn hosts(&self, function: Function) -> Slots {
-        (0u8..)
-            .zip(self.slots)
-            .filter(|(_, slot)| slot.unit_for(function).is_some())
-            .map(|(s, _)| s)
-            .collect()
+        self.numbered_slots().filter(|(_, slot)| slot.unit_for(function).is_some()).map(|(s, _)| s).collect()
     }
 
-    /// The slots whose bank has the register at an address: one at most.
-    pub fn writers(&self, address: u16) -> Slots {
-        (0u8..).zip(self.slots).filter(|(_, slot)| slot.bank.contains(address)).map(|(s, _)| s).collect()
+    /// The slots whose bank has a register: one at most.
+    pub fn writers(&self, register: Register) -> Slots {
+        self.numbered_slots().filter(|(_, slot)| slot.bank.contains(register)).map(|(s, _)| s).collect()
     }
 
     /// The banks: one for each slot, in slot order, then the inputs.
@@ -230,61 +285,65 @@ impl Machine {
         self.slots.iter().map(|slot| &slot.bank).chain([&self.inputs])
     }
 
+    /// Whether the machine has a register at an address: whether one of its banks does.
+    pub fn has_register(&self, register: Register) -> bool {
+        self.banks().any(|bank| bank.contains(register))
+    }
+
     /// The canonical name of a register, `zero` included; `None` if the address is in no bank.
-    pub fn register_name(&self, address: u16) -> Option<String> {
-        if address == ZERO {
+    pub fn register_name(&self, register: Register) -> Option<String> {
+        if register == Register::ZERO {
             return Some("zero".to_owned());
         }
-        let bank = self.banks().find(|bank| bank.contains(address))?;
-        Some(format!("{}{}", bank.name, address - bank.base))
+        self.banks().find_map(|bank| Some(format!("{}{}", bank.name, bank.index(register)?)))
     }
 
     /// The address of a register by its canonical name.
-    pub fn register_address(&self, name: &str) -> Option<u16> {
+    pub fn register_address(&self, name: &str) -> Option<Register> {
         if name == "zero" {
-            return Some(ZERO);
+            return Some(Register::ZERO);
         }
         let split = name.find(|c: char| c.is_ascii_digit())?;
         let (prefix, digits) = name.split_at(split);
         if digits.len() > 1 && digits.starts_with('0') {
             return None;
         }
-        let index: u16 = digits.parse().ok()?;
-        let bank = self.banks().find(|bank| bank.name == prefix)?;
-        (index < bank.depth).then(|| bank.base + index)
+        let index = BankIndex::new(digits.parse().ok()?)?;
+        self.banks().find(|bank| bank.name == prefix)?.register(index)
     }
 
     /// Whether the address is an output port.
-    pub fn is_output(&self, address: u16) -> bool {
-        self.output_number(address).is_some()
+    pub fn is_output(&self, register: Register) -> bool {
+        self.output_number(register).is_some()
     }
 
     /// The number of the output port at an address: its place in the output window of its bank. The windows of all banks
     /// stand for the same ports: the outside sees [`Machine::outputs_per_bank`] of them, by number, whichever slot writes.
-    pub fn output_number(&self, address: u16) -> Option<u16> {
-        let slot = self.slots.iter().find(|slot| slot.bank.contains(address))?;
-        (address - slot.bank.base).checked_sub(slot.bank.depth - self.outputs_per_bank)
+    pub fn output_number(&self, register: Register) -> Option<u16> {
+        let find = |slot: &Slot| Some((slot.bank.index(register)?, slot.bank.depth));
+        let (index, depth) = self.slots.iter().find_map(find)?;
+        index.get().checked_sub(depth - self.outputs_per_bank)
     }
 
-    /// Where slot `slot` writes the output port of a number, which is below [`Machine::outputs_per_bank`].
-    pub fn output_register(&self, slot: usize, number: u16) -> u16 {
-        let bank = &self.slots[slot].bank;
-        bank.base + bank.depth - self.outputs_per_bank + number
+    /// Where a slot writes the output ports, by their number.
+    pub fn output_registers(&self, slot: &Slot) -> impl Iterator<Item = Register> + Clone + use<> {
+        let first = usize::from(slot.bank.depth - self.outputs_per_bank);
+        slot.bank.registers().skip(first)
     }
 
     /// The number of the input port at an address: its place in the input bank.
-    pub fn input_number(&self, address: u16) -> Option<u16> {
-        self.is_input(address).then(|| address - self.inputs.base)
+    pub fn input_number(&self, register: Register) -> Option<u16> {
+        self.inputs.index(register).filter(|_| register != Register::ZERO).map(BankIndex::get)
     }
 
     /// Input ports: those of the bank but `zero`.
     pub fn input_count(&self) -> u16 {
-        self.inputs.depth - u16::from(self.inputs.contains(ZERO))
+        self.inputs.depth - u16::from(self.inputs.contains(Register::ZERO))
     }
 
     /// Whether the address is an input port (`zero` is not).
-    pub fn is_input(&self, address: u16) -> bool {
-        self.inputs.contains(address) && address != ZERO
+    pub fn is_input(&self, register: Register) -> bool {
+        self.input_number(register).is_some()
     }
 }
 

@@ -56,10 +56,11 @@ units! {
     ADD       add       [Add]         5/1  ["swapped operands" "aligned operands" "sum, leading zeros" "normalised, rounded"] "binary32 adder.";
     CONVERT   convert   [Convert]     5/1  ["operand" "magnitude, leading zeros" "shifted" "rounded"] "Integer to binary32 and back.";
     MULTIPLY  multiply  [Multiply]    5/1  ["partial products" "product, shift count" "normalised" "rounded"] "binary32 multiplier: three 18x18 products, and 6x6 bits in logic.";
+    FUSED     fused     [Fused Multiply Add] 6/1 ["partial products" "product, aligned addend" "sum" "leading zeros, shifted by nibbles" "normalised, rounded"] "binary32 product and sum with one rounding; a product, or a sum, alone has the bits of the units that compute only that. A machine's row says which functions it executes there.";
     DIVROOT   divroot   [Divide Root] 10/1 ["classified" "normalised" "reciprocal" "first digit" "first product" "first residual" "second digit" "second product" "rounded"] "Division and square root, very high radix: a reciprocal table, two quotient digits of 14 and 10 bits, rounding by the sign of the last residual.";
     DIVIDE    divide    [Divide]      18/14 [] "Iterative radix-4 divider.";
     ROOT      root      [Root]        16/13 [] "Iterative square root, two bits a cycle.";
     SINE      sine      [Sine]        14/1 ["aligned" "multiple" "table" "multiple of π/2" "remainder" "segment" "coefficients" "slope's product" "polynomial" "product" "sums" "difference" "rounded"] "Sine and cosine: the distance from the nearest multiple of π/2, which comes from a table, and a piecewise quadratic; three 18x18 products.";
-    ARCTANGENT arctangent [Arctangent] 24/16 [] "Division by digits whose divisor turns with the angle already found; a table of arctangents; no multiplier.";
-    ARCCOSINE arccosine [Arccosine]   30/16 [] "Square root by digits, each of which adds its multiple of a function taken from a table; no multiplier.";
+    ARCTANGENT arctangent [Arctangent] 24/16 [] "Digit-by-digit division whose divisor grows with the digits found; a table of arctangents; no multiplier.";
+    ARCCOSINE arccosine [Arccosine]   30/16 [] "Digit-by-digit square root; each digit adds its multiple of a function from a table; no multiplier.";
 }

@@ -265,6 +265,77 @@ impl Pairs {
     }
 }
 
+/// Operands of a fused product and sum: a pair of [`Pairs`], and what is added to their product, most often where cancellation,
+/// rounding, or what both leave of a subnormal number is decided.
+pub(crate) struct Triples {
+    pairs: Pairs,
+}
+
+impl Triples {
+    pub(crate) fn new(seed: u64) -> Triples {
+        Triples { pairs: Pairs::new(seed) }
+    }
+
+    pub(crate) fn next(&mut self) -> (u32, u32, u32) {
+        let (mut a, mut b) = self.pairs.next();
+        let pairs = &mut self.pairs;
+        let kind = pairs.random.between(0, 15);
+        if kind >= 13 {
+            // A subnormal factor: its product begins with zeros. Or one factor with few ones, whose product ends with zeros.
+            a = if kind == 13 { a & (SIGN | 0x007f_ffff) } else { pairs.finite() & 0xfff0_0000 };
+            let exponent = pairs.random.between(if kind == 13 { 100 } else { 60 }, 254);
+            b = pairs.with_exponent(a, exponent).1;
+        }
+        // (1 + i·2⁻²³)(1 - i·2⁻²³) is closer to 1 than binary64 sees beside an addend of which 1 is half a unit of the last place.
+        // Half of these products are half the smallest subnormal number.
+        let tiny = pairs.random.bits() & 1 == 0;
+        if kind == 11 {
+            let (i, exponent) =
+                (pairs.random.bits() & 7, pairs.random.between(1, if tiny { 102 } else { 254 }));
+            a = pairs.pack(exponent, i);
+            let other = if tiny { 103 - exponent } else { pairs.random.between(80, 200) };
+            b = pairs.pack(other, 0x0080_0000 - 2 * i);
+        }
+        // A product halfway between two numbers, and one bit, far below, that decides.
+        if kind == 15 {
+            let width = pairs.random.between(2, 23);
+            let exponents = pairs.random.between(121, 181);
+            let first = pairs.random.between(1, exponents - 1);
+            let at = |number: u32, exponent: i32| number & 0x807f_ffff | (exponent as u32) << 23;
+            a = at(pairs.short_odd(width), first);
+            b = at(pairs.short_odd(25 - width), exponents - first);
+        }
+        let product = (f64::from(f32::from_bits(a)) * f64::from(f32::from_bits(b))) as f32;
+        let (bits, at) = (product.to_bits(), exponent(product.to_bits()));
+        let c = match kind {
+            0 => pairs.random.bits(),
+            1 | 2 => pairs.special(),
+            3 => pairs.finite(),
+            // Any distance at which both matter, and a little more.
+            4 | 5 | 13 | 14 => {
+                let exponent = at + pairs.random.between(-52, 28);
+                pairs.with_exponent(a, exponent).1
+            }
+            // Cancellation: the product but for its last places, which binary32 does not hold, or but for a binade.
+            6..=8 => (bits ^ SIGN).wrapping_add_signed(pairs.random.between(-3, 3)),
+            9 => {
+                let exponent = at + pairs.random.between(-2, 2);
+                pairs.with_exponent(a, exponent).1
+            }
+            // The addend is about half a unit of the product's last place, or the product of the addend's.
+            10 => pairs.pack(at - 24, 0).wrapping_add_signed(pairs.random.between(-1, 1)),
+            11 => {
+                let fraction = pairs.fraction();
+                pairs.pack(if tiny { 0 } else { at + 24 }, fraction)
+            }
+            15 => pairs.random.bits() & SIGN | 1 << pairs.random.between(0, 22),
+            // Sums about the largest number.
+            _ => bits & SIGN | 0x7f00_0000 | pairs.fraction() & 0x00ff_ffff,
+        };
+        (a, b, c)
+    }
+}
+
 fn exponent(a: u32) -> i32 {
     (a >> 23 & 0xff) as i32
 }

@@ -51,7 +51,10 @@ def main():
     takt = sys.argv[1] if len(sys.argv) > 1 else "takt"
     program = pathlib.Path(__file__).with_name("servo.s")
     command = [takt, "run", program, "--inputs", "-", "--outputs", "-", "--tick", str(TICK), "--deny", "all"]
-    controller = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    try:
+        controller = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    except OSError as error:
+        sys.exit(f"cannot run {takt}: {error.strerror}; give its path, as in plant.py target/release/takt")
 
     def answer():
         row = controller.stdout.readline()

@@ -1,7 +1,7 @@
 //! The nonlinear integrator in open loop: reversals, both thresholds of `tc`, errors on either side of `ec`, saturation.
 //!
 //! The reference stands still in position while its velocity is driven at will, and the encoders are off by as many
-//! counts as a scenario wants; the law only looks at the sign of the velocity and at the error, so it need not be
+//! counts as a scenario needs; the law only looks at the sign of the velocity and at the error, so it need not be
 //! consistent.
 
 use crate::inputs::Random;
@@ -21,7 +21,7 @@ pub(crate) enum Off {
     Below,
     /// By more than `ec`: a boost goes on to `Tc`.
     Above,
-    /// By either, anew in every period.
+    /// By either, again in every period.
     Mixed,
     /// By a centimetre or a tenth of a radian: the integrators saturate.
     Far,

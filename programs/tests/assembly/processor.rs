@@ -3,16 +3,18 @@
 use std::sync::{Arc, Mutex};
 use takt_asm::{Assembled, MemoryLoader, Options, Schedule};
 use takt_emu::{Emulator, PeriodError, PeriodReport};
-use takt_isa::{Machine, Program, Type};
+use takt_isa::{Machine, Program, Register, Type};
 use takt_programs::SOURCES;
 use takt_programs::hybrid::ports::{INPUTS, OUTPUTS, PortType};
 use takt_programs::hybrid::{Inputs, Outputs, TrackingController};
 
 /// `tracking.s`, shared work done once.
 pub(crate) const TRACKING: &str = "hybrid/tracking.s";
+/// `tracking_equations.s`, the same in equations.
+pub(crate) const EQUATIONS: &str = "hybrid/tracking_equations.s";
 /// `tracking_literal.s`, every equation as printed.
 pub(crate) const LITERAL: &str = "hybrid/tracking_literal.s";
-/// Both.
+/// `tracking.s` and `tracking_literal.s`.
 pub(crate) const PROGRAMS: [&str; 2] = [TRACKING, LITERAL];
 
 /// Whether to take the time for everything: in release builds, and where `TAKT_FULL=1` asks for it.
@@ -53,8 +55,8 @@ pub(crate) fn floats<const N: usize>(words: [u32; N]) -> [f32; N] {
 #[derive(Clone)]
 pub(crate) struct Processor {
     emulator: Emulator,
-    inputs: [u16; INPUTS.len()],
-    outputs: [u16; OUTPUTS.len()],
+    inputs: [Register; INPUTS.len()],
+    outputs: [Register; OUTPUTS.len()],
     /// The report of the last period.
     pub(crate) report: Option<PeriodReport>,
     /// NaNs written to output ports since reset.

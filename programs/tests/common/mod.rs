@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-/// Compares a table in a document, between the line `<!-- table: NAME -->` and the next blank line, with what it ought to be;
+/// Compares a table in a document, between the line `<!-- table: NAME -->` and the next blank line, with what it should be;
 /// `TAKT_BLESS=1` writes it. The path is within the workspace.
 pub(crate) fn check_table(document: &str, name: &str, table: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(document);
@@ -21,6 +21,6 @@ pub(crate) fn check_table(document: &str, name: &str, table: &str) {
         let new = format!("{before}{marker}{}\n\n{rest}", table.trim_end());
         std::fs::write(&path, new).expect("the document can be written");
     } else {
-        panic!("{document}: table {name} is stale (TAKT_BLESS=1 writes it), it ought to be:\n{table}");
+        panic!("{document}: table {name} is stale (TAKT_BLESS=1 writes it), it should be:\n{table}");
     }
 }

@@ -4,7 +4,7 @@
 
 use std::collections::HashMap;
 use takt_isa::fp::{Flags, Host};
-use takt_isa::{Effect, Program, ROWS, ZERO, compute};
+use takt_isa::{Effect, Program, ROWS, Register, compute};
 
 /// Operands at once: what the first-level cache holds beside some dozens of registers.
 pub(crate) const LANES: usize = 128;
@@ -58,12 +58,12 @@ impl Batch {
     /// The period of a program with one output, without branches and loads.
     pub(crate) fn new(program: &Program) -> Batch {
         let mut columns = vec![[0; LANES]];
-        let mut places = HashMap::from([(ZERO, 0)]);
+        let mut places = HashMap::from([(Register::ZERO, 0)]);
         for &(register, bits) in &program.constants {
             places.insert(register, columns.len());
             columns.push([bits; LANES]);
         }
-        let mut place = |register: u16| {
+        let mut place = |register: Register| {
             *places.entry(register).or_insert_with(|| {
                 columns.push([0; LANES]);
                 columns.len() - 1
@@ -73,7 +73,7 @@ impl Batch {
         let output = place(program.outputs[0].register);
         let section = program.sections.iter().find(|section| section.name == "period").expect("it has one");
         let mut bundles = Vec::new();
-        for address in section.start..section.end {
+        for address in section.start.until(section.end) {
             let mut steps = Vec::new();
             let bundle = program.bundle(address).expect("it is there").expect("it is legal");
             for (slot, instruction) in program.machine.slots.iter().zip(&bundle) {

@@ -13,7 +13,7 @@ use crate::bench::{LoadRecord, Space, load_records};
 use crate::wishbone::{self, REGISTERS};
 use serde::Serialize;
 use takt_isa::program::Port;
-use takt_isa::{Program, Type};
+use takt_isa::{BundleAddress, Program, Type};
 
 /// The version of [`Header`]'s JSON.
 pub const SCHEMA: u32 = 1;
@@ -142,7 +142,7 @@ pub struct Cycles {
     /// Its name: its label, or `once`.
     pub name: String,
     /// Its first bundle.
-    pub address: u32,
+    pub address: BundleAddress,
     /// Whether it runs once, from reset to its `wait`; else from each tick.
     pub once: bool,
     /// Cycles to the issue of its `wait`; of a period, with its tick in time.

@@ -7,8 +7,8 @@ use crate::verilog::{
     no, set, yes,
 };
 use takt_isa::shape::{Field, OPCODE, Shape};
-use takt_isa::spec::machines::{Bank, ZERO};
-use takt_isa::{Effect, Row};
+use takt_isa::spec::machines::Bank;
+use takt_isa::{Effect, Register, Row};
 
 /// The decoder of a slot as a module.
 pub(super) fn module(plan: &Plan, slot: &SlotPlan) -> Result<String, ModuleError> {
@@ -144,7 +144,7 @@ fn source(plan: &Plan, operand: usize, m: &mut Module) -> Option<Expr> {
     };
     let mut banks: Vec<Expr> = plan.machine.banks().map(|bank| read.clone() & window(bank)).collect();
     if let Some(inputs) = banks.pop() {
-        banks.push(inputs & decode::WORD.slice(high, low).is_not(decimal(bits.width, ZERO)));
+        banks.push(inputs & decode::WORD.slice(high, low).is_not(decimal(bits.width, Register::ZERO.get())));
     }
     m.define(read.clone(), decode::READS.at(operand as u32));
     m.assign(decode::bank(plan, operand), concat(banks));

@@ -175,7 +175,12 @@ fn instance(slot: &SlotPlan, circuit: &Circuit) -> Instance {
         instance = instance.port("op", slot.code().low(circuit.op_bits));
     }
     for (operand, letter) in LETTERS.iter().enumerate().take(circuit.operands) {
-        instance = instance.port(*letter, slot.operand(operand));
+        // A unit may have more operands than the operations for which the machine has it.
+        instance = if operand < slot.sources {
+            instance.port(*letter, slot.operand(operand))
+        } else {
+            instance.port(*letter, decimal(32, 0_u32))
+        };
     }
     instance
         .port("out_valid", slot.unit_valid(unit))

@@ -30,14 +30,14 @@ pub enum PlanError {
         /// Why.
         error: CircuitError,
     },
-    /// The core wants a data memory.
+    /// The core needs a data memory.
     #[error("machine `{machine}`: no slot hosts the data memory (function Memory), which the core has")]
     NoMemory {
         /// The machine.
         machine: &'static str,
     },
     /// A depth that is no power of two, or 1.
-    #[error("machine `{machine}`: {what} is {value}; the circuit wants a power of two from 2 to {most}")]
+    #[error("machine `{machine}`: {what} is {value}; the circuit needs a power of two from 2 to {most}")]
     PowerOfTwo {
         /// The machine.
         machine: &'static str,
@@ -50,7 +50,7 @@ pub enum PlanError {
     },
     /// A bank does not begin where its indices do.
     #[error(
-        "machine `{machine}`: bank `{bank}` begins at {base}; the circuit wants a multiple of {multiple}{}",
+        "machine `{machine}`: bank `{bank}` begins at {base}; the circuit needs a multiple of {multiple}{}",
         if *.inputs { ", its depth" } else { ", the depth of the deepest bank" }
     )]
     Base {
@@ -67,7 +67,7 @@ pub enum PlanError {
     },
     /// A unit is too fast for the circuit's scoreboard.
     #[error(
-        "machine `{machine}`: slot `{slot}`: unit `{unit}` has latency {latency}; the circuit wants 2 at least"
+        "machine `{machine}`: slot `{slot}`: unit `{unit}` has latency {latency}; the circuit needs 2 at least"
     )]
     Fast {
         /// The machine.
@@ -82,7 +82,7 @@ pub enum PlanError {
     /// A unit that works on one operation at a time is not slower than the slot's pipelined units by what the circuit needs.
     #[error(
         "machine `{machine}`: slot `{slot}`: unit `{unit}` has latency {latency} and interval {interval}; beside results that are \
-         in flight for {depth} cycles, a unit of interval above 1 wants a latency of {} and an interval of 3 at least",
+         in flight for {depth} cycles, a unit of interval above 1 needs a latency of {} and an interval of 3 at least",
         depth + 2
     )]
     Late {
@@ -100,7 +100,7 @@ pub enum PlanError {
         depth: u32,
     },
     /// A part of the core does not do what the row says.
-    #[error("machine `{machine}`: {what} is {value}; rtl/core/{part}.v wants {limit}")]
+    #[error("machine `{machine}`: {what} is {value}; rtl/core/{part}.v needs {limit}")]
     Part {
         /// The machine.
         machine: &'static str,
@@ -120,7 +120,7 @@ pub enum PlanError {
 pub struct LateUnit {
     /// Its row.
     pub unit: &'static Unit,
-    /// Cycles that it is in flight there: its latency less the places of `takt_underway`.
+    /// Cycles that it is in flight there: its latency less the places of `takt_in_flight`.
     pub beyond: u32,
 }
 
@@ -161,7 +161,7 @@ fn writing(slot: &'static Slot) -> impl Iterator<Item = &'static Unit> {
     slot.units.iter().filter(|unit| unit.latency > 0)
 }
 
-/// Places of a slot's `takt_underway`: every pipelined unit's latency, and what is left of the others' when they can take the next
+/// Places of a slot's `takt_in_flight`: every pipelined unit's latency, and what is left of the others' when they can take the next
 /// operation; 4 at least.
 fn depth(slot: &'static Slot) -> u32 {
     let places = |unit: &Unit| match unit.interval {
@@ -181,7 +181,7 @@ impl Plan {
             return Err(error.into());
         }
         check_windows(machine)?;
-        let host = |function| machine.host(function).map(|(slot, _)| slot);
+        let host = |function| machine.host(function).map(|(slot, _)| slot.index());
         let control_slot = host(Function::Control).unwrap_or(0);
         let memory_slot = host(Function::Memory).ok_or(PlanError::NoMemory { machine: machine.name })?;
         check_parts(machine)?;
@@ -244,7 +244,7 @@ impl SlotPlan {
     /// Whether a result has its writeback in `place` cycles: none, or a bit for each way in which it can be in flight.
     pub fn booked(&self, place: u32) -> Vec<Expr> {
         if place < self.depth {
-            return vec![self.underway().at(place)];
+            return vec![self.in_flight().at(place)];
         }
         let late = self.late.iter().filter(|late| late.unit.latency > place);
         late.map(|late| self.late_at(late).at(late.unit.latency - place)).collect()

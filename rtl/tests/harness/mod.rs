@@ -10,7 +10,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use takt_isa::fp::{Flags, Reference, SIN_IDENTITY, SIN_LIMIT, Value};
-use takt_isa::{Effect, Op, Unit, compute};
+use takt_isa::{Effect, Op, Row, Type, Unit, compute};
 use takt_rtl::{Circuit, Library};
 
 #[path = "../../../isa/tests/fp_common/mod.rs"]
@@ -18,7 +18,7 @@ use takt_rtl::{Circuit, Library};
 mod fp_common;
 
 pub(crate) use fp_common::full;
-use fp_common::{Pairs, Random, special_values};
+use fp_common::{Pairs, Random, Triples, special_values};
 
 /// The other half of [`Simulation`].
 const DRIVER: &str = include_str!("driver.cpp");
@@ -247,13 +247,35 @@ impl Simulation {
         Ok(())
     }
 
-    /// All pairs of special values, for every operation; the third operand takes a few.
+    /// All pairs of special values, for every operation; a third operand takes a few. Of three numbers the third takes every
+    /// seventh of those that are numbers, another seventh for each pair, and with `TAKT_FULL=1` all.
     pub(crate) fn check_special_values(&mut self) -> Result<u64, String> {
         let values = self.special_values();
         let mut count = 0;
         for operation in self.circuit.operations.clone() {
-            let sources = operation.op.row().shape.sources();
+            let row = operation.op.row();
+            let sources = row.shape.sources();
             let mut requests = Vec::new();
+            if is_fused(row) {
+                let (numbers, step) = (special_values(), if full() { 1 } else { 7 });
+                for (i, &a) in numbers.iter().enumerate() {
+                    for (j, &b) in numbers.iter().enumerate() {
+                        for &c in numbers.iter().skip((i + j) % step).step_by(step) {
+                            let sources = [a, b, c];
+                            requests.push(Request {
+                                op: operation.op,
+                                code: operation.code,
+                                sources,
+                                idle: 0,
+                            });
+                        }
+                    }
+                    self.check(&requests)?;
+                    count += requests.len() as u64;
+                    requests.clear();
+                }
+                continue;
+            }
             for (i, &a) in values.iter().enumerate() {
                 for (j, &b) in values.iter().enumerate() {
                     if sources < 2 && j > 0 {
@@ -322,6 +344,11 @@ impl Drop for Simulation {
         self.stdin = None;
         let _ = self.process.wait();
     }
+}
+
+/// Whether an instruction takes three numbers.
+fn is_fused(row: &Row) -> bool {
+    row.shape.sources() == 3 && (0..3).all(|index| row.source_type(index) == Type::F)
 }
 
 /// What the specification says of an operation. What the core puts in place of a source (an immediate, the status
@@ -400,12 +427,13 @@ fn compile(library: &Library, circuit: &Circuit, program: &Path) -> Result<(), S
 /// Operands for an instruction, by the types of its sources.
 struct Operands {
     pairs: Pairs,
+    triples: Triples,
     random: Random,
 }
 
 impl Operands {
     fn new(seed: u64) -> Operands {
-        Operands { pairs: Pairs::new(seed), random: Random::new(!seed) }
+        Operands { pairs: Pairs::new(seed), triples: Triples::new(seed), random: Random::new(!seed) }
     }
 
     /// A number of idle cycles: mostly few, sometimes enough to empty the unit.
@@ -469,6 +497,10 @@ impl Operands {
     fn next(&mut self, op: Op) -> [u32; 3] {
         use takt_isa::Type::{B, F, I};
         let row = op.row();
+        if is_fused(row) {
+            let (a, b, c) = self.triples.next();
+            return [a, b, c];
+        }
         let (mut a, mut b) = self.pairs.next();
         let mut c = self.random.bits();
         let integers = (0..row.shape.sources()).any(|index| matches!(row.source_type(index), I | B));

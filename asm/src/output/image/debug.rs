@@ -2,12 +2,12 @@
 
 use super::ImageError;
 use super::meta::MetaType;
-use super::validate::{FILE_NAME, in_bank, is_spelled};
+use super::validate::{FILE_NAME, is_spelled, wrong_port};
 use crate::output::names::{DebugInfo, NamedValue, Names, Position, Scope};
 use crate::syntax::expr::Value;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
-use takt_isa::{Program, ZERO};
+use takt_isa::{BundleAddress, Program, Register};
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -57,8 +57,11 @@ struct Named {
     #[serde(rename = "type")]
     ty: MetaType,
     orders: Option<(u32, u32)>,
-    bundles: Option<(u32, u32)>,
+    bundles: Option<(BundleAddress, BundleAddress)>,
 }
+
+/// Why a value's register is none.
+const MISPLACED: &str = "it does not lie where such registers lie";
 
 pub(super) fn to_json(info: &DebugInfo) -> serde_json::Result<Vec<u8>> {
     let DebugInfo { sources, constants, names } = info;
@@ -74,7 +77,7 @@ pub(super) fn to_json(info: &DebugInfo) -> serde_json::Result<Vec<u8>> {
     let value = |value: &NamedValue| Named {
         name: value.name.clone(),
         label: value.label.clone(),
-        register: value.register,
+        register: value.register.get(),
         ty: value.ty.into(),
         orders: value.orders,
         bundles: value.bundles,
@@ -123,15 +126,12 @@ pub(super) fn from_json(bytes: &[u8], program: &Program) -> Result<DebugInfo, Im
         values: debug
             .values
             .into_iter()
-            .map(|Named { name, label, register, ty, orders, bundles }| NamedValue {
-                name,
-                label,
-                register,
-                ty: ty.into(),
-                orders,
-                bundles,
+            .map(|Named { name, label, register, ty, orders, bundles }| {
+                let known = Register::new(register.into());
+                let register = known.ok_or_else(|| wrong_port("value", &label, register, MISPLACED))?;
+                Ok(NamedValue { name, label, register, ty: ty.into(), orders, bundles })
             })
-            .collect(),
+            .collect::<Result<_, ImageError>>()?,
     };
     check(&names, program)?;
     Ok(DebugInfo {
@@ -174,15 +174,13 @@ fn check(names: &Names, program: &Program) -> Result<(), ImageError> {
         spelled(name)?;
         spelled(label)?;
         let machine = program.machine;
-        if !in_bank(machine, *register) || machine.is_input(*register) || *register == ZERO {
-            let reason = "it does not lie where such registers lie";
-            let what = format!("value `{label}`");
-            return Err(ImageError::Register { what, address: (*register).into(), reason });
+        if !machine.has_register(*register) || machine.is_input(*register) || *register == Register::ZERO {
+            return Err(wrong_port("value", label, register.get(), MISPLACED));
         }
         if let Some((after, through)) = orders.filter(|(after, through)| after > through) {
             return wrong(format!("`{label}` is read from {after} to {through}"));
         }
-        if let Some((first, last)) = lives.filter(|(first, last)| first > last || *last >= bundles) {
+        if let Some((first, last)) = lives.filter(|(first, last)| first > last || last.get() >= bundles) {
             return wrong(format!("`{label}` lives in bundles {first} to {last}, and there are {bundles}"));
         }
     }

@@ -1,9 +1,10 @@
 //! The metadata of an image: what ELF has no place for, as JSON.
 
+use super::validate::{NO_BANK, wrong_port};
 use super::{ImageError, VERSION};
 use serde::{Deserialize, Serialize};
-use takt_isa::program::{Location, Port, Section, Symbol};
-use takt_isa::{Machine, Program, Type};
+use takt_isa::program::{Columns, Location, Port, Section, Symbol};
+use takt_isa::{BundleAddress, Machine, Program, Register, Type};
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -20,6 +21,9 @@ pub(super) struct Meta {
     files: Vec<String>,
     /// For each word of code its file and line.
     lines: Vec<Option<(u32, u32)>>,
+    /// Of words that compute a part of an equation, the word's index and the part's first and last column. Left out if there is none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    parts: Vec<(u32, u32, u32)>,
 }
 
 /// Read first: of a metadata of another version nothing else may be assumed.
@@ -50,8 +54,8 @@ pub(super) enum MetaType {
 #[serde(deny_unknown_fields)]
 struct MetaSection {
     name: String,
-    start: u32,
-    end: u32,
+    start: BundleAddress,
+    end: BundleAddress,
 }
 
 impl From<Type> for MetaType {
@@ -79,7 +83,7 @@ impl Meta {
         let ports = |ports: &[Port]| {
             let port = |port: &Port| MetaPort {
                 name: port.name.clone(),
-                register: port.register,
+                register: port.register.get(),
                 ty: port.ty.into(),
             };
             ports.iter().map(port).collect()
@@ -103,6 +107,7 @@ impl Meta {
                 .iter()
                 .map(|line| line.map(|Location { file, line }| (file, line)))
                 .collect(),
+            parts: program.parts.iter().map(|(word, part)| (*word, part.first, part.last)).collect(),
         }
     }
 
@@ -124,11 +129,15 @@ impl Meta {
         machine: &'static Machine,
         code: Vec<u64>,
         data: Vec<u32>,
-        constants: Vec<(u16, u32)>,
+        constants: Vec<(Register, u32)>,
         symbols: Vec<Symbol>,
     ) -> Result<Program, ImageError> {
-        let ports = |ports: Vec<MetaPort>| {
-            let port = |MetaPort { name, register, ty }| Port { name, register, ty: ty.into() };
+        let ports = |kind, ports: Vec<MetaPort>| -> Result<Vec<Port>, ImageError> {
+            let port = |MetaPort { name, register, ty }| {
+                let known = Register::new(register.into());
+                let register = known.ok_or_else(|| wrong_port(kind, &name, register, NO_BANK))?;
+                Ok(Port { name, register, ty: ty.into() })
+            };
             ports.into_iter().map(port).collect()
         };
         let section = |MetaSection { name, start, end }| Section { name, start, end };
@@ -137,10 +146,10 @@ impl Meta {
             code,
             data,
             constants,
-            inputs: ports(self.inputs),
-            outputs: ports(self.outputs),
+            inputs: ports("input", self.inputs)?,
+            outputs: ports("output", self.outputs)?,
             latched: self.latched,
-            registers: ports(self.registers),
+            registers: ports("register", self.registers)?,
             symbols,
             loop_bounds: Vec::new(),
             sections: self.sections.into_iter().map(section).collect(),
@@ -149,6 +158,11 @@ impl Meta {
                 .lines
                 .into_iter()
                 .map(|line| line.map(|(file, line)| Location { file, line }))
+                .collect(),
+            parts: self
+                .parts
+                .into_iter()
+                .map(|(word, first, last)| (word, Columns { first, last }))
                 .collect(),
         })
     }

@@ -18,7 +18,7 @@ use object::write::elf as write;
 use object::{Endianness, LittleEndian as LE};
 use takt_isa::encode::WORD_MASK;
 use takt_isa::program::{LoopBound, Space, Symbol};
-use takt_isa::{Machine, Program};
+use takt_isa::{BundleAddress, Machine, Program};
 
 /// The largest file that is read.
 pub const LIMIT: usize = limits::IMAGE_BYTES;
@@ -148,7 +148,7 @@ pub enum ImageError {
     #[error("the bound of the loop at bundle {address}: {reason}")]
     Loop {
         /// The bundle.
-        address: u32,
+        address: BundleAddress,
         /// What is wrong.
         reason: &'static str,
     },
@@ -217,9 +217,9 @@ fn write_elf(
         let [e, f, g, h] = second.to_le_bytes();
         [a, b, c, d, e, f, g, h]
     };
-    let constants = program.constants.iter().map(|&(register, bits)| (register.into(), bits));
+    let constants = program.constants.iter().map(|&(register, bits)| (register.get().into(), bits));
     let constants: Vec<u8> = constants.flat_map(pair).collect();
-    let loops = program.loop_bounds.iter().map(|bound| (bound.address, bound.most));
+    let loops = program.loop_bounds.iter().map(|bound| (bound.address.get(), bound.most));
     let loops: Vec<u8> = loops.flat_map(pair).collect();
     // First everything is given its place, then everything is written there, in the same order.
     let mut writer = write::Writer::new(Endianness::Little, false, bytes);
@@ -411,7 +411,7 @@ pub fn read_with(bytes: &[u8]) -> Result<(Program, Option<DebugInfo>), ImageErro
         symbols
     };
     let mut program = meta.into_program(machine, code, words(data), constants, symbols)?;
-    let bound = |&[address, most]: &[u32; 2]| LoopBound { address, most };
+    let bound = |&[address, most]: &[u32; 2]| LoopBound { address: BundleAddress::new(address), most };
     program.loop_bounds = words(loops).as_chunks::<2>().0.iter().map(bound).collect();
     validate::program(&program)?;
     let debug = optional(DEBUG)?;

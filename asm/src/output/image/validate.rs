@@ -4,21 +4,18 @@ use super::ImageError;
 use crate::limits;
 use std::collections::HashSet;
 use takt_isa::program::{LoopBound, Port, Space};
-use takt_isa::{Machine, Program, ZERO};
+use takt_isa::{BundleAddress, Machine, Program, Register};
 
 /// The longest name of a source file.
 pub(super) const FILE_NAME: usize = 4096;
 
 /// Register addresses and bits, from the words of their section.
-pub(super) fn constants(words: &[u32], machine: &Machine) -> Result<Vec<(u16, u32)>, ImageError> {
-    let mut constants: Vec<(u16, u32)> = Vec::with_capacity(words.len() / 2);
+pub(super) fn constants(words: &[u32], machine: &Machine) -> Result<Vec<(Register, u32)>, ImageError> {
+    let mut constants: Vec<(Register, u32)> = Vec::with_capacity(words.len() / 2);
     for &[address, bits] in words.as_chunks::<2>().0 {
         let wrong = |reason| ImageError::Register { what: "a constant".to_owned(), address, reason };
-        let register = u16::try_from(address).map_err(|_| wrong("it is in no bank"))?;
-        if !in_bank(machine, register) {
-            return Err(wrong("it is in no bank"));
-        }
-        if register == ZERO {
+        let register = register(machine, address).ok_or_else(|| wrong(NO_BANK))?;
+        if register == Register::ZERO {
             return Err(wrong("nothing can be written there"));
         }
         if constants.last().is_some_and(|(last, _)| *last >= register) {
@@ -29,16 +26,33 @@ pub(super) fn constants(words: &[u32], machine: &Machine) -> Result<Vec<(u16, u3
     Ok(constants)
 }
 
-pub(super) fn in_bank(machine: &Machine, register: u16) -> bool {
-    machine.banks().any(|bank| bank.contains(register))
+/// Why an address names no register.
+pub(super) const NO_BANK: &str = "it is in no bank";
+
+/// The register that a machine has at an address of an image.
+pub(super) fn register(machine: &Machine, address: u32) -> Option<Register> {
+    Register::new(address as usize).filter(|register| machine.has_register(*register))
 }
 
-/// Whether a name has the letters of one, and no more than `limit`. (Those that a macro's use gives may be longer than a
-/// source's.)
+/// That a named register of an image is none.
+pub(super) fn wrong_port(kind: &str, name: &str, address: u16, reason: &'static str) -> ImageError {
+    ImageError::Register { what: format!("{kind} `{name}`"), address: address.into(), reason }
+}
+
+/// Whether a name has the letters of one, as `P` or, of an array's element, `P[2,3]`, and no more than `limit`. (Those that a
+/// macro's use gives may be longer than a source's.)
 pub(super) fn is_spelled(name: &str, limit: usize) -> bool {
     let first = |c: char| c.is_ascii_alphabetic() || c == '_';
     let other = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
-    name.starts_with(first) && name.chars().all(other) && name.len() <= limit
+    let index = |index: &str| !index.is_empty() && index.bytes().all(|byte| byte.is_ascii_digit());
+    let (head, indices) = match name.strip_suffix(']').and_then(|name| name.split_once('[')) {
+        Some((head, indices)) => (head, Some(indices)),
+        None => (name, None),
+    };
+    head.starts_with(first)
+        && head.chars().all(other)
+        && indices.is_none_or(|indices| indices.split(',').all(index))
+        && name.len() <= limit
 }
 
 /// Whether a source could declare the name.
@@ -70,7 +84,7 @@ fn loops(program: &Program) -> Result<(), ImageError> {
     let mut last = None;
     for &LoopBound { address, most } in &program.loop_bounds {
         let reason = match () {
-            () if address >= program.bundles() => "there is no such bundle",
+            () if address.get() >= program.bundles() => "there is no such bundle",
             () if most == 0 => "a loop that is entered turns at least once",
             () if last.is_some_and(|last| last >= address) => "bounds are not in ascending order",
             () => "",
@@ -87,12 +101,9 @@ fn ports(program: &Program) -> Result<(), ImageError> {
     let machine = program.machine;
     let mut seen = HashSet::new();
     let mut check = |what: &str, port: &Port, fits: bool| {
-        let wrong = |reason| {
-            let what = format!("{what} `{}`", port.name);
-            Err(ImageError::Register { what, address: port.register.into(), reason })
-        };
-        if !in_bank(machine, port.register) || port.register == ZERO {
-            return wrong("it is in no bank");
+        let wrong = |reason| Err(wrong_port(what, &port.name, port.register.get(), reason));
+        if !machine.has_register(port.register) || port.register == Register::ZERO {
+            return wrong(NO_BANK);
         }
         if !fits {
             return wrong("it does not lie where such registers lie");
@@ -110,9 +121,8 @@ fn ports(program: &Program) -> Result<(), ImageError> {
         let number = machine.output_number(port.register);
         check("output", port, number.is_some())?;
         if !numbers.insert(number) {
-            let (what, address) = (format!("output `{}`", port.name), port.register.into());
-            let reason = "another output has the same number, in another bank: assemble its source anew";
-            return Err(ImageError::Register { what, address, reason });
+            let reason = "another output has the same number, in another bank: assemble its source again";
+            return Err(wrong_port("output", &port.name, port.register.get(), reason));
         }
     }
     for port in &program.registers {
@@ -168,18 +178,18 @@ fn labels(program: &Program) -> Result<(), ImageError> {
 
 fn sections(program: &Program) -> Result<(), ImageError> {
     let bundles = program.bundles();
-    let wrong = ImageError::Sections { bundles };
-    let mut at = 0;
+    let (wrong, end) = (ImageError::Sections { bundles }, BundleAddress::new(bundles));
+    let mut at = BundleAddress::RESET;
     let mut allowed: &[&str] = &["once", "period"];
     for section in &program.sections {
         let Some(position) = allowed.iter().position(|name| *name == section.name) else { return Err(wrong) };
         allowed = &allowed[position + 1..];
-        if section.start != at || section.end <= section.start || section.end > bundles {
+        if section.start != at || section.end <= section.start || section.end > end {
             return Err(wrong);
         }
         at = section.end;
     }
-    if at == bundles { Ok(()) } else { Err(wrong) }
+    if at == end { Ok(()) } else { Err(wrong) }
 }
 
 fn lines(program: &Program) -> Result<(), ImageError> {
@@ -194,6 +204,16 @@ fn lines(program: &Program) -> Result<(), ImageError> {
         if location.line == 0 {
             return wrong("one is line 0, and lines count from 1".to_owned());
         }
+    }
+    let mut next = 0;
+    for (word, columns) in &program.parts {
+        if *word < next || program.lines.get(*word as usize).is_none_or(Option::is_none) {
+            return wrong(format!("word {word} has columns out of order, or without a line"));
+        }
+        if columns.first == 0 || columns.first > columns.last {
+            return wrong(format!("there are no columns {} to {}", columns.first, columns.last));
+        }
+        next = word + 1;
     }
     Ok(())
 }

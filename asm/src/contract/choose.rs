@@ -1,0 +1,133 @@
+//! Which of the products that could be fused are.
+//!
+//! Fusing saves an operation. It saves time, too, where the sum waits for the product; but where it waits for what is added, or
+//! for another product, it costs the cycles by which a fused operation takes longer than a sum. So every product is fused that
+//! makes its sum earlier or no later, were there slots for everything, and every other one that leaves the run's longest chain as
+//! long as it then is.
+
+use super::{Where, Wishes};
+use crate::ir::{Ir, RegisterId, runs};
+use smallvec::SmallVec;
+use std::cmp::Reverse;
+use std::collections::HashMap;
+use takt_isa::{Fusion, Op};
+
+/// An operation of the run.
+struct Node {
+    at: Where,
+    op: Op,
+    /// For each source the operation of the run that computes it.
+    from: SmallVec<[Option<usize>; 3]>,
+    /// The products that it could be fused with.
+    wishes: SmallVec<[(usize, Fusion); 2]>,
+}
+
+/// What was decided, by operation.
+struct Decisions {
+    /// The product that it is fused with.
+    fused: Vec<Option<(usize, Fusion)>>,
+    /// The cycle from the run's start in which its result can be used.
+    done: Vec<u32>,
+}
+
+/// The sums of a run that are fused, each with its product, in the order of the source.
+pub(super) fn choose(ir: &Ir, run: runs::Run, wishes: &Wishes) -> Vec<(Where, Where, Fusion)> {
+    let nodes = nodes(ir, run, wishes);
+    if nodes.iter().all(|node| node.wishes.is_empty()) {
+        return Vec::new();
+    }
+    let soonest = decide(ir, &nodes, |_, _| false);
+    let longest = soonest.done.iter().copied().max().unwrap_or(0);
+    let after = after(ir, &nodes, &soonest);
+    let Decisions { fused, .. } = decide(ir, &nodes, |sum, done| done + after[sum] <= longest);
+    let chosen = nodes.iter().zip(fused);
+    chosen
+        .filter_map(|(sum, fused)| fused.map(|(product, fusion)| (sum.at, nodes[product].at, fusion)))
+        .collect()
+}
+
+fn nodes(ir: &Ir, run: runs::Run, wishes: &Wishes) -> Vec<Node> {
+    let mut nodes = Vec::new();
+    let mut numbers: HashMap<Where, usize> = HashMap::new();
+    let mut writer: HashMap<RegisterId, usize> = HashMap::new();
+    for bundle in run.start..run.end {
+        let mut written: SmallVec<[(RegisterId, usize); 4]> = SmallVec::new();
+        for (which, operation) in ir.bundles[bundle].operations.iter().enumerate() {
+            let at = (bundle, which);
+            let known = wishes.get(&at).into_iter().flatten();
+            numbers.insert(at, nodes.len());
+            written.extend(operation.dest.map(|dest| (dest, nodes.len())));
+            nodes.push(Node {
+                at,
+                op: operation.op,
+                from: operation.reads().iter().map(|source| writer.get(source).copied()).collect(),
+                wishes: known
+                    .filter_map(|&(product, fusion)| Some((*numbers.get(&product)?, fusion)))
+                    .collect(),
+            });
+        }
+        writer.extend(written);
+    }
+    nodes
+}
+
+fn latency(ir: &Ir, op: Op) -> u32 {
+    let host = ir.machine.host(op.row().function);
+    host.map_or(0, |(slot, unit)| ir.machine.slot(slot).units[unit].latency)
+}
+
+/// The operations that a fused one waits for: those of the product's factors and of what is added.
+fn waits_for<'a>(
+    nodes: &'a [Node],
+    sum: &'a Node,
+    product: usize,
+    fusion: Fusion,
+) -> impl Iterator<Item = usize> + 'a {
+    let addend = sum.from.get(1 - fusion.source).copied().flatten();
+    nodes[product].from.iter().copied().flatten().chain(addend)
+}
+
+/// Decides in the order of the source. `may_wait`: whether a fused operation may be there in this cycle although the sum by itself
+/// would be there sooner.
+fn decide(ir: &Ir, nodes: &[Node], may_wait: impl Fn(usize, u32) -> bool) -> Decisions {
+    let mut decisions =
+        Decisions { fused: Vec::with_capacity(nodes.len()), done: Vec::with_capacity(nodes.len()) };
+    for (number, node) in nodes.iter().enumerate() {
+        let Decisions { fused, done } = &mut decisions;
+        let latest =
+            |sources: &mut dyn Iterator<Item = usize>| sources.map(|source| done[source]).max().unwrap_or(0);
+        let plain = latest(&mut node.from.iter().copied().flatten()) + latency(ir, node.op);
+        let with = |&(product, fusion): &(usize, Fusion)| {
+            let ready = latest(&mut waits_for(nodes, node, product, fusion)) + latency(ir, fusion.fused);
+            (ready, product, fusion)
+        };
+        // Of equals the later product.
+        let best = node.wishes.iter().map(with).min_by_key(|&(ready, product, _)| (ready, Reverse(product)));
+        let best = best.filter(|&(ready, ..)| ready <= plain || may_wait(number, ready));
+        fused.push(best.map(|(_, product, fusion)| (product, fusion)));
+        done.push(best.map_or(plain, |(ready, ..)| ready));
+    }
+    decisions
+}
+
+/// The cycles from an operation's result to the end of the longest chain that begins with it.
+fn after(ir: &Ir, nodes: &[Node], decisions: &Decisions) -> Vec<u32> {
+    let mut after = vec![0; nodes.len()];
+    let mut gone = vec![false; nodes.len()];
+    for number in (0..nodes.len()).rev() {
+        let node = &nodes[number];
+        let mut chain = |sources: &mut dyn Iterator<Item = usize>, op: Op| {
+            let length = latency(ir, op) + after[number];
+            sources.for_each(|source| after[source] = after[source].max(length));
+        };
+        match decisions.fused[number] {
+            _ if gone[number] => {}
+            Some((product, fusion)) => {
+                gone[product] = true;
+                chain(&mut waits_for(nodes, node, product, fusion), fusion.fused);
+            }
+            None => chain(&mut node.from.iter().copied().flatten(), node.op),
+        }
+    }
+    after
+}

@@ -1,0 +1,225 @@
+//! `.contract on`: a product and the sum that alone uses it become one operation, with one rounding.
+//!
+//! What is fused depends on the source and the machine's latencies, never on what the scheduler makes of it, so that a program
+//! computes the same bits however it is scheduled. The product's operation goes; the fused one stands where the sum stood.
+
+mod choose;
+
+use crate::homes;
+use crate::ir::matching;
+use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, runs};
+use smallvec::SmallVec;
+use std::collections::{HashMap, HashSet};
+use takt_isa::program::Location;
+use takt_isa::{Fusion, Slots, fusions};
+
+/// A product that was fused into a sum.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Contraction {
+    /// The instruction that does both.
+    pub mnemonic: &'static str,
+    /// Where the product stands.
+    pub product: Option<Location>,
+    /// Where the sum stands.
+    pub sum: Option<Location>,
+}
+
+/// What was fused.
+#[derive(Debug, Default)]
+pub(crate) struct Contracted {
+    /// In the order of the sums.
+    pub(crate) contractions: Vec<Contraction>,
+    /// Registers that only products used which are no more: nothing need write or read them.
+    pub(crate) gone: HashSet<RegisterId>,
+}
+
+/// An operation: its bundle, and its number there.
+type Where = (usize, usize);
+
+/// By sum, the products that it could be fused with, in the order of the source.
+type Wishes = HashMap<Where, SmallVec<[(Where, Fusion); 2]>>;
+
+/// What a straight run has made of a register so far.
+#[derive(Clone, Default)]
+struct Current {
+    /// How many operations have written it.
+    version: u32,
+    /// The product whose value it is.
+    product: Option<usize>,
+}
+
+/// A product of a run.
+struct Product {
+    at: Where,
+    dest: RegisterId,
+    /// The versions of its sources when it reads them, and of its result.
+    versions: [u32; 2],
+    version: u32,
+    /// Who reads it, as which source; of the second reader on it only matters that there is one.
+    readers: SmallVec<[(Where, usize); 2]>,
+    /// Whether nothing writes its register again before the run ends.
+    last: bool,
+    /// Whether one of its sources has another value by the time that it is used.
+    stale: bool,
+}
+
+/// Fuses what `is_on` allows, by index of the bundle, if the machine has an operation for it.
+pub(crate) fn contract(ir: &mut Ir, is_on: impl Fn(usize) -> bool) -> Contracted {
+    let mut contracted = Contracted::default();
+    let hosted = |fusion: &&Fusion| ir.machine.host(fusion.fused.row().function).is_some();
+    let known: Vec<&Fusion> = fusions().iter().filter(hosted).collect();
+    // Where every bundle must keep its address, and where words may read anything, nothing can be taken out.
+    let fixed = runs::jumps_to_numbers(ir) || ir.bundles.iter().any(|bundle| bundle.is_opaque());
+    if known.is_empty() || fixed || !(0..ir.bundles.len()).any(&is_on) {
+        return contracted;
+    }
+    let exposed = exposed(ir);
+    let mut current = vec![Current::default(); ir.registers.len()];
+    for run in runs::runs(ir) {
+        current.fill(Current::default());
+        let products = products(ir, &known, run, &mut current);
+        let fits = |product: &Product| {
+            let [(reader, source)] = product.readers[..] else { return None };
+            let sum = at(ir, reader);
+            let fusion = known.iter().find(|fusion| {
+                (fusion.product, fusion.sum, fusion.source) == (at(ir, product.at).op, sum.op, source)
+            })?;
+            let wanted = is_on(product.at.0) && is_on(reader.0);
+            let free = !(product.last && exposed[product.dest.index()]) && !product.stale;
+            (wanted && free && has_place(ir, reader, fusion)).then_some((reader, **fusion))
+        };
+        let mut wishes = Wishes::new();
+        for product in &products {
+            if let Some((sum, fusion)) = fits(product) {
+                wishes.entry(sum).or_default().push((product.at, fusion));
+            }
+        }
+        for (sum, product, fusion) in choose::choose(ir, run, &wishes) {
+            contracted.gone.extend(at(ir, product).dest);
+            contracted.contractions.push(fuse(ir, product, sum, fusion));
+        }
+    }
+    for operation in ir.operations() {
+        for register in operation.reads().iter().chain(&operation.dest) {
+            contracted.gone.remove(register);
+        }
+    }
+    contracted
+}
+
+fn at(ir: &Ir, (bundle, number): Where) -> &Operation {
+    &ir.bundles[bundle].operations[number]
+}
+
+/// Registers that a run reads before it writes them: by index, whether a value may be read outside its own run.
+fn exposed(ir: &Ir) -> Vec<bool> {
+    let mut exposed = vec![false; ir.registers.len()];
+    let mut written = vec![usize::MAX; ir.registers.len()];
+    for (number, run) in runs::runs(ir).into_iter().enumerate() {
+        for bundle in &ir.bundles[run.start..run.end] {
+            // All operations of a bundle read before any writes.
+            for register in bundle.operations.iter().flat_map(Operation::reads) {
+                exposed[register.index()] |= written[register.index()] != number;
+            }
+            for register in bundle.operations.iter().filter_map(|operation| operation.dest) {
+                written[register.index()] = number;
+            }
+        }
+    }
+    exposed
+}
+
+/// The products of a run in registers that are nobody else's business, and who reads them.
+fn products(ir: &Ir, known: &[&Fusion], run: runs::Run, current: &mut [Current]) -> Vec<Product> {
+    let mut products: Vec<Product> = Vec::new();
+    for bundle in run.start..run.end {
+        let operations = || (0..).zip(&ir.bundles[bundle].operations);
+        for (number, operation) in operations() {
+            for (source, register) in operation.reads().iter().enumerate() {
+                let Some(index) = current[register.index()].product else { continue };
+                let factors = at(ir, products[index].at).reads();
+                let product = &mut products[index];
+                product.readers.push(((bundle, number), source));
+                // Of a factor that the product itself overwrites, the value before it is there again once the product is gone.
+                let as_it_was = |(factor, version): (&RegisterId, &u32)| {
+                    let now = current[factor.index()].version;
+                    now == *version || (*factor == product.dest && now == product.version)
+                };
+                product.stale |= !factors.iter().zip(&product.versions).all(as_it_was);
+            }
+        }
+        let mut written: SmallVec<[(RegisterId, Option<usize>); 4]> = SmallVec::new();
+        for (number, operation) in operations() {
+            let Some(dest) = operation.dest else { continue };
+            let register = ir.register(dest);
+            let free = register.kind == RegisterKind::Plain
+                && register.pinned.is_none()
+                && register.preset.is_none();
+            let is_product = free && known.iter().any(|fusion| fusion.product == operation.op);
+            let product = is_product.then_some(products.len());
+            if is_product {
+                let version = |index: usize| current[operation.sources[index].index()].version;
+                products.push(Product {
+                    at: (bundle, number),
+                    dest,
+                    versions: [version(0), version(1)],
+                    version: current[dest.index()].version + 1,
+                    readers: SmallVec::new(),
+                    last: true,
+                    stale: false,
+                });
+            }
+            written.push((dest, product));
+        }
+        for (dest, product) in written {
+            let register = &mut current[dest.index()];
+            if let Some(old) = register.product {
+                products[old].last = false;
+            }
+            *register = Current { version: register.version + 1, product };
+        }
+    }
+    products
+}
+
+/// Whether the fused operation can stand where the sum stands: a slot is free for it there, and writes the sum's register.
+fn has_place(ir: &Ir, (bundle, number): Where, fusion: &Fusion) -> bool {
+    let operations = &ir.bundles[bundle].operations;
+    let dest = operations[number].dest;
+    let others =
+        || operations.iter().enumerate().filter(|(other, _)| *other != number).map(|(_, other)| other);
+    let mut slots: Vec<Slots> =
+        others().filter(|other| other.slot.is_some()).map(|other| other.slots).collect();
+    slots.push(dest.map_or_else(Slots::default, |dest| homes::able(ir, dest, fusion.fused)));
+    // A branch on what its own bundle computes cannot wait for a copy.
+    let branches =
+        others().any(|other| other.redirects() && dest.is_some_and(|dest| other.reads().contains(&dest)));
+    // Nor does it go elsewhere than the source wants the sum.
+    let named =
+        dest.is_some_and(|dest| operations[number].slots != homes::able(ir, dest, operations[number].op));
+    !branches && !named && matching::is_possible(&slots)
+}
+
+/// Puts the fused operation in the sum's place, and takes the product out.
+fn fuse(ir: &mut Ir, product: Where, sum: Where, fusion: Fusion) -> Contraction {
+    let first = *at(ir, product);
+    let second = *at(ir, sum);
+    let slots = second.dest.map_or_else(Slots::default, |dest| homes::able(ir, dest, fusion.fused));
+    let [a, b, _] = first.sources;
+    let sources = [a, b, second.sources[1 - fusion.source]];
+    // No operand of the tree is one of its own: messages point at the sum.
+    let written = (u32::MAX, 0);
+    ir.bundles[sum.0].operations[sum.1] = Operation {
+        op: fusion.fused,
+        slots,
+        slot: slots.first(),
+        sources,
+        constant: Constant::None,
+        made: true,
+        written,
+        ..second
+    };
+    // Taken out of its bundle once nothing counts on its place.
+    ir.bundles[product.0].operations[product.1] = Operation { made: true, ..first.idle() };
+    Contraction { mnemonic: fusion.fused.row().mnemonic, product: first.location, sum: second.location }
+}

@@ -1,0 +1,74 @@
+//! What a bundle does to control: where execution goes on. Emulator, blocks and analysis match on it; nobody else says what
+//! an [`Effect`] means to the order of execution.
+
+use crate::encode::Instruction;
+use crate::number::{BundleAddress, Register};
+use crate::spec::instructions::Effect;
+
+/// Where execution goes on after a bundle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flow {
+    /// At the next bundle.
+    Next,
+    /// At the target.
+    Jump(BundleAddress),
+    /// At the target if the register is zero (all 32 bits), or is not, as `zero` says; else at the next bundle.
+    Branch {
+        /// The register, as the bundle reads it.
+        register: Register,
+        /// Whether it is taken on zero.
+        zero: bool,
+        /// Where it leads if it is taken.
+        target: BundleAddress,
+    },
+    /// At the target, the address of the next bundle pushed on the return stack.
+    Call(BundleAddress),
+    /// At the address popped from the return stack.
+    Return,
+    /// At the target, on the tick.
+    Wait(BundleAddress),
+    /// Nowhere.
+    Halt,
+}
+
+impl Flow {
+    /// What the instructions of a bundle do to control. One of them at most does anything: a machine has one sequencer
+    /// ([`crate::MachineReason::TwoSlots`]).
+    pub fn of<'i>(instructions: impl IntoIterator<Item = &'i Instruction>) -> Flow {
+        instructions.into_iter().map(Instruction::flow).find(|flow| *flow != Flow::Next).unwrap_or(Flow::Next)
+    }
+
+    /// Where a jump, a taken branch, a call or a `wait` leads.
+    pub const fn target(self) -> Option<BundleAddress> {
+        match self {
+            Flow::Jump(target) | Flow::Branch { target, .. } | Flow::Call(target) | Flow::Wait(target) => {
+                Some(target)
+            }
+            Flow::Next | Flow::Return | Flow::Halt => None,
+        }
+    }
+}
+
+impl Instruction {
+    /// What the instruction does to control.
+    pub fn flow(&self) -> Flow {
+        let target = BundleAddress::new(self.constant);
+        let branch = |zero| Flow::Branch { register: self.sources[0], zero, target };
+        match self.effect() {
+            Effect::Jump => Flow::Jump(target),
+            Effect::BranchZero => branch(true),
+            Effect::BranchNonzero => branch(false),
+            Effect::Call => Flow::Call(target),
+            Effect::Return => Flow::Return,
+            Effect::Wait => Flow::Wait(target),
+            Effect::Halt => Flow::Halt,
+            Effect::Compute
+            | Effect::Nothing
+            | Effect::Immediate
+            | Effect::Load
+            | Effect::Store
+            | Effect::ReadFlags
+            | Effect::ClearFlags => Flow::Next,
+        }
+    }
+}

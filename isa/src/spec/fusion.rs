@@ -1,0 +1,61 @@
+//! Which instruction is a product and a sum in one: told from the rows' meanings.
+
+use super::instructions::{Function, Op, ROWS, Row, compute};
+use crate::fp;
+use crate::shape::Shape;
+use std::sync::LazyLock;
+
+/// A product, what takes it as its source `source`, and the instruction that does both with one rounding.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Fusion {
+    /// The product.
+    pub product: Op,
+    /// The sum or difference.
+    pub sum: Op,
+    /// Which of its sources is the product.
+    pub source: usize,
+    /// The one for both: of the product's sources, then the sum's other one.
+    pub fused: Op,
+}
+
+static FUSIONS: LazyLock<Vec<Fusion>> = LazyLock::new(|| {
+    let of = |function: Function, shape: Shape| {
+        ROWS.iter().filter(move |row| row.function == function && row.shape == shape)
+    };
+    let mut fusions = Vec::new();
+    for product in of(Function::Multiply, Shape::Dab) {
+        for sum in of(Function::Add, Shape::Dab) {
+            for source in [0, 1] {
+                let fused =
+                    of(Function::Fused, Shape::Dabc).find(|fused| does_both(product, sum, source, fused));
+                fusions.extend(fused.map(|fused| Fusion {
+                    product: product.op,
+                    sum: sum.op,
+                    source,
+                    fused: fused.op,
+                }));
+            }
+        }
+    }
+    fusions
+});
+
+/// Whether the results are the same wherever nothing is rounded.
+fn does_both(product: &Row, sum: &Row, source: usize, fused: &Row) -> bool {
+    const EXACT: [f32; 7] = [3.0, -5.0, 0.25, 0.0, -0.0, f32::INFINITY, 15.0];
+    let value = |row: &Row, [a, b, c]: [u32; 3]| compute::<fp::Host>(row.op, a, b, c);
+    let numbers = || EXACT.into_iter().map(f32::to_bits);
+    let triples = numbers().flat_map(|a| numbers().flat_map(move |b| numbers().map(move |c| [a, b, c])));
+    triples.into_iter().all(|[a, b, c]| {
+        let first = value(product, [a, b, 0]);
+        let sources = if source == 0 { [first.bits, c, 0] } else { [c, first.bits, 0] };
+        let second = value(sum, sources);
+        let both = value(fused, [a, b, c]);
+        both.bits == second.bits && both.flags == first.flags | second.flags
+    })
+}
+
+/// Every pair of instructions that another one does in one.
+pub fn fusions() -> &'static [Fusion] {
+    &FUSIONS
+}

@@ -1,0 +1,44 @@
+// takt_significand_product: the product of two significands of 24 bits.
+//
+// Contract
+//   p = a * b of the cycle before: the partial products are registered, their sum is combinational. No reset.
+//
+// 24 = 6 + 18 bits: three products of 18 x 18 bits, and that of the upper 6 bits in logic, for a multiplier is too good for it.
+
+module takt_significand_product (
+    input  wire        clk,
+    input  wire [23:0] a,
+    input  wire [23:0] b,
+    output wire [47:0] p
+);
+
+    wire [35:0] low_low, high_low, low_high;
+    takt_product u_low_low (.clk(clk), .a(a[17:0]), .b(b[17:0]), .p(low_low));
+    takt_product u_high_low (.clk(clk), .a({12'd0, a[23:18]}), .b(b[17:0]), .p(high_low));
+    takt_product u_low_high (.clk(clk), .a(a[17:0]), .b({12'd0, b[23:18]}), .p(low_high));
+
+    // The product of the upper 5 bits of the fractions, row by row, and what the leading ones add to it. They come late (a
+    // subnormal number has none), so the two are summed behind the register.
+    wire [4:0]  x = a[22:18];
+    wire [4:0]  y = b[22:18];
+    wire [9:0]  fractions =
+        ({5'd0, x & {5{y[0]}}} + {4'd0, x & {5{y[1]}}, 1'd0}) +
+        ({3'd0, x & {5{y[2]}}, 2'd0} + {2'd0, x & {5{y[3]}}, 3'd0}) + {1'd0, x & {5{y[4]}}, 4'd0};
+    wire [6:0]  ones = {2'd0, x & {5{b[23]}}} + {1'd0, a[23] & b[23], y & {5{a[23]}}};
+
+    reg  [9:0]  fractions1;
+    reg  [6:0]  ones1;
+
+    always @(posedge clk) begin
+        fractions1 <= fractions;
+        ones1      <= ones;
+    end
+
+    // The sum's low 18 bits are those of low_low.
+    wire [29:0] upper =
+        {2'd0, fractions1, low_low[35:18]} + {ones1, 23'd0} + ({6'd0, high_low[23:0]} + {6'd0, low_high[23:0]});
+    wire        unused_high = |{high_low[35:24], low_high[35:24]};  // zero: 6 x 18 bits
+
+    assign p = {upper, low_low[17:0]};
+
+endmodule

@@ -1,0 +1,320 @@
+// takt_fused: binary32 product and sum with one rounding, to nearest even, subnormals included; a product or a sum alone, too.
+//
+// Contract
+//   An operation whose operands and op stand on the inputs in one cycle, with in_valid, has its result and flags on the
+//   outputs, with out_valid, LATENCY - 1 cycles later. One operation a cycle. No reset: after LATENCY cycles without
+//   in_valid nothing is left of what was before.
+//   flags = {invalid, divide by zero, overflow}. The one NaN that comes out is 7fc00000.
+//   A product alone has the bits and flags of takt_multiply, a sum or difference those of takt_add. Each has a bit of the code
+//   to itself, so that synthesis drops what a machine does not ask for.
+//
+//@ op 4'b0000 fma
+//@ op 4'b0001 fms
+//@ op 4'b0010 fnma
+//@ op 4'b0011 fnms
+//@ op 4'b0100 fmul
+//@ op 4'b1000 fadd
+//@ op 4'b1001 fsub
+//
+// op[0] negates the addend, op[1] the product; op[2]: the addend is a zero of the product's sign, which changes no product;
+// op[3]: a + b is computed as a · 1 + b.
+//
+// Notation: P is the product of the significands, 48 bits; C the addend's significand, 24 bits, leading one included. Both
+// stand in a window of 76 places, C at the top, two places that guard it, P, and two places after P:
+//
+//    75       52 51 50 49                 2 1 0
+//   +-----------+-----+--------------------+---+
+//   |     C     |     |          P         |   |
+//   +-----------+-----+--------------------+---+
+//
+// C is shifted to the right by the distance of the exponents; what it loses at the lower end is gathered in one bit. Why the
+// window is large enough:
+//   An addend further to the left than the top stays there. Then P is too large, but below a quarter of C's last place as
+//   before, where it decides rounding and no more. If C has no leading one, its last place is the last of subnormal numbers.
+//   C loses something only where it lies below place 23. A product of normal numbers reaches place 48, and what C loses is far
+//   below the result's last place. One of a subnormal number begins with zeros, but reaches place 25: then the result reaches
+//   place 24, and needs the 24 places from there and one more, down to place 0.
+//   The product of two subnormal numbers lies below every C.
+// An exponent below that of the smallest normal number never stands at the top: the shift to the left that normalises stops
+// where the exponent is 1, and there is none to the right.
+//
+// Pipeline
+//   1  partial products                    of 18 x 18 bits; the distance of the exponents
+//   2  product, aligned addend
+//   3  sum                                 or difference, of either sign
+//   4  leading zeros, shifted by nibbles
+//   5  normalised, rounded                 the result
+
+module takt_fused #(
+    parameter LATENCY = 6
+) (
+    input  wire        clk,
+    input  wire        in_valid,
+    input  wire [3:0]  op,
+    input  wire [31:0] a,
+    input  wire [31:0] b,
+    input  wire [31:0] c,
+    output reg         out_valid,
+    output reg  [31:0] result,
+    output reg  [2:0]  flags
+);
+
+    generate
+        if (LATENCY != 6) begin : g_latency
+            takt_fused_has_latency_6 unsupported ();
+        end
+    endgenerate
+
+    reg valid1, valid2, valid3, valid4;
+    always @(posedge clk) begin
+        valid1    <= in_valid;
+        valid2    <= valid1;
+        valid3    <= valid2;
+        valid4    <= valid3;
+        out_valid <= valid4;
+    end
+
+    // =============================================================== 1: partial products; distance
+
+    // The factors are a and y, the addend is z.
+    wire [31:0] y      = op[3] ? 32'h3f800000 : b;
+    wire [30:0] z      = op[2] ? 31'd0 : op[3] ? b[30:0] : c[30:0];
+    wire        p_sign = a[31] ^ y[31] ^ op[1];
+    wire        z_sign = op[2] ? p_sign : (op[3] ? b[31] : c[31]) ^ op[0];
+    wire        minus  = p_sign ^ z_sign;
+
+    wire        a_small = a[30:23] == 8'd0;  // zero or subnormal
+    wire        y_small = y[30:23] == 8'd0;
+    wire        z_small = z[30:23] == 8'd0;
+
+    wire [47:0] product;  // of the next stage
+    takt_significand_product u_product (
+        .clk(clk), .a({~a_small, a[22:0]}), .b({~y_small, y[22:0]}), .p(product)
+    );
+
+    wire        a_empty   = ~|a[22:0];
+    wire        y_empty   = ~|y[22:0];
+    wire        z_empty   = ~|z[22:0];
+    wire        a_special = &a[30:23];
+    wire        y_special = &y[30:23];
+    wire        z_special = &z[30:23];
+    wire        a_nan     = a_special & ~a_empty;
+    wire        y_nan     = y_special & ~y_empty;
+    wire        z_nan     = z_special & ~z_empty;
+    wire        a_zero    = a_small & a_empty;
+    wire        y_zero    = y_small & y_empty;
+    wire        improper  = (a_special & a_empty & y_zero) | (a_zero & y_special & y_empty);  // 0 · ∞
+    wire        opposed   = (a_special | y_special) & z_special & minus;  // infinities, if there is no NaN
+    wire        any_nan   = a_nan | y_nan | z_nan;
+    wire        signaling = (a_nan & ~a[22]) | (y_nan & ~y[22]) | (z_nan & ~z[22]);
+
+    // A biased exponent; that of a subnormal number is 1.
+    wire [7:0]  a_exponent = {a[30:24], a[23] | a_small};
+    wire [7:0]  y_exponent = {y[30:24], y[23] | y_small};
+    wire [7:0]  z_exponent = {z[30:24], z[23] | z_small};
+    wire [9:0]  exponents  = {2'd0, a_exponent} + {2'd0, y_exponent};
+    wire [9:0]  distance   = exponents - {2'd0, z_exponent} - 10'd100;
+
+    reg  [8:0]  distance1;   // places by which C goes to the right
+    reg         at_top1;     // C stays at the top
+    reg  [8:0]  above_p1;    // exponent of a number with its leading one in place 75, less 1: by that of the product
+    reg  [7:0]  above_z1;    // by that of an addend that stays at the top
+    reg  [23:0] c1;
+    reg         minus1, p_sign1, z_sign1, nan1, infinite1, p_infinite1, invalid1;
+
+    wire [9:0]  above_p = exponents - 10'd101;  // not used if negative: then C stays at the top
+    wire        unused_above = above_p[9];
+
+    always @(posedge clk) begin
+        distance1   <= distance[8:0];
+        at_top1     <= distance[9] | a_zero | y_zero;
+        above_p1    <= above_p[8:0];
+        above_z1    <= z_exponent - 8'd1;
+        c1          <= {~z_small, z[22:0]};
+        minus1      <= minus;
+        p_sign1     <= p_sign;
+        z_sign1     <= z_sign;
+        nan1        <= any_nan | improper | opposed;
+        infinite1   <= a_special | y_special | z_special;
+        p_infinite1 <= a_special | y_special;
+        invalid1    <= signaling | improper | (opposed & ~any_nan);
+    end
+
+    // =============================================================== 2: product; aligned addend
+
+    // By less than 4, by less than 16 in fours, the rest in sixteens: only the last can lose something.
+    wire [8:0]  right    = distance1 & {9{~at_top1}};
+    wire [26:0] by1      = {c1, 3'd0} >> right[1:0];
+    wire [38:0] by4      = {by1, 12'd0} >> {right[3:2], 2'd0};
+    wire        at_0     = right[8:4] == 5'd0;
+    wire        at_16    = right[8:4] == 5'd1;
+    wire        at_32    = right[8:4] == 5'd2;
+    wire        at_48    = right[8:4] == 5'd3;
+    wire        at_64    = right[8:4] == 5'd4;
+    wire        beyond   = ~(at_0 | at_16 | at_32 | at_48 | at_64);
+    wire [75:0] aligned  =
+        ({by4, 37'd0} & {76{at_0}}) | ({16'd0, by4, 21'd0} & {76{at_16}}) | ({32'd0, by4, 5'd0} & {76{at_32}}) |
+        ({48'd0, by4[38:11]} & {76{at_48}}) | ({64'd0, by4[38:27]} & {76{at_64}});
+    wire        lost     = (at_48 & (|by4[10:0])) | (at_64 & (|by4[26:0])) | (beyond & (|c1));
+
+    reg  [47:0] product2;
+    reg  [75:0] addend2;  // inverted, if it is to be subtracted
+    reg         lost2;
+    reg  [8:0]  above2;
+    reg         minus2, p_sign2, z_sign2, nan2, infinite2, invalid2;
+
+    always @(posedge clk) begin
+        product2  <= product;
+        addend2   <= aligned ^ {76{minus1}};
+        lost2     <= lost;
+        above2    <= at_top1 ? {1'b0, above_z1} : above_p1;
+        minus2    <= minus1;
+        // An infinity's sign is found as that of the larger one.
+        p_sign2   <= infinite1 & ~p_infinite1 ? z_sign1 : p_sign1;
+        z_sign2   <= infinite1 & p_infinite1 ? p_sign1 : z_sign1;
+        nan2      <= nan1;
+        infinite2 <= infinite1;
+        invalid2  <= invalid1;
+    end
+
+    // =============================================================== 3: sum
+
+    // P - C, with a carry in unless C has lost something, is P + ~C + 1. C - P is ~(P + ~C), whose carry says whether P is the
+    // larger: it is wherever C has lost something.
+    wire [76:0] plain = {27'd0, product2, 2'd0} + {1'b0, addend2};
+    wire [75:0] sum   = {26'd0, product2, 2'd0} + addend2 + {75'd0, minus2 & ~lost2};
+    wire        swap  = minus2 & ~plain[76];
+
+    reg  [75:0] sum3;
+    reg  [18:0] stop3;  // the nibble, from the top, at which the exponent is 1 to 4
+    reg  [8:0]  above3;
+    reg         lost3, minus3, sign3, nan3, infinite3, invalid3;
+
+    genvar i;
+    generate
+        for (i = 0; i < 19; i = i + 1) begin : g_stop
+            always @(posedge clk) begin
+                stop3[i] <= above2[8:2] == i;
+            end
+        end
+    endgenerate
+
+    always @(posedge clk) begin
+        sum3      <= swap ? ~plain[75:0] : sum;
+        above3    <= above2;
+        lost3     <= lost2;
+        minus3    <= minus2;
+        sign3     <= swap ? z_sign2 : p_sign2;
+        nan3      <= nan2;
+        infinite3 <= infinite2;
+        invalid3  <= invalid2;
+    end
+
+    // =============================================================== 4: leading zeros, shift by nibbles
+
+    // Nibbles are counted from the top. `some`: a nibble has a one; `ends`: or the count of zeros ends there.
+    wire [19:0] some;
+    wire [18:0] ends;
+    generate
+        for (i = 0; i < 19; i = i + 1) begin : g_nibble
+            assign some[i] = |sum3[75 - 4*i -: 4];
+            assign ends[i] = (|sum3[75 - 4*i -: 4]) | stop3[i];
+        end
+    endgenerate
+    assign some[19] = 1'b0;
+
+    // The first group of four nibbles that ends the count, the last if none does; in it the first nibble.
+    wire [3:0]  group_ends = {|ends[15:12], |ends[11:8], |ends[7:4], |ends[3:0]};
+    wire [2:0]  group;
+    assign group[2] = ~|group_ends;
+    assign group[1] = ~|group_ends[1:0] & (|group_ends[3:2]);
+    assign group[0] = ~group_ends[0] & (group_ends[1] | (~group_ends[2] & group_ends[3]));
+
+    wire [43:0] grouped =
+        group[2] ? {sum3[11:0], 32'd0} :
+        group[1] ? (group[0] ? {sum3[27:0], 16'd0} : sum3[43:0]) : (group[0] ? sum3[59:16] : sum3[75:32]);
+    wire [2:0]  group_nibbles =
+        group[2] ? ends[18:16] :
+        group[1] ? (group[0] ? ends[14:12] : ends[10:8]) : (group[0] ? ends[6:4] : ends[2:0]);
+    wire [3:0]  group_stops =
+        group[2] ? {1'b0, stop3[18:16]} :
+        group[1] ? (group[0] ? stop3[15:12] : stop3[11:8]) : (group[0] ? stop3[7:4] : stop3[3:0]);
+    wire [1:0]  nibble = {~(group_nibbles[0] | group_nibbles[1]),
+                          ~group_nibbles[0] & (group_nibbles[1] | ~group_nibbles[2])};
+
+    // What follows the 32 places that are kept: the nibbles from the eighth after this one.
+    wire [19:8] after;
+    generate
+        for (i = 8; i < 20; i = i + 1) begin : g_after
+            assign after[i] = |some[19:i];
+        end
+    endgenerate
+    wire [3:0]  group_after =
+        group[2] | (group[1] & group[0]) ? 4'd0 :
+        group[1] ? {after[19], after[18], after[17], after[16]} :
+        group[0] ? {after[15], after[14], after[13], after[12]} : {after[11], after[10], after[9], after[8]};
+
+    reg  [31:0] shifted4;
+    reg  [4:0]  nibbles4;  // zeros before it, in fours
+    reg         limited4;  // the exponent may become 1 within the first nibble
+    reg  [8:0]  above4;
+    reg         lost4, zero4, sign4, nan4, infinite4, invalid4;
+
+    always @(posedge clk) begin
+        case (nibble)
+            2'd0: shifted4 <= grouped[43:12];
+            2'd1: shifted4 <= grouped[39:8];
+            2'd2: shifted4 <= grouped[35:4];
+            2'd3: shifted4 <= grouped[31:0];
+        endcase
+        nibbles4  <= {group, nibble};
+        limited4  <= group_stops[nibble];
+        above4    <= above3;
+        lost4     <= lost3 | group_after[nibble];
+        zero4     <= ~|some;
+        sign4     <= sign3 & ~(minus3 & ~infinite3 & ~|some);
+        nan4      <= nan3;
+        infinite4 <= infinite3;
+        invalid4  <= invalid3;
+    end
+
+    // =============================================================== 5: normalise, round
+
+    // The zeros in the first nibble, up to where the exponent is 1.
+    wire [2:0]  first = shifted4[31:29] |
+        {limited4 & (above4[1:0] == 2'd0), limited4 & (above4[1:0] == 2'd1), limited4 & (above4[1:0] == 2'd2)};
+    wire [1:0]  zeros = {~(first[2] | first[1]), ~(first[2] | (~first[1] & first[0]))};
+
+    reg  [24:0] kept;  // and the place after it
+    reg         rest;
+    always @* begin
+        case (zeros)
+            2'd0: {kept, rest} = {shifted4[31:7], |shifted4[6:0]};
+            2'd1: {kept, rest} = {shifted4[30:6], |shifted4[5:0]};
+            2'd2: {kept, rest} = {shifted4[29:5], |shifted4[4:0]};
+            2'd3: {kept, rest} = {shifted4[28:4], |shifted4[3:0]};
+        endcase
+    end
+    wire        up    = kept[0] & (rest | lost4 | kept[1]);
+
+    // The leading one adds itself to the exponent field, and so does rounding's carry; above the largest number that gives
+    // infinity. Without a leading one the field is 0.
+    wire [8:0]  field    = above4 - {2'd0, nibbles4, zeros};
+    wire [30:0] rounded  = {field[7:0], kept[23:1]} + {7'd0, kept[24], 22'd0, up};
+    wire        too_large          = field[8] | (field[7:0] >= 8'd254);
+    wire        rounds_to_infinity = (field == 9'd253) & up & (&kept[24:1]);
+    wire        special            = nan4 | infinite4;
+
+    always @(posedge clk) begin
+        result[31] <= sign4 & ~nan4;
+        if (special | (too_large & ~zero4)) begin
+            result[30:0] <= {8'hff, nan4, 22'd0};
+        end else if (zero4) begin
+            result[30:0] <= 31'd0;
+        end else begin
+            result[30:0] <= rounded;
+        end
+        flags <= {invalid4, 1'b0, ~special & ~zero4 & (too_large | rounds_to_infinity)};
+    end
+
+endmodule
