@@ -81,10 +81,10 @@ fn expressions_become_programs() {
   {"op": "OP", "to": 2, "of": [0, 1]},
   {"op": "output", "of": [2], "port": [0, 0]}
 ]}"#;
-    folder.write("f.json", &list.replace("OP", "atan2"));
+    folder.write("f.json", list.replace("OP", "atan2"));
     assert!(folder.line("model f.json -o f.s").ok().contains("1 operations:"));
     assert!(folder.read_text("f.s").contains("        y = atan2(x_1, x_2)\n"));
-    folder.write("f.json", &list.replace("OP", "erf"));
+    folder.write("f.json", list.replace("OP", "erf"));
     let done = folder.line("model f.json");
     assert_eq!(done.status, Some(1));
     assert!(
@@ -97,7 +97,7 @@ fn expressions_become_programs() {
 #[test]
 fn mistakes_have_one_message() {
     let folder = folder();
-    folder.write("floating.urdf", &UR5.replacen("type=\"revolute\"", "type=\"floating\"", 1));
+    folder.write("floating.urdf", UR5.replacen("type=\"revolute\"", "type=\"floating\"", 1));
     folder.write("robot.txt", UR5);
     folder.write("f.json", "{");
     for (line, status, expected) in [
