@@ -4,7 +4,7 @@
 
 use crate::context::{At, Reported, Wanted, type_name, words};
 use crate::expand::equation::Results;
-use crate::expand::{Fast, Item};
+use crate::expand::{Fast, Item, SourcePlace};
 use crate::ir::given::Kind;
 use crate::ir::{Bundle, Constant, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
@@ -18,7 +18,6 @@ use crate::syntax::ast::*;
 use crate::syntax::expr::Value;
 use smallvec::SmallVec;
 use std::rc::Rc;
-use takt_isa::program::{Columns, Location};
 use takt_isa::{Op, Slots, Type};
 
 /// What a part of an equation is.
@@ -57,7 +56,7 @@ impl Term {
 
 /// The equation at hand.
 pub(super) struct Line {
-    location: Option<(Location, Option<Columns>)>,
+    location: Option<SourcePlace>,
     scheduled: bool,
     /// What its operations have computed so far: where the value is, the bundle, and the part.
     pub(super) computed: Vec<(RegisterId, usize, Key)>,

@@ -13,7 +13,7 @@ mod slots;
 
 use crate::context::{At, Context, Reported, ScopeId};
 use crate::expand::load::Loader;
-use crate::expand::{self, Data, Flat, Item, Timing};
+use crate::expand::{self, Data, Flat, Item, SourcePlace, Timing};
 use crate::ir::given::Kind;
 use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
 use crate::report::diag::Diagnostic;
@@ -24,7 +24,7 @@ use crate::syntax::ast::*;
 use smallvec::SmallVec;
 use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
-use takt_isa::program::{Columns, Location};
+use takt_isa::program::Location;
 use takt_isa::spec::instructions::Function;
 use takt_isa::{Op, ROWS, Slots, Type};
 
@@ -278,7 +278,7 @@ impl Resolver<'_> {
         (span, line): (Span, u32),
         index: usize,
         count: usize,
-    ) -> Option<(Location, Option<Columns>)> {
+    ) -> Option<SourcePlace> {
         if item.loc != 0 {
             let places = &self.flat.locs[item.loc as usize];
             if places.len() > 1 && places.len() != count {
@@ -307,7 +307,7 @@ impl Resolver<'_> {
         ast: &Ast,
         number: u32,
         of: usize,
-        location: Option<(Location, Option<Columns>)>,
+        location: Option<SourcePlace>,
     ) -> Result<Operation, Reported> {
         let written = &ast.operations[number as usize];
         let name = self.context.spelled(at, written.mnemonic.name, written.mnemonic.span)?;
@@ -360,7 +360,7 @@ impl Resolver<'_> {
         number: u32,
         written: &crate::syntax::ast::Operation,
         operands: &[Operand],
-        location: Option<(Location, Option<Columns>)>,
+        location: Option<SourcePlace>,
     ) -> Result<Operation, Reported> {
         let [slot, word] = operands else { return Err(Reported) };
         let name = self.context.reports.sources.text(slot.span).to_owned();
