@@ -42,6 +42,8 @@ pub const DATA_WORDS: usize = 1 << 20;
 pub const NAME_BYTES: usize = 255;
 /// Names that a program may use, those of macros' locals and of name templates included.
 pub const NAMES: usize = 1 << 24;
+/// Names in the source, each expansion counted, that an index of names keeps.
+pub const REFERENCES: usize = 1 << 20;
 /// Errors, and warnings, that are kept and shown; the rest are counted.
 pub const SHOWN: usize = 100;
 /// Bytes of a source line that a shown diagnostic quotes; of a longer line, the part around the error.

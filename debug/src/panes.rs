@@ -237,7 +237,7 @@ fn used(session: &Session) -> BTreeSet<Register> {
 }
 
 /// Operations in flight.
-pub(crate) fn flight(session: &Session) -> Vec<Flying> {
+pub fn flight(session: &Session) -> Vec<Flying> {
     let program = session.program();
     let flying = session.in_flight().into_iter().map(|(retire, left)| Flying {
         left,
@@ -249,7 +249,7 @@ pub(crate) fn flight(session: &Session) -> Vec<Flying> {
 }
 
 /// Where the cycles since reset went: bundles that issued, stalls by kind, and the bundles that stalled longest.
-pub(crate) fn stalls(session: &Session) -> Vec<(u64, String)> {
+pub fn stalls(session: &Session) -> Vec<(u64, String)> {
     let statistics = session.emulator().statistics();
     let program = session.program();
     let mut rows = vec![(statistics.bundles, "issue".to_owned())];

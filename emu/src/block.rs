@@ -196,7 +196,7 @@ impl Cache {
 }
 
 /// Keeps the bundles that can still hold up one that issues now.
-fn ages(code: &Code, recent: impl Iterator<Item = (BundleAddress, u8)>) -> Ages {
+pub(crate) fn ages(code: &Code, recent: impl Iterator<Item = (BundleAddress, u8)>) -> Ages {
     recent
         .filter(|&(address, age)| code.legal(address).is_some_and(|decoded| decoded.reach > age.into()))
         .collect()

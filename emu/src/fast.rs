@@ -134,7 +134,7 @@ impl Emulator {
 
 /// Whether everything that a block requires has been written, counting what is written back by its last issue. (What is
 /// not, the block cannot read.)
-fn has_required(state: &State, block: &Block, last: Cycle) -> bool {
+pub(crate) fn has_required(state: &State, block: &Block, last: Cycle) -> bool {
     let mut written = state.written;
     let pending = state.pending.iter().filter(|pending| pending.retire.cycle <= last);
     pending.for_each(|pending| written.insert(pending.register));

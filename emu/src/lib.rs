@@ -12,6 +12,7 @@
 //!
 //! Within both, instructions are known by their effects; none is named.
 
+mod batch;
 mod block;
 mod code;
 mod cycle;
@@ -27,6 +28,7 @@ mod system;
 #[cfg(feature = "testing")]
 pub mod testing;
 
+pub use batch::Batch;
 pub use emulator::{Emulator, MAX_CYCLE, Observed, Status, Step, Stop, Upcoming};
 pub use event::{Event, PortWrite, Retire};
 pub use fault::{Fault, FaultKind, LoadError, ShownFault};

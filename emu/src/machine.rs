@@ -70,6 +70,11 @@ impl RegisterSet {
         self.0[register.index() / 64] >> (register.index() % 64) & 1 != 0
     }
 
+    /// How many there are.
+    pub(crate) fn len(&self) -> u32 {
+        self.0.iter().map(|word| word.count_ones()).sum()
+    }
+
     pub(crate) fn insert_all(&mut self, other: &RegisterSet) {
         self.0.iter_mut().zip(other.0).for_each(|(word, other)| *word |= other);
     }
@@ -125,12 +130,12 @@ pub(crate) struct State {
 #[derive(Clone, Debug)]
 pub(crate) struct Latches {
     /// The inputs as the host has set them.
-    inputs: [u32; Register::COUNT],
+    pub(crate) inputs: [u32; Register::COUNT],
     /// The outputs as they were published, and which of them were ever written.
-    outputs: [u32; Register::COUNT],
-    published: RegisterSet,
+    pub(crate) outputs: [u32; Register::COUNT],
+    pub(crate) published: RegisterSet,
     /// Inputs that were set since they were last taken.
-    changed: Vec<Register>,
+    pub(crate) changed: Vec<Register>,
     /// Whether they are to be taken at the beginning of the cycle to come.
     pub(crate) take: bool,
 }

@@ -37,13 +37,13 @@ pub(crate) enum Kind {
 /// A pre-decoded operation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Micro {
-    kind: Kind,
-    op: Op,
-    dest: Word,
-    a: Word,
-    b: Word,
-    c: Word,
-    constant: u32,
+    pub(crate) kind: Kind,
+    pub(crate) op: Op,
+    pub(crate) dest: Word,
+    pub(crate) a: Word,
+    pub(crate) b: Word,
+    pub(crate) c: Word,
+    pub(crate) constant: u32,
 }
 
 impl Micro {

@@ -53,6 +53,24 @@ impl Ticks {
         asked || regular
     }
 
+    /// The same ticks, each so many cycles later.
+    pub(crate) fn shifted(&self, by: i64) -> Ticks {
+        let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
+        Ticks {
+            asked: self.asked.iter().copied().map(shift).collect(),
+            regular: self.regular.map(shift),
+            remembered: self.remembered.map(shift),
+            waited: self.waited.map(shift),
+            ..*self
+        }
+    }
+
+    /// Whether the ticks to come, and one that is remembered, are the same.
+    pub(crate) fn agree(&self, other: &Ticks) -> bool {
+        let to_come = |ticks: &Ticks| (ticks.every, ticks.regular, ticks.remembered, ticks.waited.is_some());
+        to_come(self) == to_come(other) && self.asked == other.asked
+    }
+
     /// Sets the regular ticks going: the first is in the first cycle after `cycle` that is a multiple of their distance.
     fn start(&mut self, cycle: Cycle) {
         self.regular = self.every.map(|every| (cycle / every + 1).saturating_mul(every.get()));
@@ -66,6 +84,14 @@ pub(crate) struct Period {
     start: Cycle,
     missed: u64,
     lost: u64,
+}
+
+impl Period {
+    /// The same period, so many cycles later.
+    pub(crate) fn shifted(self, by: i64) -> Period {
+        let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
+        Period { tick: shift(self.tick), start: shift(self.start), ..self }
+    }
 }
 
 /// A period that has ended.
@@ -86,6 +112,16 @@ pub struct PeriodReport {
     pub lost: u64,
     /// NaNs written to output ports since the last report.
     pub nan_writes: Vec<PortWrite>,
+}
+
+impl PeriodReport {
+    /// The same report, so many cycles later, with other NaNs.
+    pub(crate) fn shifted(&self, by: i64, nan_writes: &[PortWrite]) -> PeriodReport {
+        let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
+        let (tick, start, wait) = (shift(self.tick), shift(self.start), shift(self.wait));
+        let PeriodReport { cycles, missed, lost, .. } = *self;
+        PeriodReport { tick, start, wait, cycles, missed, lost, nan_writes: nan_writes.to_vec() }
+    }
 }
 
 /// A value for an input port.
@@ -137,7 +173,7 @@ impl Number {
     }
 
     /// Whether it may stand for a value of this type.
-    fn fits(self, ty: Type) -> bool {
+    pub(crate) fn fits(self, ty: Type) -> bool {
         matches!(
             (self, ty),
             (Number::Bits(_), _) | (_, Type::B) | (Number::Float(_), Type::F) | (Number::Integer(_), Type::I)
@@ -163,6 +199,14 @@ pub enum PortError {
         name: String,
         /// What it carries.
         ty: Type,
+    },
+    /// Values for another number of lanes than the batch has ([`crate::Batch`]).
+    #[error("{given} values for {lanes} lanes")]
+    Lanes {
+        /// Values given.
+        given: usize,
+        /// Lanes of the batch.
+        lanes: usize,
     },
     /// The machine has no input port at this address.
     #[error("register address {register} is no input port")]

@@ -12,9 +12,19 @@ use std::rc::Rc;
 use takt_isa::Type;
 
 impl Context {
-    /// The name that a reference stands for where it stands.
+    /// The name that a reference stands for where it stands, noted for the index.
     #[inline]
     pub(crate) fn name(&mut self, at: At, name: NameRef, span: Span) -> Result<NameId, Reported> {
+        let name = self.spelled(at, name, span)?;
+        if let Some(notes) = &mut self.notes {
+            notes.name(span, at.scope, name);
+        }
+        Ok(name)
+    }
+
+    /// The name that is written somewhere, whatever it may mean there: a register's place, an instruction, a word as `on`.
+    #[inline]
+    pub(crate) fn spelled(&mut self, at: At, name: NameRef, span: Span) -> Result<NameId, Reported> {
         match name.resolve() {
             Ok(name) => Ok(name),
             Err(template) => self.nested(at, span, |context| context.instantiate(at, template, span)),
@@ -71,8 +81,8 @@ impl Context {
     /// The text for one braced part of a name.
     fn piece(&mut self, at: At, nodes: &[Node], span: Span) -> Result<String, Reported> {
         // A parameter whose argument is a name gives the name's text, unless that is an integer.
-        if let [Node { kind: NodeKind::Name(name), .. }] = *nodes {
-            let name = self.name(at, name, span)?;
+        if let [Node { kind: NodeKind::Name(name), span: place }] = *nodes {
+            let name = self.name(at, name, place)?;
             let argument = match self.lookup(at.scope, name) {
                 Binding::Argument(argument) => Some(self.declared.arguments[argument as usize]),
                 _ => None,

@@ -2,11 +2,13 @@
 
 mod declared;
 mod evaluate;
+mod notes;
 mod reports;
 mod scopes;
 mod unknown;
 
 pub(crate) use declared::{Argument, Array, Declared, NamedConstant};
+pub(crate) use notes::Notes;
 pub(crate) use reports::Reports;
 pub(crate) use scopes::{Binding, MacroDefinition, ScopeId, ScopeKind, Scopes};
 pub(crate) use unknown::Wanted;
@@ -41,6 +43,8 @@ pub(crate) struct Context {
     pub(crate) scopes: Scopes,
     pub(crate) declared: Declared,
     pub(crate) reports: Reports,
+    /// Which names stand where, if somebody wants to know ([`index`](crate::index)).
+    pub(crate) notes: Option<Notes>,
     /// Arguments and templates under evaluation, one within the other.
     depth: usize,
 }
@@ -51,7 +55,7 @@ impl Context {
         let zero = scopes.names_mut().intern("zero");
         scopes.bind(ScopeId::ROOT, zero, Binding::Register(RegisterId::ZERO));
         let (declared, reports) = (Declared::new(), Reports::default());
-        Context { machine, asts: Vec::new(), scopes, declared, reports, depth: 0 }
+        Context { machine, asts: Vec::new(), scopes, declared, reports, notes: None, depth: 0 }
     }
 
     /// Reports a mistake in a scope, with the expansions that led there.
@@ -123,7 +127,7 @@ impl Context {
 }
 
 /// A type as the source writes it.
-pub(crate) const fn type_name(ty: Type) -> &'static str {
+pub const fn type_name(ty: Type) -> &'static str {
     match ty {
         Type::F => "float",
         Type::I => "int",

@@ -2,7 +2,7 @@
 //! the program has, rather than where it goes.
 
 use crate::context::{Array, At, Binding, Context, Reported};
-use crate::expand::{Data, Expander};
+use crate::expand::{Data, Expander, Fast};
 use crate::ir::{RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
 use crate::report::diag::Diagnostic;
@@ -10,6 +10,7 @@ use crate::report::source::Span;
 use crate::syntax::ast::*;
 use crate::syntax::name::NameId;
 use smallvec::SmallVec;
+use takt_isa::program::{Columns, Location};
 use takt_isa::{Machine, Register, Type};
 
 impl Expander<'_> {
@@ -186,7 +187,7 @@ impl Expander<'_> {
             _ => None,
         };
         if let Some(name) = name {
-            let id = self.context.name(at, name.name, name.span)?;
+            let id = self.context.spelled(at, name.name, name.span)?;
             let is_register = self.context.machine.register_address(self.context.scopes.text(id)).is_some();
             let binding = self.context.lookup(at.scope, id);
             // What is neither a register nor a number is taken for a register's name misspelt.
@@ -246,7 +247,7 @@ impl Expander<'_> {
 
     /// The word of a directive that switches something on or off.
     pub(crate) fn is_on(&mut self, at: At, word: Name, directive: &'static str) -> Result<bool, Reported> {
-        let name = self.context.name(at, word.name, word.span)?;
+        let name = self.context.spelled(at, word.name, word.span)?;
         match self.context.scopes.text(name) {
             "on" => Ok(true),
             "off" => Ok(false),
@@ -257,9 +258,73 @@ impl Expander<'_> {
         }
     }
 
+    /// `.fast`: what it allows from here on.
+    pub(crate) fn allowed(&mut self, at: At, words: &[Name]) -> Result<Fast, Reported> {
+        let mut fast = Fast::default();
+        for word in words {
+            let name = self.context.name(at, word.name, word.span)?;
+            match self.context.scopes.text(name) {
+                "reassociate" => fast.reassociate = true,
+                "reciprocal" => fast.reciprocal = true,
+                "off" if words.len() == 1 => {}
+                other => {
+                    let message =
+                        format!("`.fast` is `reassociate`, `reciprocal`, both, or `off`, not `{other}`");
+                    return Err(self.context.error(at.scope, "fast", word.span, message));
+                }
+            }
+        }
+        Ok(fast)
+    }
+
+    fn columns(&mut self, at: At, first: Expr, last: Expr) -> Result<Columns, Reported> {
+        let span = first.span.to(last.span);
+        let (first, last) = (self.context.integer(at, first)?, self.context.integer(at, last)?);
+        match (u32::try_from(first), u32::try_from(last)) {
+            (Ok(first), Ok(last)) if 0 < first && first <= last => Ok(Columns { first, last }),
+            _ => {
+                let message = format!("there are no columns {first} to {last}: they count from 1");
+                Err(self.context.error(at.scope, "range", span, message))
+            }
+        }
+    }
+
+    pub(crate) fn set_loc(&mut self, at: At, places: &[Loc]) -> Result<(), Reported> {
+        let mut locations = Vec::with_capacity(places.len());
+        for place in places {
+            locations.push(match place {
+                Loc::None(name) => {
+                    let text = self.context.reports.sources.text(name.span);
+                    if text != "none" {
+                        let message =
+                            format!("`{text}` is not a place: a file in `\"` and a line, or `none`");
+                        return Err(self.context.error(at.scope, "syntax", name.span, message));
+                    }
+                    None
+                }
+                Loc::At(file, line, columns) => {
+                    let number = self.context.integer(at, *line)?;
+                    let Some(number) = u32::try_from(number).ok().filter(|number| *number > 0) else {
+                        let message = format!("there is no line {number}: lines count from 1");
+                        return Err(self.context.error(at.scope, "range", line.span, message));
+                    };
+                    let columns = match columns {
+                        Some((first, last)) => Some(self.columns(at, *first, *last)?),
+                        None => None,
+                    };
+                    let file = self.flat.file(file);
+                    Some((Location { file, line: number }, columns))
+                }
+            });
+        }
+        self.flat.locs.push(locations);
+        self.loc = self.flat.locs.len() as u32 - 1;
+        Ok(())
+    }
+
     /// `.ports`: whether they are latched.
     pub(crate) fn ports(&mut self, at: At, word: Name) -> Result<(), Reported> {
-        let name = self.context.name(at, word.name, word.span)?;
+        let name = self.context.spelled(at, word.name, word.span)?;
         let latched = match self.context.scopes.text(name) {
             "latched" => true,
             "direct" => false,
@@ -325,7 +390,7 @@ impl Expander<'_> {
 
 /// The address of a register by its canonical name.
 pub(crate) fn address(context: &mut Context, at: At, place: Name) -> Result<Register, Reported> {
-    let id = context.name(at, place.name, place.span)?;
+    let id = context.spelled(at, place.name, place.span)?;
     let text = context.scopes.text(id).to_owned();
     let machine = context.machine;
     machine.register_address(&text).ok_or_else(|| {

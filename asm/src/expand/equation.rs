@@ -66,7 +66,14 @@ impl Expander<'_> {
                 self.flat.pieces.push(piece.clone());
                 self.push(at, statement, Some(number), span);
             }
-            Step::Use(name, operands, span) => self.enter_macro(at, *name, *span, operands),
+            Step::Use(name, operands, span) => {
+                let length = self.context.scopes.text(*name).len() as u32;
+                if let Some(notes) = &mut self.context.notes {
+                    // A call begins with the function's name.
+                    notes.macro_use(Span::new(span.start, span.start + length), *name);
+                }
+                self.enter_macro(at, *name, *span, operands);
+            }
         }
     }
 

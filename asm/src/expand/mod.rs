@@ -40,6 +40,17 @@ pub(crate) struct Item {
     pub(crate) scheduled: bool,
     /// Whether `.contract on` is in force; none if the file, of the library, excludes it for what it defines.
     pub(crate) contracted: Option<bool>,
+    /// What `.fast` allows.
+    pub(crate) fast: Fast,
+}
+
+/// What `.fast` allows of equations beyond what is written.
+#[derive(Clone, Copy, Default, Debug)]
+pub(crate) struct Fast {
+    /// The order of a sum and of a product may change.
+    pub(crate) reassociate: bool,
+    /// A division by a constant may be a multiplication by its inverse.
+    pub(crate) reciprocal: bool,
 }
 
 /// Words of data memory.
@@ -143,7 +154,7 @@ pub(crate) struct Expander<'l> {
     pub(crate) flat: Flat,
     pub(crate) frames: Vec<Frame>,
     pub(crate) section: Section,
-    loc: u32,
+    pub(crate) loc: u32,
     pub(crate) data_words: usize,
     statements: usize,
     /// Files read: the tree and the index in the sources.
@@ -158,6 +169,7 @@ pub(crate) struct Expander<'l> {
     contracted: bool,
     /// Files of the library of whose operations none is fused.
     uncontracted: HashSet<u32>,
+    fast: Fast,
     pub(crate) include_depth: usize,
     pub(crate) includes: usize,
     macro_depth: usize,
@@ -190,6 +202,7 @@ impl<'l> Expander<'l> {
             scheduled: false,
             contracted: false,
             uncontracted: HashSet::new(),
+            fast: Fast::default(),
             data_words: 0,
             statements: 0,
             files: HashMap::new(),
@@ -377,7 +390,7 @@ impl<'l> Expander<'l> {
         let ast = &self.context.asts[at.ast as usize];
         let operation = ast.operations[first as usize];
         if count == 1 {
-            let Ok(name) = self.context.name(at, operation.mnemonic.name, operation.mnemonic.span) else {
+            let Ok(name) = self.context.spelled(at, operation.mnemonic.name, operation.mnemonic.span) else {
                 return;
             };
             // A macro cannot have an instruction's name.
@@ -406,8 +419,8 @@ impl<'l> Expander<'l> {
                 return;
             }
         };
-        let (loc, scheduled) = (self.loc, self.scheduled);
-        items.push(Item { at, statement, piece, loc, scheduled, contracted });
+        let (loc, scheduled, fast) = (self.loc, self.scheduled, self.fast);
+        items.push(Item { at, statement, piece, loc, scheduled, contracted, fast });
         if self.flat.once.len() + self.flat.period.len() > limits::OPERATIONS {
             let message = format!("the program expands to more than {} bundles", limits::OPERATIONS);
             self.limit(at.scope, span, message);
@@ -430,6 +443,9 @@ impl<'l> Expander<'l> {
             let error = Diagnostic::error("arguments", operation.span, message).also(defined, "defined here");
             self.context.report(at.scope, error);
             return;
+        }
+        if let Some(notes) = &mut self.context.notes {
+            notes.macro_use(operation.mnemonic.span, name);
         }
         self.enter_macro(at, name, operation.span, &given);
     }
@@ -528,7 +544,7 @@ impl<'l> Expander<'l> {
             }
             DirectiveKind::Rep { variable, first, last, end } => {
                 self.jump(*end + 1);
-                let variable = self.context.name(at, variable.name, variable.span)?;
+                let variable = self.context.spelled(at, variable.name, variable.span)?;
                 let from = self.context.integer(at, *first)?;
                 let to = self.context.integer(at, *last)?;
                 if to.saturating_sub(from) >= limits::REPETITIONS {
@@ -574,6 +590,7 @@ impl<'l> Expander<'l> {
                 }
                 on => self.contracted = on,
             },
+            DirectiveKind::Fast(words) => self.fast = self.allowed(at, words)?,
             DirectiveKind::Ports(word) => self.ports(at, *word)?,
             DirectiveKind::LoopBound(most) => self.loop_bound(at, *most, span)?,
             DirectiveKind::Deadline(..) | DirectiveKind::Order(_) | DirectiveKind::Late(..) => {
@@ -622,7 +639,7 @@ impl<'l> Expander<'l> {
         if at.scope != ScopeId::ROOT {
             return Err(Reported);
         }
-        let id = self.context.name(at, name.name, name.span)?;
+        let id = self.context.spelled(at, name.name, name.span)?;
         let text = self.context.scopes.text(id).to_owned();
         if id.op().is_some() {
             let error = Diagnostic::error("declared-twice", name.span, format!("`{text}` is an instruction"))
@@ -651,51 +668,6 @@ impl<'l> Expander<'l> {
             }
         }
         self.context.scopes.macros.insert(id, MacroDefinition { ast: at.ast, directive, start, uses: 0 });
-        Ok(())
-    }
-
-    fn columns(&mut self, at: At, first: Expr, last: Expr) -> Result<Columns, Reported> {
-        let span = first.span.to(last.span);
-        let (first, last) = (self.context.integer(at, first)?, self.context.integer(at, last)?);
-        match (u32::try_from(first), u32::try_from(last)) {
-            (Ok(first), Ok(last)) if 0 < first && first <= last => Ok(Columns { first, last }),
-            _ => {
-                let message = format!("there are no columns {first} to {last}: they count from 1");
-                Err(self.context.error(at.scope, "range", span, message))
-            }
-        }
-    }
-
-    fn set_loc(&mut self, at: At, places: &[Loc]) -> Result<(), Reported> {
-        let mut locations = Vec::with_capacity(places.len());
-        for place in places {
-            locations.push(match place {
-                Loc::None(name) => {
-                    let text = self.context.reports.sources.text(name.span);
-                    if text != "none" {
-                        let message =
-                            format!("`{text}` is not a place: a file in `\"` and a line, or `none`");
-                        return Err(self.context.error(at.scope, "syntax", name.span, message));
-                    }
-                    None
-                }
-                Loc::At(file, line, columns) => {
-                    let number = self.context.integer(at, *line)?;
-                    let Some(number) = u32::try_from(number).ok().filter(|number| *number > 0) else {
-                        let message = format!("there is no line {number}: lines count from 1");
-                        return Err(self.context.error(at.scope, "range", line.span, message));
-                    };
-                    let columns = match columns {
-                        Some((first, last)) => Some(self.columns(at, *first, *last)?),
-                        None => None,
-                    };
-                    let file = self.flat.file(file);
-                    Some((Location { file, line: number }, columns))
-                }
-            });
-        }
-        self.flat.locs.push(locations);
-        self.loc = self.flat.locs.len() as u32 - 1;
         Ok(())
     }
 }

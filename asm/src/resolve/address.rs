@@ -122,7 +122,7 @@ impl Resolver<'_> {
     }
 
     fn origin_of_name(&mut self, at: At, name: NameRef, nodes: &mut u32) -> Origin {
-        let Ok(name) = self.context.name(at, name, Span::default()) else { return Origin::Other };
+        let Ok(name) = self.context.spelled(at, name, Span::default()) else { return Origin::Other };
         match self.context.lookup(at.scope, name) {
             Binding::Data(label) => Origin::Label(label),
             Binding::Argument(argument) => {

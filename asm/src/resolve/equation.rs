@@ -3,14 +3,15 @@
 //! of the line that it computes as its span. Here is what becomes of the values: where they go, and what types they have.
 
 use crate::context::{At, Reported, Wanted, type_name, words};
-use crate::expand::Item;
 use crate::expand::equation::Results;
+use crate::expand::{Fast, Item};
 use crate::ir::given::Kind;
 use crate::ir::{Bundle, Constant, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::resolve::Resolver;
+use crate::resolve::fast::Chain;
 use crate::resolve::forms::Meaning;
 use crate::resolve::sharing::Key;
 use crate::syntax::ast::*;
@@ -27,6 +28,8 @@ pub(super) enum Part {
     Constant(Value, ExprId),
     /// A register and what is known of its type.
     Register(RegisterId, Kind),
+    /// A sum or a product that is still to be computed: which of the line's, and its type.
+    Chain(usize, Kind),
 }
 
 /// A part of an equation, and where it stands.
@@ -40,13 +43,13 @@ impl Term {
     pub(super) fn value(&self) -> Option<Value> {
         match self.part {
             Part::Constant(value, _) => Some(value),
-            Part::Register(..) => None,
+            Part::Register(..) | Part::Chain(..) => None,
         }
     }
 
     pub(super) fn kind(&self) -> Option<Kind> {
         match self.part {
-            Part::Register(_, kind) => Some(kind),
+            Part::Register(_, kind) | Part::Chain(_, kind) => Some(kind),
             Part::Constant(..) => None,
         }
     }
@@ -59,6 +62,10 @@ pub(super) struct Line {
     /// What its operations have computed so far: where the value is, the bundle, and the part.
     pub(super) computed: Vec<(RegisterId, usize, Key)>,
     pub(super) results: Results,
+    /// What `.fast` allows.
+    pub(super) fast: Fast,
+    /// Sums and products that are not computed yet.
+    pub(super) chains: Vec<Chain>,
 }
 
 impl Resolver<'_> {
@@ -69,7 +76,14 @@ impl Resolver<'_> {
         let piece = item.piece.map(|piece| self.flat.pieces[piece as usize].clone());
         let (argument, results) = piece.map_or((None, Results::default()), |p| (p.argument, p.results));
         self.sharing.next();
-        let mut line = Line { location, scheduled: item.scheduled, computed: Vec::new(), results };
+        let mut line = Line {
+            location,
+            scheduled: item.scheduled,
+            computed: Vec::new(),
+            results,
+            fast: item.fast,
+            chains: Vec::new(),
+        };
         if let Some((value, register)) = argument {
             let term = self.compute(item.at, &mut line, ast, value.id, Kind::None)?;
             return self.assign(item.at, &mut line, &[(register, Kind::None, value.span)], &[term]);
@@ -295,6 +309,8 @@ impl Resolver<'_> {
     ) -> Result<RegisterId, Reported> {
         let source = match term.part {
             Part::Register(register, _) => register,
+            // An expression's value is computed.
+            Part::Chain(..) => return Err(Reported),
             Part::Constant(value, expr) => self.holding(at, value, expr, term.span, ty)?,
         };
         let Some(Meaning { op, .. }) = self.forms.get("", 1).first() else { return Err(Reported) };

@@ -15,9 +15,13 @@ use crate::resolve::forms::Meaning;
 use crate::syntax::ast::*;
 use crate::syntax::expr::{self, EvalError, Value};
 use crate::syntax::name::{NameId, NameRef};
+use smallvec::SmallVec;
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 use takt_isa::Type;
+
+/// The part of the line at hand, and its expression.
+pub(super) type Here = (Span, ExprId);
 
 /// What an expression is made of, found before it is computed.
 struct Plan {
@@ -177,10 +181,14 @@ impl Resolver<'_> {
                     span: nodes[last as usize].span,
                 };
                 let NodeKind::Name(variable) = nodes[index as usize].kind else { return Err(Reported) };
-                let variable = self.context.name(at, variable, nodes[index as usize].span)?;
+                let counts = nodes[index as usize].span;
+                let variable = self.context.spelled(at, variable, counts)?;
                 let from = self.context.integer(at, expression(operands[1]))?;
                 let last = self.context.integer(at, expression(operands[2]))?;
                 let span = nodes[sum as usize].span;
+                if let Some(notes) = &mut self.context.notes {
+                    notes.sum(span, counts, variable);
+                }
                 if from > last {
                     stack.push(constant(Value::Int(0), index, sum, span));
                     continue;
@@ -264,10 +272,16 @@ impl Resolver<'_> {
             };
             stack.push(term);
         }
-        stack.pop().ok_or(Reported)
+        let value = stack.pop().ok_or(Reported)?;
+        self.settled(at, line, value)
     }
 
-    fn folded(&mut self, at: At, value: Result<Value, expr::Fault>, span: Span) -> Result<Value, Reported> {
+    pub(super) fn folded(
+        &mut self,
+        at: At,
+        value: Result<Value, expr::Fault>,
+        span: Span,
+    ) -> Result<Value, Reported> {
         value.map_err(|fault| self.context.fault(at.scope, EvalError { span, fault }))
     }
 
@@ -286,7 +300,7 @@ impl Resolver<'_> {
     }
 
     /// What a name stands for.
-    fn name(&mut self, at: At, name: NameRef, (span, id): (Span, ExprId)) -> Result<Term, Reported> {
+    fn name(&mut self, at: At, name: NameRef, (span, id): Here) -> Result<Term, Reported> {
         self.cast = None;
         let (place, given, meaning) = self.meaning(at, Operand { kind: OperandKind::Name(name), span })?;
         let register = |resolver: &Self, register| {
@@ -330,7 +344,7 @@ impl Resolver<'_> {
         line: &mut Line,
         name: NameId,
         terms: &[Term],
-        here: (Span, ExprId),
+        here: Here,
     ) -> Result<Term, Reported> {
         let text = self.context.scopes.text(name).to_owned();
         // The least or greatest of several.
@@ -353,7 +367,27 @@ impl Resolver<'_> {
         line: &mut Line,
         symbol: &str,
         terms: &[Term],
-        here: (Span, ExprId),
+        here: Here,
+        wanted: Kind,
+    ) -> Result<Term, Reported> {
+        if let Some(term) = self.fast(at, line, symbol, terms, here)? {
+            return Ok(term);
+        }
+        let mut settled: SmallVec<[Term; 3]> = SmallVec::new();
+        for term in terms {
+            settled.push(self.settled(at, line, *term)?);
+        }
+        self.operate(at, line, symbol, &settled, here, wanted)
+    }
+
+    /// The same, of values that are computed, as written.
+    pub(super) fn operate(
+        &mut self,
+        at: At,
+        line: &mut Line,
+        symbol: &str,
+        terms: &[Term],
+        here: Here,
         wanted: Kind,
     ) -> Result<Term, Reported> {
         let fitting: Vec<Meaning> = self
@@ -376,8 +410,8 @@ impl Resolver<'_> {
             if let Some(opposite) = opposite(symbol)
                 && self.forms.get(opposite, terms.len()).iter().any(|meaning| self.fits(meaning, terms))
             {
-                let term = self.apply(at, line, opposite, terms, here, Kind::None)?;
-                return self.apply(at, line, Operator::Not.text(), &[term], here, Kind::None);
+                let term = self.operate(at, line, opposite, terms, here, Kind::None)?;
+                return self.operate(at, line, Operator::Not.text(), &[term], here, Kind::None);
             }
             return Err(self.no_form(at, symbol, terms, here.0));
         };
@@ -415,6 +449,8 @@ impl Resolver<'_> {
             (registers[which], kinds[which]) = match term.part {
                 Part::Register(register, kind) => (register, kind),
                 Part::Constant(value, expr) => (self.holding(at, value, expr, term.span, ty)?, Kind::of(ty)),
+                // Its caller has computed it.
+                Part::Chain(..) => return Err(Reported),
             };
         }
         let result = self.forms.result(op, |which| kinds[which]);
@@ -442,13 +478,15 @@ impl Resolver<'_> {
     }
 
     /// Whether an instruction takes what the terms are.
-    fn fits(&self, meaning: &Meaning, terms: &[Term]) -> bool {
+    pub(super) fn fits(&self, meaning: &Meaning, terms: &[Term]) -> bool {
         let row = meaning.op.row();
         let passed = self.forms.passed(meaning.op);
         let takes = |(term, &which): (&Term, &usize)| match (row.source_type(which), term.part) {
-            (Type::F, Part::Register(_, kind)) => kind != Kind::Int,
-            (Type::I, Part::Register(_, kind)) => kind != Kind::Float,
-            (Type::B, Part::Register(_, kind)) => passed.contains(&which) || kind != Kind::Float,
+            (Type::F, Part::Register(_, kind) | Part::Chain(_, kind)) => kind != Kind::Int,
+            (Type::I, Part::Register(_, kind) | Part::Chain(_, kind)) => kind != Kind::Float,
+            (Type::B, Part::Register(_, kind) | Part::Chain(_, kind)) => {
+                passed.contains(&which) || kind != Kind::Float
+            }
             (Type::B, Part::Constant(value, _)) if !passed.contains(&which) => value.integer().is_ok(),
             (Type::I, Part::Constant(value, _)) => value.integer().is_ok(),
             (_, Part::Constant(..)) => true,

@@ -3,6 +3,7 @@
 mod address;
 pub(crate) mod equation;
 mod expression;
+mod fast;
 pub(crate) mod forms;
 mod mismatch;
 mod operand;
@@ -359,7 +360,7 @@ impl Resolver<'_> {
         location: Option<(Location, Option<Columns>)>,
     ) -> Result<Operation, Reported> {
         let written = &ast.operations[number as usize];
-        let name = self.context.name(at, written.mnemonic.name, written.mnemonic.span)?;
+        let name = self.context.spelled(at, written.mnemonic.name, written.mnemonic.span)?;
         let operands = &ast.operands[written.first as usize..(written.first + written.count) as usize];
         let Some(op) = name.op() else {
             if name.directive() == Some(Directive::Raw) {

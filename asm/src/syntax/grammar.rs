@@ -722,6 +722,13 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
     let schedule = is(Directive::Schedule)
         .ignore_then(name.clone().labelled("`on` or `off`"))
         .map(DirectiveKind::Schedule);
+    let allowed = comma().or_not().ignore_then(name.clone()).repeated().collect::<Vec<_>>();
+    let fast = is(Directive::Fast)
+        .ignore_then(name.clone().labelled("`reassociate`, `reciprocal` or `off`").then(allowed))
+        .map(|(first, mut more)| {
+            more.insert(0, first);
+            DirectiveKind::Fast(more)
+        });
     let contract = is(Directive::Contract)
         .ignore_then(name.clone().labelled("`on` or `off`"))
         .map(DirectiveKind::Contract);
@@ -763,7 +770,7 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
         .map(DirectiveKind::Loc);
     choice((
         bare, declare, float, word, constant, preset, space, branch, elif, rep, macro_, include, error, loc,
-        schedule, contract, latched, loop_bound, deadline, order, late,
+        schedule, contract, fast, latched, loop_bound, deadline, order, late,
     ))
     .map_with(|kind, e| Body::Directive(kind, e.span()))
 }

@@ -13,7 +13,7 @@ use logos::Logos;
 #[derive(Logos, Clone, Copy, PartialEq, Eq, Debug)]
 #[logos(skip r"[ \t\r\x0C]+")]
 #[logos(skip(r";[^\n]*", allow_greedy = true))]
-enum Raw {
+pub(super) enum Raw {
     #[token("\n")]
     Newline,
     #[regex(r"[A-Za-z_][A-Za-z0-9_.]*")]

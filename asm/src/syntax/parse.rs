@@ -183,6 +183,7 @@ fn number_lines(operations: &mut [Operation], tokens: &[(Token, Span)], first: u
 /// Keeps of a line that could not be read what other lines depend on: its label, the block that it opens or closes, and
 /// the names that it may have declared.
 fn broken(tokens: &[(Token, Span)], line: &LineTokens, ast: &mut Ast) {
+    ast.broken.push(line.number);
     let (label, rest) = match tokens {
         [(Token::Name(name), span), (Token::Colon, _), rest @ ..] => {
             (Some(Name { name: NameRef::plain(*name), span: *span }), rest)

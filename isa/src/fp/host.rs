@@ -17,7 +17,7 @@ pub struct Host;
 
 /// Whether `bits` is an infinity or a NaN, the only results that can have raised a flag.
 #[inline(always)]
-const fn is_special(bits: u32) -> bool {
+pub(super) const fn is_special(bits: u32) -> bool {
     bits & INFINITY == INFINITY
 }
 
@@ -76,7 +76,8 @@ const fn special_fused(a: u32, b: u32, c: u32, result: u32) -> Value {
 
 /// `product + addend`, of which `sum` is the binary64 nearest: the sum cut off to binary64, with an odd last place if that lost
 /// something. From there, rounding to a format narrower by two places or more is right.
-fn round_to_odd(product: f64, addend: f64, sum: f64) -> f64 {
+#[inline(always)]
+pub(super) fn round_to_odd(product: f64, addend: f64, sum: f64) -> f64 {
     // What the sum lost, exactly (Knuth's TwoSum): neither operand comes near the ends of binary64's range.
     let of_addend = sum - product;
     let lost = (product - (sum - of_addend)) + (addend - of_addend);
@@ -107,6 +108,17 @@ const fn saturated_integer(a: u32) -> Value {
 #[cold]
 const fn unordered(signaling: bool) -> Value {
     Value::new(0, if signaling { Flags::INVALID } else { Flags::NONE })
+}
+
+/// The integer nearest to a binary32, ties to even, if it fits, and whether it does.
+#[inline(always)]
+pub(super) fn to_integer(a: u32) -> (u32, bool) {
+    // In binary64 the sum with 1.5·2⁵² is rounded at the units' place, ties to even, and its low word is the integer
+    // in two's complement.
+    const ROUND_TO_UNITS: f64 = 6_755_399_441_055_744.0;
+    const LIMIT: f32 = 2_147_483_648.0;
+    let x = f32::from_bits(a);
+    ((f64::from(x) + ROUND_TO_UNITS).to_bits() as u32, (-LIMIT..LIMIT).contains(&x))
 }
 
 impl Arithmetic for Host {
@@ -163,15 +175,9 @@ impl Arithmetic for Host {
 
     #[inline(always)]
     fn ftoi(a: u32) -> Value {
-        // In binary64 the sum with 1.5·2⁵² is rounded at the units' place, ties to even, and its low word is the integer
-        // in two's complement.
-        const ROUND_TO_UNITS: f64 = 6_755_399_441_055_744.0;
-        const LIMIT: f32 = 2_147_483_648.0;
-        let x = f32::from_bits(a);
-        if (-LIMIT..LIMIT).contains(&x) {
-            Value::exact((f64::from(x) + ROUND_TO_UNITS).to_bits() as u32)
-        } else {
-            saturated_integer(a)
+        match to_integer(a) {
+            (bits, true) => Value::exact(bits),
+            _ => saturated_integer(a),
         }
     }
 

@@ -287,6 +287,29 @@ macro_rules! instructions {
                 $(Op::$mnemonic => value!($($meaning)*),)*
             }
         }
+
+        /// [`compute`] on many operands at once, into `results`: a loop for each instruction, which the compiler turns into
+        /// vector instructions where `A` has no branches ([`fp::Screened`]). Whether any of the values has a flag set.
+        #[inline(always)]
+        #[allow(unused_variables)]
+        pub fn compute_lanes<A: Arithmetic, const L: usize>(
+            op: Op,
+            sources: [&[u32; L]; 3],
+            results: &mut [u32; L],
+        ) -> bool {
+            let mut raised = 0;
+            match op {
+                $(Op::$mnemonic => {
+                    for lane in 0..L {
+                        let [$a, $b, $c] = [sources[0][lane], sources[1][lane], sources[2][lane]];
+                        let value: Value = value!($($meaning)*);
+                        results[lane] = value.bits;
+                        raised |= u32::from(value.flags.bits());
+                    }
+                })*
+            }
+            raised != 0
+        }
     };
 }
 

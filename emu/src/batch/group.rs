@@ -1,0 +1,584 @@
+//! A group of lanes that go through the program together, and those that have left it for a while.
+//!
+//! What all lanes have in common stands once, in an ordinary [`Emulator`]: cycles, fetch, ticks, the bundles issued of late,
+//! which registers were written, the return stack, which results are underway. Of its own values it keeps none; those
+//! are rows of [`Lanes`]. A lane that branches differently from most, or is about to fault, is taken out: with its values and
+//! the common timeline it is an ordinary emulator, which runs to the end of the period and knows nothing of the batch. At
+//! the tick it joins again, if it is then where the others are.
+
+use super::lanes::{LANES, Lanes, Mask, Row, Underway};
+use crate::block::{Ages, ages};
+use crate::emulator::{Emulator, MAX_CYCLE, Recent, Status};
+use crate::event::{PortWrite, Retire};
+use crate::execute::stack_fault;
+use crate::fast::has_required;
+use crate::fault::LoadError;
+use crate::machine::{Pending, RegisterSet, State};
+use crate::micro::Late;
+use crate::system::{PeriodError, PeriodReport};
+use takt_isa::fp::Flags;
+use takt_isa::timing::{self, Cycle};
+use takt_isa::{BundleAddress, Flow, Program, Register};
+
+/// Where a lane is.
+enum Place {
+    /// With the others.
+    Present,
+    /// On its own, and how its last period ended.
+    Away(Box<Emulator>, Option<Result<PeriodReport, PeriodError>>),
+    /// Nowhere: the batch has fewer lanes.
+    Empty,
+}
+
+/// Lanes that run together.
+pub(crate) struct Group {
+    /// The common timeline.
+    lead: Emulator,
+    lanes: Lanes,
+    places: Vec<Place>,
+    present: Mask,
+    /// How much later each lane's cycles are than the timeline's.
+    offsets: [i64; LANES],
+    /// What a lane has written before it joined.
+    written: Vec<RegisterSet>,
+    published: Vec<RegisterSet>,
+    /// Emulators without a lane.
+    spare: Vec<Box<Emulator>>,
+    report: Option<PeriodReport>,
+    nan_writes: Vec<Vec<PortWrite>>,
+    /// Cycles that a period may take, and the cycle before which that ends each lane's present one.
+    limit: Cycle,
+    limits: [Cycle; LANES],
+    /// Periods of lanes that ran on their own, at least in part.
+    pub(crate) apart: u64,
+}
+
+/// What comes after a stretch of the common run.
+enum Next {
+    More,
+    /// The period has ended, or nobody is present any more.
+    End,
+}
+
+impl Group {
+    /// The first `count` lanes with a program in them.
+    pub(crate) fn new(program: &Program, count: usize) -> Result<Group, LoadError> {
+        let lead = Emulator::new(program)?;
+        let written = vec![lead.state.written; LANES];
+        let published =
+            lead.state.latches.as_ref().map_or(RegisterSet::default(), |latches| latches.published);
+        let places = (0..LANES).map(|lane| if lane < count { Place::Present } else { Place::Empty });
+        Ok(Group {
+            lanes: Lanes::new(&lead.state),
+            places: places.collect(),
+            present: std::array::from_fn(|lane| lane < count),
+            offsets: [0; LANES],
+            written,
+            published: vec![published; LANES],
+            spare: Vec::new(),
+            report: None,
+            nan_writes: vec![Vec::new(); LANES],
+            limit: MAX_CYCLE,
+            limits: [MAX_CYCLE; LANES],
+            apart: 0,
+            lead,
+        })
+    }
+
+    // ---- Settings and inputs.
+
+    pub(crate) fn each_emulator(&mut self, mut set: impl FnMut(&mut Emulator)) {
+        set(&mut self.lead);
+        for place in &mut self.places {
+            if let Place::Away(emulator, _) = place {
+                set(emulator);
+            }
+        }
+    }
+
+    /// Cycles that a period may take.
+    pub(crate) fn set_period_limit(&mut self, cycles: Cycle) {
+        self.limit = cycles;
+    }
+
+    /// Sets an input port, which the machine has. `values` are those of the first lanes.
+    pub(crate) fn set_input(&mut self, register: Register, values: &[u32]) {
+        let mut row: Row = std::array::from_fn(|lane| values.get(lane).copied().unwrap_or(0));
+        if let Some(model) = self.model() {
+            let value = row[model];
+            let absent = row.iter_mut().zip(self.present).filter(|(_, present)| !present);
+            absent.for_each(|(word, _)| *word = value);
+        }
+        self.lead.state.set_input(register, row[0]);
+        match &mut self.lanes.latches {
+            Some(latches) => latches.inputs[register.index()] = row,
+            None => self.lanes.registers[register.index()] = row,
+        }
+        for (place, &value) in self.places.iter_mut().zip(values) {
+            if let Place::Away(emulator, _) = place {
+                emulator.state.set_input(register, value);
+            }
+        }
+    }
+
+    // ---- What there is to see.
+
+    /// How a lane's last period ended; `None` before the first.
+    pub(crate) fn outcome(&self, lane: usize) -> Option<Result<PeriodReport, PeriodError>> {
+        match &self.places[lane] {
+            Place::Away(_, outcome) => outcome.clone(),
+            _ => self
+                .report
+                .as_ref()
+                .map(|report| Ok(report.shifted(self.offsets[lane], &self.nan_writes[lane]))),
+        }
+    }
+
+    /// As [`Group::outcome`], of periods without a fault only the cycles.
+    pub(crate) fn cycles(&self, lane: usize) -> Option<Cycle> {
+        match &self.places[lane] {
+            Place::Away(_, outcome) => Some(outcome.as_ref()?.as_ref().ok()?.cycles),
+            _ => Some(self.report.as_ref()?.cycles),
+        }
+    }
+
+    pub(crate) fn output(&self, lane: usize, register: Register) -> Option<u32> {
+        let state = &self.lead.state;
+        match (&self.places[lane], &state.latches, &self.lanes.latches) {
+            (Place::Away(emulator, _), ..) => emulator.state.output(register),
+            (_, Some(latches), Some(rows)) => {
+                let published =
+                    latches.published.contains(register) || self.published[lane].contains(register);
+                published.then(|| rows.outputs[register.index()][lane])
+            }
+            _ => self.register(lane, register),
+        }
+    }
+
+    pub(crate) fn register(&self, lane: usize, register: Register) -> Option<u32> {
+        match &self.places[lane] {
+            Place::Away(emulator, _) => emulator.register(register),
+            _ => {
+                let written =
+                    self.lead.state.written.contains(register) || self.written[lane].contains(register);
+                written.then(|| self.lanes.registers[register.index()][lane])
+            }
+        }
+    }
+
+    pub(crate) fn memory(&self, lane: usize) -> Vec<u32> {
+        match &self.places[lane] {
+            Place::Away(emulator, _) => emulator.memory().to_vec(),
+            _ => self.lanes.memory.iter().map(|row| row[lane]).collect(),
+        }
+    }
+
+    pub(crate) fn flags(&self, lane: usize) -> Flags {
+        match &self.places[lane] {
+            Place::Away(emulator, _) => emulator.flags(),
+            _ => self.lanes.flags[lane],
+        }
+    }
+
+    pub(crate) fn now(&self, lane: usize) -> Cycle {
+        match &self.places[lane] {
+            Place::Away(emulator, _) => emulator.now(),
+            _ => self.lead.now.wrapping_add_signed(self.offsets[lane]),
+        }
+    }
+
+    // ---- A period.
+
+    /// Runs every lane to the end of its period.
+    pub(crate) fn run_period(&mut self) {
+        self.limits = std::array::from_fn(|lane| self.now(lane).saturating_add(self.limit));
+        self.rejoin();
+        self.report = None;
+        self.lead.report = None;
+        let present = (0..LANES).filter(|&lane| self.present[lane]);
+        let limits = present.map(|lane| self.limits[lane].saturating_add_signed(-self.offsets[lane]));
+        self.lead.set_cycle_limit(limits.min().unwrap_or(MAX_CYCLE));
+        for (place, limit) in self.places.iter_mut().zip(self.limits) {
+            if let Place::Away(emulator, _) = place {
+                emulator.set_cycle_limit(limit);
+            }
+        }
+        while self.model().is_some() {
+            if let Next::End = self.stretch() {
+                break;
+            }
+        }
+        for (lane, place) in self.places.iter_mut().enumerate() {
+            match place {
+                Place::Away(emulator, outcome) => {
+                    self.apart += 1;
+                    *outcome = Some(emulator.run_period(&[]));
+                }
+                Place::Present if !self.lanes.nan_writes[lane].kept.is_empty() => {
+                    self.nan_writes[lane] = std::mem::take(&mut self.lanes.nan_writes[lane].kept);
+                    self.nan_writes[lane].sort_unstable();
+                }
+                Place::Present => self.nan_writes[lane].clear(),
+                Place::Empty => {}
+            }
+        }
+    }
+
+    /// The first lane that is present.
+    fn model(&self) -> Option<usize> {
+        self.present.iter().position(|&present| present)
+    }
+
+    /// A wait, or a block.
+    fn stretch(&mut self) -> Next {
+        match self.lead.status {
+            Status::Waiting { address, .. } => self.wait_for_tick(address),
+            Status::Running => self.run_block(),
+            // Neither happens to the timeline: those lanes have left it.
+            Status::Halted { .. } | Status::Faulted(_) => self.leave_all(),
+        }
+    }
+
+    fn wait_for_tick(&mut self, address: BundleAddress) -> Next {
+        if self.lead.ticks.next().is_none()
+            && let Some(tick) = self.lead.due_tick()
+        {
+            self.lead.tick_at(tick);
+        }
+        let Some(tick) = self.lead.ticks.next().filter(|&tick| tick < self.lead.cycle_limit) else {
+            return self.leave_all();
+        };
+        self.take_inputs();
+        self.lead.ticks.take(tick);
+        self.lanes.take_inputs(&mut self.lead.state);
+        self.lead.see_tick(tick, &mut None);
+        self.lanes.write_back_until(&mut self.lead.state, tick, &self.present, &self.offsets);
+        self.lead.tally.wait(address, tick + 1 - self.lead.now);
+        self.lead.now = tick + 1;
+        Next::More
+    }
+
+    /// Takes latched inputs, if that is to be done before the next cycle.
+    fn take_inputs(&mut self) {
+        if self.lead.state.latches.as_ref().is_some_and(|latches| latches.take) {
+            self.lanes.take_inputs(&mut self.lead.state);
+        }
+    }
+
+    /// The next block, in every lane that is present.
+    fn run_block(&mut self) -> Next {
+        let lead = &mut self.lead;
+        if lead.cache.is_full() {
+            lead.drop_blocks();
+        }
+        let (entry, entered) = (lead.front.next, lead.front.delivered);
+        let id = match &lead.recent {
+            Recent::Block { id, cycle } => {
+                lead.cache.successor(&lead.code, &lead.pauses, *id, *cycle, entry, entered)
+            }
+            Recent::List(recent) => lead.cache.after(&lead.code, &lead.pauses, recent, entry, entered),
+        };
+        let Some(id) = id else { return self.leave_all() };
+        let block = &lead.cache.blocks[id as usize];
+        let (flow, last) = (block.flow, entered + Cycle::from(block.last));
+        if last >= lead.cycle_limit
+            || flow == Flow::Halt
+            || lead.beyond_bound().is_some()
+            || stack_fault(flow, &lead.state, lead.code.machine).is_some()
+        {
+            return self.leave_all();
+        }
+        self.take_inputs();
+        let block = &self.lead.cache.blocks[id as usize];
+        if !block.verified && !has_required(&self.lead.state, block, last) {
+            return self.leave_all();
+        }
+        while let Err(outside) = self.try_block(id, last) {
+            (0..LANES).filter(|&lane| outside[lane]).for_each(|lane| self.leave(lane));
+            if self.model().is_none() {
+                return Next::End;
+            }
+        }
+        let address = self.after_block(id, entered, last);
+        self.go_on(flow, address, last)
+    }
+
+    /// Runs a block's operations; if that takes lanes out of their memory, they are the error, and nothing has happened.
+    fn try_block(&mut self, id: u32, last: Cycle) -> Result<(), Mask> {
+        let Group { lead, lanes, present, offsets, .. } = self;
+        let Emulator { cache, state, .. } = lead;
+        let block = &cache.blocks[id as usize];
+        lanes.begin(state, block, last);
+        let before = block.restore.as_ref().map(|_| (state.pending.clone(), state.written));
+        lanes.write_back_until(state, last, present, offsets);
+        lanes.run(block, present).inspect_err(|_| {
+            lanes.undo();
+            if let Some((pending, written)) = before {
+                (state.pending, state.written) = (pending, written);
+            }
+        })
+    }
+
+    /// What a block that has run leaves behind in the timeline; its last bundle.
+    fn after_block(&mut self, id: u32, entered: Cycle, last: Cycle) -> BundleAddress {
+        let Group { lead, lanes, offsets, .. } = self;
+        let block = &mut lead.cache.blocks[id as usize];
+        for late in &block.late {
+            lead.state.pending.push(pending(late, entered));
+        }
+        lanes.end(block, entered, offsets);
+        if !block.verified {
+            lead.state.written.insert_all(&block.writes);
+            block.verified = true;
+        }
+        block.enter(lead.front.from, entered - lead.now);
+        block.runs += 1;
+        let address = block.end().previous();
+        lead.now = last + 1;
+        lead.recent = Recent::Block { id, cycle: last };
+        lead.scoreboard = None;
+        while let Some(tick) = lead.ticks.next().filter(|&tick| tick <= last) {
+            lead.ticks.take(tick);
+            lead.see_tick(tick, &mut None);
+        }
+        address
+    }
+
+    /// Goes on after the bundle at `address`, which issued in cycle `last`. Of lanes that branch, the larger part stays.
+    fn go_on(&mut self, flow: Flow, address: BundleAddress, last: Cycle) -> Next {
+        if let Flow::Branch { register, .. } = flow {
+            let row = self.lanes.registers[register.index()];
+            let is_zero = |lane: usize| row[lane] == 0;
+            let zeros = (0..LANES).filter(|&lane| self.present[lane] && is_zero(lane)).count();
+            let all = self.present.iter().filter(|&&present| present).count();
+            let most = 2 * zeros > all;
+            if zeros != 0 && zeros != all {
+                for lane in 0..LANES {
+                    if self.present[lane] && is_zero(lane) != most {
+                        self.leave(lane);
+                        if let Place::Away(emulator, _) = &mut self.places[lane] {
+                            let last = last.wrapping_add_signed(self.offsets[lane]);
+                            emulator.follow(flow, address, last, &mut None);
+                        }
+                    }
+                }
+            }
+            // What the timeline's branch looks at.
+            self.lead.state.registers[register.index()] = u32::from(!most);
+        }
+        self.lead.follow(flow, address, last, &mut None);
+        if !matches!(flow, Flow::Wait(_)) {
+            return Next::More;
+        }
+        let Emulator { state, code, .. } = &self.lead;
+        if state.latches.is_some() {
+            let outputs = code.machine.slots.iter().flat_map(|slot| code.machine.output_registers(slot));
+            let all_written = &self.written;
+            let present = self.present;
+            // A lane that has written more publishes more; the value is in its row all the same.
+            let outputs: Vec<Register> = outputs.collect();
+            for lane in (0..LANES).filter(|&lane| present[lane]) {
+                for &register in outputs.iter().filter(|&&register| all_written[lane].contains(register)) {
+                    self.published[lane].insert(register);
+                }
+            }
+            self.lanes.publish_outputs(outputs.into_iter());
+        }
+        self.report = self.lead.report.take();
+        if self.report.is_some() { Next::End } else { Next::More }
+    }
+
+    // ---- Leaving and joining.
+
+    fn leave_all(&mut self) -> Next {
+        (0..LANES)
+            .filter(|&lane| self.present[lane])
+            .collect::<Vec<_>>()
+            .into_iter()
+            .for_each(|lane| self.leave(lane));
+        Next::End
+    }
+
+    /// Takes a lane out: an emulator that is exactly where it is.
+    fn leave(&mut self, lane: usize) {
+        let by = self.offsets[lane];
+        let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
+        self.lead.list_recent();
+        let mut emulator = self.spare.pop().unwrap_or_else(|| Box::new(self.lead.snapshot()));
+        // It may have run for a lane that had written more.
+        emulator.cache.blocks.iter_mut().for_each(|block| block.verified = false);
+        let lead = &self.lead;
+        emulator.now = shift(lead.now);
+        emulator.status = match lead.status {
+            Status::Waiting { since, address } => Status::Waiting { since: shift(since), address },
+            ref status => status.clone(),
+        };
+        emulator.front = lead.front;
+        emulator.front.delivered = shift(lead.front.delivered);
+        emulator.turns.clone_from(&lead.turns);
+        emulator.recent = match &lead.recent {
+            Recent::List(recent) => {
+                Recent::List(recent.iter().map(|&(address, cycle)| (address, shift(cycle))).collect())
+            }
+            recent => recent.clone(),
+        };
+        (emulator.scoreboard, emulator.planned, emulator.report) = (None, None, None);
+        emulator.ticks = lead.ticks.shifted(by);
+        emulator.period = lead.period.map(|period| period.shifted(by));
+        emulator.set_cycle_limit(self.limits[lane]);
+        let state = &mut emulator.state;
+        state.written = lead.state.written;
+        state.written.insert_all(&self.written[lane]);
+        state.stack.clone_from(&lead.state.stack);
+        state.pending.clone_from(&lead.state.pending);
+        for pending in &mut state.pending {
+            pending.retire.cycle = shift(pending.retire.cycle);
+            pending.retire.issued = shift(pending.retire.issued);
+        }
+        state.latches.clone_from(&lead.state.latches);
+        if let Some(latches) = &mut state.latches {
+            latches.published.insert_all(&self.published[lane]);
+        }
+        self.lanes.gather(lane, state);
+        self.places[lane] = Place::Away(emulator, None);
+        self.present[lane] = false;
+        if let Some(model) = self.model() {
+            self.lanes.imitate(lane, model);
+        }
+    }
+
+    /// Lets the lanes that are away join, where they are where the others are: it is the beginning of a period.
+    fn rejoin(&mut self) {
+        if !self.places.iter().any(|place| matches!(place, Place::Away(..))) {
+            return;
+        }
+        if self.model().is_none() && !self.adopt() {
+            return;
+        }
+        for lane in 0..LANES {
+            let place = std::mem::replace(&mut self.places[lane], Place::Empty);
+            self.places[lane] = match place {
+                Place::Away(emulator, outcome) => match self.join(lane, emulator) {
+                    Ok(()) => Place::Present,
+                    Err(emulator) => Place::Away(emulator, outcome),
+                },
+                place => place,
+            };
+        }
+    }
+
+    /// With nobody present, makes one lane's timeline the common one: of a lane that waits, and has written least, so that
+    /// others can join.
+    fn adopt(&mut self) -> bool {
+        let waiting = self.places.iter_mut().filter_map(|place| match place {
+            Place::Away(emulator, _) if matches!(emulator.status, Status::Waiting { .. }) => Some(emulator),
+            _ => None,
+        });
+        let Some(first) = waiting.min_by_key(|emulator| emulator.state.written.len()) else { return false };
+        first.list_recent();
+        let lead = &mut self.lead;
+        (lead.now, lead.front) = (first.now, first.front);
+        lead.status.clone_from(&first.status);
+        lead.turns.clone_from(&first.turns);
+        lead.recent.clone_from(&first.recent);
+        (lead.scoreboard, lead.planned, lead.report) = (None, None, None);
+        lead.ticks.clone_from(&first.ticks);
+        lead.period = first.period;
+        lead.state.clone_from(&first.state);
+        // It may have written less than was found before.
+        lead.cache.blocks.iter_mut().for_each(|block| block.verified = false);
+        let underway = lead.state.pending.iter().map(|pending| Underway {
+            values: [pending.retire.value; LANES],
+            flags: [pending.retire.flags; LANES],
+            memory: pending.retire.memory.map(|word| [word; LANES]),
+        });
+        self.lanes.underway = underway.collect();
+        true
+    }
+
+    /// Joins a lane, if it waits for the same tick in the same state of everything but values.
+    fn join(&mut self, lane: usize, mut emulator: Box<Emulator>) -> Result<(), Box<Emulator>> {
+        let Some(by) = self.distance(&mut emulator) else { return Err(emulator) };
+        self.offsets[lane] = by;
+        self.written[lane] = emulator.state.written;
+        self.published[lane] =
+            emulator.state.latches.as_ref().map_or(RegisterSet::default(), |latches| latches.published);
+        self.lanes.scatter(lane, &mut emulator.state);
+        self.present[lane] = true;
+        self.spare.push(emulator);
+        Ok(())
+    }
+
+    /// How much later than the common timeline another one is that is otherwise the same; `None` if it differs.
+    fn distance(&mut self, other: &mut Emulator) -> Option<i64> {
+        let lead = &mut self.lead;
+        let (Status::Waiting { since, .. }, Status::Waiting { since: others_since, .. }) =
+            (&lead.status, &other.status)
+        else {
+            return None;
+        };
+        let (since, others_since) = (*since, *others_since);
+        let (tick, others_tick) = (lead.due_tick()?, other.due_tick()?);
+        let by = others_tick.wrapping_sub(tick).cast_signed();
+        let machine = lead.code.machine;
+        let delivered = timing::after_tick(machine, since, tick);
+        let others_delivered = timing::after_tick(machine, others_since, others_tick);
+        lead.list_recent();
+        other.list_recent();
+        let same = lead.front.next == other.front.next
+            && delivered.wrapping_add_signed(by) == others_delivered
+            && lead.ticks.shifted(by).agree(&other.ticks)
+            && lead.turns == other.turns
+            && lead.state.stack == other.state.stack
+            && other.state.written.contains_all(&lead.state.written)
+            && same_latches(&lead.state, &other.state)
+            && same_pending(&lead.state.pending, &other.state.pending, by)
+            && recent_at(lead, delivered) == recent_at(other, others_delivered);
+        same.then_some(by)
+    }
+}
+
+/// The bundles that still count when the next one is delivered.
+fn recent_at(emulator: &Emulator, delivered: Cycle) -> Ages {
+    let Recent::List(recent) = &emulator.recent else { return Box::new([]) };
+    let age = |cycle: Cycle| (delivered - cycle).min(u8::MAX.into()) as u8;
+    ages(&emulator.code, recent.iter().map(|&(address, cycle)| (address, age(cycle))))
+}
+
+fn same_latches(common: &State, other: &State) -> bool {
+    match (&common.latches, &other.latches) {
+        (Some(common), Some(other)) => {
+            common.take == other.take
+                && common.changed == other.changed
+                && other.published.contains_all(&common.published)
+        }
+        (None, None) => true,
+        _ => false,
+    }
+}
+
+fn same_pending(common: &[Pending], others: &[Pending], by: i64) -> bool {
+    let key = |pending: &Pending, by: i64| {
+        let Retire { cycle, address, slot, op, .. } = pending.retire;
+        (cycle.wrapping_add_signed(by), address, slot, op, pending.register)
+    };
+    common.iter().map(|pending| key(pending, by)).eq(others.iter().map(|pending| key(pending, 0)))
+}
+
+/// A late result of a block entered in cycle `entered`. Its values are in the lanes.
+fn pending(late: &Late, entered: Cycle) -> Pending {
+    let Late { operation, register, address, offset } = *late;
+    let issued = entered + Cycle::from(offset);
+    let retire = Retire {
+        cycle: issued + Cycle::from(operation.latency),
+        issued,
+        address,
+        slot: operation.slot,
+        op: operation.op,
+        register: Some(register),
+        value: 0,
+        flags: Flags::NONE,
+        memory: None,
+    };
+    Pending { retire, register, output: operation.output, float: operation.float }
+}

@@ -1,0 +1,366 @@
+//! The values of a group's lanes, and what operations do to all of them at once.
+
+use crate::block::Block;
+use crate::event::PortWrite;
+use crate::execute::data_address;
+use crate::machine::{NanWrites, State, WORDS, Word};
+use crate::micro::{Kind, Micro};
+use takt_isa::fp::{Flags, Host, Screened, Value, is_nan};
+use takt_isa::timing::Cycle;
+use takt_isa::{Register, compute, compute_lanes};
+
+/// Lanes of a group: vectors as wide as the widest hosts', several of them, so that choosing what to do costs little beside
+/// doing it.
+pub(crate) const LANES: usize = 16;
+
+/// One word of every lane.
+pub(crate) type Row = [u32; LANES];
+
+/// A set of lanes.
+pub(crate) type Mask = [bool; LANES];
+
+/// Of a result underway: the values of all lanes. What is the same for all is in the timeline's list, at the same place.
+#[derive(Clone, Debug)]
+pub(crate) struct Underway {
+    pub(crate) values: Row,
+    pub(crate) flags: [Flags; LANES],
+    /// The data words that it was loaded from, if it is a load.
+    pub(crate) memory: Option<Row>,
+}
+
+/// Latched ports of all lanes, by register.
+#[derive(Clone, Debug)]
+pub(crate) struct LatchedRows {
+    pub(crate) inputs: Box<[Row]>,
+    pub(crate) outputs: Box<[Row]>,
+}
+
+/// Everything that operations read and write, of all lanes.
+#[derive(Clone, Debug)]
+pub(crate) struct Lanes {
+    pub(crate) registers: Box<[Row; WORDS]>,
+    pub(crate) memory: Vec<Row>,
+    pub(crate) flags: [Flags; LANES],
+    pub(crate) underway: Vec<Underway>,
+    pub(crate) nan_writes: Vec<NanWrites>,
+    pub(crate) latches: Option<LatchedRows>,
+    late: Vec<Underway>,
+    nans: Vec<(u32, usize, u32)>,
+    undo: Undo,
+}
+
+/// What a block that may fault has changed.
+#[derive(Clone, Debug, Default)]
+struct Undo {
+    registers: Vec<(Register, Row)>,
+    /// Whether it may fault.
+    kept: bool,
+    /// Rows of memory before a store.
+    stored: Vec<(usize, Row)>,
+    underway: Vec<Underway>,
+    flags: [Flags; LANES],
+    nans: Vec<(usize, u64)>,
+}
+
+impl Lanes {
+    /// All lanes as a state is.
+    pub(crate) fn new(state: &State) -> Lanes {
+        let rows: Vec<Row> = state.registers.iter().map(|&word| [word; LANES]).collect();
+        let spread = |words: &[u32]| words.iter().map(|&word| [word; LANES]).collect();
+        let latches = state.latches.as_ref().map(|latches| LatchedRows {
+            inputs: spread(&latches.inputs),
+            outputs: spread(&latches.outputs),
+        });
+        Lanes {
+            registers: rows.try_into().unwrap_or_else(|_| Box::new([[0; LANES]; WORDS])),
+            memory: state.memory.iter().map(|&word| [word; LANES]).collect(),
+            flags: [state.flags; LANES],
+            underway: Vec::new(),
+            nan_writes: vec![NanWrites::default(); LANES],
+            latches,
+            late: Vec::new(),
+            nans: Vec::new(),
+            undo: Undo::default(),
+        }
+    }
+
+    /// Gives a lane the registers and the memory of another: one that is away computes along with the rest, and with these
+    /// it does not hold them up. Nobody looks at what it computes.
+    pub(crate) fn imitate(&mut self, lane: usize, model: usize) {
+        self.registers.iter_mut().for_each(|row| row[lane] = row[model]);
+        self.memory.iter_mut().for_each(|row| row[lane] = row[model]);
+        self.underway.iter_mut().for_each(|underway| underway.values[lane] = underway.values[model]);
+    }
+
+    /// Takes the values of lane `lane` into a state.
+    pub(crate) fn gather(&mut self, lane: usize, state: &mut State) {
+        for (word, row) in state.registers.iter_mut().zip(&self.registers[..]) {
+            *word = row[lane];
+        }
+        for (word, row) in state.memory.iter_mut().zip(&self.memory) {
+            *word = row[lane];
+        }
+        state.flags = self.flags[lane];
+        for (pending, underway) in state.pending.iter_mut().zip(&self.underway) {
+            pending.retire.value = underway.values[lane];
+            pending.retire.flags = underway.flags[lane];
+            pending.retire.memory = underway.memory.map(|words| words[lane]);
+        }
+        state.nan_writes = std::mem::take(&mut self.nan_writes[lane]);
+        if let (Some(latches), Some(rows)) = (&mut state.latches, &self.latches) {
+            latches.inputs.iter_mut().zip(&rows.inputs).for_each(|(word, row)| *word = row[lane]);
+            latches.outputs.iter_mut().zip(&rows.outputs).for_each(|(word, row)| *word = row[lane]);
+        }
+    }
+
+    /// Puts a state's values into lane `lane`.
+    pub(crate) fn scatter(&mut self, lane: usize, state: &mut State) {
+        for (row, &word) in self.registers.iter_mut().zip(&state.registers[..]) {
+            row[lane] = word;
+        }
+        for (row, &word) in self.memory.iter_mut().zip(&state.memory) {
+            row[lane] = word;
+        }
+        self.flags[lane] = state.flags;
+        for (underway, pending) in self.underway.iter_mut().zip(&state.pending) {
+            underway.values[lane] = pending.retire.value;
+            underway.flags[lane] = pending.retire.flags;
+            if let (Some(words), Some(word)) = (&mut underway.memory, pending.retire.memory) {
+                words[lane] = word;
+            }
+        }
+        self.nan_writes[lane] = std::mem::take(&mut state.nan_writes);
+        if let (Some(latches), Some(rows)) = (&state.latches, &mut self.latches) {
+            rows.inputs.iter_mut().zip(&latches.inputs).for_each(|(row, &word)| row[lane] = word);
+            rows.outputs.iter_mut().zip(&latches.outputs).for_each(|(row, &word)| row[lane] = word);
+        }
+    }
+
+    /// Latched inputs are taken, if `state`'s are to be.
+    pub(crate) fn take_inputs(&mut self, state: &mut State) {
+        let (Some(latches), Some(rows)) = (&mut state.latches, &self.latches) else { return };
+        latches.take = false;
+        for register in latches.changed.drain(..) {
+            self.registers[register.index()] = rows.inputs[register.index()];
+            state.written.insert(register);
+        }
+    }
+
+    /// Latched outputs of these registers are published.
+    pub(crate) fn publish_outputs(&mut self, registers: impl Iterator<Item = Register>) {
+        if let Some(rows) = &mut self.latches {
+            registers.for_each(|r| rows.outputs[r.index()] = self.registers[r.index()]);
+        }
+    }
+
+    /// Writes back every result of the timeline that is on its bus in cycle `last` or before. `present` are the lanes that
+    /// count, each `offsets` later.
+    pub(crate) fn write_back_until(
+        &mut self,
+        state: &mut State,
+        last: Cycle,
+        present: &Mask,
+        offsets: &[i64; LANES],
+    ) {
+        let mut i = 0;
+        while i < state.pending.len() {
+            if state.pending[i].retire.cycle > last {
+                i += 1;
+                continue;
+            }
+            let pending = state.pending.remove(i);
+            let Underway { values, flags, .. } = self.underway.remove(i);
+            self.registers[pending.register.index()] = values;
+            state.written.insert(pending.register);
+            self.flags.iter_mut().zip(flags).for_each(|(all, flags)| *all |= flags);
+            if pending.output && pending.float {
+                let takt = pending.retire;
+                for lane in (0..LANES).filter(|&lane| present[lane] && is_nan(values[lane])) {
+                    self.nan_writes[lane].record(PortWrite {
+                        cycle: takt.cycle.wrapping_add_signed(offsets[lane]),
+                        slot: takt.slot,
+                        address: takt.address,
+                        register: pending.register,
+                        value: values[lane],
+                        nan: true,
+                    });
+                }
+            }
+        }
+    }
+
+    /// Keeps what `block` may change before it faults; its last bundle issues in cycle `last`.
+    pub(crate) fn begin(&mut self, state: &State, block: &Block, last: Cycle) {
+        self.undo.stored.clear();
+        self.nans.clear();
+        self.late.clear();
+        if !block.late.is_empty() {
+            let none = Underway { values: [0; LANES], flags: [Flags::NONE; LANES], memory: None };
+            self.late.resize(block.late.len(), none);
+        }
+        self.undo.kept = block.restore.is_some();
+        let Some(restore) = &block.restore else { return };
+        let pending = state.pending.iter().filter(|pending| pending.retire.cycle <= last);
+        let registers = pending.map(|pending| pending.register).chain(restore.iter().copied());
+        self.undo.registers.clear();
+        self.undo.registers.extend(registers.map(|register| (register, self.registers[register.index()])));
+        self.undo.underway.clone_from(&self.underway);
+        self.undo.flags = self.flags;
+        self.undo.nans.clear();
+        self.undo.nans.extend(self.nan_writes.iter().map(|writes| (writes.kept.len(), writes.count)));
+    }
+
+    /// Puts back what was kept.
+    pub(crate) fn undo(&mut self) {
+        for &(register, row) in &self.undo.registers {
+            self.registers[register.index()] = row;
+        }
+        for &(address, row) in self.undo.stored.iter().rev() {
+            self.memory[address] = row;
+        }
+        self.underway.clone_from(&self.undo.underway);
+        self.flags = self.undo.flags;
+        for (writes, &(kept, count)) in self.nan_writes.iter_mut().zip(&self.undo.nans) {
+            writes.kept.truncate(kept);
+            writes.count = count;
+        }
+    }
+
+    /// Runs the micros of a block. If that takes a lane that is present out of its memory, those lanes are the error, and
+    /// everything is to be undone.
+    pub(crate) fn run(&mut self, block: &Block, present: &Mask) -> Result<(), Mask> {
+        for micro in &block.micros {
+            self.micro(micro, present)?;
+        }
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn micro(&mut self, micro: &Micro, present: &Mask) -> Result<(), Mask> {
+        let registers = &mut *self.registers;
+        let dest = micro.dest.index();
+        match micro.kind {
+            Kind::Compute => {
+                let sources = [micro.a, micro.b, micro.c].map(|word| &registers[word.index()]);
+                // Apart from the registers, so that the compiler knows that it is no source.
+                let mut results = [0; LANES];
+                let raised = compute_lanes::<Screened, LANES>(micro.op, sources, &mut results);
+                if raised {
+                    return self.exactly(micro);
+                }
+                registers[dest] = results;
+            }
+            Kind::Immediate => registers[dest] = [micro.constant; LANES],
+            Kind::Move => registers[dest] = registers[micro.a.index()],
+            Kind::Load => return self.load(micro, present),
+            Kind::Store => return self.store(micro, present),
+            Kind::ReadFlags => registers[dest] = self.flags.map(|flags| flags.bits().into()),
+            Kind::ClearFlags => self.flags = [Flags::NONE; LANES],
+            Kind::Check => {
+                let row = &registers[micro.a.index()];
+                let mut any = false;
+                row.iter().for_each(|&bits| any |= is_nan(bits));
+                if any {
+                    let nans = (0..LANES).filter(|&lane| present[lane] && is_nan(row[lane]));
+                    self.nans.extend(nans.map(|lane| (micro.constant, lane, row[lane])));
+                }
+                return Ok(());
+            }
+        }
+        if let Some(number) = micro.dest.late_number() {
+            self.finish_late(number, [Flags::NONE; LANES], None);
+        }
+        Ok(())
+    }
+
+    /// An operation, lane by lane, with the flags that it raises.
+    #[cold]
+    #[inline(never)]
+    fn exactly(&mut self, micro: &Micro) -> Result<(), Mask> {
+        let mut raised = [Flags::NONE; LANES];
+        for (lane, raised) in raised.iter_mut().enumerate() {
+            let [a, b, c] = [micro.a, micro.b, micro.c].map(|word| self.registers[word.index()][lane]);
+            let Value { bits, flags } = compute::<Host>(micro.op, a, b, c);
+            self.registers[micro.dest.index()][lane] = bits;
+            *raised = flags;
+        }
+        match micro.dest.late_number() {
+            Some(number) => self.finish_late(number, raised, None),
+            None => self.flags.iter_mut().zip(raised).for_each(|(all, flags)| *all |= flags),
+        }
+        Ok(())
+    }
+
+    #[inline(never)]
+    fn finish_late(&mut self, number: usize, flags: [Flags; LANES], memory: Option<Row>) {
+        if let Some(late) = self.late.get_mut(number) {
+            *late = Underway { values: self.registers[Word::late(number).index()], flags, memory };
+        }
+    }
+
+    /// The data words that a load or store addresses, all in the memory; or the lanes present in which they are not. (A lane
+    /// that is away reads and writes none.)
+    fn addresses(&self, micro: &Micro, present: &Mask) -> Result<[Option<usize>; LANES], Mask> {
+        let bases = &self.registers[micro.a.index()];
+        let words = bases.map(|base| {
+            Some(data_address(micro.constant, base)).filter(|&address| address < self.memory.len())
+        });
+        let outside = std::array::from_fn(|lane| present[lane] && words[lane].is_none());
+        if outside == [false; LANES] { Ok(words) } else { Err(outside) }
+    }
+
+    /// The base if it is the same in every lane.
+    fn common_address(&self, micro: &Micro) -> Option<usize> {
+        let bases = &self.registers[micro.a.index()];
+        let address = data_address(micro.constant, bases[0]);
+        (*bases == [bases[0]; LANES] && address < self.memory.len()).then_some(address)
+    }
+
+    fn load(&mut self, micro: &Micro, present: &Mask) -> Result<(), Mask> {
+        let mut from = None;
+        let row = if let Some(address) = self.common_address(micro) {
+            if micro.dest.late_number().is_some() {
+                from = Some([address as u32; LANES]);
+            }
+            self.memory[address]
+        } else {
+            let words = self.addresses(micro, present)?;
+            from = Some(words.map(|word| word.unwrap_or(0) as u32));
+            std::array::from_fn(|lane| words[lane].map_or(0, |word| self.memory[word][lane]))
+        };
+        self.registers[micro.dest.index()] = row;
+        if let Some(number) = micro.dest.late_number() {
+            self.finish_late(number, [Flags::NONE; LANES], from);
+        }
+        Ok(())
+    }
+
+    fn store(&mut self, micro: &Micro, present: &Mask) -> Result<(), Mask> {
+        let row = self.registers[micro.b.index()];
+        if let Some(address) = self.common_address(micro) {
+            if self.undo.kept {
+                self.undo.stored.push((address, self.memory[address]));
+            }
+            self.memory[address] = row;
+            return Ok(());
+        }
+        for (lane, word) in self.addresses(micro, present)?.into_iter().enumerate() {
+            if let Some(word) = word {
+                if self.undo.kept {
+                    self.undo.stored.push((word, self.memory[word]));
+                }
+                self.memory[word][lane] = row[lane];
+            }
+        }
+        Ok(())
+    }
+
+    /// After a block entered in cycle `entered`: its late results are underway, its NaNs recorded.
+    pub(crate) fn end(&mut self, block: &Block, entered: Cycle, offsets: &[i64; LANES]) {
+        self.underway.append(&mut self.late);
+        for &(check, lane, bits) in &self.nans {
+            let entered = entered.wrapping_add_signed(offsets[lane]);
+            self.nan_writes[lane].record(block.checks[check as usize].write(entered, bits));
+        }
+    }
+}

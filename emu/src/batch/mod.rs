@@ -1,0 +1,194 @@
+//! Batches: many runs of one program at once.
+//!
+//! Time and control flow rarely depend on data, so a [`Batch`] finds them once for 16 runs (a [`group`]) and does the
+//! arithmetic in all of these *lanes* together ([`lanes`]), in vectors. Each lane has the values, flags, faults and cycles, to
+//! the bit, that an [`crate::Emulator`] of its own would have.
+
+mod group;
+mod lanes;
+
+use crate::fault::LoadError;
+use crate::system::{Number, PeriodError, PeriodReport, PortError};
+use group::Group;
+use lanes::LANES;
+use rayon::prelude::*;
+use std::num::NonZeroU64;
+use std::sync::Arc;
+use takt_isa::fp::Flags;
+use takt_isa::program::Port;
+use takt_isa::timing::Cycle;
+use takt_isa::{Program, Register};
+
+/// Many runs of one program, *lanes*, each with its own inputs, values, flags and faults.
+///
+/// A lane gives what an [`crate::Emulator`] would give that is asked for the same periods with [`crate::Emulator::run_period`]:
+/// outputs, registers, memory, flags, cycles, reports and faults are the same to the bit. Groups of [`Batch::WIDTH`] lanes
+/// run on all cores.
+///
+/// ```
+/// # use takt_emu::Batch;
+/// # fn run(program: &takt_isa::Program) -> Result<(), Box<dyn std::error::Error>> {
+/// let mut batch = Batch::new(program, 3)?;
+/// for period in 0..100 {
+///     // One value for each lane.
+///     batch.set_input("position", &[0.1_f32, 0.2, 0.3])?;
+///     batch.run_period();
+///     for lane in 0..batch.lanes() {
+///         let report = batch.outcome(lane).ok_or("no period has run")??;
+///         println!("{} cycles, {:?}", report.cycles, batch.output(lane, "force")?);
+///     }
+/// }
+/// # Ok(())
+/// # }
+/// ```
+pub struct Batch {
+    program: Arc<Program>,
+    groups: Vec<Group>,
+    lanes: usize,
+}
+
+impl Batch {
+    /// Lanes that share the cost of control. A batch of so many, or a multiple, is best.
+    pub const WIDTH: usize = LANES;
+    /// Lanes at most. (Each takes about 9 kB.)
+    pub const MAX_LANES: usize = 1 << 20;
+
+    /// Loads a program into each of so many lanes (at least one, at most [`Batch::MAX_LANES`]; other numbers give the
+    /// nearest) and resets them.
+    ///
+    /// # Errors
+    /// As [`crate::Emulator::new`].
+    pub fn new(program: &Program, lanes: usize) -> Result<Batch, LoadError> {
+        let lanes = lanes.clamp(1, Batch::MAX_LANES);
+        let counts = (0..lanes).step_by(LANES).map(|first| (lanes - first).min(LANES));
+        let groups = counts.map(|count| Group::new(program, count)).collect::<Result<_, _>>()?;
+        Ok(Batch { program: Arc::new(program.clone()), groups, lanes })
+    }
+
+    /// Number of lanes.
+    pub fn lanes(&self) -> usize {
+        self.lanes
+    }
+
+    /// The program.
+    pub fn program(&self) -> &Program {
+        &self.program
+    }
+
+    /// As [`crate::Emulator::set_tick_period`], for every lane.
+    pub fn set_tick_period(&mut self, cycles: Option<NonZeroU64>) {
+        self.groups
+            .iter_mut()
+            .for_each(|group| group.each_emulator(|emulator| emulator.set_tick_period(cycles)));
+    }
+
+    /// Stops a lane with [`crate::FaultKind::CycleLimit`] if a period takes so many cycles, waiting and what runs once
+    /// included.
+    pub fn set_period_limit(&mut self, cycles: Cycle) {
+        self.groups.iter_mut().for_each(|group| group.set_period_limit(cycles));
+    }
+
+    /// Sets an input port: one value for each lane. They are seen from the next period on (and by what runs once).
+    ///
+    /// # Errors
+    /// If the program has no such port, or one of another type, or there are more values than lanes, or fewer. Nothing is set
+    /// then.
+    pub fn set_input<N: Into<Number> + Copy>(&mut self, name: &str, values: &[N]) -> Result<(), PortError> {
+        let Some(port) = self.program.inputs.iter().find(|port| port.name == name) else {
+            return Err(PortError::Unknown { name: name.to_owned(), kind: "input" });
+        };
+        let (register, ty) = (port.register, port.ty);
+        if values.iter().any(|&value| !value.into().fits(ty)) {
+            return Err(PortError::Type { name: name.to_owned(), ty });
+        }
+        let bits: Vec<u32> = values.iter().map(|&value| value.into().bits()).collect();
+        self.set_input_bits(register, &bits)
+    }
+
+    /// Sets an input port by its register address: one word for each lane.
+    ///
+    /// # Errors
+    /// If the machine has no such port, or there are more values than lanes, or fewer.
+    pub fn set_input_bits(&mut self, register: Register, values: &[u32]) -> Result<(), PortError> {
+        if !self.program.machine.is_input(register) {
+            return Err(PortError::NoInput { register });
+        }
+        if values.len() != self.lanes {
+            return Err(PortError::Lanes { given: values.len(), lanes: self.lanes });
+        }
+        let groups = self.groups.iter_mut().zip(values.chunks(LANES));
+        groups.for_each(|(group, values)| group.set_input(register, values));
+        Ok(())
+    }
+
+    /// Runs every lane to the end of its period, as [`crate::Emulator::run_period`] does. A lane that has faulted or halted
+    /// stays where it is; the others go on.
+    pub fn run_period(&mut self) {
+        if let [group] = &mut self.groups[..] {
+            group.run_period();
+        } else {
+            self.groups.par_iter_mut().for_each(Group::run_period);
+        }
+    }
+
+    /// How a lane's last period ended; `None` before the first, or if there is no such lane.
+    pub fn outcome(&self, lane: usize) -> Option<Result<PeriodReport, PeriodError>> {
+        let (group, lane) = self.lane(lane)?;
+        group.outcome(lane)
+    }
+
+    /// The cycles of a lane's last period; `None` if it did not come to its end.
+    pub fn cycles(&self, lane: usize) -> Option<Cycle> {
+        let (group, lane) = self.lane(lane)?;
+        group.cycles(lane)
+    }
+
+    /// What the outside sees on an output port of a lane, as [`crate::Emulator::output_bits`].
+    pub fn output_bits(&self, lane: usize, register: Register) -> Option<u32> {
+        let (group, lane) = self.lane(lane)?;
+        self.program.machine.is_output(register).then(|| group.output(lane, register))?
+    }
+
+    /// The value on an output port of a lane; `None` if none was ever written, or there is no such lane.
+    ///
+    /// # Errors
+    /// If the program has no such port.
+    pub fn output(&self, lane: usize, name: &str) -> Result<Option<Number>, PortError> {
+        let Some(Port { register, ty, .. }) = self.program.outputs.iter().find(|port| port.name == name)
+        else {
+            return Err(PortError::Unknown { name: name.to_owned(), kind: "output" });
+        };
+        Ok(self.output_bits(lane, *register).map(|bits| Number::of(*ty, bits)))
+    }
+
+    /// A lane's register, as [`crate::Emulator::register`].
+    pub fn register(&self, lane: usize, register: Register) -> Option<u32> {
+        let (group, lane) = self.lane(lane)?;
+        group.register(lane, register)
+    }
+
+    /// A lane's data memory; empty if there is no such lane.
+    pub fn memory(&self, lane: usize) -> Vec<u32> {
+        self.lane(lane).map_or(Vec::new(), |(group, lane)| group.memory(lane))
+    }
+
+    /// A lane's sticky exception flags.
+    pub fn flags(&self, lane: usize) -> Flags {
+        self.lane(lane).map_or(Flags::NONE, |(group, lane)| group.flags(lane))
+    }
+
+    /// Cycles that have passed in a lane since reset.
+    pub fn now(&self, lane: usize) -> Cycle {
+        self.lane(lane).map_or(0, |(group, lane)| group.now(lane))
+    }
+
+    /// How many periods, counted over all lanes, ran outside their group, at least in part: after a branch that went another
+    /// way than in most lanes, or to a fault. They are slower, and otherwise the same.
+    pub fn periods_apart(&self) -> u64 {
+        self.groups.iter().map(|group| group.apart).sum()
+    }
+
+    fn lane(&self, lane: usize) -> Option<(&Group, usize)> {
+        (lane < self.lanes).then(|| (&self.groups[lane / LANES], lane % LANES))
+    }
+}

@@ -1,0 +1,126 @@
+//! A batch does in each lane what an emulator of its own would do: random programs, random inputs, everything compared.
+
+use std::num::NonZeroU64;
+use takt_emu::testing::{Options, Random, input_ports, random_program};
+use takt_emu::{Batch, Emulator};
+use takt_isa::fp::Flags;
+use takt_isa::{MACHINES, Program, Register};
+
+/// Programs of each kind and machine.
+const PROGRAMS: u64 = 60;
+const PERIODS: u32 = 8;
+
+/// What was met in a run.
+#[derive(Default)]
+struct Met {
+    /// Periods of lanes, and those of them that were run apart.
+    periods: u64,
+    apart: u64,
+    /// Lanes that ran together again after they had been apart.
+    joined: u64,
+    faults: u64,
+    nan_writes: u64,
+    flags: u64,
+    missed: u64,
+}
+
+/// Everything that can be seen of a lane is as in its own emulator.
+fn assert_same(context: &str, batch: &Batch, lane: usize, single: &Emulator) {
+    assert_eq!(batch.now(lane), single.now(), "{context}: now");
+    assert_eq!(batch.flags(lane), single.flags(), "{context}: flags");
+    for register in Register::all() {
+        assert_eq!(batch.register(lane, register), single.register(register), "{context}: {register}");
+        let (found, expected) = (batch.output_bits(lane, register), single.output_bits(register));
+        assert_eq!(found, expected, "{context}: output at {register}");
+    }
+    assert_eq!(batch.memory(lane), single.memory(), "{context}: memory");
+}
+
+/// Runs a program with random inputs in a batch and in an emulator for each lane.
+fn compare(seed: u64, program: &Program, met: &mut Met) {
+    let mut random = Random::new(!seed);
+    // A group that is full and one that is not.
+    let lanes = Batch::WIDTH + 1 + random.below(4) as usize;
+    let mut batch = Batch::new(program, lanes).unwrap();
+    let mut singles: Vec<Emulator> = (0..lanes).map(|_| Emulator::new(program).unwrap()).collect();
+    if random.once_in(2) {
+        let tick = NonZeroU64::new(u64::from(1 + random.below(900)));
+        batch.set_tick_period(tick);
+        singles.iter_mut().for_each(|single| single.set_tick_period(tick));
+    }
+    let limit = u64::from(200 + random.below(3000));
+    batch.set_period_limit(limit);
+    // How many lanes differ in an input.
+    let rarity = 1 + random.below(2 * lanes as u32);
+    let mut was_apart = 0;
+    for period in 0..PERIODS {
+        for register in input_ports(program.machine) {
+            let all = random.word();
+            let values: Vec<u32> =
+                (0..lanes).map(|_| if random.once_in(rarity) { random.word() } else { all }).collect();
+            batch.set_input_bits(register, &values).unwrap();
+            for (single, value) in singles.iter_mut().zip(values) {
+                single.set_input_bits(register, value).unwrap();
+            }
+        }
+        let before = batch.periods_apart();
+        batch.run_period();
+        let apart = batch.periods_apart() - before;
+        met.periods += lanes as u64;
+        met.apart += apart;
+        met.joined += u64::from(apart < was_apart);
+        was_apart = apart;
+        for (lane, single) in singles.iter_mut().enumerate() {
+            single.set_cycle_limit(single.now() + limit);
+            let expected = single.run_period(&[]);
+            let context = format!("{} seed {seed}, period {period}, lane {lane}", program.machine.name);
+            let cycles = expected.as_ref().ok().map(|report| report.cycles);
+            assert_eq!(batch.cycles(lane), cycles, "{context}");
+            met.faults += u64::from(expected.is_err());
+            met.flags += u64::from(single.flags() != Flags::NONE);
+            if let Ok(report) = &expected {
+                met.nan_writes += report.nan_writes.len() as u64;
+                met.missed += u64::from(report.missed);
+            }
+            assert_eq!(batch.outcome(lane), Some(expected), "{context}");
+            assert_same(&context, &batch, lane, single);
+        }
+    }
+}
+
+fn compare_all(options: Options) -> Met {
+    let mut met = Met::default();
+    for machine in MACHINES {
+        for seed in 0..PROGRAMS {
+            let program = random_program(seed, machine, options);
+            compare(seed, &Program { latched: seed % 3 == 2, ..program }, &mut met);
+        }
+    }
+    // Otherwise the comparison says nothing.
+    let together = met.periods - met.apart;
+    assert!(met.apart > met.periods / 50 && together > met.periods / 20, "{} of {}", met.apart, met.periods);
+    assert!(met.joined > 3 && met.nan_writes > 100 && met.flags > 100);
+    met
+}
+
+#[test]
+fn lanes_of_tame_programs_are_as_alone() {
+    assert!(compare_all(Options::TAME).missed > 100);
+}
+
+#[test]
+fn lanes_of_wild_programs_are_as_alone() {
+    assert!(compare_all(Options::WILD).faults > 100);
+}
+
+#[test]
+fn lanes_of_straight_programs_stay_together() {
+    let mut met = Met::default();
+    for machine in MACHINES {
+        for seed in 0..PROGRAMS / 2 {
+            let program = random_program(seed, machine, Options { control: false, ..Options::TAME });
+            compare(seed, &program, &mut met);
+        }
+    }
+    assert!(met.periods > 1000);
+}
