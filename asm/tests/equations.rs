@@ -547,3 +547,17 @@ fn fast_allows_what_it_names() {
     let report = bad(&text(".fast associate\n"), &T3);
     assert_eq!(report.list[0].code, "fast");
 }
+
+/// Of an array some element has to be used, not each; and not each value of one.
+#[test]
+fn arrays_are_used_as_a_whole() {
+    let warnings = |lines: &str| {
+        let text = format!(
+            ".schedule on\n.input x\n.output a\n.reg t[3]\n.once\n wait p\n.period\np:\n{lines} wait p\n"
+        );
+        good(&text).warnings.list.iter().map(|warning| warning.message.clone()).collect::<Vec<_>>()
+    };
+    assert_eq!(warnings(" t[1] = x\n t[1] = x*x\n t[2] = x\n a = t[1]\n"), [""; 0]);
+    assert_eq!(warnings(" a = x\n"), ["register `t` is never used"]);
+    assert_eq!(warnings(" t[1] = x\n a = x\n"), ["register `t` is written and never read"]);
+}

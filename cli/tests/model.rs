@@ -38,12 +38,17 @@ const TAU: [f64; 2] = [-0.174_463_92, -57.207_66];
 fn output_goes_where_it_is_told() {
     let folder = folder();
     let source = folder.line("model ur5.urdf -f inverse-dynamics -o -").ok();
-    assert!(source.starts_with("; inverse-dynamics of ur5") && source.ends_with("wait    period\n"), "{source}");
+    assert!(
+        source.starts_with("; inverse-dynamics of ur5") && source.ends_with("wait    period\n"),
+        "{source}"
+    );
     let json = folder.line("model ur5.urdf -f jacobian --tip tool0 --json -m t1").ok();
     let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
     assert_eq!(json["machine"], "t1");
     assert_eq!(json["operations"], 65);
-    assert!(json["cycles"].as_u64() >= json["bound"].as_u64() && json["bound"].as_u64() >= json["chain"].as_u64());
+    assert!(
+        json["cycles"].as_u64() >= json["bound"].as_u64() && json["bound"].as_u64() >= json["chain"].as_u64()
+    );
     assert_eq!(json["constants"].as_array().expect("a list").len(), 10);
 }
 
@@ -82,7 +87,11 @@ fn expressions_become_programs() {
     folder.write("f.json", list.replace("OP", "erf"));
     let done = folder.line("model f.json");
     assert_eq!(done.status, Some(1));
-    assert!(done.stderr.contains("f.json:6: operation `erf` has no meaning here; in `erf(x_1, x_2)`"), "{}", done.stderr);
+    assert!(
+        done.stderr.contains("f.json:6: operation `erf` has no meaning here; in `erf(x_1, x_2)`"),
+        "{}",
+        done.stderr
+    );
 }
 
 #[test]
@@ -94,9 +103,17 @@ fn mistakes_have_one_message() {
     for (line, status, expected) in [
         ("model ur5.urdf", 2, "say with --function what to compute: forward-kinematics, jacobian,"),
         ("model ur5.urdf -f gravty", 2, "there is no such function; did you mean `gravity`?"),
-        ("model ur5.urdf -f gravity --tip wrist", 1, "ur5.urdf: --tip: there is no link `wrist`; the links are"),
+        (
+            "model ur5.urdf -f gravity --tip wrist",
+            1,
+            "ur5.urdf: --tip: there is no link `wrist`; the links are",
+        ),
         ("model floating.urdf -f gravity", 1, "floating.urdf:12: `shoulder_pan_joint`: a floating joint:"),
-        ("model robot.txt -f gravity", 1, "robot.txt: what it is follows from its ending: .urdf or .xml, .csv, .json"),
+        (
+            "model robot.txt -f gravity",
+            1,
+            "robot.txt: what it is follows from its ending: .urdf or .xml, .csv, .json",
+        ),
         ("model none.urdf -f gravity", 1, "cannot open none.urdf"),
         ("model f.json -f gravity", 2, "--function is about robots; f.json is a list of instructions"),
         ("model f.json", 1, "f.json:1: this is no list of instructions: EOF while parsing an object"),

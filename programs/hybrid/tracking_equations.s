@@ -30,7 +30,7 @@ period: .late n1, n2, n3, n4, n5 = 2
 .macro  arms    to, f, px, py, sum      ; to_i = sum - f·(px·xp_i + py·yp_i)
 .reg    px2 py2
         px2, py2 = px*(f*xp), py*(f*R/2)
-        to[1], to[2], to[3] = sum - (py2 + py2), sum + (py2 - px2), sum + (py2 + px2)
+        to[2], to[3], to[1] = sum + (py2 - px2), sum + (py2 + px2), sum - (py2 + py2)
 .endm
         xy = x*x + y*y + (z*z - 0.5)
         arms    L, 2, x, y, xy

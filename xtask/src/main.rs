@@ -11,7 +11,8 @@ mod venv;
 use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
+use takt_isa::MACHINES;
 
 /// Project automation for Takt.
 #[derive(Parser)]
@@ -46,6 +47,9 @@ enum Task {
     Formal(formal::Arguments),
     /// Compile for aarch64 Linux, macOS, Windows and wasm32, and run the core crates' tests on aarch64 (installs what it lacks).
     Reach(reach::Arguments),
+    /// Measure how fast emulator, assembler and lockstep are beside native code, GNU `as` and one another; print it and write
+    /// docs/speed.md (a few minutes on an idle machine).
+    Speed,
     /// Fuzz the assembler and the image loader, one after the other (installs cargo-fuzz if it is not there).
     Fuzz {
         /// Minutes for each target.
@@ -62,6 +66,7 @@ fn main() -> Result<()> {
         Task::Formal(arguments) => formal::formal(&arguments),
         Task::Synth(arguments) => synth::synth(&arguments),
         Task::Reach(arguments) => reach::reach(&arguments),
+        Task::Speed => speed(),
         Task::Fuzz { minutes } => fuzz(minutes),
     }
 }
@@ -153,6 +158,21 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
     run(&mut tests)
 }
 
+/// Measures, prints, writes docs/speed.md.
+fn speed() -> Result<()> {
+    install()?;
+    let mut measure = cargo();
+    measure.args(["run", "--release", "--package", "takt-benches", "--bin", "speed"]);
+    let output = measure.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
+    if !output.status.success() {
+        bail!("measuring failed ({})", output.status);
+    }
+    let text = String::from_utf8(output.stdout).context("what was measured is no text")?;
+    print!("{text}");
+    let path = root().join("docs/speed.md");
+    std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
+}
+
 fn lint() -> Result<()> {
     run(cargo().args(["fmt", "--all", "--check"]))?;
     run(cargo().args(["clippy", "--workspace", "--all-targets", "--release", "--", "-D", "warnings"]))?;
@@ -205,7 +225,7 @@ fn seed() -> Result<()> {
             }
         }
     }
-    for machine in ["t3", "t1"] {
+    for machine in MACHINES.iter().map(|machine| machine.name) {
         let image = images.join(format!("{machine}.takt"));
         let source = "programs/hybrid/tracking.s";
         run(cargo().args(["run", "--release", "-q", "--", "asm", source, "-m", machine, "-o"]).arg(image))?;

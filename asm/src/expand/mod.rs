@@ -44,6 +44,9 @@ pub(crate) struct Item {
     pub(crate) fast: Fast,
 }
 
+/// A line, and the part of it that is meant, if it is not all.
+pub(crate) type SourcePlace = (Location, Option<Columns>);
+
 /// What `.fast` allows of equations beyond what is written.
 #[derive(Clone, Copy, Default, Debug)]
 pub(crate) struct Fast {
@@ -104,7 +107,7 @@ pub(crate) struct Flat {
     /// What `.ports` says, `latched` or not, and where.
     pub(crate) ports: Option<(bool, Span)>,
     /// What each `.loc` says; the first is none at all.
-    pub(crate) locs: Vec<Vec<Option<(Location, Option<Columns>)>>>,
+    pub(crate) locs: Vec<Vec<Option<SourcePlace>>>,
     /// Files that `.loc` names, in order, then those whose own lines are code.
     pub(crate) files: Vec<String>,
     file_numbers: HashMap<String, u32>,

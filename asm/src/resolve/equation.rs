@@ -4,7 +4,7 @@
 
 use crate::context::{At, Reported, Wanted, type_name, words};
 use crate::expand::equation::Results;
-use crate::expand::{Fast, Item};
+use crate::expand::{Fast, Item, SourcePlace};
 use crate::ir::given::Kind;
 use crate::ir::{Bundle, Constant, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
@@ -18,8 +18,7 @@ use crate::syntax::ast::*;
 use crate::syntax::expr::Value;
 use smallvec::SmallVec;
 use std::rc::Rc;
-use takt_isa::program::{Columns, Location};
-use takt_isa::{Op, SlotIndex, Type};
+use takt_isa::{Op, Slots, Type};
 
 /// What a part of an equation is.
 #[derive(Clone, Copy, Debug)]
@@ -57,7 +56,7 @@ impl Term {
 
 /// The equation at hand.
 pub(super) struct Line {
-    location: Option<(Location, Option<Columns>)>,
+    location: Option<SourcePlace>,
     scheduled: bool,
     /// What its operations have computed so far: where the value is, the bundle, and the part.
     pub(super) computed: Vec<(RegisterId, usize, Key)>,
@@ -315,10 +314,10 @@ impl Resolver<'_> {
         };
         let Some(Meaning { op, .. }) = self.forms.get("", 1).first() else { return Err(Reported) };
         let op = *op;
-        let slot = self.slot(at, op, term.span)?;
+        let slots = self.hosting(at, op, None, term.span)?;
         let sources = [source, RegisterId::ZERO, RegisterId::ZERO];
         let register = target.unwrap_or_else(|| self.fresh(term.span));
-        self.emit(at, line, op, slot, sources, register, term.span);
+        self.emit(at, line, op, slots, sources, register, term.span);
         Ok(register)
     }
 
@@ -349,14 +348,16 @@ impl Resolver<'_> {
         at: At,
         line: &Line,
         op: Op,
-        slot: Option<SlotIndex>,
+        slots: Slots,
         sources: [RegisterId; 3],
         dest: RegisterId,
         span: Span,
     ) {
+        let slots = self.writing(slots, Some(dest));
         let operation = Operation {
             op,
-            slot,
+            slots,
+            slot: slots.first(),
             dest: Some(dest),
             sources,
             constant: Constant::None,

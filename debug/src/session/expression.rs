@@ -445,18 +445,15 @@ fn parse(text: &str, known: Known<'_>, depth: usize) -> Result<Live, String> {
         } else if bytes.get(at) == Some(&b'[') {
             let end = closing(bytes, at).ok_or_else(|| format!("`{}`: a `]` is missing", &text[at..]))?;
             let element = text[start..=end].replace(' ', "");
-            if meanings(&element, known).is_some() {
-                operand = Some(name(&element, known)?);
-                at = end + 1;
-            }
-        }
-        if operand.is_some() {
-        } else if bytes.get(at) == Some(&b'[') {
-            let end = closing(bytes, at).ok_or_else(|| format!("`{}`: a `]` is missing", &text[at..]))?;
-            let part = |text: &str| parse(text, known, depth - 1).map(Box::new);
-            let offset = part(if head.is_empty() { "0" } else { head })?;
-            let index = part(&text[at + 1..end])?;
-            operand = Some(Operand::Memory { offset, index, ty: Type::F });
+            operand = Some(match meanings(&element, known) {
+                Some(_) => name(&element, known)?,
+                None => {
+                    let part = |text: &str| parse(text, known, depth - 1).map(Box::new);
+                    let offset = part(if head.is_empty() { "0" } else { head })?;
+                    let index = part(&text[at + 1..end])?;
+                    Operand::Memory { offset, index, ty: Type::F }
+                }
+            });
             at = end + 1;
         } else if head.is_empty() {
             plain.push(char::from(bytes[at]));
