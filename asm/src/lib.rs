@@ -21,7 +21,8 @@
 //! ```
 //!
 //! `syntax` reads a file; `expand` writes out macros, repetitions and includes, and declares; `resolve` gives every name its
-//! meaning; `check` looks at the whole program (types, who writes what); `contract` fuses products into sums; `homes` finds each value its place; `schedule` packs bundles;
+//! meaning; `check` looks at the whole program (types, who writes what); `contract` fuses products into sums; `homes` finds
+//! each operation a slot and each value its place; `schedule` packs bundles, and chooses anew among the slots that can take an operation;
 //! `emit` places registers and makes words; `output` is what can be made of the result. `context` is what the stages before
 //! `schedule` share, `report` how mistakes are told. A stage uses those before it, never one after it.
 //!
@@ -212,6 +213,7 @@ fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, op
                 Contract::None => false,
             })
         });
+        homes::slots::choose(&mut ir);
         let mut homes = homes::choose(&mut ir);
         homes.quiet.extend(contracted.gone);
         let values = values::split(&mut ir, &mut homes);

@@ -581,3 +581,33 @@ fn macros_are_functions() {
         assert_eq!(a.map(f32::from_bits), Some(4.25 + 14.0), "{}", machine.name);
     }
 }
+
+/// A register that has its place is written by the slot whose bank it lies in, where several have the unit.
+#[test]
+fn placed_registers_are_written_by_their_slot() {
+    for machine in MACHINES {
+        for (index, slot) in machine.slots.iter().enumerate() {
+            let hosts = |op: Op| {
+                let of = |slot: &takt_isa::Slot| {
+                    slot.units.iter().any(|unit| unit.functions.contains(&op.row().function))
+                };
+                machine.slots.iter().filter(|slot| of(slot)).count() > 1 && of(&machine.slots[index])
+            };
+            let some = takt_isa::ROWS.iter().find(|row| {
+                hosts(row.op)
+                    && row
+                        .forms
+                        .iter()
+                        .any(|form| form.contains("a, b") || form.contains("a + b") || form.contains("a & b"))
+            });
+            let Some(row) = some else { continue };
+            let text = format!(
+                ".schedule on\n.input a:bits, b:bits\n.output y:bits\n.reg t:bits @ {}7\n.once\n wait p\n.period\np: t = {}\n y = t\n wait p\n",
+                slot.bank.name, row.forms[0]
+            );
+            if let Err(report) = assemble(&text, machine) {
+                panic!("{} on {}: {}", row.mnemonic, machine.name, report.render(false));
+            }
+        }
+    }
+}

@@ -69,7 +69,8 @@ fn main() {
     for key in 0..KEYS {
         // A letter of a mnemonic, wrong and right in turn.
         let letter = if key % 2 == 0 { "k" } else { "l" };
-        let range = json!({ "start": { "line": line, "character": 11 }, "end": { "line": line, "character": 12 } });
+        let range =
+            json!({ "start": { "line": line, "character": 11 }, "end": { "line": line, "character": 12 } });
         let change = json!({ "range": range, "text": letter });
         let start = Instant::now();
         notify(
@@ -96,8 +97,13 @@ fn main() {
     let assemble = seconds(&|| drop(takt_asm::assemble("bench.s", &loader, &options)));
     let check = seconds(&|| drop(takt_asm::check("bench.s", &loader, &options)));
     let (whole, _) = shown(assemble);
-    println!("{:>44}{:>12}{:>12}{:>24}", "in 10,000 lines", "median, ms", "longest, ms", "of assembling them");
-    for (what, times) in [("read, check, index", check), ("keystroke to diagnostics, 10 ms of it a pause", keys)] {
+    println!(
+        "{:>44}{:>12}{:>12}{:>24}",
+        "in 10,000 lines", "median, ms", "longest, ms", "of assembling them"
+    );
+    for (what, times) in
+        [("read, check, index", check), ("keystroke to diagnostics, 10 ms of it a pause", keys)]
+    {
         let (median, longest) = shown(times);
         println!("{what:>44}{median:>12.1}{longest:>12.1}{:>24.2}", median / whole);
     }

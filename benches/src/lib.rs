@@ -4,7 +4,9 @@
 //! prints ratios of things measured in the same run, from the fastest sample of each.
 
 use criterion::{BenchmarkGroup, Criterion, Throughput, measurement::WallTime};
+use std::fmt::Write as _;
 use std::time::{Duration, Instant};
+use takt_isa::{Machine, T3};
 
 /// A group of measurements that keeps the fastest time of each.
 pub struct Measured<'c> {
@@ -39,4 +41,34 @@ impl<'c> Measured<'c> {
         });
         fastest
     }
+}
+
+/// t3 with room for a million bundles: the machine is data.
+pub static DEEP: Machine = Machine { name: "t3-deep", code_depth: 1 << 21, ..T3 };
+
+/// A source of this many lines, in the mix of a real one: comments, blank lines, labels, bundles, macros' uses, constants.
+pub fn source(lines: usize) -> String {
+    let mut text = String::from(
+        ".const k = 2*pi*80\n.input n:int, x, y\n.output F\n.reg a b c d t\n.macro scale to, by\n fmul to, to, by\n.endm\n\
+         .once\n wait period\n.period\nperiod:\n",
+    );
+    let mut line = text.lines().count();
+    let mut label = 0;
+    while line + 12 < lines {
+        let _ = write!(
+            text,
+            "; block {label}: a proportional controller\n\n\
+             step{label}:\n        fmul    a, x, k\n        fmul    b, y, 0.25e-6         ; m\n\
+             \x20       fadd    c, a, b || mov d, x\n        scale   a, 2*k + {label}\n        fsub    c, c, a\n\
+             \x20       sel     d, d, x, y\n        itof    t, n\n        fsqrt   a, x\n        fadd    F, c, t\n"
+        );
+        label += 1;
+        line += 12;
+    }
+    while line + 1 < lines {
+        text.push_str("; rest\n");
+        line += 1;
+    }
+    text.push_str("        wait period\n");
+    text
 }

@@ -16,13 +16,13 @@ const AXES: usize = 5;
 
 /// Registers of a program for the ports of the tracking algorithm.
 #[derive(Clone)]
-struct Binding {
-    inputs: [Register; INPUTS.len()],
+pub(crate) struct Binding {
+    pub(crate) inputs: [Register; INPUTS.len()],
     outputs: [Register; OUTPUTS.len()],
 }
 
 impl Binding {
-    fn new(program: &Program) -> Result<Binding> {
+    pub(crate) fn new(program: &Program) -> Result<Binding> {
         if let Some(port) = program.inputs.iter().find(|port| !is_among(&INPUTS, &port.name)) {
             bail!("this is no tracking program: nothing gives its input port `{}` a value", port.name);
         }
@@ -35,6 +35,19 @@ impl Binding {
             *register = find("output", port, &program.outputs, &OUTPUTS)?;
         }
         Ok(binding)
+    }
+
+    /// What the program has computed, read by register.
+    pub(crate) fn outputs(
+        &self,
+        read: impl Fn(Register) -> Option<u32>,
+    ) -> Result<Outputs<f64>, ControllerError> {
+        let mut values = [0.0; OUTPUTS.len()];
+        for ((value, register), port) in values.iter_mut().zip(&self.outputs).zip(&OUTPUTS) {
+            let bits = read(*register).ok_or(ControllerError::Unwritten(port.name))?;
+            *value = f64::from(f32::from_bits(bits));
+        }
+        Ok(Outputs::from_array(values))
     }
 }
 
@@ -172,12 +185,6 @@ impl TrackingController for OnEmulator {
         };
         self.until_detail = self.until_detail.wrapping_sub(1);
         self.report = Some(report?);
-        let mut values = [0.0; OUTPUTS.len()];
-        for ((value, register), port) in values.iter_mut().zip(&self.binding.outputs).zip(&OUTPUTS) {
-            let bits = self.emulator.output_bits(*register);
-            let bits = bits.ok_or(ControllerError::Unwritten(port.name))?;
-            *value = f64::from(f32::from_bits(bits));
-        }
-        Ok(Outputs::from_array(values))
+        self.binding.outputs(|register| self.emulator.output_bits(register))
     }
 }

@@ -156,6 +156,12 @@ fn arguments(configuration: &Value, folder: Option<&Path>) -> Result<Vec<String>
         }
         _ => text.to_owned(),
     };
+    let loops = fields.get("track").is_some_and(|track| *track != Value::Bool(false));
+    if !fields.contains_key("program") && !loops {
+        return Err(
+            "a launch configuration has `program`, the path of a source or an image, or `track`".to_owned()
+        );
+    }
     let mut list = Vec::new();
     for (name, value) in fields {
         if name == "program" {
@@ -208,7 +214,9 @@ impl Launcher for CommandLine {
         })?;
         let (session, note) = debug::open(&parsed.debug, control, false).map_err(|error| describe(&error))?;
         let file = parsed.debug.file.unwrap_or_default();
-        let folder = file.parent().map_or_else(PathBuf::new, Path::to_owned);
+        // The folder of a file alone is the one at hand.
+        let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = folder.to_owned();
         Ok(Launched { session, note, folder: std::path::absolute(&folder).unwrap_or(folder) })
     }
 }

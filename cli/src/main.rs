@@ -5,6 +5,7 @@ mod account;
 mod analyse;
 mod arm;
 mod asm;
+mod batch;
 mod bound;
 mod completions;
 mod controller;
@@ -22,6 +23,8 @@ mod load;
 mod lsp;
 mod machines;
 mod man;
+mod model;
+mod monte_carlo;
 mod nan;
 mod number;
 mod output;
@@ -70,6 +73,7 @@ enum Command {
     Track(track::Track),
     Arm(arm::Arm),
     Asm(asm::Asm),
+    Model(model::Model),
     Disasm(disasm::Disasm),
     Run(run::Run),
     Debug(debug::Debug),
@@ -92,6 +96,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Track(track) => track::run(track, color, out),
         Command::Arm(arm) => arm::run(arm, color, out),
         Command::Asm(asm) => asm::run(asm, color, out),
+        Command::Model(model) => model::run(model, color, out),
         Command::Disasm(disasm) => disasm::run(disasm, color),
         Command::Run(run) => run::run(run, color, out),
         Command::Debug(debug) => debug::run(debug, color, out),

@@ -49,6 +49,14 @@ pub(crate) fn natural(text: &str) -> Result<u64, String> {
     whole(text, 0..=u64::MAX)
 }
 
+/// Robots that `takt track --monte-carlo` drives at most.
+const ROBOTS: u64 = 1_000_000;
+
+/// A number of robots, for clap.
+pub(crate) fn robots(text: &str) -> Result<u64, String> {
+    whole(text, 1..=ROBOTS)
+}
+
 /// The longest time between ticks, cycles: well within [`crate::run::PERIOD_LIMIT`].
 const LONGEST_TICK: u64 = 100_000_000;
 

@@ -180,6 +180,58 @@ impl Plot {
     }
 }
 
+/// Bars of a histogram, about.
+const BARS: f64 = 40.0;
+const HISTOGRAM_HEIGHT: u32 = 480;
+
+/// How many of the values, ascending and in µm, lie where: bars, and the requirement as a line.
+pub(crate) fn histogram(title: &str, microns: &[f64]) -> Result<String> {
+    let mut svg = String::new();
+    histogram_into(title, microns, &mut svg).map_err(|error| anyhow!("cannot draw: {error}"))?;
+    Ok(in_pixels(&svg, SIZE, HISTOGRAM_HEIGHT))
+}
+
+/// The width of a bar: 1, 2 or 5 times a power of ten.
+fn bar_width(span: f64) -> f64 {
+    let least = (span / BARS).max(1e-3);
+    let power = 10f64.powf(least.log10().floor());
+    [1.0, 2.0, 5.0, 10.0].into_iter().map(|step| step * power).find(|&width| width >= least).unwrap_or(power)
+}
+
+fn histogram_into(title: &str, microns: &[f64], svg: &mut String) -> Outcome<()> {
+    let root = SVGBackend::with_string(svg, (px(SIZE), px(HISTOGRAM_HEIGHT))).into_drawing_area();
+    root.fill(&WHITE)?;
+    let (kept, lost, limit) = (CUT.filled(), LIMIT.mix(0.6).filled(), LIMIT.stroke_width(px(2)));
+    let required = format!("required: {REQUIRED} µm");
+    let styles = [("robots that keep it", kept), ("that do not", lost), (required.as_str(), limit)];
+    let area = headed(&root, title, &styles)?;
+    let (least, most) = match microns {
+        [first, .., last] => (first.min(REQUIRED), last.max(REQUIRED)),
+        [only] => (only.min(REQUIRED), only.max(REQUIRED)),
+        [] => (0.0, REQUIRED),
+    };
+    let width = bar_width(most - least);
+    let first = (least / width).floor() - 1.0;
+    let mut counts = vec![0_u64; ((most / width).floor() - first) as usize + 2];
+    for value in microns {
+        counts[((value / width).floor() - first) as usize] += 1;
+    }
+    let highest = counts.iter().copied().max().unwrap_or(0).max(1) as f64;
+    let range = first * width..(first + counts.len() as f64) * width;
+    let mut chart = chart(&area).build_cartesian_2d(range, 0.0..highest * 1.1)?;
+    mesh(&mut chart, "largest tracking error while cutting, µm", "robots")?;
+    for (index, &count) in counts.iter().enumerate().filter(|&(_, &count)| count > 0) {
+        let from = (first + index as f64) * width;
+        let style = if from >= REQUIRED { lost } else { kept };
+        // A little light between the bars.
+        let corners = [(from + 0.06 * width, 0.0), (from + 0.94 * width, count as f64)];
+        chart.draw_series([Rectangle::new(corners, style)])?;
+    }
+    chart.draw_series(LineSeries::new([(REQUIRED, 0.0), (REQUIRED, highest * 1.1)], limit))?;
+    root.present()?;
+    Ok(())
+}
+
 /// An arm's way: the tool's positions, mm, and the joint angles, degrees, of every period, which is in seconds.
 pub(crate) struct ArmPlot<'a> {
     pub(crate) tool: &'a [[f64; 3]],

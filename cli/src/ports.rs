@@ -113,6 +113,47 @@ pub(crate) fn rows(
     Ok(rows)
 }
 
+/// The column that says which run a row belongs to.
+const RUN: &str = "run";
+
+/// Inputs of many runs from one CSV with a column `run`, in the order in which the runs begin: their names, and their rows.
+pub(crate) fn runs(
+    path: &Path,
+    ports: &[Port],
+    most: usize,
+    most_periods: usize,
+) -> Result<Vec<(String, Rows)>> {
+    let mut table = Table::open(path, ports)?;
+    let name = table.name.clone();
+    if ports.iter().any(|port| port.name == RUN) {
+        bail!("{name}: column `{RUN}` would be an input port's; give a folder with a file for each run");
+    }
+    let header = table.reader.headers().map_err(|error| explain(&name, error))?;
+    let Some(column) = header.iter().position(|title| title == RUN) else {
+        let near = suggest(RUN, header.iter());
+        bail!("{name}: no column `{RUN}`{near}; it says which run a row belongs to");
+    };
+    let mut runs: Vec<(String, Rows)> = Vec::new();
+    let mut numbers = std::collections::HashMap::new();
+    let mut periods = 0;
+    while let Some(row) = table.next()?.cloned() {
+        let label = table.record.get(column).unwrap_or_default().to_owned();
+        let number = *numbers.entry(label.clone()).or_insert(runs.len());
+        if number == runs.len() {
+            runs.push((label, Rows::new()));
+        }
+        runs[number].1.push(row);
+        periods += 1;
+        if runs.len() > most {
+            bail!("{name}: more than {most} runs");
+        }
+        if periods > most_periods {
+            bail!("{name}: more than {most_periods} periods in all runs together");
+        }
+    }
+    Ok(runs)
+}
+
 /// Rows of input values from a CSV with one named column for each input port; further columns are left alone.
 pub(crate) struct Table {
     name: String,

@@ -1,6 +1,7 @@
 //! `takt run`: a program on the emulator, with inputs and outputs as CSV.
 
 use crate::account::Account;
+use crate::batch;
 use crate::deny::{Denials, DenyArguments, Watch};
 use crate::fault;
 use crate::files::{self, Out};
@@ -38,6 +39,14 @@ pub(crate) struct Run {
     /// CSV with one named column for each input port and one row for each period; other columns are ignored; `-` is standard input.
     #[arg(long, value_name = "CSV")]
     inputs: Option<PathBuf>,
+    /// Many runs of the program at once, on all cores: a folder with a CSV of inputs for each run, or one CSV with a column
+    /// `run`. --outputs gets that column too.
+    #[arg(
+        long,
+        value_name = "DIR|CSV",
+        conflicts_with_all = ["inputs", "periods", "max_cycles", "trace", "deny", "stats"]
+    )]
+    batch: Option<PathBuf>,
     /// Where the output ports go, as CSV, one row for each period, with a column `cycles`; `-` is standard output, where
     /// nothing else is written then.
     #[arg(long, value_name = "CSV")]
@@ -69,7 +78,8 @@ Examples:
   takt run prog.s --inputs in.csv --stats         a period for each row; where did the cycles go?
   takt run prog.takt --inputs in.csv --outputs -  outputs and cycles of every period
   takt run prog.s --periods 3 --trace out.vcd     waveforms for GTKWave or Surfer
-  takt run prog.s --inputs in.csv --deny all      for CI: status 3 if a flag is raised, …";
+  takt run prog.s --inputs in.csv --deny all      for CI: status 3 if a flag is raised, …
+  takt run prog.s --batch runs --outputs out.csv  a run for each CSV in the folder `runs`";
 
 /// Cycles in which a period ends, or nobody expects it to any more.
 pub(crate) const PERIOD_LIMIT: u64 = 1_000_000_000;
@@ -86,6 +96,9 @@ struct Periods {
 pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
     let mut reads = vec![("FILE", arguments.file.as_path())];
     reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
+    // A folder is no file that could be written over.
+    let batch = arguments.batch.as_deref();
+    reads.extend(batch.filter(|path| !path.is_dir()).map(|path| ("--batch", path)));
     let mut writes = Vec::new();
     writes.extend(arguments.outputs.as_deref().map(|path| ("--outputs", path)));
     writes.extend(arguments.trace.given());
@@ -93,7 +106,7 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
         writes.push(("--json", Path::new("-")));
     }
     files::check(&reads, &writes)?;
-    let has_periods = arguments.inputs.is_some() || arguments.periods.is_some();
+    let has_periods = arguments.inputs.is_some() || arguments.periods.is_some() || batch.is_some();
     if arguments.outputs.is_some() && !has_periods {
         return Err(Failure::Usage(
             "--outputs has a row for each period: give --inputs or --periods".to_owned(),
@@ -103,6 +116,12 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
 
     let loaded =
         Load::new(arguments.machine.machine, color).with(&arguments.source).with_source(&arguments.file)?;
+    if let Some(inputs) = batch {
+        let Run { file, tick, json, .. } = arguments;
+        let outputs = arguments.outputs.as_deref();
+        let arguments = batch::Arguments { file, inputs, outputs, tick: *tick, json: *json };
+        return batch::run(&arguments, &loaded, color, out);
+    }
     let program = &loaded.program;
     let mut emulator = Emulator::new(program)?;
     emulator.set_tick_period(arguments.tick);

@@ -6,6 +6,7 @@ use crate::deny::{Denials, DenyArguments, Watch};
 use crate::fault;
 use crate::files::{self, Given, Out};
 use crate::load::{Load, Loaded};
+use crate::monte_carlo::{MonteCarlo, SpreadArguments, leaves_stdout};
 use crate::nan::NanWrites;
 use crate::number;
 use crate::plot::Plot;
@@ -58,6 +59,17 @@ pub(crate) struct Track {
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     #[command(flatten)]
+    robot: SpreadArguments,
+    /// Drive so many robots that differ, and print how their tracking errors spread; --plot draws a histogram.
+    #[arg(
+        long,
+        value_name = "N",
+        value_parser = number::robots,
+        allow_hyphen_values = true,
+        conflicts_with_all = ["csv", "deny"]
+    )]
+    monte_carlo: Option<u64>,
+    #[command(flatten)]
     deny: DenyArguments,
     /// Print the result as JSON.
     #[arg(long)]
@@ -73,7 +85,8 @@ Examples:
   takt track --machine t1 --plot agh.svg         on the small machine; draw path and error
   takt track --program mine.s --gcode part.ngc   your own controller, your own path
   takt track --periods 1000 --csv path.csv       record inputs and outputs for `takt run`
-  takt track -q --deny all                       for CI: status 3 if a deadline is missed, …";
+  takt track -q --deny all                       for CI: status 3 if a deadline is missed, …
+  takt track --monte-carlo 100 --plot errors.svg  a hundred robots that differ: how far off is each?";
 
 /// Bytes of G-code; beyond, the longest path that can be driven would be made of moves of a micrometre.
 const GCODE_LIMIT: usize = 16 << 20;
@@ -134,6 +147,7 @@ impl Totals {
 pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
     let mut reads: Vec<Given<'_>> = vec![("--program", &arguments.program)];
     reads.extend(arguments.gcode.as_deref().map(|path| ("--gcode", path)));
+    reads.extend(arguments.robot.spread.as_deref().map(|path| ("--spread", path)));
     let outputs = [("--csv", arguments.csv.as_deref()), ("--plot", arguments.plot.as_deref())];
     let mut writes: Vec<Given<'_>> =
         outputs.into_iter().filter_map(|(name, path)| Some((name, path?))).collect();
@@ -141,16 +155,38 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
         writes.push(("--json", Path::new("-")));
     }
     files::check(&reads, &writes)?;
+    if arguments.robot.spread.is_some() && arguments.robot.seed.is_none() && arguments.monte_carlo.is_none() {
+        let text = "--spread says how robots differ: give --seed for one of them, or --monte-carlo for many";
+        return Err(output::Failure::Usage(text.to_owned()).into());
+    }
 
     let (path, trajectory) = trajectory(arguments.gcode.as_deref())?;
     let (name, loaded) =
         program(&arguments.program, Load::new(arguments.machine.machine, color).with(&arguments.source))?;
     let program = &loaded.program;
     let periods = arguments.periods.unwrap_or(u64::MAX).min(trajectory.periods());
+    if let Some(robots) = arguments.monte_carlo {
+        let monte_carlo = MonteCarlo {
+            name: &name,
+            path: &path,
+            program,
+            trajectory: &trajectory,
+            periods,
+            tick: period_cycles(arguments.clock),
+            spread: arguments.robot.spread()?,
+            first: arguments.robot.seed.unwrap_or(1),
+            robots,
+        };
+        let plot = arguments.plot.as_deref();
+        let file = plot.map(Out::create).transpose()?;
+        let drives = monte_carlo.run(arguments.quiet)?;
+        return drives.print(arguments.json, file, !leaves_stdout(plot), out);
+    }
     let mut emulator = Emulator::new(program)?;
     emulator.set_tick_period(period_cycles(arguments.clock));
     let controller = OnEmulator::new(emulator, arguments.deny.watch(), periods - 1);
-    let mut closed_loop = ClosedLoop::new(&trajectory, controller.with_context(|| name.clone())?);
+    let robot = arguments.robot.robot(&trajectory)?;
+    let mut closed_loop = ClosedLoop::with(robot, &trajectory, controller.with_context(|| name.clone())?);
 
     // Opened before the work, so that a path that cannot be written is known at once.
     let mut table = arguments.csv.as_deref().map(Table::create).transpose()?;
@@ -216,6 +252,12 @@ pub(crate) struct ClosedLoopArguments {
     /// With --track: stop after this many periods [default: the whole path].
     #[arg(long, value_name = "N", value_parser = number::count, requires = "track", allow_hyphen_values = true)]
     periods: Option<u64>,
+    /// With --track: the robot of this seed, as `takt track --seed` drives it.
+    #[arg(long, value_name = "S", value_parser = number::natural, requires = "track", allow_hyphen_values = true)]
+    seed: Option<u64>,
+    /// With --seed: standard deviations of what is drawn, as in `takt track`.
+    #[arg(long, value_name = "FILE", requires = "seed")]
+    pub(crate) spread: Option<PathBuf>,
 }
 
 /// What a program was given in a closed loop, and where to look.
@@ -245,7 +287,8 @@ impl ClosedLoopArguments {
         let controller =
             OnEmulator::new(emulator, Watch::idle(), periods - 1).with_context(|| name.clone())?;
         let registers = controller.inputs();
-        let mut closed_loop = ClosedLoop::new(&trajectory, controller);
+        let robot = SpreadArguments { seed: self.seed, spread: self.spread.clone() }.robot(&trajectory)?;
+        let mut closed_loop = ClosedLoop::with(robot, &trajectory, controller);
         let (mut inputs, mut worst) = (Vec::new(), (0, -1.0, false));
         let progress = progress(periods, "periods", false);
         for _ in 0..periods {

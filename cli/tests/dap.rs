@@ -55,7 +55,7 @@ fn a_broken_configuration_is_told() {
     let mut client = Client::start(&folder, "dap");
     client.command("initialize", json!({}));
     for (configuration, told) in [
-        (json!({}), "--track"),
+        (json!({}), "has `program`, the path of a source or an image, or `track`"),
         (json!([]), "is an object"),
         (json!({ "program": 7 }), "`program` in the launch configuration is the path"),
         (json!({ "program": "none.s" }), "cannot open none.s"),
@@ -205,7 +205,6 @@ fn exceptions_stop_where_they_are_raised() {
     folder.write(
         "nan.s",
         "\
-.input x
 .output y
 .reg n:int t
         li      n, 40
@@ -235,8 +234,7 @@ turn:   isub    n, n, 1
     end(client);
 
     // A fault is an exception that nobody has to ask for.
-    folder.write("fault.s", ".reg a b\n fadd a, b, 1.0\n halt\n.preset b = 0\n.data\n.space 3\n");
-    folder.write("read.s", ".reg a i:int\n li i, 5000\n ld a, [i]\n halt\n");
+    folder.write("read.s", ".reg _a i:int\n li i, 5000\n ld _a, [i]\n halt\n");
     let mut client = launched(&folder, json!({ "program": "read.s" }));
     start(&mut client);
     let (reason, line) = go(&mut client, "continue", json!({ "threadId": 1 }));

@@ -11,7 +11,7 @@ mod venv;
 use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 /// Project automation for Takt.
 #[derive(Parser)]
@@ -46,6 +46,9 @@ enum Task {
     Formal(formal::Arguments),
     /// Compile for aarch64 Linux, macOS, Windows and wasm32, and run the core crates' tests on aarch64 (installs what it lacks).
     Reach(reach::Arguments),
+    /// Measure how fast emulator, assembler and lockstep are beside native code, GNU `as` and one another; print it and write
+    /// docs/speed.md (a few minutes on an idle machine).
+    Speed,
     /// Fuzz the assembler and the image loader, one after the other (installs cargo-fuzz if it is not there).
     Fuzz {
         /// Minutes for each target.
@@ -62,6 +65,7 @@ fn main() -> Result<()> {
         Task::Formal(arguments) => formal::formal(&arguments),
         Task::Synth(arguments) => synth::synth(&arguments),
         Task::Reach(arguments) => reach::reach(&arguments),
+        Task::Speed => speed(),
         Task::Fuzz { minutes } => fuzz(minutes),
     }
 }
@@ -140,6 +144,7 @@ fn install_client() -> Result<()> {
 
 fn test(full: bool, rest: &[String]) -> Result<()> {
     install()?;
+    venv::Venv::with(&venv::MODELS)?;
     install_client()?;
     if rest.is_empty() {
         formal::formal(&formal::Arguments::SHARE)?;
@@ -150,6 +155,21 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
         tests.env("TAKT_FULL", "1");
     }
     run(&mut tests)
+}
+
+/// Measures, prints, writes docs/speed.md.
+fn speed() -> Result<()> {
+    install()?;
+    let mut measure = cargo();
+    measure.args(["run", "--release", "--package", "takt-benches", "--bin", "speed"]);
+    let output = measure.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
+    if !output.status.success() {
+        bail!("measuring failed ({})", output.status);
+    }
+    let text = String::from_utf8(output.stdout).context("what was measured is no text")?;
+    print!("{text}");
+    let path = root().join("docs/speed.md");
+    std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
 }
 
 fn lint() -> Result<()> {

@@ -89,10 +89,15 @@ impl Context {
         }
     }
 
-    /// Whether the machine has an instruction, where the name asks for that: `has.` and a mnemonic.
+    /// Whether the machine has an instruction, where the name asks for that: `has.` and a mnemonic, which may name a slot.
     fn has(&self, name: NameId) -> Option<bool> {
-        let row = Op::from_mnemonic(self.scopes.text(name).strip_prefix(HAS)?)?.row();
-        Some(row.function == takt_isa::Function::Idle || self.machine.host(row.function).is_some())
+        let asked = self.scopes.text(name).strip_prefix(HAS)?;
+        let (mnemonic, slot) = asked.split_once('.').map_or((asked, None), |(op, slot)| (op, Some(slot)));
+        let row = Op::from_mnemonic(mnemonic)?.row();
+        let is_idle = row.function == takt_isa::Function::Idle;
+        Some(self.machine.slots.iter().any(|host| {
+            slot.is_none_or(|name| name == host.name) && (is_idle || host.unit_for(row.function).is_some())
+        }))
     }
 
     /// Declares a name in the scope that takes declarations, unless it is declared there.

@@ -6,7 +6,8 @@
 //! * a bundle has at least one operation and no two that claim one slot; on a machine with one slot it has exactly one;
 //! * all operations of a bundle read before any writes; bundles execute in the order of [`Ir::bundles`], and
 //!   [`Operation::redirects`] says where that order ends;
-//! * every register that is written is written from one slot only;
+//! * every register that is written is written from one slot only; which slot executes an operation that several may
+//!   ([`Operation::slots`]) is chosen first by [`choose`](crate::homes::slots::choose), and again by the scheduler;
 //! * bundles of `once` precede those of `period`; a label stands before the bundle at its position, or at the end.
 //!
 //! Whoever moves bundles must move [`Label::position`]s, [`LoopBound::position`]s and [`Ir::period`] along, and leave alone, as fences, bundles that
@@ -14,6 +15,7 @@
 
 pub(crate) mod flow;
 pub(crate) mod given;
+pub(crate) mod matching;
 pub(crate) mod runs;
 
 use crate::report::source::Span;
@@ -21,7 +23,7 @@ use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
 use takt_isa::program::{Columns, Location, Space};
-use takt_isa::{Machine, Op, Operand, Register, Row, SlotIndex, Type};
+use takt_isa::{Machine, Op, Operand, Register, Row, SlotIndex, Slots, Type};
 
 /// A register of [`Ir::registers`].
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
@@ -109,7 +111,9 @@ pub enum Constant {
 pub struct Operation {
     /// The instruction; `nop` where the word is given bit by bit.
     pub op: Op,
-    /// The slot that executes it; `None` if any can, as a `nop`.
+    /// The slots that may execute it: those that host its function, as far as the source leaves a choice. None if any can, as a `nop`.
+    pub slots: Slots,
+    /// The one of them that executes it, so far as it is known; `None` if any can.
     pub slot: Option<SlotIndex>,
     /// The register that it writes.
     pub dest: Option<RegisterId>,
@@ -174,6 +178,7 @@ impl Operation {
     pub(crate) fn idle(&self) -> Operation {
         Operation {
             op: Op::nop,
+            slots: Slots::default(),
             slot: None,
             dest: None,
             sources: [RegisterId::ZERO; 3],

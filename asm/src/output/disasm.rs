@@ -185,7 +185,7 @@ impl<'p> Writer<'p> {
         let instruction = Instruction::decode(word).ok()?;
         instruction.place(machine, slot).ok()?;
         let function = instruction.op.row().function;
-        if function == Function::Idle || machine.host(function)?.0 != slot {
+        if function == Function::Idle {
             return None;
         }
         let is_access = matches!(instruction.effect(), Effect::Load | Effect::Store);
@@ -202,7 +202,13 @@ impl<'p> Writer<'p> {
             Some(name) => (*name).to_owned(),
             None => address.to_string(),
         };
-        Some(instruction.text_with(machine, slot, register, target))
+        let text = instruction.text_with(machine, slot, register, target);
+        if machine.hosts(function).len() < 2 {
+            return Some(text);
+        }
+        // Its slot is one of several.
+        let (mnemonic, operands) = text.split_at(instruction.op.row().mnemonic.len());
+        Some(format!("{mnemonic}.{}{operands}", machine.slot(slot).name))
     }
 
     fn data(&mut self) {

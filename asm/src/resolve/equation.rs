@@ -18,7 +18,7 @@ use crate::syntax::ast::*;
 use crate::syntax::expr::Value;
 use smallvec::SmallVec;
 use std::rc::Rc;
-use takt_isa::{Op, SlotIndex, Type};
+use takt_isa::{Op, Slots, Type};
 
 /// What a part of an equation is.
 #[derive(Clone, Copy, Debug)]
@@ -220,7 +220,10 @@ impl Resolver<'_> {
                         || operation.reads().contains(&value)
                 };
                 if !behind.iter().flat_map(|bundle| &bundle.operations).any(touches) {
-                    self.ir.bundles[bundle].operations[0].dest = Some(*target);
+                    // A register that has its place leaves fewer slots to choose from.
+                    let slots = self.writing(self.ir.bundles[bundle].operations[0].slots, Some(*target));
+                    let operation = &mut self.ir.bundles[bundle].operations[0];
+                    (operation.dest, operation.slots, operation.slot) = (Some(*target), slots, slots.first());
                     line.computed.remove(place);
                     self.written(*target, kind);
                     let register = &self.context.declared.registers[target.index()];
@@ -314,10 +317,10 @@ impl Resolver<'_> {
         };
         let Some(Meaning { op, .. }) = self.forms.get("", 1).first() else { return Err(Reported) };
         let op = *op;
-        let slot = self.slot(at, op, term.span)?;
+        let slots = self.hosting(at, op, None, term.span)?;
         let sources = [source, RegisterId::ZERO, RegisterId::ZERO];
         let register = target.unwrap_or_else(|| self.fresh(term.span));
-        self.emit(at, line, op, slot, sources, register, term.span);
+        self.emit(at, line, op, slots, sources, register, term.span);
         Ok(register)
     }
 
@@ -348,14 +351,16 @@ impl Resolver<'_> {
         at: At,
         line: &Line,
         op: Op,
-        slot: Option<SlotIndex>,
+        slots: Slots,
         sources: [RegisterId; 3],
         dest: RegisterId,
         span: Span,
     ) {
+        let slots = self.writing(slots, Some(dest));
         let operation = Operation {
             op,
-            slot,
+            slots,
+            slot: slots.first(),
             dest: Some(dest),
             sources,
             constant: Constant::None,

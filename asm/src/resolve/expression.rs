@@ -416,7 +416,7 @@ impl Resolver<'_> {
             return Err(self.no_form(at, symbol, terms, here.0));
         };
         let (op, row) = (*op, op.row());
-        let slot = self.slot(at, op, self.symbol_span(symbol, terms, here.0))?;
+        let slots = self.hosting(at, op, None, self.symbol_span(symbol, terms, here.0))?;
         // Constants that the instruction takes as any bits are of the type of what they are an alternative to.
         let passed = self.forms.passed(op).to_vec();
         let among = |which: &usize| passed.is_empty() || passed.contains(which);
@@ -465,7 +465,7 @@ impl Resolver<'_> {
         }
         let register = self.fresh(here.0);
         let bundle = self.ir.bundles.len();
-        self.emit(at, line, op, slot, registers, register, here.0);
+        self.emit(at, line, op, slots, registers, register, here.0);
         self.sharing.insert(key, register, bundle as u32);
         line.computed.push((register, bundle, key));
         Ok(Term { part: Part::Register(register, result), span: here.0 })

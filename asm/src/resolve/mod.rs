@@ -9,6 +9,7 @@ mod mismatch;
 mod operand;
 pub(crate) mod serialise;
 mod sharing;
+mod slots;
 
 use crate::context::{At, Context, Reported, ScopeId};
 use crate::expand::load::Loader;
@@ -16,7 +17,6 @@ use crate::expand::{self, Data, Flat, Item, SourcePlace, Timing};
 use crate::ir::given::Kind;
 use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
 use crate::report::diag::Diagnostic;
-use crate::report::nearest;
 use crate::report::source::Span;
 use crate::resolve::forms::Forms;
 use crate::resolve::sharing::Sharing;
@@ -26,7 +26,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 use takt_isa::program::Location;
 use takt_isa::spec::instructions::Function;
-use takt_isa::{Op, ROWS, SlotIndex, Type};
+use takt_isa::{Op, ROWS, Slots, Type};
 
 /// The most cycles that a demand on ports can name: many times what a program memory holds.
 const MAX_CYCLES: u32 = 1 << 24;
@@ -38,7 +38,9 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         .iter()
         .map(|row| match row.function {
             Function::Idle => Host::Any,
-            function => machine.host(function).map_or(Host::None, |(slot, _)| Host::Slot(slot)),
+            function => Some(machine.hosts(function))
+                .filter(|slots| !slots.is_empty())
+                .map_or(Host::None, Host::Slots),
         })
         .collect();
     let ir = Ir {
@@ -105,11 +107,11 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
     ir
 }
 
-/// Which slot executes an instruction.
+/// Which slots execute an instruction.
 #[derive(Clone, Copy)]
 enum Host {
     Any,
-    Slot(SlotIndex),
+    Slots(Slots),
     None,
 }
 
@@ -215,7 +217,7 @@ impl Resolver<'_> {
                     self.context.report(item.at.scope, diagnostic);
                 }
             }
-        } else if self.check_slots(item.at, &operations).is_ok() {
+        } else if self.assign_slots(item.at, &mut operations).is_ok() {
             if let Some(diagnostic) = serialise::twice(&operations) {
                 let diagnostic = diagnostic(&self.context.declared.registers, self.ir.machine);
                 self.context.report(item.at.scope, diagnostic);
@@ -299,58 +301,6 @@ impl Resolver<'_> {
         Some((Location { file, line }, None))
     }
 
-    /// Two operations of a bundle that need one slot are a mistake.
-    fn check_slots(&mut self, at: At, operations: &[Operation]) -> Result<(), Reported> {
-        let machine = self.ir.machine;
-        let mut result = Ok(());
-        for (index, operation) in operations.iter().enumerate() {
-            let Some(slot) = operation.slot else { continue };
-            let Some(first) = operations[..index].iter().find(|before| before.slot == Some(slot)) else {
-                continue;
-            };
-            let name = machine.slot(slot).name;
-            let message = format!("two operations of the bundle need slot `{name}`");
-            let what = |operation: &Operation| match operation.constant {
-                Constant::Raw(_) => ".raw",
-                _ => operation.row().mnemonic,
-            };
-            let error = Diagnostic::error("slot-conflict", operation.span, message)
-                .here(format!("`{}` needs it", what(operation)))
-                .also(first.span, format!("so does `{}`", what(first)))
-                .help("write them as two bundles");
-            result = Err(self.context.report(at.scope, error));
-        }
-        if operations.len() > machine.slots.len() && result.is_ok() {
-            let message = format!(
-                "{} operations, and {} has {} slots",
-                operations.len(),
-                machine.name,
-                machine.slots.len()
-            );
-            let last = operations[operations.len() - 1].span;
-            result = Err(self.context.error(at.scope, "slot-conflict", last, message));
-        }
-        result
-    }
-
-    /// The slot that executes an instruction; none if any can.
-    fn slot(&mut self, at: At, op: Op, span: Span) -> Result<Option<SlotIndex>, Reported> {
-        let row = op.row();
-        match self.slots[op as usize] {
-            Host::Any => Ok(None),
-            Host::Slot(slot) => Ok(Some(slot)),
-            Host::None => {
-                let message = format!("{} has no unit for `{}`", self.ir.machine.name, row.mnemonic);
-                let having = takt_isa::MACHINES.iter().find(|machine| machine.host(row.function).is_some());
-                let mut error = Diagnostic::error("no-unit", span, message);
-                if let Some(machine) = having {
-                    error = error.note(format!("machine {} has one", machine.name));
-                }
-                Err(self.context.report(at.scope, error))
-            }
-        }
-    }
-
     fn operation(
         &mut self,
         at: At,
@@ -362,21 +312,26 @@ impl Resolver<'_> {
         let written = &ast.operations[number as usize];
         let name = self.context.spelled(at, written.mnemonic.name, written.mnemonic.span)?;
         let operands = &ast.operands[written.first as usize..(written.first + written.count) as usize];
-        let Some(op) = name.op() else {
-            if name.directive() == Some(Directive::Raw) {
+        let (op, pinned) = match name.op() {
+            Some(op) => (op, None),
+            None if name.directive() == Some(Directive::Raw) => {
                 return self.raw(at, number, written, operands, location);
             }
-            return Err(self.unknown_mnemonic(at, name, written, of));
+            None => match self.pinned(at, name, written.mnemonic.span)? {
+                Some((op, slot)) => (op, Some(slot)),
+                None => return Err(self.unknown_mnemonic(at, name, written, of)),
+            },
         };
         let row = op.row();
-        let slot = self.slot(at, op, written.mnemonic.span)?;
+        let slots = self.hosting(at, op, pinned, written.mnemonic.span)?;
         let places = row.shape.operands();
         if places.len() != operands.len() {
             return Err(self.wrong_count(at, row, written, operands));
         }
         let mut operation = Operation {
             op,
-            slot,
+            slots,
+            slot: slots.first(),
             dest: None,
             sources: [RegisterId::ZERO; 3],
             constant: Constant::None,
@@ -393,6 +348,8 @@ impl Resolver<'_> {
             // All operands are looked at, whatever is wrong with one.
             failed |= self.operand(at, row, *place, *operand, &mut operation).is_err();
         }
+        operation.slots = self.writing(slots, operation.dest);
+        operation.slot = operation.slots.first();
         if failed { Err(Reported) } else { Ok(operation) }
     }
 
@@ -406,18 +363,8 @@ impl Resolver<'_> {
         location: Option<SourcePlace>,
     ) -> Result<Operation, Reported> {
         let [slot, word] = operands else { return Err(Reported) };
-        let slots = self.ir.machine.slots;
         let name = self.context.reports.sources.text(slot.span).to_owned();
-        let mut numbered = self.ir.machine.numbered_slots();
-        let Some((index, _)) = numbered.find(|(_, slot)| slot.name == name) else {
-            let names = slots.iter().map(|slot| slot.name);
-            let message = format!("{} has no slot `{name}`", self.ir.machine.name);
-            let meant = nearest(&name, names.clone());
-            let error = Diagnostic::error("operand", slot.span, message)
-                .note(format!("slots: {}", names.collect::<Vec<_>>().join(" ")))
-                .did_you_mean(meant);
-            return Err(self.context.report(at.scope, error));
-        };
+        let index = self.named_slot(at, &name, slot.span)?;
         let value = self.operand_value(at, *word)?;
         let Some(bits) =
             value.integer().ok().and_then(|value| u64::try_from(value).ok()).filter(|value| value >> 48 == 0)
@@ -427,6 +374,7 @@ impl Resolver<'_> {
         self.ir.raw.push(bits);
         Ok(Operation {
             op: Op::nop,
+            slots: Slots::of(index),
             slot: Some(index),
             dest: None,
             sources: [RegisterId::ZERO; 3],

@@ -74,6 +74,7 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
     reads.extend(arguments.file.as_deref().map(|path| ("FILE", path)));
     reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
     reads.extend(arguments.closed_loop.gcode.as_deref().map(|path| ("--gcode", path)));
+    reads.extend(arguments.closed_loop.spread.as_deref().map(|path| ("--spread", path)));
     reads.extend(arguments.script.as_deref().map(|path| ("--script", path)));
     files::check(&reads, &[])?;
     let reads_stdin = arguments.script.is_none();

@@ -5,6 +5,7 @@ use crate::event::PortWrite;
 use crate::execute::data_address;
 use crate::machine::{NanWrites, State, WORDS, Word};
 use crate::micro::{Kind, Micro};
+use pulp::{Arch, NullaryFnOnce};
 use takt_isa::fp::{Flags, Host, Screened, Value, is_nan};
 use takt_isa::timing::Cycle;
 use takt_isa::{Register, compute, compute_lanes};
@@ -60,6 +61,25 @@ struct Undo {
     underway: Vec<Underway>,
     flags: [Flags; LANES],
     nans: Vec<(usize, u64)>,
+}
+
+/// [`Lanes::run`], compiled once for each width of vectors that the host may have.
+struct Run<'a> {
+    lanes: &'a mut Lanes,
+    block: &'a Block,
+    present: &'a Mask,
+}
+
+impl NullaryFnOnce for Run<'_> {
+    type Output = Result<(), Mask>;
+
+    #[inline(always)]
+    fn call(self) -> Result<(), Mask> {
+        for micro in &self.block.micros {
+            self.lanes.micro(micro, self.present)?;
+        }
+        Ok(())
+    }
 }
 
 impl Lanes {
@@ -229,10 +249,7 @@ impl Lanes {
     /// Runs the micros of a block. If that takes a lane that is present out of its memory, those lanes are the error, and
     /// everything is to be undone.
     pub(crate) fn run(&mut self, block: &Block, present: &Mask) -> Result<(), Mask> {
-        for micro in &block.micros {
-            self.micro(micro, present)?;
-        }
-        Ok(())
+        Arch::new().dispatch(Run { lanes: self, block, present })
     }
 
     #[inline(always)]

@@ -10,8 +10,8 @@ use std::convert::Infallible;
 
 use super::controller::{Controller, Outputs};
 use super::kinematics::Reference;
-use super::plant::Plant;
 use super::ports;
+use super::spread::Robot;
 use crate::real::Real;
 use crate::trajectory::{Sample, Samples, Trajectory};
 
@@ -118,7 +118,7 @@ pub enum LoopError<E> {
 #[derive(Debug, Clone)]
 pub struct ClosedLoop<'t, C> {
     samples: Samples<'t>,
-    plant: Plant,
+    robot: Robot,
     controller: C,
     period: u64,
     failed: bool,
@@ -127,13 +127,12 @@ pub struct ClosedLoop<'t, C> {
 impl<'t, C: TrackingController> ClosedLoop<'t, C> {
     /// A loop about to run; the plant stands at the trajectory's start, balanced against gravity.
     pub fn new(trajectory: &'t Trajectory, controller: C) -> Self {
-        Self {
-            samples: trajectory.samples(),
-            plant: Plant::at_rest(&trajectory.start()),
-            controller,
-            period: 0,
-            failed: false,
-        }
+        Self::with(Robot::nominal(&trajectory.start()), trajectory, controller)
+    }
+
+    /// The same with another robot, which is to stand at the trajectory's start.
+    pub fn with(robot: Robot, trajectory: &'t Trajectory, controller: C) -> Self {
+        Self { samples: trajectory.samples(), robot, controller, period: 0, failed: false }
     }
 
     /// The controller, to inspect it between periods.
@@ -143,17 +142,16 @@ impl<'t, C: TrackingController> ClosedLoop<'t, C> {
 
     fn run(&mut self, sample: Sample) -> Result<Record, LoopError<C::Error>> {
         let period = self.period;
-        let counts = self.plant.counts().ok_or(LoopError::Lost { period })?;
+        let counts = self.robot.counts().ok_or(LoopError::Lost { period })?;
         let inputs = Inputs { counts, reference: sample.reference.convert() };
         let outputs =
             self.controller.step(&inputs).map_err(|source| LoopError::Controller { period, source })?;
-        let efforts = outputs.force.iter().chain(&outputs.torque);
-        if let Some((_, port)) = efforts.zip(ports::OUTPUTS).find(|(effort, _)| !effort.is_finite()) {
-            return Err(LoopError::NotFinite { period, port: port.name });
+        if let Some(port) = not_finite(&outputs) {
+            return Err(LoopError::NotFinite { period, port });
         }
-        let position = self.plant.position();
+        let position = self.robot.plant().position();
         let tool_error = distance(position, sample.reference.position);
-        self.plant.advance(outputs.force, outputs.torque);
+        self.robot.advance(outputs.force, outputs.torque);
         self.period += 1;
         Ok(Record { period, sample, inputs, outputs, position, tool_error })
     }
@@ -173,7 +171,16 @@ impl<C: TrackingController> Iterator for ClosedLoop<'_, C> {
     }
 }
 
-fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+/// The name of a force or torque that is infinite or not a number.
+#[must_use]
+pub fn not_finite(outputs: &Outputs<f64>) -> Option<&'static str> {
+    let efforts = outputs.force.iter().chain(&outputs.torque);
+    efforts.zip(ports::OUTPUTS).find(|(effort, _)| !effort.is_finite()).map(|(_, port)| port.name)
+}
+
+/// Distance of two points.
+#[must_use]
+pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()
 }
 

@@ -8,9 +8,14 @@ use crate::real::Real;
 #[inline]
 #[must_use]
 pub fn end_inertia<T: Real>(length: T) -> T {
+    end_inertia_of(T::from_f64(params::ARM_INERTIA), T::from_f64(params::SLIDER_MASS), length)
+}
+
+/// [`end_inertia`] of an arm with another moment of inertia `J0`, kg·m², and another slider's mass, kg.
+#[inline]
+pub(super) fn end_inertia_of<T: Real>(inertia: T, slider: T, length: T) -> T {
     let offset = length - T::from_f64(params::SLIDER_OFFSET);
-    (T::from_f64(params::ARM_INERTIA) + T::from_f64(params::SLIDER_MASS) * offset * offset)
-        / (length * length)
+    (inertia + slider * offset * offset) / (length * length)
 }
 
 /// Reduced masses `M_11 M_22 M_33` in kg at arm lengths in m, (23).
@@ -42,8 +47,13 @@ pub fn reduced_masses<T: Real>(length: [T; 3]) -> [T; 3] {
 #[inline]
 #[must_use]
 pub fn gravity_mass<T: Real>(length: [T; 3]) -> T {
+    gravity_mass_of(T::from_f64(params::PLATFORM_MASS + 3.0 * params::SLIDER_MASS), length)
+}
+
+/// [`gravity_mass`] where platform and sliders together have another mass, kg.
+#[inline]
+pub(super) fn gravity_mass_of<T: Real>(fixed: T, length: [T; 3]) -> T {
     let balance = T::from_f64(params::ARM_BALANCE);
-    let fixed = T::from_f64(params::PLATFORM_MASS + 3.0 * params::SLIDER_MASS);
     fixed + (balance / length[0] + balance / length[1] + balance / length[2])
 }
 
@@ -54,13 +64,19 @@ pub fn gravity_mass<T: Real>(length: [T; 3]) -> T {
 #[inline]
 #[must_use]
 pub fn gravity<T: Real>(length: [T; 3], point: [T; 3]) -> [T; 3] {
+    gravity_of(gravity_mass(length), length, point)
+}
+
+/// [`gravity`] where another mass, kg, is to be held.
+#[inline]
+pub(super) fn gravity_of<T: Real>(mass: T, length: [T; 3], point: [T; 3]) -> [T; 3] {
     let [x, y, z] = point;
     let third = T::from_f64(1.0 / 3.0);
     let per_x = T::from_f64(params::SQRT_3 / (3.0 * params::BASE_RADIUS));
     let per_y = T::from_f64(1.0 / (3.0 * params::BASE_RADIUS));
     let (along, up) = (x * per_x, y * per_y);
     let share = [third + (up + up), third + (along - up), third - (along + up)];
-    let scale = gravity_mass(length) * T::from_f64(params::GRAVITY) / z;
+    let scale = mass * T::from_f64(params::GRAVITY) / z;
     [length[0] * share[0] * scale, length[1] * share[1] * scale, length[2] * share[2] * scale]
 }
 

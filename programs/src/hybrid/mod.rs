@@ -12,9 +12,11 @@ pub mod kinematics;
 pub mod params;
 pub mod plant;
 pub mod ports;
+pub mod spread;
 pub mod workspace;
 
 pub use closed_loop::{ClosedLoop, Inputs, LoopError, Record, TrackingController, TrackingError};
 pub use controller::{Controller, Outputs};
 pub use kinematics::{JointReference, Reference};
 pub use plant::Plant;
+pub use spread::{Robot, Spread};

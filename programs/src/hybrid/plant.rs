@@ -7,14 +7,66 @@
 //! exact exponential for the lag and the other order of lag and motion were tried: the largest tool errors move by
 //! less than half a per cent.
 
-use super::dynamics::{dot, end_inertia, gravity, gravity_mass, solve, table_gravity};
+use super::dynamics::{dot, end_inertia_of, gravity_mass_of, gravity_of, solve};
 use super::kinematics::{Reference, arms, inverse};
 use super::params;
 use crate::path::Pose;
 
+/// What one robot is made of. The default is the robot that the controller's model knows, [`params`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameters {
+    /// Mass of each arm's slider, kg.
+    pub slider_mass: f64,
+    /// Mass of the platform with its tool, kg.
+    pub platform_mass: f64,
+    /// Moment of inertia of each arm without its slider, about the pivot, kg·m².
+    pub arm_inertia: f64,
+    /// Moments of inertia of the table about its tilt and its rotation axis, kg·m².
+    pub table_inertia: [f64; 2],
+    /// Static moment of the table about the tilt axis, kg·m.
+    pub tilt_imbalance: f64,
+    /// Coulomb friction of each arm, N.
+    pub arm_coulomb: [f64; 3],
+    /// Viscous friction of each arm, N·s/m.
+    pub arm_viscous: [f64; 3],
+    /// Coulomb friction of the table's axes, N·m.
+    pub table_coulomb: [f64; 2],
+    /// Time constant of the actuators, s.
+    pub actuator_lag: f64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            slider_mass: params::SLIDER_MASS,
+            platform_mass: params::PLATFORM_MASS,
+            arm_inertia: params::ARM_INERTIA,
+            table_inertia: [params::TILT_INERTIA, params::ROTATION_INERTIA],
+            tilt_imbalance: params::TILT_IMBALANCE,
+            arm_coulomb: [params::ARM_COULOMB; 3],
+            arm_viscous: [params::ARM_VISCOUS; 3],
+            table_coulomb: params::TABLE_COULOMB,
+            actuator_lag: params::ACTUATOR_LAG,
+        }
+    }
+}
+
+impl Parameters {
+    /// Mass that gravity acts on at the platform, kg, at arm lengths in m.
+    fn gravity_mass(&self, length: [f64; 3]) -> f64 {
+        gravity_mass_of(self.platform_mass + 3.0 * self.slider_mass, length)
+    }
+
+    /// Moments that hold the table at a tilt in rad, N·m.
+    fn table_gravity(&self, tilt: f64) -> [f64; 2] {
+        [self.tilt_imbalance * params::GRAVITY * tilt.sin(), 0.0]
+    }
+}
+
 /// State of the plant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plant {
+    parameters: Parameters,
     /// Tool point, m, and its velocity, m/s.
     position: [f64; 3],
     velocity: [f64; 3],
@@ -29,10 +81,17 @@ impl Plant {
     /// The plant at rest in a pose, its actuators holding it against gravity.
     #[must_use]
     pub fn at_rest(pose: &Pose) -> Self {
+        Self::made_of(Parameters::default(), pose)
+    }
+
+    /// As [`Plant::at_rest`], of a robot with other parameters.
+    #[must_use]
+    pub fn made_of(parameters: Parameters, pose: &Pose) -> Self {
         let length = lengths(pose.position);
-        let [f1, f2, f3] = gravity(length, pose.position);
-        let [t4, t5] = table_gravity(pose.angle[0]);
+        let [f1, f2, f3] = gravity_of(parameters.gravity_mass(length), length, pose.position);
+        let [t4, t5] = parameters.table_gravity(pose.angle[0]);
         Self {
+            parameters,
             position: pose.position,
             velocity: [0.0; 3],
             angle: pose.angle,
@@ -56,11 +115,17 @@ impl Plant {
     /// Encoder counts, each rounded to the nearest; `None` if one does not fit 32 bits.
     #[must_use]
     pub fn counts(&self) -> Option<[i32; 5]> {
+        self.counts_off_by([0.0; 5])
+    }
+
+    /// The same of encoders that read wrong by so many counts.
+    #[must_use]
+    pub fn counts_off_by(&self, counts_off: [f64; 5]) -> Option<[i32; 5]> {
         let [l1, l2, l3] = lengths(self.position);
         let exact = [l1, l2, l3, self.angle[0], self.angle[1]];
         let mut counts = [0; 5];
         for (axis, count) in counts.iter_mut().enumerate() {
-            let rounded = (exact[axis] / params::RESOLUTION[axis]).round();
+            let rounded = (exact[axis] / params::RESOLUTION[axis] + counts_off[axis]).round();
             // The cast alone would turn NaN and large values into counts that look sound.
             let fits = rounded.abs() <= f64::from(i32::MAX);
             *count = fits.then_some(rounded as i32)?;
@@ -70,11 +135,16 @@ impl Plant {
 
     /// Lets one sampling period pass with the actuators commanded to `force` (N) and `torque` (N·m).
     pub fn advance(&mut self, force: [f64; 3], torque: [f64; 2]) {
+        self.advance_by(params::SAMPLE_TIME, force, torque);
+    }
+
+    /// The same for a period of another length, s.
+    pub fn advance_by(&mut self, period: f64, force: [f64; 3], torque: [f64; 2]) {
         let command = [force[0], force[1], force[2], torque[0], torque[1]];
-        let step = params::SAMPLE_TIME / f64::from(params::PLANT_STEPS);
+        let step = period / f64::from(params::PLANT_STEPS);
         for _ in 0..params::PLANT_STEPS {
             for (effort, command) in self.effort.iter_mut().zip(command) {
-                *effort += (command - *effort) * (step / params::ACTUATOR_LAG);
+                *effort += (command - *effort) * (step / self.parameters.actuator_lag);
             }
             let acceleration = self.acceleration();
             let angular_acceleration = self.angular_acceleration();
@@ -87,24 +157,25 @@ impl Plant {
     fn acceleration(&self) -> [f64; 3] {
         let mut right = [0.0; 3];
         let mut mass = [[0.0; 3]; 3];
-        let mut diagonal = params::PLATFORM_MASS;
+        let made_of = &self.parameters;
+        let mut diagonal = made_of.platform_mass;
         let length = lengths(self.position);
         for (i, arm) in arms(self.position).into_iter().enumerate() {
             let direction = arm.map(|d| d / length[i]);
             let speed = dot(direction, self.velocity);
-            let friction = params::ARM_COULOMB * (speed / params::ARM_COULOMB_SPEED).tanh()
-                + params::ARM_VISCOUS * speed;
+            let friction = made_of.arm_coulomb[i] * (speed / params::ARM_COULOMB_SPEED).tanh()
+                + made_of.arm_viscous[i] * speed;
             let pull = self.effort[i] - friction;
-            let swing = end_inertia(length[i]);
+            let swing = end_inertia_of(made_of.arm_inertia, made_of.slider_mass, length[i]);
             diagonal += swing;
             for row in 0..3 {
                 right[row] += direction[row] * pull;
                 for column in 0..3 {
-                    mass[column][row] += (params::SLIDER_MASS - swing) * direction[row] * direction[column];
+                    mass[column][row] += (made_of.slider_mass - swing) * direction[row] * direction[column];
                 }
             }
         }
-        right[2] -= gravity_mass(length) * params::GRAVITY;
+        right[2] -= made_of.gravity_mass(length) * params::GRAVITY;
         for (i, column) in mass.iter_mut().enumerate() {
             column[i] += diagonal;
         }
@@ -112,11 +183,11 @@ impl Plant {
     }
 
     fn angular_acceleration(&self) -> [f64; 2] {
-        let load = table_gravity(self.angle[0]);
-        let inertia = [params::TILT_INERTIA, params::ROTATION_INERTIA];
+        let load = self.parameters.table_gravity(self.angle[0]);
+        let inertia = self.parameters.table_inertia;
         std::array::from_fn(|i| {
-            let friction =
-                params::TABLE_COULOMB[i] * (self.angular_velocity[i] / params::TABLE_COULOMB_SPEED).tanh();
+            let friction = self.parameters.table_coulomb[i]
+                * (self.angular_velocity[i] / params::TABLE_COULOMB_SPEED).tanh();
             (self.effort[3 + i] - load[i] - friction) / inertia[i]
         })
     }
