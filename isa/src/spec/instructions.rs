@@ -254,18 +254,19 @@ macro_rules! instructions {
             sources: [&[u32; L]; 3],
             results: &mut [u32; L],
         ) -> bool {
-            let mut raised = 0;
+            // One word a lane: the vectoriser makes poor code of one for all.
+            let mut raised = [0; L];
             match op {
                 $(Op::$mnemonic => {
                     for lane in 0..L {
                         let [$a, $b, $c] = [sources[0][lane], sources[1][lane], sources[2][lane]];
                         let value: Value = value!($($meaning)*);
                         results[lane] = value.bits;
-                        raised |= u32::from(value.flags.bits());
+                        raised[lane] = u32::from(value.flags.bits());
                     }
                 })*
             }
-            raised != 0
+            raised.iter().fold(0, |all, flags| all | flags) != 0
         }
     };
 }
