@@ -86,7 +86,7 @@ Examples:
   takt track --program mine.s --gcode part.ngc   your own controller, your own path
   takt track --periods 1000 --csv path.csv       record inputs and outputs for `takt run`
   takt track -q --deny all                       for CI: status 3 if a deadline is missed, …
-  takt track --monte-carlo 100 --plot errors.svg  a hundred robots that differ: how far off is each?";
+  takt track --monte-carlo 100 --plot errors.svg  a hundred robots that differ";
 
 /// Bytes of G-code; beyond, the longest path that can be driven would be made of moves of a micrometre.
 const GCODE_LIMIT: usize = 16 << 20;

@@ -275,6 +275,52 @@ fn names_are_followed_through_macros_repetitions_and_includes() {
     session.end();
 }
 
+const EQUATIONS: &str = "\
+.input  x, y
+.output F, G
+.macro  halve r, a
+        fmul    r, a, 0.5
+.endm
+.period
+.reg    v[3] t
+period:
+        .rep i, 1, 3
+        v[i] = i*x + y
+        .endr
+        t = sum(k, 1, 3, k*v[k])
+        F, G = t - halve(x*y), v[2] > 0 ? t : y
+        wait    period
+";
+
+#[test]
+fn names_of_equations_and_arrays_are_followed() {
+    let files = [("main.s", EQUATIONS)];
+    let mut session = Session::new(&files);
+    assert_eq!(session.open("main.s", EQUATIONS), Vec::<Value>::new());
+    for (of, to, from, into) in [
+        ("v[3]", "w", "v[", "w["),
+        ("t = sum", "total", "t ", "total "),
+        ("k, 1", "index", "(k, 1, 3, k*v[k]", "(index, 1, 3, index*v[index]"),
+        ("halve(", "half", "halve", "half"),
+        ("x*y", "speed", "x", "speed"),
+    ] {
+        let answer = session.rename("main.s", EQUATIONS, of, to);
+        let texts = session.applied(&answer, &files);
+        let expected = match of {
+            "t = sum" => EQUATIONS
+                .replace(" t\n", " total\n")
+                .replace("t = ", "total = ")
+                .replace("= t ", "= total ")
+                .replace("? t ", "? total "),
+            _ => EQUATIONS.replace(from, into),
+        };
+        assert_eq!(texts, [expected], "{of}");
+    }
+    // As `takt fmt` leaves it.
+    assert_eq!(session.folder.line("fmt --check main.s").status, Some(0));
+    session.end();
+}
+
 #[test]
 fn an_included_file_is_read_as_it_is_open() {
     let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);

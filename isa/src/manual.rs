@@ -167,8 +167,11 @@ pub fn text() -> String {
         }
         let _ = writeln!(out, " {}", entry.summary);
     }
-    out.push_str(
-        "\nColumns t3, t1: issue slot, latency/interval in cycles. `takt isa MNEMONIC` tells more.\n",
+    let machines: Vec<&str> = manual.machines.iter().map(|machine| machine.name).collect();
+    let _ = writeln!(
+        out,
+        "\nColumns {}: issue slot, latency/interval in cycles. `takt isa MNEMONIC` tells more.",
+        machines.join(", ")
     );
     out
 }

@@ -12,6 +12,7 @@ use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use takt_isa::MACHINES;
 
 /// Project automation for Takt.
 #[derive(Parser)]
@@ -224,7 +225,7 @@ fn seed() -> Result<()> {
             }
         }
     }
-    for machine in ["t3", "t1"] {
+    for machine in MACHINES.iter().map(|machine| machine.name) {
         let image = images.join(format!("{machine}.takt"));
         let source = "programs/hybrid/tracking.s";
         run(cargo().args(["run", "--release", "-q", "--", "asm", source, "-m", machine, "-o"]).arg(image))?;

@@ -85,7 +85,7 @@ pub(crate) fn contract(ir: &mut Ir, is_on: impl Fn(usize) -> bool) -> Contracted
                 (fusion.product, fusion.sum, fusion.source) == (at(ir, product.at).op, sum.op, source)
             })?;
             let wanted = is_on(product.at.0) && is_on(reader.0);
-            let free = !(product.last && exposed[product.dest.index()]) && !product.stale;
+            let free = !(product.stale || product.last && exposed[product.dest.index()]);
             (wanted && free && has_place(ir, reader, fusion)).then_some((reader, **fusion))
         };
         let mut wishes = Wishes::new();

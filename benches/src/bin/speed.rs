@@ -285,6 +285,8 @@ fn lockstep(text: &mut String) -> Outcome<()> {
 }
 
 fn main() -> Outcome<()> {
+    // Of the parts only these; all, if none is named.
+    let wanted: Vec<String> = std::env::args().skip(1).collect();
     let mut text = format!(
         "# How fast the tools are\n\n\
          Written by `cargo xtask speed`. Absolute speeds depend on the machine, so each figure is a ratio to something that a \
@@ -297,8 +299,10 @@ fn main() -> Outcome<()> {
         ("assembler", assembler),
         ("lockstep", lockstep),
     ] {
-        eprintln!("measuring: {name}");
-        measure(&mut text)?;
+        if wanted.is_empty() || wanted.iter().any(|wanted| wanted == name) {
+            eprintln!("measuring: {name}");
+            measure(&mut text)?;
+        }
     }
     print!("{text}");
     Ok(())

@@ -20,6 +20,9 @@ pub(super) enum Hits {
     Every(u64),
 }
 
+/// What makes a stop of a request's entry, and what the answer says of it.
+type Make<'m> = &'m dyn Fn(&Session, &Value) -> Result<(Stop, Option<Value>), String>;
+
 impl Hits {
     fn parse(text: &str) -> Result<Hits, String> {
         let text = text.trim();
@@ -65,13 +68,7 @@ pub(super) struct Breakpoints {
 
 impl Debugged {
     /// Replaces the breakpoints of a group.
-    fn replace(
-        &mut self,
-        group: String,
-        reason: &'static str,
-        wanted: &Value,
-        make: &dyn Fn(&Session, &Value) -> Result<(Stop, Option<Value>), String>,
-    ) -> Answer {
+    fn replace(&mut self, group: String, reason: &'static str, wanted: &Value, make: Make<'_>) -> Answer {
         let wanted = wanted.as_array().cloned().unwrap_or_default();
         for id in self.breakpoints.groups.remove(&group).unwrap_or_default() {
             self.session().remove_stop(id);

@@ -100,18 +100,16 @@ impl Workspace {
             let open = self.of_open.iter();
             let on_disk = self.on_disk.iter().filter(|(from, _)| !self.of_open.contains_key(*from));
             let all = open.chain(on_disk.map(|(from, (_, to))| (from, to)));
-            // A program's files lie in the folder of its first.
-            let by = all.filter(|(from, to)| {
-                to.contains(&file) && from.parent().is_some_and(|folder| path.starts_with(folder))
-            });
+            let by = all.filter(|(_, to)| to.contains(&file));
             let by: Vec<PathBuf> = by.map(|(from, _)| from.clone()).collect();
-            if by.is_empty() {
+            // A program's files lie in the folder of its first.
+            if by.is_empty() && file.parent().is_some_and(|folder| path.starts_with(folder)) {
                 roots.push(file);
             }
             left.extend(by.into_iter().filter(|from| seen.insert(from.clone())));
         }
         if roots.is_empty() {
-            // Files that include one another.
+            // Files that include one another, or one that nothing can include.
             roots.push(path.to_owned());
         }
         roots.sort();

@@ -43,6 +43,8 @@ pub(crate) struct Group {
     written: Vec<RegisterSet>,
     published: Vec<RegisterSet>,
     /// Emulators without a lane.
+    // Boxed: an emulator is large, and a lane that leaves takes one as it is.
+    #[allow(clippy::vec_box)]
     spare: Vec<Box<Emulator>>,
     report: Option<PeriodReport>,
     nan_writes: Vec<Vec<PortWrite>>,
