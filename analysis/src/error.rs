@@ -105,8 +105,8 @@ pub(crate) fn place(program: &Program, address: BundleAddress) -> String {
             format!(" ({label} + {distance})")
         });
     }
-    match program.location(address) {
-        Some(location) => format!("{}: {text}", program.place_text(location)),
+    match program.bundle_place(address) {
+        Some(place) => format!("{place}: {text}"),
         None => text,
     }
 }

@@ -1,15 +1,17 @@
 //! Timing analysis of programs: plain data out, nothing printed. `docs/analysis.md` says how it is done and why it is safe.
 //!
 //! - [`bound`]: the best and the worst that each section of a program can take, from the program alone.
-
+//! - [`straight()`]: in which cycle each operation of a straight line issues, and what it waits for.
 //! - [`trace`]: where the cycles of one period, or of a run, went: every issue and what it waited for, the chain of
 //!   operations that sets the time, and what a faster unit would bring.
 
 pub mod bound;
 mod error;
 mod graph;
+mod straight;
 mod trace;
 
 pub use bound::{Bounds, SectionBounds, Span, bound};
 pub use error::{BoundError, Refusal};
+pub use straight::{StraightIssue, straight};
 pub use trace::{Issued, Link, LinkKind, MAX_ISSUES, Stalls, Trace, TraceError, WhatIf, trace};

@@ -30,7 +30,7 @@ pub struct Trace {
     pub cycles: Cycle,
     /// The bundles, in order.
     pub issues: Vec<Issued>,
-    /// The bundle that waited for the tick, and the cycle of its issue: what issued with it may still be underway.
+    /// The bundle that waited for the tick, and the cycle of its issue: what issued with it may still be in flight.
     before: Option<(BundleAddress, Cycle)>,
 }
 

@@ -177,7 +177,7 @@ fn straight_programs_take_exactly_their_bounds() {
     random_programs(options, 300, |seed, program, bounds, measured| {
         for &one in measured {
             let exact = check(bounds, one, program.machine.refill);
-            // A period that begins with what the `wait`'s own bundle left underway may depend on when the tick comes.
+            // A period that begins with what the `wait`'s own bundle left in flight may depend on when the tick comes.
             let section = section(bounds, one);
             if one.entered == Entered::Reset {
                 assert!(exact, "seed {seed}");

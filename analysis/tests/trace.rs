@@ -1,6 +1,6 @@
 //! Traces against the emulator's own accounts.
 
-use takt_analysis::{Trace, trace};
+use takt_analysis::{Trace, straight, trace};
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_emu::Emulator;
 use takt_emu::testing::{self, Random, random_program};
@@ -68,6 +68,34 @@ fn the_tracking_program_waits_for_its_units() {
             }
             let write_port = what.stalls[Cause::KINDS.iter().position(|kind| *kind == "write port").unwrap()];
             assert!(what.cycles <= period.cycles || write_port > 0, "{what:?}");
+        }
+    }
+}
+
+/// Along a straight line, each bundle of the schedule issues when the scheduler says that the block ends, and when the emulator
+/// issues it.
+#[test]
+fn straight_lines_issue_as_scheduled() {
+    for machine in MACHINES {
+        let loader = MemoryLoader::new(takt_programs::SOURCES);
+        let options = Options { machine, ..Options::default() };
+        let assembled = assemble("hybrid/tracking.s", &loader, &options).expect("it assembles");
+        let issues = straight(&assembled.program);
+        assert_eq!(issues.len(), assembled.program.bundles() as usize);
+        for block in assembled.blocks.iter().filter(|block| block.bundles > 1) {
+            let last = &issues[block.address.index() + block.bundles as usize - 1];
+            if last.from == block.address {
+                assert_eq!(last.cycle, u64::from(block.cycles), "{} {:?}", machine.name, block.label);
+            }
+        }
+        let period =
+            assembled.program.sections.iter().find(|section| section.name == "period").expect("it has one");
+        assert!(issues[period.end.index() - 1].from == period.start);
+        for issue in &issues {
+            let stalled: u64 = issue.stalls.iter().map(|(_, cycles)| u64::from(*cycles)).sum();
+            let before =
+                issues.get(issue.address.index().wrapping_sub(1)).filter(|before| before.from == issue.from);
+            assert!(before.is_none_or(|before| before.cycle + stalled < issue.cycle));
         }
     }
 }

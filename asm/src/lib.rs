@@ -21,7 +21,8 @@
 //! ```
 //!
 //! `syntax` reads a file; `expand` writes out macros, repetitions and includes, and declares; `resolve` gives every name its
-//! meaning; `check` looks at the whole program (types, who writes what); `contract` fuses products into sums; `homes` finds each value its place; `schedule` packs bundles;
+//! meaning; `check` looks at the whole program (types, who writes what); `contract` fuses products into sums; `homes` finds
+//! each operation a slot and each value its place; `schedule` packs bundles, and chooses anew among the slots that can take an operation;
 //! `emit` places registers and makes words; `output` is what can be made of the result. `context` is what the stages before
 //! `schedule` share, `report` how mistakes are told. A stage uses those before it, never one after it.
 //!
@@ -34,6 +35,7 @@ mod contract;
 mod emit;
 mod expand;
 mod homes;
+pub mod index;
 mod ir;
 pub mod limits;
 mod output;
@@ -48,14 +50,16 @@ use report::source::Sources;
 use std::sync::Arc;
 use takt_isa::{Machine, Program, T3};
 
+pub use context::type_name;
 pub use contract::Contraction;
-pub use expand::load::{FileLoader, LoadError, Loader, MemoryLoader, Search};
+pub use expand::load::{FileLoader, LoadError, Loader, MemoryLoader, Open, Search};
 pub use homes::{Adjustment, Made};
-pub use output::{disasm, image, listing, names};
+pub use output::{disasm, format, image, listing, names};
 pub use report::diag::{Diagnostic, Diagnostics};
 pub use report::levels::Levels;
 pub use report::{diag, levels, nearest, source};
-pub use syntax::{Expression, expr};
+pub use syntax::ast::Directive;
+pub use syntax::{Expression, expr, tokens};
 
 /// What the assembler is to do.
 #[derive(Clone, Copy, Debug)]
@@ -164,10 +168,31 @@ pub fn assemble_bytes(
 /// # Errors
 /// Every error of the program, and its warnings.
 pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<Assembled, Diagnostics> {
+    check_with(context::Context::new(options.machine), path, loader, options).finish()
+}
+
+/// A program that is read and checked, not yet scheduled: what an editor can have after each keystroke.
+pub struct Checked {
+    context: context::Context,
+    ir: ir::Ir,
+    /// Where values live, and what was contracted. None if the program cannot fit, which is reported.
+    homes: Option<(homes::Homes, Vec<Contraction>)>,
+    effort: u32,
+    index: index::Index,
+}
+
+/// Reads and checks the program that begins with the source at `path`, and indexes its names. [`Checked::finish`] does the rest.
+pub fn check(path: &str, loader: &dyn Loader, options: &Options) -> Checked {
     let mut context = context::Context::new(options.machine);
+    context.notes = Some(context::Notes::default());
+    check_with(context, path, loader, options)
+}
+
+fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, options: &Options) -> Checked {
     context.reports.sink.levels = options.levels;
     let (mut context, flat) = expand::Expander::new(context, loader).expand(path);
     let mut ir = resolve::resolve(&mut context, loader, flat);
+    let index = index::index(&mut context, &ir);
     let packs = |scheduled| match options.schedule {
         Schedule::AsWritten => scheduled,
         Schedule::All => true,
@@ -176,55 +201,88 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
     ir.bundles.iter_mut().for_each(|bundle| bundle.scheduled = packs(bundle.scheduled));
     check::types::check(&mut context, &ir);
     // Of a program that cannot fit nothing else is worth its time.
-    if emit::is_too_long(&ir) {
+    let homes = if emit::is_too_long(&ir) {
         emit::limits(&ir, &mut context.reports.sink);
-        return Err(context.reports.sink.finish(Arc::new(context.reports.sources)));
+        None
+    } else {
+        let marked = std::mem::take(&mut ir.contracted);
+        let contracted = contract::contract(&mut ir, |bundle| {
+            marked.get(bundle).copied().flatten().is_some_and(|on| match options.contract {
+                Contract::AsWritten => on,
+                Contract::All => true,
+                Contract::None => false,
+            })
+        });
+        homes::slots::choose(&mut ir);
+        let mut homes = homes::choose(&mut ir);
+        homes.quiet.extend(contracted.gone);
+        let values = values::split(&mut ir, &mut homes);
+        copies::insert(&mut ir, &mut homes, &values);
+        check::check(&mut context, &ir, &homes);
+        Some((homes, contracted.contractions))
+    };
+    Checked { context, ir, homes, effort: options.effort, index }
+}
+
+impl Checked {
+    /// The program's names.
+    pub fn index(&self) -> &index::Index {
+        &self.index
     }
-    let marked = std::mem::take(&mut ir.contracted);
-    let contracted = contract::contract(&mut ir, |bundle| match options.contract {
-        Contract::AsWritten => marked.get(bundle).copied().unwrap_or(false),
-        Contract::All => true,
-        Contract::None => false,
-    });
-    let mut homes = homes::choose(&mut ir);
-    homes.quiet.extend(contracted.gone);
-    let values = values::split(&mut ir, &mut homes);
-    copies::insert(&mut ir, &mut homes, &values);
-    check::check(&mut context, &ir, &homes);
-    let mut sink = std::mem::take(&mut context.reports.sink);
-    let sources = Arc::new(std::mem::take(&mut context.reports.sources));
-    // What follows would only report what follows from the errors there are.
-    if sink.errors > 0 {
-        return Err(sink.finish(sources));
+
+    /// The sources that were read.
+    pub fn sources(&self) -> &Sources {
+        &self.context.reports.sources
     }
-    let schedule::Report { blocks, timing } = schedule::schedule(&mut ir, options.effort, &mut sink);
-    if sink.errors > 0 {
-        return Err(sink.finish(sources));
+
+    /// The errors and warnings so far. [`Checked::finish`] gives these, and if there is no error among them perhaps others.
+    pub fn diagnostics(&self) -> Diagnostics {
+        let reports = &self.context.reports;
+        reports.sink.clone().finish(Arc::new(reports.sources.clone()))
     }
-    let adjustments = copies::report(&ir, homes);
-    let placement = place::place(&ir, &mut sink);
-    let emitted = emit::emit(&ir, &placement, &mut sink);
-    let names = names::names(&context, &ir, &placement, &emitted);
-    let report = sink.finish(Arc::clone(&sources));
-    if report.has_errors() {
-        return Err(report);
+
+    /// Schedules and emits the program.
+    ///
+    /// # Errors
+    /// Every error of the program, and its warnings.
+    pub fn finish(self) -> Result<Assembled, Diagnostics> {
+        let Checked { mut context, mut ir, homes, effort, .. } = self;
+        let mut sink = std::mem::take(&mut context.reports.sink);
+        let sources = Arc::new(std::mem::take(&mut context.reports.sources));
+        // What follows would only report what follows from the errors there are.
+        let Some((homes, contractions)) = homes.filter(|_| sink.errors == 0) else {
+            return Err(sink.finish(sources));
+        };
+        let schedule::Report { blocks, timing } = schedule::schedule(&mut ir, effort, &mut sink);
+        if sink.errors > 0 {
+            return Err(sink.finish(sources));
+        }
+        let adjustments = copies::report(&ir, homes);
+        let placement = place::place(&ir, &mut sink);
+        let mut emitted = emit::emit(&ir, &placement, &mut sink);
+        emitted.program.parts = names::parts(&sources, &emitted);
+        let names = names::names(&context, &ir, &placement, &emitted);
+        let report = sink.finish(Arc::clone(&sources));
+        if report.has_errors() {
+            return Err(report);
+        }
+        let constants = context
+            .declared
+            .constants
+            .into_iter()
+            .filter_map(|constant| Some((constant.name, constant.value?)))
+            .collect();
+        Ok(Assembled {
+            program: emitted.program,
+            warnings: report,
+            sources,
+            constants,
+            blocks,
+            timing,
+            contractions,
+            adjustments,
+            expanded: emitted.expanded,
+            names,
+        })
     }
-    let constants = context
-        .declared
-        .constants
-        .into_iter()
-        .filter_map(|constant| Some((constant.name, constant.value?)))
-        .collect();
-    Ok(Assembled {
-        program: emitted.program,
-        warnings: report,
-        sources,
-        constants,
-        blocks,
-        timing,
-        contractions: contracted.contractions,
-        adjustments,
-        expanded: emitted.expanded,
-        names,
-    })
 }

@@ -13,6 +13,12 @@ pub const EXPRESSION_DEPTH: usize = 128;
 pub const EVALUATION_DEPTH: usize = EXPRESSION_DEPTH + 32;
 /// Operands and operators of one expression.
 pub const EXPRESSION_NODES: usize = 1 << 16;
+/// Elements of one array of registers, and of all arrays together.
+pub const ARRAY_ELEMENTS: usize = 1 << 16;
+/// Indices of an array.
+pub const ARRAY_INDICES: usize = 8;
+/// Registers that a statement writes, as `a, b = …`.
+pub const EQUATION_TARGETS: usize = 64;
 /// `.include` within `.include`.
 pub const INCLUDE_DEPTH: usize = 32;
 /// `.include`s met during expansion.
@@ -36,6 +42,8 @@ pub const DATA_WORDS: usize = 1 << 20;
 pub const NAME_BYTES: usize = 255;
 /// Names that a program may use, those of macros' locals and of name templates included.
 pub const NAMES: usize = 1 << 24;
+/// Names in the source, each expansion counted, that an index of names keeps.
+pub const REFERENCES: usize = 1 << 20;
 /// Errors, and warnings, that are kept and shown; the rest are counted.
 pub const SHOWN: usize = 100;
 /// Bytes of a source line that a shown diagnostic quotes; of a longer line, the part around the error.

@@ -5,8 +5,9 @@ mod random_source;
 
 use common::{bad, bundles};
 use random_source::Random;
+use std::collections::HashMap;
 use std::fmt::Write as _;
-use takt_asm::{Assembled, Contract, MemoryLoader, Options, Schedule, listing};
+use takt_asm::{Assembled, Contract, MemoryLoader, Options, Schedule, Search, listing};
 use takt_emu::{Emulator, Event};
 use takt_isa::{Function, Machine, T1, T3, T4};
 
@@ -47,6 +48,22 @@ fn sums_and_differences() {
     becomes(" fmul t, a, b\n fsub F, t, c", " fms F, a, b, c");
     becomes(" fmul t, a, b\n fsub F, c, t", " fnma F, a, b, c");
     becomes(" fmul t, a, a\n fadd s, s, t\n mov F, s", " fma s, a, a, s\n mov F, s");
+}
+
+/// An equation's products, and a fused operation that an equation asks for, with or without contraction.
+#[test]
+fn equations() {
+    let period = |contract: &str, body: &str| {
+        let assembled = on_t4(&format!("{HEAD}.contract {contract}\n.period\np:\n{body}\n wait p\n"));
+        bundles(&assembled)[0].clone()
+    };
+    assert_eq!(period("on", " F = a*b + c"), "fma F, a, b, c");
+    assert_eq!(period("on", " F = c - a*b"), "fnma F, a, b, c");
+    for contract in ["on", "off"] {
+        assert_eq!(period(contract, " F = fms(a, b, c)"), "fms F, a, b, c");
+        assert_eq!(period(contract, " fnms F, a, b, c"), "fnms F, a, b, c");
+    }
+    assert!(period("off", " F = a*b + c").starts_with("fmul"));
 }
 
 /// One name for several values, a factor that has the product's own name, operations between.
@@ -167,6 +184,27 @@ fn what_is_said_of_it() {
     assert!(wrong.contains("`.contract` is `on` or `off`, not `yes`"), "{wrong}");
 }
 
+/// A file of the library that says so keeps its operations, and with them its error bounds, wherever its macros are used.
+#[test]
+fn the_library_speaks_for_itself() {
+    let body = ".macro muladd d, a, b, c\n.reg t\n fmul t, a, b\n fadd d, t, c\n.endm\n";
+    let text = format!(
+        "{HEAD}.contract on\n.include <f.s>\n.period\np: muladd F, a, b, c\n fmul t, a, b\n fadd G, t, d\n wait p\n"
+    );
+    for (head, fused) in [("", 2), (".contract off\n", 1)] {
+        let file = format!("{head}{body}");
+        for contract in [Contract::AsWritten, Contract::All] {
+            let options = Options { machine: &T4, contract, ..Options::default() };
+            let loader =
+                Search::new(MemoryLoader::of("test.s", text.as_str())).library(&[("f.s", file.as_str())]);
+            let assembled = takt_asm::assemble("test.s", &loader, &options);
+            let assembled = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false)));
+            assert_eq!(bundles(&assembled)[3 - fused], "fma G, a, b, d");
+            assert_eq!(assembled.contractions.len(), fused);
+        }
+    }
+}
+
 /// A period of sums and products of few names, in runs that branches part, in which products are sometimes used elsewhere.
 fn source(seed: u64) -> String {
     let random = &mut Random(seed * 2 + 0x6a09_e667_f3bc_c909);
@@ -252,4 +290,74 @@ fn nothing_but_the_rounding_changes() {
         }
     }
     assert!(fused > 400 && compared > 100, "{fused} fused, {compared} compared");
+}
+
+/// Inverse dynamics in binary64, operation by operation: the outputs, by name.
+fn in_binary64(text: &str, inputs: &HashMap<String, f64>) -> HashMap<String, f64> {
+    let mut values = inputs.clone();
+    for line in text.lines().skip_while(|line| *line != "period:").skip(1) {
+        let words: Vec<&str> = line.split([' ', ',']).filter(|word| !word.is_empty()).collect();
+        let value = |index: usize| {
+            let word: &str = words[index];
+            // A constant is a binary32 on the machine.
+            word.parse().map_or_else(|_| values[word], |number: f64| f64::from(number as f32))
+        };
+        let result = match words[0] {
+            "fmul" => value(2) * value(3),
+            "fadd" => value(2) + value(3),
+            "fsub" => value(2) - value(3),
+            "fsin" => value(2).sin(),
+            "fcos" => value(2).cos(),
+            "fneg" => -value(2),
+            "mov" => value(2),
+            "wait" => break,
+            other => panic!("{other}"),
+        };
+        values.insert(words[1].to_owned(), result);
+    }
+    values
+}
+
+/// Fusing shortens the dynamics' longest chain, and their errors do not grow.
+#[test]
+fn dynamics() {
+    let text = include_str!("kernels/rnea6.s");
+    let with = |contract| {
+        let options = Options { machine: &T4, contract, effort: 0, ..Options::default() };
+        takt_asm::assemble("rnea6.s", &MemoryLoader::of("rnea6.s", text), &options)
+            .unwrap_or_else(|errors| panic!("{}", errors.render(false)))
+    };
+    let [plain, contracted] = [Contract::None, Contract::All].map(with);
+    let chain = |assembled: &Assembled| assembled.blocks.iter().map(|block| block.bound.critical_path).max();
+    let operations =
+        |assembled: &Assembled| assembled.blocks.iter().map(|block| block.operations).sum::<u32>();
+    assert_eq!((chain(&plain), operations(&plain)), (Some(296), 676));
+    assert_eq!((chain(&contracted), operations(&contracted)), (Some(267), 510));
+    assert_eq!(contracted.contractions.len(), 166);
+
+    let random = &mut Random(0x3243_f6a8_885a_308d);
+    let mut errors = [0.0_f64; 2];
+    for _ in 0..200 {
+        let mut inputs = HashMap::new();
+        let mut bits = HashMap::new();
+        for port in &plain.program.inputs {
+            let value = (random.below(2001) as f32 - 1000.0) / 500.0;
+            inputs.insert(port.name.clone(), f64::from(value));
+            bits.insert(port.name.clone(), value.to_bits());
+        }
+        let exact = in_binary64(text, &inputs);
+        for (assembled, worst) in [&plain, &contracted].into_iter().zip(&mut errors) {
+            let mut emulator = Emulator::new(&assembled.program).expect("it fits");
+            for port in &assembled.program.inputs {
+                emulator.set_input_bits(port.register, bits[&port.name]).expect("it is an input");
+            }
+            emulator.run_period(&[]).unwrap_or_else(|error| panic!("{error}"));
+            for port in &assembled.program.outputs {
+                let found = f32::from_bits(emulator.output_bits(port.register).expect("it is written"));
+                *worst = worst.max((f64::from(found) - exact[&port.name]).abs());
+            }
+        }
+    }
+    // Newton metres.
+    assert!(errors[1] <= errors[0] && errors[0] < 5e-5, "{errors:?}");
 }

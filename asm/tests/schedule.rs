@@ -2,6 +2,7 @@
 //! values to every port, in the same order, and leaves the same memory and flags, in no more cycles than the source's order.
 
 mod random_source;
+mod rows;
 
 use random_source::{Random, source};
 use std::collections::BTreeMap;
@@ -11,7 +12,7 @@ use takt_asm::schedule::DemandKind;
 use takt_asm::schedule::TimingReport;
 use takt_asm::{MemoryLoader, Options, Schedule, assemble};
 use takt_emu::{Emulator, Event};
-use takt_isa::{MACHINES, Machine, Program};
+use takt_isa::{MACHINES, Machine, Program, T3};
 
 fn program(text: &str, machine: &'static Machine, schedule: Schedule, effort: u32) -> Program {
     let options = Options { machine, schedule, effort, ..Options::default() };
@@ -68,15 +69,64 @@ fn scheduled_programs_compute_the_same() {
     assert!(10 * after < 8 * before, "{after} cycles scheduled, {before} as written");
 }
 
+/// Whatever slots host a function: the values are those of t3, the cycles those that the scheduler says and no fewer than its
+/// bound; the disassembly of what it chose is the program.
+#[test]
+fn slots_that_share_functions_compute_the_same() {
+    let mut machines: Vec<&'static Machine> = rows::all().iter().collect();
+    let random = &mut Random(5);
+    machines.extend((0..12).map(|_| rows::random(|n| random.below(n))));
+    let mut shared = 0;
+    for (seed, machine) in (0..).zip(machines.iter().cycle()).take(2 * machines.len()) {
+        for (text, is_block) in [(source(seed), false), (straight(seed), true)] {
+            // A random row need not have the slots for a bundle.
+            let text = if machine.name == "random" { text.replace(" || ", "\n ") } else { text };
+            let expected = run(&program(&text, &T3, Schedule::None, 0), seed).0;
+            let plain = program(&text, machine, Schedule::None, 0);
+            assert_eq!(
+                run(&plain, seed).0,
+                expected,
+                "seed {seed} as written on {:#?}:\n{text}",
+                machine.slots
+            );
+            let options = Options { machine, effort: 1, ..Options::default() };
+            let assembled = assemble("random.s", &MemoryLoader::of("random.s", text.as_str()), &options)
+                .unwrap_or_else(|errors| panic!("{text}\n{}", errors.render(false)));
+            let (found, cycles) = run(&assembled.program, seed);
+            assert_eq!(found, expected, "seed {seed} scheduled on {:#?}:\n{text}", machine.slots);
+            for block in &assembled.blocks {
+                assert!(block.bound.cycles() <= block.cycles, "{block:?} on {:#?}:\n{text}", machine.slots);
+                shared +=
+                    usize::from(block.bound.shared.iter().any(|one| one.cycles == block.bound.cycles()));
+            }
+            if is_block {
+                let block = assembled.blocks.iter().find(|block| block.label.as_deref() == Some("period"));
+                let predicted = u64::from(block.expect("the period is a block").cycles);
+                assert_eq!(cycles, [predicted; 4], "seed {seed} on {:#?}:\n{text}", machine.slots);
+            }
+            for program in [&plain, &assembled.program] {
+                let text = takt_asm::disasm::disassemble(program);
+                let again = assemble("again.s", &MemoryLoader::of("again.s", text.as_str()), &options);
+                let again = again.unwrap_or_else(|errors| panic!("{text}\n{}", errors.render(false)));
+                assert_eq!(again.program.code, program.code, "{text}");
+            }
+        }
+    }
+    // Slots together do set bounds.
+    assert!(shared > 20, "{shared} blocks");
+}
+
 #[test]
 fn the_same_source_gives_the_same_image() {
     for seed in 0..20 {
         let text = source(seed).replace("period:\n", ".late in0, in1 = 3\nperiod:\n");
-        let image = || {
-            takt_asm::image::write(&program(&text, MACHINES[0], Schedule::AsWritten, 3))
-                .expect("an image holds it")
-        };
-        assert_eq!(image(), image());
+        for machine in [MACHINES[0], rows::named("second_adder")] {
+            let image = || {
+                takt_asm::image::write(&program(&text, machine, Schedule::AsWritten, 3))
+                    .expect("an image holds it")
+            };
+            assert_eq!(image(), image());
+        }
     }
 }
 
@@ -102,6 +152,11 @@ fn predicted_cycles_are_those_of_the_machine() {
             assert_eq!(cycles, [predicted; 4], "seed {seed} on {}:\n{text}", machine.name);
         }
     }
+}
+
+/// The shipped machines, and one whose choices of slots take different time.
+fn machines() -> impl Iterator<Item = &'static Machine> {
+    MACHINES.iter().copied().chain([rows::named("late_alu")])
 }
 
 /// Assembles a source whose period has demands on ports.
@@ -155,7 +210,7 @@ fn deadlines_are_met_or_refused() {
     let (mut met, mut refused) = (0, 0);
     for seed in 0..20 {
         let text = straight(seed);
-        for machine in MACHINES {
+        for machine in machines() {
             let random = &mut Random(seed * 7 + 3);
             let values = run(&program(&text, machine, Schedule::None, 0), seed).0;
             let free = demanding(&text, ".deadline oa = 100000", machine).expect("it has all the time");
@@ -202,7 +257,7 @@ fn orders_are_kept_or_refused() {
     let (mut kept, mut refused) = (0, 0);
     for seed in 0..20 {
         let text = straight(seed);
-        for machine in MACHINES {
+        for machine in machines() {
             let random = &mut Random(seed * 5 + 1);
             let values = run(&program(&text, machine, Schedule::None, 0), seed).0;
             for _ in 0..3 {
@@ -237,7 +292,7 @@ fn late_reads_come_later_and_cost_what_they_may() {
     let (mut before, mut after) = (0, 0);
     for seed in 0..12 {
         let text = straight(seed);
-        for machine in MACHINES {
+        for machine in machines() {
             let values = run(&program(&text, machine, Schedule::None, 0), seed).0;
             let length = |assembled: &Assembled| {
                 assembled

@@ -297,12 +297,11 @@ impl Analysis<'_> {
             Some((label, 0)) => label.to_owned(),
             _ => address.to_string(),
         };
-        let place = program.operation_location(address, s);
         Some(json!({
             "slot": slot.name,
             "unit": unit.name,
             "text": instruction.text_with(program.machine, s, |register| program.register_text(register), target),
-            "place": place.map(|place| program.place_text(place)),
+            "place": program.operation_place(address, s),
             "latency": instruction.writes(slot).map(|_| unit.latency),
         }))
     }
@@ -316,13 +315,12 @@ impl Analysis<'_> {
                 Cause::Branch { from } => Some(from),
                 _ => None,
             };
-            let line = producer.and_then(|address| program.location(address));
             json!({
                 "cause": cause.name(),
                 "cycles": cycles,
                 "text": program.cause_text(*cause),
                 "producer": producer,
-                "producer_place": line.map(|line| program.place_text(line)),
+                "producer_place": producer.and_then(|address| program.bundle_place(address)),
             })
         };
         let bundle = |(i, issue): (usize, &Issued)| {
@@ -331,7 +329,7 @@ impl Analysis<'_> {
             json!({
                 "address": issue.address,
                 "cycle": self.cycle(i),
-                "place": program.location(issue.address).map(|place| program.place_text(place)),
+                "place": program.bundle_place(issue.address),
                 "stalls": issue.stalls.iter().map(stall).collect::<Vec<_>>(),
                 "critical": critical.contains(&i),
                 "operations": operations

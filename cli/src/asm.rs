@@ -12,9 +12,9 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
 use takt_asm::schedule::DemandKind;
-use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, TimingReport};
+use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, Resources, SharedBound, TimingReport};
 use takt_asm::{Adjustment, Assembled, Contraction, Made, Schedule, image, listing};
-use takt_isa::Program;
+use takt_isa::{Program, SlotIndex, Slots};
 use takt_rtl::header::{Cycles, Header, Language, Span};
 
 /// Assemble a source into an image.
@@ -312,32 +312,41 @@ fn block_name(program: &Program, block: &BlockReport) -> String {
     block.label.clone().or_else(place).unwrap_or_else(|| format!("bundle {}", block.address))
 }
 
-/// The bounds of the critical path, of the slot and of the unit that need most.
+/// The bounds of the critical path, and of what needs most: a slot, a unit, slots and units that share functions.
 fn bounds_text(block: &BlockReport, program: &Program) -> String {
-    let slots = program.machine.slots;
+    let resources = resources(block);
     // The first of equals.
-    let slot = slots.iter().zip(&block.bound.slots).rev().max_by_key(|(_, cycles)| **cycles);
-    let units = slots.iter().flat_map(|slot| slot.units).zip(&block.bound.units);
-    let unit = units.collect::<Vec<_>>().into_iter().rev().max_by_key(|(_, cycles)| **cycles);
-    let slot = slot.map_or(String::new(), |(slot, cycles)| format!(", slot {} {cycles}", slot.name));
-    let unit = unit.map_or(String::new(), |(unit, cycles)| format!(", unit {} {cycles}", unit.name));
-    format!("chain {}{slot}{unit}", block.bound.critical_path)
+    let most = |kind: fn(&Resources) -> bool| {
+        let found = resources.iter().rev().filter(|(of, _)| kind(of)).max_by_key(|(_, cycles)| *cycles);
+        found.map_or(String::new(), |(of, cycles)| format!(", {} {cycles}", of.text(program.machine)))
+    };
+    let kinds: [fn(&Resources) -> bool; 4] = [
+        |of| matches!(of, Resources::Slots(slots) if slots.len() == 1),
+        |of| matches!(of, Resources::Units(units) if units.len() == 1),
+        |of| matches!(of, Resources::Slots(slots) if slots.len() > 1),
+        |of| matches!(of, Resources::Units(units) if units.len() > 1),
+    ];
+    format!("chain {}{}", block.bound.critical_path, kinds.map(most).concat())
+}
+
+/// What each resource bounds a block by: slots, units, then several together.
+fn resources(block: &BlockReport) -> Vec<(Resources, u32)> {
+    let bound = &block.bound;
+    let slots = SlotIndex::all().zip(&bound.slots);
+    let slots = slots.map(|(slot, cycles)| (Resources::Slots(Slots::of(slot)), *cycles));
+    let units = (0..).zip(&bound.units).map(|(unit, cycles)| (Resources::Units(vec![unit]), *cycles));
+    let shared = bound.shared.iter().map(|shared| (shared.resources.clone(), shared.cycles));
+    slots.chain(units).chain(shared).collect()
 }
 
 /// What sets a bound.
 fn bound_text(block: &BlockReport, program: &Program) -> String {
     let bound = block.bound.cycles();
-    let slots = program.machine.slots;
     if block.bound.critical_path == bound {
         return "the chain of dependent operations".to_owned();
     }
-    if let Some((slot, _)) = slots.iter().zip(&block.bound.slots).find(|(_, cycles)| **cycles == bound) {
-        return format!("slot {}", slot.name);
-    }
-    let mut units = slots.iter().flat_map(|slot| slot.units).zip(&block.bound.units);
-    units
-        .find(|(_, cycles)| **cycles == bound)
-        .map_or(String::new(), |(unit, _)| format!("unit {}", unit.name))
+    let found = resources(block).into_iter().find(|(_, cycles)| *cycles == bound);
+    found.map_or(String::new(), |(of, _)| of.text(program.machine))
 }
 
 fn messages(diagnostics: &Diagnostics) -> Result<Value> {
@@ -346,6 +355,7 @@ fn messages(diagnostics: &Diagnostics) -> Result<Value> {
 
 fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
     let program = &assembled.program;
+    let shared = |shared: &SharedBound| json!({ "resources": shared.resources.text(program.machine), "cycles": shared.cycles });
     let block = |block: &BlockReport| {
         json!({
             "name": block_name(program, block),
@@ -359,6 +369,7 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
                 "critical_path": block.bound.critical_path,
                 "slots": block.bound.slots,
                 "units": block.bound.units,
+                "shared": block.bound.shared.iter().map(shared).collect::<Vec<_>>(),
             },
         })
     };

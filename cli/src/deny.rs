@@ -96,7 +96,7 @@ struct Finding {
 #[derive(Clone)]
 pub(crate) struct Watch {
     findings: Vec<Finding>,
-    /// The period underway.
+    /// The current period.
     period: Option<u64>,
     /// The bundle that issued last.
     at: BundleAddress,
@@ -138,10 +138,10 @@ impl Finding {
     }
 }
 
-/// `file:line` of the operation, or else of its bundle.
+/// `file:line`, and the columns of a part of an equation, of the operation, or else of its bundle.
 fn location(program: &Program, first: &First) -> Option<String> {
-    let own = first.operation.and_then(|(slot, _)| program.operation_location(first.address, slot));
-    own.or_else(|| program.location(first.address)).map(|location| program.place_text(location))
+    let own = first.operation.and_then(|(slot, _)| program.operation_place(first.address, slot));
+    own.or_else(|| program.bundle_place(first.address))
 }
 
 impl Watch {
@@ -221,13 +221,13 @@ impl Watch {
         }
     }
 
-    /// What was denied and happened, with what issued together with the last `wait` and is still underway.
+    /// What was denied and happened, with what issued together with the last `wait` and is still in flight.
     pub(crate) fn end(&self, emulator: &Emulator) -> Denials {
         let program = emulator.program();
         let mut watch = self.clone();
         let is_float =
             |register| program.outputs.iter().any(|port| port.register == register && port.ty == Type::F);
-        for retire in emulator.underway() {
+        for retire in emulator.in_flight() {
             watch.raised(retire);
             if is_nan(retire.value) && retire.register.is_some_and(is_float) {
                 let operation = Some((retire.slot, retire.register));

@@ -10,16 +10,20 @@ mod bound;
 mod completions;
 mod controller;
 mod cosim;
+mod dap;
 mod debug;
 mod deny;
 mod disasm;
 mod eval;
 mod fault;
 mod files;
+mod fmt;
 mod isa;
 mod load;
+mod lsp;
 mod machines;
 mod man;
+mod model;
 mod monte_carlo;
 mod nan;
 mod number;
@@ -69,12 +73,16 @@ enum Command {
     Track(track::Track),
     Arm(arm::Arm),
     Asm(asm::Asm),
+    Model(model::Model),
     Disasm(disasm::Disasm),
     Run(run::Run),
     Debug(debug::Debug),
     Analyse(analyse::Analyse),
     Bound(bound::Bound),
     Eval(eval::Eval),
+    Fmt(fmt::Fmt),
+    Lsp(lsp::Lsp),
+    Dap(dap::Dap),
     Rtl(rtl::Rtl),
     Cosim(cosim::Cosim),
     Isa(isa::Isa),
@@ -88,12 +96,16 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Track(track) => track::run(track, color, out),
         Command::Arm(arm) => arm::run(arm, color, out),
         Command::Asm(asm) => asm::run(asm, color, out),
+        Command::Model(model) => model::run(model, color, out),
         Command::Disasm(disasm) => disasm::run(disasm, color),
         Command::Run(run) => run::run(run, color, out),
         Command::Debug(debug) => debug::run(debug, color, out),
         Command::Analyse(analyse) => analyse::run(analyse, color, out),
         Command::Bound(bound) => bound::run(bound, color, out),
         Command::Eval(eval) => eval::run(eval, out),
+        Command::Fmt(fmt) => fmt::run(fmt, out),
+        Command::Lsp(lsp) => lsp::run(lsp),
+        Command::Dap(dap) => dap::run(dap),
         Command::Rtl(rtl) => rtl::run(rtl, color, out),
         Command::Cosim(cosim) => cosim::run(cosim, color, out),
         Command::Isa(isa) => isa::run(isa, out),

@@ -36,7 +36,7 @@ fn cycles(text: &str) -> Result<Range<u64>, String> {
     if range.is_empty() { Err("has no cycle between its ends".to_owned()) } else { Ok(range) }
 }
 
-/// A trace underway.
+/// A trace that is being written.
 pub(crate) struct Trace<'o> {
     tracer: Tracer<'o>,
     name: String,

@@ -564,7 +564,7 @@ fn references() {
     assert_eq!(one["mnemonic"], "fadd");
     let machines: serde_json::Value = serde_json::from_str(&folder.line("machines --json").ok()).unwrap();
     let names: Vec<&str> = machines.as_array().unwrap().iter().map(|m| m["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["t3", "t1"]);
+    assert_eq!(names, takt_isa::MACHINES.iter().map(|machine| machine.name).collect::<Vec<_>>());
     let text = folder.line("machines").ok();
     assert!(names.iter().all(|name| text.contains(*name)), "{text}");
     assert!(folder.line("man").ok().contains(".TH takt 1"));

@@ -295,7 +295,7 @@ fn command_lines() {
     check(
         "usage",
         &[
-            "run pd.s --machine t4",
+            "run pd.s --machine t5",
             "run pd.s --machine riscv",
             "run pd.s --periods 0",
             "run pd.s --periods -1",

@@ -98,7 +98,7 @@ period: fdiv F, 1.0, a
 /// After which what hangs is taken to hang.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// `takt run` underway.
+/// A running `takt run`.
 struct Running {
     child: Child,
     stdin: Option<ChildStdin>,

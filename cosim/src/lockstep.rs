@@ -234,11 +234,11 @@ impl Lockstep {
                 event.cycle <= cycle || !matches!(event.kind, EventKind::Missed | EventKind::Lost)
             }),
             (None, _) => self.check(|event| event.cycle < now),
-            // What issued before the fault is still written, and nothing else; the emulator leaves it underway.
+            // What issued before the fault is still written, and nothing else; the emulator leaves it in flight.
             (Some(fault), _) if fault_code(&fault.kind).is_some() => {
                 let cycle = fault.cycle;
                 let machine = self.emulator.machine();
-                for &retire in self.emulator.underway() {
+                for &retire in self.emulator.in_flight() {
                     self.expected.extend(expect(&Event::Retire(retire)));
                     if let Some(register) = retire.register.filter(|&register| machine.is_output(register)) {
                         let (cycle, slot, address, value) =

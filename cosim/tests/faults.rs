@@ -25,7 +25,7 @@ const COMMON: &[Fault] = &[
     ("takt_convert", "x[31] & ~nan", "1'b0"),
     ("takt_alu", "a[31] ^ b[31] ^ minus ^ low_sum[32]", "a[31] ^ b[31] ^ minus"),
     ("takt_sine", "quadrant3[1] ^ (quadrant3[0] & op3)", "quadrant3[1]"),
-    // Waiting for operands: too short, in each of the ways in which a result is underway.
+    // Waiting for operands: too short, in each of the ways in which a result is in flight.
     ("takt_hazard", "r_later | r_on_issue", "r_later"),
     ("takt_hazard", "(|hit[DEPTH-1:3]) | (|late_hit)", "|hit[DEPTH-1:3]"),
     ("takt_hazard", "(|hit[DEPTH-1:3]) | (|late_hit)", "|late_hit"),
@@ -43,7 +43,7 @@ const COMMON: &[Fault] = &[
     ("takt_source", "~next_fresh & ~next_input", "1'b0"),
     ("takt_bank", "show ? read : 32'd0", "read"),
     // A bundle at fault.
-    ("takt_underway", "above[j+1] & ~((above_fresh[j+1] | above_recent[j+1]) & cancel)", "above[j+1]"),
+    ("takt_in_flight", "above[j+1] & ~((above_fresh[j+1] | above_recent[j+1]) & cancel)", "above[j+1]"),
     // The unit's interval.
     ("takt_late", "working & ~age[INTERVAL-1]", "1'b0"),
     // Branches, calls, the tick.

@@ -180,7 +180,7 @@ fn tracking(machine: &'static Machine) {
     bus.load(&program);
     bus.write("control", 1);
     bus.until_waiting();
-    // A reset asked for briefly, while the program runs, lasts its time. A constant loaded at once waits for what is underway.
+    // A reset asked for briefly, while the program runs, lasts its time. A constant loaded at once waits for what is in flight.
     let kept = load_records(&program).into_iter().find(|record| record.space == Space::Register);
     let kept = kept.expect("the program has constants");
     bus.write("load_place", u32::from(kept.address) | (Space::Register as u32) << 16);

@@ -60,7 +60,7 @@ commands! {
     "registers" "r" "[PATTERN]" Completion::Names, |c, a| Ok(c.registers(a)), "Named registers; `*` stands for any characters.";
     "ports" "" "" Completion::None, |c, _| Ok(c.ports()), "Input and output ports.";
     "memory" "m" "EXPR [COUNT]" Completion::Names, Console::memory, "Data words from an address on.";
-    "flight" "f" "" Completion::None, |c, _| Ok(c.flight()), "Operations underway, with the cycles until their results are there.";
+    "flight" "f" "" Completion::None, |c, _| Ok(c.flight()), "Operations in flight, with the cycles until their results are there.";
     "stalls" "" "" Completion::None, |c, _| Ok(c.stalls()), "Where the cycles since reset went.";
     "list" "l" "[LINE]" Completion::None, Console::list, "Source lines around this position, or a line.";
     "where" "" "" Completion::None, |c, _| Ok(c.place()), "This position; the calls that lead to it.";
@@ -518,7 +518,7 @@ impl Console {
             let cycles = if left == 1 { "cycle" } else { "cycles" };
             let _ = writeln!(text, "{left:>3} {cycles:<6}  {register:<width$} {mnemonic} of {from}");
         }
-        if text.is_empty() { "nothing is underway\n".to_owned() } else { text }
+        if text.is_empty() { "nothing is in flight\n".to_owned() } else { text }
     }
 
     fn stalls(&self) -> String {

@@ -79,8 +79,8 @@ fn lifetime(program: &Program, life: &Life) -> String {
         let Some(Ok(instructions)) = program.bundle(address) else { continue };
         for (instruction, (number, slot)) in instructions.iter().zip(program.machine.numbered_slots()) {
             let place = || {
-                let line = program.operation_location(address, number);
-                let line = line.map_or(String::new(), |line| format!(" ({})", program.place_text(line)));
+                let line = program.operation_place(address, number);
+                let line = line.map_or(String::new(), |line| format!(" ({line})"));
                 format!("bundle {address}{line}")
             };
             // Where registers are shared, the bundle of a value's last use may write the next one.

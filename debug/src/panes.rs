@@ -52,7 +52,7 @@ impl Named {
     }
 }
 
-/// An operation underway.
+/// An operation in flight.
 #[derive(Clone, Debug)]
 pub struct Flying {
     /// Cycles until its result is there.
@@ -97,7 +97,7 @@ pub struct Panes {
     pub inputs: Vec<Named>,
     /// Output ports.
     pub outputs: Vec<Named>,
-    /// Operations underway.
+    /// Operations in flight.
     pub flight: Vec<Flying>,
     /// Why nothing issues in the cycle to come.
     pub cause: Option<String>,
@@ -236,8 +236,8 @@ fn used(session: &Session) -> BTreeSet<Register> {
     used
 }
 
-/// Operations underway.
-pub(crate) fn flight(session: &Session) -> Vec<Flying> {
+/// Operations in flight.
+pub fn flight(session: &Session) -> Vec<Flying> {
     let program = session.program();
     let flying = session.in_flight().into_iter().map(|(retire, left)| Flying {
         left,
@@ -249,7 +249,7 @@ pub(crate) fn flight(session: &Session) -> Vec<Flying> {
 }
 
 /// Where the cycles since reset went: bundles that issued, stalls by kind, and the bundles that stalled longest.
-pub(crate) fn stalls(session: &Session) -> Vec<(u64, String)> {
+pub fn stalls(session: &Session) -> Vec<(u64, String)> {
     let statistics = session.emulator().statistics();
     let program = session.program();
     let mut rows = vec![(statistics.bundles, "issue".to_owned())];

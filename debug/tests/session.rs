@@ -399,3 +399,17 @@ fn counters_come_before_labels() {
     console.execute("until period == 3").expect("it comes");
     assert_eq!(value(&console, "period"), 3.0);
 }
+
+/// Arrays of registers have their elements' names, and what computes a part of an equation the part's columns.
+#[test]
+fn equations_and_arrays() {
+    let source = ".input x\n.output y\n.state P[2,2]\n.once\n P[1,1], P[1,2], P[2,1], P[2,2] = 1, 2, 3, 4\n wait p\n\
+                  .period\np: y = x*P[1,2] + P[2,1]*2\n P[1,2] = P[1,2] + 0.5\n wait p\n";
+    let mut console = console(source);
+    console.execute("break p if P[1,2] > 2.75").unwrap();
+    console.execute("continue").unwrap();
+    assert_eq!(value(&console, "P[1,2]"), 3.0);
+    assert_eq!(value(&console, "P[2, 1]*2 + P[2,2]"), 10.0);
+    let said = console.execute("info P[2,1]").unwrap();
+    assert!(said.contains(":8:17-24)"), "{said}");
+}

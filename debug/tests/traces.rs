@@ -412,7 +412,7 @@ fn konata() {
                 arrows += 1;
             }
         }
-        // Operations underway at the end are in the log to their end.
+        // Operations in flight at the end are in the log to their end.
         shown.retain(|(done, ..)| *done < summary.cycles.end);
         shown.sort_unstable();
         let mut real: Vec<_> = retires(&program)

@@ -130,6 +130,7 @@ fn period() -> Program {
         registers: Vec::new(),
         symbols: Vec::new(),
         loop_bounds: Vec::new(),
+        parts: Vec::new(),
         latched: false,
         sections: Vec::new(),
         files: Vec::new(),

@@ -143,7 +143,7 @@ impl Cache {
         entry: BundleAddress,
         at: Cycle,
     ) -> Option<u32> {
-        // However much later, nothing is underway any more.
+        // However much later, nothing is in flight any more.
         let distance = (at - last).min(Cycle::from(MAX_LATENCY)) as u8;
         let edges = &self.blocks[id as usize].edges;
         if let Some(edge) = edges.iter().find(|edge| edge.target == entry && edge.distance == distance) {

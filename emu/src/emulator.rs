@@ -465,7 +465,7 @@ impl Emulator {
     }
 
     /// Sets a register (a debugger's way in; ports have their own): what issues in the next cycle reads `bits`. A result whose
-    /// writeback is in that very cycle gives way, those underway for longer still arrive.
+    /// writeback is in that very cycle gives way, those in flight for longer still arrive.
     ///
     /// Returns false, and does nothing, for `zero` and for an address where the machine has no register.
     pub fn set_register(&mut self, register: Register, bits: u32) -> bool {
@@ -500,8 +500,8 @@ impl Emulator {
         self.state.flags
     }
 
-    /// Operations underway: issued, and to be written back in the cycle that each one names.
-    pub fn underway(&self) -> impl Iterator<Item = &Retire> {
+    /// Operations in flight: issued, and to be written back in the cycle that each one names.
+    pub fn in_flight(&self) -> impl Iterator<Item = &Retire> {
         self.state.pending.iter().map(|pending| &pending.retire)
     }
 

@@ -138,6 +138,12 @@ impl ShownFault<'_> {
         }
     }
 
+    /// Where in the source it happened: `pd.s:12`.
+    fn source(&self, program: &Program) -> Option<String> {
+        let own = self.fault.slot.and_then(|slot| program.operation_place(self.fault.address, slot));
+        own.or_else(|| program.bundle_place(self.fault.address))
+    }
+
     /// Where and when it happened: `bundle 12, slot add, cycle 44`.
     pub fn place(&self) -> String {
         let Fault { cycle, address, slot, .. } = *self.fault;
@@ -153,9 +159,9 @@ impl ShownFault<'_> {
 impl std::fmt::Display for ShownFault<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         if let Some(program) = self.program
-            && let Some(location) = self.fault.location(program)
+            && let Some(place) = self.source(program)
         {
-            write!(f, "{}: ", program.place_text(location))?;
+            write!(f, "{place}: ")?;
         }
         write!(f, "{}: {}", self.place(), self.message())
     }

@@ -1,8 +1,8 @@
 //! Micros: a block's operations as a flat list, one after the other, that does what its bundles do.
 //!
-//! Micros write registers at once, although the results are underway for some cycles yet. Nobody can tell, as the
-//! interlocks keep every operation from reading or overwriting a register with a result underway; except at the block's
-//! end, where somebody may look. So results that are still underway then (*late* ones) go to words of their own in the
+//! Micros write registers at once, although the results are in flight for some cycles yet. Nobody can tell, as the
+//! interlocks keep every operation from reading or overwriting a register with a result in flight; except at the block's
+//! end, where somebody may look. So results that are still in flight then (*late* ones) go to words of their own in the
 //! register array, from which they become [`crate::machine::Pending`].
 
 use crate::code::Operation;
@@ -53,7 +53,7 @@ impl Micro {
     }
 }
 
-/// A result that is underway at the block's end.
+/// A result that is in flight at the block's end.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Late {
     pub(crate) operation: Operation,

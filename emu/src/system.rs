@@ -77,7 +77,7 @@ impl Ticks {
     }
 }
 
-/// A period underway.
+/// The current period.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Period {
     tick: Cycle,

@@ -31,12 +31,12 @@ fn assert_same(seed: u64, fast: &mut Emulator, step: &mut Emulator) {
     assert_eq!(fast.memory(), step.memory(), "{}", context("memory"));
     assert_eq!(fast.stack(), step.stack(), "{}", context("stack"));
     assert_eq!(fast.flags(), step.flags(), "{}", context("flags"));
-    let underway = |emulator: &Emulator| {
-        let mut all: Vec<_> = emulator.underway().copied().collect();
+    let in_flight = |emulator: &Emulator| {
+        let mut all: Vec<_> = emulator.in_flight().copied().collect();
         all.sort_by_key(|retire| (retire.cycle, retire.slot));
         all
     };
-    assert_eq!(underway(fast), underway(step), "{}", context("underway"));
+    assert_eq!(in_flight(fast), in_flight(step), "{}", context("in_flight"));
     let statistics = fast.statistics();
     assert_eq!(statistics, step.statistics(), "{}", context("statistics"));
     assert_eq!(statistics.cycles, statistics.bundles + statistics.stalled(), "{}", context("accounting"));
@@ -279,9 +279,9 @@ fn observed_runs_agree() {
             assert_eq!(count(|event| matches!(event, Event::Tick { .. })), statistics.ticks);
             assert_eq!(count(|event| matches!(event, Event::DeadlineMissed { .. })), statistics.missed);
             assert_eq!(count(|event| matches!(event, Event::TickLost { .. })), statistics.lost);
-            let underway = heard.underway().count() as u64;
+            let in_flight = heard.in_flight().count() as u64;
             assert_eq!(
-                count(|event| matches!(event, Event::Retire(_))) + underway,
+                count(|event| matches!(event, Event::Retire(_))) + in_flight,
                 statistics.total_operations(),
                 "seed {seed}"
             );

@@ -122,15 +122,15 @@ fn a_faulting_bundle_does_nothing() {
     assert_eq!(register("x0"), Some(7));
     assert_eq!(emulator.memory()[3], 7);
     assert_eq!([register("x1"), register("m1"), register("a2"), register("x2")], [None; 4]);
-    let underway: Vec<_> = emulator.underway().map(|retire| retire.address).collect();
-    assert_eq!(underway, [0, 2, 2].map(at));
+    let in_flight: Vec<_> = emulator.in_flight().map(|retire| retire.address).collect();
+    assert_eq!(in_flight, [0, 2, 2].map(at));
 }
 
 /// A block that ran ahead is undone: registers, memory, flags, NaNs that went out.
 #[test]
 fn a_fault_in_a_block_undoes_what_came_after() {
     // The block counts in memory, then divides by i1 and loads from i0: run twice, it would count twice; and when the
-    // load faults, the flag of the division is still underway.
+    // load faults, the flag of the division is still in flight.
     let source = ".output F x224
                   .preset x0 1
                   .preset m0 1.0
@@ -163,10 +163,10 @@ fn a_fault_in_a_block_undoes_what_came_after() {
     assert_eq!(blocks.take_nan_writes().len(), 1);
     assert_eq!(blocks.memory(), stepper.memory());
     assert_eq!(blocks.statistics(), stepper.statistics());
-    assert_eq!(blocks.underway().count(), stepper.underway().count());
+    assert_eq!(blocks.in_flight().count(), stepper.in_flight().count());
 }
 
-/// As above for a result that was underway when the block began, and would have been written before the block's end.
+/// As above for a result that was in flight when the block began, and would have been written before the block's end.
 #[test]
 fn a_fault_in_a_block_undoes_results_of_earlier_blocks() {
     let source = ".preset m0 1.0
@@ -182,7 +182,7 @@ fn a_fault_in_a_block_undoes_results_of_earlier_blocks() {
     assert!(emulator.flags().is_empty());
     let m1 = T3.register_address("m1").unwrap();
     assert_eq!(emulator.register(m1), None);
-    assert_eq!(emulator.underway().map(|retire| retire.register).collect::<Vec<_>>(), [Some(m1)]);
+    assert_eq!(emulator.in_flight().map(|retire| retire.register).collect::<Vec<_>>(), [Some(m1)]);
 }
 
 #[test]

@@ -93,7 +93,7 @@ fn what_is_set_is_read() {
         for _ in 0..300 {
             let now = emulator.now();
             let due =
-                emulator.underway().find(|retire| retire.cycle == now).and_then(|retire| retire.register);
+                emulator.in_flight().find(|retire| retire.cycle == now).and_then(|retire| retire.register);
             if let Some(register) = due {
                 emulator.set_register(register, 0x1234_5678);
                 emulator.step_cycle().unwrap();

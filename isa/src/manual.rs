@@ -2,7 +2,7 @@
 
 use crate::shape::{Field, OPCODE, Shape, WORD_BITS};
 use crate::spec::instructions::{Function, ROWS, Row, Type};
-use crate::spec::machines::{MACHINES, Machine};
+use crate::spec::machines::{MACHINES, Machine, Slot};
 use crate::spec::units::{UNITS, Unit};
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -37,6 +37,8 @@ pub struct Entry {
     pub summary: &'static str,
     /// Special cases, flags, error bound.
     pub text: &'static str,
+    /// How equations write it, in the letters of its sources.
+    pub forms: &'static [&'static str],
     /// Bit fields: name, least significant bit, width.
     pub fields: Vec<(&'static str, u32, u32)>,
     /// Where it issues and what it costs, one entry for each machine that has a unit for it.
@@ -58,14 +60,22 @@ pub struct Timing {
     pub interval: u32,
 }
 
-fn timing(row: &Row, machine: &'static Machine) -> Option<Timing> {
+fn timings(row: &Row, machine: &'static Machine) -> Vec<Timing> {
     if row.function == Function::Idle {
-        return Some(Timing { machine: machine.name, slot: "any", unit: "", latency: 0, interval: 1 });
+        return vec![Timing { machine: machine.name, slot: "any", unit: "", latency: 0, interval: 1 }];
     }
-    let (s, u) = machine.host(row.function)?;
-    let (slot, unit) = (machine.slot(s), &machine.slot(s).units[u]);
-    let latency = if row.shape.has_dest() { unit.latency } else { 0 };
-    Some(Timing { machine: machine.name, slot: slot.name, unit: unit.name, latency, interval: unit.interval })
+    let timing = |slot: &'static Slot| {
+        let unit = &slot.units[slot.unit_for(row.function)?];
+        let latency = if row.shape.has_dest() { unit.latency } else { 0 };
+        Some(Timing {
+            machine: machine.name,
+            slot: slot.name,
+            unit: unit.name,
+            latency,
+            interval: unit.interval,
+        })
+    };
+    machine.slots.iter().filter_map(timing).collect()
 }
 
 /// The manual.
@@ -78,13 +88,14 @@ pub fn manual() -> Manual {
         types: row.types,
         summary: row.summary,
         text: row.text,
+        forms: row.forms,
         fields: row
             .shape
             .fields()
             .iter()
             .map(|field| (field.name(), field.bits().low, field.bits().width))
             .collect(),
-        timing: MACHINES.iter().filter_map(|machine| timing(row, machine)).collect(),
+        timing: MACHINES.iter().flat_map(|machine| timings(row, machine)).collect(),
     };
     Manual {
         word_bits: WORD_BITS,
@@ -99,14 +110,15 @@ impl Entry {
         format!("{} {}", self.mnemonic, self.syntax).trim_end().to_owned()
     }
 
-    /// `slot 5/1` for a machine, `-` where no unit is there.
+    /// `slot 5/1` for a machine, for each slot that hosts the unit; `-` where no unit is there.
     fn cost(&self, machine: &str) -> String {
-        self.timing.iter().find(|timing| timing.machine == machine).map_or("-".to_owned(), |timing| {
-            match timing.latency {
-                0 => format!("{} -/{}", timing.slot, timing.interval),
-                latency => format!("{} {latency}/{}", timing.slot, timing.interval),
-            }
-        })
+        let cost = |timing: &Timing| match timing.latency {
+            0 => format!("{} -/{}", timing.slot, timing.interval),
+            latency => format!("{} {latency}/{}", timing.slot, timing.interval),
+        };
+        let costs: Vec<String> =
+            self.timing.iter().filter(|timing| timing.machine == machine).map(cost).collect();
+        if costs.is_empty() { "-".to_owned() } else { costs.join(", ") }
     }
 }
 
@@ -115,6 +127,9 @@ pub fn entry_text(entry: &Entry) -> String {
     let mut out = format!("{}\n    {}\n", entry.assembly(), entry.summary);
     if !entry.text.is_empty() {
         let _ = writeln!(out, "    {}", entry.text);
+    }
+    if !entry.forms.is_empty() {
+        let _ = writeln!(out, "    in equations: {}", entry.forms.join(", "));
     }
     let _ = write!(out, "    opcode 0x{:02x}", entry.opcode);
     for (name, low, width) in &entry.fields {
@@ -152,8 +167,11 @@ pub fn text() -> String {
         }
         let _ = writeln!(out, " {}", entry.summary);
     }
-    out.push_str(
-        "\nColumns t3, t1: issue slot, latency/interval in cycles. `takt isa MNEMONIC` tells more.\n",
+    let machines: Vec<&str> = manual.machines.iter().map(|machine| machine.name).collect();
+    let _ = writeln!(
+        out,
+        "\nColumns {}: issue slot, latency/interval in cycles. `takt isa MNEMONIC` tells more.",
+        machines.join(", ")
     );
     out
 }

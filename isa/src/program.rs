@@ -35,6 +35,17 @@ pub struct Program {
     pub files: Vec<String>,
     /// Where each operation comes from, parallel to `code`; `None` for filler.
     pub lines: Vec<Option<Location>>,
+    /// Of words that compute a part of an equation, what part of their line that is: index into `code`, ascending, and columns.
+    pub parts: Vec<(u32, Columns)>,
+}
+
+/// Columns of a line: its characters from `first` to `last`, from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Columns {
+    /// The first.
+    pub first: u32,
+    /// The last.
+    pub last: u32,
 }
 
 /// A named register: a port or a register of the source.
@@ -180,6 +191,33 @@ impl Program {
         format!("{file}:{}", location.line)
     }
 
+    /// The part of its line that a word computes, if that is a part of an equation.
+    pub fn part(&self, word: usize) -> Option<Columns> {
+        let found = self.parts.binary_search_by_key(&word, |(index, _)| *index as usize);
+        found.ok().map(|index| self.parts[index].1)
+    }
+
+    /// `file:line` of a word of the code, or of a part of an equation `file:line:columns`, as in `pd.s:12:9-14`.
+    pub fn word_place(&self, word: usize) -> Option<String> {
+        let mut place = self.place_text((*self.lines.get(word)?)?);
+        if let Some(Columns { first, last }) = self.part(word) {
+            place.push_str(&if first == last { format!(":{first}") } else { format!(":{first}-{last}") });
+        }
+        Some(place)
+    }
+
+    /// The place of a bundle: that of its first operation that has one.
+    pub fn bundle_place(&self, address: BundleAddress) -> Option<String> {
+        let start = address.index().checked_mul(self.machine.slots.len())?;
+        (0..self.locations(address).len()).find_map(|slot| self.word_place(start + slot))
+    }
+
+    /// The place of the operation that a slot of a bundle executes.
+    pub fn operation_place(&self, address: BundleAddress, slot: SlotIndex) -> Option<String> {
+        self.operation_location(address, slot)?;
+        self.word_place(address.index() * self.machine.slots.len() + slot.index())
+    }
+
     /// The source's name for a register: port, named register, or else the canonical name.
     pub fn register_text(&self, register: Register) -> String {
         self.outputs
@@ -194,8 +232,8 @@ impl Program {
 
     /// A bundle and its place: `bundle 12 (tracking.s:40)`.
     pub fn bundle_text(&self, address: BundleAddress) -> String {
-        match self.location(address) {
-            Some(location) => format!("bundle {address} ({})", self.place_text(location)),
+        match self.bundle_place(address) {
+            Some(place) => format!("bundle {address} ({place})"),
             None => format!("bundle {address}"),
         }
     }

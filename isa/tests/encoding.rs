@@ -71,6 +71,36 @@ fn every_row_runs_on_a_unit_and_a_machine() {
     }
 }
 
+/// What equations write for instructions: sources that there are, each once, and no two instructions for one form and one
+/// choice of types.
+#[test]
+fn forms_of_equations_are_told_apart_by_their_types() {
+    let mut seen = HashSet::new();
+    for row in ROWS {
+        for (form, text) in row.forms().zip(row.forms) {
+            let mut sources = form.sources.clone();
+            sources.sort_unstable();
+            sources.dedup();
+            assert_eq!(sources.len(), form.sources.len(), "`{text}` has a source twice");
+            assert!(!sources.is_empty(), "`{text}` has no source");
+            assert!(
+                sources.iter().all(|source| *source < row.shape.sources()),
+                "`{text}` of {}",
+                row.mnemonic
+            );
+            assert!(row.shape.has_dest() && row.effect == takt_isa::Effect::Compute, "{}", row.mnemonic);
+            let types: Vec<String> =
+                form.sources.iter().map(|source| format!("{:?}", row.source_type(*source))).collect();
+            assert!(seen.insert((form.symbol, types)), "`{text}` means two instructions");
+        }
+    }
+    let forms = |op: Op| op.row().forms().map(|form| (form.symbol, form.sources)).collect::<Vec<_>>();
+    assert_eq!(forms(Op::flt), [("<".to_owned(), vec![0, 1]), (">".to_owned(), vec![1, 0])]);
+    assert_eq!(forms(Op::sel), [("?:".to_owned(), vec![0, 1, 2])]);
+    assert_eq!(forms(Op::fatan2), [("atan2".to_owned(), vec![0, 1])]);
+    assert_eq!(forms(Op::isub), [("-".to_owned(), vec![0, 1]), ("-".to_owned(), vec![1])]);
+}
+
 #[test]
 fn pipelined_units_name_each_of_their_registers() {
     for unit in UNITS {

@@ -8,7 +8,7 @@
 
 ; ---- Elementary functions. Their errors are measured over every operand; what they cost, how they work and what they raise stands in
 ;      docs/library.md. Names that begin with `math.` are not for use outside. ----
-
+.contract off                           ; the errors are those of the operations as they stand
 .const math.shift = 0x1.8p23            ; added to a number below 2²², it leaves the nearest integer in the low bits of the sum
 .const math.sign  = 0x80000000
 .const math.inf   = 0x7f800000

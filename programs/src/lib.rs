@@ -27,6 +27,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("arm/inverse.s", include_str!("../arm/inverse.s")),
     ("hybrid/robot.s", include_str!("../hybrid/robot.s")),
     ("hybrid/tracking.s", include_str!("../hybrid/tracking.s")),
+    ("hybrid/tracking_equations.s", include_str!("../hybrid/tracking_equations.s")),
     ("hybrid/tracking_literal.s", include_str!("../hybrid/tracking_literal.s")),
 ];
 
@@ -48,7 +49,8 @@ pub const EXAMPLES: &[(&str, &str)] = &[
 ];
 
 /// The library, for `.include <name>`: name and text of every file in `library/`.
-pub const LIBRARY: &[(&str, &str)] = &[("math.s", include_str!("../library/math.s"))];
+pub const LIBRARY: &[(&str, &str)] =
+    &[("math.s", include_str!("../library/math.s")), ("matrix.s", include_str!("../library/matrix.s"))];
 
 #[cfg(test)]
 mod tests {

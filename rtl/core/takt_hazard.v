@@ -1,7 +1,7 @@
 // takt_hazard: one register address of a bundle, from match to issue: where in the pipelines its pending result is.
 //
 // The address accompanies its bundle through three stages: match (m_), read (r_), issue (i_). In match it is compared with all
-// results underway and with the destinations of the two bundles ahead; from then on only with place 2 of takt_underway, for
+// results in flight and with the destinations of the two bundles ahead; from then on only with place 2 of takt_in_flight, for
 // what comes closer must pass there. A register has at most one result pending (rule 3 of docs/timing.md), so that a few bits
 // say all.
 //
@@ -18,7 +18,7 @@
 
 module takt_hazard #(
     parameter SLOTS = 3,   // slots whose banks the address can be in
-    parameter DEPTH = 10,  // places of takt_underway, at least 4
+    parameter DEPTH = 10,  // places of takt_in_flight, at least 4
     parameter LATE  = 1,   // units with takt_late, at most, of a slot
     parameter INDEX = 8
 ) (
@@ -30,9 +30,9 @@ module takt_hazard #(
     input  wire [INDEX-1:0]             r_index,
     input  wire [SLOTS-1:0]             i_bank,
     input  wire [INDEX-1:0]             i_index,
-    // For each slot: results underway, and what the bundles in read and issue will write: early with a latency of 2.
-    input  wire [SLOTS*DEPTH-1:0]       underway,
-    input  wire [SLOTS*DEPTH*INDEX-1:0] underway_index,
+    // For each slot: results in flight, and what the bundles in read and issue will write: early with a latency of 2.
+    input  wire [SLOTS*DEPTH-1:0]       in_flight,
+    input  wire [SLOTS*DEPTH*INDEX-1:0] in_flight_index,
     input  wire [SLOTS*LATE-1:0]        late,
     input  wire [SLOTS*LATE*INDEX-1:0]  late_index,
     input  wire [SLOTS-1:0]             r_writes,
@@ -51,7 +51,7 @@ module takt_hazard #(
     output wire [SLOTS-1:0]             next_past
 );
 
-    // Comparisons with all that is underway; m_at[j] for place j, m_later for place 3 and beyond.
+    // Comparisons with all that is in flight; m_at[j] for place j, m_later for place 3 and beyond.
     wire [SLOTS-1:0] m_at0, m_at1, m_at2, m_later, m_on_read, m_on_issue, r_at2, i_at2;
 
     genvar s, j;
@@ -60,20 +60,20 @@ module takt_hazard #(
             wire [DEPTH-1:0] hit;
             wire [LATE-1:0]  late_hit;
             for (j = 0; j < DEPTH; j = j + 1) begin : g_place
-                assign hit[j] = underway[s*DEPTH+j] & (underway_index[(s*DEPTH+j)*INDEX +: INDEX] == m_index);
+                assign hit[j] = in_flight[s*DEPTH+j] & (in_flight_index[(s*DEPTH+j)*INDEX +: INDEX] == m_index);
             end
             for (j = 0; j < LATE; j = j + 1) begin : g_late
                 assign late_hit[j] = late[s*LATE+j] & (late_index[(s*LATE+j)*INDEX +: INDEX] == m_index);
             end
-            wire [INDEX-1:0] index2 = underway_index[(s*DEPTH+2)*INDEX +: INDEX];
+            wire [INDEX-1:0] index2 = in_flight_index[(s*DEPTH+2)*INDEX +: INDEX];
             assign m_at0[s]      = m_bank[s] & hit[0];
             assign m_at1[s]      = m_bank[s] & hit[1];
             assign m_at2[s]      = m_bank[s] & hit[2];
             assign m_later[s]    = m_bank[s] & ((|hit[DEPTH-1:3]) | (|late_hit));
             assign m_on_read[s]  = m_bank[s] & r_writes[s] & (r_dest[s*INDEX +: INDEX] == m_index);
             assign m_on_issue[s] = m_bank[s] & i_writes[s] & (i_dest[s*INDEX +: INDEX] == m_index);
-            assign r_at2[s]      = r_bank[s] & underway[s*DEPTH+2] & (index2 == r_index);
-            assign i_at2[s]      = i_bank[s] & underway[s*DEPTH+2] & (index2 == i_index);
+            assign r_at2[s]      = r_bank[s] & in_flight[s*DEPTH+2] & (index2 == r_index);
+            assign i_at2[s]      = i_bank[s] & in_flight[s*DEPTH+2] & (index2 == i_index);
         end
     endgenerate
 

@@ -1,17 +1,17 @@
 // takt_late: the result of a unit that works on one operation at a time and takes longer than the slot's pipelined units.
 //
 // Contract
-//   An operation that issues now, insert, is in at[1] in the next cycle, in at[2] in the one after, and so on; underway until
-//   its result passes on to takt_underway's last place: last, in the cycle before. busy: the unit would not accept an
+//   An operation that issues now, insert, is in at[1] in the next cycle, in at[2] in the one after, and so on; in flight until
+//   its result passes on to takt_in_flight's last place: last, in the cycle before. busy: the unit would not accept an
 //   operation in the next cycle even if none issues now.
-//   Requires INTERVAL >= LATENCY - DEPTH, so that one operation at a time is underway here.
+//   Requires INTERVAL >= LATENCY - DEPTH, so that one operation at a time is in flight here.
 //   cancel, which stays: what issued in the last two cycles and what issues from now on does not count.
 //   Requires LATENCY - DEPTH >= 2: none is cancelled that has passed on.
 
 module takt_late #(
     parameter LATENCY  = 18,
     parameter INTERVAL = 14,
-    parameter DEPTH    = 10,  // places of takt_underway
+    parameter DEPTH    = 10,  // places of takt_in_flight
     parameter INDEX    = 8,
     parameter ADDRESS  = 16
 ) (
@@ -22,7 +22,7 @@ module takt_late #(
     input  wire [INDEX-1:0]       insert_index,
     input  wire [ADDRESS-1:0]     insert_address,
     output wire [LATENCY-DEPTH:1] at,
-    output reg                    underway,
+    output reg                    in_flight,
     output reg  [INDEX-1:0]       index,
     output reg  [ADDRESS-1:0]     address,
     output wire                   last,
@@ -47,7 +47,7 @@ module takt_late #(
     always @(posedge clk) begin
         age      <= {age[AGES-1:3], age[2] & ~cancel, age[1] & ~cancel, insert};
         working  <= insert | busy;
-        underway <= insert | (underway & ~age[LATENCY-DEPTH]);
+        in_flight <= insert | (in_flight & ~age[LATENCY-DEPTH]);
         if (insert) begin
             index   <= insert_index;
             address <= insert_address;
@@ -55,7 +55,7 @@ module takt_late #(
         if (rst) begin
             age      <= {AGES{1'b0}};
             working  <= 1'b0;
-            underway <= 1'b0;
+            in_flight <= 1'b0;
         end
     end
 

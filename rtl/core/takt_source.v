@@ -25,9 +25,9 @@ module takt_source #(
     input  wire [SLOTS:0]               m_bank,
     input  wire [INDEX-1:0]             m_index,
     input  wire                         m_place,
-    input  wire [SLOTS*DEPTH-1:0]       underway,
-    input  wire [SLOTS*DEPTH*INDEX-1:0] underway_index,
-    input  wire [SLOTS-1:0]             writes,          // takt_underway's
+    input  wire [SLOTS*DEPTH-1:0]       in_flight,
+    input  wire [SLOTS*DEPTH*INDEX-1:0] in_flight_index,
+    input  wire [SLOTS-1:0]             writes,          // takt_in_flight's
     input  wire [SLOTS*LATE-1:0]        late,
     input  wire [SLOTS*LATE*INDEX-1:0]  late_index,
     input  wire [SLOTS-1:0]             r_writes,
@@ -69,7 +69,7 @@ module takt_source #(
         .clk(clk), .advance(advance),
         .m_bank(m_bank[SLOTS-1:0]), .m_index(m_index), .r_bank(r_bank[SLOTS-1:0]), .r_index(r_index),
         .i_bank(i_bank[SLOTS-1:0]), .i_index(i_index),
-        .underway(underway), .underway_index(underway_index), .late(late), .late_index(late_index),
+        .in_flight(in_flight), .in_flight_index(in_flight_index), .late(late), .late_index(late_index),
         .r_writes(r_writes), .r_early(r_early), .r_dest(r_dest), .i_writes(i_writes), .i_early(i_early), .i_dest(i_dest),
         .r_waits(r_waits), .i_waits(i_waits), .r_copy(r_copy), .r_past(r_past), .r_taken(r_taken), .i_taken(i_taken), .next_now(next_now), .next_past(next_past)
     );
@@ -108,7 +108,7 @@ module takt_source #(
         end
         for (s = 0; s < SLOTS; s = s + 1) begin : g_slot
             takt_bank #(.INDEX(INDEX)) bank (
-                .clk(clk), .write(writes[s]), .write_index(underway_index[s*DEPTH*INDEX +: INDEX]),
+                .clk(clk), .write(writes[s]), .write_index(in_flight_index[s*DEPTH*INDEX +: INDEX]),
                 .write_value(result[32*s +: 32]), .read_index(read_index), .show(next_copy[s]), .value(copy[32*s +: 32])
             );
         end

@@ -54,7 +54,7 @@ pub(crate) const CORE: &[File] = files!("core":
     "takt_program.v"
     "takt_sequencer.v"
     "takt_source.v"
-    "takt_underway.v"
+    "takt_in_flight.v"
 );
 
 #[cfg(test)]

@@ -167,7 +167,7 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
 //   adr_i counts words; addresses are hexadecimal:
 {table}//   {INPUTS:04x} + port  w  input port
 //   {OUTPUTS:04x} + port  r  output port: what was last written to it; if LATCHED, as of the last `wait`
-//   Accesses are acknowledged in the next cycle, but load_low and, with RESTORE, input ports only when a reset underway has
+//   Accesses are acknowledged in the next cycle, but load_low and, with RESTORE, input ports only when a reset in progress has
 //   lasted long enough. What is written nowhere is lost, what is read nowhere is 0.
 //   rst_i: for a cycle at least, after power-up.
 //   waiting: the program waits for the tick: the outputs of the period stand. It can serve as an interrupt.

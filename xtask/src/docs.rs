@@ -3,6 +3,8 @@
 use anyhow::{Context, Result, bail};
 use std::path::Path;
 
+/// What an editor colours by itself.
+const GRAMMAR: &str = "editors/vscode/syntaxes/takt.tmLanguage.json";
 /// What synthesis measured.
 pub(crate) const SYNTHESIS: &str = "docs/synthesis.md";
 
@@ -10,6 +12,7 @@ pub(crate) const SYNTHESIS: &str = "docs/synthesis.md";
 fn generated() -> Result<Vec<(&'static str, String)>> {
     Ok(vec![
         ("docs/isa.md", takt_isa::manual::markdown()),
+        (GRAMMAR, takt_editor::grammar::textmate_text()),
         (SYNTHESIS, crate::synth::markdown(&crate::synth::recorded()?)),
     ])
 }

@@ -210,7 +210,7 @@ fn scoreboard(plan: &Plan) -> String {
             v,
             "        if ({rst}) begin\n            f_{name}_pending <= 6'd0;\n            f_{name}_due <= 1'b0;\n            f_{name}_booked <= 64'd0;\n        end\n    end"
         );
-        let (written, register) = (slot.underway().at(0), slot.underway_index().low(plan.index));
+        let (written, register) = (slot.in_flight().at(0), slot.in_flight_index().low(plan.index));
         let _ = writeln!(checks, "        if (f_check) assert ({written} == f_{name}_booked[0]);");
         let _ = writeln!(
             checks,

@@ -12,6 +12,7 @@ use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use takt_isa::MACHINES;
 
 /// Project automation for Takt.
 #[derive(Parser)]
@@ -96,7 +97,7 @@ fn works(program: &str, argument: &str) -> bool {
 }
 
 /// What the tests call, how to ask whether it works, and the Debian package that has it.
-const TOOLS: [(&str, &str, &str); 6] = [
+const TOOLS: [(&str, &str, &str); 9] = [
     // Berkeley SoftFloat, the reference arithmetic, is C.
     ("cc", "--version", "gcc"),
     // The circuit runs in Verilator, which builds with make and a C++ compiler, and in Icarus Verilog.
@@ -104,6 +105,11 @@ const TOOLS: [(&str, &str, &str); 6] = [
     ("make", "--version", "make"),
     ("verilator", "--version", "verilator"),
     ("iverilog", "-V", "iverilog"),
+    // The language server is used by the client of an editor.
+    ("nvim", "--version", "neovim"),
+    // The debug adapter by another one, in JavaScript.
+    ("node", "--version", "nodejs"),
+    ("npm", "--version", "npm"),
     // The page of `takt analyse` is opened in a browser.
     ("chromium", "--version", "chromium"),
 ];
@@ -128,8 +134,19 @@ fn apt_install(packages: &[&str]) -> Result<()> {
     run(install.env("DEBIAN_FRONTEND", "noninteractive"))
 }
 
+/// Installs with npm the debug adapter's client, in the versions that are written down.
+fn install_client() -> Result<()> {
+    let folder = root().join("cli/tests/clients/dap");
+    if folder.join("node_modules").is_dir() {
+        return Ok(());
+    }
+    run(Command::new("npm").args(["ci", "--no-audit", "--no-fund"]).current_dir(folder))
+}
+
 fn test(full: bool, rest: &[String]) -> Result<()> {
     install()?;
+    venv::Venv::with(&venv::MODELS)?;
+    install_client()?;
     if rest.is_empty() {
         formal::formal(&formal::Arguments::SHARE)?;
     }
@@ -208,7 +225,7 @@ fn seed() -> Result<()> {
             }
         }
     }
-    for machine in ["t3", "t1"] {
+    for machine in MACHINES.iter().map(|machine| machine.name) {
         let image = images.join(format!("{machine}.takt"));
         let source = "programs/hybrid/tracking.s";
         run(cargo().args(["run", "--release", "-q", "--", "asm", source, "-m", machine, "-o"]).arg(image))?;

@@ -77,7 +77,20 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
     }
     if !opaque {
         no_wait(context, ir);
-        for (register, used, _) in (0..uses.len()).map(found).filter(|(.., id)| !homes.quiet.contains(id)) {
+        for array in context.declared.arrays.clone() {
+            // Of an array it is enough that one element is used.
+            let elements = array.elements().map(RegisterId::index);
+            let best = elements
+                .max_by_key(|&element| (uses[element].read.is_some(), uses[element].written.is_some()));
+            if let Some(best) = best {
+                let register = VirtualRegister { name: array.name.clone(), ..ir.registers[best].clone() };
+                unused(context, &register, &uses[best]);
+            }
+        }
+        let single = |(register, _, id): &(&VirtualRegister, &Use, RegisterId)| {
+            !homes.quiet.contains(id) && !register.name.ends_with(']')
+        };
+        for (register, used, _) in (0..uses.len()).map(found).filter(single) {
             unused(context, register, used);
         }
     }

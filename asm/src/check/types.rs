@@ -6,17 +6,17 @@
 //! written to it, or none. What may be either is not reported: every warning is about a value that is certainly of the other type.
 
 use crate::check::{dest_span, source_span, text};
-use crate::context::{Context, ScopeId, type_name};
+use crate::context::{Context, ScopeId, type_name, words};
 use crate::ir::given::{Given, GivenTypes, Kind, Part, What};
 use crate::ir::runs::{Run, runs};
 use crate::ir::{Ir, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
+use crate::resolve::forms::passed;
 use crate::syntax::expr::Value;
 use smallvec::SmallVec;
 use std::collections::HashMap;
 use takt_isa::program::Space;
-use takt_isa::spec::instructions::compute;
 use takt_isa::{Effect, ROWS, Row, Type};
 
 #[derive(Clone, Copy, Debug)]
@@ -78,7 +78,7 @@ struct Types<'i> {
     /// The tables of data memory, by label.
     tables: HashMap<LabelId, Typed>,
     /// For each instruction, the sources whose bits its result is.
-    passed: Vec<SmallVec<[usize; 3]>>,
+    passed: Vec<Vec<usize>>,
     changed: bool,
 }
 
@@ -260,26 +260,6 @@ fn literal(operation: &Operation, kind: Kind, what: What, span: Span) -> Typed {
     Typed { kind, origin: Some(Origin { what, span, scope: ScopeId(operation.expansion) }) }
 }
 
-/// The sources of which one gives an instruction's result its bits; none if it computes new ones. The table says what
-/// an instruction computes: it is asked with patterns that nothing but a copy gives again.
-fn passed(row: &Row) -> SmallVec<[usize; 3]> {
-    const PATTERNS: [u32; 3] = [0x1234_5679, 0xa5b6_c7d3, 0x5e8f_9a1b];
-    let mut passed = SmallVec::new();
-    if row.effect != Effect::Compute || row.result_type() != Type::B {
-        return passed;
-    }
-    for first in [PATTERNS[0], 0] {
-        let sources = [first, PATTERNS[1], PATTERNS[2]];
-        let result = compute::<takt_isa::fp::Host>(row.op, sources[0], sources[1], sources[2]).bits;
-        match sources[..row.shape.sources()].iter().position(|source| *source == result) {
-            Some(which) if passed.contains(&which) => {}
-            Some(which) => passed.push(which),
-            None => return SmallVec::new(),
-        }
-    }
-    passed
-}
-
 /// The types of the tables of data memory: each goes from its label to the next.
 fn tables(ir: &Ir, types: &[Type]) -> HashMap<LabelId, Typed> {
     let labels = ir.labels.iter().enumerate().filter(|(_, label)| label.space == Space::Data);
@@ -295,15 +275,6 @@ fn tables(ir: &Ir, types: &[Type]) -> HashMap<LabelId, Typed> {
         (LabelId(number as u32), Typed { kind, origin: Some(origin) })
     };
     labels.map(table).collect()
-}
-
-/// A type in words.
-fn words(ty: Type) -> &'static str {
-    match ty {
-        Type::F => "a float",
-        Type::I => "an integer",
-        Type::B => "bits",
-    }
 }
 
 /// The instruction that converts from one type to another.

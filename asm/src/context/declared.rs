@@ -8,6 +8,7 @@ use crate::report::source::Span;
 use crate::syntax::ast::{Operand, Section};
 use crate::syntax::expr::Value;
 use crate::syntax::name::NameId;
+use smallvec::SmallVec;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use takt_isa::{Register, Type};
 
@@ -20,6 +21,31 @@ pub(crate) struct NamedConstant {
     pub(crate) used: bool,
     /// Whether that it is never used is worth a warning.
     pub(crate) watched: bool,
+}
+
+/// An array of registers, which follow one another, the last index counting fastest.
+#[derive(Clone, Debug)]
+pub(crate) struct Array {
+    pub(crate) name: String,
+    /// Its first element.
+    pub(crate) first: RegisterId,
+    /// How many elements it has in each direction; indices count from 1.
+    pub(crate) sizes: SmallVec<[u32; 2]>,
+    pub(crate) span: Span,
+}
+
+impl Array {
+    /// Its elements.
+    pub(crate) fn elements(&self) -> impl Iterator<Item = RegisterId> + use<> {
+        let count = self.sizes.iter().product::<u32>() as usize;
+        (self.first.index()..self.first.index() + count).map(RegisterId::new)
+    }
+
+    /// Its sizes as the source writes them: `4,4`.
+    pub(crate) fn shape(&self) -> String {
+        let sizes: Vec<String> = self.sizes.iter().map(u32::to_string).collect();
+        sizes.join(",")
+    }
 }
 
 /// An argument of a macro's use.
@@ -42,6 +68,9 @@ pub(crate) struct Declared {
     pub(crate) typed: HashSet<RegisterId>,
     /// What the source says of the types of operands that the instruction leaves open.
     pub(crate) given: GivenTypes,
+    pub(crate) arrays: Vec<Array>,
+    /// Elements of all arrays.
+    pub(crate) elements: usize,
     pub(crate) constants: Vec<NamedConstant>,
     pub(crate) arguments: Vec<Argument>,
     /// Parameters of macros' uses that stand for registers, as far as operations use them.
@@ -71,6 +100,8 @@ impl Declared {
             numbered: BTreeMap::new(),
             typed: HashSet::new(),
             given: GivenTypes::default(),
+            arrays: Vec::new(),
+            elements: 0,
             constants: Vec::new(),
             arguments: Vec::new(),
             parameters: HashMap::new(),
@@ -84,6 +115,7 @@ impl Declared {
     pub(crate) fn declaration(&self, binding: Binding) -> Option<Span> {
         match binding {
             Binding::Register(id) => Some(self.registers[id.index()].span),
+            Binding::Array(id) => Some(self.arrays[id as usize].span),
             Binding::Constant(id) => Some(self.constants[id as usize].span),
             Binding::Code(id) | Binding::Data(id) => Some(self.labels[id.0 as usize].span),
             Binding::Argument(id) => Some(self.arguments[id as usize].operand.span),
@@ -101,6 +133,7 @@ impl Declared {
                 _ => "a register",
             },
             Binding::Constant(_) | Binding::Builtin(_) | Binding::Has(_) => "a constant",
+            Binding::Array(_) => "an array of registers",
             Binding::Code(_) => "a code label",
             Binding::Data(_) => "a data label",
             Binding::Argument(_) => "a parameter",

@@ -12,9 +12,19 @@ use std::rc::Rc;
 use takt_isa::Type;
 
 impl Context {
-    /// The name that a reference stands for where it stands.
+    /// The name that a reference stands for where it stands, noted for the index.
     #[inline]
     pub(crate) fn name(&mut self, at: At, name: NameRef, span: Span) -> Result<NameId, Reported> {
+        let name = self.spelled(at, name, span)?;
+        if let Some(notes) = &mut self.notes {
+            notes.name(span, at.scope, name);
+        }
+        Ok(name)
+    }
+
+    /// The name that is written somewhere, whatever it may mean there: a register's place, an instruction, a word as `on`.
+    #[inline]
+    pub(crate) fn spelled(&mut self, at: At, name: NameRef, span: Span) -> Result<NameId, Reported> {
         match name.resolve() {
             Ok(name) => Ok(name),
             Err(template) => self.nested(at, span, |context| context.instantiate(at, template, span)),
@@ -71,8 +81,8 @@ impl Context {
     /// The text for one braced part of a name.
     fn piece(&mut self, at: At, nodes: &[Node], span: Span) -> Result<String, Reported> {
         // A parameter whose argument is a name gives the name's text, unless that is an integer.
-        if let [Node { kind: NodeKind::Name(name), .. }] = *nodes {
-            let name = self.name(at, name, span)?;
+        if let [Node { kind: NodeKind::Name(name), span: place }] = *nodes {
+            let name = self.name(at, name, place)?;
             let argument = match self.lookup(at.scope, name) {
                 Binding::Argument(argument) => Some(self.declared.arguments[argument as usize]),
                 _ => None,
@@ -170,6 +180,16 @@ impl Context {
         value.map_err(|error| self.fault(at.scope, error))
     }
 
+    /// The value of an index, given as its nodes.
+    pub(crate) fn index(&mut self, at: At, nodes: &[Node], span: Span) -> Result<i64, Reported> {
+        let id = ExprId { first: 0, count: nodes.len() as u32 };
+        let value = expr::evaluate(nodes, id, &mut Environment { context: self, at });
+        let span = nodes.last().map_or(span, |node| node.span);
+        value
+            .and_then(|value| value.integer().map_err(|fault| EvalError { span, fault }))
+            .map_err(|error| self.fault(at.scope, error))
+    }
+
     /// The value of an expression that is to be an integer.
     pub(crate) fn integer(&mut self, at: At, expr: Expr) -> Result<i64, Reported> {
         let value = self.value(at, expr.id)?;
@@ -195,6 +215,7 @@ impl Context {
                 let message = format!("`{}` is {kind}: it has no value here", self.scopes.text(name));
                 let mut error = Diagnostic::error("not-a-value", span, message);
                 error = match binding {
+                    Binding::Array(_) => error.help("write an element of it, with its indices in brackets"),
                     Binding::Code(_) => error
                         .note("the addresses of code are known only after scheduling")
                         .help("a code label stands alone, as a target or as the immediate of `li`"),
@@ -219,7 +240,10 @@ impl Context {
                 let name = context.name(at, name, operand.span)?;
                 context.name_value(at.scope, name, operand.span)
             })?,
-            OperandKind::Place(_) | OperandKind::Memory(_) | OperandKind::Cast(_) => {
+            OperandKind::Place(_)
+            | OperandKind::Memory(_)
+            | OperandKind::Cast(_)
+            | OperandKind::Element(_) => {
                 let error = Diagnostic::error("not-a-value", span, "a value is needed here")
                     .also(operand.span, "the argument is an operand without one");
                 return Err(self.report(at.scope, error));

@@ -2,11 +2,13 @@
 
 mod declared;
 mod evaluate;
+mod notes;
 mod reports;
 mod scopes;
 mod unknown;
 
-pub(crate) use declared::{Argument, Declared, NamedConstant};
+pub(crate) use declared::{Argument, Array, Declared, NamedConstant};
+pub(crate) use notes::Notes;
 pub(crate) use reports::Reports;
 pub(crate) use scopes::{Binding, MacroDefinition, ScopeId, ScopeKind, Scopes};
 pub(crate) use unknown::Wanted;
@@ -41,6 +43,8 @@ pub(crate) struct Context {
     pub(crate) scopes: Scopes,
     pub(crate) declared: Declared,
     pub(crate) reports: Reports,
+    /// Which names stand where, if somebody wants to know ([`index`](crate::index)).
+    pub(crate) notes: Option<Notes>,
     /// Arguments and templates under evaluation, one within the other.
     depth: usize,
 }
@@ -51,7 +55,7 @@ impl Context {
         let zero = scopes.names_mut().intern("zero");
         scopes.bind(ScopeId::ROOT, zero, Binding::Register(RegisterId::ZERO));
         let (declared, reports) = (Declared::new(), Reports::default());
-        Context { machine, asts: Vec::new(), scopes, declared, reports, depth: 0 }
+        Context { machine, asts: Vec::new(), scopes, declared, reports, notes: None, depth: 0 }
     }
 
     /// Reports a mistake in a scope, with the expansions that led there.
@@ -85,10 +89,15 @@ impl Context {
         }
     }
 
-    /// Whether the machine has an instruction, where the name asks for that: `has.` and a mnemonic.
+    /// Whether the machine has an instruction, where the name asks for that: `has.` and a mnemonic, which may name a slot.
     fn has(&self, name: NameId) -> Option<bool> {
-        let row = Op::from_mnemonic(self.scopes.text(name).strip_prefix(HAS)?)?.row();
-        Some(row.function == takt_isa::Function::Idle || self.machine.host(row.function).is_some())
+        let asked = self.scopes.text(name).strip_prefix(HAS)?;
+        let (mnemonic, slot) = asked.split_once('.').map_or((asked, None), |(op, slot)| (op, Some(slot)));
+        let row = Op::from_mnemonic(mnemonic)?.row();
+        let is_idle = row.function == takt_isa::Function::Idle;
+        Some(self.machine.slots.iter().any(|host| {
+            slot.is_none_or(|name| name == host.name) && (is_idle || host.unit_for(row.function).is_some())
+        }))
     }
 
     /// Declares a name in the scope that takes declarations, unless it is declared there.
@@ -123,10 +132,19 @@ impl Context {
 }
 
 /// A type as the source writes it.
-pub(crate) const fn type_name(ty: Type) -> &'static str {
+pub const fn type_name(ty: Type) -> &'static str {
     match ty {
         Type::F => "float",
         Type::I => "int",
+        Type::B => "bits",
+    }
+}
+
+/// A type in words.
+pub(crate) const fn words(ty: Type) -> &'static str {
+    match ty {
+        Type::F => "a float",
+        Type::I => "an integer",
         Type::B => "bits",
     }
 }

@@ -3,7 +3,7 @@
 use crate::ir::{LabelId, RegisterId};
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
-use crate::syntax::ast::Ast;
+use crate::syntax::ast::{Ast, DirectiveKind};
 use crate::syntax::intern::Interner;
 use crate::syntax::name::NameId;
 use std::collections::HashMap;
@@ -44,6 +44,8 @@ pub(crate) enum ScopeKind {
 pub(crate) enum Binding {
     None,
     Register(RegisterId),
+    /// An array of registers: an index into the arrays.
+    Array(u32),
     Constant(u32),
     Code(LabelId),
     Data(LabelId),
@@ -68,6 +70,14 @@ pub(crate) struct MacroDefinition {
 }
 
 impl MacroDefinition {
+    /// How many parameters it has, and where its name stands in the definition.
+    pub(crate) fn parameters(&self, asts: &[Rc<Ast>]) -> (usize, Span) {
+        match &asts[self.ast as usize].directives[self.directive as usize].kind {
+            DirectiveKind::Macro { parameters, name, .. } => (parameters.len(), name.span),
+            _ => (0, self.span(asts)),
+        }
+    }
+
     /// Where the macro is defined.
     pub(crate) fn span(&self, asts: &[Rc<Ast>]) -> Span {
         asts[self.ast as usize].directives[self.directive as usize].span

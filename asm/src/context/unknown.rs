@@ -17,6 +17,8 @@ use takt_isa::ROWS;
 pub(crate) enum Wanted {
     /// A register to write.
     Dest,
+    /// The same, left of an equation's `=`.
+    Left,
     /// A register or constant to read.
     Source,
     /// A code label.
@@ -25,6 +27,8 @@ pub(crate) enum Wanted {
     Value,
     /// A place in data memory.
     Table,
+    /// An array of registers.
+    Array,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -95,6 +99,9 @@ impl Context {
                 None if name.op().is_some() => error.note(format!("`{text}` is an instruction")),
                 None => match wanted {
                     Wanted::Dest => error.help(format!("declare it with `.reg {text}` or `.output {text}`")),
+                    Wanted::Left => error.help(format!(
+                        "declare it with `.reg {text}` or `.output {text}`; a constant is `.const {text} = …`"
+                    )),
                     Wanted::Source => error.help(format!(
                         "declare it with `.reg {text}`, `.input {text}` or `.const {text} = …`"
                     )),
@@ -102,6 +109,9 @@ impl Context {
                         error.help(format!("put the label `{text}:` before the bundle to continue at"))
                     }
                     Wanted::Value => error.help(format!("define it with `.const {text} = …`")),
+                    Wanted::Array => {
+                        error.help(format!("declare it with `.reg {text}[n]`, or `.reg {text}[n,m]`"))
+                    }
                     Wanted::Table => error.help(format!(
                         "put it into data memory: `.data`, then `{text}: .float …`, `.word …` or `.space …`"
                     )),
@@ -116,11 +126,13 @@ impl Context {
     fn similar(&self, scope: ScopeId, text: &str, wanted: Wanted) -> Option<String> {
         let fits = |binding: Binding| match (wanted, binding) {
             (_, Binding::None) => false,
+            (Wanted::Array, binding) => matches!(binding, Binding::Array(_) | Binding::Argument(_)),
+            (_, Binding::Array(_)) => false,
             (_, Binding::Argument(_)) => true,
-            (Wanted::Dest, Binding::Register(id)) => {
+            (Wanted::Dest | Wanted::Left, Binding::Register(id)) => {
                 !matches!(self.declared.registers[id.index()].kind, RegisterKind::Input | RegisterKind::Zero)
             }
-            (Wanted::Dest, _) => false,
+            (Wanted::Dest | Wanted::Left, _) => false,
             (Wanted::Source, Binding::Code(_)) => false,
             (Wanted::Source, _) => true,
             (Wanted::Target, binding) => matches!(binding, Binding::Code(_)),

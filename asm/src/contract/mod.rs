@@ -5,11 +5,13 @@
 
 mod choose;
 
+use crate::homes;
+use crate::ir::matching;
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, runs};
 use smallvec::SmallVec;
 use std::collections::{HashMap, HashSet};
 use takt_isa::program::Location;
-use takt_isa::{Fusion, fusions};
+use takt_isa::{Fusion, Slots, fusions};
 
 /// A product that was fused into a sum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,7 +85,7 @@ pub(crate) fn contract(ir: &mut Ir, is_on: impl Fn(usize) -> bool) -> Contracted
                 (fusion.product, fusion.sum, fusion.source) == (at(ir, product.at).op, sum.op, source)
             })?;
             let wanted = is_on(product.at.0) && is_on(reader.0);
-            let free = !(product.last && exposed[product.dest.index()]) && !product.stale;
+            let free = !(product.stale || product.last && exposed[product.dest.index()]);
             (wanted && free && has_place(ir, reader, fusion)).then_some((reader, **fusion))
         };
         let mut wishes = Wishes::new();
@@ -180,33 +182,37 @@ fn products(ir: &Ir, known: &[&Fusion], run: runs::Run, current: &mut [Current])
     products
 }
 
-/// Whether the fused operation can stand where the sum stands: its slot is free there, and writes the sum's register.
+/// Whether the fused operation can stand where the sum stands: a slot is free for it there, and writes the sum's register.
 fn has_place(ir: &Ir, (bundle, number): Where, fusion: &Fusion) -> bool {
-    let Some((slot, _)) = ir.machine.host(fusion.fused.row().function) else { return false };
     let operations = &ir.bundles[bundle].operations;
     let dest = operations[number].dest;
     let others =
         || operations.iter().enumerate().filter(|(other, _)| *other != number).map(|(_, other)| other);
-    let taken = others().any(|other| other.slot == Some(slot));
+    let mut slots: Vec<Slots> =
+        others().filter(|other| other.slot.is_some()).map(|other| other.slots).collect();
+    slots.push(dest.map_or_else(Slots::default, |dest| homes::able(ir, dest, fusion.fused)));
     // A branch on what its own bundle computes cannot wait for a copy.
     let branches =
         others().any(|other| other.redirects() && dest.is_some_and(|dest| other.reads().contains(&dest)));
-    let place = dest.and_then(|dest| ir.register(dest).pinned);
-    !taken && !branches && place.is_none_or(|address| ir.machine.slot(slot).bank.contains(address))
+    // Nor does it go elsewhere than the source wants the sum.
+    let named =
+        dest.is_some_and(|dest| operations[number].slots != homes::able(ir, dest, operations[number].op));
+    !branches && !named && matching::is_possible(&slots)
 }
 
 /// Puts the fused operation in the sum's place, and takes the product out.
 fn fuse(ir: &mut Ir, product: Where, sum: Where, fusion: Fusion) -> Contraction {
     let first = *at(ir, product);
     let second = *at(ir, sum);
-    let slot = ir.machine.host(fusion.fused.row().function).map(|(slot, _)| slot);
+    let slots = second.dest.map_or_else(Slots::default, |dest| homes::able(ir, dest, fusion.fused));
     let [a, b, _] = first.sources;
     let sources = [a, b, second.sources[1 - fusion.source]];
     // No operand of the tree is one of its own: messages point at the sum.
     let written = (u32::MAX, 0);
     ir.bundles[sum.0].operations[sum.1] = Operation {
         op: fusion.fused,
-        slot,
+        slots,
+        slot: slots.first(),
         sources,
         constant: Constant::None,
         made: true,

@@ -3,7 +3,7 @@
 pub(crate) mod place;
 
 use crate::emit::place::Placement;
-use crate::ir::{Constant, Ir, Operation, RegisterKind};
+use crate::ir::{Constant, Ir, Operation, RegisterKind, numbered};
 use crate::limits::NAME_BYTES;
 use crate::report::diag::{Diagnostic, Sink};
 use crate::report::source::Span;
@@ -17,6 +17,8 @@ pub(crate) struct Emitted {
     pub(crate) expanded: Vec<u32>,
     /// For each word that has a source line, its operation's order and expansion.
     pub(crate) origins: Vec<Option<(u32, u32)>>,
+    /// Words that compute a part of an equation, and where that stands.
+    pub(crate) parts: Vec<(u32, Span)>,
 }
 
 /// Writes the program.
@@ -25,7 +27,8 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
     let filler = Instruction::NOP.encode().unwrap_or(0);
     let mut code = vec![filler; ir.bundles.len() * slots];
     let mut lines = vec![None; ir.bundles.len() * slots];
-    let mut expanded = Vec::new();
+    let (mut expanded, mut parts) = (Vec::new(), Vec::new());
+    let mut columns = Vec::new();
     let mut origins = vec![None; ir.bundles.len() * slots];
     for (address, bundle) in ir.bundles.iter().enumerate() {
         let words = address * slots..(address + 1) * slots;
@@ -38,13 +41,20 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
             code[index] = word(ir, operation, slot, placement, sink);
             lines[index] = operation.location;
             origins[index] = operation.location.map(|_| (operation.order, operation.expansion));
-            if operation.expansion != 0 || operation.made {
+            columns.extend(
+                operation.columns.filter(|_| operation.location.is_some()).map(|part| (index as u32, part)),
+            );
+            if operation.is_computed() && operation.columns.is_none() {
+                parts.push((index as u32, operation.span));
+            }
+            if operation.expansion != 0 || operation.made || operation.is_computed() {
                 expanded.push(index as u32);
             }
         }
     }
     limits(ir, sink);
     expanded.sort_unstable();
+    parts.sort_unstable_by_key(|(word, _)| *word);
     let mut program = Program {
         machine: ir.machine,
         code,
@@ -59,9 +69,11 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
         loop_bounds: loop_bounds(ir),
         files: ir.files.clone(),
         lines,
+        // Those of equations are known where the sources are.
+        parts: columns,
     };
     distinguish(&mut program);
-    Emitted { program, expanded, origins }
+    Emitted { program, expanded, origins, parts }
 }
 
 fn word(ir: &Ir, operation: &Operation, slot: SlotIndex, placement: &Placement, sink: &mut Sink) -> u64 {
@@ -206,10 +218,12 @@ fn distinguish(program: &mut Program) {
             continue;
         }
         // ASCII throughout: a name can be cut anywhere.
-        let stem = name[..name.len().min(NAME_BYTES - 12)].to_owned();
+        let (head, indices) = name.split_at(name.find('[').unwrap_or(name.len()));
+        let room = (NAME_BYTES - 12).saturating_sub(indices.len());
+        let stem = format!("{}{indices}", &head[..head.len().min(room)]);
         let mut number = 2;
         *name = loop {
-            let candidate = format!("{stem}._{number}");
+            let candidate = numbered(&stem, &format!("._{number}"));
             if taken.insert(candidate.clone()) {
                 break candidate;
             }

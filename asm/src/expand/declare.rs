@@ -1,13 +1,16 @@
 //! Declarations: registers and their places, presets, data. The part of [`expand`](crate::expand) that writes down what
 //! the program has, rather than where it goes.
 
-use crate::context::{At, Binding, Context, Reported};
-use crate::expand::{Data, Expander};
+use crate::context::{Array, At, Binding, Context, Reported};
+use crate::expand::{Data, Expander, Fast};
 use crate::ir::{RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
+use crate::syntax::name::NameId;
+use smallvec::SmallVec;
+use takt_isa::program::{Columns, Location};
 use takt_isa::{Machine, Register, Type};
 
 impl Expander<'_> {
@@ -43,6 +46,17 @@ impl Expander<'_> {
     ) -> Result<(), Reported> {
         let Name { name, span } = declaration.name;
         let id = self.context.name(at, name, span)?;
+        self.declare_name(at, what, declaration, id)
+    }
+
+    fn declare_name(
+        &mut self,
+        at: At,
+        what: Declares,
+        declaration: &Declaration,
+        id: NameId,
+    ) -> Result<(), Reported> {
+        let span = declaration.name.span;
         let kind = match what {
             Declares::Register => RegisterKind::Plain,
             Declares::State => RegisterKind::State,
@@ -71,6 +85,101 @@ impl Expander<'_> {
         }
     }
 
+    /// Declares an array of registers.
+    pub(crate) fn declare_array(
+        &mut self,
+        at: At,
+        what: Declares,
+        declaration: &Declaration,
+        sizes: &[Expr],
+    ) -> Result<(), Reported> {
+        let Name { name, span } = declaration.name;
+        let id = self.context.name(at, name, span)?;
+        let text = self.context.scopes.full_name(at.scope, id);
+        let kind = match what {
+            Declares::Register => RegisterKind::Plain,
+            Declares::State => RegisterKind::State,
+            Declares::Input | Declares::Output => {
+                let error = Diagnostic::error("array", span, "ports have a name each, not an array")
+                    .help(format!("declare them in a repetition, as `{text}{{i}}`"));
+                return Err(self.context.report(at.scope, error));
+            }
+        };
+        // With a place it is one element that is declared: what disassembly says of an array.
+        if declaration.place.is_some() {
+            let mut indices = Vec::with_capacity(sizes.len());
+            for size in sizes {
+                let index = self.context.integer(at, *size)?;
+                if index < 1 {
+                    let message = format!("there is no element {index}: indices count from 1");
+                    return Err(self.context.error(at.scope, "range", size.span, message));
+                }
+                indices.push(index.to_string());
+            }
+            if let Binding::Array(_) = self.context.lookup(at.scope, id) {
+                let message = format!("`{text}` is declared already, as an array without places");
+                return Err(self.context.error(at.scope, "declared-twice", span, message));
+            }
+            let element = format!("{}[{}]", self.context.scopes.text(id), indices.join(","));
+            let id = self.context.scopes.names_mut().intern(&element);
+            return self.declare_name(at, what, declaration, id);
+        }
+        if sizes.len() > limits::ARRAY_INDICES {
+            let message = format!("an array has at most {} indices", limits::ARRAY_INDICES);
+            return Err(self.context.error(at.scope, "limit", span, message));
+        }
+        let most = (limits::ARRAY_ELEMENTS - self.context.declared.elements) as i64;
+        let mut count = 1u32;
+        let mut shape = SmallVec::new();
+        for size in sizes {
+            let value = self.context.integer(at, *size)?;
+            if value < 1 {
+                let message = format!("{value} elements: an array has 1 or more in each direction");
+                return Err(self.context.error(at.scope, "range", size.span, message));
+            }
+            if value.saturating_mul(i64::from(count)) > most {
+                let message = format!("arrays of more than {} elements in all", limits::ARRAY_ELEMENTS);
+                return Err(self.context.error(at.scope, "limit", size.span, message));
+            }
+            // Not beyond the limit, which 32 bits hold.
+            count *= value as u32;
+            shape.push(value as u32);
+        }
+        let ty = match declaration.ty {
+            Some(ty) => Some(self.context.type_named(at, ty)?),
+            None => None,
+        };
+        let number = self.context.declared.arrays.len() as u32;
+        self.context.declare(at, id, span, Binding::Array(number))?;
+        self.context.declared.elements += count as usize;
+        let first = RegisterId::new(self.context.declared.registers.len());
+        let mut indices: SmallVec<[u32; 2]> = SmallVec::from_elem(1, shape.len());
+        for _ in 0..count {
+            let texts: Vec<String> = indices.iter().map(u32::to_string).collect();
+            let name = format!("{text}[{}]", texts.join(","));
+            let register = RegisterId::new(self.context.declared.registers.len());
+            self.context.declared.typed.extend(ty.map(|_| register));
+            let ty = ty.unwrap_or(Type::F);
+            self.context.declared.registers.push(VirtualRegister {
+                name,
+                kind,
+                ty,
+                pinned: None,
+                preset: None,
+                span,
+            });
+            for (index, size) in indices.iter_mut().zip(&shape).rev() {
+                *index += 1;
+                if *index <= *size {
+                    break;
+                }
+                *index = 1;
+            }
+        }
+        self.context.declared.arrays.push(Array { name: text, first, sizes: shape, span });
+        Ok(())
+    }
+
     /// What follows the `@` of a declaration: a register's canonical name, or a port's number.
     fn place(&mut self, at: At, register: RegisterId, place: Expr) -> Result<(), Reported> {
         let name = match self.context.asts[at.ast as usize].nodes[place.id.range()] {
@@ -78,7 +187,7 @@ impl Expander<'_> {
             _ => None,
         };
         if let Some(name) = name {
-            let id = self.context.name(at, name.name, name.span)?;
+            let id = self.context.spelled(at, name.name, name.span)?;
             let is_register = self.context.machine.register_address(self.context.scopes.text(id)).is_some();
             let binding = self.context.lookup(at.scope, id);
             // What is neither a register nor a number is taken for a register's name misspelt.
@@ -138,7 +247,7 @@ impl Expander<'_> {
 
     /// The word of a directive that switches something on or off.
     pub(crate) fn is_on(&mut self, at: At, word: Name, directive: &'static str) -> Result<bool, Reported> {
-        let name = self.context.name(at, word.name, word.span)?;
+        let name = self.context.spelled(at, word.name, word.span)?;
         match self.context.scopes.text(name) {
             "on" => Ok(true),
             "off" => Ok(false),
@@ -149,9 +258,73 @@ impl Expander<'_> {
         }
     }
 
+    /// `.fast`: what it allows from here on.
+    pub(crate) fn allowed(&mut self, at: At, words: &[Name]) -> Result<Fast, Reported> {
+        let mut fast = Fast::default();
+        for word in words {
+            let name = self.context.name(at, word.name, word.span)?;
+            match self.context.scopes.text(name) {
+                "reassociate" => fast.reassociate = true,
+                "reciprocal" => fast.reciprocal = true,
+                "off" if words.len() == 1 => {}
+                other => {
+                    let message =
+                        format!("`.fast` is `reassociate`, `reciprocal`, both, or `off`, not `{other}`");
+                    return Err(self.context.error(at.scope, "fast", word.span, message));
+                }
+            }
+        }
+        Ok(fast)
+    }
+
+    fn columns(&mut self, at: At, first: Expr, last: Expr) -> Result<Columns, Reported> {
+        let span = first.span.to(last.span);
+        let (first, last) = (self.context.integer(at, first)?, self.context.integer(at, last)?);
+        match (u32::try_from(first), u32::try_from(last)) {
+            (Ok(first), Ok(last)) if 0 < first && first <= last => Ok(Columns { first, last }),
+            _ => {
+                let message = format!("there are no columns {first} to {last}: they count from 1");
+                Err(self.context.error(at.scope, "range", span, message))
+            }
+        }
+    }
+
+    pub(crate) fn set_loc(&mut self, at: At, places: &[Loc]) -> Result<(), Reported> {
+        let mut locations = Vec::with_capacity(places.len());
+        for place in places {
+            locations.push(match place {
+                Loc::None(name) => {
+                    let text = self.context.reports.sources.text(name.span);
+                    if text != "none" {
+                        let message =
+                            format!("`{text}` is not a place: a file in `\"` and a line, or `none`");
+                        return Err(self.context.error(at.scope, "syntax", name.span, message));
+                    }
+                    None
+                }
+                Loc::At(file, line, columns) => {
+                    let number = self.context.integer(at, *line)?;
+                    let Some(number) = u32::try_from(number).ok().filter(|number| *number > 0) else {
+                        let message = format!("there is no line {number}: lines count from 1");
+                        return Err(self.context.error(at.scope, "range", line.span, message));
+                    };
+                    let columns = match columns {
+                        Some((first, last)) => Some(self.columns(at, *first, *last)?),
+                        None => None,
+                    };
+                    let file = self.flat.file(file);
+                    Some((Location { file, line: number }, columns))
+                }
+            });
+        }
+        self.flat.locs.push(locations);
+        self.loc = self.flat.locs.len() as u32 - 1;
+        Ok(())
+    }
+
     /// `.ports`: whether they are latched.
     pub(crate) fn ports(&mut self, at: At, word: Name) -> Result<(), Reported> {
-        let name = self.context.name(at, word.name, word.span)?;
+        let name = self.context.spelled(at, word.name, word.span)?;
         let latched = match self.context.scopes.text(name) {
             "latched" => true,
             "direct" => false,
@@ -217,7 +390,7 @@ impl Expander<'_> {
 
 /// The address of a register by its canonical name.
 pub(crate) fn address(context: &mut Context, at: At, place: Name) -> Result<Register, Reported> {
-    let id = context.name(at, place.name, place.span)?;
+    let id = context.spelled(at, place.name, place.span)?;
     let text = context.scopes.text(id).to_owned();
     let machine = context.machine;
     machine.register_address(&text).ok_or_else(|| {

@@ -35,6 +35,12 @@ pub(crate) enum Unread {
 }
 
 impl Expander<'_> {
+    /// Whether a tree is that of a file of the library in memory.
+    pub(crate) fn is_in_library(&self, ast: u32) -> bool {
+        let place = self.origins.get(ast as usize).and_then(|origin| origin.place);
+        place.is_some_and(|place| !self.loader.places()[place].takes_quoted())
+    }
+
     /// Reads and parses a file, or finds it among those read.
     pub(crate) fn load(&mut self, id: &FileId) -> Result<(u32, usize), Unread> {
         if let Some(known) = self.files.get(id) {
@@ -113,6 +119,7 @@ impl Expander<'_> {
             if let Some((_, file)) = self.files.get(&id).copied() {
                 // What several files need of the library is there once.
                 if library {
+                    self.note_include(span, file);
                     return Ok(());
                 }
                 if open.contains(&file) {
@@ -130,6 +137,7 @@ impl Expander<'_> {
             }
             match self.load(&id) {
                 Ok((ast, file)) => {
+                    self.note_include(span, file);
                     self.enter_file(ast, file);
                     return Ok(());
                 }
@@ -142,6 +150,13 @@ impl Expander<'_> {
         }
         let error = if library { self.not_in_library(&within, span) } else { self.not_found(&within, span) };
         Err(self.context.report(at.scope, error))
+    }
+
+    /// Notes for the index which file an `.include` means.
+    fn note_include(&mut self, span: Span, file: usize) {
+        if let Some(notes) = &mut self.context.notes {
+            notes.includes.push((span, file));
+        }
     }
 
     /// There is no file for `.include "path"`.

@@ -4,6 +4,7 @@ use crate::limits;
 use std::collections::BTreeMap;
 use std::io::Read as _;
 use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
 
 /// Why a source cannot be had.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
@@ -111,6 +112,17 @@ impl<L: Loader> Search<L> {
         self
     }
 
+    /// With what an editor has open, in the folders so far.
+    #[must_use]
+    pub fn with_open(mut self, open: &Open) -> Search<L> {
+        for place in &mut self.places {
+            if let PlaceKind::Folder(_, folder) = &mut place.0 {
+                folder.open = Arc::clone(open);
+            }
+        }
+        self
+    }
+
     /// A library in memory, each file a name and its text, searched after the places there are for `<name>` only.
     #[must_use]
     pub fn library<'s>(mut self, files: impl IntoIterator<Item = &'s (&'s str, &'s str)>) -> Search<L> {
@@ -185,12 +197,23 @@ impl Loader for First<'_> {
 #[derive(Clone, Debug)]
 pub struct FileLoader {
     root: PathBuf,
+    /// Texts that count in the place of what lies on the disk, by whole path.
+    open: Open,
 }
+
+/// Sources that an editor has open, by the whole path of each: saved or not, they count in the place of what lies on the disk.
+pub type Open = Arc<BTreeMap<PathBuf, Arc<str>>>;
 
 impl FileLoader {
     /// The loader of a folder. Whether there is such a folder shows when it is asked for a file.
     pub fn new(root: impl Into<PathBuf>) -> FileLoader {
-        FileLoader { root: root.into() }
+        FileLoader { root: root.into(), open: Open::default() }
+    }
+
+    /// The same, but for what an editor has open.
+    #[must_use]
+    pub fn with_open(self, open: Open) -> FileLoader {
+        FileLoader { open, ..self }
     }
 
     /// The loader of a file's folder, and the file's path in it.
@@ -234,10 +257,18 @@ impl Loader for FileLoader {
         if !relative.components().all(|part| matches!(part, Component::Normal(_))) {
             return Err(LoadError::Outside);
         }
+        // What is open need not be on the disk.
+        if let Some(text) = self.open.get(&self.root.join(relative)) {
+            return Ok(text.as_bytes().to_vec());
+        }
         let root = self.root.canonicalize().map_err(system)?;
         let whole = root.join(relative).canonicalize().map_err(system)?;
         if !whole.starts_with(&root) {
             return Err(LoadError::Outside);
+        }
+        // The same file by another path.
+        if let Some(text) = self.open.get(&whole) {
+            return Ok(text.as_bytes().to_vec());
         }
         let about = whole.metadata().map_err(system)?;
         if !about.is_file() {

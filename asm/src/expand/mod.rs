@@ -4,6 +4,7 @@
 //! known, bundles and data, is listed for [`resolve`](crate::resolve). The walk has a stack of its own, not the thread's.
 
 mod declare;
+pub(crate) mod equation;
 mod files;
 pub(crate) mod load;
 
@@ -12,6 +13,7 @@ pub(crate) use declare::{address, register_at};
 use crate::context::{
     Argument, At, Binding, Context, MacroDefinition, NamedConstant, Reported, ScopeId, ScopeKind, space_of,
 };
+use crate::expand::equation::{Piece, Step};
 use crate::expand::files::FileId;
 use crate::expand::load::{Loader, include_path};
 use crate::ir::{Label, LabelId};
@@ -20,21 +22,38 @@ use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
 use crate::syntax::name::NameId;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 use takt_isa::Type;
+use takt_isa::program::{Columns, Location};
 
-/// A bundle of the source where it is expanded.
+/// A bundle or an equation of the source where it is expanded.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Item {
     pub(crate) at: At,
     pub(crate) statement: u32,
+    /// Of an equation that uses macros, the part that is meant: an index into [`Flat::pieces`].
+    pub(crate) piece: Option<u32>,
     /// The `.loc` in force: an index into [`Flat::locs`].
     pub(crate) loc: u32,
     /// Whether `.schedule on` is in force.
     pub(crate) scheduled: bool,
-    /// Whether `.contract on` is in force.
-    pub(crate) contracted: bool,
+    /// Whether `.contract on` is in force; none if the file, of the library, excludes it for what it defines.
+    pub(crate) contracted: Option<bool>,
+    /// What `.fast` allows.
+    pub(crate) fast: Fast,
+}
+
+/// A line, and the part of it that is meant, if it is not all.
+pub(crate) type SourcePlace = (Location, Option<Columns>);
+
+/// What `.fast` allows of equations beyond what is written.
+#[derive(Clone, Copy, Default, Debug)]
+pub(crate) struct Fast {
+    /// The order of a sum and of a product may change.
+    pub(crate) reassociate: bool,
+    /// A division by a constant may be a multiplication by its inverse.
+    pub(crate) reciprocal: bool,
 }
 
 /// Words of data memory.
@@ -80,6 +99,7 @@ pub(crate) struct Timing {
 pub(crate) struct Flat {
     pub(crate) once: Vec<Item>,
     pub(crate) period: Vec<Item>,
+    pub(crate) pieces: Vec<Piece>,
     pub(crate) data: Vec<Data>,
     pub(crate) presets: Vec<Preset>,
     pub(crate) loop_bounds: Vec<LoopBound>,
@@ -87,7 +107,7 @@ pub(crate) struct Flat {
     /// What `.ports` says, `latched` or not, and where.
     pub(crate) ports: Option<(bool, Span)>,
     /// What each `.loc` says; the first is none at all.
-    pub(crate) locs: Vec<Vec<Option<(u32, u32)>>>,
+    pub(crate) locs: Vec<Vec<Option<SourcePlace>>>,
     /// Files that `.loc` names, in order, then those whose own lines are code.
     pub(crate) files: Vec<String>,
     file_numbers: HashMap<String, u32>,
@@ -115,6 +135,8 @@ pub(crate) struct Frame {
 }
 
 pub(crate) enum FrameKind {
+    /// An equation that uses macros; its statement.
+    Equation(Rc<[Step]>, u32),
     /// A file, its path, and the `.loc` that was in force where it is included.
     File(usize, u32),
     Macro,
@@ -135,7 +157,7 @@ pub(crate) struct Expander<'l> {
     pub(crate) flat: Flat,
     pub(crate) frames: Vec<Frame>,
     pub(crate) section: Section,
-    loc: u32,
+    pub(crate) loc: u32,
     pub(crate) data_words: usize,
     statements: usize,
     /// Files read: the tree and the index in the sources.
@@ -148,6 +170,9 @@ pub(crate) struct Expander<'l> {
     scheduled: bool,
     /// Whether products of what follows are fused into sums.
     contracted: bool,
+    /// Files of the library of whose operations none is fused.
+    uncontracted: HashSet<u32>,
+    fast: Fast,
     pub(crate) include_depth: usize,
     pub(crate) includes: usize,
     macro_depth: usize,
@@ -160,6 +185,7 @@ impl<'l> Expander<'l> {
         let flat = Flat {
             once: Vec::new(),
             period: Vec::new(),
+            pieces: Vec::new(),
             data: Vec::new(),
             presets: Vec::new(),
             loop_bounds: Vec::new(),
@@ -178,6 +204,8 @@ impl<'l> Expander<'l> {
             loc: 0,
             scheduled: false,
             contracted: false,
+            uncontracted: HashSet::new(),
+            fast: Fast::default(),
             data_words: 0,
             statements: 0,
             files: HashMap::new(),
@@ -211,7 +239,13 @@ impl<'l> Expander<'l> {
             if frame.next < frame.end {
                 let (at, index) = (frame.at, frame.next);
                 frame.next += 1;
-                self.statement(at, index);
+                match &frame.kind {
+                    FrameKind::Equation(steps, statement) => {
+                        let (steps, statement) = (Rc::clone(steps), *statement);
+                        self.step(at, statement, &steps[index as usize]);
+                    }
+                    _ => self.statement(at, index),
+                }
             } else {
                 self.leave();
             }
@@ -259,7 +293,7 @@ impl<'l> Expander<'l> {
 
     /// Counts a statement.
     #[inline]
-    fn count(&mut self, scope: ScopeId, span: Span) {
+    pub(crate) fn count(&mut self, scope: ScopeId, span: Span) {
         self.statements += 1;
         if self.statements > limits::STATEMENTS {
             self.limit(
@@ -283,7 +317,7 @@ impl<'l> Expander<'l> {
             let span = self.frames.iter().find_map(|frame| match frame.kind {
                 FrameKind::Rep { site, .. } => Some(site),
                 FrameKind::Macro => Some(self.context.scopes.scope(frame.at.scope).site),
-                FrameKind::File(..) => None,
+                FrameKind::File(..) | FrameKind::Equation(..) => None,
             });
             let message = format!("the program expands to more than {} statements", limits::STATEMENTS);
             self.limit(ScopeId::ROOT, span.unwrap_or_default(), message);
@@ -295,6 +329,7 @@ impl<'l> Expander<'l> {
         match kind {
             StatementKind::Empty => {}
             StatementKind::Bundle(first, count) => self.bundle(at, index, first, count),
+            StatementKind::Equation(equation) => self.equation(at, index, equation),
             StatementKind::Directive(directive) => {
                 let ast = Rc::clone(&self.context.asts[at.ast as usize]);
                 // What goes wrong is in the report; the walk goes on.
@@ -358,7 +393,7 @@ impl<'l> Expander<'l> {
         let ast = &self.context.asts[at.ast as usize];
         let operation = ast.operations[first as usize];
         if count == 1 {
-            let Ok(name) = self.context.name(at, operation.mnemonic.name, operation.mnemonic.span) else {
+            let Ok(name) = self.context.spelled(at, operation.mnemonic.name, operation.mnemonic.span) else {
                 return;
             };
             // A macro cannot have an instruction's name.
@@ -367,62 +402,78 @@ impl<'l> Expander<'l> {
                 return;
             }
         }
+        self.push(at, index, None, operation.span);
+    }
+
+    /// Adds a bundle, an equation or a piece of one to the section.
+    pub(crate) fn push(&mut self, at: At, statement: u32, piece: Option<u32>, span: Span) {
+        let contracted = (!self.uncontracted.contains(&at.ast)).then_some(self.contracted);
         let items = match self.section {
             Section::Once => &mut self.flat.once,
             Section::Period => &mut self.flat.period,
             Section::Data => {
-                let error = Diagnostic::error("section", operation.span, "an instruction in `.data`")
-                    .help("open `.once` or `.period` before it");
+                let what = match self.context.asts[at.ast as usize].statements[statement as usize].kind {
+                    StatementKind::Equation(_) => "an equation in `.data`",
+                    _ => "an instruction in `.data`",
+                };
+                let error =
+                    Diagnostic::error("section", span, what).help("open `.once` or `.period` before it");
                 self.context.report(at.scope, error);
                 return;
             }
         };
-        let (loc, scheduled, contracted) = (self.loc, self.scheduled, self.contracted);
-        items.push(Item { at, statement: index, loc, scheduled, contracted });
+        let (loc, scheduled, fast) = (self.loc, self.scheduled, self.fast);
+        items.push(Item { at, statement, piece, loc, scheduled, contracted, fast });
         if self.flat.once.len() + self.flat.period.len() > limits::OPERATIONS {
             let message = format!("the program expands to more than {} bundles", limits::OPERATIONS);
-            self.limit(at.scope, operation.span, message);
+            self.limit(at.scope, span, message);
         }
     }
 
     fn call(&mut self, at: At, name: NameId, operation: Operation) {
+        let first = operation.first as usize;
+        let operands = &self.context.asts[at.ast as usize].operands[first..first + operation.count as usize];
+        let given = operands.to_vec();
+        let Some(definition) = self.context.scopes.macros.get(&name) else { return };
+        let (parameters, defined) = definition.parameters(&self.context.asts);
+        if parameters != given.len() {
+            let plural = if parameters == 1 { "" } else { "s" };
+            let message = format!(
+                "macro `{}` takes {parameters} argument{plural}, not {}",
+                self.context.scopes.text(name),
+                operation.count
+            );
+            let error = Diagnostic::error("arguments", operation.span, message).also(defined, "defined here");
+            self.context.report(at.scope, error);
+            return;
+        }
+        if let Some(notes) = &mut self.context.notes {
+            notes.macro_use(operation.mnemonic.span, name);
+        }
+        self.enter_macro(at, name, operation.span, &given);
+    }
+
+    /// Goes on with a macro's body. There are as many operands as the macro has parameters.
+    pub(crate) fn enter_macro(&mut self, at: At, name: NameId, span: Span, given: &[Operand]) {
         let Some(definition) = self.context.scopes.macros.get_mut(&name) else { return };
         definition.uses += 1;
         let MacroDefinition { ast, directive, start, uses } = *definition;
         let body = Rc::clone(&self.context.asts[ast as usize]);
-        let DirectiveKind::Macro { parameters, end, name: defined, .. } =
-            &body.directives[directive as usize].kind
-        else {
+        let DirectiveKind::Macro { parameters, end, .. } = &body.directives[directive as usize].kind else {
             return;
         };
-        if parameters.len() != operation.count as usize {
-            let plural = if parameters.len() == 1 { "" } else { "s" };
-            let message = format!(
-                "macro `{}` takes {} argument{plural}, not {}",
-                self.context.scopes.text(name),
-                parameters.len(),
-                operation.count
-            );
-            let error =
-                Diagnostic::error("arguments", operation.span, message).also(defined.span, "defined here");
-            self.context.report(at.scope, error);
-            return;
-        }
         if self.macro_depth >= limits::MACRO_DEPTH {
             let message =
                 format!("macros are used within one another more than {} deep", limits::MACRO_DEPTH);
-            let error = Diagnostic::error("limit", operation.span, message)
+            let error = Diagnostic::error("limit", span, message)
                 .help("does the macro use itself without an `.if` that ends it?");
             self.context.report(at.scope, error);
             self.stop = true;
             return;
         }
-        let scope =
-            self.context.scopes.open(ScopeId::ROOT, at.scope, ScopeKind::Macro(name, uses), operation.span);
-        let first = operation.first as usize;
-        for (parameter, index) in parameters.iter().zip(first..) {
-            let mut operand = self.context.asts[at.ast as usize].operands[index];
-            let mut outer = at;
+        let scope = self.context.scopes.open(ScopeId::ROOT, at.scope, ScopeKind::Macro(name, uses), span);
+        for (parameter, operand) in parameters.iter().zip(given) {
+            let (mut operand, mut outer) = (*operand, at);
             // A parameter that is passed on as it is stands for its own argument.
             if let OperandKind::Name(passed) = operand.kind
                 && let Ok(passed) = passed.resolve()
@@ -446,6 +497,12 @@ impl<'l> Expander<'l> {
         match kind {
             DirectiveKind::Declare(what, names) => {
                 for declaration in names {
+                    let (first, count) = declaration.sizes;
+                    if count > 0 {
+                        let sizes = &ast.sizes[first as usize..(first + count) as usize];
+                        let _ = self.declare_array(at, *what, declaration, sizes);
+                        continue;
+                    }
                     // Each name is a declaration of its own: a mistake in one leaves the others.
                     let _ = self.declare(at, *what, declaration);
                 }
@@ -490,7 +547,7 @@ impl<'l> Expander<'l> {
             }
             DirectiveKind::Rep { variable, first, last, end } => {
                 self.jump(*end + 1);
-                let variable = self.context.name(at, variable.name, variable.span)?;
+                let variable = self.context.spelled(at, variable.name, variable.span)?;
                 let from = self.context.integer(at, *first)?;
                 let to = self.context.integer(at, *last)?;
                 if to.saturating_sub(from) >= limits::REPETITIONS {
@@ -529,7 +586,14 @@ impl<'l> Expander<'l> {
             DirectiveKind::Include(path, library) => self.include(at, path, *library, span)?,
             DirectiveKind::Loc(places) => self.set_loc(at, places)?,
             DirectiveKind::Schedule(word) => self.scheduled = self.is_on(at, *word, "schedule")?,
-            DirectiveKind::Contract(word) => self.contracted = self.is_on(at, *word, "contract")?,
+            DirectiveKind::Contract(word) => match self.is_on(at, *word, "contract")? {
+                // A file of the library speaks for itself, wherever its macros are used.
+                false if self.is_in_library(at.ast) => {
+                    self.uncontracted.insert(at.ast);
+                }
+                on => self.contracted = on,
+            },
+            DirectiveKind::Fast(words) => self.fast = self.allowed(at, words)?,
             DirectiveKind::Ports(word) => self.ports(at, *word)?,
             DirectiveKind::LoopBound(most) => self.loop_bound(at, *most, span)?,
             DirectiveKind::Deadline(..) | DirectiveKind::Order(_) | DirectiveKind::Late(..) => {
@@ -578,7 +642,7 @@ impl<'l> Expander<'l> {
         if at.scope != ScopeId::ROOT {
             return Err(Reported);
         }
-        let id = self.context.name(at, name.name, name.span)?;
+        let id = self.context.spelled(at, name.name, name.span)?;
         let text = self.context.scopes.text(id).to_owned();
         if id.op().is_some() {
             let error = Diagnostic::error("declared-twice", name.span, format!("`{text}` is an instruction"))
@@ -607,35 +671,6 @@ impl<'l> Expander<'l> {
             }
         }
         self.context.scopes.macros.insert(id, MacroDefinition { ast: at.ast, directive, start, uses: 0 });
-        Ok(())
-    }
-
-    fn set_loc(&mut self, at: At, places: &[Loc]) -> Result<(), Reported> {
-        let mut locations = Vec::with_capacity(places.len());
-        for place in places {
-            locations.push(match place {
-                Loc::None(name) => {
-                    let text = self.context.reports.sources.text(name.span);
-                    if text != "none" {
-                        let message =
-                            format!("`{text}` is not a place: a file in `\"` and a line, or `none`");
-                        return Err(self.context.error(at.scope, "syntax", name.span, message));
-                    }
-                    None
-                }
-                Loc::At(file, line) => {
-                    let number = self.context.integer(at, *line)?;
-                    let Some(number) = u32::try_from(number).ok().filter(|number| *number > 0) else {
-                        let message = format!("there is no line {number}: lines count from 1");
-                        return Err(self.context.error(at.scope, "range", line.span, message));
-                    };
-                    let file = self.flat.file(file);
-                    Some((file, number))
-                }
-            });
-        }
-        self.flat.locs.push(locations);
-        self.loc = self.flat.locs.len() as u32 - 1;
         Ok(())
     }
 }

@@ -45,6 +45,7 @@ pub(crate) fn insert(ir: &mut Ir, homes: &mut Homes, copies: &[Copy]) {
             let from = ir.bundles[copy.at.0].operations[copy.at.1];
             let operation = Operation {
                 op: copier,
+                slots: homes::able(ir, copy.to, copier),
                 slot: Some(home.slot),
                 dest: Some(copy.to),
                 sources: [copy.from, RegisterId::ZERO, RegisterId::ZERO],

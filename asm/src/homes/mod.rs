@@ -7,6 +7,7 @@
 //! slot, and anything else is copied by an operation that copies bits ([`copies`](crate::homes::copies)).
 
 pub(crate) mod copies;
+pub(crate) mod slots;
 pub(crate) mod values;
 
 use crate::ir::flow::{self, Flow};
@@ -17,7 +18,7 @@ use crate::report::source::Span;
 use std::collections::HashSet;
 use takt_isa::fp::Host;
 use takt_isa::program::Location;
-use takt_isa::{BundleAddress, Effect, Machine, Op, ROWS, Register, Row, SlotIndex, Type, compute};
+use takt_isa::{BundleAddress, Effect, Machine, Op, ROWS, Register, Row, SlotIndex, Slots, Type, compute};
 
 /// What the assembler did about a register that operations of several slots write.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -202,7 +203,7 @@ fn coming_home(ir: &Ir, runs: &[Run], flow: &Flow, id: RegisterId, live: &[bool]
             for (number, operation) in operations.iter().enumerate() {
                 let (Some(slot), true) = (operation.slot, operation.dest == Some(id)) else { continue };
                 let constant = constant(ir, operation);
-                let initial = constant.is_some() && !used && !reads && !output && at < flow.once;
+                let initial = !used && !reads && is_initial(ir, flow, at, operation);
                 let copied = !fixed && branch_that_reads(ir, at).is_none();
                 writes.push(Write { bundle: at, number, slot, live: *live, constant, initial, copied });
             }
@@ -214,6 +215,12 @@ fn coming_home(ir: &Ir, runs: &[Run], flow: &Flow, id: RegisterId, live: &[bool]
         }
     }
     writes
+}
+
+/// Whether the value that an operation writes can be in its register from the start, if nothing uses that before.
+pub(crate) fn is_initial(ir: &Ir, flow: &Flow, at: usize, operation: &Operation) -> bool {
+    let output = operation.dest.is_some_and(|dest| ir.register(dest).kind == RegisterKind::Output);
+    !output && at < flow.once && constant(ir, operation).is_some()
 }
 
 /// A redirection that reads what its own bundle writes: it cannot be issued after the rest.
@@ -268,7 +275,8 @@ fn bring(ir: &mut Ir, id: RegisterId, slot: SlotIndex, write: &Write) -> Option<
         Made::Preset(bits)
     } else if is_free(ir, write, slot) {
         let (op, sources) = giving(ir.machine, slot, bits)?;
-        let mut new = Operation { op, slot: Some(slot), dest: Some(id), made: true, ..old.idle() };
+        let slots = able(ir, id, op);
+        let mut new = Operation { op, slots, slot: Some(slot), dest: Some(id), made: true, ..old.idle() };
         (new.location, new.expansion) = (old.location, old.expansion);
         match op.row().effect {
             Effect::Immediate => new.constant = Constant::Value(bits),
@@ -310,12 +318,16 @@ fn copier(machine: &Machine, slot: SlotIndex) -> Option<Op> {
         .map(|(_, row)| row.op)
 }
 
+/// The slots that may execute an operation made to write a register.
+pub(crate) fn able(ir: &Ir, id: RegisterId, op: Op) -> Slots {
+    let hosts = ir.machine.hosts(op.row().function);
+    ir.register(id).pinned.map_or(hosts, |place| hosts.and(ir.machine.writers(place)))
+}
+
 /// The instructions that a slot executes, with their latencies.
 fn rows(machine: &Machine, slot: SlotIndex) -> impl Iterator<Item = (u32, &'static Row)> + '_ {
-    ROWS.iter().filter_map(move |row| {
-        let (host, unit) = machine.host(row.function)?;
-        (host == slot).then(|| (machine.slot(host).units[unit].latency, row))
-    })
+    let host = machine.slot(slot);
+    ROWS.iter().filter_map(move |row| Some((host.units[host.unit_for(row.function)?].latency, row)))
 }
 
 /// The bits that an operation writes, if they are known and it raises no flag.

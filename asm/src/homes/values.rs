@@ -7,7 +7,7 @@
 
 use crate::homes::Homes;
 use crate::ir::runs;
-use crate::ir::{Ir, RegisterId, RegisterKind, Version, VirtualRegister};
+use crate::ir::{Ir, RegisterId, RegisterKind, Version, VirtualRegister, numbered};
 
 /// Registers that operations of different slots write, by index.
 pub(crate) fn contested(ir: &Ir) -> Vec<bool> {
@@ -92,7 +92,7 @@ pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
                 }
                 name.made += 1;
                 let fresh = VirtualRegister {
-                    name: format!("{}.{}", original.name, name.made),
+                    name: numbered(&original.name, &format!(".{}", name.made)),
                     kind: RegisterKind::Plain,
                     pinned: None,
                     preset: None,

@@ -6,7 +6,8 @@
 //! * a bundle has at least one operation and no two that claim one slot; on a machine with one slot it has exactly one;
 //! * all operations of a bundle read before any writes; bundles execute in the order of [`Ir::bundles`], and
 //!   [`Operation::redirects`] says where that order ends;
-//! * every register that is written is written from one slot only;
+//! * every register that is written is written from one slot only; which slot executes an operation that several may
+//!   ([`Operation::slots`]) is chosen first by [`choose`](crate::homes::slots::choose), and again by the scheduler;
 //! * bundles of `once` precede those of `period`; a label stands before the bundle at its position, or at the end.
 //!
 //! Whoever moves bundles must move [`Label::position`]s, [`LoopBound::position`]s and [`Ir::period`] along, and leave alone, as fences, bundles that
@@ -14,14 +15,15 @@
 
 pub(crate) mod flow;
 pub(crate) mod given;
+pub(crate) mod matching;
 pub(crate) mod runs;
 
 use crate::report::source::Span;
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
-use takt_isa::program::{Location, Space};
-use takt_isa::{Machine, Op, Operand, Register, Row, SlotIndex, Type};
+use takt_isa::program::{Columns, Location, Space};
+use takt_isa::{Machine, Op, Operand, Register, Row, SlotIndex, Slots, Type};
 
 /// A register of [`Ir::registers`].
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
@@ -85,6 +87,12 @@ pub struct VirtualRegister {
     pub span: Span,
 }
 
+/// A name with something behind it, and that before the indices if it is an element's: `t.1`, `P.1[2,3]`.
+pub(crate) fn numbered(name: &str, number: &str) -> String {
+    let (head, indices) = name.split_at(name.find('[').unwrap_or(name.len()));
+    format!("{head}{number}{indices}")
+}
+
 /// What an operation carries beyond registers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Constant {
@@ -103,7 +111,9 @@ pub enum Constant {
 pub struct Operation {
     /// The instruction; `nop` where the word is given bit by bit.
     pub op: Op,
-    /// The slot that executes it; `None` if any can, as a `nop`.
+    /// The slots that may execute it: those that host its function, as far as the source leaves a choice. None if any can, as a `nop`.
+    pub slots: Slots,
+    /// The one of them that executes it, so far as it is known; `None` if any can.
     pub slot: Option<SlotIndex>,
     /// The register that it writes.
     pub dest: Option<RegisterId>,
@@ -113,6 +123,8 @@ pub struct Operation {
     pub constant: Constant,
     /// The source line that it is attributed to.
     pub location: Option<Location>,
+    /// The part of that line, where the source says it (`.loc`).
+    pub columns: Option<Columns>,
     /// Its place in the source.
     pub span: Span,
     /// Which use of a macro, or turn of a repetition, made it; 0 if it stands in the source as it is.
@@ -121,11 +133,20 @@ pub struct Operation {
     pub made: bool,
     /// Its place in the order of the source: the index of its bundle before any was moved.
     pub order: u32,
-    /// Where it is written: the tree, and the operation of the tree. For messages that point at an operand.
+    /// Where it is written: the tree, and the operation of the tree; [`Operation::COMPUTED`] if it is a part of an equation.
+    /// For messages that point at an operand.
     pub(crate) written: (u32, u32),
 }
 
 impl Operation {
+    /// In [`Operation::written`] the operation that no tree has: one that computes a part of an equation, where its span is.
+    pub(crate) const COMPUTED: u32 = u32::MAX;
+
+    /// Whether it computes a part of an equation.
+    pub(crate) fn is_computed(&self) -> bool {
+        self.written.1 == Operation::COMPUTED
+    }
+
     /// The instruction's row.
     #[inline]
     pub fn row(&self) -> &'static Row {
@@ -157,11 +178,13 @@ impl Operation {
     pub(crate) fn idle(&self) -> Operation {
         Operation {
             op: Op::nop,
+            slots: Slots::default(),
             slot: None,
             dest: None,
             sources: [RegisterId::ZERO; 3],
             constant: Constant::None,
             location: None,
+            columns: None,
             expansion: 0,
             ..*self
         }
@@ -276,8 +299,8 @@ pub struct Ir {
     pub data: Vec<u32>,
     /// Words given bit by bit.
     pub raw: Vec<u64>,
-    /// By bundle, as the source has them: whether `.contract on` is in force there.
-    pub contracted: Vec<bool>,
+    /// By bundle, as the source has them: whether `.contract on` is in force there; none where it has no effect.
+    pub contracted: Vec<Option<bool>>,
     /// Source files that [`Operation::location`] names.
     pub files: Vec<String>,
     /// Values with registers of their own, by [`Version::after`] for each name.

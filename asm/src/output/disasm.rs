@@ -5,7 +5,7 @@
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
-use takt_isa::program::{Location, Port, Space};
+use takt_isa::program::{Columns, Location, Port, Space};
 use takt_isa::spec::instructions::Function;
 use takt_isa::{BundleAddress, Effect, Instruction, Op, Program, Register, SlotIndex, Type};
 
@@ -25,10 +25,13 @@ pub fn disassemble(program: &Program) -> String {
 #[derive(Clone, PartialEq, Eq)]
 enum Loc {
     /// All from one place.
-    One(Option<Location>),
+    One(Option<Place>),
     /// Each from its own.
-    Each(Vec<Option<Location>>),
+    Each(Vec<Option<Place>>),
 }
+
+/// A line, and what part of it.
+type Place = (Location, Option<Columns>);
 
 struct Writer<'p> {
     program: &'p Program,
@@ -109,7 +112,9 @@ impl<'p> Writer<'p> {
                 self.line(format_args!("        .loop_bound {}", bound.most));
             }
             let words = address.index() * slots..(address.index() + 1) * slots;
-            let (text, places) = self.bundle(&program.code[words.clone()], &program.lines[words]);
+            let lines: Vec<Option<Place>> =
+                words.clone().map(|word| Some((program.lines[word]?, program.part(word)))).collect();
+            let (text, places) = self.bundle(&program.code[words], &lines);
             let wanted = match places.as_slice() {
                 [first, rest @ ..] if rest.iter().all(|place| place == first) => Loc::One(*first),
                 _ => Loc::Each(places),
@@ -127,12 +132,11 @@ impl<'p> Writer<'p> {
     }
 
     fn loc(&self, loc: &Loc) -> String {
-        let place = |place: &Option<Location>| match place {
-            Some(Location { file, line }) => {
-                format!(
-                    "{} {line}",
-                    quoted(self.program.files.get(*file as usize).map_or("", String::as_str))
-                )
+        let place = |place: &Option<Place>| match place {
+            Some((Location { file, line }, columns)) => {
+                let file = quoted(self.program.files.get(*file as usize).map_or("", String::as_str));
+                let columns = columns.map_or(String::new(), |part| format!("[{},{}]", part.first, part.last));
+                format!("{file} {line}{columns}")
             }
             None => "none".to_owned(),
         };
@@ -143,7 +147,7 @@ impl<'p> Writer<'p> {
     }
 
     /// A bundle's text, and where its operations come from.
-    fn bundle(&self, words: &[u64], lines: &[Option<Location>]) -> (String, Vec<Option<Location>>) {
+    fn bundle(&self, words: &[u64], lines: &[Option<Place>]) -> (String, Vec<Option<Place>>) {
         let slots = || self.program.machine.numbered_slots().map(|(slot, _)| slot);
         let word = |slot: SlotIndex| words[slot.index()];
         let is_filler = |slot: &SlotIndex| word(*slot) == self.filler && lines[slot.index()].is_none();
@@ -181,7 +185,7 @@ impl<'p> Writer<'p> {
         let instruction = Instruction::decode(word).ok()?;
         instruction.place(machine, slot).ok()?;
         let function = instruction.op.row().function;
-        if function == Function::Idle || machine.host(function)?.0 != slot {
+        if function == Function::Idle {
             return None;
         }
         let is_access = matches!(instruction.effect(), Effect::Load | Effect::Store);
@@ -198,7 +202,13 @@ impl<'p> Writer<'p> {
             Some(name) => (*name).to_owned(),
             None => address.to_string(),
         };
-        Some(instruction.text_with(machine, slot, register, target))
+        let text = instruction.text_with(machine, slot, register, target);
+        if machine.hosts(function).len() < 2 {
+            return Some(text);
+        }
+        // Its slot is one of several.
+        let (mnemonic, operands) = text.split_at(instruction.op.row().mnemonic.len());
+        Some(format!("{mnemonic}.{}{operands}", machine.slot(slot).name))
     }
 
     fn data(&mut self) {

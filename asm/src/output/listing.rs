@@ -5,11 +5,13 @@ use crate::report::source::Lines;
 use crate::syntax::expr::Value;
 use serde::Serialize;
 use std::fmt::Write as _;
-use takt_isa::program::{Location, Port, Space};
+use takt_isa::program::{Columns, Location, Port, Space};
 use takt_isa::{BundleAddress, Instruction, Program, SlotIndex, Type};
 
 /// The listing of an assembled program: for each bundle its address, its words in the order of the slots, and the source
-/// lines that they come from. An operation that a macro, a repetition or the assembler made is shown as what it became, behind a `+`.
+/// lines that they come from. An operation that a macro, a repetition or the assembler made is shown as what it became, behind a `+`;
+/// so is one that computes a part of an equation, with that part. Before a line stand the slots of those of its operations that
+/// another slot could have taken.
 pub fn listing(assembled: &Assembled) -> String {
     let mut lister = Lister::new(assembled);
     lister.code();
@@ -100,7 +102,7 @@ impl<'a> Lister<'a> {
     /// The source lines of a bundle, whose words begin at `first`: place and text.
     fn rows(&self, first: usize) -> Vec<(String, String)> {
         let program = self.program;
-        let mut rows: Vec<(String, String)> = Vec::new();
+        let mut rows: Vec<(String, String, Vec<&str>)> = Vec::new();
         let slots = program.machine.slots.len();
         for (slot, _) in program.machine.numbered_slots() {
             let index = first + slot.index();
@@ -110,6 +112,16 @@ impl<'a> Lister<'a> {
                 Some(location) => {
                     let expanded = self.assembled.expanded.binary_search(&(index as u32)).is_ok();
                     let place = program.place_text(location);
+                    if let Some(Columns { first, last }) = program.part(index) {
+                        let part = self.columns(location, first, last);
+                        let operation = self.operation(index, slot);
+                        rows.push((
+                            place + "+",
+                            format!("{operation:<31} ; {part}"),
+                            self.chosen(index, slot).into_iter().collect(),
+                        ));
+                        continue;
+                    }
                     match self.source(location) {
                         // Of a bundle that issues one after another each operation is shown by itself.
                         Some(text) if !(expanded || slots == 1 && text.contains("||")) => (place, text),
@@ -118,11 +130,33 @@ impl<'a> Lister<'a> {
                 }
             };
             // A line with several operations is shown once.
-            if !rows.contains(&row) {
-                rows.push(row);
-            }
+            let at = rows.iter().position(|(place, text, _)| (place, text) == (&row.0, &row.1));
+            let at = at.unwrap_or_else(|| {
+                rows.push((row.0, row.1, Vec::new()));
+                rows.len() - 1
+            });
+            rows[at].2.extend(self.chosen(index, slot));
         }
-        rows
+        let shown = |(place, text, slots): (String, String, Vec<&str>)| match slots.is_empty() {
+            true => (place, text),
+            false => (place, format!("{:<8}{text}", slots.join(" "))),
+        };
+        rows.into_iter().map(shown).collect()
+    }
+
+    /// The slot of an operation, if another could have taken it.
+    fn chosen(&self, index: usize, slot: SlotIndex) -> Option<&'a str> {
+        let machine = self.program.machine;
+        let function = Instruction::decode(self.program.code[index]).ok()?.op.row().function;
+        (machine.hosts(function).len() > 1).then(|| machine.slot(slot).name)
+    }
+
+    /// A part of a source line.
+    fn columns(&self, location: Location, first: u32, last: u32) -> String {
+        let line = self.files.get(location.file as usize).and_then(Option::as_ref);
+        let line = line.and_then(|(text, lines)| lines.text(text, location.line)).unwrap_or("");
+        let part = line.chars().skip(first as usize - 1).take((last - first + 1).min(160) as usize);
+        part.map(|c| if c == '\t' { ' ' } else { c }).collect()
     }
 
     fn source(&self, location: Location) -> Option<String> {

@@ -9,8 +9,10 @@ use crate::context::{Context, ScopeId};
 use crate::emit::Emitted;
 use crate::emit::place::Placement;
 use crate::ir::{Ir, RegisterId};
+use crate::report::source::{Lines, Sources, Span};
 use crate::syntax::expr::Value;
 use std::collections::{BTreeMap, HashMap, HashSet};
+use takt_isa::program::Columns;
 use takt_isa::{BundleAddress, Register, Type};
 
 /// What a debugger knows of a program beyond what the machine loads: an image carries it, unless it is stripped.
@@ -79,6 +81,28 @@ pub struct NamedValue {
     /// The first bundle that writes it and the last one that uses it, if it lives only there: its register may have other
     /// values elsewhere.
     pub bundles: Option<(BundleAddress, BundleAddress)>,
+}
+
+/// The columns of what words compute of their lines: of those that the program attributes to the lines where they stand.
+pub(crate) fn parts(sources: &Sources, emitted: &Emitted) -> Vec<(u32, Columns)> {
+    let mut lines: HashMap<usize, Lines> = HashMap::new();
+    let part = |&(word, span): &(u32, Span)| {
+        let number = sources.file_of(span.start);
+        let file = sources.files().get(number)?;
+        let lines = lines.entry(number).or_insert_with(|| Lines::of(&file.text));
+        let (start, end) = ((span.start - file.base) as usize, (span.end - file.base) as usize);
+        let index = lines.index(start as u32);
+        let location = emitted.program.lines.get(word as usize).copied().flatten()?;
+        let is_there = location.line as usize == index + 1
+            && emitted.program.files.get(location.file as usize).is_some_and(|name| **name == *file.name);
+        let before = file.text.get(lines.range(index)?.start..start)?.chars().count() as u32;
+        let within = file.text.get(start..end)?.chars().count() as u32;
+        (is_there && within > 0).then_some((word, Columns { first: before + 1, last: before + within }))
+    };
+    let mut parts: Vec<(u32, Columns)> = emitted.program.parts.clone();
+    parts.extend(emitted.parts.iter().filter_map(part));
+    parts.sort_unstable_by_key(|(word, _)| *word);
+    parts
 }
 
 /// What the names of a program stand for.

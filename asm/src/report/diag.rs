@@ -120,7 +120,7 @@ impl Diagnostic {
 }
 
 /// Where diagnostics gather during assembly: bounded, and each mistake of the source once however often it is expanded.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Sink {
     kept: Vec<Diagnostic>,
     seen: HashSet<(&'static str, Span)>,

@@ -117,12 +117,12 @@ impl Resolver<'_> {
                 let inner = self.context.asts[at.ast as usize].casts[cast as usize].operand;
                 self.origin(at, inner.kind, nodes)
             }
-            OperandKind::Place(_) => Origin::Other,
+            OperandKind::Place(_) | OperandKind::Element(_) => Origin::Other,
         }
     }
 
     fn origin_of_name(&mut self, at: At, name: NameRef, nodes: &mut u32) -> Origin {
-        let Ok(name) = self.context.name(at, name, Span::default()) else { return Origin::Other };
+        let Ok(name) = self.context.spelled(at, name, Span::default()) else { return Origin::Other };
         match self.context.lookup(at.scope, name) {
             Binding::Data(label) => Origin::Label(label),
             Binding::Argument(argument) => {
@@ -165,6 +165,12 @@ impl Resolver<'_> {
                     let all = stack.drain(first..).all(|origin| origin == Origin::Number);
                     if all { Origin::Number } else { Origin::Other }
                 }
+                NodeKind::Choice => {
+                    let first = stack.len().saturating_sub(3);
+                    let all = stack.drain(first..).all(|origin| origin == Origin::Number);
+                    if all { Origin::Number } else { Origin::Other }
+                }
+                NodeKind::Element(_) => Origin::Other,
             };
             stack.push(origin);
         }

@@ -1,23 +1,32 @@
 //! Names to registers, labels and numbers: the expanded source as [`Ir`].
 
 mod address;
+pub(crate) mod equation;
+mod expression;
+mod fast;
+pub(crate) mod forms;
+mod mismatch;
 mod operand;
 pub(crate) mod serialise;
+mod sharing;
+mod slots;
 
-use crate::context::{At, Context, Reported};
+use crate::context::{At, Context, Reported, ScopeId};
 use crate::expand::load::Loader;
-use crate::expand::{self, Data, Flat, Item, Timing};
+use crate::expand::{self, Data, Flat, Item, SourcePlace, Timing};
+use crate::ir::given::Kind;
 use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
 use crate::report::diag::Diagnostic;
-use crate::report::nearest;
 use crate::report::source::Span;
+use crate::resolve::forms::Forms;
+use crate::resolve::sharing::Sharing;
 use crate::syntax::ast::*;
 use smallvec::SmallVec;
 use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 use takt_isa::program::Location;
 use takt_isa::spec::instructions::Function;
-use takt_isa::{Op, ROWS, SlotIndex, Type};
+use takt_isa::{Op, ROWS, Slots, Type};
 
 /// The most cycles that a demand on ports can name: many times what a program memory holds.
 const MAX_CYCLES: u32 = 1 << 24;
@@ -29,7 +38,9 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         .iter()
         .map(|row| match row.function {
             Function::Idle => Host::Any,
-            function => machine.host(function).map_or(Host::None, |(slot, _)| Host::Slot(slot)),
+            function => Some(machine.hosts(function))
+                .filter(|slots| !slots.is_empty())
+                .map_or(Host::None, Host::Slots),
         })
         .collect();
     let ir = Ir {
@@ -54,13 +65,28 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
     };
     let data_words = flat.data.iter().map(words).sum();
     let (pool, own_files) = (HashMap::new(), Vec::new());
-    let mut resolver =
-        Resolver { context, loader, flat, ir, slots, pool, own_files, label: 0, data_words, cast: None };
+    let mut resolver = Resolver {
+        context,
+        loader,
+        flat,
+        ir,
+        slots,
+        pool,
+        own_files,
+        label: 0,
+        data_words,
+        cast: None,
+        forms: Forms::new(),
+        kinds: Vec::new(),
+        sharing: Sharing::default(),
+        turns: 0,
+    };
     let once = std::mem::take(&mut resolver.flat.once);
     resolver.section(Section::Once, &once);
     resolver.ir.period = resolver.ir.bundles.len() as u32;
     let period = std::mem::take(&mut resolver.flat.period);
     resolver.section(Section::Period, &period);
+    resolver.entered();
     resolver.data();
     resolver.presets();
     for timing in std::mem::take(&mut resolver.flat.timing) {
@@ -81,11 +107,11 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
     ir
 }
 
-/// Which slot executes an instruction.
+/// Which slots execute an instruction.
 #[derive(Clone, Copy)]
 enum Host {
     Any,
-    Slot(SlotIndex),
+    Slots(Slots),
     None,
 }
 
@@ -106,12 +132,21 @@ pub(crate) struct Resolver<'c> {
     pub(crate) cast: Option<Type>,
     /// Words of data memory that the source declares.
     pub(crate) data_words: u32,
+    /// What equations write for instructions.
+    forms: Forms,
+    /// What was last written to each register, above the line at hand.
+    kinds: Vec<Kind>,
+    /// What is computed already.
+    sharing: Sharing,
+    /// Turns of all sums.
+    turns: usize,
 }
 
 impl Resolver<'_> {
     /// Resolves the bundles of a section, and moves the section's labels from statements to bundles.
     fn section(&mut self, section: Section, items: &[Item]) {
         self.label = 0;
+        self.sharing.cut();
         let mut bounds = self.flat.loop_bounds.clone();
         bounds.retain(|bound| bound.section == section);
         let mut bounds = bounds.into_iter().peekable();
@@ -119,6 +154,7 @@ impl Resolver<'_> {
             self.place_labels(section, index as u32);
             if let Some(expand::LoopBound { most, .. }) = bounds.next_if(|bound| bound.item == index as u32) {
                 self.ir.loop_bounds.push(LoopBound { position: self.ir.bundles.len() as u32, most });
+                self.sharing.cut();
             }
             self.item(item);
             self.ir.contracted.resize(self.ir.bundles.len(), item.contracted);
@@ -134,6 +170,9 @@ impl Resolver<'_> {
                     return;
                 }
                 label.position = self.ir.bundles.len() as u32;
+                if section != Section::Data {
+                    self.sharing.cut();
+                }
             }
             self.label += 1;
         }
@@ -141,13 +180,19 @@ impl Resolver<'_> {
 
     fn item(&mut self, item: &Item) {
         let ast = Rc::clone(&self.context.asts[item.at.ast as usize]);
-        let StatementKind::Bundle(first, count) = ast.statements[item.statement as usize].kind else {
-            return;
+        let (first, count) = match ast.statements[item.statement as usize].kind {
+            StatementKind::Bundle(first, count) => (first, count),
+            StatementKind::Equation(equation) => {
+                // What goes wrong is in the report.
+                let _ = self.equation(item, &ast, equation);
+                return;
+            }
+            StatementKind::Empty | StatementKind::Directive(_) => return,
         };
         let written = &ast.operations[first as usize..(first + count) as usize];
         let mut operations: SmallVec<[Operation; 1]> = SmallVec::with_capacity(written.len());
         for (index, (operation, number)) in written.iter().zip(first..).enumerate() {
-            let location = self.location(item, operation, index, written.len());
+            let location = self.location(item, (operation.span, operation.line), index, written.len());
             // What goes wrong is in the report; other operations may have mistakes of their own.
             if let Ok(operation) = self.operation(item.at, &ast, number, written.len(), location) {
                 operations.push(operation);
@@ -158,13 +203,13 @@ impl Resolver<'_> {
         }
         let explicit = written.len() > 1;
         if !explicit {
-            self.ir.bundles.push(Bundle { operations, explicit, scheduled: item.scheduled });
+            self.push(Bundle { operations, explicit, scheduled: item.scheduled });
         } else if self.ir.machine.slots.len() == 1 {
             match serialise::order(&operations) {
                 Ok(order) => {
                     for index in order {
                         let operations = SmallVec::from_elem(operations[index], 1);
-                        self.ir.bundles.push(Bundle { operations, explicit, scheduled: item.scheduled });
+                        self.push(Bundle { operations, explicit, scheduled: item.scheduled });
                     }
                 }
                 Err(diagnostic) => {
@@ -172,77 +217,88 @@ impl Resolver<'_> {
                     self.context.report(item.at.scope, diagnostic);
                 }
             }
-        } else if self.check_slots(item.at, &operations).is_ok() {
+        } else if self.assign_slots(item.at, &mut operations).is_ok() {
             if let Some(diagnostic) = serialise::twice(&operations) {
                 let diagnostic = diagnostic(&self.context.declared.registers, self.ir.machine);
                 self.context.report(item.at.scope, diagnostic);
             }
-            self.ir.bundles.push(Bundle { operations, explicit, scheduled: item.scheduled });
+            self.push(Bundle { operations, explicit, scheduled: item.scheduled });
         }
+    }
+
+    /// Refuses jumps by number to where an equation counts on what was computed above.
+    fn entered(&mut self) {
+        if self.sharing.stretches.is_empty() {
+            return;
+        }
+        // How many stretches begin, and less how many end, before each bundle.
+        let mut steps = vec![0i64; self.ir.bundles.len() + 2];
+        for (computed, used) in &self.sharing.stretches {
+            steps[*computed as usize + 1] += 1;
+            steps[*used as usize + 1] -= 1;
+        }
+        let within: Vec<bool> = steps
+            .iter()
+            .scan(0, |open, step| {
+                *open += step;
+                Some(*open > 0)
+            })
+            .collect();
+        let enters = |target: u32| within.get(target as usize).copied().unwrap_or(false);
+        let jumps = self.ir.operations().filter(|operation| operation.target_number().is_some_and(enters));
+        let wrong: Vec<(Span, u32)> = jumps.map(|operation| (operation.span, operation.expansion)).collect();
+        for (span, expansion) in wrong {
+            let message = "a jump by number between equations that share what they compute";
+            let error = Diagnostic::error("target", span, message)
+                .help("jump to a label: equations behind it compute everything themselves");
+            self.context.report(ScopeId(expansion), error);
+        }
+    }
+
+    /// Adds a bundle to the program.
+    fn push(&mut self, bundle: Bundle) {
+        let is_opaque = bundle.is_opaque();
+        for operation in &bundle.operations {
+            if let Some(dest) = operation.dest {
+                let kind = self.result_kind(operation);
+                self.set_kind(dest, kind);
+                self.sharing.write(dest);
+            }
+            if is_opaque || operation.redirects() || operation.row().effect.drains() {
+                self.sharing.cut();
+            }
+        }
+        self.ir.bundles.push(bundle);
     }
 
     /// Where an operation comes from: its own line, or what `.loc` says.
     fn location(
         &mut self,
         item: &Item,
-        operation: &crate::syntax::ast::Operation,
+        (span, line): (Span, u32),
         index: usize,
         count: usize,
-    ) -> Option<Location> {
+    ) -> Option<SourcePlace> {
         if item.loc != 0 {
             let places = &self.flat.locs[item.loc as usize];
             if places.len() > 1 && places.len() != count {
                 let message = format!("a bundle of {count}, and `.loc` gives {} places", places.len());
-                self.context.error(item.at.scope, "loc", operation.span, message);
+                self.context.error(item.at.scope, "loc", span, message);
                 return None;
             }
             let place = places.get(if places.len() == 1 { 0 } else { index }).copied().flatten();
-            return place.map(|(file, line)| Location { file, line });
+            return place;
         }
         let ast = item.at.ast as usize;
         if let Some(Some(file)) = self.own_files.get(ast) {
-            return Some(Location { file: *file, line: operation.line });
+            return Some((Location { file: *file, line }, None));
         }
-        let file = self.context.reports.sources.file_of(operation.span.start);
+        let file = self.context.reports.sources.file_of(span.start);
         let name = std::sync::Arc::clone(&self.context.reports.sources.files()[file].name);
         let file = self.flat.file(&name);
         self.own_files.resize(self.own_files.len().max(ast + 1), None);
         self.own_files[ast] = Some(file);
-        Some(Location { file, line: operation.line })
-    }
-
-    /// Two operations of a bundle that need one slot are a mistake.
-    fn check_slots(&mut self, at: At, operations: &[Operation]) -> Result<(), Reported> {
-        let machine = self.ir.machine;
-        let mut result = Ok(());
-        for (index, operation) in operations.iter().enumerate() {
-            let Some(slot) = operation.slot else { continue };
-            let Some(first) = operations[..index].iter().find(|before| before.slot == Some(slot)) else {
-                continue;
-            };
-            let name = machine.slot(slot).name;
-            let message = format!("two operations of the bundle need slot `{name}`");
-            let what = |operation: &Operation| match operation.constant {
-                Constant::Raw(_) => ".raw",
-                _ => operation.row().mnemonic,
-            };
-            let error = Diagnostic::error("slot-conflict", operation.span, message)
-                .here(format!("`{}` needs it", what(operation)))
-                .also(first.span, format!("so does `{}`", what(first)))
-                .help("write them as two bundles");
-            result = Err(self.context.report(at.scope, error));
-        }
-        if operations.len() > machine.slots.len() && result.is_ok() {
-            let message = format!(
-                "{} operations, and {} has {} slots",
-                operations.len(),
-                machine.name,
-                machine.slots.len()
-            );
-            let last = operations[operations.len() - 1].span;
-            result = Err(self.context.error(at.scope, "slot-conflict", last, message));
-        }
-        result
+        Some((Location { file, line }, None))
     }
 
     fn operation(
@@ -251,42 +307,36 @@ impl Resolver<'_> {
         ast: &Ast,
         number: u32,
         of: usize,
-        location: Option<Location>,
+        location: Option<SourcePlace>,
     ) -> Result<Operation, Reported> {
         let written = &ast.operations[number as usize];
-        let name = self.context.name(at, written.mnemonic.name, written.mnemonic.span)?;
+        let name = self.context.spelled(at, written.mnemonic.name, written.mnemonic.span)?;
         let operands = &ast.operands[written.first as usize..(written.first + written.count) as usize];
-        let Some(op) = name.op() else {
-            if name.directive() == Some(Directive::Raw) {
+        let (op, pinned) = match name.op() {
+            Some(op) => (op, None),
+            None if name.directive() == Some(Directive::Raw) => {
                 return self.raw(at, number, written, operands, location);
             }
-            return Err(self.unknown_mnemonic(at, name, written, of));
+            None => match self.pinned(at, name, written.mnemonic.span)? {
+                Some((op, slot)) => (op, Some(slot)),
+                None => return Err(self.unknown_mnemonic(at, name, written, of)),
+            },
         };
         let row = op.row();
-        let slot = match self.slots[op as usize] {
-            Host::Any => None,
-            Host::Slot(slot) => Some(slot),
-            Host::None => {
-                let message = format!("{} has no unit for `{}`", self.ir.machine.name, row.mnemonic);
-                let having = takt_isa::MACHINES.iter().find(|machine| machine.host(row.function).is_some());
-                let mut error = Diagnostic::error("no-unit", written.mnemonic.span, message);
-                if let Some(machine) = having {
-                    error = error.note(format!("machine {} has one", machine.name));
-                }
-                return Err(self.context.report(at.scope, error));
-            }
-        };
+        let slots = self.hosting(at, op, pinned, written.mnemonic.span)?;
         let places = row.shape.operands();
         if places.len() != operands.len() {
             return Err(self.wrong_count(at, row, written, operands));
         }
         let mut operation = Operation {
             op,
-            slot,
+            slots,
+            slot: slots.first(),
             dest: None,
             sources: [RegisterId::ZERO; 3],
             constant: Constant::None,
-            location,
+            location: location.map(|(location, _)| location),
+            columns: location.and_then(|(_, columns)| columns),
             span: written.span,
             expansion: at.scope.0,
             made: false,
@@ -298,6 +348,8 @@ impl Resolver<'_> {
             // All operands are looked at, whatever is wrong with one.
             failed |= self.operand(at, row, *place, *operand, &mut operation).is_err();
         }
+        operation.slots = self.writing(slots, operation.dest);
+        operation.slot = operation.slots.first();
         if failed { Err(Reported) } else { Ok(operation) }
     }
 
@@ -308,21 +360,11 @@ impl Resolver<'_> {
         number: u32,
         written: &crate::syntax::ast::Operation,
         operands: &[Operand],
-        location: Option<Location>,
+        location: Option<SourcePlace>,
     ) -> Result<Operation, Reported> {
         let [slot, word] = operands else { return Err(Reported) };
-        let slots = self.ir.machine.slots;
         let name = self.context.reports.sources.text(slot.span).to_owned();
-        let mut numbered = self.ir.machine.numbered_slots();
-        let Some((index, _)) = numbered.find(|(_, slot)| slot.name == name) else {
-            let names = slots.iter().map(|slot| slot.name);
-            let message = format!("{} has no slot `{name}`", self.ir.machine.name);
-            let meant = nearest(&name, names.clone());
-            let error = Diagnostic::error("operand", slot.span, message)
-                .note(format!("slots: {}", names.collect::<Vec<_>>().join(" ")))
-                .did_you_mean(meant);
-            return Err(self.context.report(at.scope, error));
-        };
+        let index = self.named_slot(at, &name, slot.span)?;
         let value = self.operand_value(at, *word)?;
         let Some(bits) =
             value.integer().ok().and_then(|value| u64::try_from(value).ok()).filter(|value| value >> 48 == 0)
@@ -332,11 +374,13 @@ impl Resolver<'_> {
         self.ir.raw.push(bits);
         Ok(Operation {
             op: Op::nop,
+            slots: Slots::of(index),
             slot: Some(index),
             dest: None,
             sources: [RegisterId::ZERO; 3],
             constant: Constant::Raw(self.ir.raw.len() as u32 - 1),
-            location,
+            location: location.map(|(location, _)| location),
+            columns: location.and_then(|(_, columns)| columns),
             span: written.span,
             expansion: at.scope.0,
             made: false,

@@ -1,7 +1,7 @@
 //! Operands to registers, labels and numbers: the part of [`resolve`](crate::resolve) that looks at one operand.
 
 use crate::context::Wanted;
-use crate::context::{Argument, At, Binding, Reported};
+use crate::context::{Argument, Array, At, Binding, Reported};
 use crate::expand::load::Loader;
 use crate::expand::{address, register_at};
 use crate::ir::given::{Given, Kind, Part, What};
@@ -13,6 +13,7 @@ use crate::resolve::Resolver;
 use crate::syntax::ast::*;
 use crate::syntax::expr::{EvalError, Value};
 use crate::syntax::name::NameId;
+use std::rc::Rc;
 use takt_isa::shape::Field;
 use takt_isa::{Effect, Operand as Place, ROWS, Row, Type};
 
@@ -31,7 +32,7 @@ impl Resolver<'_> {
         self.cast = None;
         match place {
             Place::Dest => {
-                operation.dest = Some(self.dest(at, operand)?);
+                operation.dest = Some(self.dest(at, operand, Wanted::Dest)?);
                 self.note_cast(operation, Part::Dest);
             }
             Place::Source(index) => {
@@ -92,7 +93,7 @@ impl Resolver<'_> {
     }
 
     /// Follows parameters to the operand that was given for them, and what its name means if it is a name.
-    fn meaning(&mut self, mut at: At, mut operand: Operand) -> Result<Meaning, Reported> {
+    pub(crate) fn meaning(&mut self, mut at: At, mut operand: Operand) -> Result<Meaning, Reported> {
         let mut parameter = None;
         loop {
             if let OperandKind::Cast(cast) = operand.kind {
@@ -104,6 +105,11 @@ impl Resolver<'_> {
                 }
                 self.cast.get_or_insert(ty);
                 operand = inner;
+            }
+            if let Some((name, indices)) = self.indexed(at, operand) {
+                let register = self.element(at, name, &indices, operand.span)?;
+                let id = self.context.name(at, name.name, name.span)?;
+                return Ok((at, operand, Some((id, Binding::Register(register)))));
             }
             let OperandKind::Name(name) = operand.kind else { return Ok((at, operand, None)) };
             let name = self.context.name(at, name, operand.span)?;
@@ -123,12 +129,17 @@ impl Resolver<'_> {
         }
     }
 
-    fn dest(&mut self, at: At, operand: Operand) -> Result<RegisterId, Reported> {
+    /// The register that an operand names, to be written: by an instruction, or an equation.
+    pub(crate) fn dest(&mut self, at: At, operand: Operand, wanted: Wanted) -> Result<RegisterId, Reported> {
+        let help = match wanted {
+            Wanted::Left => "what stands left of `=` is the register to write",
+            _ => "the first operand is the register to write",
+        };
         let (place, given, meaning) = self.meaning(at, operand)?;
         let register = match (given.kind, meaning) {
             (_, Some((_, Binding::Register(register)))) => register,
             (_, Some((name, Binding::None))) => {
-                return Err(self.context.unknown(place.scope, name, given.span, Wanted::Dest));
+                return Err(self.context.unknown(place.scope, name, given.span, wanted));
             }
             (OperandKind::Place(name), _) => {
                 let address = address(self.context, place, Name { name, span: given.span })?;
@@ -141,13 +152,11 @@ impl Resolver<'_> {
                 if let Some(declared) = self.context.declared.declaration(binding) {
                     error = error.also(declared, "declared here");
                 }
-                return Err(self
-                    .context
-                    .report(at.scope, error.help("the first operand is the register to write")));
+                return Err(self.context.report(at.scope, error.help(help)));
             }
             _ => {
-                let error = Diagnostic::error("not-writable", given.span, "this cannot be written")
-                    .help("the first operand is the register to write");
+                let error =
+                    Diagnostic::error("not-writable", given.span, "this cannot be written").help(help);
                 return Err(self.context.report(at.scope, error));
             }
         };
@@ -174,6 +183,116 @@ impl Resolver<'_> {
             _ => return Ok(register),
         };
         Err(self.context.report(at.scope, error))
+    }
+
+    /// The array and the indices of an operand that is an element of one. With one index it looks like a place in memory.
+    fn indexed(&mut self, at: At, operand: Operand) -> Option<(Name, Vec<Vec<Node>>)> {
+        let ast = Rc::clone(&self.context.asts[at.ast as usize]);
+        match operand.kind {
+            OperandKind::Element(element) => {
+                let Element { name, indices } = &ast.elements[element as usize];
+                Some((*name, indices.clone()))
+            }
+            OperandKind::Memory(memory) => {
+                let Memory { offset: Some(offset), base } = ast.memories[memory as usize] else {
+                    return None;
+                };
+                let [Node { kind: NodeKind::Name(name), span }] = ast.nodes[offset.id.range()] else {
+                    return None;
+                };
+                let id = name.resolve().ok()?;
+                let mut binding = self.context.lookup(at.scope, id);
+                while let Binding::Argument(argument) = binding {
+                    let argument = self.context.declared.arguments[argument as usize];
+                    let OperandKind::Name(name) = argument.operand.kind else { return None };
+                    binding = self.context.lookup(argument.at.scope, name.resolve().ok()?);
+                }
+                match (binding, base.kind) {
+                    (Binding::Array(_), _) => {}
+                    // An element that is declared with its place.
+                    (Binding::None, OperandKind::Expr(expr)) => {
+                        let [Node { kind: NodeKind::Int(index), .. }] = ast.nodes[expr.range()] else {
+                            return None;
+                        };
+                        let element = format!("{}[{index}]", self.context.scopes.text(id));
+                        let element = self.context.scopes.names_mut().intern(&element);
+                        let Binding::Register(_) = self.context.lookup(at.scope, element) else {
+                            return None;
+                        };
+                    }
+                    _ => return None,
+                }
+                let index = match base.kind {
+                    OperandKind::Name(name) => vec![Node { kind: NodeKind::Name(name), span: base.span }],
+                    OperandKind::Expr(expr) => ast.nodes[expr.range()].to_vec(),
+                    _ => return None,
+                };
+                Some((Name { name, span }, vec![index]))
+            }
+            _ => None,
+        }
+    }
+
+    /// The register that an element is.
+    pub(crate) fn element(
+        &mut self,
+        at: At,
+        name: Name,
+        indices: &[Vec<Node>],
+        span: Span,
+    ) -> Result<RegisterId, Reported> {
+        let operand = Operand { kind: OperandKind::Name(name.name), span: name.span };
+        let (place, _, meaning) = self.meaning(at, operand)?;
+        let array = match meaning {
+            Some((_, Binding::Array(array))) => self.context.declared.arrays[array as usize].clone(),
+            Some((id, Binding::None)) => {
+                let indices: Result<Vec<String>, Reported> = indices
+                    .iter()
+                    .map(|nodes| self.context.index(at, nodes, span).map(|index| index.to_string()))
+                    .collect();
+                let element = format!("{}[{}]", self.context.scopes.text(id), indices?.join(","));
+                let element = self.context.scopes.names_mut().intern(&element);
+                return match self.context.lookup(place.scope, element) {
+                    Binding::Register(register) => Ok(register),
+                    _ => Err(self.context.unknown(place.scope, id, name.span, Wanted::Array)),
+                };
+            }
+            _ => {
+                let text = self.context.reports.sources.text(name.span).to_owned();
+                let kind =
+                    meaning.map_or("no array", |(_, binding)| self.context.declared.kind_text(binding));
+                let message = format!("`{text}` is {kind}, not an array of registers");
+                let mut error = Diagnostic::error("array", name.span, message);
+                if let Some(declared) =
+                    meaning.and_then(|(_, binding)| self.context.declared.declaration(binding))
+                {
+                    error = error.also(declared, "declared here");
+                }
+                return Err(self.context.report(at.scope, error));
+            }
+        };
+        let Array { name: text, first, sizes, span: declared } = &array;
+        if indices.len() != sizes.len() {
+            let (takes, found) = (sizes.len(), indices.len());
+            let plural = if takes == 1 { "index" } else { "indices" };
+            let message = format!("`{text}` has {takes} {plural}, not {found}");
+            let error = Diagnostic::error("array", span, message)
+                .also(*declared, format!("declared here as `{text}[{}]`", array.shape()));
+            return Err(self.context.report(at.scope, error));
+        }
+        let mut number = 0;
+        for (nodes, size) in indices.iter().zip(sizes) {
+            let index = self.context.index(at, nodes, span)?;
+            let Some(index) = u32::try_from(index).ok().filter(|index| (1..=*size).contains(index)) else {
+                let span = nodes.last().map_or(span, |node| node.span);
+                let message = format!("`{text}` has no element {index} here: it is 1 to {size}");
+                let error = Diagnostic::error("array", span, message)
+                    .also(*declared, format!("declared here as `{text}[{}]`", array.shape()));
+                return Err(self.context.report(at.scope, error));
+            };
+            number = number * size + index - 1;
+        }
+        Ok(RegisterId::new(first.index() + number as usize))
     }
 
     /// The port that a name stands for, of a kind if one is wanted.
@@ -258,7 +377,7 @@ impl Resolver<'_> {
     }
 
     /// A register to read: a register as such, or the one that holds a constant.
-    fn source(&mut self, at: At, operand: Operand, ty: Type) -> Result<RegisterId, Reported> {
+    pub(crate) fn source(&mut self, at: At, operand: Operand, ty: Type) -> Result<RegisterId, Reported> {
         let (place, given, meaning) = self.meaning(at, operand)?;
         match (given.kind, meaning) {
             (_, Some((_, Binding::Register(register)))) => Ok(register),
@@ -283,7 +402,7 @@ impl Resolver<'_> {
     }
 
     /// The register that holds a constant.
-    fn pooled(&mut self, bits: u32, span: Span) -> RegisterId {
+    pub(crate) fn pooled(&mut self, bits: u32, span: Span) -> RegisterId {
         if bits == 0 {
             return RegisterId::ZERO;
         }
@@ -527,7 +646,7 @@ impl Resolver<'_> {
 
 impl Resolver<'_> {
     /// The file of a library that defines a macro.
-    fn library_with(&self, macro_name: &str) -> Option<String> {
+    pub(crate) fn library_with(&self, macro_name: &str) -> Option<String> {
         let defines = |line: &str| {
             let rest = line.trim_start().strip_prefix(".macro").unwrap_or_default();
             rest.split_whitespace().next() == Some(macro_name)
@@ -549,8 +668,10 @@ fn loading() -> &'static str {
 /// What other processors have and Takt has not, though an instruction of a like name may do something else.
 fn absent(name: &str) -> Option<&'static str> {
     Some(match name {
-        "fma" | "fmadd" | "fmac" | "fmla" | "fnma" | "fms" | "fmsub" | "mac" | "madd" => {
-            "there is no fused operation: `fmul`, then `fadd` or `fsub`"
+        "fmadd" | "fmac" | "fmla" | "mac" | "madd" => "`fma` is a · b + c; a machine may lack it",
+        "fmsub" | "fmls" => "`fms` is a · b - c, `fnma` is c - a · b; a machine may lack them",
+        "fnmadd" | "fnmsub" => {
+            "RISC-V's fnmsub is `fnma`, c - a · b, and its fnmadd is `fnms`, -(a · b) - c; a machine may lack them"
         }
         "imul" | "idiv" | "imod" | "irem" | "imin" | "imax" | "iabs" | "ineg" => {
             "of integers there are sums, shifts, logic and comparisons: `itof` converts, and `ishl` multiplies by a power of two"
@@ -609,7 +730,7 @@ mod tests {
     #[test]
     fn advice_names_instructions() {
         let known = |name: &str| ROWS.iter().any(|row| row.mnemonic == name);
-        for name in ["fma", "imul", "fgt", "igt", "fne", "beq", "not"] {
+        for name in ["fmadd", "fmsub", "fnmadd", "imul", "fgt", "igt", "fne", "beq", "not"] {
             assert!(!known(name));
             let help = absent(name).expect("there is advice");
             assert!(help.split('`').skip(1).step_by(2).all(known), "{help}");

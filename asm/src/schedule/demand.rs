@@ -2,13 +2,15 @@
 //! scheduling problem, whether a schedule keeps it, and who stands in the way if none can.
 
 use super::Block;
-use super::solve::{Edge, Problem};
+use super::bound::{Bound, Resources};
+use super::problem::{Edge, Problem};
 use crate::ir::runs::Run;
 use crate::ir::{Bundle, Demand, DemandKind, Ir, Operation, RegisterId, RegisterKind};
 use crate::report::diag::{Diagnostic, Sink};
 use crate::report::source::Span;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use takt_isa::SlotIndex;
 
 /// Pairs of reads and writes that the orders of a run may give: far beyond what a port is used for.
 const ORDER_EDGES: usize = 1 << 16;
@@ -129,11 +131,12 @@ impl<'a> Demands<'a> {
     fn events(&self, block: &Block, port: RegisterId) -> Vec<Event> {
         let mut events = Vec::new();
         for (task, &origin) in block.origins.iter().enumerate() {
-            let parts = block.problem.tasks[task].parts.iter();
-            for (operation, part) in self.bundles[origin].operations.iter().zip(parts) {
+            for (index, operation) in self.bundles[origin].operations.iter().enumerate() {
                 let span = operation.span;
                 if uses(self.ir, operation, port) {
-                    let after = if operation.dest == Some(port) { part.writes.unwrap_or(0) } else { 0 };
+                    // Whatever the choice of its slot: a port is written as quickly as can be.
+                    let written = || block.problem.tasks[task].written(index).unwrap_or(0);
+                    let after = if operation.dest == Some(port) { written() } else { 0 };
                     events.push(Event { task, after, span });
                 }
             }
@@ -213,7 +216,8 @@ impl<'a> Demands<'a> {
                 self.contradiction(demand, *at, x, y, "one bundle uses both", sink);
                 return false;
             }
-            block.problem.edges.push(Edge { from: x.task, to: y.task, distance, demanded: true });
+            let (from, to) = (x.task, y.task);
+            block.problem.edges.push(Edge { from, to, distance, latency_of: None, demanded: true });
         }
         if ordered.iter().all(|(_, _, x, y)| x.task < y.task) || sort(block) {
             return true;
@@ -282,22 +286,23 @@ impl<'a> Demands<'a> {
                 error = error.also(operation.span, format!("{place} of the chain"));
             }
         } else {
-            let slots = self.ir.machine.slots;
-            let units = || slots.iter().flat_map(|slot| slot.units);
-            let slot = bound.slots.iter().position(|slot| *slot == cycles);
-            let unit = bound.units.iter().position(|unit| *unit == cycles);
-            let (what, count) = match (slot, unit) {
-                (Some(slot), _) => {
-                    let parts = part.tasks.iter().flat_map(|task| &task.parts);
-                    (format!("slot `{}`", slots[slot].name), parts.filter(|part| part.slot == slot).count())
-                }
-                (None, unit) => {
-                    let parts = part.tasks.iter().flat_map(|task| &task.parts);
-                    let name = unit.and_then(|unit| units().nth(unit)).map_or("", |unit| unit.name);
-                    (format!("unit `{name}`"), parts.filter(|part| part.unit == unit).count())
-                }
+            let single = |bounds: &[u32]| bounds.iter().position(|bound| *bound == cycles);
+            let shared = || bound.shared.iter().find(|shared| shared.cycles == cycles);
+            let resources = match (single(&bound.slots), single(&bound.units)) {
+                (Some(slot), _) => Some(Resources::Slots(SlotIndex::new(slot).into_iter().collect())),
+                (None, Some(unit)) => Some(Resources::Units(vec![unit])),
+                (None, None) => shared().map(|shared| shared.resources.clone()),
             };
-            error = error.note(format!("{what} has {count} operations to issue for it, one after another"));
+            if let Some(resources) = resources {
+                let count = Bound::operations(&part, &resources);
+                let text = resources.text(self.ir.machine);
+                let (kind, names) = text.split_once(' ').unwrap_or_default();
+                let (has, how) = match kind.strip_suffix('s') {
+                    None => ("has", ", one after another"),
+                    Some(_) => ("have", ""),
+                };
+                error = error.note(format!("{kind} `{names}` {has} {count} operations to issue for it{how}"));
+            }
             error = error.also(last.span, "written here");
         }
         sink.push(error.help(later(cycles)));

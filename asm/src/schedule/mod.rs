@@ -4,24 +4,31 @@
 //! its last. What must keep its order is an edge between two operations (see [`Block`]); everything else may move.
 //! `docs/scheduling.md` says what that means for who writes a program.
 
+mod banks;
+mod bound;
 mod demand;
 mod memory;
+mod pass;
+mod problem;
 mod solve;
 
 pub use crate::ir::DemandKind;
+pub use bound::{Bound, Resources, SharedBound};
 pub use demand::TimingReport;
-pub use solve::Bound;
 
+use crate::ir::matching;
 use crate::ir::runs;
 use crate::ir::{Bundle, Ir, Operation, RegisterId, RegisterKind};
 use crate::report::diag::Sink;
+use banks::Banks;
 use demand::Demands;
 use memory::Memory;
+use pass::Plan;
+use problem::{Edge, Part, Problem, Task};
 use smallvec::{SmallVec, smallvec};
-use solve::{Edge, Part, Problem, Task};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use takt_isa::program::{Location, Space};
-use takt_isa::{BundleAddress, Effect, Function, Machine, SlotIndex};
+use takt_isa::{BundleAddress, Effect, Function, Machine, SlotIndex, Slots};
 
 /// How long the scheduler searches unless told otherwise.
 pub const DEFAULT_EFFORT: u32 = 20;
@@ -63,6 +70,7 @@ pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
     let fixed_registers = memory::fixed(ir);
     let runs = runs::runs(ir);
     let demands = demand::assign(ir, &runs, sink);
+    let mut banks = Banks::new(ir, &runs, fixed);
     let mut report = Report::default();
     let mut bundles: Vec<Bundle> = Vec::with_capacity(ir.bundles.len());
     // New address of each block's start, by its old one.
@@ -77,7 +85,7 @@ pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
             continue;
         }
         let demands = Demands::new(ir, old, demands);
-        let mut block = Block::new(ir, &fixed_registers, old, scheduled);
+        let mut block = Block::new(ir, &fixed_registers, old, scheduled.then_some(&banks));
         if !scheduled {
             let start = block.problem.as_written();
             report.timing.extend(demands.check(&block, &start, None, scheduled, sink));
@@ -89,13 +97,14 @@ pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
             continue;
         }
         let solution = solve::solve(&block.problem, effort);
-        report.timing.extend(demands.check(&block, &solution.start, solution.window, scheduled, sink));
-        let packed = block.pack(old, &solution.start);
+        report.timing.extend(demands.check(&block, &solution.plan.start, solution.window, scheduled, sink));
+        let packed = block.pack(old, &solution.plan);
+        banks.settle(&packed);
         report.blocks.push(BlockReport {
             location: old.first().and_then(|bundle| bundle.operations.first()?.location),
             label: label_at(ir, run.start as u32),
             address: BundleAddress::new(address),
-            operations: block.problem.tasks.iter().map(|task| task.parts.len() as u32).sum(),
+            operations: block.problem.tasks.iter().map(|task| task.operations as u32).sum(),
             bundles: packed.len() as u32,
             cycles: solution.length,
             bound: solution.bound,
@@ -117,12 +126,12 @@ pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
 
 /// The cycle in which each bundle of a straight run issues, if the run stays as it is written. The first is 0.
 pub(crate) fn as_written(ir: &Ir, bundles: &[Bundle]) -> Vec<u32> {
-    Block::new(ir, &memory::fixed(ir), bundles, false).problem.as_written()
+    Block::new(ir, &memory::fixed(ir), bundles, None).problem.as_written()
 }
 
 /// Cycles from an operation's issue to the earliest one of an operation that reads its result.
 pub(crate) fn latency(machine: &Machine, operation: &Operation) -> u32 {
-    part(machine, operation).writes.unwrap_or(0)
+    part(machine, operation, operation.slot).writes.unwrap_or(0)
 }
 
 fn label_at(ir: &Ir, position: u32) -> Option<String> {
@@ -132,10 +141,10 @@ fn label_at(ir: &Ir, position: u32) -> Option<String> {
         .map(|label| label.name.clone())
 }
 
-/// Which unit of a machine an operation uses, by slot.
-fn part(machine: &Machine, operation: &Operation) -> Part {
+/// Which unit of a machine an operation uses on a slot.
+fn part(machine: &Machine, operation: &Operation, slot: Option<SlotIndex>) -> Part {
     let function = operation.row().function;
-    let slot = operation.slot.unwrap_or(SlotIndex::FIRST).index();
+    let slot = slot.unwrap_or(SlotIndex::FIRST).index();
     let before: usize = machine.slots[..slot].iter().map(|slot| slot.units.len()).sum();
     match machine.slots[slot].unit_for(function).filter(|_| function != Function::Idle) {
         Some(unit) => {
@@ -145,6 +154,15 @@ fn part(machine: &Machine, operation: &Operation) -> Part {
         }
         None => Part { slot, unit: None, interval: 1, writes: None },
     }
+}
+
+/// What one task must wait for of another.
+#[derive(Clone, Copy)]
+enum Wait {
+    /// So many cycles from its issue.
+    Cycles(u32),
+    /// The write of one of its operations.
+    Written(usize),
 }
 
 /// The order that a block's operations must keep.
@@ -163,9 +181,9 @@ struct Block {
 }
 
 impl Block {
-    /// The problem of a run of bundles. Fillers, which a schedule has no use for, are tasks only where it is as written.
-    /// `fixed` holds the bits of registers that never change ([`memory::fixed`]).
-    fn new(ir: &Ir, fixed: &[Option<u32>], bundles: &[Bundle], scheduled: bool) -> Block {
+    /// The problem of a run of bundles: as they are written, or if `banks` says where registers may lie, for a schedule, which has
+    /// no use for fillers. `fixed` holds the bits of registers that never change ([`memory::fixed`]).
+    fn new(ir: &Ir, fixed: &[Option<u32>], bundles: &[Bundle], banks: Option<&Banks>) -> Block {
         let machine = ir.machine;
         let is_output = |id: RegisterId| ir.register(id).kind == RegisterKind::Output;
         let mut problem = Problem {
@@ -174,8 +192,8 @@ impl Block {
             ..Problem::default()
         };
         let mut origins = Vec::new();
-        // For each register: the task of its last value with that value's latency, and the tasks that read it since.
-        let mut values: HashMap<RegisterId, (usize, u32)> = HashMap::new();
+        // For each register: the task and the operation of its last value, and the tasks that read it since.
+        let mut values: HashMap<RegisterId, (usize, usize)> = HashMap::new();
         let mut readers: HashMap<RegisterId, Vec<usize>> = HashMap::new();
         let mut memory = Memory::new(ir, fixed);
         // Loads and stores that may fault; for each output port the task of its last write, and how many of those precede it.
@@ -183,21 +201,38 @@ impl Block {
         let mut outputs: BTreeMap<RegisterId, (usize, usize)> = BTreeMap::new();
         for (b, bundle) in bundles.iter().enumerate() {
             let effects = || bundle.operations.iter().map(|operation| operation.row().effect);
-            if scheduled && !bundle.explicit && effects().all(|effect| effect == Effect::Nothing) {
+            if banks.is_some() && !bundle.explicit && effects().all(|effect| effect == Effect::Nothing) {
                 continue;
             }
             let to = problem.tasks.len();
             origins.push(b);
-            let parts: Vec<Part> =
-                bundle.operations.iter().map(|operation| part(machine, operation)).collect();
-            let mut after = |from: usize, distance: u32| {
+            let mut task = Task {
+                operations: bundle.operations.len(),
+                parts: choices(ir, bundle, banks)
+                    .iter()
+                    .flat_map(|slots| bundle.operations.iter().zip(slots))
+                    .map(|(operation, slot)| part(machine, operation, *slot))
+                    .collect(),
+                ..Task::default()
+            };
+            let Problem { tasks, edges, .. } = &mut problem;
+            let mut edge = |from: usize, distance: u32, latency_of: Option<usize>| {
                 if from != to {
-                    problem.edges.push(Edge { from, to, distance, demanded: false });
+                    edges.push(Edge { from, to, distance, latency_of, demanded: false });
                 }
             };
+            let mut after = |from: usize, wait: Wait| match (wait, tasks.get(from)) {
+                (Wait::Written(operation), Some(task)) => {
+                    let varies = Some(operation).filter(|operation| task.varies(*operation));
+                    edge(from, task.written(operation).unwrap_or(0), varies);
+                }
+                // By the bundle itself.
+                (Wait::Written(_), None) => {}
+                (Wait::Cycles(distance), _) => edge(from, distance, None),
+            };
             for register in bundle.operations.iter().flat_map(Operation::reads) {
-                if let Some(&(from, latency)) = values.get(register) {
-                    after(from, latency);
+                if let Some(&(from, operation)) = values.get(register) {
+                    after(from, Wait::Written(operation));
                 }
                 readers.entry(*register).or_default().push(to);
             }
@@ -205,52 +240,55 @@ impl Block {
                 bundle.operations.iter().filter_map(|operation| memory.access(operation)).collect::<Vec<_>>()
             {
                 for from in memory.follow(to, access) {
-                    after(from, 1);
+                    after(from, Wait::Cycles(1));
                 }
                 if access.may_fault {
                     for &(from, _) in outputs.values() {
-                        after(from, 1);
+                        after(from, Wait::Cycles(1));
                     }
                     faults.push(to);
                 }
             }
             memory.write(&bundle.operations);
-            let mut output = None;
-            for (operation, part) in bundle.operations.iter().zip(&parts) {
+            for (index, operation) in bundle.operations.iter().enumerate() {
                 let Some(dest) = operation.dest else { continue };
                 for from in readers.remove(&dest).unwrap_or_default() {
-                    after(from, 0);
+                    after(from, Wait::Cycles(0));
                 }
-                if let Some((from, latency)) = values.insert(dest, (to, part.writes.unwrap_or(0))) {
-                    after(from, latency);
+                if let Some((from, operation)) = values.insert(dest, (to, index)) {
+                    after(from, Wait::Written(operation));
                 }
                 if is_output(dest) {
-                    output = output.max(part.writes);
+                    task.output = task.output.max(task.written(index));
                     // What precedes the port's write before this one precedes this one.
                     let known = outputs.insert(dest, (to, faults.len())).map_or(0, |(_, known)| known);
                     for &from in &faults[known..] {
-                        after(from, 0);
+                        after(from, Wait::Cycles(0));
                     }
                 }
             }
             if effects().any(Effect::redirects) {
                 let drains = effects().any(Effect::drains);
-                for from in 0..to {
-                    let written = problem.tasks[from].parts.iter().filter_map(|part| part.writes).max();
-                    after(from, written.filter(|_| drains).unwrap_or(0));
+                for (from, earlier) in tasks.iter().enumerate() {
+                    if drains {
+                        (0..earlier.operations).for_each(|index| after(from, Wait::Written(index)));
+                    } else {
+                        after(from, Wait::Cycles(0));
+                    }
                 }
             }
-            problem.tasks.push(Task { parts, output, ..Task::default() });
+            problem.tasks.push(task);
         }
         Block { problem, origins }
     }
 
     /// The bundles of a schedule: tasks that issue in one cycle become one bundle. A gap that only a demand makes is filled, for
     /// the machine would not wait.
-    fn pack(&self, old: &[Bundle], start: &[u32]) -> Vec<Bundle> {
+    fn pack(&self, old: &[Bundle], plan: &Plan) -> Vec<Bundle> {
+        let start = &plan.start;
         let mut by_cycle: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-        for (&origin, &cycle) in self.origins.iter().zip(start) {
-            by_cycle.entry(cycle).or_default().push(origin);
+        for (task, &cycle) in start.iter().enumerate() {
+            by_cycle.entry(cycle).or_default().push(task);
         }
         let demanded = self.problem.edges.iter().filter(|edge| edge.demanded);
         let held: BTreeSet<u32> = demanded
@@ -261,16 +299,53 @@ impl Block {
         let mut next = 0;
         for (cycle, members) in by_cycle {
             let mut operations: SmallVec<[Operation; 1]> =
-                members.iter().flat_map(|&b| old[b].operations.iter().copied()).collect();
+                members.iter().flat_map(|&task| self.placed(old, plan, task)).collect();
             operations.sort_by_key(|operation| operation.slot);
             if let Some(first) = operations.first().filter(|_| held.contains(&cycle)) {
                 let filler = Bundle { operations: smallvec![first.idle()], explicit: false, scheduled: true };
                 bundles.extend(std::iter::repeat_n(filler, (cycle - next) as usize));
             }
-            let explicit = members.iter().any(|&b| old[b].explicit);
+            let explicit = members.iter().any(|&task| old[self.origins[task]].explicit);
             bundles.push(Bundle { operations, explicit, scheduled: true });
             next = cycle + 1;
         }
         bundles
     }
+
+    /// The operations of a task, on their slots.
+    fn placed<'b>(
+        &self,
+        old: &'b [Bundle],
+        plan: &Plan,
+        task: usize,
+    ) -> impl Iterator<Item = Operation> + use<'_, 'b> {
+        let parts = self.problem.tasks[task].choice(plan.choice[task]);
+        old[self.origins[task]].operations.iter().zip(parts).map(|(operation, part)| {
+            let slot = operation.slot.and_then(|_| SlotIndex::new(part.slot));
+            Operation { slot, ..*operation }
+        })
+    }
+}
+
+/// Choices of slots that the scheduler has for a bundle: of one with very many not all.
+const CHOICES: usize = 120;
+
+/// The ways to give the operations of a bundle slots, the present one first; the only one, if nothing says where registers may lie.
+fn choices(ir: &Ir, bundle: &Bundle, banks: Option<&Banks>) -> Vec<Vec<Option<SlotIndex>>> {
+    let present: Vec<Option<SlotIndex>> = bundle.operations.iter().map(|operation| operation.slot).collect();
+    let Some(banks) = banks else { return vec![present] };
+    let placed = || bundle.operations.iter().filter(|operation| operation.slot.is_some());
+    let sets: Vec<Slots> = placed().map(|operation| banks.able(ir, operation)).collect();
+    if sets.iter().copied().eq(present.iter().flatten().map(|slot| Slots::of(*slot))) {
+        return vec![present];
+    }
+    let mut all = Vec::new();
+    for slots in matching::all(&sets, CHOICES) {
+        let mut slots = slots.into_iter();
+        let choice: Vec<Option<SlotIndex>> =
+            present.iter().map(|slot| slot.and_then(|_| slots.next())).collect();
+        let first = if choice == present { 0 } else { all.len() };
+        all.insert(first, choice);
+    }
+    if all.is_empty() { vec![present] } else { all }
 }

@@ -49,6 +49,10 @@ pub enum NodeKind {
     Infix(Operator),
     /// A function, by name, of as many arguments as precede the node.
     Call(NameId, u32),
+    /// `c ? a : b` of the three operands that precede the node.
+    Choice,
+    /// `name[i, j]`: an index into [`Ast::elements`].
+    Element(u32),
 }
 
 /// An expression: a range of nodes.
@@ -105,6 +109,28 @@ pub(crate) enum OperandKind {
     Memory(u32),
     /// `register:type`: an index into [`Ast::casts`].
     Cast(u32),
+    /// `name[i, j]`: an index into [`Ast::elements`].
+    Element(u32),
+}
+
+/// `name[i, j]`: an element of an array of registers.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Element {
+    /// The array.
+    pub name: Name,
+    /// The nodes of each index.
+    pub indices: Vec<Vec<Node>>,
+}
+
+/// `target, … = value, …`: computed when the program runs.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Equation {
+    /// What is written.
+    pub targets: Vec<Operand>,
+    /// What is written there.
+    pub values: Vec<Expr>,
+    /// All of it.
+    pub span: Span,
 }
 
 /// `register:type`: its bits are taken as another type.
@@ -160,6 +186,8 @@ pub(crate) enum StatementKind {
     Bundle(u32, u32),
     /// A directive: its index in [`Ast::directives`].
     Directive(u32),
+    /// An equation: its index in [`Ast::equations`].
+    Equation(u32),
 }
 
 /// What a declaration declares.
@@ -180,6 +208,8 @@ pub(crate) enum Declares {
 pub(crate) struct Declaration {
     /// The name.
     pub name: Name,
+    /// Of an array, how many elements it has in each direction: where they begin in [`Ast::sizes`], and how many there are.
+    pub sizes: (u32, u32),
     /// What follows its colon.
     pub ty: Option<Name>,
     /// What follows its `@`: a name, of a register, or the number of a port.
@@ -281,6 +311,8 @@ pub(crate) enum DirectiveKind {
     Schedule(Name),
     /// `.contract` and `on` or `off`.
     Contract(Name),
+    /// `.fast` and what it allows, or `off`.
+    Fast(Vec<Name>),
     /// `.ports` and `latched` or `direct`.
     Ports(Name),
     /// `.loop_bound`.
@@ -298,12 +330,12 @@ pub(crate) enum DirectiveKind {
 pub(crate) enum Loc {
     /// `none`, or another name by mistake.
     None(Name),
-    /// A file and a line.
-    At(String, Expr),
+    /// A file, a line, and perhaps the first and the last column of a part of it.
+    At(String, Expr, Option<(Expr, Expr)>),
 }
 
 macro_rules! directives {
-    ($($variant:ident $name:literal $operands:literal;)*) => {
+    ($($variant:ident $name:literal $operands:literal $text:literal;)*) => {
         /// The directives, by name.
         #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
         #[allow(missing_docs)]
@@ -324,42 +356,48 @@ macro_rules! directives {
             pub const fn operands(self) -> &'static str {
                 match self { $(Directive::$variant => $operands,)* }
             }
+
+            /// What it says, in a sentence.
+            pub const fn text(self) -> &'static str {
+                match self { $(Directive::$variant => $text,)* }
+            }
         }
     };
 }
 
 directives! {
-    Reg ".reg" "a, b:int, c @ m3";
-    State ".state" "a, b:int, c @ m3";
-    Input ".input" "a, b:int";
-    Output ".output" "a, b:int";
-    Const ".const" "NAME = expression";
-    Preset ".preset" "m12 = expression";
-    Once ".once" "";
-    Period ".period" "";
-    Data ".data" "";
-    Float ".float" "expression, …";
-    Word ".word" "expression, …";
-    Space ".space" "words";
-    Macro ".macro" "name p, q";
-    EndMacro ".endm" "";
-    Rep ".rep" "i, first, last";
-    EndRep ".endr" "";
-    If ".if" "expression";
-    Elif ".elif" "expression";
-    Else ".else" "";
-    EndIf ".endif" "";
-    Include ".include" "\"file\"|<file>";
-    Loc ".loc" "\"file\" line";
-    Error ".error" "\"text\"";
-    Schedule ".schedule" "on|off";
-    Contract ".contract" "on|off";
-    Ports ".ports" "latched|direct";
-    LoopBound ".loop_bound" "turns";
-    Deadline ".deadline" "port, port = cycle";
-    Order ".order" "port, port, …";
-    Late ".late" "port, port = cycles";
-    Raw ".raw" "slot 0x…";
+    Reg ".reg" "a, b:int, c @ m3, P[4,4]" "Registers, placed by the assembler or with `@`.";
+    State ".state" "a, b:int, c @ m3, P[4,4]" "Registers whose value outlives the period.";
+    Input ".input" "a, b:int" "Input ports; `@ 4` gives one its number.";
+    Output ".output" "a, b:int" "Output ports; `@ 3` gives one its number.";
+    Const ".const" "NAME = expression" "A named constant, evaluated in binary64 or as an integer, rounded once where it is used.";
+    Preset ".preset" "m12 = expression" "A register that the loader sets.";
+    Once ".once" "" "What follows runs once, after reset.";
+    Period ".period" "" "What follows runs every period.";
+    Data ".data" "" "What follows is data memory.";
+    Float ".float" "expression, …" "Words of data: binary32.";
+    Word ".word" "expression, …" "Words of data: 32-bit integers.";
+    Space ".space" "words" "Words of data: zeros.";
+    Macro ".macro" "name p, q" "A macro; its use writes out the body with the arguments for the parameters.";
+    EndMacro ".endm" "" "The end of a macro's body.";
+    Rep ".rep" "i, first, last" "Repeats its body with the name = first … last.";
+    EndRep ".endr" "" "The end of a repetition's body.";
+    If ".if" "expression" "Assembles what follows if the value is not zero.";
+    Elif ".elif" "expression" "Assembles what follows if no branch before was taken and the value is not zero.";
+    Else ".else" "" "Assembles what follows if no branch before was taken.";
+    EndIf ".endif" "" "The end of the branches.";
+    Include ".include" "\"file\"|<file>" "The named file: beside this one, or of the library.";
+    Loc ".loc" "\"file\" line" "What follows is attributed to that line of that file.";
+    Error ".error" "\"text\"" "An error with that text.";
+    Schedule ".schedule" "on|off" "Whether the assembler packs what follows into bundles and orders it.";
+    Contract ".contract" "on|off" "Whether a product that only one sum uses becomes a fused operation with it.";
+    Fast ".fast" "reassociate reciprocal|off" "What equations may do beyond what is written.";
+    Ports ".ports" "latched|direct" "Whether inputs are taken together at the tick and outputs published together at `wait`.";
+    LoopBound ".loop_bound" "turns" "The bundle that follows heads a loop of at most so many iterations.";
+    Deadline ".deadline" "port, port = cycle" "Each output is written for the last time in that cycle or before.";
+    Order ".order" "port, port, …" "Every use of one port comes before the first of the next.";
+    Late ".late" "port, port = cycles" "The inputs are read as late as the length of the schedule allows.";
+    Raw ".raw" "slot 0x…" "48 bits for a slot, whatever they mean.";
 }
 
 /// A source file, read.
@@ -377,12 +415,20 @@ pub(crate) struct Ast {
     pub memories: Vec<Memory>,
     /// Operands with a type.
     pub casts: Vec<Cast>,
+    /// Elements of arrays.
+    pub elements: Vec<Element>,
+    /// Equations.
+    pub equations: Vec<Equation>,
+    /// Sizes of declared arrays.
+    pub sizes: Vec<Expr>,
     /// Name templates.
     pub templates: Vec<Template>,
     /// Directives.
     pub directives: Vec<DirectiveLine>,
     /// Names in lines that could not be read and may have declared them: that they are unknown is no further error.
     pub doubtful: BTreeSet<NameId>,
+    /// Lines, from 1, that could not be read.
+    pub broken: Vec<u32>,
 }
 
 /// A binary or unary operator.

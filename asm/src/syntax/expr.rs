@@ -9,6 +9,7 @@
 use crate::report::source::Span;
 use crate::syntax::ast::{ExprId, Node, NodeKind, Operator};
 use crate::syntax::name::NameRef;
+use smallvec::SmallVec;
 use takt_isa::Type;
 
 /// What an expression evaluates to.
@@ -133,6 +134,9 @@ pub enum Fault {
     /// A real number where an integer goes.
     #[error("{0} is not an integer")]
     NotInteger(f64),
+    /// An element of an array of registers.
+    #[error("an element of an array is a register: it has no value before the program runs")]
+    Element,
     /// The caller has reported it.
     #[error("reported")]
     Reported,
@@ -197,10 +201,50 @@ pub fn evaluate(nodes: &[Node], id: ExprId, names: &mut dyn Names) -> Result<Val
                 stack.truncate(first);
                 value
             }
+            NodeKind::Choice => {
+                let (b, a) = (pop(), pop());
+                if pop().is_zero() { b } else { a }
+            }
+            NodeKind::Element(_) => return Err(fault(Fault::Element)),
         };
         stack.push(value);
     }
     Ok(stack.pop().unwrap_or(Value::Int(0)))
+}
+
+/// Where the part of an expression that each node heads begins: the node itself, or its first operand's part.
+pub(crate) fn parts(nodes: &[Node]) -> Vec<u32> {
+    let mut parts: Vec<u32> = Vec::with_capacity(nodes.len());
+    // The beginnings of the parts that no operator has taken yet.
+    let mut open: Vec<u32> = Vec::new();
+    for (index, node) in (0..).zip(nodes) {
+        let operands = match node.kind {
+            NodeKind::Int(_) | NodeKind::Real(_) | NodeKind::Name(_) | NodeKind::Element(_) => 0,
+            NodeKind::Prefix(_) => 1,
+            NodeKind::Infix(_) => 2,
+            NodeKind::Choice => 3,
+            NodeKind::Call(_, count) => count as usize,
+        };
+        let first = open.len().saturating_sub(operands);
+        let start = open.get(first).copied().filter(|_| operands > 0).unwrap_or(index);
+        open.truncate(first);
+        open.push(start);
+        parts.push(start);
+    }
+    parts
+}
+
+/// The parts that are the operands of a node, in order: first and last node of each. `parts` is what [`parts`] gave.
+pub(crate) fn operands(parts: &[u32], node: u32) -> SmallVec<[(u32, u32); 3]> {
+    let (start, mut end) = (parts[node as usize], node);
+    let mut operands = SmallVec::new();
+    while end > start {
+        let first = parts[end as usize - 1];
+        operands.push((first, end - 1));
+        end = first;
+    }
+    operands.reverse();
+    operands
 }
 
 impl Value {
@@ -289,7 +333,8 @@ fn only_integer(operator: &'static str, value: Value) -> Result<i64, Fault> {
     value.integer().map_err(|_| Fault::NeedsInteger { operator, value: value.real() })
 }
 
-fn prefix(operator: Operator, a: Value) -> Result<Value, Fault> {
+/// The value of an operator before one operand.
+pub(crate) fn prefix(operator: Operator, a: Value) -> Result<Value, Fault> {
     Ok(match (operator, a) {
         (Operator::Sub, Value::Int(a)) => Value::Int(a.checked_neg().ok_or(Fault::IntegerOverflow("-"))?),
         (Operator::Sub, Value::Real(a)) => Value::Real(-a),
@@ -299,7 +344,8 @@ fn prefix(operator: Operator, a: Value) -> Result<Value, Fault> {
     })
 }
 
-fn infix(operator: Operator, a: Value, b: Value) -> Result<Value, Fault> {
+/// The value of an operator between two operands.
+pub(crate) fn infix(operator: Operator, a: Value, b: Value) -> Result<Value, Fault> {
     use Operator::*;
     let name = operator.text();
     let integers = || Ok((only_integer(name, a)?, only_integer(name, b)?));
@@ -361,7 +407,8 @@ fn infix(operator: Operator, a: Value, b: Value) -> Result<Value, Fault> {
     }
 }
 
-fn call(function: Function, arguments: &[Value]) -> Result<Value, Fault> {
+/// The value of a function.
+pub(crate) fn call(function: Function, arguments: &[Value]) -> Result<Value, Fault> {
     let name = function.name();
     let takes = function.arguments();
     let (Some(&a), true) = (arguments.first(), takes == 0 || takes == arguments.len()) else {

@@ -37,6 +37,9 @@ pub(crate) struct Mark {
     operations: u32,
     memories: u32,
     casts: u32,
+    elements: u32,
+    equations: u32,
+    sizes: u32,
     templates: u32,
 }
 
@@ -49,6 +52,9 @@ impl Builder<'_> {
             operations: self.ast.operations.len() as u32,
             memories: self.ast.memories.len() as u32,
             casts: self.ast.casts.len() as u32,
+            elements: self.ast.elements.len() as u32,
+            equations: self.ast.equations.len() as u32,
+            sizes: self.ast.sizes.len() as u32,
             templates: self.ast.templates.len() as u32,
         }
     }
@@ -60,6 +66,9 @@ impl Builder<'_> {
         self.ast.operations.truncate(mark.operations as usize);
         self.ast.memories.truncate(mark.memories as usize);
         self.ast.casts.truncate(mark.casts as usize);
+        self.ast.elements.truncate(mark.elements as usize);
+        self.ast.equations.truncate(mark.equations as usize);
+        self.ast.sizes.truncate(mark.sizes as usize);
         self.ast.templates.truncate(mark.templates as usize);
     }
 
@@ -98,6 +107,19 @@ impl Builder<'_> {
         parts.reverse();
         self.ast.templates.push(Template { parts, tail });
         NameRef::template(self.ast.templates.len() as u32 - 1)
+    }
+
+    /// Closes an element whose indices' nodes begin at `starts`: they move out of the list, as those of a template do.
+    fn element(&mut self, name: Name, starts: Vec<u32>) -> u32 {
+        let first = starts.first().copied().unwrap_or(self.ast.nodes.len() as u32);
+        let mut nodes = self.ast.nodes.split_off(first as usize);
+        let mut indices: Vec<Vec<Node>> = Vec::with_capacity(starts.len());
+        for start in starts.into_iter().rev() {
+            indices.push(nodes.split_off((start - first) as usize));
+        }
+        indices.reverse();
+        self.ast.elements.push(Element { name, indices });
+        self.ast.elements.len() as u32 - 1
     }
 
     fn text_of(&self, span: Span) -> &str {
@@ -151,6 +173,8 @@ pub(crate) enum Body {
     /// This many operations, the last of the list.
     Bundle(u32),
     Directive(DirectiveKind, Span),
+    /// An equation, the last of the list.
+    Equation,
 }
 
 type Extra<'a, E> = extra::Full<E, Builder<'a>, ()>;
@@ -300,8 +324,25 @@ fn name_ref<'t, 'a: 't, E: LineError<'t>>(
     plain.or(template).labelled("a name").boxed()
 }
 
-/// The parser of an expression. It knows itself weakly: one that owned itself would never be freed.
-fn expression<'t, 'a: 't, E: LineError<'t>>() -> impl Parser<'t, Tokens<'t>, (), Extra<'a, E>> + Clone {
+/// The indices of an element, in brackets: where the nodes of each begin. As many as `least` or more.
+fn indices<'t, 'a: 't, E: LineError<'t>>(
+    expression: impl Parser<'t, Tokens<'t>, (), Extra<'a, E>> + Clone + 't,
+    least: usize,
+) -> impl Parser<'t, Tokens<'t>, Vec<u32>, Extra<'a, E>> + Clone {
+    here()
+        .then(expression)
+        .map(|(start, ())| start)
+        .separated_by(just(Token::Comma).labelled("`,`"))
+        .at_least(least)
+        .collect::<Vec<_>>()
+        .delimited_by(just(Token::BracketOpen).labelled("`[`"), just(Token::BracketClose).labelled("`]`"))
+}
+
+/// The parser of an expression, with or without elements of arrays: elsewhere than in equations a bracket after a name is
+/// that of a memory operand. It knows itself weakly: one that owned itself would never be freed.
+fn expression<'t, 'a: 't, E: LineError<'t>>(
+    elements: bool,
+) -> impl Parser<'t, Tokens<'t>, (), Extra<'a, E>> + Clone {
     fn fold<'t, 'a, 'b, E: LineError<'t>>(
         _: (),
         operator: Operator,
@@ -311,8 +352,19 @@ fn expression<'t, 'a: 't, E: LineError<'t>>() -> impl Parser<'t, Tokens<'t>, (),
         let span = e.span();
         e.state().node(NodeKind::Infix(operator), span);
     }
-    recursive(|expression| {
+    recursive(move |expression| {
         let name_ref = name_ref(expression.clone());
+        let element = name_ref
+            .clone()
+            .map_with(|name, e| Name { name, span: e.span() })
+            .then(indices(expression.clone(), 1))
+            .filter(move |_| elements)
+            .map_with(|(name, starts), e| {
+                let span = e.span();
+                let builder: &mut Builder<'a> = e.state();
+                let element = builder.element(name, starts);
+                builder.node(NodeKind::Element(element), span);
+            });
         let arguments = expression
             .clone()
             .separated_by(just(Token::Comma))
@@ -346,13 +398,18 @@ fn expression<'t, 'a: 't, E: LineError<'t>>() -> impl Parser<'t, Tokens<'t>, (),
         });
         let parenthesised =
             expression.clone().delimited_by(just(Token::Open), just(Token::Close).labelled("`)`"));
-        let atom = choice((literal, call_or_name, parenthesised)).labelled("an operand");
+        // Where there are no elements, what follows a name is not looked at.
+        let element = match elements {
+            true => element.boxed(),
+            false => call_or_name.clone().boxed(),
+        };
+        let atom = choice((literal, element, call_or_name, parenthesised)).labelled("an operand");
 
         let operator = |level: u16| {
             select! { Token::Operator(operator) if operator.precedence() == level => operator }
                 .labelled("an operator")
         };
-        atom.pratt((
+        let computed = atom.pratt((
             prefix(
                 7,
                 select! { Token::Operator(operator) if operator.is_prefix() => operator }
@@ -370,8 +427,22 @@ fn expression<'t, 'a: 't, E: LineError<'t>>() -> impl Parser<'t, Tokens<'t>, (),
             infix(left(3), operator(3), fold),
             infix(left(2), operator(2), fold),
             infix(left(1), operator(1), fold),
-        ))
-        .boxed()
+        ));
+        let choices = just(Token::Question)
+            .labelled("an operator")
+            .ignore_then(expression.clone())
+            .then(just(Token::Colon).labelled("`:`").ignore_then(expression))
+            .or_not();
+        computed
+            .then(choices)
+            .map_with(|(_, choices): ((), Option<((), ())>), e| {
+                let span = e.span();
+                if choices.is_some() {
+                    let builder: &mut Builder<'a> = e.state();
+                    builder.node(NodeKind::Choice, span);
+                }
+            })
+            .boxed()
     })
 }
 
@@ -381,7 +452,7 @@ fn expression<'t, 'a: 't, E: LineError<'t>>() -> impl Parser<'t, Tokens<'t>, (),
 pub(crate) fn line<'t, 'a: 't, E: LineError<'t>>(
     shortcut: bool,
 ) -> impl Parser<'t, Tokens<'t>, Line, Extra<'a, E>> {
-    let expression = expression().boxed();
+    let expression = expression(false).boxed();
     let name_ref = name_ref(expression.clone());
     let name = name_ref.clone().map_with(|name, e| Name { name, span: e.span() });
     let expr = here()
@@ -440,7 +511,13 @@ pub(crate) fn line<'t, 'a: 't, E: LineError<'t>>(
         builder.ast.memories.push(Memory { offset: None, base });
         Operand { kind: OperandKind::Memory(builder.ast.memories.len() as u32 - 1), span }
     });
-    let operand = choice((place.clone(), memory_alone, memory_or_expression))
+    // With one index it may be a place in memory: what the name means decides.
+    let element = name.clone().then(indices(expression.clone(), 2)).map_with(|(name, starts), e| {
+        let span = e.span();
+        let builder: &mut Builder<'a> = e.state();
+        Operand { kind: OperandKind::Element(builder.element(name, starts)), span }
+    });
+    let operand = choice((place.clone(), memory_alone, element, memory_or_expression))
         .then(ty)
         .map_with(cast)
         .map_with(|operand, e| (e.state() as &mut Builder<'a>).ast.operands.push(operand))
@@ -489,6 +566,47 @@ pub(crate) fn line<'t, 'a: 't, E: LineError<'t>>(
     quick.or(proper)
 }
 
+/// The parser of a line that holds an equation: an optional label, what is written, `=`, and what is computed.
+pub(crate) fn equation<'t, 'a: 't, E: LineError<'t>>() -> impl Parser<'t, Tokens<'t>, Line, Extra<'a, E>> {
+    let expression = expression(true).boxed();
+    let name = name_ref(expression.clone()).map_with(|name, e| Name { name, span: e.span() });
+    let place = just(Token::At)
+        .ignore_then(name.clone())
+        .map_with(|name, e| Operand { kind: OperandKind::Place(name.name), span: e.span() });
+    let element = name.clone().then(indices(expression.clone(), 1)).map_with(|(name, starts), e| {
+        let span = e.span();
+        let builder: &mut Builder<'a> = e.state();
+        Operand { kind: OperandKind::Element(builder.element(name, starts)), span }
+    });
+    let plain = name.clone().map(|name| Operand { kind: OperandKind::Name(name.name), span: name.span });
+    let target = choice((place, element, plain)).labelled("a register to write");
+    let value = here()
+        .then(expression)
+        .map_with(|(first, ()), e| {
+            let span = e.span();
+            let builder: &mut Builder<'a> = e.state();
+            Expr { id: builder.expr(first), span }
+        })
+        .labelled("an expression");
+    let comma = || just(Token::Comma).labelled("`,`");
+    let body = target
+        .separated_by(comma())
+        .at_least(1)
+        .collect::<Vec<_>>()
+        .then_ignore(just(Token::Assign).labelled("`=`"))
+        .then(value.separated_by(comma()).at_least(1).collect::<Vec<_>>())
+        .map_with(|(targets, values), e| {
+            let span = e.span();
+            let builder: &mut Builder<'a> = e.state();
+            builder.ast.equations.push(Equation { targets, values, span });
+        });
+    let label = name.then_ignore(just(Token::Colon)).or_not();
+    label
+        .then(body)
+        .then_ignore(just(Token::Newline).labelled("the end of the line"))
+        .map(|(label, ())| Line { label, body: Body::Equation })
+}
+
 #[inline]
 fn push_operation(builder: &mut Builder<'_>, mnemonic: Name, count: usize, span: Span) {
     let first = builder.ast.operands.len() as u32 - count as u32;
@@ -524,8 +642,22 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
         Token::Directive(Directive::Input) => Declares::Input,
         Token::Directive(Directive::Output) => Declares::Output,
     };
+    let sizes = expr
+        .clone()
+        .separated_by(comma())
+        .at_least(1)
+        .collect::<Vec<_>>()
+        .delimited_by(just(Token::BracketOpen).labelled("`[`"), just(Token::BracketClose).labelled("`]`"))
+        .or_not()
+        .map_with(|sizes, e| {
+            let all = &mut (e.state() as &mut Builder<'a>).ast.sizes;
+            let sizes = sizes.unwrap_or_default();
+            all.extend(&sizes);
+            ((all.len() - sizes.len()) as u32, sizes.len() as u32)
+        });
     let declaration = name
         .clone()
+        .then(sizes)
         .then(just(Token::Colon).labelled("`:`").ignore_then(name.clone().labelled("a type")).or_not())
         .then(
             just(Token::At)
@@ -533,7 +665,7 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
                 .ignore_then(expr.clone().labelled("a register's place or a port's number"))
                 .or_not(),
         )
-        .map(|((name, ty), place)| Declaration { name, ty, place });
+        .map(|(((name, sizes), ty), place)| Declaration { name, sizes, ty, place });
     // Separated by blanks or commas.
     let declarations = declaration
         .clone()
@@ -590,6 +722,13 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
     let schedule = is(Directive::Schedule)
         .ignore_then(name.clone().labelled("`on` or `off`"))
         .map(DirectiveKind::Schedule);
+    let allowed = comma().or_not().ignore_then(name.clone()).repeated().collect::<Vec<_>>();
+    let fast = is(Directive::Fast)
+        .ignore_then(name.clone().labelled("`reassociate`, `reciprocal` or `off`").then(allowed))
+        .map(|(first, mut more)| {
+            more.insert(0, first);
+            DirectiveKind::Fast(more)
+        });
     let contract = is(Directive::Contract)
         .ignore_then(name.clone().labelled("`on` or `off`"))
         .map(DirectiveKind::Contract);
@@ -615,16 +754,23 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
         .then(just(Token::Assign).labelled("`=`").ignore_then(expr.clone().labelled("cycles")).or_not())
         .map(|(ports, cost)| DirectiveKind::Late(ports, cost));
     let error = is(Directive::Error).ignore_then(text()).map(DirectiveKind::Error);
+    let columns = expr
+        .clone()
+        .then_ignore(comma())
+        .then(expr.clone())
+        .delimited_by(just(Token::BracketOpen).labelled("`[`"), just(Token::BracketClose).labelled("`]`"))
+        .or_not();
     let at = text()
         .then(expr.clone().labelled("a line number"))
-        .map(|(file, line)| Loc::At(file, line))
+        .then(columns)
+        .map(|((file, line), columns)| Loc::At(file, line, columns))
         .or(name.map(Loc::None));
     let loc = is(Directive::Loc)
         .ignore_then(at.separated_by(just(Token::Bars).labelled("`||`")).at_least(1).collect::<Vec<_>>())
         .map(DirectiveKind::Loc);
     choice((
         bare, declare, float, word, constant, preset, space, branch, elif, rep, macro_, include, error, loc,
-        schedule, contract, latched, loop_bound, deadline, order, late,
+        schedule, contract, fast, latched, loop_bound, deadline, order, late,
     ))
     .map_with(|kind, e| Body::Directive(kind, e.span()))
 }

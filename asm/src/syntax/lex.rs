@@ -13,7 +13,7 @@ use logos::Logos;
 #[derive(Logos, Clone, Copy, PartialEq, Eq, Debug)]
 #[logos(skip r"[ \t\r\x0C]+")]
 #[logos(skip(r";[^\n]*", allow_greedy = true))]
-enum Raw {
+pub(super) enum Raw {
     #[token("\n")]
     Newline,
     #[regex(r"[A-Za-z_][A-Za-z0-9_.]*")]
@@ -62,6 +62,8 @@ enum Raw {
     At,
     #[token("=")]
     Assign,
+    #[token("?")]
+    Question,
     #[token("||")]
     Bars,
     #[token("==")]
@@ -131,6 +133,7 @@ pub(crate) enum Token {
     BracketClose,
     At,
     Assign,
+    Question,
     Bars,
     Operator(Operator),
     /// Reported already; no line that holds one is parsed.
@@ -361,6 +364,10 @@ fn token(raw: Raw, text: &str, nesting: &mut usize, names: &mut Interner) -> Res
         Raw::BracketClose => Token::BracketClose,
         Raw::At => Token::At,
         Raw::Assign => Token::Assign,
+        Raw::Question => {
+            nest();
+            Token::Question
+        }
         Raw::Bars => Token::Bars,
         Raw::Eq => Token::Operator(Operator::Eq),
         Raw::Ne => Token::Operator(Operator::Ne),

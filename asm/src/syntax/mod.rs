@@ -9,5 +9,6 @@ pub(crate) mod intern;
 mod lex;
 pub(crate) mod name;
 pub(crate) mod parse;
+pub mod tokens;
 
 pub use expression::Expression;

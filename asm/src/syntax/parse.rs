@@ -82,6 +82,7 @@ pub(crate) fn parse_expression(
 fn parse_chunk(chunk: &Chunk, source: &Source, ast: &mut Ast, sink: &mut Sink, shortcut: bool) {
     let mut builder = Builder { ast: std::mem::take(ast), text: &source.text, base: source.base, line: 0 };
     let quick = grammar::line::<EmptyErr>(shortcut);
+    let equation = grammar::equation::<EmptyErr>();
     let mut start = 0;
     for line in &chunk.lines {
         let tokens = &chunk.tokens[start..line.end as usize];
@@ -93,7 +94,12 @@ fn parse_chunk(chunk: &Chunk, source: &Source, ast: &mut Ast, sink: &mut Sink, s
         builder.line = line.number;
         let mark = builder.mark();
         let end = tokens[tokens.len() - 1].1;
-        let parsed = quick.parse_with_state(tokens.split_token_span(end), &mut builder).into_output();
+        let input = tokens.split_token_span(end);
+        let parsed = if is_equation(tokens) {
+            equation.parse_with_state(input, &mut builder).into_output()
+        } else {
+            quick.parse_with_state(input, &mut builder).into_output()
+        };
         match parsed {
             Some(parsed) => add(parsed, line, tokens, source, &mut builder.ast, sink),
             None => {
@@ -109,8 +115,21 @@ fn parse_chunk(chunk: &Chunk, source: &Source, ast: &mut Ast, sink: &mut Sink, s
         }
     }
     // The parser may hold on to the builder's lifetime until it is dropped.
-    drop(quick);
+    drop((quick, equation));
     *ast = builder.ast;
+}
+
+/// Whether a line is meant as an equation: of the others only directives have a `=`.
+fn is_equation(tokens: &[(Token, Span)]) -> bool {
+    let mut assigns = false;
+    for (token, _) in tokens {
+        match token {
+            Token::Directive(_) | Token::NotDirective => return false,
+            Token::Assign => assigns = true,
+            _ => {}
+        }
+    }
+    assigns
 }
 
 /// Adds a parsed line to the tree.
@@ -143,6 +162,7 @@ fn add(
             ast.directives.push(DirectiveLine { kind, span });
             StatementKind::Directive(ast.directives.len() as u32 - 1)
         }
+        Body::Equation => StatementKind::Equation(ast.equations.len() as u32 - 1),
     };
     ast.statements.push(Statement { label: parsed.label, kind, line: line.number });
 }
@@ -163,6 +183,7 @@ fn number_lines(operations: &mut [Operation], tokens: &[(Token, Span)], first: u
 /// Keeps of a line that could not be read what other lines depend on: its label, the block that it opens or closes, and
 /// the names that it may have declared.
 fn broken(tokens: &[(Token, Span)], line: &LineTokens, ast: &mut Ast) {
+    ast.broken.push(line.number);
     let (label, rest) = match tokens {
         [(Token::Name(name), span), (Token::Colon, _), rest @ ..] => {
             (Some(Name { name: NameRef::plain(*name), span: *span }), rest)
@@ -205,30 +226,38 @@ fn broken(tokens: &[(Token, Span)], line: &LineTokens, ast: &mut Ast) {
 
 /// Whether an operand nests deeper, or is longer, than the assembler reads; then it is reported.
 fn nests_too_deeply(tokens: &[(Token, Span)], sink: &mut Sink) -> bool {
-    // For each open bracket, and for the operand as a whole, the prefix operators and powers that await their operand.
-    let mut pending: Vec<usize> = vec![0];
+    // For each open bracket, and for the operand as a whole, the prefix operators and powers that await their operand, and
+    // the choices that await their last alternative.
+    let mut pending: Vec<[usize; 2]> = vec![[0, 0]];
     let (mut depth, mut length, mut operand_before) = (0, 0, false);
     for &(token, span) in tokens {
         length += 1;
         let mut operand = false;
+        let last = pending.len() - 1;
         match token {
             Token::Open | Token::BracketOpen | Token::Begin(_) => {
-                pending.push(0);
+                pending.push([0, 0]);
                 depth += 1;
             }
             Token::Close | Token::BracketClose | Token::End(_) => {
-                if pending.len() > 1 {
-                    depth -= 1 + pending.pop().unwrap_or(0);
+                if last > 0 {
+                    depth -= 1 + pending.pop().map_or(0, |[operators, choices]| operators + choices);
                 }
                 operand = true;
             }
             Token::Operator(operator) if operator == Operator::Power || !operand_before => {
                 depth += 1;
-                *pending.last_mut().unwrap_or(&mut 0) += 1;
+                pending[last][0] += 1;
             }
-            Token::Operator(_) | Token::Comma | Token::Bars | Token::Middle(_) => {
-                depth -= std::mem::take(pending.last_mut().unwrap_or(&mut 0));
-                if pending.len() == 1 && !matches!(token, Token::Operator(_)) {
+            Token::Question => {
+                depth = depth + 1 - std::mem::take(&mut pending[last][0]);
+                pending[last][1] += 1;
+            }
+            Token::Operator(_) | Token::Colon => depth -= std::mem::take(&mut pending[last][0]),
+            Token::Comma | Token::Bars | Token::Middle(_) | Token::Assign => {
+                let [operators, choices] = std::mem::take(&mut pending[last]);
+                depth -= operators + choices;
+                if last == 0 {
                     length = 0;
                 }
             }
@@ -267,8 +296,12 @@ fn explain<'t, 'a: 't>(
     sink: &mut Sink,
 ) {
     let end = tokens.last().map_or(Span::default(), |last| last.1);
-    let parser = grammar::line::<Rich<'t, Token, Span>>(false);
-    let errors = parser.parse_with_state(tokens.split_token_span(end), builder).into_errors();
+    let input = tokens.split_token_span(end);
+    let errors = if is_equation(tokens) {
+        grammar::equation::<Rich<'t, Token, Span>>().parse_with_state(input, builder).into_errors()
+    } else {
+        grammar::line::<Rich<'t, Token, Span>>(false).parse_with_state(input, builder).into_errors()
+    };
     let slice = |span: Span| {
         let range = (span.start - source.base) as usize..(span.end - source.base) as usize;
         source.text.get(range).unwrap_or("")
@@ -358,13 +391,23 @@ fn describe<'s>(
             format!("{shown} in the middle of a line"),
             Some("a directive begins its line; only a label may stand before it".to_owned()),
         ),
-        (Some(Token::Name(_) | Token::End(_)), Token::Assign) if directive.is_none() && !is_alone => (
-            "a constant is defined by a directive".to_owned(),
-            Some(format!(
-                "write `.const {}`",
-                text(tokens[0].1.to(tokens[tokens.len().saturating_sub(2)].1))
-            )),
+        _ if is_equation(tokens) && tokens.iter().any(|(token, _)| *token == Token::Bars) => (
+            "an equation within a bundle".to_owned(),
+            Some("an equation has a line of its own: the scheduler packs its operations".to_owned()),
         ),
+        (Some(_), Token::Assign) if tokens[..at].iter().any(|(token, _)| *token == Token::Assign) => {
+            ("a second `=`".to_owned(), Some("`==` compares; `a, b = x, y` writes two registers".to_owned()))
+        }
+        (Some(Token::Name(_)), Token::Name(_) | Token::Int(_) | Token::Real(_)) if is_equation(tokens) => (
+            format!("{shown} follows an operand"),
+            Some("is an operator missing, or a function's parentheses?".to_owned()),
+        ),
+        (_, Token::Newline)
+            if tokens.iter().filter(|(token, _)| *token == Token::Question).count()
+                > tokens.iter().skip(2).filter(|(token, _)| *token == Token::Colon).count() =>
+        {
+            ("the choice is incomplete".to_owned(), Some("a choice is written `c ? a : b`".to_owned()))
+        }
         (_, Token::Name(name))
             if operand(previous) && name.op().is_some() && directive.is_none() && !is_alone =>
         {
@@ -425,6 +468,7 @@ fn pattern(pattern: &RichPattern<'_, Token>) -> String {
             Token::Colon => "`:`".to_owned(),
             Token::At => "`@`".to_owned(),
             Token::Assign => "`=`".to_owned(),
+            Token::Question => "`?`".to_owned(),
             Token::Bars => "`||`".to_owned(),
             Token::Open => "`(`".to_owned(),
             Token::Close => "`)`".to_owned(),
@@ -470,7 +514,7 @@ mod tests {
             pieces in prop::collection::vec(
                 prop::sample::select(vec![
                     "a", "b", "fadd", "l:", ":", "1", "2.5", ",", ", ", " ", " ", "||", " || ", "||\n", "\n", "[", "]", "4[a]",
-                    "t[b]", "2.5[a]", "@", "@m3", "-", "+", "x{i}", "(", ")", ".reg", "; c",
+                    "t[b]", "=", " = ", "?", "t[b,c]", "2.5[a]", "@", "@m3", "-", "+", "x{i}", "(", ")", ".reg", "; c",
                 ]),
                 0..14,
             )

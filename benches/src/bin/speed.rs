@@ -188,7 +188,8 @@ fn assembler(text: &mut String) -> Outcome<()> {
 
 fn assembler_in(folder: &Path, text: &mut String) -> Outcome<()> {
     let gnu = |file: &Path| -> Outcome<()> {
-        let status = Command::new("as").arg("-o").arg(folder.join("out.o")).arg(file).stdin(Stdio::null()).status()?;
+        let status =
+            Command::new("as").arg("-o").arg(folder.join("out.o")).arg(file).stdin(Stdio::null()).status()?;
         if status.success() { Ok(()) } else { Err("`as` failed".into()) }
     };
     let version = Command::new("as").arg("--version").output();

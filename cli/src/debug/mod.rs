@@ -33,7 +33,7 @@ use takt_debug::session::{Control, Options, Rows, Session, Unit, Why};
 pub(crate) struct Debug {
     /// Source or image. With --track, `tracking` (as if nothing is said), `tracking_literal`, or a file.
     #[arg(required_unless_present = "track")]
-    file: Option<PathBuf>,
+    pub(crate) file: Option<PathBuf>,
     #[command(flatten)]
     machine: OptionalMachine,
     #[command(flatten)]
@@ -95,19 +95,10 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
     }
 
     let control = Arc::new(Control::default());
-    let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
-    let session = if arguments.closed_loop.track {
-        let recording = arguments.closed_loop.record(arguments.file.as_deref(), load, ROWS)?;
-        in_recording(recording, &control, out)?
-    } else {
-        let path = arguments.file.as_deref().context("no file")?;
-        let loaded = load.with_source(path)?;
-        let inputs = arguments.inputs.as_deref().map(|path| rows(path, &loaded)).transpose()?;
-        changed_sources(path, &loaded, color);
-        let Loaded { program, constants, sources, names } = loaded;
-        let (tick, control) = (arguments.tick, Arc::clone(&control));
-        Session::new(&program, Options { inputs, tick, constants, sources, names, control })?
-    };
+    let (session, why) = open(arguments, &control, color)?;
+    if let Some(why) = why {
+        writeln!(out, "{why}")?;
+    }
     let mut console = Console::new(session);
     #[cfg(feature = "tui")]
     if arguments.tui {
@@ -122,6 +113,27 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
         None => batch(&mut console, "standard input", &mut BufReader::new(std::io::stdin()), color, out)?,
     }
     Ok(())
+}
+
+/// The session that the command line asks for, and why it begins where it does, if there is a reason.
+pub(crate) fn open(
+    arguments: &Debug,
+    control: &Arc<Control>,
+    color: bool,
+) -> Result<(Session, Option<String>)> {
+    let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
+    if arguments.closed_loop.track {
+        let recording = arguments.closed_loop.record(arguments.file.as_deref(), load, ROWS)?;
+        let (session, why) = in_recording(recording, control)?;
+        return Ok((session, Some(why)));
+    }
+    let path = arguments.file.as_deref().context("no file")?;
+    let loaded = load.with_source(path)?;
+    let inputs = arguments.inputs.as_deref().map(|path| rows(path, &loaded)).transpose()?;
+    changed_sources(path, &loaded, color);
+    let Loaded { program, constants, sources, names } = loaded;
+    let (tick, control) = (arguments.tick, Arc::clone(control));
+    Ok((Session::new(&program, Options { inputs, tick, constants, sources, names, control })?, None))
 }
 
 /// Warns of sources that were changed since the image that is debugged was made of them. They are looked for where the
@@ -160,12 +172,11 @@ fn rows(path: &Path, loaded: &Loaded) -> Result<Arc<Rows>> {
 }
 
 /// A session on what a program did in a closed loop, at the period that is worth a look.
-fn in_recording(recording: Recording, control: &Arc<Control>, out: &mut Out) -> Result<Session> {
-    let Recording { loaded, inputs, tick, period, why } = recording;
+fn in_recording(recording: Recording, control: &Arc<Control>) -> Result<(Session, String)> {
+    let Recording { loaded, inputs, tick, period, why: reason } = recording;
     let Loaded { program, constants, sources, names } = loaded;
     let (inputs, control) = (Some(Arc::new(inputs)), Arc::clone(control));
     let mut session = Session::new(&program, Options { inputs, tick, constants, sources, names, control })?;
-    writeln!(out, "{why}")?;
     // To where the period's first bundle is about to issue.
     let why = match session.go_to_period(period) {
         Why::Done => session.step(Unit::Bundle),
@@ -174,7 +185,7 @@ fn in_recording(recording: Recording, control: &Arc<Control>, out: &mut Out) -> 
     if why != Why::Done {
         bail!("period {period} cannot be reached: {why:?}");
     }
-    Ok(session)
+    Ok((session, reason))
 }
 
 /// Commands from a file or a pipe: all are executed, whatever becomes of one.

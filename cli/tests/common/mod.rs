@@ -1,6 +1,8 @@
 //! The binary under test, and folders to run it in.
 #![allow(dead_code, unreachable_pub, reason = "each test file uses its part")]
 
+pub mod protocol;
+
 use std::ffi::OsStr;
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -3,6 +3,7 @@
 //! | written | means |
 //! |---|---|
 //! | `x` | what the source line at hand would read: the port or register of that name, or the label's address, or the constant |
+//! | `P[2,3]` | the element of an array of registers |
 //! | `@m12` | the register at that place (`m12` too, if nothing else is named so) |
 //! | `table[i]`, `4[i]`, `[i]` | the data word at that offset and index, as binary32 |
 //! | `x:int`, `@m12:bits`, `[i]:float` | the same bits as a value of that type |
@@ -87,7 +88,7 @@ impl Machine<'_> {
     /// What a bundle that issued in the cycle to come would read.
     pub(crate) fn register(&self, register: Register) -> Option<u32> {
         let now = self.emulator.now();
-        let due = self.emulator.underway().filter(|retire| retire.cycle == now);
+        let due = self.emulator.in_flight().filter(|retire| retire.cycle == now);
         due.filter(|retire| retire.register == Some(register))
             .map(|retire| retire.value)
             .next()
@@ -123,7 +124,7 @@ impl Machine<'_> {
     /// Cycles until the result in flight to a register is there, if there is one.
     pub(crate) fn arrives(&self, register: Register) -> Option<Cycle> {
         let now = self.emulator.now();
-        let flying = self.emulator.underway().filter(|retire| retire.register == Some(register));
+        let flying = self.emulator.in_flight().filter(|retire| retire.register == Some(register));
         flying.map(|retire| retire.cycle.saturating_sub(now)).filter(|left| *left > 0).max()
     }
 
@@ -443,10 +444,16 @@ fn parse(text: &str, known: Known<'_>, depth: usize) -> Result<Live, String> {
             operand = Some(Operand::Register(register, Type::F));
         } else if bytes.get(at) == Some(&b'[') {
             let end = closing(bytes, at).ok_or_else(|| format!("`{}`: a `]` is missing", &text[at..]))?;
-            let part = |text: &str| parse(text, known, depth - 1).map(Box::new);
-            let offset = part(if head.is_empty() { "0" } else { head })?;
-            let index = part(&text[at + 1..end])?;
-            operand = Some(Operand::Memory { offset, index, ty: Type::F });
+            let element = text[start..=end].replace(' ', "");
+            operand = Some(match meanings(&element, known) {
+                Some(_) => name(&element, known)?,
+                None => {
+                    let part = |text: &str| parse(text, known, depth - 1).map(Box::new);
+                    let offset = part(if head.is_empty() { "0" } else { head })?;
+                    let index = part(&text[at + 1..end])?;
+                    Operand::Memory { offset, index, ty: Type::F }
+                }
+            });
             at = end + 1;
         } else if head.is_empty() {
             plain.push(char::from(bytes[at]));

@@ -91,12 +91,12 @@ impl Interest {
     pub(super) fn next(&self, emulator: &Emulator, issuing: Option<BundleAddress>, until: Cycle) -> Cycle {
         let now = emulator.now();
         // While the program waits and nothing is in flight, nothing changes until the tick.
-        let idle = emulator.due_tick().filter(|_| emulator.underway().next().is_none());
-        let mut underway = emulator.underway().filter(|retire| retire.cycle > now);
+        let idle = emulator.due_tick().filter(|_| emulator.in_flight().next().is_none());
+        let mut in_flight = emulator.in_flight().filter(|retire| retire.cycle > now);
         let each = self.clock
             || self.every && idle.is_none()
             || issuing.is_some_and(|address| self.bundles.contains(&address))
-            || underway.any(|retire| self.bundles.contains(&retire.address));
+            || in_flight.any(|retire| self.bundles.contains(&retire.address));
         if each {
             return (now + 1).min(until);
         }

@@ -327,7 +327,7 @@ impl Session {
     /// one whose result is there for the bundle that issues next but one. What is there already is left out.
     pub fn in_flight(&self) -> Vec<(Retire, Cycle)> {
         let now = self.cycle();
-        let pending = self.core.emulator.underway().filter(|retire| retire.cycle > now);
+        let pending = self.core.emulator.in_flight().filter(|retire| retire.cycle > now);
         let mut pending: Vec<_> = pending.map(|retire| (*retire, retire.cycle - now)).collect();
         pending.sort_by_key(|(retire, left)| (*left, retire.slot));
         pending

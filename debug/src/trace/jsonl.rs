@@ -40,13 +40,12 @@ impl<'w> JsonLines<'w> {
         }
         let row = retire.op.row();
         let machine = program.machine;
-        let location = program.operation_location(retire.address, retire.slot);
         Some(Line {
             issued: Some(retire.issued),
             bundle: Some(retire.address),
             slot: Some(machine.slot(retire.slot).name),
             op: Some(row.mnemonic),
-            source: location.map(|location| program.place_text(location)),
+            source: program.operation_place(retire.address, retire.slot),
             register: retire.register.map(|register| program.register_text(register)),
             bits: (retire.register.is_some() || retire.memory.is_some())
                 .then(|| format!("0x{:08x}", retire.value)),

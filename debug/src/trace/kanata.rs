@@ -116,8 +116,8 @@ impl<'w> Kanata<'w> {
                 cycle,
                 format_args!("L\t{id}\t0\t{address} {}: {label}{text}", machine.slot(slot).name),
             );
-            if let Some(location) = program.operation_location(address, slot) {
-                self.line(cycle, format_args!("L\t{id}\t1\t{}", program.place_text(location)));
+            if let Some(place) = program.operation_place(address, slot) {
+                self.line(cycle, format_args!("L\t{id}\t1\t{place}"));
             }
             self.line(cycle, format_args!("S\t{id}\t0\t{stage}"));
             rows.push((id, slot, instruction));

@@ -426,7 +426,7 @@ impl Machine {
         if let Some(reason) = self.shared(Function::Memory) {
             return Some(reason);
         }
-        if self.hosts(Function::Control, 0).is_none() {
+        if self.host_from(Function::Control, 0).is_none() {
             return Some(MachineReason::NoSequencer);
         }
         let depths = [
@@ -446,7 +446,7 @@ impl Machine {
     }
 
     /// The first slot from `from` on that hosts a function.
-    const fn hosts(&self, function: Function, from: usize) -> Option<usize> {
+    const fn host_from(&self, function: Function, from: usize) -> Option<usize> {
         let mut s = from;
         while s < self.slots.len() {
             let mut u = 0;
@@ -463,8 +463,8 @@ impl Machine {
 
     /// That two slots host a function.
     const fn shared(&self, function: Function) -> Option<MachineReason> {
-        let Some(first) = self.hosts(function, 0) else { return None };
-        let Some(second) = self.hosts(function, first + 1) else { return None };
+        let Some(first) = self.host_from(function, 0) else { return None };
+        let Some(second) = self.host_from(function, first + 1) else { return None };
         let (slot, other) = (self.slots[second].name, self.slots[first].name);
         Some(MachineReason::TwoSlots { function, slot, other })
     }

@@ -66,6 +66,65 @@ impl Slot {
     }
 }
 
+/// A set of slots of a machine, which has [`MAX_SLOTS`](super::check::MAX_SLOTS) at most.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default, Debug)]
+pub struct Slots(u8);
+
+impl Slots {
+    /// The set of one slot.
+    pub const fn of(slot: SlotIndex) -> Slots {
+        Slots(1 << slot.get())
+    }
+
+    /// Whether a slot is in it.
+    pub const fn contains(self, slot: SlotIndex) -> bool {
+        self.0 >> slot.get() & 1 == 1
+    }
+
+    /// Whether no slot is in it.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// How many slots are in it.
+    pub const fn len(self) -> usize {
+        self.0.count_ones() as usize
+    }
+
+    /// The first slot of it.
+    pub const fn first(self) -> Option<SlotIndex> {
+        SlotIndex::new(self.0.trailing_zeros() as usize)
+    }
+
+    /// The slots that are in both.
+    #[must_use]
+    pub const fn and(self, other: Slots) -> Slots {
+        Slots(self.0 & other.0)
+    }
+
+    /// The slots that are in either.
+    #[must_use]
+    pub const fn or(self, other: Slots) -> Slots {
+        Slots(self.0 | other.0)
+    }
+
+    /// Whether all its slots are in another set.
+    pub const fn is_within(self, other: Slots) -> bool {
+        self.0 & !other.0 == 0
+    }
+
+    /// Its slots, ascending.
+    pub fn iter(self) -> impl DoubleEndedIterator<Item = SlotIndex> {
+        SlotIndex::all().filter(move |slot| self.contains(*slot))
+    }
+}
+
+impl FromIterator<SlotIndex> for Slots {
+    fn from_iter<I: IntoIterator<Item = SlotIndex>>(slots: I) -> Slots {
+        slots.into_iter().fold(Slots::default(), |set, slot| set.or(Slots::of(slot)))
+    }
+}
+
 /// One row of the table.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct Machine {
@@ -135,7 +194,7 @@ T1 = Machine {
     slots: &[Slot {
         name: "one",
         bank: bank("r", 0, 512),
-        // A sine at most every nine cycles: then what is underway needs as many places as the other units' latency.
+        // A sine at most every nine cycles: then what is in flight needs as many places as the other units' latency.
         units: &[
             ADD,
             CONVERT,
@@ -160,7 +219,7 @@ T1 = Machine {
 /// The fast machine with fused multiply-add.
 T4 = Machine {
     name: "t4",
-    text: "The fast machine with fused multiply-add: product and sum in one operation, with one rounding; division beside the ALU.",
+    text: "The fast machine with fused multiply-add: product and sum in one operation, with one rounding; division beside the adder, conversion beside the ALU.",
     slots: &[
         Slot {
             name: "mul",
@@ -172,8 +231,8 @@ T4 = Machine {
                 ARCCOSINE,
             ],
         },
-        Slot { name: "add", bank: bank("a", 256, 256), units: &[ADD] },
-        Slot { name: "aux", bank: bank("x", 512, 256), units: &[ALU, CONVERT, DIVROOT, MEMORY, SEQUENCER] },
+        Slot { name: "add", bank: bank("a", 256, 256), units: &[ADD, DIVROOT] },
+        Slot { name: "aux", bank: bank("x", 512, 256), units: &[ALU, CONVERT, MEMORY, SEQUENCER] },
     ],
     inputs: bank("i", 768, 256),
     outputs_per_bank: 32,
@@ -209,6 +268,16 @@ impl Machine {
         &self,
     ) -> impl DoubleEndedIterator<Item = (SlotIndex, &'static Slot)> + Clone + use<> {
         SlotIndex::all().zip(self.slots)
+    }
+
+    /// The slots that host a unit for `function`. None do for idle operations: every slot takes them.
+    pub fn hosts(&self, function: Function) -> Slots {
+        self.numbered_slots().filter(|(_, slot)| slot.unit_for(function).is_some()).map(|(s, _)| s).collect()
+    }
+
+    /// The slots whose bank has a register: one at most.
+    pub fn writers(&self, register: Register) -> Slots {
+        self.numbered_slots().filter(|(_, slot)| slot.bank.contains(register)).map(|(s, _)| s).collect()
     }
 
     /// The banks: one for each slot, in slot order, then the inputs.

@@ -2,7 +2,7 @@
 
 use crate::inputs::{CIRCLE, Random, moves, pair, recorded, words};
 use crate::integrator::{Off, scenario};
-use crate::processor::{LITERAL, PROGRAMS, Processor, assemble};
+use crate::processor::{EQUATIONS, LITERAL, PROGRAMS, Processor, TRACKING, assemble, source};
 use takt_asm::Schedule;
 use takt_isa::{MACHINES, Machine};
 use takt_programs::hybrid::Inputs;
@@ -53,4 +53,31 @@ fn machines_and_schedules_agree_bit_for_bit() {
             }
         }
     }
+}
+
+/// `tracking_equations.s` is `tracking.s`: outputs, state and flags bit for bit, every period in the same cycles, from half the
+/// lines.
+#[test]
+fn equations_compute_what_the_hand_written_program_does() {
+    let stimuli = stimuli();
+    for &machine in MACHINES {
+        let [mut written, mut equations] =
+            [TRACKING, EQUATIONS].map(|path| Processor::shipped(path, machine));
+        for (period, inputs) in stimuli.iter().enumerate() {
+            let outputs = written.period(inputs).expect("no input makes the program fault");
+            assert_eq!(equations.period(inputs), Ok(outputs), "{}, period {period}", machine.name);
+            for name in state(TRACKING) {
+                let (array, index) = name.split_at(name.len() - 1);
+                let element = equations.state(&format!("{array}[{index}]"));
+                assert_eq!(element, written.state(&name), "{}, period {period}: {name}", machine.name);
+            }
+            let seen = |processor: &Processor| (processor.emulator().flags(), processor.cycles());
+            assert_eq!(seen(&equations), seen(&written), "{}, period {period}", machine.name);
+        }
+    }
+    let lines = |path| {
+        let lines = source(path).lines().map(|line| line.split(';').next().unwrap_or("").trim());
+        lines.filter(|line| !line.is_empty()).count()
+    };
+    assert!(2 * lines(EQUATIONS) <= lines(TRACKING), "{} lines, {}", lines(EQUATIONS), lines(TRACKING));
 }

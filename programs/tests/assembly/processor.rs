@@ -10,9 +10,11 @@ use takt_programs::hybrid::{Inputs, Outputs, TrackingController};
 
 /// `tracking.s`, shared work done once.
 pub(crate) const TRACKING: &str = "hybrid/tracking.s";
+/// `tracking_equations.s`, the same in equations.
+pub(crate) const EQUATIONS: &str = "hybrid/tracking_equations.s";
 /// `tracking_literal.s`, every equation as printed.
 pub(crate) const LITERAL: &str = "hybrid/tracking_literal.s";
-/// Both.
+/// `tracking.s` and `tracking_literal.s`.
 pub(crate) const PROGRAMS: [&str; 2] = [TRACKING, LITERAL];
 
 /// Whether to take the time for everything: in release builds, and where `TAKT_FULL=1` asks for it.

@@ -1,4 +1,5 @@
-//! `programs/library/math.s`: what each macro's error is, what it raises, what it costs, on every machine.
+//! `programs/library/math.s`: what each macro's error is, what it raises, what it costs, on every machine; and
+//! `programs/library/matrix.s` ([`matrix`]).
 //!
 //! By default over a sample of operands; with `TAKT_FULL=1` over all 2³², then the figures must come out exactly:
 //!
@@ -12,6 +13,7 @@ mod batch;
 mod common;
 mod cost;
 mod functions;
+mod matrix;
 mod measure;
 mod pairs;
 

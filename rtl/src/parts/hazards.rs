@@ -62,8 +62,8 @@ fn destination(plan: &Plan, slot: &SlotPlan, m: &mut Module) {
             .port(format!("{stage}_index"), slot.dest(stage));
     }
     hazard = hazard
-        .port("underway", slot.underway())
-        .port("underway_index", slot.underway_index())
+        .port("in_flight", slot.in_flight())
+        .port("in_flight_index", slot.in_flight_index())
         .port("late", late(plan.late(), 1))
         .port("late_index", late(plan.late_index(), plan.index));
     for stage in [Read, Issue] {
@@ -107,8 +107,8 @@ fn port_taken(slot: &SlotPlan, stage: Stage) -> Expr {
 /// Rule 5.
 fn drain(plan: &Plan, m: &mut Module) {
     let pending = plan.slots.iter().flat_map(|slot| {
-        let late = slot.late.iter().map(|late| Expr::from(slot.late_underway(late)));
-        late.chain([slot.underway().slice(slot.depth - 1, 2).any_bit()])
+        let late = slot.late.iter().map(|late| Expr::from(slot.late_in_flight(late)));
+        late.chain([slot.in_flight().slice(slot.depth - 1, 2).any_bit()])
     });
     m.define(net::PENDING, any(pending));
     let drains = |stage| {

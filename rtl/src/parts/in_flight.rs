@@ -35,7 +35,7 @@ fn late_unit(slot: &SlotPlan, late: &LateUnit, m: &mut Module) {
         slot.depth
     ));
     m.wires([slot.late_at(late)]);
-    m.wires([slot.late_underway(late), slot.late_last(late), slot.late_busy(late)]);
+    m.wires([slot.late_in_flight(late), slot.late_last(late), slot.late_busy(late)]);
     m.wires([slot.late_index(late)]);
     m.wires([slot.late_address(late)]);
     m.unused(slot.late_unused(late), slot.late_at(late), Some("of which some bits are"));
@@ -52,7 +52,7 @@ fn late_unit(slot: &SlotPlan, late: &LateUnit, m: &mut Module) {
             .port("insert_index", slot.dest(Stage::Issue))
             .port("insert_address", net::I_ADDRESS)
             .port("at", slot.late_at(late))
-            .port("underway", slot.late_underway(late))
+            .port("in_flight", slot.late_in_flight(late))
             .port("index", slot.late_index(late))
             .port("address", slot.late_address(late))
             .port("last", slot.late_last(late))
@@ -81,12 +81,12 @@ fn places(slot: &SlotPlan, m: &mut Module) {
         let bit = ControlBit::Result(latency);
         if slot.has(bit) { net::ISSUE & slot.bit(Stage::Issue, bit) } else { no() }
     });
-    m.wires([slot.underway()]);
+    m.wires([slot.in_flight()]);
     m.wires([slot.writes()]);
-    m.wires([slot.underway_index()]);
+    m.wires([slot.in_flight_index()]);
     m.wires([slot.retire_address()]);
     m.instance(
-        Instance::new("takt_underway", slot.results())
+        Instance::new("takt_in_flight", slot.results())
             .parameter("DEPTH", slot.depth)
             .parameter("INDEX", index)
             .same([net::CLK, net::RST])
@@ -100,8 +100,8 @@ fn places(slot: &SlotPlan, m: &mut Module) {
             .port("late_index", select(&|late| slot.late_index(late), index))
             .port("late_address", select(&|late| slot.late_address(late), 16))
             .port("writes", slot.writes())
-            .port("valid", slot.underway())
-            .port("index", slot.underway_index())
+            .port("valid", slot.in_flight())
+            .port("index", slot.in_flight_index())
             .port("address", slot.retire_address()),
     );
     m.wires([slot.result()]);
@@ -121,8 +121,8 @@ fn together(plan: &Plan, m: &mut Module) {
         });
         Expr::Concat(slots.collect::<Vec<_>>().into_iter().rev().collect())
     };
-    m.define(plan.underway(), padded(SlotPlan::underway, 1));
-    m.define(plan.underway_index(), padded(SlotPlan::underway_index, plan.index));
+    m.define(plan.in_flight(), padded(SlotPlan::in_flight, 1));
+    m.define(plan.in_flight_index(), padded(SlotPlan::in_flight_index, plan.index));
     let lates = |net: fn(&SlotPlan, &LateUnit) -> Net, width: u32| {
         let places = plan.slots.iter().flat_map(|slot| (0..plan.late as usize).map(move |k| (slot, k)));
         let all: Vec<Expr> = places
@@ -130,7 +130,7 @@ fn together(plan: &Plan, m: &mut Module) {
             .collect();
         concat(all)
     };
-    m.define(plan.late(), lates(SlotPlan::late_underway, 1));
+    m.define(plan.late(), lates(SlotPlan::late_in_flight, 1));
     m.define(plan.late_index(), lates(SlotPlan::late_index, plan.index));
     for stage in [Stage::Read, Stage::Issue] {
         m.define(plan.writes_at(stage), plan.each(|slot| slot.writes_at(stage)));

@@ -50,7 +50,7 @@ fn source(plan: &Plan, slot: &SlotPlan, operand: usize, number: u32, m: &mut Mod
             .port("m_bank", slot.source_bank(Stage::Match, operand))
             .port("m_index", slot.source_index(Stage::Match, operand))
             .port("m_place", plan.place(Stage::Match).at(number))
-            .same([plan.underway(), plan.underway_index(), plan.writes(), plan.late(), plan.late_index()])
+            .same([plan.in_flight(), plan.in_flight_index(), plan.writes(), plan.late(), plan.late_index()])
             .same(
                 [Stage::Read, Stage::Issue]
                     .into_iter()

@@ -15,9 +15,9 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     for slot in &plan.slots {
         let bank = slot.slot.bank;
         let log = bank.depth.trailing_zeros();
-        let port = slot.underway_index().slice(log - 1, plan.port_bits).every_bit();
+        let port = slot.in_flight_index().slice(log - 1, plan.port_bits).every_bit();
         m.assign(plan.output_write(&bank), slot.writes() & port);
-        m.assign(plan.output_index(&bank), slot.underway_index().low(plan.port_bits));
+        m.assign(plan.output_index(&bank), slot.in_flight_index().low(plan.port_bits));
         m.assign(plan.output_value(&bank), slot.result());
     }
     let of_banks = |of: &dyn Fn(&Plan, &Bank) -> Net| plan.each(|slot| of(plan, &slot.slot.bank));
@@ -37,7 +37,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.assign(plan.retire(), plan.each(|slot| slot.writes() & !net::RST));
     m.assign(plan.retire_address(), plan.each(SlotPlan::retire_address));
     let register = |slot: &SlotPlan| {
-        let index = concat([slot.underway_index().low(plan.index), decimal(10 - plan.index, 0_u32)]);
+        let index = concat([slot.in_flight_index().low(plan.index), decimal(10 - plan.index, 0_u32)]);
         decimal(10, slot.slot.bank.base) | index
     };
     m.assign(plan.retire_register(), plan.each(register));

@@ -120,7 +120,7 @@ pub enum PlanError {
 pub struct LateUnit {
     /// Its row.
     pub unit: &'static Unit,
-    /// Cycles that it is in flight there: its latency less the places of `takt_underway`.
+    /// Cycles that it is in flight there: its latency less the places of `takt_in_flight`.
     pub beyond: u32,
 }
 
@@ -161,7 +161,7 @@ fn writing(slot: &'static Slot) -> impl Iterator<Item = &'static Unit> {
     slot.units.iter().filter(|unit| unit.latency > 0)
 }
 
-/// Places of a slot's `takt_underway`: every pipelined unit's latency, and what is left of the others' when they can take the next
+/// Places of a slot's `takt_in_flight`: every pipelined unit's latency, and what is left of the others' when they can take the next
 /// operation; 4 at least.
 fn depth(slot: &'static Slot) -> u32 {
     let places = |unit: &Unit| match unit.interval {
@@ -244,7 +244,7 @@ impl SlotPlan {
     /// Whether a result has its writeback in `place` cycles: none, or a bit for each way in which it can be in flight.
     pub fn booked(&self, place: u32) -> Vec<Expr> {
         if place < self.depth {
-            return vec![self.underway().at(place)];
+            return vec![self.in_flight().at(place)];
         }
         let late = self.late.iter().filter(|late| late.unit.latency > place);
         late.map(|late| self.late_at(late).at(late.unit.latency - place)).collect()

@@ -126,13 +126,13 @@ impl Plan {
     }
 
     /// For each slot, the places of its results in flight.
-    pub fn underway(&self) -> Net {
-        Net::bus("underway", self.slot_count() * self.depth)
+    pub fn in_flight(&self) -> Net {
+        Net::bus("in_flight", self.slot_count() * self.depth)
     }
 
     /// Their registers.
-    pub fn underway_index(&self) -> Net {
-        Net::bus("underway_index", self.slot_count() * self.depth * self.index)
+    pub fn in_flight_index(&self) -> Net {
+        Net::bus("in_flight_index", self.slot_count() * self.depth * self.index)
     }
 
     /// For each slot, its units with a `takt_late`: whether they have a result in flight.
@@ -299,13 +299,13 @@ impl SlotPlan {
     }
 
     /// Bit j: a result is on the slot's bus j cycles from now.
-    pub fn underway(&self) -> Net {
-        self.own("underway").wide(self.depth)
+    pub fn in_flight(&self) -> Net {
+        self.own("in_flight").wide(self.depth)
     }
 
     /// Its register, for each place.
-    pub fn underway_index(&self) -> Net {
-        self.own("underway_index").wide(self.depth * self.index)
+    pub fn in_flight_index(&self) -> Net {
+        self.own("in_flight_index").wide(self.depth * self.index)
     }
 
     /// What is on the bus is written back.
@@ -353,8 +353,8 @@ impl SlotPlan {
     }
 
     /// The unit has a result in flight that the slot's common places do not have.
-    pub fn late_underway(&self, late: &LateUnit) -> Net {
-        self.of_unit(late.unit, "underway")
+    pub fn late_in_flight(&self, late: &LateUnit) -> Net {
+        self.of_unit(late.unit, "in_flight")
     }
 
     /// It passes on to them.

@@ -75,7 +75,7 @@ pub struct SlotPlan {
     pub sources: usize,
     /// Latencies of results, ascending.
     pub latencies: Vec<u32>,
-    /// Places of `takt_underway`: how many cycles ahead of its writeback a result in flight is known to it.
+    /// Places of `takt_in_flight`: how many cycles ahead of its writeback a result in flight is known to it.
     pub depth: u32,
     /// Units that work on one operation at a time and have a `takt_late` each.
     pub late: Vec<LateUnit>,

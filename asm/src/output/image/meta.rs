@@ -3,7 +3,7 @@
 use super::validate::{NO_BANK, wrong_port};
 use super::{ImageError, VERSION};
 use serde::{Deserialize, Serialize};
-use takt_isa::program::{Location, Port, Section, Symbol};
+use takt_isa::program::{Columns, Location, Port, Section, Symbol};
 use takt_isa::{BundleAddress, Machine, Program, Register, Type};
 
 #[derive(Serialize, Deserialize)]
@@ -21,6 +21,9 @@ pub(super) struct Meta {
     files: Vec<String>,
     /// For each word of code its file and line.
     lines: Vec<Option<(u32, u32)>>,
+    /// Of words that compute a part of an equation, the word's index and the part's first and last column. Left out if there is none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    parts: Vec<(u32, u32, u32)>,
 }
 
 /// Read first: of a metadata of another version nothing else may be assumed.
@@ -104,6 +107,7 @@ impl Meta {
                 .iter()
                 .map(|line| line.map(|Location { file, line }| (file, line)))
                 .collect(),
+            parts: program.parts.iter().map(|(word, part)| (*word, part.first, part.last)).collect(),
         }
     }
 
@@ -154,6 +158,11 @@ impl Meta {
                 .lines
                 .into_iter()
                 .map(|line| line.map(|(file, line)| Location { file, line }))
+                .collect(),
+            parts: self
+                .parts
+                .into_iter()
+                .map(|(word, first, last)| (word, Columns { first, last }))
                 .collect(),
         })
     }

@@ -39,12 +39,20 @@ pub(super) fn wrong_port(kind: &str, name: &str, address: u16, reason: &'static 
     ImageError::Register { what: format!("{kind} `{name}`"), address: address.into(), reason }
 }
 
-/// Whether a name has the letters of one, and no more than `limit`. (Those that a macro's use gives may be longer than a
-/// source's.)
+/// Whether a name has the letters of one, as `P` or, of an array's element, `P[2,3]`, and no more than `limit`. (Those that a
+/// macro's use gives may be longer than a source's.)
 pub(super) fn is_spelled(name: &str, limit: usize) -> bool {
     let first = |c: char| c.is_ascii_alphabetic() || c == '_';
     let other = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
-    name.starts_with(first) && name.chars().all(other) && name.len() <= limit
+    let index = |index: &str| !index.is_empty() && index.bytes().all(|byte| byte.is_ascii_digit());
+    let (head, indices) = match name.strip_suffix(']').and_then(|name| name.split_once('[')) {
+        Some((head, indices)) => (head, Some(indices)),
+        None => (name, None),
+    };
+    head.starts_with(first)
+        && head.chars().all(other)
+        && indices.is_none_or(|indices| indices.split(',').all(index))
+        && name.len() <= limit
 }
 
 /// Whether a source could declare the name.
@@ -196,6 +204,16 @@ fn lines(program: &Program) -> Result<(), ImageError> {
         if location.line == 0 {
             return wrong("one is line 0, and lines count from 1".to_owned());
         }
+    }
+    let mut next = 0;
+    for (word, columns) in &program.parts {
+        if *word < next || program.lines.get(*word as usize).is_none_or(Option::is_none) {
+            return wrong(format!("word {word} has columns out of order, or without a line"));
+        }
+        if columns.first == 0 || columns.first > columns.last {
+            return wrong(format!("there are no columns {} to {}", columns.first, columns.last));
+        }
+        next = word + 1;
     }
     Ok(())
 }

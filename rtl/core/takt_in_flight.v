@@ -1,4 +1,4 @@
-// takt_underway: the results underway to a slot's bank, by the cycles that are left until their writeback.
+// takt_in_flight: the results in flight to a slot's bank, by the cycles that are left until their writeback.
 //
 // Contract
 //   Place j holds the result that is on the slot's bus j cycles from now: valid[j], the register's index, the bundle's address.
@@ -9,7 +9,7 @@
 //   writes: what is in place 0 is written; valid[0], unless it is cancelled in this very cycle.
 //   load: in reset, the loader's write takes place 0 in the next cycle.
 
-module takt_underway #(
+module takt_in_flight #(
     parameter DEPTH   = 10,  // places
     parameter INDEX   = 8,   // bits of a register's index
     parameter ADDRESS = 16   // bits of a bundle's address

@@ -1,0 +1,55 @@
+//! In which cycle each operation issues, as far as that follows from the program alone: along its straight lines.
+
+use std::collections::BTreeSet;
+use takt_isa::timing::{self, Bundle, Cause, Cycle, Issue, Scoreboard};
+use takt_isa::{BundleAddress, Flow, Instruction, Program, Register};
+
+/// When a bundle issues.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StraightIssue {
+    /// Its address.
+    pub address: BundleAddress,
+    /// The bundle from which cycles count: the first of a section, one that is jumped to, or one behind a bundle that jumps.
+    pub from: BundleAddress,
+    /// Its cycle. The first bundle's is 1, if no earlier result is in flight.
+    pub cycle: Cycle,
+    /// The cycles before it in which nothing issued, and why.
+    pub stalls: Vec<(Cause, u32)>,
+    /// For each slot: of the registers that its operation reads, the one whose result comes last along this line, the cycle from
+    /// which on it is there, and the bundle that computes it.
+    pub awaits: Vec<Option<(Register, Cycle, BundleAddress)>>,
+}
+
+/// The issue of each bundle of a program, by address. A bundle that is none ends the list.
+pub fn straight(program: &Program) -> Vec<StraightIssue> {
+    let machine = program.machine;
+    let mut entries: BTreeSet<BundleAddress> = program.sections.iter().map(|section| section.start).collect();
+    entries.extend(program.loop_bounds.iter().map(|bound| bound.address));
+    let bundles: Vec<Vec<Instruction>> =
+        program.addresses().map_while(|address| program.bundle(address)?.ok()).collect();
+    entries.extend(bundles.iter().filter_map(|bundle| Flow::of(bundle).target()));
+    let mut scoreboard = Scoreboard::new(machine);
+    let (mut from, mut earliest) = (BundleAddress::RESET, 1);
+    let mut issues = Vec::with_capacity(bundles.len());
+    for (address, instructions) in program.addresses().zip(&bundles) {
+        if entries.contains(&address) {
+            (scoreboard, from, earliest) = (Scoreboard::new(machine), address, 1);
+        }
+        let bundle = Bundle::new(machine, instructions);
+        let awaits = instructions.iter().map(|instruction| {
+            let ready = instruction.reads().iter().map(|register| (*register, scoreboard.ready(*register)));
+            let last = ready.max_by_key(|(_, (cycle, _))| *cycle).filter(|(_, (cycle, _))| *cycle > 0);
+            last.map(|(register, (cycle, producer))| (register, cycle, producer))
+        });
+        let awaits = awaits.collect();
+        let issue: Issue = scoreboard.issue(&bundle, address, earliest);
+        let stalls = issue.stalls().to_vec();
+        issues.push(StraightIssue { address, from, cycle: issue.cycle, stalls, awaits });
+        match Flow::of(instructions) {
+            Flow::Next => earliest = timing::after_sequential(issue.cycle),
+            Flow::Branch { .. } => earliest = timing::after_not_taken(machine, issue.cycle),
+            _ => (scoreboard, from, earliest) = (Scoreboard::new(machine), address.next(), 1),
+        }
+    }
+    issues
+}

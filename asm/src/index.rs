@@ -1,0 +1,336 @@
+//! Which name means what, and where it stands: what an editor asks of a program, whether it assembles or not.
+//!
+//! The index is recorded while the assembler resolves names ([`check`](crate::check)), so that it knows what the assembler
+//! knows: a name in a macro's body is found for each use, a name with `{}` for each value that it takes. Code that is never
+//! expanded, as the body of a macro that nothing uses, is not resolved, and is not in it.
+
+use crate::context::{Binding, Context, ScopeKind};
+use crate::ir::{Ir, RegisterKind};
+use crate::report::source::Span;
+use crate::syntax::ast::{Directive, DirectiveKind};
+use crate::syntax::expr::Value;
+use crate::syntax::name::NameId;
+use std::collections::HashMap;
+use takt_isa::program::Space;
+use takt_isa::{Register, Type};
+
+/// What a name is declared as.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub enum SymbolKind {
+    /// `.reg`.
+    Register,
+    /// `.state`.
+    State,
+    /// An array of registers.
+    Array,
+    /// `.input`.
+    Input,
+    /// `.output`.
+    Output,
+    /// `.const`.
+    Constant,
+    /// A label of code.
+    Code,
+    /// A label of data.
+    Data,
+    /// `.macro`.
+    Macro,
+    /// A parameter of a macro.
+    Parameter,
+    /// What a `.rep` counts with.
+    Count,
+}
+
+impl SymbolKind {
+    /// What it is, in words.
+    pub const fn text(self) -> &'static str {
+        match self {
+            SymbolKind::Register => "register",
+            SymbolKind::State => "state",
+            SymbolKind::Array => "array of registers",
+            SymbolKind::Input => "input port",
+            SymbolKind::Output => "output port",
+            SymbolKind::Constant => "constant",
+            SymbolKind::Code => "code label",
+            SymbolKind::Data => "data label",
+            SymbolKind::Macro => "macro",
+            SymbolKind::Parameter => "parameter",
+            SymbolKind::Count => "count of a repetition",
+        }
+    }
+}
+
+/// A name that the source declares. One declaration in a repetition or a macro declares several.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Symbol {
+    /// The name, as the symbol map has it: that of a macro's local has the use before it, `limit.2.done`.
+    pub name: String,
+    /// What it is.
+    pub kind: SymbolKind,
+    /// Where its name stands in its declaration.
+    pub span: Span,
+    /// Of a register or port: how its bits are read.
+    pub ty: Option<Type>,
+    /// Of a register or port: the address that the source gives it.
+    pub place: Option<Register>,
+    /// Of a constant: its value, if it has one.
+    pub value: Option<Value>,
+    /// Of a label: word of data memory.
+    pub word: Option<u32>,
+    /// Of an array: how many elements it has in each direction.
+    pub sizes: Vec<u32>,
+    /// Of a macro: its parameters.
+    pub parameters: Vec<String>,
+    /// Of a parameter: its macro.
+    pub of: Option<String>,
+}
+
+/// A place in the source that names a symbol; its declaration is one.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, PartialOrd, Ord)]
+pub struct Reference {
+    /// The name's place.
+    pub span: Span,
+    /// What it names: an index into [`Index::symbols`]. A place in a macro or a repetition may name several.
+    pub symbol: u32,
+}
+
+/// A block of lines: what a directive opens and another closes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Block {
+    /// `.macro`, `.rep` or `.if`; of an `.if` with branches, one block for each.
+    pub directive: Directive,
+    /// The directive that opens it.
+    pub open: Span,
+    /// Line, from 1, of what closes it, in the same file.
+    pub last_line: u32,
+}
+
+/// The names of a program.
+#[derive(Clone, Debug, Default)]
+pub struct Index {
+    /// What is declared.
+    pub symbols: Vec<Symbol>,
+    /// Where it is named, by place, each once.
+    pub references: Vec<Reference>,
+    /// `.include`s by place, and which of the sources each means.
+    pub includes: Vec<(Span, usize)>,
+    /// Blocks of the sources.
+    pub blocks: Vec<Block>,
+    /// Whether all references are in it: there may be more than [`limits::REFERENCES`](crate::limits::REFERENCES).
+    pub complete: bool,
+}
+
+impl Index {
+    /// What the name at a place means: the references there. An offset at the name's end counts.
+    pub fn at(&self, offset: u32) -> &[Reference] {
+        // Names do not overlap but for those in the braces of another: the innermost begins last.
+        let end = self.references.partition_point(|reference| reference.span.start <= offset);
+        let holds = |reference: &&Reference| reference.span.end >= offset;
+        // A template with its braces is at most a line; what it holds lies between.
+        let Some(found) = self.references[..end].iter().rev().take(256).find(holds) else { return &[] };
+        self.of_span(found.span)
+    }
+
+    /// The references at exactly a place.
+    pub fn of_span(&self, span: Span) -> &[Reference] {
+        let start = self.references.partition_point(|reference| reference.span < span);
+        let end = self.references.partition_point(|reference| reference.span <= span);
+        &self.references[start..end]
+    }
+}
+
+/// The index of what a program declares and names, once it is resolved.
+pub(crate) fn index(context: &mut Context, ir: &Ir) -> Index {
+    let Some(notes) = context.notes.take() else { return Index::default() };
+    let mut builder = Builder { context, index: Index { complete: !notes.cut, ..Index::default() } };
+    let registers = builder.registers(ir);
+    let constants = builder.constants();
+    let labels = builder.labels(ir);
+    let arrays = builder.arrays();
+    let mut blocks = builder.blocks();
+    for (sum, variable, name) in &notes.sums {
+        if !blocks.contains_key(sum) {
+            let text = builder.context.scopes.text(*name).to_owned();
+            builder.add(text, SymbolKind::Count, *variable);
+            blocks.insert(*sum, builder.last());
+        }
+    }
+    let (macros, parameters) = builder.macros();
+    let context = builder.context;
+    let symbol = |scope, name: NameId| -> Option<u32> {
+        match context.lookup(scope, name) {
+            Binding::Register(id) => registers[id.index()],
+            Binding::Array(id) => arrays.get(id as usize).copied(),
+            Binding::Constant(id) => constants.get(id as usize).copied(),
+            Binding::Code(id) | Binding::Data(id) => labels.get(id.0 as usize).copied(),
+            Binding::Argument(_) => match context.scopes.scope(context.scopes.scope(scope).owner).kind {
+                ScopeKind::Macro(of, _) => parameters.get(&(of, name)).copied(),
+                _ => None,
+            },
+            Binding::Count(_) => {
+                let mut scope = *context.scopes.scope(scope);
+                loop {
+                    match scope.kind {
+                        ScopeKind::Rep(variable, _) if variable == name => {
+                            return blocks.get(&scope.site).copied();
+                        }
+                        ScopeKind::Rep(..) => scope = *context.scopes.scope(scope.parent),
+                        _ => return None,
+                    }
+                }
+            }
+            Binding::None | Binding::Builtin(_) | Binding::Has(_) => None,
+        }
+    };
+    let names = notes.names.iter().filter_map(|&(span, scope, name)| Some((span, symbol(scope, name)?)));
+    let uses = notes.macros.iter().filter_map(|(span, name)| Some((*span, *macros.get(name)?)));
+    let mut references: Vec<Reference> =
+        names.chain(uses).map(|(span, symbol)| Reference { span, symbol }).collect();
+    // Parameters and counts are declared without being looked up, and so are macros.
+    let quiet = [SymbolKind::Parameter, SymbolKind::Count, SymbolKind::Macro];
+    let declared = (0..).zip(&builder.index.symbols).filter(|(_, symbol)| quiet.contains(&symbol.kind));
+    references.extend(declared.map(|(number, symbol)| Reference { span: symbol.span, symbol: number }));
+    references.sort_unstable();
+    references.dedup();
+    let mut index = builder.index;
+    index.references = references;
+    index.includes = notes.includes;
+    index.includes.sort_unstable();
+    index.includes.dedup();
+    index
+}
+
+struct Builder<'c> {
+    context: &'c Context,
+    index: Index,
+}
+
+impl Builder<'_> {
+    fn add(&mut self, name: String, kind: SymbolKind, span: Span) -> &mut Symbol {
+        let symbols = &mut self.index.symbols;
+        symbols.push(Symbol {
+            name,
+            kind,
+            span,
+            ty: None,
+            place: None,
+            value: None,
+            word: None,
+            sizes: Vec::new(),
+            parameters: Vec::new(),
+            of: None,
+        });
+        let last = symbols.len() - 1;
+        &mut symbols[last]
+    }
+
+    fn last(&self) -> u32 {
+        self.index.symbols.len() as u32 - 1
+    }
+
+    fn registers(&mut self, ir: &Ir) -> Vec<Option<u32>> {
+        let mut numbers = Vec::with_capacity(ir.registers.len());
+        for register in &ir.registers {
+            let kind = match register.kind {
+                _ if register.name.is_empty() => None,
+                RegisterKind::Plain => Some(SymbolKind::Register),
+                RegisterKind::State => Some(SymbolKind::State),
+                RegisterKind::Input => Some(SymbolKind::Input),
+                RegisterKind::Output => Some(SymbolKind::Output),
+                RegisterKind::Constant(_) | RegisterKind::Zero => None,
+            };
+            numbers.push(kind.map(|kind| {
+                let symbol = self.add(register.name.clone(), kind, register.span);
+                (symbol.ty, symbol.place) = (Some(register.ty), register.pinned);
+                self.last()
+            }));
+        }
+        numbers
+    }
+
+    fn constants(&mut self) -> Vec<u32> {
+        let mut numbers = Vec::new();
+        for constant in &self.context.declared.constants {
+            self.add(constant.name.clone(), SymbolKind::Constant, constant.span).value = constant.value;
+            numbers.push(self.last());
+        }
+        numbers
+    }
+
+    fn arrays(&mut self) -> Vec<u32> {
+        let mut numbers = Vec::new();
+        for array in &self.context.declared.arrays {
+            self.add(array.name.clone(), SymbolKind::Array, array.span).sizes = array.sizes.to_vec();
+            numbers.push(self.last());
+        }
+        numbers
+    }
+
+    fn labels(&mut self, ir: &Ir) -> Vec<u32> {
+        let mut numbers = Vec::new();
+        for label in &ir.labels {
+            let is_data = label.space == Space::Data;
+            let kind = if is_data { SymbolKind::Data } else { SymbolKind::Code };
+            self.add(label.name.clone(), kind, label.span).word = is_data.then_some(label.position);
+            numbers.push(self.last());
+        }
+        numbers
+    }
+
+    /// The blocks, and the symbols of what repetitions count with, by their directive's place.
+    fn blocks(&mut self) -> HashMap<Span, u32> {
+        let mut counts = HashMap::new();
+        for ast in &self.context.asts {
+            let line = |statement: u32| {
+                let last = || ast.statements.last().map_or(1, |statement| statement.line);
+                ast.statements.get(statement as usize).map_or_else(last, |statement| statement.line)
+            };
+            for directive in &ast.directives {
+                let (what, end) = match &directive.kind {
+                    DirectiveKind::Macro { end, .. } => (Directive::Macro, *end),
+                    DirectiveKind::Rep { variable, end, .. } => {
+                        if let Ok(name) = variable.name.resolve() {
+                            let text = self.context.scopes.text(name).to_owned();
+                            self.add(text, SymbolKind::Count, variable.span);
+                            counts.insert(directive.span, self.last());
+                        }
+                        (Directive::Rep, *end)
+                    }
+                    DirectiveKind::If(_, next) => (Directive::If, *next),
+                    DirectiveKind::Elif(_, next, _) => (Directive::If, *next),
+                    DirectiveKind::Else(end) => (Directive::If, *end),
+                    _ => continue,
+                };
+                self.index.blocks.push(Block { directive: what, open: directive.span, last_line: line(end) });
+            }
+        }
+        counts
+    }
+
+    /// The symbols of macros, and of their parameters.
+    fn macros(&mut self) -> (HashMap<NameId, u32>, HashMap<(NameId, NameId), u32>) {
+        let (mut macros, mut all) = (HashMap::new(), HashMap::new());
+        let scopes = &self.context.scopes;
+        let mut definitions: Vec<_> = scopes.macros.iter().collect();
+        definitions.sort_by_key(|(_, definition)| definition.span(&self.context.asts));
+        for (&id, definition) in definitions {
+            let directive =
+                &self.context.asts[definition.ast as usize].directives[definition.directive as usize];
+            let DirectiveKind::Macro { name, parameters, .. } = &directive.kind else { continue };
+            let plain = parameters
+                .iter()
+                .filter_map(|parameter| Some((parameter.name.resolve().ok()?, parameter.span)));
+            let plain: Vec<(NameId, Span)> = plain.collect();
+            let of = scopes.text(id).to_owned();
+            let names = plain.iter().map(|(name, _)| scopes.text(*name).to_owned()).collect();
+            self.add(of.clone(), SymbolKind::Macro, name.span).parameters = names;
+            macros.insert(id, self.last());
+            for (parameter, span) in plain {
+                let text = scopes.text(parameter).to_owned();
+                self.add(text, SymbolKind::Parameter, span).of = Some(of.clone());
+                all.insert((id, parameter), self.last());
+            }
+        }
+        (macros, all)
+    }
+}

@@ -1,0 +1,375 @@
+//! Equations to operations: each operator and function becomes the instruction that the table says, on registers without
+//! names, in the order in which the equation is written ([`expression`](crate::resolve::expression)). Each operation has the part
+//! of the line that it computes as its span. Here is what becomes of the values: where they go, and what types they have.
+
+use crate::context::{At, Reported, Wanted, type_name, words};
+use crate::expand::equation::Results;
+use crate::expand::{Fast, Item, SourcePlace};
+use crate::ir::given::Kind;
+use crate::ir::{Bundle, Constant, Operation, RegisterId, RegisterKind, VirtualRegister};
+use crate::limits;
+use crate::report::diag::Diagnostic;
+use crate::report::source::Span;
+use crate::resolve::Resolver;
+use crate::resolve::fast::Chain;
+use crate::resolve::forms::Meaning;
+use crate::resolve::sharing::Key;
+use crate::syntax::ast::*;
+use crate::syntax::expr::Value;
+use smallvec::SmallVec;
+use std::rc::Rc;
+use takt_isa::{Op, Slots, Type};
+
+/// What a part of an equation is.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Part {
+    /// A constant, and its expression.
+    Constant(Value, ExprId),
+    /// A register and what is known of its type.
+    Register(RegisterId, Kind),
+    /// A sum or a product that is still to be computed: which of the line's, and its type.
+    Chain(usize, Kind),
+}
+
+/// A part of an equation, and where it stands.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Term {
+    pub(super) part: Part,
+    pub(super) span: Span,
+}
+
+impl Term {
+    pub(super) fn value(&self) -> Option<Value> {
+        match self.part {
+            Part::Constant(value, _) => Some(value),
+            Part::Register(..) | Part::Chain(..) => None,
+        }
+    }
+
+    pub(super) fn kind(&self) -> Option<Kind> {
+        match self.part {
+            Part::Register(_, kind) | Part::Chain(_, kind) => Some(kind),
+            Part::Constant(..) => None,
+        }
+    }
+}
+
+/// The equation at hand.
+pub(super) struct Line {
+    location: Option<SourcePlace>,
+    scheduled: bool,
+    /// What its operations have computed so far: where the value is, the bundle, and the part.
+    pub(super) computed: Vec<(RegisterId, usize, Key)>,
+    pub(super) results: Results,
+    /// What `.fast` allows.
+    pub(super) fast: Fast,
+    /// Sums and products that are not computed yet.
+    pub(super) chains: Vec<Chain>,
+}
+
+impl Resolver<'_> {
+    pub(super) fn equation(&mut self, item: &Item, ast: &Rc<Ast>, equation: u32) -> Result<(), Reported> {
+        let equation = &ast.equations[equation as usize];
+        let number = ast.statements[item.statement as usize].line;
+        let location = self.location(item, (equation.span, number), 0, 1);
+        let piece = item.piece.map(|piece| self.flat.pieces[piece as usize].clone());
+        let (argument, results) = piece.map_or((None, Results::default()), |p| (p.argument, p.results));
+        self.sharing.next();
+        let mut line = Line {
+            location,
+            scheduled: item.scheduled,
+            computed: Vec::new(),
+            results,
+            fast: item.fast,
+            chains: Vec::new(),
+        };
+        if let Some((value, register)) = argument {
+            let term = self.compute(item.at, &mut line, ast, value.id, Kind::None)?;
+            return self.assign(item.at, &mut line, &[(register, Kind::None, value.span)], &[term]);
+        }
+        if equation.targets.len() != equation.values.len() {
+            let (targets, values) = (equation.targets.len(), equation.values.len());
+            let plural = |count: usize| if count == 1 { "" } else { "s" };
+            let message = format!(
+                "{targets} register{} to write and {values} value{}",
+                plural(targets),
+                plural(values)
+            );
+            let error = Diagnostic::error("equation", equation.span, message)
+                .help("write one value for each register, separated by `,`");
+            return Err(self.context.report(item.at.scope, error));
+        }
+        if equation.targets.len() > limits::EQUATION_TARGETS {
+            let message = format!("an equation writes at most {} registers", limits::EQUATION_TARGETS);
+            return Err(self.context.error(item.at.scope, "limit", equation.span, message));
+        }
+        let mut targets: Vec<(RegisterId, Kind, Span)> = Vec::with_capacity(equation.targets.len());
+        let mut failed = false;
+        for target in &equation.targets {
+            match self.target_of(item.at, *target) {
+                Ok((register, wanted)) => {
+                    if let Some((_, _, first)) = targets.iter().find(|(other, ..)| *other == register) {
+                        let message = "one register is written twice in one equation";
+                        let error =
+                            Diagnostic::error("equation", target.span, message).also(*first, "the other");
+                        return Err(self.context.report(item.at.scope, error));
+                    }
+                    targets.push((register, wanted, target.span));
+                }
+                Err(Reported) => failed = true,
+            }
+        }
+        let mut terms = Vec::with_capacity(equation.values.len());
+        for (index, value) in equation.values.iter().enumerate() {
+            let wanted = targets.get(index).map_or(Kind::None, |(_, wanted, _)| *wanted);
+            match self.compute(item.at, &mut line, ast, value.id, wanted) {
+                Ok(term) => terms.push(term),
+                Err(Reported) => failed = true,
+            }
+        }
+        if failed { Err(Reported) } else { self.assign(item.at, &mut line, &targets, &terms) }
+    }
+
+    /// The register that an equation writes, and the type that it has whatever is written.
+    fn target_of(&mut self, at: At, target: Operand) -> Result<(RegisterId, Kind), Reported> {
+        self.cast = None;
+        let register = self.dest(at, target, Wanted::Left)?;
+        Ok((register, self.declared_kind(register).unwrap_or(Kind::None)))
+    }
+
+    /// The type that a register is declared with; none for one that has the type of what it holds.
+    fn declared_kind(&self, id: RegisterId) -> Option<Kind> {
+        let register = &self.context.declared.registers[id.index()];
+        let is_open = register.kind == RegisterKind::Plain
+            && (register.name.is_empty() && register.pinned.is_none()
+                || !register.name.is_empty() && !self.context.declared.typed.contains(&id));
+        (!is_open).then(|| Kind::of(register.ty))
+    }
+
+    /// What is known of the type of what a register holds.
+    pub(super) fn kind(&self, id: RegisterId) -> Kind {
+        self.declared_kind(id).unwrap_or_else(|| match self.kinds.get(id.index()) {
+            None | Some(Kind::None) => Kind::Float,
+            Some(kind) => *kind,
+        })
+    }
+
+    /// Notes the type of what was written to a register.
+    pub(super) fn set_kind(&mut self, id: RegisterId, kind: Kind) {
+        if self.kinds.len() <= id.index() {
+            self.kinds.resize(self.context.declared.registers.len().max(id.index() + 1), Kind::None);
+        }
+        self.kinds[id.index()] = kind;
+    }
+
+    /// The type of what an operation writes.
+    pub(super) fn result_kind(&self, operation: &Operation) -> Kind {
+        use crate::ir::given::{Given, Part};
+        let given = |part| match self.context.declared.given.get(operation, part) {
+            Some(Given::Cast(ty)) => Some(Kind::of(ty)),
+            Some(Given::Literal { kind, .. }) => Some(kind),
+            _ => None,
+        };
+        if let Some(kind) = given(Part::Dest).or_else(|| given(Part::Immediate)) {
+            return kind;
+        }
+        let source = |which: usize| {
+            let id = operation.sources[which];
+            given(Part::Source(which as u8)).unwrap_or_else(|| {
+                match self.context.declared.registers[id.index()].kind {
+                    RegisterKind::Constant(_) | RegisterKind::Zero => Kind::Any,
+                    _ => self.kind(id),
+                }
+            })
+        };
+        self.forms.result(operation.op, source)
+    }
+
+    /// Writes an equation's values to its registers, all of them computed before any is written.
+    fn assign(
+        &mut self,
+        at: At,
+        line: &mut Line,
+        targets: &[(RegisterId, Kind, Span)],
+        terms: &[Term],
+    ) -> Result<(), Reported> {
+        let mut failed = false;
+        for ((target, wanted, span), term) in targets.iter().zip(terms) {
+            failed |= self.check_target(at, (*target, *wanted, *span), *term).is_err();
+        }
+        if failed {
+            return Err(Reported);
+        }
+        // What computes a value writes the register itself where nothing behind it reads what that held.
+        let mut left: Vec<(RegisterId, Kind, Term)> = Vec::new();
+        for (index, ((target, wanted, _), term)) in targets.iter().zip(terms).enumerate() {
+            let others = terms.iter().enumerate().filter(|(other, _)| *other != index).map(|(_, term)| term);
+            let is_other = |id: RegisterId| {
+                others.clone().any(|other| matches!(other.part, Part::Register(used, _) if used == id))
+            };
+            if let Part::Register(value, kind) = term.part
+                && let Some(place) = line.computed.iter().position(|(register, ..)| *register == value)
+                && !is_other(value)
+                && !is_other(*target)
+            {
+                let (_, bundle, key) = line.computed[place];
+                let behind = &self.ir.bundles[bundle + 1..];
+                let touches = |operation: &Operation| {
+                    operation.dest == Some(*target)
+                        || operation.reads().contains(target)
+                        || operation.reads().contains(&value)
+                };
+                if !behind.iter().flat_map(|bundle| &bundle.operations).any(touches) {
+                    self.ir.bundles[bundle].operations[0].dest = Some(*target);
+                    line.computed.remove(place);
+                    self.written(*target, kind);
+                    let register = &self.context.declared.registers[target.index()];
+                    let lasts = matches!(register.kind, RegisterKind::Plain | RegisterKind::State);
+                    if lasts && register.pinned.is_none() {
+                        self.sharing.insert(key, *target, bundle as u32);
+                    } else {
+                        self.sharing.remove(&key);
+                    }
+                    continue;
+                }
+            }
+            left.push((*target, *wanted, *term));
+        }
+        // A register that is read and written is kept where it is read after it is written.
+        for index in 0..left.len() {
+            let Part::Register(value, kind) = left[index].2.part else { continue };
+            let written = left[..index].iter().any(|(target, ..)| *target == value)
+                || targets.iter().any(|(target, ..)| *target == value)
+                    && left.iter().all(|(target, ..)| *target != value);
+            if written {
+                let span = left[index].2.span;
+                let kept = self.copy(at, line, left[index].2, Type::B, None)?;
+                left[index].2 = Term { part: Part::Register(kept, kind), span };
+            }
+        }
+        for (target, wanted, term) in left {
+            let ty = match wanted {
+                Kind::Int => Type::I,
+                Kind::Any => Type::B,
+                Kind::Float | Kind::None => Type::F,
+            };
+            let kind = term.kind().unwrap_or(Kind::of(ty));
+            self.copy(at, line, term, ty, Some(target))?;
+            self.written(target, kind);
+        }
+        Ok(())
+    }
+
+    fn written(&mut self, target: RegisterId, kind: Kind) {
+        self.set_kind(target, kind);
+        self.sharing.write(target);
+    }
+
+    /// Whether a value may go to a register.
+    fn check_target(
+        &mut self,
+        at: At,
+        (target, wanted, span): (RegisterId, Kind, Span),
+        term: Term,
+    ) -> Result<(), Reported> {
+        let Some(kind) = term.kind() else { return Ok(()) };
+        let (is, to) = match (kind, wanted) {
+            (Kind::Int, Kind::Float) => (Type::I, Type::F),
+            (Kind::Float, Kind::Int) => (Type::F, Type::I),
+            _ => return Ok(()),
+        };
+        let VirtualRegister { name, span: declared, .. } = &self.context.declared.registers[target.index()];
+        let (name, declared) = (name.clone(), *declared);
+        let message = format!("this is {}, and `{name}` {}", words(is), words(to));
+        let written = self.context.reports.sources.text(term.span);
+        let written = if written.len() > 24 { "…" } else { written };
+        let help = match self.forms.conversion(is, to) {
+            Some(convert) => {
+                format!("convert it: `{convert}({written})`, or declare `{name}:{}`", type_name(is))
+            }
+            None => format!("declare `{name}:{}`", type_name(is)),
+        };
+        let error = Diagnostic::error("equation", term.span, message)
+            .here(words(is))
+            .also(span, format!("`{name}` is written here"))
+            .also(declared, format!("declared here, as {}", words(to)))
+            .help(help);
+        Err(self.context.report(at.scope, error))
+    }
+
+    /// Copies a value, to a register or to a new one.
+    fn copy(
+        &mut self,
+        at: At,
+        line: &mut Line,
+        term: Term,
+        ty: Type,
+        target: Option<RegisterId>,
+    ) -> Result<RegisterId, Reported> {
+        let source = match term.part {
+            Part::Register(register, _) => register,
+            // An expression's value is computed.
+            Part::Chain(..) => return Err(Reported),
+            Part::Constant(value, expr) => self.holding(at, value, expr, term.span, ty)?,
+        };
+        let Some(Meaning { op, .. }) = self.forms.get("", 1).first() else { return Err(Reported) };
+        let op = *op;
+        let slots = self.hosting(at, op, None, term.span)?;
+        let sources = [source, RegisterId::ZERO, RegisterId::ZERO];
+        let register = target.unwrap_or_else(|| self.fresh(term.span));
+        self.emit(at, line, op, slots, sources, register, term.span);
+        Ok(register)
+    }
+
+    /// The register that holds a constant as a type has it.
+    pub(super) fn holding(
+        &mut self,
+        at: At,
+        value: Value,
+        expr: ExprId,
+        span: Span,
+        ty: Type,
+    ) -> Result<RegisterId, Reported> {
+        let operand = Operand { kind: OperandKind::Expr(expr), span };
+        let bits = self.bits(at, value, ty, operand)?;
+        Ok(self.pooled(bits, span))
+    }
+
+    /// A register without a name.
+    pub(super) fn fresh(&mut self, span: Span) -> RegisterId {
+        let registers = &mut self.context.declared.registers;
+        registers.push(VirtualRegister::unnamed(span));
+        RegisterId::new(registers.len() - 1)
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn emit(
+        &mut self,
+        at: At,
+        line: &Line,
+        op: Op,
+        slots: Slots,
+        sources: [RegisterId; 3],
+        dest: RegisterId,
+        span: Span,
+    ) {
+        let slots = self.writing(slots, Some(dest));
+        let operation = Operation {
+            op,
+            slots,
+            slot: slots.first(),
+            dest: Some(dest),
+            sources,
+            constant: Constant::None,
+            location: line.location.map(|(location, _)| location),
+            columns: line.location.and_then(|(_, columns)| columns),
+            span,
+            expansion: at.scope.0,
+            made: false,
+            order: 0,
+            written: (at.ast, Operation::COMPUTED),
+        };
+        let operations = SmallVec::from_elem(operation, 1);
+        self.push(Bundle { operations, explicit: false, scheduled: line.scheduled });
+    }
+}

@@ -1,0 +1,130 @@
+//! What `.fast` allows: sums and products as trees, divisions by constants as multiplications. A part of
+//! [`expression`](crate::resolve::expression).
+//!
+//! While it is computed, a sum of several terms is kept as the list of its terms, and a product as that of its factors; where the
+//! value is needed, neighbours are paired until one is left, so that of n terms ⌈log₂ n⌉ operations wait for one another.
+
+use crate::context::{At, Reported};
+use crate::ir::given::Kind;
+use crate::resolve::Resolver;
+use crate::resolve::equation::{Line, Part, Term};
+use crate::resolve::expression::Here;
+use crate::syntax::ast::{ExprId, Operator};
+use crate::syntax::expr::{self, Value};
+
+/// A sum or a product that is not computed yet.
+#[derive(Clone, Debug)]
+pub(super) struct Chain {
+    is_product: bool,
+    /// Its terms, and whether each is subtracted; or its factors.
+    terms: Vec<(Term, bool)>,
+}
+
+impl Resolver<'_> {
+    /// What a symbol means between terms where the source allows more than what is written; none if that is as ever.
+    pub(super) fn fast(
+        &mut self,
+        at: At,
+        line: &mut Line,
+        symbol: &str,
+        terms: &[Term],
+        here: Here,
+    ) -> Result<Option<Term>, Reported> {
+        let [a, b] = terms else { return Ok(None) };
+        let (sum, difference) = (Operator::Add.text(), Operator::Sub.text());
+        let product = Operator::Mul.text();
+        if line.fast.reciprocal
+            && symbol == Operator::Div.text()
+            && let Part::Constant(divisor, id) = b.part
+        {
+            let inverse = 1.0 / divisor.real();
+            if (inverse as f32).is_normal() {
+                let factor = Term { part: Part::Constant(Value::Real(inverse), id), span: b.span };
+                return self.apply(at, line, product, &[*a, factor], here, Kind::None).map(Some);
+            }
+        }
+        let is_product = symbol == product;
+        if !line.fast.reassociate || !(is_product || symbol == sum || symbol == difference) {
+            return Ok(None);
+        }
+        let kinds = [a.kind(), b.kind()];
+        let kind = kinds.into_iter().flatten().fold(Kind::None, Kind::join);
+        let fits = self.forms.get(symbol, 2).iter().any(|meaning| self.fits(meaning, terms));
+        if !fits || !matches!(kind, Kind::Float | Kind::Int) {
+            return Ok(None);
+        }
+        let mut all = self.flattened(at, line, *a, is_product)?;
+        let more = self.flattened(at, line, *b, is_product)?;
+        all.extend(more.into_iter().map(|(term, negative)| (term, negative != (symbol == difference))));
+        line.chains.push(Chain { is_product, terms: all });
+        let part = Part::Chain(line.chains.len() - 1, kind);
+        Ok(Some(Term { part, span: here.0 }))
+    }
+
+    /// The terms or factors of a value; of one that is computed already, or in another way, itself.
+    fn flattened(
+        &mut self,
+        at: At,
+        line: &mut Line,
+        term: Term,
+        is_product: bool,
+    ) -> Result<Vec<(Term, bool)>, Reported> {
+        if let Part::Chain(index, _) = term.part
+            && line.chains[index].is_product == is_product
+        {
+            // Every value is used once: of the chain that it was nothing is wanted again.
+            return Ok(std::mem::take(&mut line.chains[index].terms));
+        }
+        Ok(vec![(self.settled(at, line, term)?, false)])
+    }
+
+    /// A value that is computed.
+    pub(super) fn settled(&mut self, at: At, line: &mut Line, term: Term) -> Result<Term, Reported> {
+        let Part::Chain(index, _) = term.part else { return Ok(term) };
+        let Chain { is_product, terms } = line.chains[index].clone();
+        let (constants, mut left): (Vec<_>, Vec<_>) =
+            terms.into_iter().partition(|(term, _)| term.value().is_some());
+        let mut folded: Option<(Value, Term)> = None;
+        for (constant, negative) in constants {
+            let (value, id) = match constant.part {
+                Part::Constant(value, id) => (value, id),
+                _ => continue,
+            };
+            let value = match (folded, is_product, negative) {
+                (None, _, false) => Ok(value),
+                (None, _, true) => expr::prefix(Operator::Sub, value),
+                (Some((before, _)), true, _) => expr::infix(Operator::Mul, before, value),
+                (Some((before, _)), false, false) => expr::infix(Operator::Add, before, value),
+                (Some((before, _)), false, true) => expr::infix(Operator::Sub, before, value),
+            };
+            let value = self.folded(at, value, term.span)?;
+            folded = Some((value, Term { part: Part::Constant(value, id), span: constant.span }));
+        }
+        left.extend(folded.map(|(_, constant)| (constant, false)));
+        let here = (term.span, ExprId { first: 0, count: 0 });
+        while left.len() > 1 {
+            let mut next = Vec::with_capacity(left.len().div_ceil(2));
+            for pair in left.chunks(2) {
+                next.push(match *pair {
+                    [(a, minus_a), (b, minus_b)] => {
+                        let (symbol, terms, negative) = match (is_product, minus_a, minus_b) {
+                            (true, ..) => (Operator::Mul, [a, b], false),
+                            (false, true, false) => (Operator::Sub, [b, a], false),
+                            (false, false, true) => (Operator::Sub, [a, b], false),
+                            (false, both, _) => (Operator::Add, [a, b], both),
+                        };
+                        (self.operate(at, line, symbol.text(), &terms, here, Kind::None)?, negative)
+                    }
+                    [one] => one,
+                    _ => continue,
+                });
+            }
+            left = next;
+        }
+        match left[..] {
+            [(value, false)] => Ok(Term { span: term.span, ..value }),
+            [(value, true)] => self.operate(at, line, Operator::Sub.text(), &[value], here, Kind::None),
+            _ => Err(Reported),
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! What is wrong where no instruction computes what an equation asks for. A part of [`equation`](crate::resolve::equation).
+
+use crate::context::{At, Reported};
+use crate::ir::given::Kind;
+use crate::report::diag::Diagnostic;
+use crate::report::nearest;
+use crate::report::source::Span;
+use crate::resolve::Resolver;
+use crate::resolve::equation::Term;
+use takt_isa::Type;
+
+impl Resolver<'_> {
+    /// Reports that a symbol means nothing between these terms.
+    pub(super) fn no_form(&mut self, at: At, symbol: &str, terms: &[Term], span: Span) -> Reported {
+        let place = self.symbol_span(symbol, terms, span);
+        if self.forms.get(symbol, terms.len()).is_empty() {
+            return self.no_symbol(at, symbol, terms, place);
+        }
+        let text = |resolver: &Self, term: &Term| resolver.context.reports.sources.text(term.span).to_owned();
+        let shown = if symbol == "?:" { "`? :`".to_owned() } else { format!("`{symbol}`") };
+        let condition = symbol == "?:";
+        // What a choice's condition is does not matter to its alternatives.
+        let mixed = if condition { &terms[1..] } else { terms };
+        let find = |kind| mixed.iter().find(|term| term.kind() == Some(kind));
+        let convert = |from, to| self.forms.conversion(from, to);
+        if condition && terms[0].kind() == Some(Kind::Float) {
+            let condition = text(self, &terms[0]);
+            let error = Diagnostic::error(
+                "equation",
+                terms[0].span,
+                "a condition is an integer, as comparisons give it, and this is a float",
+            )
+            .help(format!("compare it: `{condition} != 0`"));
+            return self.context.report(at.scope, error);
+        }
+        // What the instructions with this form want.
+        let wants = |ty| {
+            self.forms
+                .get(symbol, terms.len())
+                .iter()
+                .any(|meaning| meaning.sources.iter().any(|which| meaning.op.row().source_type(*which) == ty))
+        };
+        let error = match (find(Kind::Int), find(Kind::Float)) {
+            (Some(int), Some(float)) => {
+                let (name, other) = (text(self, int), text(self, float));
+                let message = format!("{shown} between an integer and a float");
+                let error = Diagnostic::error("equation", int.span, message)
+                    .here("an integer")
+                    .also(float.span, "a float");
+                match (convert(Type::I, Type::F), convert(Type::F, Type::I)) {
+                    (Some(float_of), Some(int_of)) if wants(Type::I) => error
+                        .help(format!("convert one of them: `{float_of}({name})` or `{int_of}({other})`")),
+                    (Some(float_of), _) => error.help(format!("convert it: `{float_of}({name})`")),
+                    _ => error,
+                }
+            }
+            (Some(int), None) if wants(Type::F) => {
+                let name = text(self, int);
+                let real = terms.iter().find(|term| term.kind().is_none());
+                let message = match (real, wants(Type::I)) {
+                    (Some(_), true) => format!("{shown} between an integer and a real number"),
+                    _ => format!("{shown} takes floats, and `{name}` is an integer"),
+                };
+                let mut error = Diagnostic::error("equation", int.span, message).here("an integer");
+                if let (Some(real), true) = (real, wants(Type::I)) {
+                    error = error.also(real.span, "a real number");
+                }
+                match convert(Type::I, Type::F) {
+                    Some(convert) => error.help(format!("convert it: `{convert}({name})`")),
+                    None => error,
+                }
+            }
+            (_, Some(float)) => {
+                let name = text(self, float);
+                let message = format!("{shown} takes integers, and `{name}` is a float");
+                let error = Diagnostic::error("equation", float.span, message).here("a float");
+                match convert(Type::F, Type::I) {
+                    Some(convert) => error.help(format!(
+                        "convert it: `{convert}({name})`, or declare it `:bits` if its pattern is meant"
+                    )),
+                    None => error,
+                }
+            }
+            _ => {
+                let real = terms.iter().find(|term| term.kind().is_none());
+                let message = format!("{shown} takes integers");
+                Diagnostic::error("equation", real.map_or(place, |term| term.span), message)
+            }
+        };
+        self.context.report(at.scope, error)
+    }
+
+    /// No instruction has the form at all.
+    fn no_symbol(&mut self, at: At, symbol: &str, terms: &[Term], place: Span) -> Reported {
+        let is_name = symbol.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');
+        if !is_name {
+            let message = format!("no instruction computes `{symbol}`");
+            let text = |term: &Term| self.context.reports.sources.text(term.span);
+            let help = match (symbol, terms) {
+                ("^", [base, _]) => Some(format!(
+                    "multiply: `{0}*{0}`; `pow(x, y)` of `<math.s>` takes any exponent",
+                    text(base)
+                )),
+                ("%", _) => Some("`fmod(x, y)` of `<math.s>` computes remainders".to_owned()),
+                ("~", [operand]) => Some(format!("`xor({}, -1)` flips all bits", text(operand))),
+                _ => None,
+            };
+            let mut error = Diagnostic::error("equation", place, message);
+            error.help = help;
+            return self.context.report(at.scope, error);
+        }
+        if let Some(takes) = self.forms.operands(symbol) {
+            let plural = if takes == 1 { "" } else { "s" };
+            let message = format!("`{symbol}` takes {takes} argument{plural}, not {}", terms.len());
+            return self.context.error(at.scope, "arguments", place, message);
+        }
+        let message = format!("`{symbol}` is not a function");
+        let error = Diagnostic::error("equation", place, message);
+        let library = self.library_with(symbol);
+        let macros = &self.context.scopes.macros;
+        let later = macros.iter().find(|(name, _)| self.context.scopes.text(**name) == symbol);
+        let error = match (later, library) {
+            (Some((_, definition)), _) => {
+                let defined = definition.span(&self.context.asts);
+                error
+                    .also(defined, "a macro of that name is defined only here")
+                    .help("move the definition up")
+            }
+            (None, Some(file)) => error.help(format!("the library defines it: `.include <{file}>`")),
+            (None, None) => {
+                let mut known: Vec<&str> =
+                    macros.keys().map(|name| self.context.scopes.text(*name)).collect();
+                known.sort_unstable();
+                let functions = self.forms.functions();
+                let meant = nearest(symbol, functions.iter().copied().chain(known));
+                match meant {
+                    Some(_) => error.did_you_mean(meant),
+                    None => error.note(format!(
+                        "functions: {}; and macros, as those of `<math.s>`",
+                        functions.join(" ")
+                    )),
+                }
+            }
+        };
+        self.context.report(at.scope, error)
+    }
+}

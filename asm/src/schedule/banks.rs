@@ -1,0 +1,85 @@
+//! In which banks registers may still lie while blocks are scheduled one after another: a choice of slot for one operation that
+//! writes a register is a choice for all.
+
+use crate::ir::runs::Run;
+use crate::ir::{Bundle, Ir, Operation, RegisterId, RegisterKind};
+use std::collections::HashMap;
+use takt_isa::{SlotIndex, Slots};
+
+/// For registers that several operations write, the slots that all of these may have.
+pub(super) struct Banks {
+    of: HashMap<RegisterId, Slots>,
+}
+
+/// What is known of the operations that write a register.
+#[derive(Clone, Copy)]
+struct Writers {
+    /// The slots that may execute all of them.
+    able: Slots,
+    /// The last run that has one.
+    run: usize,
+    count: u32,
+    /// Whether they stay where they are.
+    stay: bool,
+    /// Whether one of them shares its bundle with others.
+    bundled: bool,
+    /// The slot that they have.
+    slot: SlotIndex,
+}
+
+impl Banks {
+    /// What the source leaves open. Where it says what the bundles are (all of them, if `fixed`), or one choice would have to
+    /// suit several operations of a block or of a bundle, it is the slot that the operations have.
+    pub(super) fn new(ir: &Ir, runs: &[Run], fixed: bool) -> Banks {
+        let mut of = HashMap::new();
+        if ir.operations().all(|operation| operation.slots.len() < 2) {
+            return Banks { of };
+        }
+        let mut registers: HashMap<RegisterId, Writers> = HashMap::new();
+        for (number, run) in runs.iter().enumerate() {
+            for bundle in &ir.bundles[run.start..run.end] {
+                let stays = fixed || !run.scheduled || run.end - run.start < 2;
+                let several = bundle.operations.len() > 1;
+                for operation in &bundle.operations {
+                    let (Some(dest), Some(slot)) = (operation.dest, operation.slot) else { continue };
+                    let (able, run) = (operation.slots, number);
+                    let first = Writers { able, run, count: 0, stay: stays, bundled: several, slot };
+                    let writers = registers.entry(dest).or_insert(first);
+                    writers.bundled |= several;
+                    writers.stay |= stays || (writers.count > 0 && writers.run == number);
+                    writers.able = writers.able.and(able);
+                    (writers.run, writers.count) = (number, writers.count + 1);
+                }
+            }
+        }
+        for (register, writers) in registers.iter().filter(|(_, writers)| writers.count > 1 || writers.stay) {
+            let stay = writers.stay || writers.bundled;
+            of.insert(*register, if stay { Slots::of(writers.slot) } else { writers.able });
+        }
+        Banks { of }
+    }
+
+    /// The slots that may execute an operation. One that writes an output port is executed where that takes least time: the
+    /// port's demands count on it.
+    pub(super) fn able(&self, ir: &Ir, operation: &Operation) -> Slots {
+        let Some(dest) = operation.dest else { return operation.slots };
+        let slots = self.of.get(&dest).map_or(operation.slots, |slots| slots.and(operation.slots));
+        if ir.register(dest).kind != RegisterKind::Output || slots.len() < 2 {
+            return slots;
+        }
+        let latency = |slot: &SlotIndex| super::part(ir.machine, operation, Some(*slot)).writes;
+        let least = slots.iter().map(|slot| latency(&slot)).min();
+        slots.iter().filter(|slot| Some(latency(slot)) == least).collect()
+    }
+
+    /// Notes the slots that a block's operations have got.
+    pub(super) fn settle(&mut self, bundles: &[Bundle]) {
+        for operation in bundles.iter().flat_map(|bundle| &bundle.operations) {
+            if let (Some(dest), Some(slot)) = (operation.dest, operation.slot)
+                && let Some(slots) = self.of.get_mut(&dest)
+            {
+                *slots = Slots::of(slot);
+            }
+        }
+    }
+}

@@ -1,0 +1,318 @@
+//! Schedule generation: tasks in an order of priority, each in the first cycle that has room, forward or backward.
+
+use super::problem::{Edge, Part, Problem, Task};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// Longest chains: before each task (cycles from the block's start), and after it (cycles to the last task's issue).
+pub(super) struct Chains {
+    pub(super) head: Vec<u32>,
+    pub(super) tail: Vec<u32>,
+}
+
+/// Sets of cycles, one for each resource.
+pub(super) struct Reservations {
+    slots: Vec<Vec<bool>>,
+    units: Vec<Vec<bool>>,
+    ports: Vec<Vec<bool>>,
+}
+
+fn is_set(row: &[bool], cycle: usize) -> bool {
+    row.get(cycle).copied().unwrap_or(false)
+}
+
+fn set(row: &mut Vec<bool>, cycle: usize) {
+    if row.len() <= cycle {
+        row.resize((cycle + 1).next_power_of_two(), false);
+    }
+    row[cycle] = true;
+}
+
+/// Time runs backward in a backward pass: cycle `c` of the pass is cycle `-c` of the schedule, offset so that write ports,
+/// which are used *after* issue, stay at positive indices.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Direction {
+    Forward,
+    Backward,
+}
+
+const PORT_OFFSET: usize = takt_isa::spec::units::MAX_LATENCY as usize;
+
+impl Reservations {
+    pub(super) fn new(problem: &Problem) -> Reservations {
+        Reservations {
+            slots: vec![Vec::new(); problem.slots],
+            units: vec![Vec::new(); problem.units],
+            ports: vec![Vec::new(); problem.slots],
+        }
+    }
+
+    fn clear(&mut self) {
+        for row in self.slots.iter_mut().chain(&mut self.units).chain(&mut self.ports) {
+            row.fill(false);
+        }
+    }
+
+    fn port_cycle(direction: Direction, cycle: usize, latency: u32) -> usize {
+        match direction {
+            Direction::Forward => cycle + latency as usize + PORT_OFFSET,
+            Direction::Backward => cycle + PORT_OFFSET - latency as usize,
+        }
+    }
+
+    fn fits(&self, parts: &[Part], cycle: usize, direction: Direction) -> bool {
+        parts.iter().all(|part| {
+            !is_set(&self.slots[part.slot], cycle)
+                && part.unit.is_none_or(|unit| {
+                    // A unit is held for `interval` cycles of the pass from the issue on. In a backward pass the hold
+                    // runs the other way, which forbids the same pairs of cycles.
+                    (0..part.interval as usize).all(|k| !is_set(&self.units[unit], cycle + k))
+                })
+                && part.writes.is_none_or(|latency| {
+                    !is_set(&self.ports[part.slot], Self::port_cycle(direction, cycle, latency))
+                })
+        })
+    }
+
+    fn reserve(&mut self, parts: &[Part], cycle: usize, direction: Direction) {
+        for part in parts {
+            set(&mut self.slots[part.slot], cycle);
+            if let Some(unit) = part.unit {
+                for k in 0..part.interval as usize {
+                    set(&mut self.units[unit], cycle + k);
+                }
+            }
+            if let Some(latency) = part.writes {
+                set(&mut self.ports[part.slot], Self::port_cycle(direction, cycle, latency));
+            }
+        }
+    }
+}
+
+/// An edge, seen from one of its ends.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Arc {
+    /// The other end.
+    pub(super) task: u32,
+    /// Its distance, or the least if that depends on a choice.
+    pub(super) distance: u32,
+    /// [`Edge::latency_of`], or `FIXED`.
+    latency_of: u32,
+}
+
+/// What [`Arc::latency_of`] is where the distance depends on no choice.
+const FIXED: u32 = u32::MAX;
+
+/// When each task issues, and on which slots.
+#[derive(Clone, Debug)]
+pub(super) struct Plan {
+    /// The cycle. Those of a backward pass count from the end.
+    pub(super) start: Vec<u32>,
+    /// Which of the task's choices.
+    pub(super) choice: Vec<u8>,
+}
+
+impl Plan {
+    pub(super) fn new(problem: &Problem) -> Plan {
+        Plan { start: vec![0; problem.tasks.len()], choice: vec![0; problem.tasks.len()] }
+    }
+}
+
+/// Which choice of slots each task takes, of several that have room.
+#[derive(Clone, Debug)]
+pub(super) struct Lean {
+    /// The one that it leans toward.
+    pub(super) toward: Vec<u8>,
+    /// How much longer it waits for that: so many quarters of the time until it is due. None: it takes that of two as early.
+    pub(super) quarters: u32,
+    /// When it is due in a forward pass, and in a backward one.
+    pub(super) due: [Vec<i64>; 2],
+}
+
+impl Lean {
+    /// How many cycles later the choice that a task leans toward may be than another that has room in a cycle.
+    #[inline]
+    fn patience(&self, direction: Direction, task: usize, cycle: u32) -> u32 {
+        if self.quarters == 0 {
+            return 0;
+        }
+        let left = self.due[direction as usize][task] - i64::from(cycle);
+        left.max(0) as u32 * self.quarters / 4
+    }
+}
+
+/// The problem with its edges sorted by either end.
+pub(super) struct Graph<'p> {
+    pub(super) problem: &'p Problem,
+    pub(super) preds: Vec<Vec<Arc>>,
+    pub(super) succs: Vec<Vec<Arc>>,
+}
+
+impl<'p> Graph<'p> {
+    pub(super) fn new(problem: &'p Problem) -> Graph<'p> {
+        let mut graph = Graph {
+            problem,
+            preds: vec![Vec::new(); problem.tasks.len()],
+            succs: vec![Vec::new(); problem.tasks.len()],
+        };
+        for &Edge { from, to, distance, latency_of, .. } in &problem.edges {
+            let latency_of = latency_of.map_or(FIXED, |index| index as u32);
+            graph.preds[to].push(Arc { task: from as u32, distance, latency_of });
+            graph.succs[from].push(Arc { task: to as u32, distance, latency_of });
+        }
+        graph
+    }
+
+    /// The distance of an edge from a task on the slots of a choice.
+    #[inline]
+    fn distance(&self, from: usize, choice: u8, arc: &Arc) -> u32 {
+        match arc.latency_of {
+            FIXED => arc.distance,
+            index => self.problem.tasks[from].choice(choice)[index as usize].writes.unwrap_or(arc.distance),
+        }
+    }
+
+    /// For each task the choice whose slots fewest operations depend on that have no other.
+    pub(super) fn lightest(&self) -> Vec<u8> {
+        let mut demand = vec![0u32; self.problem.slots];
+        for task in self.problem.tasks.iter().filter(|task| task.choices() == 1) {
+            task.parts.iter().for_each(|part| demand[part.slot] += 1);
+        }
+        let lightest = |task: &Task| {
+            let load = |choice: &u8| task.choice(*choice).iter().map(|part| demand[part.slot]).sum::<u32>();
+            (0..task.choices() as u8).min_by_key(load).unwrap_or(0)
+        };
+        self.problem.tasks.iter().map(lightest).collect()
+    }
+
+    pub(super) fn chains(&self) -> Chains {
+        let n = self.problem.tasks.len();
+        let (mut head, mut tail) = (vec![0; n], vec![0; n]);
+        for i in 0..n {
+            let ends = self.preds[i].iter().map(|arc| head[arc.task as usize] + arc.distance);
+            head[i] = ends.max().unwrap_or(0);
+        }
+        for i in (0..n).rev() {
+            let ends = self.succs[i].iter().map(|arc| tail[arc.task as usize] + arc.distance);
+            tail[i] = ends.max().unwrap_or(0);
+        }
+        Chains { head, tail }
+    }
+
+    /// For each task the cycle in which it must issue for the schedule to have `length` cycles and for deadlines to be met
+    /// `spare` cycles early; negative where that cannot be.
+    pub(super) fn due(&self, length: u32, spare: u32) -> Vec<i64> {
+        let mut due = vec![i64::from(length) - 1; self.problem.tasks.len()];
+        for i in (0..due.len()).rev() {
+            if let Some(latest) = self.problem.tasks[i].latest {
+                due[i] = due[i].min(i64::from(latest) - i64::from(spare));
+            }
+            for arc in &self.succs[i] {
+                due[i] = due[i].min(due[arc.task as usize] - i64::from(arc.distance));
+            }
+        }
+        due
+    }
+
+    /// Places every task, in an order that respects the edges and otherwise follows `key` (small first), in the first
+    /// cycle that has room and is not before its `release`; of several choices of slots, that which has its results first,
+    /// unless it leans toward another.
+    pub(super) fn pass(
+        &self,
+        direction: Direction,
+        key: &[u64],
+        lean: &Lean,
+        release: impl Fn(&Task) -> u32,
+        table: &mut Reservations,
+        plan: &mut Plan,
+    ) {
+        let (preds, succs) = match direction {
+            Direction::Forward => (&self.preds, &self.succs),
+            Direction::Backward => (&self.succs, &self.preds),
+        };
+        table.clear();
+        let mut waiting: Vec<u32> = preds.iter().map(|p| p.len() as u32).collect();
+        let mut ready: BinaryHeap<Reverse<(u64, u32)>> = waiting
+            .iter()
+            .enumerate()
+            .filter(|(_, count)| **count == 0)
+            .map(|(i, _)| Reverse((key[i], i as u32)))
+            .collect();
+        while let Some(Reverse((_, i))) = ready.pop() {
+            let i = i as usize;
+            let task = &self.problem.tasks[i];
+            let mut best: Option<(u32, u32, u8)> = None;
+            let toward = lean.toward[i];
+            let others = (0..task.choices() as u8).filter(|choice| *choice != toward);
+            for choice in std::iter::once(toward).chain(others) {
+                let after = |arc: &Arc| {
+                    let other = arc.task as usize;
+                    let distance = match direction {
+                        Direction::Forward => self.distance(other, plan.choice[other], arc),
+                        Direction::Backward => self.distance(i, choice, arc),
+                    };
+                    plan.start[other] + distance
+                };
+                let parts = task.choice(choice);
+                let mut cycle = preds[i].iter().map(after).fold(release(task), u32::max);
+                while !table.fits(parts, cycle as usize, direction) {
+                    cycle += 1;
+                }
+                // What is quicker may issue later. (Backward, the distances have seen to that.)
+                let written = match direction {
+                    Direction::Forward => parts.iter().filter_map(|part| part.writes).max().unwrap_or(0),
+                    Direction::Backward => 0,
+                };
+                let done = cycle + written;
+                let patience = if choice == toward { 0 } else { lean.patience(direction, i, cycle) };
+                if best.is_none_or(|(other, start, _)| (done + patience, cycle + patience) < (other, start)) {
+                    best = Some((done, cycle, choice));
+                }
+            }
+            let (_, cycle, choice) = best.unwrap_or_default();
+            table.reserve(task.choice(choice), cycle as usize, direction);
+            (plan.start[i], plan.choice[i]) = (cycle, choice);
+            for arc in &succs[i] {
+                let other = arc.task as usize;
+                waiting[other] -= 1;
+                if waiting[other] == 0 {
+                    ready.push(Reverse((key[other], arc.task)));
+                }
+            }
+        }
+    }
+
+    /// When the tasks really issue if those that share a cycle of the plan become a bundle: bundles go in order, each as early
+    /// as the machine lets it, which may be earlier than planned, and then, because of what it takes there, make a later one
+    /// late. Returns the length.
+    pub(super) fn issue(&self, plan: &Plan, table: &mut Reservations, start: &mut [u32]) -> u32 {
+        let Plan { start: plan, choice } = plan;
+        let mut order: Vec<u32> = (0..plan.len() as u32).collect();
+        order.sort_unstable_by_key(|&i| (plan[i as usize], i));
+        table.clear();
+        let mut cycle = 0;
+        for bundle in order.chunk_by(|&a, &b| plan[a as usize] == plan[b as usize]) {
+            let tasks = || {
+                let indices = bundle.iter().map(|&i| i as usize);
+                indices.map(|i| (i, self.problem.tasks[i].choice(choice[i])))
+            };
+            for (i, _) in tasks() {
+                let earlier = self.preds[i].iter().filter(|arc| plan[arc.task as usize] < plan[i]);
+                let after = |arc: &Arc| {
+                    let from = arc.task as usize;
+                    start[from] + self.distance(from, choice[from], arc)
+                };
+                cycle = earlier.map(after).fold(cycle, u32::max);
+            }
+            while !tasks().all(|(_, parts)| table.fits(parts, cycle as usize, Direction::Forward)) {
+                cycle += 1;
+            }
+            for (i, parts) in tasks() {
+                table.reserve(parts, cycle as usize, Direction::Forward);
+                start[i] = cycle;
+            }
+            cycle += 1;
+        }
+        cycle
+    }
+}

@@ -1,0 +1,563 @@
+//! Equations compute what they say: random ones on the emulator against their evaluation here, operation by operation in the order
+//! written; and what becomes of equal parts, of names that are written in between, of limits.
+
+mod common;
+
+use common::{assemble, bad, bundles, good};
+use proptest::prelude::*;
+use takt_asm::expr::Value;
+use takt_asm::{Expression, listing};
+use takt_emu::Emulator;
+use takt_isa::fp::Host;
+use takt_isa::{MACHINES, Op, Program, T1, T3, Type, compute};
+
+/// An expression, as the test has it.
+#[derive(Clone, Debug)]
+enum Tree {
+    /// A literal, as it is written.
+    Literal(&'static str),
+    /// A register.
+    Name(&'static str),
+    Prefix(&'static str, Box<Tree>),
+    Infix(&'static str, Box<Tree>, Box<Tree>),
+    Call(&'static str, Vec<Tree>),
+    Choice(Box<Tree>, Box<Tree>, Box<Tree>),
+}
+
+use Tree::{Call, Choice, Infix, Literal, Name, Prefix};
+
+/// How tightly the head of an expression binds.
+fn level(tree: &Tree) -> u8 {
+    match tree {
+        Choice(..) => 0,
+        Infix("==" | "!=" | "<" | "<=" | ">" | ">=", ..) => 1,
+        Infix("|", ..) => 2,
+        Infix("&", ..) => 3,
+        Infix("<<" | ">>", ..) => 4,
+        Infix("+" | "-", ..) => 5,
+        Infix(..) => 6,
+        Prefix(..) => 7,
+        Literal(_) | Name(_) | Call(..) => 9,
+    }
+}
+
+/// The expression as it is written, with no more parentheses than it needs.
+fn text(tree: &Tree) -> String {
+    let at = |tree: &Tree, least: u8| {
+        if level(tree) < least { format!("({})", text(tree)) } else { text(tree) }
+    };
+    match tree {
+        Literal(text) => (*text).to_owned(),
+        Name(name) => (*name).to_owned(),
+        Prefix(operator, a) => format!("{operator}{}", at(a, 7)),
+        Infix(operator, a, b) => format!("{} {operator} {}", at(a, level(tree)), at(b, level(tree) + 1)),
+        Call(name, arguments) => {
+            format!("{name}({})", arguments.iter().map(text).collect::<Vec<_>>().join(", "))
+        }
+        Choice(c, a, b) => format!("{} ? {} : {}", at(c, 1), text(a), text(b)),
+    }
+}
+
+/// A value while an expression is evaluated.
+#[derive(Clone, Copy, Debug)]
+enum Seen {
+    Constant(Value),
+    Float(u32),
+    Int(u32),
+}
+
+/// The registers of the test's programs.
+type Registers = std::collections::BTreeMap<&'static str, u32>;
+
+fn is_int(name: &str) -> bool {
+    matches!(name, "n" | "k" | "j")
+}
+
+/// Why there is no value: a constant part has none, which the assembler says.
+struct NoValue;
+
+fn bits(seen: Seen, ty: Type) -> Result<u32, NoValue> {
+    match seen {
+        Seen::Constant(value) => value.bits(ty).map_err(|_| NoValue),
+        Seen::Float(bits) | Seen::Int(bits) => Ok(bits),
+    }
+}
+
+/// Evaluates an expression: constant parts in binary64, all else by one operation each, in the order written.
+fn evaluate(tree: &Tree, registers: &Registers) -> Result<Seen, NoValue> {
+    let run = |op, sources: &[Seen], ty: Type| -> Result<u32, NoValue> {
+        let mut all = [0; 3];
+        for (bits_of, source) in all.iter_mut().zip(sources) {
+            *bits_of = bits(*source, ty)?;
+        }
+        Ok(compute::<Host>(op, all[0], all[1], all[2]).bits)
+    };
+    let operands = match tree {
+        Literal(_) | Name(_) => vec![],
+        Prefix(_, a) => vec![evaluate(a, registers)?],
+        Infix(_, a, b) => vec![evaluate(a, registers)?, evaluate(b, registers)?],
+        Call(_, arguments) => {
+            arguments.iter().map(|tree| evaluate(tree, registers)).collect::<Result<_, _>>()?
+        }
+        Choice(condition, a, b) => {
+            let condition = evaluate(condition, registers)?;
+            if let Seen::Constant(value) = condition {
+                return evaluate(if value.is_zero() { b } else { a }, registers);
+            }
+            vec![condition, evaluate(a, registers)?, evaluate(b, registers)?]
+        }
+    };
+    let constant = |operand: &Seen| matches!(operand, Seen::Constant(_));
+    let folds = !matches!(tree, Name(_) | Choice(..) | Call("sat" | "sign" | "itof" | "ftoi", _));
+    if folds && operands.iter().all(constant) {
+        // Of the operands' values: of a choice that is made, the other alternative does not count.
+        let written: Vec<String> = operands
+            .iter()
+            .map(|operand| match operand {
+                Seen::Constant(Value::Int(value)) => format!("({value})"),
+                Seen::Constant(Value::Real(value)) => format!("({value:?})"),
+                Seen::Float(_) | Seen::Int(_) => String::new(),
+            })
+            .collect();
+        let folded = match tree {
+            Prefix(operator, _) => format!("{operator}{}", written[0]),
+            Infix(operator, ..) => format!("{} {operator} {}", written[0], written[1]),
+            Call(name, _) => format!("{name}({})", written.join(", ")),
+            _ => text(tree),
+        };
+        let parsed = Expression::parse(&folded).map_err(|_| NoValue)?;
+        return parsed.evaluate(|_| None).map(Seen::Constant).map_err(|_| NoValue);
+    }
+    let is_int_one = |seen: &Seen| matches!(seen, Seen::Int(_));
+    Ok(match tree {
+        Literal(_) => return Err(NoValue),
+        Name(name) if is_int(name) => Seen::Int(registers[name]),
+        Name(name) => Seen::Float(registers[name]),
+        Choice(..) => {
+            let ty = if operands[1..].iter().any(is_int_one) { Type::I } else { Type::F };
+            let chosen = operands[if bits(operands[0], Type::I)? != 0 { 1 } else { 2 }];
+            let value = bits(chosen, ty)?;
+            if ty == Type::I { Seen::Int(value) } else { Seen::Float(value) }
+        }
+        Prefix("!", _) => Seen::Int(u32::from(bits(operands[0], Type::I)? == 0)),
+        Prefix(_, _) if is_int_one(&operands[0]) => Seen::Int(bits(operands[0], Type::I)?.wrapping_neg()),
+        Prefix(..) => Seen::Float(run(Op::fneg, &operands, Type::F)?),
+        Infix(operator, ..) if operands.iter().any(is_int_one) => {
+            let (a, b) = (bits(operands[0], Type::I)?, bits(operands[1], Type::I)?);
+            let (x, y) = (a.cast_signed(), b.cast_signed());
+            Seen::Int(match *operator {
+                "+" => a.wrapping_add(b),
+                "-" => a.wrapping_sub(b),
+                "&" => a & b,
+                "|" => a | b,
+                "<<" => a << (b & 31),
+                ">>" => (x >> (b & 31)).cast_unsigned(),
+                "==" => u32::from(a == b),
+                "!=" => u32::from(a != b),
+                "<" => u32::from(x < y),
+                "<=" => u32::from(x <= y),
+                ">" => u32::from(x > y),
+                ">=" => u32::from(x >= y),
+                _ => return Err(NoValue),
+            })
+        }
+        Infix(operator, ..) => {
+            let (a, b) =
+                (f32::from_bits(bits(operands[0], Type::F)?), f32::from_bits(bits(operands[1], Type::F)?));
+            let truth = |condition: bool| Seen::Int(condition.into());
+            match *operator {
+                "+" => Seen::Float(run(Op::fadd, &operands, Type::F)?),
+                "-" => Seen::Float(run(Op::fsub, &operands, Type::F)?),
+                "*" => Seen::Float(run(Op::fmul, &operands, Type::F)?),
+                "/" => Seen::Float(run(Op::fdiv, &operands, Type::F)?),
+                "==" => truth(a == b),
+                "!=" => truth(a != b),
+                "<" => truth(a < b),
+                "<=" => truth(a <= b),
+                ">" => truth(a > b),
+                ">=" => truth(a >= b),
+                _ => return Err(NoValue),
+            }
+        }
+        Call("xor", _) => Seen::Int(bits(operands[0], Type::I)? ^ bits(operands[1], Type::I)?),
+        Call("itof", _) => Seen::Float(run(Op::itof, &operands, Type::I)?),
+        Call("ftoi", _) => Seen::Int(run(Op::ftoi, &operands, Type::F)?),
+        Call(name, _) => {
+            let op = match *name {
+                "sqrt" => Op::fsqrt,
+                "abs" => Op::fabs,
+                "sign" => Op::fsign,
+                "min" => Op::fmin,
+                "max" => Op::fmax,
+                "sat" => Op::fsat,
+                "sin" => Op::fsin,
+                "cos" => Op::fcos,
+                _ => return Err(NoValue),
+            };
+            Seen::Float(run(op, &operands, Type::F)?)
+        }
+    })
+}
+
+/// Trees from a stream of choices, which proptest makes and makes shorter.
+struct Choices<'c>(std::slice::Iter<'c, u8>);
+
+impl Choices<'_> {
+    fn below(&mut self, n: u8) -> u8 {
+        self.0.next().map_or(0, |byte| byte % n)
+    }
+
+    fn one(&mut self, of: &[&'static str]) -> &'static str {
+        of[usize::from(self.below(of.len() as u8))]
+    }
+
+    fn boxed(&mut self, float: bool, depth: u8) -> Box<Tree> {
+        Box::new(if float { self.float(depth) } else { self.int(depth) })
+    }
+
+    fn float(&mut self, depth: u8) -> Tree {
+        if depth == 0 {
+            return match self.below(8) {
+                0 => Literal(self.one(&["2", "0.5", "3.1", "1e-3", "7"])),
+                _ => Name(self.one(&["x", "y", "t", "u", "v"])),
+            };
+        }
+        let d = depth - 1;
+        match self.below(10) {
+            0 => self.float(0),
+            1 => Prefix("-", self.boxed(true, d)),
+            2..=6 => Infix(self.one(&["+", "-", "*", "/"]), self.boxed(true, d), self.boxed(true, d)),
+            7 => match self.below(3) {
+                0 => Call(self.one(&["sqrt", "abs", "sin", "cos"]), vec![self.float(d)]),
+                1 => Call("sign", vec![Infix("+", Box::new(Name("x")), self.boxed(true, d))]),
+                _ => Call("itof", vec![Infix("+", Box::new(Name("n")), self.boxed(false, d))]),
+            },
+            8 => match self.below(3) {
+                0 => Call(self.one(&["min", "max"]), vec![self.float(d), self.float(d)]),
+                _ => Call("sat", vec![Name(self.one(&["x", "u"])), self.float(d)]),
+            },
+            _ => Choice(self.boxed(false, d), Box::new(Name(self.one(&["x", "v"]))), self.boxed(true, d)),
+        }
+    }
+
+    fn int(&mut self, depth: u8) -> Tree {
+        if depth == 0 {
+            return match self.below(6) {
+                0 => Literal(self.one(&["0", "1", "3", "17"])),
+                _ => Name(self.one(&["n", "k", "j"])),
+            };
+        }
+        let d = depth - 1;
+        const COMPARE: &[&str] = &["==", "!=", "<", "<=", ">", ">="];
+        match self.below(9) {
+            0 => self.int(0),
+            1 => Prefix(self.one(&["-", "!"]), self.boxed(false, d)),
+            2 | 3 => Infix(self.one(&["+", "-", "&", "|"]), self.boxed(false, d), self.boxed(false, d)),
+            4 => Infix(self.one(&["<<", ">>"]), self.boxed(false, d), Box::new(Literal("3"))),
+            5 => Infix(self.one(COMPARE), self.boxed(true, d), self.boxed(true, d)),
+            6 => Infix(self.one(COMPARE), self.boxed(false, d), self.boxed(false, d)),
+            7 => match self.below(2) {
+                0 => Call("xor", vec![self.int(d), self.int(d)]),
+                _ => Call("ftoi", vec![Infix("*", Box::new(Name("y")), self.boxed(true, d))]),
+            },
+            _ => Choice(self.boxed(false, d), Box::new(Name(self.one(&["n", "k"]))), self.boxed(false, d)),
+        }
+    }
+}
+
+/// Some equations: what each writes, and what.
+fn equations(choices: &[u8]) -> Vec<(&'static str, Tree)> {
+    let mut choices = Choices(choices.iter());
+    (0..6)
+        .map(|_| {
+            let target = choices.one(&["t", "u", "v", "k", "j"]);
+            let depth = choices.below(5);
+            (target, if is_int(target) { choices.int(depth) } else { choices.float(depth) })
+        })
+        .collect()
+}
+
+const STATES: [&str; 5] = ["t", "u", "v", "k", "j"];
+const VALUES: [u32; 8] =
+    [0x3f80_0000, 0xc020_0000, 0x0000_0000, 0x8000_0000, 0x7f80_0000, 0x7fc0_0000, 0x0000_0007, 0x42f6_e979];
+
+/// A program of these equations, in three periods.
+fn source(equations: &[(&'static str, Tree)], ports: &str) -> String {
+    let mut source = format!(
+        ".ports {ports}\n.schedule on\n.input x, y, n:int\n.state t, u, v, k:int, j:int\n\
+         .output ot, ou, ov, ok:int, oj:int\n.once\n t, u, v, k, j = 1, 2, 3, 4, 5\n wait period\n.period\nperiod:\n"
+    );
+    for (target, tree) in equations {
+        source.push_str(&format!(" {target} = {}\n", text(tree)));
+    }
+    source.push_str(" ot, ou, ov, ok, oj = t, u, v, k, j\n wait period\n");
+    source
+}
+
+fn set(emulator: &mut Emulator, program: &Program, name: &str, bits: u32) {
+    if let Some(port) = program.inputs.iter().find(|port| port.name == name) {
+        emulator.set_input_bits(port.register, bits).expect("it is an input");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 120, ..ProptestConfig::default() })]
+
+    /// On every machine, bit for bit, with NaNs and infinities among the values.
+    #[test]
+    fn equations_compute_what_is_written(choices in prop::collection::vec(any::<u8>(), 1..160), latched in any::<bool>()) {
+        let equations = equations(&choices);
+        let source = source(&equations, if latched { "latched" } else { "direct" });
+        let mut expected: Registers = [("t", 1.0f32), ("u", 2.0), ("v", 3.0)].map(|(name, value)| (name, value.to_bits())).into();
+        expected.extend([("k", 4), ("j", 5)]);
+        let mut outputs: Vec<Option<Registers>> = Vec::new();
+        for period in 0..3 {
+            let values = |i: usize| VALUES[(usize::from(choices[0]) + 3 * i + 5 * period) % VALUES.len()];
+            expected.extend([("x", values(0)), ("y", values(1)), ("n", values(2))]);
+            for (target, tree) in &equations {
+                let ty = if is_int(target) { Type::I } else { Type::F };
+                let value = evaluate(tree, &expected).and_then(|seen| bits(seen, ty));
+                let Ok(value) = value else {
+                    // A constant part without a value: one error, and it says where.
+                    let report = bad(&source, &T3);
+                    let mut errors = report.list.iter().filter(|d| d.severity == takt_asm::diag::Severity::Error);
+                    prop_assert!(errors.all(|error| error.code == "expression"), "{source}{}", report.render(false));
+                    return Ok(());
+                };
+                expected.insert(target, value);
+            }
+            outputs.push(Some(expected.clone()));
+        }
+        for machine in MACHINES {
+            // The search for short schedules is not what is asked about.
+            let options = takt_asm::Options { effort: 0, ..common::options(machine) };
+            let assembled = takt_asm::assemble("test.s", &takt_asm::MemoryLoader::of("test.s", source.as_str()), &options);
+            let assembled = match assembled {
+                Ok(assembled) => assembled,
+                Err(report) => return Err(TestCaseError::fail(format!("{source}{}", report.render(false)))),
+            };
+            let program = &assembled.program;
+            let mut emulator = Emulator::new(program).expect("it fits");
+            for (period, outputs) in outputs.iter().flatten().enumerate() {
+                for name in ["x", "y", "n"] {
+                    set(&mut emulator, program, name, outputs[name]);
+                }
+                emulator.run_period(&[]).expect("it runs");
+                for name in STATES {
+                    let port = program.outputs.iter().find(|port| port.name == format!("o{name}"));
+                    let seen = emulator.register(port.expect("it is declared").register);
+                    prop_assert_eq!(seen, Some(outputs[name]), "{} on {}, period {}:\n{}", name, machine.name, period, source);
+                }
+            }
+        }
+    }
+}
+
+/// The operations of a period with these lines, none scheduled.
+fn period(declarations: &str, lines: &str) -> Vec<String> {
+    let source = format!(
+        ".input x, y, n:int\n.output a, b\n.reg t u v w\n{declarations}\n.once\n t, u, v, w = 0, 0, 0, 0\n wait period\n.period\nperiod:\n{lines}\n wait period\n"
+    );
+    let assembled = good(&source);
+    let start = assembled.program.sections[1].start.index();
+    bundles(&assembled)[start..].to_vec()
+}
+
+fn count(operations: &[String], mnemonic: &str) -> usize {
+    operations.iter().filter(|operation| operation.starts_with(mnemonic)).count()
+}
+
+#[test]
+fn equal_parts_are_computed_once() {
+    let once = |declarations: &str, lines: &str| count(&period(declarations, lines), "fmul");
+    // Within an equation; of ports, too.
+    assert_eq!(once("", " a = x*y + x*y\n b = t"), 1);
+    // In the equations of a run.
+    assert_eq!(once("", " a = t*u + 1\n b = t*u - 1"), 1);
+    // Where the part is a whole equation, its register has the value.
+    assert_eq!(once("", " v = t*u\n a = t*u - 1\n b = v"), 1);
+    // Not once a source is written, nor once what has the value is.
+    assert_eq!(once("", " a = t*u + 1\n t = x\n b = t*u - 1"), 2);
+    assert_eq!(once("", " a = t*u + 1\n fadd t, x, y\n b = t*u - 1"), 2);
+    assert_eq!(once("", " v = t*u\n v = x\n a = t*u - 1\n b = v"), 2);
+    // Not across a label, a branch, a loop's head, or what sees the flags.
+    assert_eq!(once("", " a = t*u + 1\nhere:\n b = t*u - 1"), 2);
+    assert_eq!(once("", " a = t*u + 1\n bz n, period\n b = t*u - 1"), 2);
+    assert_eq!(once("", " a = t*u + 1\n clrflags\n b = t*u - 1"), 2);
+    assert_eq!(once("", " a = t*u + 1\n .loop_bound 3\n b = t*u - 1"), 2);
+    // A port that may change is read anew in each equation; a latched one is not.
+    assert_eq!(once("", " a = x*y + 1\n b = x*y - 1"), 2);
+    assert_eq!(once(".ports latched", " a = x*y + 1\n b = x*y - 1"), 1);
+    // The order of a sum is kept: these are different parts.
+    assert_eq!(once("", " a = t*u*v\n b = u*v*t"), 4);
+}
+
+/// A jump by number into what counts on the line above would skip the computation.
+#[test]
+fn jumps_by_number_do_not_skip_what_is_shared() {
+    let text = |target: u32| {
+        format!(
+            ".input x, n:int\n.output a, b\n.reg t\n.once\n t = x\n wait period\n.period\nperiod: bz n, {target}\n a = t*t + 1\n b = t*t - 1\n wait period\n"
+        )
+    };
+    let codes =
+        |report: takt_asm::diag::Diagnostics| report.list.iter().map(|error| error.code).collect::<Vec<_>>();
+    // Bundles: mov, wait, bz, fmul, fadd, fsub, wait.
+    assert!(assemble(&text(3), &T3).is_ok());
+    assert_eq!(codes(bad(&text(4), &T3)), ["target"]);
+    assert_eq!(codes(bad(&text(5), &T3)), ["target"]);
+    assert!(assemble(&text(6), &T3).is_ok());
+}
+
+#[test]
+fn constants_are_folded_where_they_are_a_part() {
+    let products = |line: &str| count(&period("", &format!("{line}\n b = t")), "fmul");
+    assert_eq!(products(" a = x*(2*pi/3)"), 1);
+    assert_eq!(products(" a = 2*pi/3*x"), 1);
+    // In the order written: (x·2)·π.
+    assert_eq!(products(" a = x*2*pi"), 2);
+    // A division stays one.
+    assert_eq!((products(" a = x/3"), count(&period("", " a = x/3\n b = t"), "fdiv")), (0, 1));
+}
+
+/// A machine that lacks an instruction says so at the operator; a choice by `has.` computes only what it has.
+#[test]
+fn what_a_machine_lacks() {
+    let lacks = |row: &&takt_isa::Row| T1.host(row.function).is_none() && !row.forms.is_empty();
+    for row in takt_isa::ROWS.iter().filter(lacks) {
+        let form = row.forms[0];
+        let text = |value: &str| {
+            format!(".input a, b, c\n.output y\n.once\n wait p\n.period\np: y = {value}\n wait p\n")
+        };
+        let report = bad(&text(form), &T1);
+        assert_eq!(report.list[0].code, "no-unit", "{}", report.render(false));
+        let chosen = format!("has.{} ? {form} : a*b*c", row.mnemonic);
+        assert!(assemble(&text(&chosen), &T1).is_ok());
+    }
+}
+
+/// Thousands of names, as generated code has them.
+#[test]
+fn many_temporaries() {
+    let names: Vec<String> = (0..5000).map(|i| format!("_u{i}")).collect();
+    let mut text = format!(
+        ".schedule on\n.input x, y\n.output a\n.reg t[400]\n.reg {}\n.once\n wait p\n.period\np: t[1] = x + y\n",
+        names.join(" ")
+    );
+    for i in 2..=400 {
+        text.push_str(&format!(" t[{i}] = t[{}]*3 + x\n", 1 + i / 2));
+    }
+    text.push_str(" a = t[400]\n wait p\n");
+    let program = good(&text).program;
+    assert!(program.bundles() < 1024);
+    assert!(program.registers.iter().all(|port| !port.name.starts_with('=')));
+}
+
+/// Each word of an equation knows its part of the line, and the image keeps it.
+#[test]
+fn words_know_their_part_of_the_line() {
+    let text = ".input x, y\n.output a\n.once\n wait p\n.period\np: a = sqrt(x*x + y*y)\n wait p\n";
+    let assembled = good(text);
+    let program = &assembled.program;
+    let line: Vec<char> = text.lines().nth(5).expect("there are so many").chars().collect();
+    let parts: Vec<String> = program
+        .parts
+        .iter()
+        .map(|(_, part)| line[part.first as usize - 1..part.last as usize].iter().collect())
+        .collect();
+    assert_eq!(parts, ["x*x", "y*y", "x*x + y*y", "sqrt(x*x + y*y)"]);
+    assert_eq!(program.word_place(program.parts[1].0 as usize).as_deref(), Some("test.s:6:19-21"));
+    let listing = listing::listing(&assembled);
+    assert!(listing.contains("; x*x + y*y\n"), "{listing}");
+    let image = takt_asm::image::write(program).expect("an image holds it");
+    assert_eq!(takt_asm::image::read(&image).as_ref(), Ok(program));
+}
+
+#[test]
+fn limits_are_finite() {
+    let code = |line: &str, declarations: &str| {
+        let text = format!(
+            ".input x\n.output a\n{declarations}\n.once\n wait p\n.period\np:\n a = x\n {line}\n wait p\n"
+        );
+        let report = bad(&text, &T3);
+        assert_eq!(report.list.len(), 1, "{}", report.render(false));
+        report.list[0].code
+    };
+    assert_eq!(code("a = sum(i, 1, 5000000, 0)", ""), "limit");
+    assert_eq!(code("a = sum(i, 1, 5000, sum(j, 1, 5000, 0))", ""), "limit");
+    assert_eq!(code(&format!("a = {}x", "x ? 1 : ".repeat(200)), ""), "limit");
+    assert_eq!(code(&format!("a = {}x{}", "(".repeat(200), ")".repeat(200)), ""), "limit");
+    assert_eq!(code("", ".reg P[300,300]"), "limit");
+    assert_eq!(code("", ".reg P[1,1,1,1,1,1,1,1,1]"), "limit");
+    let names: Vec<String> = (1..=65).map(|i| format!("t[{i}]")).collect();
+    let values = vec!["x"; 65].join(", ");
+    assert_eq!(code(&format!("{} = {values}", names.join(", ")), ".reg t[65]"), "limit");
+    // What is long, but not deep, is read.
+    let long = vec!["x*x"; 200].join(" + ");
+    assert!(
+        good(&format!(".input x\n.output a\n.once\n wait p\n.period\np: a = {long}\n wait p\n"))
+            .program
+            .bundles()
+            > 200
+    );
+}
+
+/// What `.fast` allows, and that without it nothing changes.
+#[test]
+fn fast_allows_what_it_names() {
+    let lines = " a = x + t - u + 3 - v + w - 5 + y\n b = x/3*t";
+    let text = |fast: &str| {
+        format!(
+            ".schedule on\n{fast}.input x, y, t, u, v, w\n.output a, b\n.once\n wait period\n.period\nperiod:\n{lines}\n wait period\n"
+        )
+    };
+    let run = |fast: &str| {
+        let program = good(&text(fast)).program;
+        let mut emulator = Emulator::new(&program).expect("it fits");
+        for (port, value) in program.inputs.iter().zip([1.0f32, 20.0, 300.0, 4000.0, 50_000.0, 600_000.0]) {
+            emulator.set_input_bits(port.register, value.to_bits()).expect("it is an input");
+        }
+        emulator.run_period(&[]).expect("it runs");
+        let report = emulator.run_period(&[]).expect("it runs");
+        let output = |number: usize| {
+            let register = program.outputs[number].register;
+            f32::from_bits(emulator.register(register).expect("it is written"))
+        };
+        (output(0), output(1), report.cycles, bundles(&good(&text(fast))))
+    };
+    let (a, b, cycles, written) = run("");
+    // All of it is exact but the quotient: 1 + 300 - 4000 + 3 - 50000 + 600000 - 5 + 20.
+    assert_eq!((a, b), (546_319.0, 1.0 / 3.0 * 300.0));
+    assert_eq!(run(".fast off\n"), (a, b, cycles, written.clone()));
+    let (sum, product, shorter, _) = run(".fast reassociate\n");
+    assert_eq!(sum, a);
+    assert!((product - b).abs() <= 1e-4);
+    assert!(shorter < cycles, "{shorter} cycles, {cycles} in the order written");
+    let (_, _, _, multiplied) = run(".fast reciprocal\n");
+    let quotients = |bundles: &[String]| bundles.iter().filter(|bundle| bundle.contains("fdiv")).count();
+    assert_eq!((quotients(&written), quotients(&multiplied)), (1, 0));
+    // Two constants of the sum become one.
+    let sums = |bundles: &[String]| {
+        bundles
+            .iter()
+            .map(|bundle| bundle.matches("fadd").count() + bundle.matches("fsub").count())
+            .sum::<usize>()
+    };
+    assert_eq!((sums(&written), sums(&run(".fast reassociate, reciprocal\n").3)), (7, 6));
+    let report = bad(&text(".fast associate\n"), &T3);
+    assert_eq!(report.list[0].code, "fast");
+}
+
+/// Of an array some element has to be used, not each; and not each value of one.
+#[test]
+fn arrays_are_used_as_a_whole() {
+    let warnings = |lines: &str| {
+        let text = format!(
+            ".schedule on\n.input x\n.output a\n.reg t[3]\n.once\n wait p\n.period\np:\n{lines} wait p\n"
+        );
+        good(&text).warnings.list.iter().map(|warning| warning.message.clone()).collect::<Vec<_>>()
+    };
+    assert_eq!(warnings(" t[1] = x\n t[1] = x*x\n t[2] = x\n a = t[1]\n"), [""; 0]);
+    assert_eq!(warnings(" a = x\n"), ["register `t` is never used"]);
+    assert_eq!(warnings(" t[1] = x\n a = x\n"), ["register `t` is written and never read"]);
+}

@@ -1,0 +1,99 @@
+//! Rows in which several slots host a function: t3's units, placed otherwise; and random ones.
+#![allow(dead_code)]
+
+use std::sync::OnceLock;
+use takt_isa::spec::units::*;
+use takt_isa::{Bank, Machine, Slot, T3, Unit};
+
+const MUL: &[Unit] = &[MULTIPLY, DIVROOT, SINE, ARCTANGENT, ARCCOSINE];
+
+/// The slots of each row: names and units.
+const ROWS: &[(&str, &[(&str, &[Unit])])] = &[
+    ("second_adder", &[("mul", MUL), ("add", &[ADD, CONVERT]), ("aux", &[ALU, ADD, MEMORY, SEQUENCER])]),
+    (
+        "second_multiplier",
+        &[("mul", MUL), ("add", &[ADD, CONVERT, MULTIPLY]), ("aux", &[ALU, ADD, MEMORY, SEQUENCER])],
+    ),
+    (
+        "two_dividers",
+        &[("mul", MUL), ("add", &[ADD, CONVERT]), ("aux", &[ALU, DIVIDE, ROOT, MEMORY, SEQUENCER])],
+    ),
+    ("two_alus", &[("mul", MUL), ("add", &[ALU, ADD, CONVERT]), ("aux", &[ALU, MEMORY, SEQUENCER])]),
+    // A function that takes longer in one slot than in the other.
+    (
+        "late_alu",
+        &[
+            ("mul", &[ALU_LATE, MULTIPLY, DIVROOT, SINE, ARCTANGENT, ARCCOSINE]),
+            ("add", &[ADD, CONVERT]),
+            ("aux", &[ALU, MEMORY, SEQUENCER]),
+        ],
+    ),
+    (
+        "four",
+        &[
+            ("mul", MUL),
+            ("add", &[ADD, CONVERT]),
+            ("aux", &[ALU, MEMORY, SEQUENCER]),
+            ("more", &[MULTIPLY, ADD, ALU]),
+        ],
+    ),
+];
+
+/// A row with t3's registers, divided among its slots.
+fn row(name: &'static str, slots: &[(&'static str, &'static [Unit])]) -> Machine {
+    let depth = T3.inputs.base / slots.len() as u16;
+    let banks = ["m", "a", "x", "y", "w"];
+    let slot = |(number, (name, units)): (u16, &(&'static str, &'static [Unit]))| Slot {
+        name,
+        bank: Bank { name: banks[usize::from(number)], base: number * depth, depth },
+        units,
+    };
+    let slots: Vec<Slot> = (0..).zip(slots).map(slot).collect();
+    let machine = Machine { name, slots: Vec::leak(slots), ..T3 };
+    if let Some(error) = machine.error() {
+        panic!("{error}");
+    }
+    machine
+}
+
+/// The rows.
+pub(crate) fn all() -> &'static [Machine] {
+    static ALL: OnceLock<Vec<Machine>> = OnceLock::new();
+    ALL.get_or_init(|| ROWS.iter().map(|(name, slots)| row(name, slots)).collect())
+}
+
+/// The row of a name.
+pub(crate) fn named(name: &str) -> &'static Machine {
+    all().iter().find(|machine| machine.name == name).expect("it is among the rows")
+}
+
+/// A row with two to four slots, in which each unit of t3, or one that does the same in other time, stands in one slot or more.
+pub(crate) fn random(mut below: impl FnMut(u64) -> u64) -> &'static Machine {
+    let count = 2 + below(3) as usize;
+    let mut units: Vec<Vec<Unit>> = vec![Vec::new(); count];
+    let alternatives: [&[&[Unit]]; 7] = [
+        &[&[MULTIPLY]],
+        &[&[DIVROOT], &[DIVIDE, ROOT]],
+        &[&[SINE], &[Unit { interval: 9, ..SINE }]],
+        &[&[ARCTANGENT, ARCCOSINE]],
+        &[&[ADD]],
+        &[&[CONVERT]],
+        &[&[ALU], &[ALU_LATE]],
+    ];
+    for kinds in alternatives {
+        for slot in 0..1 + below(count as u64) {
+            let first = if slot == 0 { below(count as u64) } else { slot };
+            let place = &mut units[first as usize];
+            let kind = kinds[below(kinds.len() as u64) as usize];
+            if !place.iter().any(|unit| kind.iter().any(|new| new.functions[0] == unit.functions[0])) {
+                place.extend_from_slice(kind);
+            }
+        }
+    }
+    units[below(count as u64) as usize].push(MEMORY);
+    units[below(count as u64) as usize].push(SEQUENCER);
+    let names = ["mul", "add", "aux", "more"];
+    let slots: Vec<(&'static str, &'static [Unit])> =
+        names.into_iter().zip(units).map(|(name, units)| (name, &*Vec::leak(units))).collect();
+    Box::leak(Box::new(row("random", &slots)))
+}

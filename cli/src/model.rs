@@ -1,0 +1,292 @@
+//! `takt model`: from a robot's description, or another tool's expressions, to a program in equations.
+
+use crate::files::{self, Given, Out};
+use crate::load::Load;
+use crate::output::{self, Failure};
+use crate::select::{MachineArgument, suggest};
+use anyhow::{Result, anyhow, bail};
+use clap::Args;
+use serde_json::{Value, json};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use takt_asm::Assembled;
+use takt_isa::Machine;
+use takt_isa::timing::Cycle;
+use takt_model::functions::{Function, Options, What, derive};
+use takt_model::graph::{Count, Delays, Rewrites};
+use takt_model::robot::{dh, urdf};
+use takt_model::{instructions, write};
+
+/// Turn a robot's description, or expressions of CasADi or SymPy, into a program in equations.
+///
+/// FILE is a robot in URDF, a table of Denavit-Hartenberg parameters (.csv), or a list of instructions (.json) that
+/// `takt_expressions.py` writes from CasADi functions and SymPy expressions. The operations that it takes are printed,
+/// and the cycles on the machine beside the bound that no schedule can beat.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Model {
+    /// Description; what it is follows from its ending: .urdf or .xml, .csv, .json.
+    file: PathBuf,
+    /// What to compute of a robot: forward-kinematics, jacobian, inverse-dynamics, gravity, mass-matrix, forward-dynamics or
+    /// computed-torque.
+    #[arg(long, short, value_name = "FUNCTION", value_parser = what)]
+    function: Option<What>,
+    /// The link that stays where it is [default: the root].
+    #[arg(long, value_name = "LINK")]
+    base: Option<String>,
+    /// Only the joints from the base to this link; the others are held at 0. It is the link whose pose and Jacobian are computed.
+    #[arg(long, value_name = "LINK")]
+    tip: Option<String>,
+    /// Of computed-torque: acceleration for an error of position, 1/s².
+    #[arg(long, value_name = "NUMBER", default_value_t = 100.0, value_parser = gain, allow_hyphen_values = true)]
+    kp: f64,
+    /// Of computed-torque: acceleration for an error of velocity, 1/s.
+    #[arg(long, value_name = "NUMBER", default_value_t = 20.0, value_parser = gain, allow_hyphen_values = true)]
+    kd: f64,
+    /// Angles this close to a multiple of a quarter turn are taken for it, rad.
+    #[arg(long, value_name = "ANGLE", default_value_t = urdf::SNAP, value_parser = angle, allow_hyphen_values = true)]
+    snap: f64,
+    #[command(flatten)]
+    rewrites: RewriteArguments,
+    #[command(flatten)]
+    machine: MachineArgument,
+    /// Write the source here; `-` is standard output.
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  takt model ur5.urdf -f inverse-dynamics -o ur5.s       then: takt run ur5.s --inputs states.csv
+  takt model talos.urdf -f gravity --base torso_2_link --tip arm_left_7_link
+  takt model f.json --exact -m t1                        expressions in the order as given";
+
+/// What is not to be rewritten.
+#[derive(Args, Clone, Copy)]
+#[command(next_help_heading = "Rewriting (all of it is exact over the reals)")]
+struct RewriteArguments {
+    /// Only rewrites that leave every operation and its rounding as given.
+    #[arg(long)]
+    exact: bool,
+    /// Do not compute with constants beforehand.
+    #[arg(long)]
+    no_fold: bool,
+    /// Keep x + 0, x - x, 1*x, 0*x, -(-x), x/1.
+    #[arg(long)]
+    no_identities: bool,
+    /// Compute equal subexpressions each time.
+    #[arg(long)]
+    no_share: bool,
+    /// Leave signs where they are.
+    #[arg(long)]
+    no_signs: bool,
+    /// Keep divisions by constants, and powers as given.
+    #[arg(long)]
+    no_strength: bool,
+    /// Keep a*b + a*c.
+    #[arg(long)]
+    no_factor: bool,
+    /// Add long sums in the order as given.
+    #[arg(long)]
+    no_balance: bool,
+    /// Keep lengths in metres.
+    #[arg(long)]
+    no_scale: bool,
+}
+
+impl RewriteArguments {
+    fn rewrites(self) -> Rewrites {
+        let all = if self.exact { Rewrites::EXACT } else { Rewrites::ALL };
+        Rewrites {
+            fold: all.fold && !self.no_fold,
+            identities: all.identities && !self.no_identities,
+            share: all.share && !self.no_share,
+            signs: all.signs && !self.no_signs,
+            strength: all.strength && !self.no_strength,
+            factor: all.factor && !self.no_factor,
+            balance: all.balance && !self.no_balance,
+            scale: all.scale && !self.no_scale,
+        }
+    }
+}
+
+fn what(name: &str) -> Result<What, String> {
+    What::from_name(name).ok_or_else(|| {
+        let names: Vec<&str> = What::ALL.iter().map(|(_, name, _)| *name).collect();
+        let near = suggest(name, names.iter().copied());
+        format!("there is no such function{near} (functions: {})", names.join(", "))
+    })
+}
+
+fn gain(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(gain) if gain.is_finite() && gain >= 0.0 => Ok(gain),
+        Ok(_) => Err("a gain is finite and not negative".to_owned()),
+        Err(_) => Err("not a number".to_owned()),
+    }
+}
+
+fn angle(text: &str) -> Result<f64, String> {
+    /// Beyond this it would be another geometry.
+    const MOST: f64 = 0.01;
+    match text.parse::<f64>() {
+        Ok(angle) if (0.0..=MOST).contains(&angle) => Ok(angle),
+        Ok(_) => Err(format!("between 0 and {MOST} rad")),
+        Err(_) => Err("not a number".to_owned()),
+    }
+}
+
+/// What became of the source on the machine.
+struct Built {
+    cycles: Cycle,
+    bound: Cycle,
+    bundles: usize,
+}
+
+pub(crate) fn run(arguments: &Model, color: bool, out: &mut Out) -> Result<()> {
+    let mut writes: Vec<Given<'_>> = Vec::new();
+    writes.extend(arguments.output.as_deref().map(|path| ("--output", path)));
+    if arguments.json {
+        writes.push(("--json", Path::new("-")));
+    }
+    files::check(&[("FILE", &arguments.file)], &writes)?;
+    let machine = arguments.machine.machine;
+    let delays = Delays::of(machine);
+    let function = function(arguments, &delays)?;
+    let source = write::source(&function);
+    if let Some(path) = &arguments.output {
+        files::write(path, source.as_bytes())?;
+    }
+    let alone = arguments.output.as_deref().is_some_and(files::is_dash);
+    let (count, chain) = (function.count(), function.depth(&delays));
+    if !alone && !arguments.json {
+        write_counts(&function, &count, out)?;
+    }
+    fits(&function, machine)?;
+    let name = arguments.output.clone().filter(|path| !files::is_dash(path));
+    let name = name.unwrap_or_else(|| PathBuf::from("model.s"));
+    let load = Load::new(machine, color);
+    let built = built(&load.finish(load.assemble(&name, source.into_bytes()))?)?;
+    if arguments.json {
+        return output::json(&result_json(arguments, &function, &count, chain, &built), out);
+    }
+    if !alone {
+        let Built { cycles, bound, bundles } = built;
+        writeln!(
+            out,
+            "{cycles} cycles on {}, bound {bound}, chain {chain}; {bundles} bundles",
+            machine.name
+        )?;
+    }
+    Ok(())
+}
+
+/// The function that is asked for.
+fn function(arguments: &Model, delays: &Delays) -> Result<Function> {
+    let path = &arguments.file;
+    let name = files::input_name(path);
+    let told = |error: takt_model::Error| match error.line {
+        Some(line) => anyhow!("{name}:{line}: {error}"),
+        None => anyhow!("{name}: {error}"),
+    };
+    let bytes = files::read(path, urdf::MAX_BYTES)?;
+    let text = String::from_utf8(bytes).map_err(|_| anyhow!("{name} is no text in UTF-8"))?;
+    let rewrites = arguments.rewrites.rewrites();
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+    let stem = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let tree = match ending.as_deref() {
+        Some("json") => {
+            let unused = [
+                ("--function", arguments.function.is_some()),
+                ("--base", arguments.base.is_some()),
+                ("--tip", arguments.tip.is_some()),
+            ];
+            if let Some((option, _)) = unused.iter().find(|(_, given)| *given) {
+                return Err(Failure::Usage(format!(
+                    "{option} is about robots; {name} is a list of instructions"
+                ))
+                .into());
+            }
+            return Ok(instructions::read(&text, rewrites).map_err(told)?.optimised(delays));
+        }
+        Some("csv") => dh::read(&text, &stem, arguments.snap).map_err(told)?,
+        Some("urdf" | "xml") => urdf::read(&text, arguments.snap).map_err(told)?,
+        _ => bail!("{name}: what it is follows from its ending: .urdf or .xml, .csv, .json"),
+    };
+    let Some(what) = arguments.function else {
+        let names: Vec<&str> = What::ALL.iter().map(|(_, name, _)| *name).collect();
+        return Err(
+            Failure::Usage(format!("say with --function what to compute: {}", names.join(", "))).into()
+        );
+    };
+    let (base, tip) = (arguments.base.as_deref(), arguments.tip.as_deref());
+    let robot = tree.robot(base, tip).map_err(|error| told(error.located(&text)))?;
+    let options = Options { rewrites, delays: *delays, tip, kp: arguments.kp, kd: arguments.kd };
+    derive(&robot, what, &options).map_err(told)
+}
+
+/// Whether the machine has the ports.
+fn fits(function: &Function, machine: &Machine) -> Result<()> {
+    let inputs = write::inputs_read(function).iter().filter(|read| **read).count();
+    let outputs = function.outputs.len() - write::constants(function).len();
+    let most = usize::from(machine.input_count());
+    if inputs > most {
+        bail!("it does not fit: it has {inputs} inputs, {} has {most} input ports", machine.name);
+    }
+    let most = usize::from(machine.outputs_per_bank);
+    if outputs > most {
+        bail!("it does not fit: it has {outputs} outputs, {} has {most} output ports", machine.name);
+    }
+    Ok(())
+}
+
+fn built(assembled: &Assembled) -> Result<Built> {
+    let program = &assembled.program;
+    let bounds = takt_analysis::bound(program).map_err(|error| anyhow!("no bound: {error}"))?;
+    let cycles = bounds.worst_period().unwrap_or(0);
+    // What the period takes beyond its blocks no schedule changes.
+    let above: u32 = assembled.blocks.iter().map(|block| block.cycles - block.bound.cycles()).sum();
+    Ok(Built { cycles, bound: cycles - Cycle::from(above), bundles: program.bundles() as usize })
+}
+
+fn write_counts(function: &Function, count: &Count, out: &mut Out) -> Result<()> {
+    writeln!(out, "{}", function.title)?;
+    for note in &function.notes {
+        writeln!(out, "  {note}")?;
+    }
+    let Count { add, mul, div, trig, other } = *count;
+    writeln!(
+        out,
+        "{} operations: {add} sums, {mul} products, {div} divisions and roots, {trig} sines and the like, {other} others",
+        count.total()
+    )?;
+    Ok(())
+}
+
+fn result_json(arguments: &Model, function: &Function, count: &Count, chain: u32, built: &Built) -> Value {
+    let ports = |ports: Vec<&takt_model::functions::Port>| {
+        let port = |port: &&takt_model::functions::Port| json!({ "name": port.name, "text": port.text });
+        ports.iter().map(port).collect::<Vec<_>>()
+    };
+    let constants = write::constants(function);
+    let constants: Vec<Value> =
+        constants.iter().map(|(port, value)| json!({ "name": port.name, "value": value })).collect();
+    json!({
+        "file": files::input_name(&arguments.file),
+        "title": function.title,
+        "notes": function.notes,
+        "machine": arguments.machine.machine.name,
+        "operations": count.total(),
+        "counts": count,
+        "cycles": built.cycles,
+        "bound": built.bound,
+        "chain": chain,
+        "bundles": built.bundles,
+        "inputs": ports(function.inputs.iter().collect()),
+        "outputs": ports(function.outputs.iter().map(|(port, _)| port).collect()),
+        "constants": constants,
+    })
+}

@@ -1,0 +1,74 @@
+// Microsoft's test client of the debug adapter protocol against `takt dap`: what it finds goes to standard output as JSON.
+const { DebugClient } = require('@vscode/debugadapter-testsupport');
+const [takt, folder] = process.argv.slice(2);
+const path = require('path');
+const program = path.join(folder, 'sum.s');
+const found = {};
+
+async function main() {
+  const client = new DebugClient(takt, 'dap', 'takt', { cwd: folder });
+  client.defaultTimeout = 60000;
+  await client.start();
+  const capabilities = (await client.initializeRequest()).body;
+  found.stepsBack = capabilities.supportsStepBack;
+  // What is wrong with a configuration is told.
+  found.refused = await client.launchRequest({ program: path.join(folder, 'none.s') }).catch((error) => error.message);
+  await Promise.all([
+    client.waitForEvent('initialized'),
+    client.launchRequest({ program, stopOnEntry: true }),
+  ]);
+  const lines = (await client.setBreakpointsRequest({
+    source: { path: program },
+    breakpoints: [{ line: 12, hitCondition: '2' }, { line: 8, logMessage: 'i is {i}' }, { line: 1 }],
+  })).body.breakpoints;
+  found.verified = lines.map((line) => line.verified);
+  found.unverified = lines[2].message;
+  const logged = [];
+  client.on('output', (event) => logged.push(event.body.output.trim()));
+  const stopped = () => client.waitForEvent('stopped').then((event) => event.body.reason);
+  const entry = stopped();
+  await client.configurationDoneRequest();
+  found.entry = await entry;
+  const threadId = 1;
+  const top = async () => {
+    const frames = (await client.stackTraceRequest({ threadId })).body.stackFrames;
+    return { line: frames[0].line, name: frames[0].name, depth: frames.length, file: frames[0].source && frames[0].source.path };
+  };
+  const run = async (request) => {
+    const reason = stopped();
+    await request({ threadId });
+    return { reason: await reason, ...(await top()) };
+  };
+  found.second = await run((a) => client.continueRequest(a));
+  found.logged = logged.slice();
+  const scopes = (await client.scopesRequest({ frameId: 0 })).body.scopes;
+  found.scopes = scopes.map((scope) => scope.name);
+  const registers = scopes.find((scope) => scope.name === 'Registers').variablesReference;
+  const rows = (await client.variablesRequest({ variablesReference: registers })).body.variables;
+  found.i = rows.find((row) => row.name === 'i').value;
+  const views = rows.find((row) => row.name === 'i').variablesReference;
+  found.views = (await client.variablesRequest({ variablesReference: views })).body.variables.map((row) => row.name);
+  found.evaluated = (await client.evaluateRequest({ expression: 'i + 40', context: 'watch' })).body.result;
+  found.wrong = await client.evaluateRequest({ expression: 'i +', context: 'watch' }).catch((error) => error.message);
+  found.out = await run((a) => client.stepOutRequest(a));
+  found.back = await run((a) => client.stepBackRequest(a));
+  found.set = (await client.setVariableRequest({ variablesReference: registers, name: 'n', value: '2' })).body.value;
+  await client.setBreakpointsRequest({ source: { path: program }, breakpoints: [] });
+  const info = (await client.dataBreakpointInfoRequest({ name: 'sum' })).body;
+  await client.setDataBreakpointsRequest({ breakpoints: [{ dataId: info.dataId }] });
+  found.changed = await run((a) => client.continueRequest(a));
+  await client.setDataBreakpointsRequest({ breakpoints: [] });
+  await client.setFunctionBreakpointsRequest({ breakpoints: [{ name: 'add' }] });
+  found.reverse = await run((a) => client.reverseContinueRequest(a));
+  await client.setFunctionBreakpointsRequest({ breakpoints: [] });
+  found.halted = await run((a) => client.continueRequest(a));
+  found.count = (await client.evaluateRequest({ expression: 'count', context: 'watch' })).body.result;
+  const over = client.waitForEvent('terminated');
+  await client.continueRequest({ threadId });
+  found.terminated = (await over).event;
+  await client.stop();
+}
+
+main()
+  .catch((error) => { found.problem = String((error && error.stack) || error); })
+  .finally(() => { console.log(JSON.stringify(found)); process.exit(0); });

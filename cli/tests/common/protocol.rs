@@ -1,0 +1,112 @@
+//! A client of a server on standard input and output: frames of JSON.
+#![allow(dead_code, unreachable_pub, reason = "each test file uses its part")]
+
+use super::Folder;
+use serde_json::{Value, json};
+use std::collections::VecDeque;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{Child, ChildStdin, ChildStdout, Stdio};
+
+/// A running server.
+pub struct Client {
+    child: Child,
+    stdin: Option<ChildStdin>,
+    stdout: BufReader<ChildStdout>,
+    sent: i64,
+    /// What came while an answer was awaited.
+    pub other: VecDeque<Value>,
+}
+
+impl Client {
+    pub fn start(folder: &Folder, line: &str) -> Client {
+        let mut command = folder.command(&line.split_whitespace().collect::<Vec<_>>());
+        let mut child = command.stdin(Stdio::piped()).spawn().unwrap();
+        let (stdin, stdout) = (child.stdin.take(), BufReader::new(child.stdout.take().unwrap()));
+        Client { child, stdin, stdout, sent: 0, other: VecDeque::new() }
+    }
+
+    /// Bytes as they are.
+    pub fn raw(&mut self, bytes: &[u8]) {
+        let stdin = self.stdin.as_mut().unwrap();
+        stdin.write_all(bytes).and_then(|()| stdin.flush()).unwrap();
+    }
+
+    pub fn send(&mut self, message: &Value) {
+        let text = message.to_string();
+        self.raw(format!("Content-Length: {}\r\n\r\n{text}", text.len()).as_bytes());
+    }
+
+    /// The next message, of those that came first.
+    #[track_caller]
+    pub fn receive(&mut self) -> Value {
+        self.read().expect("the server has not ended")
+    }
+
+    fn read(&mut self) -> Option<Value> {
+        let mut length = 0;
+        loop {
+            let mut line = String::new();
+            if self.stdout.read_line(&mut line).unwrap() == 0 {
+                return None;
+            }
+            match line.trim_end().split_once(": ") {
+                Some(("Content-Length", value)) => length = value.parse().unwrap(),
+                Some(_) => {}
+                None => break,
+            }
+        }
+        let mut bytes = vec![0; length];
+        self.stdout.read_exact(&mut bytes).unwrap();
+        Some(serde_json::from_slice(&bytes).unwrap())
+    }
+
+    /// A message for which a condition holds: one that came before, or the next.
+    #[track_caller]
+    pub fn wait(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
+        if let Some(at) = self.other.iter().position(&wanted) {
+            return self.other.remove(at).unwrap();
+        }
+        loop {
+            let message = self.receive();
+            if wanted(&message) {
+                return message;
+            }
+            self.other.push_back(message);
+        }
+    }
+
+    /// A request of the language server protocol, and its whole answer.
+    #[track_caller]
+    pub fn ask(&mut self, method: &str, params: Value) -> Value {
+        self.sent += 1;
+        let id = self.sent;
+        self.send(&json!({ "jsonrpc": "2.0", "id": id, "method": method, "params": params }));
+        self.wait(|message| message["id"] == id && message.get("method").is_none())
+    }
+
+    pub fn notify(&mut self, method: &str, params: Value) {
+        self.send(&json!({ "jsonrpc": "2.0", "method": method, "params": params }));
+    }
+
+    /// A request of the debug adapter protocol, and its whole answer.
+    #[track_caller]
+    pub fn command(&mut self, command: &str, arguments: Value) -> Value {
+        self.sent += 1;
+        let id = self.sent;
+        self.send(&json!({ "seq": id, "type": "request", "command": command, "arguments": arguments }));
+        self.wait(|message| message["type"] == "response" && message["request_seq"] == id)
+    }
+
+    #[track_caller]
+    pub fn event(&mut self, event: &str) -> Value {
+        self.wait(|message| message["type"] == "event" && message["event"] == event)
+    }
+
+    /// Closes standard input; the exit status and what is on standard error.
+    pub fn end(mut self) -> (Option<i32>, String) {
+        drop(self.stdin.take());
+        while self.read().is_some() {}
+        let output = self.child.wait_with_output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    }
+}

@@ -1,0 +1,9 @@
+//! What editors ask of Takt, over the protocols that they speak.
+//!
+//! [`lsp`] is the language server: everything it says of the language it asks of `takt_asm` and of the tables in `takt_isa`.
+//! [`dap`] is the debug adapter. [`grammar`] is what an editor colours without it. Nothing here prints: a connection is a pair of channels.
+
+pub mod dap;
+pub mod grammar;
+pub mod lsp;
+pub mod wire;

@@ -1,0 +1,348 @@
+//! What can be written at a place.
+
+use crate::lsp::program::{File, Front};
+use crate::lsp::{Settings, hover};
+use lsp_types::{
+    CompletionItem, CompletionItemKind, CompletionTextEdit, Documentation, InsertTextFormat, MarkupContent,
+    MarkupKind, Range, TextEdit,
+};
+use std::collections::BTreeMap;
+use takt_asm::expr::{BUILTINS, Function};
+use takt_asm::index::SymbolKind;
+use takt_asm::tokens::{self, Token, TokenKind};
+use takt_asm::{Directive, type_name};
+use takt_isa::{Op, Operand, ROWS, Row, Type};
+
+/// What is wanted.
+struct Wanted<'a> {
+    /// Whether the client fills in operands by their places.
+    snippets: bool,
+    range: Range,
+    settings: &'a Settings,
+}
+
+impl Wanted<'_> {
+    fn item(&self, label: &str, kind: CompletionItemKind, detail: String, text: String) -> CompletionItem {
+        CompletionItem {
+            label: label.to_owned(),
+            kind: Some(kind),
+            detail: Some(detail).filter(|detail| !detail.is_empty()),
+            text_edit: Some(CompletionTextEdit::Edit(TextEdit { range: self.range, new_text: text })),
+            ..CompletionItem::default()
+        }
+    }
+
+    /// A word and the operands that follow it, in their column.
+    fn with_operands(
+        &self,
+        label: &str,
+        kind: CompletionItemKind,
+        detail: String,
+        operands: &[String],
+    ) -> CompletionItem {
+        if operands.is_empty() {
+            return self.item(label, kind, detail, label.to_owned());
+        }
+        let blanks = takt_asm::format::CODE.saturating_sub(label.len()).max(1);
+        let shown = |(number, operand): (usize, &String)| match self.snippets {
+            true => format!("${{{}:{}}}", number + 1, operand.replace(['$', '}'], "")),
+            false => operand.clone(),
+        };
+        let operands: Vec<String> = operands.iter().enumerate().map(shown).collect();
+        let head = if self.snippets { label.replace('$', "\\$") } else { label.to_owned() };
+        let mut item = self.item(label, kind, detail, head + &" ".repeat(blanks) + &operands.join(", "));
+        if self.snippets {
+            item.insert_text_format = Some(InsertTextFormat::SNIPPET);
+        } else {
+            // Without places to fill in, operands would have to be deleted.
+            item.text_edit = Some(CompletionTextEdit::Edit(TextEdit {
+                range: self.range,
+                new_text: format!("{label}{}", " ".repeat(blanks)),
+            }));
+        }
+        item
+    }
+
+    fn instruction(&self, row: &Row) -> CompletionItem {
+        let operands: Vec<String> =
+            row.shape.syntax().split(", ").filter(|one| !one.is_empty()).map(str::to_owned).collect();
+        let detail = format!("{} {}", row.mnemonic, row.shape.syntax());
+        let mut item = self.with_operands(row.mnemonic, CompletionItemKind::FUNCTION, detail, &operands);
+        item.documentation = Some(Documentation::MarkupContent(MarkupContent {
+            kind: MarkupKind::Markdown,
+            value: hover::instruction(row, self.settings),
+        }));
+        item
+    }
+}
+
+/// What can be written at a byte of a file.
+pub(crate) fn complete(
+    settings: &Settings,
+    front: &Front,
+    file: &File,
+    byte: usize,
+    snippets: bool,
+    encoding: crate::lsp::text::Encoding,
+) -> Vec<CompletionItem> {
+    let Some(line) = file.text.line(file.text.line_of(byte)) else { return Vec::new() };
+    let before = &file.text.text[line.start..byte.max(line.start)];
+    let lines = tokens::lines(before);
+    let Some(tokens) = lines.first() else { return Vec::new() };
+    let touches = |token: &&Token| token.range.end == before.len();
+    // The word that is being written, and what stands before it.
+    let written = tokens.last().filter(touches).filter(|token| {
+        matches!(
+            token.kind,
+            TokenKind::Name | TokenKind::Directive | TokenKind::UnknownDirective | TokenKind::TemplateBegin
+        ) || before[token.range.clone()] == *"."
+    });
+    if tokens.last().is_some_and(|token| token.kind == TokenKind::Comment) {
+        return Vec::new();
+    }
+    let dot = tokens.last().filter(touches).filter(|token| before[token.range.clone()] == *".");
+    let start = written.or(dot).map_or(before.len(), |token| token.range.start);
+    let tokens = if written.is_some() { &tokens[..tokens.len() - 1] } else { &tokens[..] };
+    let word = |token: &Token| &before[token.range.clone()];
+    let range = file.text.range(line.start + start..byte, encoding);
+    let wanted = Wanted { snippets, range, settings };
+
+    // The operation that the place is in.
+    let begin = tokens.iter().rposition(|token| token.kind == TokenKind::Bars).map_or(0, |bars| bars + 1);
+    let operation = &tokens[begin..];
+    let operation = match operation {
+        [name, colon, rest @ ..]
+            if colon.kind == TokenKind::Colon && name.kind == TokenKind::Name && begin == 0 =>
+        {
+            rest
+        }
+        operation => operation,
+    };
+    let Some((head, operands)) = operation.split_first() else {
+        return beginnings(&wanted, front, file, byte);
+    };
+    let previous = operands.last().unwrap_or(head);
+    if previous.kind == TokenKind::Colon {
+        let types = [Type::F, Type::I, Type::B].map(type_name);
+        return types
+            .map(|ty| wanted.item(ty, CompletionItemKind::TYPE_PARAMETER, String::new(), ty.to_owned()))
+            .into();
+    }
+    if head.kind == TokenKind::Directive {
+        let Some(directive) = Directive::ALL.iter().find(|directive| directive.name() == word(head)) else {
+            return Vec::new();
+        };
+        if *directive == Directive::Include {
+            return includes(&wanted, file, before, head);
+        }
+        // `on|off`
+        if directive.operands().contains('|') {
+            let words = directive.operands().split('|');
+            return words
+                .map(|word| wanted.item(word, CompletionItemKind::KEYWORD, String::new(), word.to_owned()))
+                .collect();
+        }
+        return match directive {
+            Directive::Deadline => named(&wanted, front, file, byte, &[SymbolKind::Output]),
+            Directive::Late => named(&wanted, front, file, byte, &[SymbolKind::Input]),
+            Directive::Order => named(&wanted, front, file, byte, &[SymbolKind::Input, SymbolKind::Output]),
+            Directive::Reg | Directive::State | Directive::Input | Directive::Output | Directive::Macro => {
+                Vec::new()
+            }
+            _ => values(&wanted, front, file, byte),
+        };
+    }
+    // Which operand it is.
+    let number = operands.iter().filter(|token| token.kind == TokenKind::Comma).count();
+    let Some(op) = Op::from_mnemonic(word(head)) else {
+        // A macro's arguments may be anything.
+        let mut items = named(&wanted, front, file, byte, &ANY);
+        items.extend(functions(&wanted));
+        return items;
+    };
+    let readable = [
+        SymbolKind::Register,
+        SymbolKind::State,
+        SymbolKind::Input,
+        SymbolKind::Output,
+        SymbolKind::Parameter,
+    ];
+    match op.row().shape.operands().get(number) {
+        Some(Operand::Dest) => {
+            let kinds = [SymbolKind::Register, SymbolKind::State, SymbolKind::Output, SymbolKind::Parameter];
+            named(&wanted, front, file, byte, &kinds)
+        }
+        Some(Operand::Source(_)) => {
+            let mut items = named(&wanted, front, file, byte, &readable);
+            items.extend(
+                values(&wanted, front, file, byte)
+                    .into_iter()
+                    .filter(|item| item.kind != Some(CompletionItemKind::VARIABLE)),
+            );
+            items
+        }
+        Some(Operand::Target) => {
+            named(&wanted, front, file, byte, &[SymbolKind::Code, SymbolKind::Parameter])
+        }
+        Some(Operand::Memory) => {
+            if operands.iter().any(|token| word(token) == "[") {
+                named(&wanted, front, file, byte, &readable)
+            } else {
+                values(&wanted, front, file, byte)
+            }
+        }
+        Some(Operand::Immediate) => {
+            let mut items = values(&wanted, front, file, byte);
+            items.extend(named(&wanted, front, file, byte, &[SymbolKind::Code]));
+            items
+        }
+        None => Vec::new(),
+    }
+}
+
+const ANY: [SymbolKind; 10] = [
+    SymbolKind::Array,
+    SymbolKind::Register,
+    SymbolKind::State,
+    SymbolKind::Input,
+    SymbolKind::Output,
+    SymbolKind::Constant,
+    SymbolKind::Code,
+    SymbolKind::Data,
+    SymbolKind::Parameter,
+    SymbolKind::Count,
+];
+
+/// What a line, or an operation of a bundle, can begin with.
+fn beginnings(wanted: &Wanted<'_>, front: &Front, file: &File, byte: usize) -> Vec<CompletionItem> {
+    let here = |row: &&Row| {
+        row.function == takt_isa::Function::Idle || wanted.settings.machine.host(row.function).is_some()
+    };
+    let mut items: Vec<CompletionItem> =
+        ROWS.iter().filter(here).map(|row| wanted.instruction(row)).collect();
+    for symbol in front.index.symbols.iter().filter(|symbol| symbol.kind == SymbolKind::Macro) {
+        let detail = format!("{} {}", symbol.name, symbol.parameters.join(", "));
+        items.push(wanted.with_operands(
+            &symbol.name,
+            CompletionItemKind::MODULE,
+            detail,
+            &symbol.parameters,
+        ));
+    }
+    for directive in Directive::ALL {
+        let detail = format!("{} {}", directive.name(), directive.operands());
+        let mut item = wanted.item(
+            directive.name(),
+            CompletionItemKind::KEYWORD,
+            detail.trim_end().to_owned(),
+            directive.name().to_owned(),
+        );
+        item.documentation = Some(Documentation::MarkupContent(MarkupContent {
+            kind: MarkupKind::Markdown,
+            value: hover::directive(directive),
+        }));
+        items.push(item);
+    }
+    let _ = (file, byte);
+    items
+}
+
+/// The last line, from 0, of the macro that a byte of a file lies in, and its first.
+fn macro_around(front: &Front, file: &File, byte: usize) -> Option<(usize, usize)> {
+    let line = file.text.line_of(byte);
+    front.index.blocks.iter().filter(|block| block.directive == Directive::Macro).find_map(|block| {
+        let (number, bytes) = front.files.place(block.open)?;
+        let (first, last) = (file.text.line_of(bytes.start), block.last_line as usize - 1);
+        (std::ptr::eq(&front.files.0[number], file) && (first..=last).contains(&line))
+            .then_some((first, last))
+    })
+}
+
+/// Names of some kinds that can be seen at a place.
+fn named(
+    wanted: &Wanted<'_>,
+    front: &Front,
+    file: &File,
+    byte: usize,
+    kinds: &[SymbolKind],
+) -> Vec<CompletionItem> {
+    let around = macro_around(front, file, byte);
+    let mut items: BTreeMap<String, CompletionItem> = BTreeMap::new();
+    for symbol in front.index.symbols.iter().filter(|symbol| kinds.contains(&symbol.kind)) {
+        let Some((number, bytes)) = front.files.place(symbol.span) else { continue };
+        let of = &front.files.0[number];
+        let within = macro_around(front, of, bytes.start);
+        // A macro's names are seen in it only, as they are written there.
+        if within.is_some() && (within != around || !std::ptr::eq(of, file)) {
+            continue;
+        }
+        let name =
+            if within.is_some() { front.files.text(symbol.span).to_owned() } else { symbol.name.clone() };
+        let kind = match symbol.kind {
+            SymbolKind::Constant | SymbolKind::Count => CompletionItemKind::CONSTANT,
+            SymbolKind::Code | SymbolKind::Data => CompletionItemKind::REFERENCE,
+            SymbolKind::Input | SymbolKind::Output => CompletionItemKind::PROPERTY,
+            _ => CompletionItemKind::VARIABLE,
+        };
+        let ty = symbol.ty.map_or(String::new(), |ty| format!(":{}", type_name(ty)));
+        let detail = format!("{}{ty}", symbol.kind.text());
+        items.entry(name.clone()).or_insert_with(|| wanted.item(&name, kind, detail, name.clone()));
+    }
+    items.into_values().collect()
+}
+
+/// What has a value: constants, data labels, functions.
+fn values(wanted: &Wanted<'_>, front: &Front, file: &File, byte: usize) -> Vec<CompletionItem> {
+    let kinds = [SymbolKind::Constant, SymbolKind::Data, SymbolKind::Parameter, SymbolKind::Count];
+    let mut items = named(wanted, front, file, byte, &kinds);
+    items.extend(functions(wanted));
+    items
+}
+
+fn functions(wanted: &Wanted<'_>) -> Vec<CompletionItem> {
+    let function = |function: &Function| {
+        let arguments = match function.arguments() {
+            0 => "a, …".to_owned(),
+            count => ["a", "b", "c"][..count.min(3)].join(", "),
+        };
+        let detail = format!("{}({arguments}): {}", function.name(), function.text());
+        wanted.item(function.name(), CompletionItemKind::OPERATOR, detail, format!("{}(", function.name()))
+    };
+    let constant = |(name, value): &(&str, takt_asm::expr::Value)| {
+        wanted.item(name, CompletionItemKind::CONSTANT, format!("{:?}", value.real()), (*name).to_owned())
+    };
+    Function::ALL.iter().map(function).chain(BUILTINS.iter().map(constant)).collect()
+}
+
+/// Files that can be included.
+fn includes(wanted: &Wanted<'_>, file: &File, before: &str, head: &Token) -> Vec<CompletionItem> {
+    let rest = before[head.range.end..].trim_start();
+    // What is being written may hold characters that end a token.
+    let typed = rest.trim_start_matches(['<', '"']);
+    let start = wanted.range.end.character
+        - typed.encode_utf16().count().min(wanted.range.end.character as usize) as u32;
+    let range = Range::new(lsp_types::Position::new(wanted.range.end.line, start), wanted.range.end);
+    let wanted = Wanted { range, ..*wanted };
+    let file_item =
+        |name: &str, text: String| wanted.item(name, CompletionItemKind::FILE, String::new(), text);
+    let library = wanted.settings.library.iter().map(|(name, _)| *name);
+    let folder = file.path.as_deref().and_then(|path| path.parent());
+    let beside = folder.and_then(|folder| std::fs::read_dir(folder).ok()).into_iter().flatten().flatten();
+    let mut beside: Vec<String> = beside
+        .filter_map(|entry| entry.file_name().into_string().ok())
+        .filter(|name| name.ends_with(".s"))
+        .take(200)
+        .collect();
+    beside.sort();
+    match rest.chars().next() {
+        Some('<') => library.map(|name| file_item(name, format!("{name}>"))).collect(),
+        Some('"') => beside.iter().map(|name| file_item(name, format!("{name}\""))).collect(),
+        _ => {
+            let library = library.map(|name| format!("<{name}>"));
+            library
+                .chain(beside.iter().map(|name| format!("\"{name}\"")))
+                .map(|name| file_item(&name, name.clone()))
+                .collect()
+        }
+    }
+}

@@ -1,0 +1,287 @@
+//! Where names are declared and used, and how to give one another name.
+
+use crate::lsp::Settings;
+use crate::lsp::program::{self, Front};
+use crate::lsp::text::Encoding;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use takt_asm::Open;
+use takt_asm::index::SymbolKind;
+use takt_asm::source::Span;
+use takt_asm::tokens::{self, TokenKind};
+use takt_isa::Op;
+
+/// Bytes of a file that change, and what they become.
+type Edits = BTreeMap<PathBuf, BTreeMap<(usize, usize), String>>;
+
+/// A name before its first brace, and the rest: `l{i}d` is `l` and `{i}d`.
+fn halves(name: &str) -> (&str, &str) {
+    name.split_at(name.find('{').unwrap_or(name.len()))
+}
+
+/// What a reference becomes when what is declared as `old` is declared as `new`: the same text, or for a name with braces the
+/// same beginning. None if it is put together in another way.
+fn renamed(reference: &str, old: &str, new: &str) -> Option<String> {
+    if reference == old {
+        return Some(new.to_owned());
+    }
+    let ((old, old_rest), (new, new_rest)) = (halves(old), halves(new));
+    if old.is_empty() || old_rest.is_empty() || old_rest != new_rest {
+        return None;
+    }
+    Some(format!("{new}{}", reference.strip_prefix(old)?))
+}
+
+/// The name at a place, as its declaration writes it: what a rename begins with.
+pub(crate) fn renamable(front: &Front, offset: u32) -> Result<(Span, String), String> {
+    let (span, symbols) = front.at(offset).ok_or("there is no name here that the program declares")?;
+    let declared = front.symbol(symbols[0]).span;
+    if symbols.iter().any(|symbol| front.symbol(*symbol).span != declared) {
+        let text = front.files.text(span);
+        return Err(format!("`{text}` stands for names of several declarations: rename one of those"));
+    }
+    match front.files.place(declared).map(|(file, _)| &front.files.0[file]) {
+        Some(file) if file.path.is_some() => Ok((span, front.files.text(declared).to_owned())),
+        Some(file) => Err(format!("it is declared in the library, {}", file.name)),
+        None => Err("its declaration is not at hand".to_owned()),
+    }
+}
+
+/// The edits that give a name another one, in every program that a file is of.
+///
+/// The programs are read anew with the edits: each must declare and name the same as before, under the new name, and have
+/// no new mistake.
+pub(crate) fn rename(
+    settings: &Settings,
+    fronts: &[(&Path, &Front)],
+    path: &Path,
+    byte: usize,
+    new: &str,
+    open: &Open,
+) -> Result<Edits, String> {
+    check_name(new)?;
+    let mut edits = Edits::new();
+    let mut counts = Vec::new();
+    for (_, front) in fronts {
+        let Some(file) = front.files.of(path) else { continue };
+        let Ok((span, old)) = renamable(front, file.base + byte as u32) else {
+            counts.push(None);
+            continue;
+        };
+        let symbols = front.at(span.start).map_or(Vec::new(), |(_, symbols)| symbols);
+        let references = front.references(&symbols);
+        let mut spans = BTreeSet::new();
+        for reference in &references {
+            let text = front.files.text(reference.span);
+            let Some(text) = renamed(text, &old, new) else {
+                let (file, bytes) = front.files.place(reference.span).ok_or("a place is not at hand")?;
+                let file = &front.files.0[file];
+                let line = file.text.line_of(bytes.start) + 1;
+                return Err(if halves(&old).1.is_empty() {
+                    format!(
+                        "`{old}` is put together at {}:{line}, as `{text}`: rename that by hand",
+                        file.name
+                    )
+                } else if halves(new).1 != halves(&old).1 {
+                    format!(
+                        "`{old}` stands for several names: the new one must end in `{}` too",
+                        halves(&old).1
+                    )
+                } else {
+                    format!("at {}:{line} it is written `{text}`: rename that by hand", file.name)
+                });
+            };
+            spans.insert((reference.span, text));
+        }
+        // Code that is not assembled is renamed by its text.
+        for span in unresolved(front, &old, &symbols) {
+            spans.insert((span, new.to_owned()));
+        }
+        for (span, text) in spans {
+            let (file, bytes) = front.files.place(span).ok_or("a place is not at hand")?;
+            let file = &front.files.0[file];
+            let path =
+                file.path.clone().ok_or_else(|| format!("it is used in the library, {}", file.name))?;
+            edits.entry(path).or_default().insert((bytes.start, bytes.end), text);
+        }
+        counts.push(Some(references.len()));
+    }
+    if counts.iter().all(Option::is_none) {
+        let front = fronts.first().ok_or("the file is of no program")?.1;
+        let file = front.files.of(path).ok_or("the file is of no program")?;
+        renamable(front, file.base + byte as u32)?;
+    }
+    verify(settings, fronts, &edits, open)?;
+    Ok(edits)
+}
+
+/// Whether a text can be a name.
+fn check_name(name: &str) -> Result<(), String> {
+    let lines = tokens::lines(name);
+    let [tokens] = lines.as_slice() else { return Err("a name is one line".to_owned()) };
+    let is_name = match tokens.as_slice() {
+        [one] => one.kind == TokenKind::Name,
+        [first, .., last] => first.kind == TokenKind::TemplateBegin && last.kind == TokenKind::TemplateEnd,
+        [] => false,
+    };
+    let whole = tokens.first().is_some_and(|token| token.range.start == 0)
+        && tokens.last().is_some_and(|token| token.range.end == name.len());
+    match is_name && whole {
+        true => Ok(()),
+        false => Err(format!(
+            "`{name}` is not a name: it begins with a letter or `_` and has letters, digits, `_` and `.`"
+        )),
+    }
+}
+
+/// Places where a name stands that the assembler never came to: in the body of a macro that nothing uses, in a branch that is
+/// not taken. Names that such a body declares itself are others.
+fn unresolved(front: &Front, name: &str, symbols: &[u32]) -> Vec<Span> {
+    let is_macro = symbols.iter().any(|symbol| front.symbol(*symbol).kind == SymbolKind::Macro);
+    let local = symbols.iter().any(|symbol| front.symbol(*symbol).kind == SymbolKind::Parameter);
+    let of = symbols.iter().find_map(|symbol| front.symbol(*symbol).of.clone());
+    let mut found = Vec::new();
+    for file in &front.files.0 {
+        let text = &file.text.text;
+        if !text.contains(name) {
+            continue;
+        }
+        // Within a macro: its name, and the names that it has for itself.
+        let mut within: Option<(String, BTreeSet<String>)> = None;
+        for tokens in tokens::lines(text) {
+            let word = |index: usize| {
+                tokens.get(index).map_or("", |token: &tokens::Token| &text[token.range.clone()])
+            };
+            let declares = [".reg", ".state", ".const", ".input", ".output"];
+            match word(0) {
+                ".macro" => {
+                    let names = (2..tokens.len()).map(|index| word(index).to_owned());
+                    within = Some((word(1).to_owned(), names.collect()));
+                }
+                ".endm" => within = None,
+                first if declares.contains(&first) => {
+                    if let Some((_, names)) = &mut within {
+                        names.extend((1..tokens.len()).map(|index| word(index).to_owned()));
+                    }
+                }
+                _ => {}
+            }
+            for (index, token) in tokens.iter().enumerate() {
+                if token.kind != TokenKind::Name || word(index) != name {
+                    continue;
+                }
+                let span = file.span(token.range.clone());
+                let before = index.checked_sub(1).map(|index| tokens[index].kind);
+                let heads = matches!(before, None | Some(TokenKind::Colon | TokenKind::Bars))
+                    && word(index + 1) != ":";
+                let is_other = heads != is_macro
+                    || Op::from_mnemonic(name).is_some() && heads
+                    || word(index.wrapping_sub(1)) == "@"
+                    || word(index + 1) == "(" && !heads
+                    || matches!(word(0), ".schedule" | ".ports" | ".macro");
+                let shadowed = within.as_ref().is_some_and(|(_, names)| names.contains(name));
+                let outside = match (&within, &of) {
+                    (Some((name, _)), Some(of)) => name != of,
+                    (None, Some(_)) => true,
+                    (_, None) => shadowed,
+                };
+                let known = !front.index.of_span(span).is_empty();
+                if !is_other && !(outside && (local || shadowed)) && !known {
+                    found.push(span);
+                }
+            }
+        }
+    }
+    found
+}
+
+/// Reads the programs with the edits, and compares what they name.
+fn verify(settings: &Settings, fronts: &[(&Path, &Front)], edits: &Edits, open: &Open) -> Result<(), String> {
+    let mut texts = (**open).clone();
+    for (path, edits) in edits {
+        let known = fronts.iter().find_map(|(_, front)| Some(Arc::clone(&front.files.of(path)?.text.text)));
+        let text = known.ok_or("a file is not at hand")?;
+        texts.insert(path.clone(), apply(&text, edits).into());
+    }
+    let texts = Arc::new(texts);
+    for (root, front) in fronts {
+        let (after, _) = program::check(settings, root, &texts);
+        let shape = |front: &Front| {
+            let kinds: Vec<SymbolKind> = front.index.symbols.iter().map(|symbol| symbol.kind).collect();
+            let names: Vec<u32> = front.index.references.iter().map(|reference| reference.symbol).collect();
+            (kinds, names)
+        };
+        let codes = |front: &Front| {
+            let mut codes: Vec<&str> =
+                front.diagnostics.list.iter().map(|diagnostic| diagnostic.code).collect();
+            codes.sort_unstable();
+            codes
+        };
+        let new = after
+            .diagnostics
+            .list
+            .iter()
+            .find(|one| !front.diagnostics.list.iter().any(|old| old.message == one.message));
+        if shape(front) != shape(&after) || codes(front) != codes(&after).as_slice() {
+            let why = new
+                .map_or("another name would then be meant somewhere".to_owned(), |new| new.message.clone());
+            return Err(format!("the program would not stay the same: {why}"));
+        }
+    }
+    Ok(())
+}
+
+/// A text with edits.
+fn apply(text: &str, edits: &BTreeMap<(usize, usize), String>) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut end = 0;
+    for (&(start, stop), new) in edits {
+        out.push_str(&text[end..start.max(end)]);
+        out.push_str(new);
+        end = stop;
+    }
+    out + &text[end..]
+}
+
+/// The edits as the protocol has them.
+pub(crate) fn as_edits(
+    fronts: &[(&Path, &Front)],
+    edits: &Edits,
+    encoding: Encoding,
+) -> Vec<(PathBuf, Vec<lsp_types::TextEdit>)> {
+    let mut out = Vec::new();
+    for (path, edits) in edits {
+        let Some(file) = fronts.iter().find_map(|(_, front)| front.files.of(path)) else { continue };
+        let edits = edits.iter().map(|(&(start, end), text)| lsp_types::TextEdit {
+            range: file.text.range(start..end, encoding),
+            new_text: text.clone(),
+        });
+        out.push((path.clone(), edits.collect()));
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_keep_their_braces() {
+        assert_eq!(renamed("x", "x", "y").as_deref(), Some("y"));
+        assert_eq!(renamed("p{j}", "p{i}", "pos{i}").as_deref(), Some("pos{j}"));
+        assert_eq!(renamed("p1", "p{i}", "pos{i}").as_deref(), Some("pos1"));
+        assert_eq!(renamed("p1", "p{i}", "pos"), None);
+        assert_eq!(renamed("{s}2", "ll2", "m"), None);
+    }
+
+    #[test]
+    fn what_can_be_a_name() {
+        for good in ["a", "_x.1", "l{i}", "l{i}d", "c{i}{j}", "{s}2"] {
+            assert_eq!(check_name(good), Ok(()), "{good}");
+        }
+        for bad in ["", "1a", "a b", " a", "a+b", "l{i", "a\nb", ".reg", "a;b", "µ"] {
+            assert!(check_name(bad).is_err(), "{bad}");
+        }
+    }
+}

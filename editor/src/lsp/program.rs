@@ -1,0 +1,181 @@
+//! A program as an editor sees it: what is known after each keystroke ([`Front`]), and what is known once it is scheduled and
+//! its cycles are counted ([`Full`]).
+
+use crate::lsp::Settings;
+use crate::lsp::text::{Encoding, Text};
+use lsp_types::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use takt_analysis::{BoundError, Bounds, StraightIssue};
+use takt_asm::diag::Diagnostics;
+use takt_asm::index::{Index, Reference, Symbol};
+use takt_asm::source::{Sources, Span};
+use takt_asm::{Assembled, Checked, FileLoader, Loader, MemoryLoader, Open, Options, Search};
+
+/// A source of a program.
+pub(crate) struct File {
+    /// Where it lies; `None` if it is of the library.
+    pub(crate) path: Option<PathBuf>,
+    /// Its name in the program.
+    pub(crate) name: Arc<str>,
+    /// Its first byte in the space of all of the program's sources.
+    pub(crate) base: u32,
+    pub(crate) text: Text,
+}
+
+/// The sources of a program.
+#[derive(Default)]
+pub(crate) struct Files(pub(crate) Vec<File>);
+
+impl Files {
+    fn new(root: &Path, sources: &Sources) -> Files {
+        let folder = root.parent().unwrap_or(Path::new(""));
+        let file = |source: &takt_asm::source::Source| {
+            let name = &*source.name;
+            // As `Search` names them: the library's, those of a further folder, those of the project.
+            let path = match name.as_bytes().first() {
+                Some(b'<') => None,
+                Some(b'.' | b'/') => {
+                    std::path::absolute(name).ok().map(|path| crate::lsp::workspace::normal(&path))
+                }
+                _ if folder.as_os_str().is_empty() => Some(PathBuf::from(name)),
+                _ => Some(folder.join(name)),
+            };
+            File {
+                path,
+                name: Arc::clone(&source.name),
+                base: source.base,
+                text: Text::new(Arc::clone(&source.text)),
+            }
+        };
+        Files(sources.files().iter().map(file).collect())
+    }
+
+    /// The file that a span lies in, and the bytes there.
+    pub(crate) fn place(&self, span: Span) -> Option<(usize, std::ops::Range<usize>)> {
+        let file = self.0.partition_point(|file| file.base <= span.start).checked_sub(1)?;
+        let File { base, text, .. } = &self.0[file];
+        let clamp = |offset: u32| (offset.saturating_sub(*base) as usize).min(text.text.len());
+        Some((file, clamp(span.start)..clamp(span.end)))
+    }
+
+    pub(crate) fn range(&self, span: Span, encoding: Encoding) -> Option<(&File, Range)> {
+        let (file, bytes) = self.place(span)?;
+        let file = &self.0[file];
+        Some((file, file.text.range(bytes, encoding)))
+    }
+
+    pub(crate) fn text(&self, span: Span) -> &str {
+        self.place(span).and_then(|(file, bytes)| self.0[file].text.text.get(bytes)).unwrap_or("")
+    }
+
+    /// The file of a path.
+    pub(crate) fn of(&self, path: &Path) -> Option<&File> {
+        self.0.iter().find(|file| file.path.as_deref() == Some(path))
+    }
+
+    pub(crate) fn named(&self, name: &str) -> Option<&File> {
+        self.0.iter().find(|file| *file.name == *name)
+    }
+}
+
+impl File {
+    /// The span of some of its bytes.
+    pub(crate) fn span(&self, bytes: std::ops::Range<usize>) -> Span {
+        Span::new(self.base + bytes.start as u32, self.base + bytes.end as u32)
+    }
+}
+
+/// What is known of a program without scheduling it.
+pub(crate) struct Front {
+    pub(crate) files: Files,
+    pub(crate) index: Index,
+    pub(crate) diagnostics: Diagnostics,
+}
+
+impl Front {
+    /// What a place in the source means: the symbols that are named there, and the span of the name.
+    pub(crate) fn at(&self, offset: u32) -> Option<(Span, Vec<u32>)> {
+        let found = self.index.at(offset);
+        Some((found.first()?.span, found.iter().map(|reference| reference.symbol).collect()))
+    }
+
+    pub(crate) fn symbol(&self, number: u32) -> &Symbol {
+        &self.index.symbols[number as usize]
+    }
+
+    /// All references to what is declared where these symbols are.
+    pub(crate) fn references(&self, symbols: &[u32]) -> Vec<Reference> {
+        let declared: Vec<Span> = symbols.iter().map(|symbol| self.symbol(*symbol).span).collect();
+        let same = |reference: &&Reference| declared.contains(&self.symbol(reference.symbol).span);
+        let mut found: Vec<Reference> = self.index.references.iter().filter(same).copied().collect();
+        found.dedup_by_key(|reference| reference.span);
+        found
+    }
+}
+
+/// What is known of a program that assembles, or why it does not.
+pub(crate) struct Full {
+    pub(crate) files: Files,
+    pub(crate) diagnostics: Diagnostics,
+    pub(crate) program: Option<Counted>,
+}
+
+/// A program and its cycles.
+pub(crate) struct Counted {
+    pub(crate) assembled: Assembled,
+    pub(crate) issues: Vec<StraightIssue>,
+    pub(crate) bounds: Result<Bounds, BoundError>,
+}
+
+/// Reads and checks the program whose first source is at `root`.
+pub(crate) fn check(settings: &Settings, root: &Path, open: &Open) -> (Front, Checked) {
+    let (folder, name) = match (root.parent(), root.file_name()) {
+        (Some(folder), Some(name)) if root.is_absolute() => {
+            (folder.to_owned(), name.to_string_lossy().into_owned())
+        }
+        // A document that lies nowhere.
+        _ => (PathBuf::new(), root.to_string_lossy().into_owned()),
+    };
+    let options = Options { machine: settings.machine, levels: settings.levels, ..Options::default() };
+    let check = |project: &dyn Loader, name: &str| takt_asm::check(name, project, &options);
+    let checked = if folder.as_os_str().is_empty() {
+        let mut alone = MemoryLoader::default();
+        if let Some(text) = open.get(root) {
+            alone.add(UNNAMED, text.as_bytes());
+        }
+        check(&search(settings, alone, open), UNNAMED)
+    } else {
+        check(&search(settings, FileLoader::new(&folder).with_open(Arc::clone(open)), open), &name)
+    };
+    let mut files = Files::new(root, checked.sources());
+    if folder.as_os_str().is_empty()
+        && let Some(first) = files.0.first_mut()
+    {
+        first.path = Some(root.to_owned());
+    }
+    let front = Front { files, index: checked.index().clone(), diagnostics: checked.diagnostics() };
+    (front, checked)
+}
+
+/// What a document without a file is called.
+const UNNAMED: &str = "untitled.s";
+
+fn search<L: Loader>(settings: &Settings, project: L, open: &Open) -> Search<L> {
+    let folders = settings.folders.iter();
+    folders.fold(Search::new(project), Search::folder).with_open(open).library(settings.library)
+}
+
+/// Does the rest: schedules, emits, counts.
+pub(crate) fn finish(root: &Path, checked: Checked) -> Full {
+    let files = Files::new(root, checked.sources());
+    match checked.finish() {
+        Err(diagnostics) => Full { files, diagnostics, program: None },
+        Ok(assembled) => {
+            let issues = takt_analysis::straight(&assembled.program);
+            let bounds = takt_analysis::bound(&assembled.program);
+            let diagnostics = assembled.warnings.clone();
+            Full { files, diagnostics, program: Some(Counted { assembled, issues, bounds }) }
+        }
+    }
+}

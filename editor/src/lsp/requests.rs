@@ -1,0 +1,384 @@
+//! The answers to requests about a document.
+
+use crate::lsp::dispatch::parameters;
+use crate::lsp::program::{Counted, File, Front, Full};
+use crate::lsp::text::Text;
+use crate::lsp::{Server, complete, diagnostics, hover, names, outline, timing, uri};
+use lsp_server::ErrorCode;
+use lsp_types::{
+    CodeActionParams, CodeLens, Command, CompletionList, CompletionParams, DocumentFormattingParams,
+    DocumentHighlight, DocumentRangeFormattingParams, FoldingRangeParams, Hover, HoverContents, InlayHint,
+    InlayHintLabel, InlayHintParams, InlayHintTooltip, Location, MarkupContent, MarkupKind, Position, Range,
+    ReferenceParams, RenameParams, SemanticTokens, SemanticTokensParams, SemanticTokensRangeParams,
+    TextDocumentIdentifier, TextDocumentPositionParams, TextEdit, Uri, WorkspaceEdit,
+};
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use takt_asm::source::Span;
+
+/// Why a request has no answer.
+pub(crate) struct Failed(pub(crate) ErrorCode, pub(crate) String);
+
+fn failed(message: impl Into<String>) -> Failed {
+    Failed(ErrorCode::RequestFailed, message.into())
+}
+
+fn value(answer: impl Serialize) -> Result<Value, Failed> {
+    serde_json::to_value(answer).map_err(|error| Failed(ErrorCode::InternalError, error.to_string()))
+}
+
+/// A document, and the program that it is of.
+struct Here<'s> {
+    path: PathBuf,
+    front: &'s Front,
+    full: Option<&'s Full>,
+    file: &'s File,
+}
+
+impl Here<'_> {
+    fn counted(&self) -> Option<&Counted> {
+        self.full?.program.as_ref()
+    }
+}
+
+impl Server<'_> {
+    /// Answers a request from what the documents say now.
+    pub(crate) fn answer(&mut self, method: &str, params: Value) -> Result<Value, Failed> {
+        if !self.stale.is_empty() {
+            self.read();
+        }
+        match method {
+            "textDocument/hover" => value(self.hover(&parameters(method, params)?)?),
+            "textDocument/completion" => value(self.completion(&parameters(method, params)?)?),
+            "textDocument/definition" => value(self.definition(&parameters(method, params)?)?),
+            "textDocument/references" => value(self.references(&parameters(method, params)?)?),
+            "textDocument/documentHighlight" => value(self.highlights(&parameters(method, params)?)?),
+            "textDocument/prepareRename" => self.prepare_rename(&parameters(method, params)?),
+            "textDocument/rename" => value(self.rename(&parameters(method, params)?)?),
+            "textDocument/documentSymbol" => {
+                let document = self.document_of(&params)?;
+                let here = self.here(&document)?;
+                value(outline::symbols(here.front, here.file, self.client.encoding))
+            }
+            "textDocument/foldingRange" => {
+                let params: FoldingRangeParams = parameters(method, params)?;
+                let here = self.here(&params.text_document.uri)?;
+                value(outline::folds(here.front, here.file))
+            }
+            "textDocument/semanticTokens/full" => {
+                let params: SemanticTokensParams = parameters(method, params)?;
+                value(self.colours(&params.text_document.uri, None)?)
+            }
+            "textDocument/semanticTokens/range" => {
+                let params: SemanticTokensRangeParams = parameters(method, params)?;
+                value(self.colours(&params.text_document.uri, Some(params.range))?)
+            }
+            "textDocument/inlayHint" => value(self.hints(&parameters(method, params)?)?),
+            "textDocument/codeLens" => {
+                let document = self.document_of(&params)?;
+                value(self.lenses(&document)?)
+            }
+            "textDocument/codeAction" => value(self.fixes(&parameters(method, params)?)),
+            "textDocument/formatting" => {
+                let params: DocumentFormattingParams = parameters(method, params)?;
+                value(self.format(&params.text_document.uri, None)?)
+            }
+            "textDocument/rangeFormatting" => {
+                let params: DocumentRangeFormattingParams = parameters(method, params)?;
+                value(self.format(&params.text_document.uri, Some(params.range))?)
+            }
+            _ => Err(Failed(ErrorCode::MethodNotFound, format!("Takt's language server has no `{method}`"))),
+        }
+    }
+
+    fn document_of(&self, params: &Value) -> Result<Uri, Failed> {
+        let document: TextDocumentIdentifier = parameters("textDocument", params["textDocument"].clone())?;
+        Ok(document.uri)
+    }
+
+    /// The document of a URI, and the first program that it is of, as the last reading has it.
+    fn here(&self, uri: &Uri) -> Result<Here<'_>, Failed> {
+        let path = uri::path(uri);
+        if !self.workspace.open.contains_key(&path) {
+            return Err(failed(format!("`{}` is not open", uri.as_str())));
+        }
+        let roots = self.workspace.roots(&path);
+        let found = roots.iter().find_map(|root| {
+            let program = self.programs.get(root)?;
+            let file = program.front.files.of(&path)?;
+            Some(Here { path: path.clone(), front: &program.front, full: program.full.as_ref(), file })
+        });
+        found.ok_or_else(|| failed(format!("`{}` could not be read", uri.as_str())))
+    }
+
+    /// What a position of a request is about.
+    fn at(&self, at: &TextDocumentPositionParams) -> Result<(Here<'_>, usize), Failed> {
+        let encoding = self.client.encoding;
+        let here = self.here(&at.text_document.uri)?;
+        let byte = here.file.text.byte(at.position, encoding);
+        Ok((here, byte))
+    }
+
+    fn hover(&self, params: &TextDocumentPositionParams) -> Result<Option<Hover>, Failed> {
+        let (settings, encoding) = (&self.settings, self.client.encoding);
+        let (here, byte) = self.at(params)?;
+        let Some((bytes, mut text)) = hover::hover(settings, here.front, here.counted(), here.file, byte)
+        else {
+            return Ok(None);
+        };
+        // On an instruction, what its operations do here.
+        let is_fresh = here
+            .full
+            .and_then(|full| full.files.of(&here.path))
+            .is_some_and(|old| old.text.text == here.file.text.text);
+        let word = &here.file.text.text[bytes.clone()];
+        if let Some(counted) =
+            here.counted().filter(|_| is_fresh && takt_isa::Op::from_mnemonic(word).is_some())
+            && let Some(more) = hover::of_line(counted, &here.file.name, here.file.text.line_of(byte) as u32)
+        {
+            text = format!("{text}\n\nHere:\n{more}");
+        }
+        let contents = HoverContents::Markup(MarkupContent { kind: MarkupKind::Markdown, value: text });
+        Ok(Some(Hover { contents, range: Some(here.file.text.range(bytes, encoding)) }))
+    }
+
+    fn completion(&self, params: &CompletionParams) -> Result<CompletionList, Failed> {
+        let (settings, client) = (&self.settings, self.client);
+        let (here, byte) = self.at(&params.text_document_position)?;
+        let items =
+            complete::complete(settings, here.front, here.file, byte, client.snippets, client.encoding);
+        Ok(CompletionList { is_incomplete: false, items })
+    }
+
+    /// The place of a span, in a file that the client can open.
+    fn location(&self, front: &Front, span: Span) -> Option<Location> {
+        let (file, range) = front.files.range(span, self.client.encoding)?;
+        let path = match &file.path {
+            Some(path) => path.clone(),
+            None => self.library_copy(file)?,
+        };
+        Some(Location { uri: uri::of_path(&path)?, range })
+    }
+
+    /// A copy of a library's file, for an editor to open.
+    fn library_copy(&self, file: &File) -> Option<PathBuf> {
+        let folder = self.settings.library_folder.as_deref()?;
+        let path = folder.join(file.name.trim_matches(['<', '>']));
+        if !std::fs::read(&path).is_ok_and(|known| known == file.text.text.as_bytes()) {
+            std::fs::create_dir_all(folder).ok()?;
+            std::fs::write(&path, file.text.text.as_bytes()).ok()?;
+        }
+        Some(path)
+    }
+
+    fn definition(&self, params: &TextDocumentPositionParams) -> Result<Vec<Location>, Failed> {
+        let (here, byte) = self.at(params)?;
+        let offset = here.file.base + byte as u32;
+        if let Some((_, file)) =
+            here.front.index.includes.iter().find(|(span, _)| (span.start..=span.end).contains(&offset))
+        {
+            let start = here.front.files.0.get(*file).map_or(0, |file| file.base);
+            return Ok(self.location(here.front, Span::new(start, start)).into_iter().collect());
+        }
+        let Some((_, symbols)) = here.front.at(offset) else { return Ok(Vec::new()) };
+        let mut spans: Vec<Span> = symbols.iter().map(|symbol| here.front.symbol(*symbol).span).collect();
+        spans.dedup();
+        Ok(spans.into_iter().filter_map(|span| self.location(here.front, span)).collect())
+    }
+
+    /// Every program that a file is of.
+    fn fronts(&self, path: &Path) -> Vec<(&Path, &Front)> {
+        let of = self.programs.iter().filter(|(_, program)| program.front.files.of(path).is_some());
+        of.map(|(root, program)| (root.as_path(), &program.front)).collect()
+    }
+
+    fn references(&self, params: &ReferenceParams) -> Result<Vec<Location>, Failed> {
+        let at = &params.text_document_position;
+        self.at(at)?;
+        let path = uri::path(&at.text_document.uri);
+        let mut found: Vec<Location> = Vec::new();
+        for (_, front) in self.fronts(&path) {
+            let Some(file) = front.files.of(&path) else { continue };
+            let byte = file.text.byte(at.position, self.client.encoding);
+            let Some((_, symbols)) = front.at(file.base + byte as u32) else { continue };
+            for reference in front.references(&symbols) {
+                let declares = front.symbol(reference.symbol).span == reference.span;
+                if (params.context.include_declaration || !declares)
+                    && let Some(location) = self.location(front, reference.span)
+                    && !found.contains(&location)
+                {
+                    found.push(location);
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    fn highlights(&self, params: &TextDocumentPositionParams) -> Result<Vec<DocumentHighlight>, Failed> {
+        let encoding = self.client.encoding;
+        let (here, byte) = self.at(params)?;
+        let Some((_, symbols)) = here.front.at(here.file.base + byte as u32) else { return Ok(Vec::new()) };
+        let places = here.front.references(&symbols).into_iter().filter_map(|reference| {
+            let (file, range) = here.front.files.range(reference.span, encoding)?;
+            std::ptr::eq(file, here.file).then_some(DocumentHighlight { range, kind: None })
+        });
+        Ok(places.collect())
+    }
+
+    fn prepare_rename(&self, params: &TextDocumentPositionParams) -> Result<Value, Failed> {
+        let encoding = self.client.encoding;
+        let (here, byte) = self.at(params)?;
+        let (span, name) = names::renamable(here.front, here.file.base + byte as u32).map_err(failed)?;
+        let (_, range) = here.front.files.range(span, encoding).ok_or_else(|| failed("it is in no file"))?;
+        Ok(json!({ "range": range, "placeholder": name }))
+    }
+
+    fn rename(&self, params: &RenameParams) -> Result<WorkspaceEdit, Failed> {
+        let at = &params.text_document_position;
+        let (_, byte) = self.at(at)?;
+        let path = uri::path(&at.text_document.uri);
+        let fronts = self.fronts(&path);
+        let open = self.workspace.texts();
+        let edits =
+            names::rename(&self.settings, &fronts, &path, byte, &params.new_name, &open).map_err(failed)?;
+        let edits = names::as_edits(&fronts, &edits, self.client.encoding);
+        let edits = edits.into_iter().filter_map(|(path, edits)| Some((uri::of_path(&path)?, edits)));
+        #[allow(clippy::mutable_key_type, reason = "the protocol's type")]
+        let changes: HashMap<Uri, Vec<TextEdit>> = edits.collect();
+        Ok(WorkspaceEdit { changes: Some(changes), ..WorkspaceEdit::default() })
+    }
+
+    fn colours(&self, uri: &Uri, range: Option<Range>) -> Result<SemanticTokens, Failed> {
+        let encoding = self.client.encoding;
+        let here = self.here(uri)?;
+        let lines =
+            range.map_or(0..usize::MAX, |range| range.start.line as usize..range.end.line as usize + 1);
+        let data = outline::colours(here.front, here.file, lines, encoding);
+        Ok(SemanticTokens { result_id: None, data })
+    }
+
+    fn hints(&self, params: &InlayHintParams) -> Result<Vec<InlayHint>, Failed> {
+        let encoding = self.client.encoding;
+        let here = self.here(&params.text_document.uri)?;
+        let Some((counted, moved)) = here.counted().and_then(|counted| Some((counted, here.moved()?))) else {
+            return Ok(Vec::new());
+        };
+        let text = &here.file.text;
+        let hints = timing::hints(counted, &here.file.name).into_iter().filter_map(|hint| {
+            let line = moved.line(hint.line)?;
+            (params.range.start.line..=params.range.end.line).contains(&line).then_some(())?;
+            let position = text.position(text.line(line as usize)?.end, encoding);
+            let tooltip = MarkupContent { kind: MarkupKind::Markdown, value: hint.more };
+            Some(InlayHint {
+                position,
+                label: InlayHintLabel::String(hint.text),
+                kind: None,
+                text_edits: None,
+                tooltip: Some(InlayHintTooltip::MarkupContent(tooltip)),
+                padding_left: Some(true),
+                padding_right: None,
+                data: None,
+            })
+        });
+        Ok(hints.collect())
+    }
+
+    fn lenses(&self, uri: &Uri) -> Result<Vec<CodeLens>, Failed> {
+        let here = self.here(uri)?;
+        let Some((counted, moved)) = here.counted().and_then(|counted| Some((counted, here.moved()?))) else {
+            return Ok(Vec::new());
+        };
+        let lens = |(line, title): (u32, String)| {
+            let line = moved.line(line)?;
+            let position = Position::new(line, 0);
+            let command = Command { title, command: String::new(), arguments: None };
+            Some(CodeLens { range: Range::new(position, position), command: Some(command), data: None })
+        };
+        // Lines of the older text, as all that is counted; a label's is known as long as it has not moved.
+        let old = here.full.and_then(|full| full.files.named(&here.file.name));
+        let head = |name: &str| old.and_then(|file| outline::head_line(file, name));
+        let lenses = timing::lenses(counted, &self.settings, &here.file.name, &head);
+        Ok(lenses.into_iter().filter_map(lens).collect())
+    }
+
+    fn fixes(&self, params: &CodeActionParams) -> Vec<lsp_types::CodeAction> {
+        let path = uri::path(&params.text_document.uri);
+        let told: Vec<_> =
+            self.published.get(&path).into_iter().flat_map(|by| by.values().flatten().cloned()).collect();
+        diagnostics::fixes(&params.text_document.uri, params.range, &told)
+    }
+
+    /// The lines that laying the document out changes.
+    fn format(&self, uri: &Uri, range: Option<Range>) -> Result<Vec<TextEdit>, Failed> {
+        let path = uri::path(uri);
+        let text = self
+            .workspace
+            .open
+            .get(&path)
+            .ok_or_else(|| failed(format!("`{}` is not open", uri.as_str())))?;
+        let laid = Text::new(takt_asm::format::format(&text.text));
+        let mut edits = Vec::new();
+        let mut line = 0;
+        // Lines keep their number, but for empty ones at the end.
+        while let (Some(old), Some(new)) = (text.line(line), laid.line(line)) {
+            let wanted =
+                range.is_none_or(|range| (range.start.line..=range.end.line).contains(&(line as u32)));
+            let new_text = &laid.text[new.clone()];
+            if wanted && text.text[old.clone()] != *new_text {
+                edits.push(TextEdit {
+                    range: text.range(old, self.client.encoding),
+                    new_text: new_text.to_owned(),
+                });
+            }
+            line += 1;
+        }
+        if range.is_none() {
+            let whole = |text: &Text| text.line(line.saturating_sub(1)).map_or(0, |line| line.end);
+            let (old, new) = (whole(text), whole(&laid));
+            if text.text[old..] != laid.text[new..] {
+                let range = text.range(old..text.text.len(), self.client.encoding);
+                edits.push(TextEdit { range, new_text: laid.text[new..].to_owned() });
+            }
+        }
+        Ok(edits)
+    }
+}
+
+/// Where the lines of an older text are in a newer one: those before and behind what changed.
+struct Moved {
+    /// Lines at the beginning that are the same.
+    head: u32,
+    /// Of the older text, the first line behind what changed.
+    tail: u32,
+    /// By how much those are moved.
+    by: i64,
+}
+
+impl Moved {
+    fn line(&self, line: u32) -> Option<u32> {
+        if line < self.head {
+            return Some(line);
+        }
+        (line >= self.tail).then(|| u32::try_from(i64::from(line) + self.by).ok())?
+    }
+}
+
+impl Here<'_> {
+    /// How lines have moved since the program was scheduled.
+    fn moved(&self) -> Option<Moved> {
+        let old = &self.full?.files.named(&self.file.name)?.text.text;
+        let new = &self.file.text.text;
+        if old == new {
+            return Some(Moved { head: u32::MAX, tail: u32::MAX, by: 0 });
+        }
+        let count = |text: &str| text.lines().count();
+        let head = old.lines().zip(new.lines()).take_while(|(old, new)| old == new).count();
+        let most = count(old).min(count(new)) - head;
+        let tail =
+            old.lines().rev().zip(new.lines().rev()).take(most).take_while(|(old, new)| old == new).count();
+        let by = count(new) as i64 - count(old) as i64;
+        Some(Moved { head: head as u32, tail: (count(old) - tail) as u32, by })
+    }
+}

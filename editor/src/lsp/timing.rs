@@ -1,0 +1,225 @@
+//! What stands beside a line: when its operations issue and what they wait for; and above a section: what it takes.
+
+use crate::lsp::program::Counted;
+use crate::lsp::{Settings, plural};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use takt_analysis::StraightIssue;
+use takt_asm::schedule::BlockReport;
+use takt_isa::program::Location;
+use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
+
+/// Cycles of a line that are listed; of more the first and the last are.
+const LISTED: usize = 4;
+/// Operations of a line that are explained.
+const EXPLAINED: usize = 12;
+
+/// What is said beside a line.
+pub(crate) struct Hint {
+    /// The line, from 0.
+    pub(crate) line: u32,
+    /// Cycles, slots, and what they wait for: `12 · mul, waits 4 for l1d`.
+    pub(crate) text: String,
+    /// A line for each operation.
+    pub(crate) more: String,
+}
+
+/// A word of the code: its bundle and its slot.
+type Word = (BundleAddress, SlotIndex);
+
+/// The words of each line of a file, in the order of their bundles.
+fn words(program: &Program, file: &str) -> BTreeMap<u32, Vec<Word>> {
+    let mut words: BTreeMap<u32, Vec<Word>> = BTreeMap::new();
+    let Some(number) = program.files.iter().position(|name| name == file) else { return words };
+    for address in program.addresses() {
+        for (location, slot) in program.locations(address).iter().zip(SlotIndex::all()) {
+            if let Some(Location { file, line }) = location
+                && *file as usize == number
+            {
+                words.entry(*line).or_default().push((address, slot));
+            }
+        }
+    }
+    words
+}
+
+/// The hints of a file's lines.
+pub(crate) fn hints(counted: &Counted, file: &str) -> Vec<Hint> {
+    let program = &counted.assembled.program;
+    let words = words(program, file);
+    words
+        .into_iter()
+        .map(|(line, words)| Hint {
+            line: line - 1,
+            text: short(counted, &words),
+            more: explained(counted, &words),
+        })
+        .collect()
+}
+
+fn issue(counted: &Counted, address: BundleAddress) -> Option<&StraightIssue> {
+    counted.issues.get(address.index())
+}
+
+/// A cycle, and from where it counts where that is not the beginning of a section.
+fn cycle(program: &Program, issue: &StraightIssue) -> String {
+    if program.sections.iter().any(|section| section.start == issue.from) {
+        return issue.cycle.to_string();
+    }
+    match program.nearest_label(issue.from) {
+        Some((label, 0)) => format!("{label} {}", issue.cycle),
+        _ => format!("@{} {}", issue.from, issue.cycle),
+    }
+}
+
+fn short(counted: &Counted, words: &[Word]) -> String {
+    let program = &counted.assembled.program;
+    let shown = |(address, slot): &Word| {
+        let cycle = cycle(program, issue(counted, *address)?);
+        Some(format!("{cycle} · {}", program.machine.slots[slot.index()].name))
+    };
+    let mut text = if words.len() <= LISTED {
+        words.iter().filter_map(shown).collect::<Vec<_>>().join(", ")
+    } else {
+        let ends = [words.first(), words.last()];
+        let ends: Vec<String> = ends.into_iter().flatten().filter_map(shown).collect();
+        format!("{} ({} operations)", ends.join(" … "), words.len())
+    };
+    // Where it is one operation, what holds its bundle up is its own affair.
+    if let [(address, _)] = words
+        && let Some(issue) = issue(counted, *address)
+        && let Some(&(cause, cycles)) = issue.stalls.iter().max_by_key(|(_, cycles)| *cycles)
+    {
+        let _ = write!(text, ", stalls {cycles}: {}", program.cause_text(cause));
+    }
+    text
+}
+
+fn explained(counted: &Counted, words: &[Word]) -> String {
+    let program = &counted.assembled.program;
+    let mut text = String::new();
+    for &(address, slot) in words.iter().take(EXPLAINED) {
+        let Some(issue) = issue(counted, address) else { continue };
+        let word = program.words(address).and_then(|words| words.get(slot.index()).copied());
+        let Some(instruction) = word.and_then(|word| Instruction::decode(word).ok()) else { continue };
+        let name = |register| program.register_text(register);
+        let operation = instruction.text_with(program.machine, slot, name, |target| {
+            match program.nearest_label(target) {
+                Some((label, 0)) => label.to_owned(),
+                _ => target.to_string(),
+            }
+        });
+        let slot_name = program.machine.slots[slot.index()].name;
+        let _ = write!(
+            text,
+            "- cycle {}, bundle {address}, slot {slot_name}: `{operation}`",
+            cycle(program, issue)
+        );
+        if let Some((register, ready, producer)) = issue.awaits[slot.index()] {
+            let from = program.bundle_text(producer);
+            let _ = write!(text, "; `{}` is there from cycle {ready} on, from {from}", name(register));
+        }
+        for (cause, cycles) in &issue.stalls {
+            let _ = write!(
+                text,
+                "; {} stalled: {}",
+                plural(u64::from(*cycles), "cycle"),
+                program.cause_text(*cause)
+            );
+        }
+        text.push('\n');
+    }
+    if words.len() > EXPLAINED {
+        let _ = writeln!(text, "- … and {}", plural((words.len() - EXPLAINED) as u64, "more operation"));
+    }
+    text
+}
+
+/// What is said above a line of a file: lines from 0. `head` knows the lines that labels and section directives stand on.
+pub(crate) fn lenses(
+    counted: &Counted,
+    settings: &Settings,
+    file: &str,
+    head: &dyn Fn(&str) -> Option<u32>,
+) -> Vec<(u32, String)> {
+    let program = &counted.assembled.program;
+    let line = |location: Option<Location>| {
+        let location = location?;
+        (program.files.get(location.file as usize)? == file).then_some(location.line - 1)
+    };
+    let mut lenses: BTreeMap<u32, Vec<String>> = BTreeMap::new();
+    let blocks = &counted.assembled.blocks;
+    let mut told = Vec::new();
+    match &counted.bounds {
+        Ok(bounds) => {
+            for section in &bounds.sections {
+                let Some(line) = head(&section.name).or_else(|| line(section.location)) else { continue };
+                let cycles = match section.cycles.best == section.cycles.worst {
+                    true => plural(section.cycles.worst, "cycle"),
+                    false => format!("{} to {}", section.cycles.best, plural(section.cycles.worst, "cycle")),
+                };
+                let mut text = format!("{}: {cycles}", section.name);
+                if section.once {
+                    text.push_str(" from reset");
+                } else {
+                    // The one block that a period is.
+                    let whole = |block: &BlockReport| {
+                        block.address == section.address
+                            && section.ends.contains(&block.address.offset(block.bundles.saturating_sub(1)))
+                    };
+                    if let Some(number) = blocks.iter().position(whole) {
+                        let _ = write!(text, ", bound {}", blocks[number].bound.cycles());
+                        told.push(number);
+                    }
+                    // As `takt bound --deadline` has it.
+                    let worst = section.in_time.worst + 1;
+                    if let Some(deadline) = settings.deadline {
+                        let (what, by) = match deadline.checked_sub(worst) {
+                            Some(spare) => ("kept", spare),
+                            None => ("missed", worst - deadline),
+                        };
+                        let _ = write!(text, ", deadline {what} by {}", grouped(by));
+                    }
+                }
+                lenses.entry(line).or_default().push(text);
+            }
+        }
+        Err(error) => {
+            let period = program.sections.iter().find(|section| section.name == "period");
+            if let Some(line) =
+                line(program.location(period.map_or(BundleAddress::RESET, |section| section.start)))
+            {
+                lenses.entry(line).or_default().push(format!("no bound: {error}"));
+            }
+        }
+    }
+    for (_, block) in blocks.iter().enumerate().filter(|(number, _)| !told.contains(number)) {
+        if let Some(line) = line(block.location) {
+            let text = format!(
+                "block: {}, bound {}",
+                plural(u64::from(block.cycles), "cycle"),
+                block.bound.cycles()
+            );
+            lenses.entry(line).or_default().push(text);
+        }
+    }
+    lenses.into_iter().map(|(line, texts)| (line, texts.join(" · "))).collect()
+}
+
+/// Digits in groups of three.
+fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let groups: Vec<&str> =
+        digits.as_bytes().rchunks(3).rev().filter_map(|group| std::str::from_utf8(group).ok()).collect();
+    groups.join(",")
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn digits_in_groups() {
+        for (number, text) in [(0, "0"), (999, "999"), (12_376, "12,376"), (1_000_000, "1,000,000")] {
+            assert_eq!(super::grouped(number), text);
+        }
+    }
+}

@@ -1,0 +1,387 @@
+//! From a robot to a function: the equations are written down for several placements of the frames, and the shortest are
+//! taken.
+
+use super::links::{Angles, Motion};
+use super::{Function, Port, What, inverse, kinematics, mass};
+use crate::Error;
+use crate::graph::{Delays, Expr, Graph, Id, Rewrites};
+use crate::robot::frames::{self, Layout, Link};
+use crate::robot::space::{self, Pose, V3};
+use crate::robot::{Kind, Robot};
+
+/// What the equations are made with.
+#[derive(Clone, Copy, Debug)]
+pub struct Options<'a> {
+    /// What may be rewritten.
+    pub rewrites: Rewrites,
+    /// The latencies that sums are balanced for.
+    pub delays: Delays,
+    /// The link whose pose is asked for.
+    pub tip: Option<&'a str>,
+    /// Of computed torque: what an error of position is multiplied by, 1/s².
+    pub kp: f64,
+    /// And one of velocity, 1/s.
+    pub kd: f64,
+}
+
+/// More joints take longer to write down, and there are more of them to try: of so many, each is.
+const TRIED: usize = 16;
+
+/// One way to write the equations.
+#[derive(Clone, PartialEq, Debug)]
+struct Attempt {
+    layout: Layout,
+    /// Use sums of angles of parallel axes.
+    sums: bool,
+    /// Through how many joints of the way positions are computed backwards.
+    split: usize,
+    /// The unit of length, m.
+    unit: f64,
+}
+
+/// A function of a robot.
+///
+/// # Errors
+/// If there is no one tip where one is needed.
+pub fn derive(robot: &Robot, what: What, options: &Options<'_>) -> Result<Function, Error> {
+    let tip = match what {
+        What::ForwardKinematics | What::Jacobian => Some(tip(robot, options.tip)?),
+        _ => None,
+    };
+    let cost = |attempt: &Attempt| {
+        let mut function = write(robot, what, options, tip, attempt);
+        if robot.joints.len() <= TRIED {
+            function = function.improved(&options.delays, false);
+        }
+        (function.count().total(), function.depth(&options.delays))
+    };
+    let mut best = Attempt { layout: Layout::new(robot), sums: true, split: usize::MAX, unit: 1.0 };
+    let mut least = cost(&best);
+    let mut consider = |best: &mut Attempt, change: &dyn Fn(&mut Attempt)| {
+        let mut other = best.clone();
+        change(&mut other);
+        let cost = if other == *best { least } else { cost(&other) };
+        if cost < least {
+            (*best, least) = (other, cost);
+        }
+    };
+    consider(&mut best, &|attempt| attempt.sums = false);
+    if what == What::ForwardKinematics {
+        for split in 0..robot.joints.len().min(TRIED) {
+            consider(&mut best, &|attempt| attempt.split = split);
+        }
+    }
+    for joint in 0..robot.joints.len().min(TRIED) {
+        consider(&mut best, &|attempt| attempt.layout.incoming[joint] ^= true);
+    }
+    for joint in robot.leaves().into_iter().take(TRIED) {
+        consider(&mut best, &|attempt| attempt.layout.balanced[joint] ^= true);
+    }
+    for joint in 0..robot.joints.len().min(TRIED) {
+        for quarters in 1..4 {
+            consider(&mut best, &|attempt| attempt.layout.quarters[joint] = quarters);
+        }
+        for quarters in 0..4 {
+            consider(&mut best, &|attempt| {
+                attempt.layout.flipped[joint] ^= true;
+                attempt.layout.quarters[joint] = quarters;
+            });
+        }
+    }
+    consider(&mut best, &|attempt| attempt.sums ^= true);
+    let scales = options.rewrites.scale
+        && matches!(what, What::InverseDynamics | What::ComputedTorque | What::Gravity | What::MassMatrix)
+        && robot.joints.iter().all(|joint| joint.kind == Kind::Revolute);
+    if scales {
+        for unit in units(&frames::place(robot, &best.layout)).into_iter().take(TRIED) {
+            consider(&mut best, &|attempt| attempt.unit = unit);
+        }
+    }
+    let mut function = write(robot, what, options, tip, &best).optimised(&options.delays);
+    function.title = match tip {
+        Some((name, ..)) => format!("{} of {}, tip {name}: {}", what.name(), robot.name, what.text()),
+        None => format!("{} of {}: {}", what.name(), robot.name, what.text()),
+    };
+    function.notes = notes(robot, &best);
+    Ok(function)
+}
+
+/// Lengths that would be worth being 1.
+fn units(links: &[Link]) -> Vec<f64> {
+    let mut units: Vec<f64> = Vec::new();
+    for link in links {
+        let lengths = link.origin.into_iter().chain(link.body.first.map(|first| 1.0 / first));
+        for length in lengths.map(f64::abs).filter(|length| length.is_normal()) {
+            if !units.contains(&length) {
+                units.push(length);
+            }
+        }
+    }
+    units
+}
+
+/// The link whose pose is asked for, the joint that carries it, and its place there.
+type Tip<'a> = (&'a str, usize, Pose);
+
+fn tip<'a>(robot: &'a Robot, name: Option<&str>) -> Result<Tip<'a>, Error> {
+    let frame = match name {
+        Some(name) => robot.frame(name),
+        // The last link of the one branch there is.
+        None => match robot.leaves()[..] {
+            [leaf] => robot.frames.iter().rev().find(|frame| frame.joint == Some(leaf)),
+            _ => None,
+        },
+    };
+    let frame = frame.ok_or_else(|| {
+        let leaves = robot.leaves();
+        let names: Vec<&str> = robot
+            .frames
+            .iter()
+            .filter(|frame| frame.joint.is_some_and(|joint| leaves.contains(&joint)))
+            .map(|frame| frame.name.as_str())
+            .collect();
+        let ends = crate::robot::list(&names);
+        Error::plain(format!("the robot has several ends: choose a link with --tip, among them {ends}"))
+    })?;
+    let joint =
+        frame.joint.ok_or_else(|| Error::plain(format!("--tip: link `{}` does not move", frame.name)))?;
+    Ok((&frame.name, joint, frame.pose))
+}
+
+fn notes(robot: &Robot, attempt: &Attempt) -> Vec<String> {
+    let mut notes = robot.notes.clone();
+    let links = frames::place(robot, &attempt.layout);
+    notes.push("frames: z along the joint's axis; of each link: its joint, and where its frame lies in the one before".to_owned());
+    for (index, link) in links.iter().enumerate() {
+        let before = link.parent.map_or_else(|| robot.base.clone(), |parent| format!("link {}", parent + 1));
+        let vector = |a: V3| a.map(|x| format!("{}", (x * 1e6).round() / 1e6 + 0.0)).join(" ");
+        notes.push(format!(
+            "link {}: {}, on {before}: origin {} m, axis {}",
+            index + 1,
+            link.name,
+            vector(link.origin),
+            vector(link.axis)
+        ));
+    }
+    if attempt.unit != 1.0 {
+        notes.push(format!("unit of length: {:.6} m", attempt.unit));
+    }
+    notes
+}
+
+/// What a joint is called in names of ports.
+pub(super) fn port_names(robot: &Robot) -> Vec<String> {
+    let plain = |name: &str| -> String {
+        let name = name.strip_suffix("_joint").unwrap_or(name);
+        name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect()
+    };
+    let names: Vec<String> = robot.joints.iter().map(|joint| plain(&joint.name)).collect();
+    let unique = |name: &String| names.iter().filter(|other| *other == name).count() == 1;
+    names
+        .iter()
+        .enumerate()
+        .map(|(index, name)| if unique(name) { name.clone() } else { format!("{name}_{}", index + 1) })
+        .collect()
+}
+
+/// The inputs, in the order in which they were asked for.
+struct Inputs<'g> {
+    graph: &'g Graph,
+    ports: Vec<Port>,
+}
+
+impl<'g> Inputs<'g> {
+    /// One for each joint.
+    fn joints(
+        &mut self,
+        robot: &Robot,
+        what: &str,
+        text: &str,
+        unit: &dyn Fn(Kind) -> String,
+    ) -> Vec<Expr<'g>> {
+        let names = port_names(robot);
+        let mut inputs = Vec::new();
+        for (joint, name) in robot.joints.iter().zip(names) {
+            inputs.push(self.graph.input(self.ports.len()));
+            let text = format!("{text} of {}, {}", joint.name, unit(joint.kind));
+            self.ports.push(Port { name: format!("{what}_{name}"), text });
+        }
+        inputs
+    }
+}
+
+fn write(
+    robot: &Robot,
+    what: What,
+    options: &Options<'_>,
+    tip: Option<Tip<'_>>,
+    attempt: &Attempt,
+) -> Function {
+    let graph = Graph::new(options.rewrites);
+    let (inputs, outputs) = {
+        let mut inputs = Inputs { graph: &graph, ports: Vec::new() };
+        let outputs = equations(&mut inputs, robot, what, options, tip, attempt);
+        (inputs.ports, outputs)
+    };
+    Function { title: String::new(), notes: Vec::new(), inputs, outputs, graph }
+}
+
+fn equations(
+    inputs: &mut Inputs<'_>,
+    robot: &Robot,
+    what: What,
+    options: &Options<'_>,
+    tip: Option<Tip<'_>>,
+    attempt: &Attempt,
+) -> Vec<(Port, Id)> {
+    let graph = inputs.graph;
+    let mut links = frames::place(robot, &attempt.layout);
+    let mut gravity = robot.gravity;
+    if attempt.unit != 1.0 {
+        let unit = attempt.unit;
+        gravity = space::scale(1.0 / unit, gravity);
+        for link in &mut links {
+            link.origin = link.origin.map(|x| if x.abs() == unit { x.signum() } else { x / unit });
+            link.body.first =
+                link.body.first.map(|x| if (x * unit).abs() - 1.0 == 0.0 { x.signum() } else { x * unit });
+            link.body.mass *= unit * unit;
+        }
+    }
+    let count = links.len();
+    let zero = vec![graph.constant(0.0); count];
+    let position = |kind: Kind| kind.unit().to_owned();
+    let speed = |kind: Kind| format!("{}/s", kind.unit());
+    let rate = |kind: Kind| format!("{}/s²", kind.unit());
+    let force = |kind: Kind| kind.force().to_owned();
+    let names = port_names(robot);
+    let q = inputs.joints(robot, "q", "position", &position);
+    let outputs = |what: &str, text: &str, unit: &dyn Fn(Kind) -> String, values: Vec<Expr<'_>>| {
+        let ports = robot.joints.iter().zip(&names).zip(values);
+        ports
+            .map(|((joint, name), value)| {
+                let text = format!("{text} of {}, {}", joint.name, unit(joint.kind));
+                (Port { name: format!("{what}_{name}"), text }, value.id())
+            })
+            .collect::<Vec<_>>()
+    };
+    let inverse = |links: &[Link], qd: &[Expr<'_>], qdd: &[Expr<'_>]| -> Vec<Id> {
+        let again = |list: &[Expr<'_>], i: usize| graph.expr(list[i].id());
+        let motions: Vec<Motion<'_>> = (0..count)
+            .map(|i| Motion { q: graph.expr(q[i].id()), qd: again(qd, i), qdd: again(qdd, i) })
+            .collect();
+        let angles = Angles::new(graph, links, &q, attempt.sums);
+        inverse::forces(graph, links, gravity, &angles, &motions).iter().map(|tau| tau.id()).collect()
+    };
+    let exprs = |ids: Vec<Id>| ids.into_iter().map(|id| graph.expr(id)).collect::<Vec<_>>();
+    match what {
+        What::InverseDynamics => {
+            let qd = inputs.joints(robot, "qd", "velocity", &speed);
+            let qdd = inputs.joints(robot, "qdd", "acceleration", &rate);
+            outputs("tau", "force", &force, exprs(inverse(&links, &qd, &qdd)))
+        }
+        What::Gravity => outputs("tau", "force", &force, exprs(inverse(&links, &zero, &zero))),
+        What::ComputedTorque => {
+            let qd = inputs.joints(robot, "qd", "velocity", &speed);
+            let qr = inputs.joints(robot, "qr", "reference position", &position);
+            let qdr = inputs.joints(robot, "qdr", "reference velocity", &speed);
+            let qddr = inputs.joints(robot, "qddr", "reference acceleration", &rate);
+            let wanted: Vec<Expr<'_>> = (0..count)
+                .map(|i| qddr[i] + options.kp * (qr[i] - q[i]) + options.kd * (qdr[i] - qd[i]))
+                .collect();
+            outputs("tau", "force", &force, exprs(inverse(&links, &qd, &wanted)))
+        }
+        What::MassMatrix => {
+            let angles = Angles::new(graph, &links, &q, attempt.sums);
+            let matrix = mass::matrix(graph, &links, &angles, &q);
+            let mut ports = Vec::new();
+            for (row, entries) in matrix.iter().enumerate() {
+                for (column, entry) in entries.iter().enumerate() {
+                    let text = format!("inertia of {} and {}", links[row].name, links[column].name);
+                    let port = Port { name: format!("M_{}_{}", row + 1, column + 1), text };
+                    ports.push((port, entry.unwrap_or_else(|| graph.constant(0.0)).id()));
+                }
+            }
+            ports
+        }
+        What::ForwardDynamics => {
+            let qd = inputs.joints(robot, "qd", "velocity", &speed);
+            let tau = inputs.joints(robot, "tau", "force", &force);
+            let bias = exprs(inverse(&links, &qd, &zero));
+            let angles = Angles::new(graph, &links, &q, attempt.sums);
+            let matrix = mass::matrix(graph, &links, &angles, &q);
+            let forces = tau.iter().zip(&bias).map(|(tau, bias)| *tau - *bias).collect();
+            outputs("qdd", "acceleration", &rate, mass::solve(&links, matrix, forces))
+        }
+        What::ForwardKinematics | What::Jacobian => {
+            let Some((_, joint, pose)) = tip else { return Vec::new() };
+            let pose = aligned(&mut links, joint, &pose);
+            let angles = Angles::new(graph, &links, &q, attempt.sums);
+            if what == What::Jacobian {
+                let columns = kinematics::jacobian(graph, &links, &angles, &q, joint, &pose);
+                return jacobian_ports(graph, robot, &columns);
+            }
+            let (rotation, position) =
+                kinematics::pose(graph, &links, &angles, &q, joint, &pose, attempt.split);
+            let mut ports = Vec::new();
+            for (i, row) in rotation.iter().enumerate() {
+                for (j, entry) in row.iter().enumerate() {
+                    let text = format!("rotation, row {}, column {}", i + 1, j + 1);
+                    ports.push((Port { name: format!("R_{}_{}", i + 1, j + 1), text }, entry.id()));
+                }
+            }
+            for (axis, entry) in ["x", "y", "z"].iter().zip(position) {
+                let port = Port { name: format!("p_{axis}"), text: format!("position along {axis}, m") };
+                ports.push((port, entry.id()));
+            }
+            ports
+        }
+    }
+}
+
+/// The tip in the frame of the joint that carries it. A part of its rotation that is about the joint's axis becomes a part of the
+/// joint's, where what remains is quarter turns.
+fn aligned(links: &mut [Link], joint: usize, pose: &Pose) -> Pose {
+    let tip = links[joint].own.then(pose);
+    let tip =
+        Pose { rotation: space::cleaned(&tip.rotation), origin: space::cleaned_vector(tip.origin, 1.0) };
+    let across = (0..3).find(|&j| tip.rotation[2][j].abs() == 1.0).map(|j| (j + 1) % 3);
+    let Some(column) = across.filter(|_| links[joint].kind == Kind::Revolute) else { return tip };
+    let [x, y, _] = space::column(&tip.rotation, column);
+    let angle = y.atan2(x);
+    if space::quarters(angle).is_some() {
+        return tip;
+    }
+    links[joint].offset += angle;
+    let back = Pose { rotation: space::about(2, -angle), origin: [0.0; 3] };
+    let tip = back.then(&tip);
+    Pose { rotation: space::cleaned(&tip.rotation), origin: space::cleaned_vector(tip.origin, 1.0) }
+}
+
+fn jacobian_ports<'g>(
+    graph: &'g Graph,
+    robot: &Robot,
+    columns: &[Option<(super::vector::Vector<'g>, super::vector::Vector<'g>)>],
+) -> Vec<(Port, Id)> {
+    let nothing = graph.constant(0.0);
+    let mut ports = Vec::new();
+    for row in 0..6 {
+        for (column, entries) in columns.iter().enumerate() {
+            let entry = match entries {
+                Some((linear, angular)) => {
+                    if row < 3 {
+                        linear[row]
+                    } else {
+                        angular[row - 3]
+                    }
+                }
+                None => nothing,
+            };
+            let axis = ["x", "y", "z"][row % 3];
+            let unit = if row < 3 { "velocity" } else { "angular velocity" };
+            let text =
+                format!("{unit} of the tip along {axis} per velocity of {}", robot.joints[column].name);
+            ports.push((Port { name: format!("J_{}_{}", row + 1, column + 1), text }, entry.id()));
+        }
+    }
+    ports
+}

@@ -1,0 +1,96 @@
+//! Evaluation in binary64, and counting.
+
+use super::{Binary, Graph, Id, Node, Unary};
+
+pub(super) fn unary(op: Unary, x: f64) -> f64 {
+    match op {
+        Unary::Neg => -x,
+        Unary::Sqrt => x.sqrt(),
+        Unary::Sin => x.sin(),
+        Unary::Cos => x.cos(),
+        Unary::Tan => x.tan(),
+        Unary::Asin => x.asin(),
+        Unary::Acos => x.acos(),
+        Unary::Exp => x.exp(),
+        Unary::Log => x.ln(),
+        Unary::Abs => x.abs(),
+        Unary::Sign if x > 0.0 => 1.0,
+        Unary::Sign if x < 0.0 => -1.0,
+        Unary::Sign => x,
+    }
+}
+
+pub(super) fn binary(op: Binary, x: f64, y: f64) -> f64 {
+    match op {
+        Binary::Add => x + y,
+        Binary::Sub => x - y,
+        Binary::Mul => x * y,
+        Binary::Div => x / y,
+        Binary::Atan2 => x.atan2(y),
+        Binary::Min => x.min(y),
+        Binary::Max => x.max(y),
+        Binary::Less => f64::from(x < y),
+        Binary::LessEqual => f64::from(x <= y),
+        Binary::Equal => f64::from(x == y),
+        Binary::NotEqual => f64::from(x != y),
+    }
+}
+
+/// The values of `outputs` for these inputs, in binary64. An input that is not there is NaN.
+pub fn evaluate(graph: &Graph, outputs: &[Id], inputs: &[f64]) -> Vec<f64> {
+    let store = graph.store.borrow();
+    let mut values: Vec<f64> = Vec::with_capacity(store.nodes.len());
+    for node in &store.nodes {
+        let value = match *node {
+            Node::Constant(bits) => f64::from_bits(bits),
+            Node::Input(index) => inputs.get(index as usize).copied().unwrap_or(f64::NAN),
+            Node::Unary(op, a) => unary(op, values[a.index()]),
+            Node::Binary(op, a, b) => binary(op, values[a.index()], values[b.index()]),
+            Node::Select(c, a, b) => values[if values[c.index()] != 0.0 { a } else { b }.index()],
+        };
+        values.push(value);
+    }
+    outputs.iter().map(|id| values[id.index()]).collect()
+}
+
+/// How many operations outputs take.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug, serde::Serialize)]
+pub struct Count {
+    /// Sums and differences.
+    pub add: usize,
+    /// Products.
+    pub mul: usize,
+    /// Divisions and square roots.
+    pub div: usize,
+    /// Sines, cosines and their like.
+    pub trig: usize,
+    /// Negations, comparisons, choices and the rest.
+    pub other: usize,
+}
+
+impl Count {
+    /// Of what `outputs` need.
+    pub fn of(graph: &Graph, outputs: &[Id]) -> Count {
+        let uses = graph.uses(outputs);
+        let store = graph.store.borrow();
+        let mut count = Count::default();
+        for node in store.nodes.iter().zip(&uses).filter(|(_, uses)| **uses > 0).map(|(node, _)| node) {
+            match node {
+                Node::Constant(_) | Node::Input(_) => {}
+                Node::Binary(Binary::Add | Binary::Sub, ..) => count.add += 1,
+                Node::Binary(Binary::Mul, ..) => count.mul += 1,
+                Node::Binary(Binary::Div, ..) | Node::Unary(Unary::Sqrt, _) => count.div += 1,
+                Node::Binary(Binary::Atan2, ..) => count.trig += 1,
+                Node::Unary(Unary::Neg | Unary::Abs | Unary::Sign, _) => count.other += 1,
+                Node::Unary(..) => count.trig += 1,
+                Node::Binary(..) | Node::Select(..) => count.other += 1,
+            }
+        }
+        count
+    }
+
+    /// All of them.
+    pub fn total(&self) -> usize {
+        self.add + self.mul + self.div + self.trig + self.other
+    }
+}

@@ -1,0 +1,314 @@
+//! The expression graph under every way in: hash-consed, so that what is equal is computed once, and typed: numbers, and
+//! conditions, which only [`Graph::select`] reads.
+//!
+//! Expressions are built through [`Expr`], whose operators apply the local [`Rewrites`] as they go; [`optimise`] does
+//! those that need to know how often a value is used. Every rewrite is exact over the reals, and each can be switched
+//! off. Nodes are in an order in which operands come first.
+
+mod evaluate;
+mod expr;
+mod passes;
+mod signs;
+mod simplify;
+
+pub use evaluate::{Count, evaluate};
+pub use expr::Expr;
+pub use passes::{Delays, depth, optimise};
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+
+/// A node: its place in the graph.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
+pub struct Id(u32);
+
+impl Id {
+    /// The place, from 0.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// Functions of one number.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[allow(missing_docs)]
+pub enum Unary {
+    Neg,
+    Sqrt,
+    Sin,
+    Cos,
+    Tan,
+    Asin,
+    Acos,
+    Exp,
+    Log,
+    Abs,
+    Sign,
+}
+
+/// Functions of two numbers; the comparisons give a condition.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[allow(missing_docs)]
+pub enum Binary {
+    Add,
+    Sub,
+    Mul,
+    Div,
+    Atan2,
+    Min,
+    Max,
+    Less,
+    LessEqual,
+    Equal,
+    NotEqual,
+}
+
+impl Binary {
+    /// Whether the result is a condition.
+    pub fn compares(self) -> bool {
+        matches!(self, Binary::Less | Binary::LessEqual | Binary::Equal | Binary::NotEqual)
+    }
+
+    fn commutes(self) -> bool {
+        matches!(
+            self,
+            Binary::Add | Binary::Mul | Binary::Min | Binary::Max | Binary::Equal | Binary::NotEqual
+        )
+    }
+}
+
+/// What a node is.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub enum Node {
+    /// A number: the bits of its binary64.
+    Constant(u64),
+    /// An input, by its index.
+    Input(u32),
+    /// A function of one number.
+    Unary(Unary, Id),
+    /// A function of two.
+    Binary(Binary, Id, Id),
+    /// The second if the first, a condition, holds, otherwise the third.
+    Select(Id, Id, Id),
+}
+
+impl Node {
+    /// The operands.
+    pub fn operands(self) -> impl Iterator<Item = Id> {
+        let (a, b, c) = match self {
+            Node::Constant(_) | Node::Input(_) => (None, None, None),
+            Node::Unary(_, a) => (Some(a), None, None),
+            Node::Binary(_, a, b) => (Some(a), Some(b), None),
+            Node::Select(a, b, c) => (Some(a), Some(b), Some(c)),
+        };
+        [a, b, c].into_iter().flatten()
+    }
+
+    /// Whether it computes something.
+    pub fn operates(self) -> bool {
+        !matches!(self, Node::Constant(_) | Node::Input(_))
+    }
+}
+
+/// What may be rewritten. All of it is exact over the reals; what changes how a result is rounded says so.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Rewrites {
+    /// Operations on constants are carried out, in binary64.
+    pub fold: bool,
+    /// `x + 0`, `x - x`, `1*x`, `0*x`, `-(-x)`, `x/1`, a choice between equals.
+    pub identities: bool,
+    /// Equal subexpressions are one.
+    pub share: bool,
+    /// `x` and `-x`, `a - b` and `b - a` are one; signs move to where they cost nothing.
+    pub signs: bool,
+    /// Division by a constant becomes a product, constants of nested products are combined, a power becomes products.
+    /// Changes rounding.
+    pub strength: bool,
+    /// `a*b + a*c` becomes `a*(b + c)` where that saves a product. Changes rounding.
+    pub factor: bool,
+    /// Long sums are added in the order in which their terms are ready. Changes rounding.
+    pub balance: bool,
+    /// Of a robot whose joints all turn: lengths are in a unit that makes one of them 1. Changes rounding.
+    pub scale: bool,
+}
+
+impl Rewrites {
+    /// All of them.
+    pub const ALL: Rewrites = Rewrites {
+        fold: true,
+        identities: true,
+        share: true,
+        signs: true,
+        strength: true,
+        factor: true,
+        balance: true,
+        scale: true,
+    };
+    /// Those that leave every operation's rounding as it is written: for finite values, the result is the same to the bit
+    /// but for the sign of a zero.
+    pub const EXACT: Rewrites =
+        Rewrites { strength: false, factor: false, balance: false, scale: false, ..Rewrites::ALL };
+
+    /// Name and effect of each, in the order of the fields.
+    pub const NAMES: [(&'static str, &'static str); 8] = [
+        ("fold", "operations on constants are carried out, in binary64"),
+        ("identities", "x + 0, x - x, 1*x, 0*x, -(-x), x/1"),
+        ("share", "equal subexpressions are computed once"),
+        ("signs", "x and -x, a - b and b - a are computed once"),
+        ("strength", "division by a constant and powers become products"),
+        ("factor", "a*b + a*c becomes a*(b + c)"),
+        ("balance", "long sums are added in the order in which their terms are ready"),
+        ("scale", "lengths are in a unit that makes one of them 1"),
+    ];
+
+    /// Switches one off by its name; `false` if there is none of that name.
+    pub fn without(&mut self, name: &str) -> bool {
+        let flag = match name {
+            "fold" => &mut self.fold,
+            "identities" => &mut self.identities,
+            "share" => &mut self.share,
+            "signs" => &mut self.signs,
+            "strength" => &mut self.strength,
+            "factor" => &mut self.factor,
+            "balance" => &mut self.balance,
+            "scale" => &mut self.scale,
+            _ => return false,
+        };
+        *flag = false;
+        true
+    }
+}
+
+/// What a node is called in the source that is written, and what it stands for.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Label {
+    /// A name of the assembler's language.
+    pub name: String,
+    /// Meaning, frame and unit; empty if the name before says it.
+    pub text: String,
+}
+
+#[derive(Default)]
+struct Store {
+    nodes: Vec<Node>,
+    index: HashMap<Node, Id>,
+    labels: HashMap<Id, Label>,
+}
+
+/// A graph of expressions.
+pub struct Graph {
+    store: RefCell<Store>,
+    rewrites: Rewrites,
+}
+
+impl Graph {
+    /// An empty graph whose constructors apply these rewrites.
+    pub fn new(rewrites: Rewrites) -> Graph {
+        Graph { store: RefCell::default(), rewrites }
+    }
+
+    /// What its constructors rewrite.
+    pub fn rewrites(&self) -> Rewrites {
+        self.rewrites
+    }
+
+    /// The number of nodes, dead ones included.
+    pub fn len(&self) -> usize {
+        self.store.borrow().nodes.len()
+    }
+
+    /// Whether there is no node.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// What a node of this graph is.
+    pub fn node(&self, id: Id) -> Node {
+        self.store.borrow().nodes[id.index()]
+    }
+
+    /// The node at a place.
+    pub fn id_at(&self, index: usize) -> Id {
+        Id(index as u32)
+    }
+
+    /// What the node at a place is.
+    pub fn node_at(&self, index: usize) -> Node {
+        self.node(self.id_at(index))
+    }
+
+    /// The node itself, not rewritten but for sharing.
+    fn raw(&self, node: Node) -> Id {
+        let mut store = self.store.borrow_mut();
+        if (self.rewrites.share || !node.operates())
+            && let Some(&id) = store.index.get(&node)
+        {
+            return id;
+        }
+        let id = Id(store.nodes.len() as u32);
+        store.nodes.push(node);
+        store.index.insert(node, id);
+        id
+    }
+
+    /// The number of a constant.
+    pub fn value(&self, id: Id) -> Option<f64> {
+        match self.node(id) {
+            Node::Constant(bits) => Some(f64::from_bits(bits)),
+            _ => None,
+        }
+    }
+
+    /// Whether the node is a condition.
+    pub fn is_condition(&self, id: Id) -> bool {
+        matches!(self.node(id), Node::Binary(op, ..) if op.compares())
+    }
+
+    /// Gives a node a name, unless it has one or computes nothing.
+    fn label(&self, id: Id, label: Label) {
+        if let Node::Unary(Unary::Neg, inner) = self.node(id) {
+            // The sign moves on to where it costs nothing; what is computed is the other one.
+            return self.label(inner, signs::negated(label));
+        }
+        if self.node(id).operates() {
+            self.store.borrow_mut().labels.entry(id).or_insert(label);
+        }
+    }
+
+    /// What a node is called.
+    pub fn label_of(&self, id: Id) -> Option<Label> {
+        self.store.borrow().labels.get(&id).cloned()
+    }
+
+    /// A constant as an expression.
+    pub fn constant(&self, value: f64) -> Expr<'_> {
+        // One zero: over the reals there is no other.
+        let value = if value == 0.0 { 0.0 } else { value };
+        Expr { graph: self, id: self.raw(Node::Constant(value.to_bits())) }
+    }
+
+    /// An input as an expression.
+    pub fn input(&self, index: usize) -> Expr<'_> {
+        Expr { graph: self, id: self.raw(Node::Input(index as u32)) }
+    }
+
+    /// A node as an expression.
+    pub fn expr(&self, id: Id) -> Expr<'_> {
+        Expr { graph: self, id }
+    }
+
+    /// How often each node is read, by live nodes and by `outputs`.
+    pub fn uses(&self, outputs: &[Id]) -> Vec<u32> {
+        let nodes = &self.store.borrow().nodes;
+        let mut uses = vec![0; nodes.len()];
+        for output in outputs {
+            uses[output.index()] += 1;
+        }
+        for (index, node) in nodes.iter().enumerate().rev() {
+            if uses[index] > 0 {
+                node.operands().for_each(|operand| uses[operand.index()] += 1);
+            }
+        }
+        uses
+    }
+}

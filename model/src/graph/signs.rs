@@ -1,0 +1,212 @@
+//! Moves signs to where they cost nothing. Instead of a value, its negative may be computed: of a difference at no cost, of a
+//! product with a number, too; a sum of two values that are there negated is there negated. What remains are
+//! negations of outputs and of operands that functions read. They are made few by turning differences round, one after
+//! the other, as long as that helps.
+
+use super::{Binary, Graph, Id, Label, Node, Rewrites, Unary};
+use std::collections::HashSet;
+
+/// A node behind its negations, and whether it is negated.
+type Signed = (Id, bool);
+
+struct Signs<'a> {
+    graph: &'a Graph,
+    outputs: &'a [Id],
+    live: Vec<Id>,
+    /// By node: whether its negative is computed, where that is free to choose.
+    turned: Vec<bool>,
+}
+
+/// A graph whose outputs are the same and whose negations are few.
+pub(super) fn settle(graph: &Graph, outputs: &[Id], thorough: bool) -> (Graph, Vec<Id>) {
+    let uses = graph.uses(outputs);
+    let live: Vec<Id> =
+        (0..uses.len()).filter(|&index| uses[index] > 0).map(|index| Id(index as u32)).collect();
+    let mut signs = Signs { graph, outputs, live, turned: vec![false; uses.len()] };
+    signs.search(if thorough { 10_000_000 } else { 50_000 });
+    signs.rebuilt()
+}
+
+impl Signs<'_> {
+    /// Turns one difference, then two at a time, as long as that leaves fewer negations, and looks at `effort` nodes in all.
+    fn search(&mut self, effort: usize) {
+        let choices: Vec<usize> =
+            self.live.iter().rev().filter(|id| self.may_turn(**id)).map(|id| id.index()).collect();
+        let singles = choices.iter().map(|&one| (one, one));
+        let pairs = choices.iter().flat_map(|&one| choices.iter().map(move |&other| (one, other)));
+        let mut least = self.negations();
+        let mut steps = 0;
+        for (one, other) in singles.chain(pairs) {
+            steps += self.live.len();
+            if least == 0 || steps > effort {
+                return;
+            }
+            let turn = |turned: &mut Vec<bool>| {
+                turned[one] ^= true;
+                turned[other] ^= other != one;
+            };
+            turn(&mut self.turned);
+            let after = self.negations();
+            if after < least {
+                least = after;
+            } else {
+                turn(&mut self.turned);
+            }
+        }
+    }
+
+    fn base(&self, mut id: Id) -> Signed {
+        let mut negative = false;
+        while let Node::Unary(Unary::Neg, a) = self.graph.node(id) {
+            (id, negative) = (a, !negative);
+        }
+        (id, negative)
+    }
+
+    /// Whether it can be free to choose which sign is computed.
+    fn may_turn(&self, id: Id) -> bool {
+        matches!(self.graph.node(id), Node::Binary(Binary::Add | Binary::Sub | Binary::Mul, ..))
+    }
+
+    /// Whether each node's negative is computed.
+    fn computed(&self) -> Vec<bool> {
+        let mut negative = vec![false; self.turned.len()];
+        for &id in &self.live {
+            let sign = |operand: Id, negative: &[bool]| {
+                let (base, flip) = self.base(operand);
+                negative[base.index()] ^ flip
+            };
+            let number = |operand: Id| self.graph.value(operand).is_some();
+            negative[id.index()] = match self.graph.node(id) {
+                Node::Binary(op @ (Binary::Add | Binary::Sub), a, b) => {
+                    let (a_sign, b_sign) = (sign(a, &negative), sign(b, &negative) ^ (op == Binary::Sub));
+                    if number(a) || number(b) || a_sign != b_sign { self.turned[id.index()] } else { a_sign }
+                }
+                Node::Binary(Binary::Mul, a, b) if number(a) || number(b) => self.turned[id.index()],
+                Node::Binary(Binary::Mul | Binary::Div, a, b) => sign(a, &negative) ^ sign(b, &negative),
+                Node::Unary(Unary::Sin | Unary::Tan | Unary::Asin | Unary::Sign, a) => sign(a, &negative),
+                _ => false,
+            };
+        }
+        negative
+    }
+
+    /// The operands whose sign must be right.
+    fn strict(&self, id: Id) -> Vec<Id> {
+        match self.graph.node(id) {
+            Node::Unary(Unary::Sqrt | Unary::Acos | Unary::Exp | Unary::Log, a) => vec![a],
+            Node::Binary(Binary::Add | Binary::Sub | Binary::Mul | Binary::Div, ..) => Vec::new(),
+            Node::Binary(_, a, b) => vec![a, b],
+            Node::Select(_, a, b) => vec![a, b],
+            _ => Vec::new(),
+        }
+    }
+
+    /// How many values must be negated.
+    fn negations(&self) -> usize {
+        let negative = self.computed();
+        let mut negated = HashSet::new();
+        let wanted = self.live.iter().flat_map(|id| self.strict(*id)).chain(self.outputs.iter().copied());
+        for id in wanted {
+            let (base, flip) = self.base(id);
+            if negative[base.index()] ^ flip && self.graph.value(base).is_none() {
+                negated.insert(base);
+            }
+        }
+        negated.len()
+    }
+
+    fn rebuilt(&self) -> (Graph, Vec<Id>) {
+        // The constructors would move the signs back.
+        let new = Graph::new(Rewrites { signs: false, ..self.graph.rewrites });
+        let negative = self.computed();
+        let mut map: Vec<Option<Id>> = vec![None; negative.len()];
+        // The node that holds an operand's value or its negative, and which.
+        let there = |operand: Id, map: &[Option<Id>]| -> Signed {
+            let (base, flip) = self.base(operand);
+            let made = map[base.index()].unwrap_or_else(|| new.constant(f64::NAN).id);
+            match new.value(made) {
+                Some(value) if flip => (new.constant(-value).id, false),
+                Some(_) => (made, false),
+                None => (made, negative[base.index()] ^ flip),
+            }
+        };
+        let right = |operand: Id, map: &[Option<Id>]| match there(operand, map) {
+            (made, true) => new.raw(Node::Unary(Unary::Neg, made)),
+            (made, false) => made,
+        };
+        for &id in &self.live {
+            let turned = negative[id.index()];
+            let made = match self.graph.node(id) {
+                // Stands for what it negates.
+                Node::Unary(Unary::Neg, _) => continue,
+                Node::Constant(bits) => new.constant(f64::from_bits(bits)).id,
+                Node::Input(index) => new.input(index as usize).id,
+                Node::Unary(Unary::Sqrt | Unary::Acos | Unary::Exp | Unary::Log, _) | Node::Select(..) => {
+                    let node = match self.graph.node(id) {
+                        Node::Unary(op, a) => Node::Unary(op, right(a, &map)),
+                        Node::Select(c, a, b) => {
+                            Node::Select(there(c, &map).0, right(a, &map), right(b, &map))
+                        }
+                        other => other,
+                    };
+                    new.raw(node)
+                }
+                Node::Unary(op, a) => new.raw(Node::Unary(op, there(a, &map).0)),
+                Node::Binary(op @ (Binary::Add | Binary::Sub), a, b) => {
+                    let ((a, a_sign), (b, b_sign)) = (there(a, &map), there(b, &map));
+                    // The terms of what is computed.
+                    let mut terms = [(a, a_sign ^ turned), (b, b_sign ^ turned ^ (op == Binary::Sub))];
+                    for term in &mut terms {
+                        if let Some(value) = new.value(term.0).filter(|value| *value < 0.0) {
+                            *term = (new.constant(-value).id, !term.1);
+                        }
+                    }
+                    // A number takes whatever sign the other term leaves it.
+                    let node = match terms {
+                        [(a, false), (b, false)] => Node::Binary(Binary::Add, a, b),
+                        [(a, false), (b, true)] => Node::Binary(Binary::Sub, a, b),
+                        [(a, true), (b, false)] => Node::Binary(Binary::Sub, b, a),
+                        [(a, true), (b, true)] => match (new.value(a), new.value(b)) {
+                            (Some(value), _) => Node::Binary(Binary::Sub, new.constant(-value).id, b),
+                            (_, Some(value)) => Node::Binary(Binary::Sub, new.constant(-value).id, a),
+                            // Its sign is not free: it is `turned`, and then both are positive.
+                            _ => Node::Binary(Binary::Add, a, b),
+                        },
+                    };
+                    new.raw(node)
+                }
+                Node::Binary(Binary::Mul, a, b) => {
+                    let ((mut a, a_sign), (mut b, b_sign)) = (there(a, &map), there(b, &map));
+                    if a_sign ^ b_sign != turned {
+                        if let Some(value) = new.value(a) {
+                            a = new.constant(-value).id;
+                        } else if let Some(value) = new.value(b) {
+                            b = new.constant(-value).id;
+                        }
+                    }
+                    new.raw(Node::Binary(Binary::Mul, a, b))
+                }
+                Node::Binary(Binary::Div, a, b) => {
+                    new.raw(Node::Binary(Binary::Div, there(a, &map).0, there(b, &map).0))
+                }
+                Node::Binary(op, a, b) => new.raw(Node::Binary(op, right(a, &map), right(b, &map))),
+            };
+            map[id.index()] = Some(made);
+            if let Some(label) = self.graph.label_of(id) {
+                new.label(made, if turned { negated(label) } else { label });
+            }
+        }
+        let outputs = self.outputs.iter().map(|id| right(*id, &map)).collect();
+        (new, outputs)
+    }
+}
+
+/// What the negative is called.
+pub(super) fn negated(label: Label) -> Label {
+    let name = match label.name.strip_suffix("_neg") {
+        Some(name) => name.to_owned(),
+        None => label.name + "_neg",
+    };
+    Label { name, text: label.text }
+}

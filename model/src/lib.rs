@@ -1,0 +1,10 @@
+//! From a robot's description, or another tool's expressions, to equations that the assembler reads.
+
+mod error;
+pub mod functions;
+pub mod graph;
+pub mod instructions;
+pub mod robot;
+pub mod write;
+
+pub use error::Error;

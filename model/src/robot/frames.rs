@@ -1,0 +1,306 @@
+//! Where each link's frame lies, so that the equations are short: every joint turns about its frame's z, and origins and x
+//! axes lie where the transform from link to link has zeros (modified Denavit-Hartenberg frames). And what each
+//! link weighs in them: moments that have the same effect in the link that carries it are moved there as numbers, so
+//! that of the ten parameters of a link that turns at most seven remain.
+
+use super::space::{self, IDENTITY, Inertia, M3, Pose, V3};
+use super::{Kind, Robot};
+
+/// A joint with its frame.
+#[derive(Clone, Debug)]
+pub struct Link {
+    /// The joint's name.
+    pub name: String,
+    /// How it moves.
+    pub kind: Kind,
+    /// The link that carries it.
+    pub parent: Option<usize>,
+    /// It turns about the same direction as its parent does: [`Link::rest`] is the identity.
+    pub parallel: bool,
+    /// 1, or -1 where its z points against the joint's axis: it turns by `sign q + offset`.
+    pub sign: f64,
+    /// What it is turned by at position 0, rad.
+    pub offset: f64,
+    /// Its rotation in its parent's frame before it is turned by the joint.
+    pub rest: M3,
+    /// Its origin in its parent's frame (of a joint that slides, at position 0), m.
+    pub origin: V3,
+    /// The direction of its axis in its parent's frame.
+    pub axis: V3,
+    /// What it weighs, what has the same effect elsewhere moved there.
+    pub body: Inertia,
+    /// The frame that the description gives it.
+    pub own: Pose,
+}
+
+/// A choice among frames that are all right: [`place`] takes any, the shortest equations come by trying.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Layout {
+    /// Whether a joint's origin is where the normal from the joint before it ends, not where the one to the next begins.
+    pub incoming: Vec<bool>,
+    /// Whether the x axis of a link that carries no other goes through its centre of mass.
+    pub balanced: Vec<bool>,
+    /// By how many quarter turns more each x axis is turned: it costs nothing, and decides which signs are needed.
+    pub quarters: Vec<u8>,
+    /// Whether a z axis points against the joint's: this, too, decides which signs are needed.
+    pub flipped: Vec<bool>,
+}
+
+impl Layout {
+    /// Origins towards the next joint, axes that need no offset.
+    pub fn new(robot: &Robot) -> Layout {
+        let count = robot.joints.len();
+        let no = vec![false; count];
+        Layout { incoming: no.clone(), balanced: no.clone(), quarters: vec![0; count], flipped: no }
+    }
+}
+
+/// The sine of an angle between axes below which they are parallel.
+const PARALLEL: f64 = 1e-9;
+/// And above which their common normal is well determined.
+const SKEW: f64 = 0.02;
+
+/// An axis in space: a point and a direction.
+#[derive(Clone, Copy)]
+struct Line {
+    point: V3,
+    direction: V3,
+}
+
+/// How far along `line` its common normal with `other` begins; `None` if they are parallel or nearly so.
+fn foot(line: Line, other: Line) -> Option<f64> {
+    let normal = space::cross(line.direction, other.direction);
+    let square = space::dot(normal, normal);
+    let between = space::sub(other.point, line.point);
+    (square > SKEW * SKEW).then(|| space::dot(space::cross(between, other.direction), normal) / square)
+}
+
+fn parallel(a: V3, b: V3) -> bool {
+    space::norm(space::cross(a, b)) < PARALLEL
+}
+
+fn normalised(a: V3) -> V3 {
+    space::scale(1.0 / space::norm(a), a)
+}
+
+/// What the frames are placed by.
+struct Geometry<'a> {
+    robot: &'a Robot,
+    /// The bodies' frames at position 0, in the base's.
+    world: Vec<Pose>,
+    lines: Vec<Line>,
+    /// Of the joints that a joint carries, the one that carries most.
+    next: Vec<Option<usize>>,
+    /// The canonical frames at position 0, in the base's, as far as they are known.
+    frames: Vec<Pose>,
+}
+
+impl<'a> Geometry<'a> {
+    fn new(robot: &'a Robot, layout: &Layout) -> Geometry<'a> {
+        let count = robot.joints.len();
+        let mut world: Vec<Pose> = Vec::with_capacity(count);
+        for joint in &robot.joints {
+            world.push(joint.parent.map_or(joint.place, |parent| world[parent].then(&joint.place)));
+        }
+        let mut lines: Vec<Line> = Vec::with_capacity(count);
+        for (index, (joint, pose)) in robot.joints.iter().zip(&world).enumerate() {
+            let mut direction = space::turn(&pose.rotation, joint.axis);
+            if layout.flipped[index] {
+                direction = space::scale(-1.0, direction);
+            }
+            // Axes that are parallel point the same way: then their angles add up.
+            let mut carrier = robot.joints[index].parent;
+            while let Some(before) = carrier.filter(|before| robot.joints[*before].kind == Kind::Prismatic) {
+                carrier = robot.joints[before].parent;
+            }
+            if let Some(before) = carrier.filter(|before| parallel(direction, lines[*before].direction))
+                && joint.kind == Kind::Revolute
+            {
+                direction = lines[before].direction;
+            }
+            lines.push(Line { point: pose.origin, direction });
+        }
+        let mut size = vec![1; count];
+        for index in (0..count).rev() {
+            if let Some(parent) = robot.joints[index].parent {
+                size[parent] += size[index];
+            }
+        }
+        let mut next: Vec<Option<usize>> = vec![None; count];
+        for (index, joint) in robot.joints.iter().enumerate() {
+            if let Some(parent) = joint.parent
+                && next[parent].is_none_or(|other| size[index] > size[other])
+            {
+                next[parent] = Some(index);
+            }
+        }
+        Geometry { robot, world, lines, next, frames: Vec::with_capacity(count) }
+    }
+
+    fn revolute(&self, joint: Option<usize>) -> Option<usize> {
+        joint.filter(|&joint| self.robot.joints[joint].kind == Kind::Revolute)
+    }
+
+    /// Whether two joints turn about parallel axes.
+    fn together(&self, a: usize, b: usize) -> bool {
+        parallel(self.lines[a].direction, self.lines[b].direction)
+    }
+
+    /// The origin of a joint's frame, on its axis. Joints on parallel axes have theirs at one height.
+    fn origin(&self, joint: usize, layout: &Layout) -> V3 {
+        let line = self.lines[joint];
+        let carrier = |joint: usize| self.revolute(self.robot.joints[joint].parent);
+        let mut first = joint;
+        while let Some(before) =
+            carrier(first).filter(|before| self.together(*before, first) && self.next[*before] == Some(first))
+        {
+            first = before;
+        }
+        let mut last = joint;
+        while let Some(after) = self.revolute(self.next[last]).filter(|after| self.together(*after, last)) {
+            last = after;
+        }
+        let along = |from: usize, distance: f64| {
+            let start = self.lines[from];
+            space::dot(space::sub(start.point, line.point), line.direction) + distance
+        };
+        let outgoing = self
+            .revolute(self.next[last])
+            .and_then(|next| foot(self.lines[last], self.lines[next]).map(|distance| along(last, distance)));
+        let incoming = carrier(first).and_then(|before| {
+            foot(self.lines[first], self.lines[before]).map(|distance| along(first, distance))
+        });
+        let (one, other) = if layout.incoming[first] { (incoming, outgoing) } else { (outgoing, incoming) };
+        let distance = one.or(other).unwrap_or_else(|| along(first, 0.0));
+        space::add(line.point, space::scale(distance, line.direction))
+    }
+
+    /// The direction of a joint's x axis, if something makes one better than another.
+    fn x_axis(&self, joint: usize, layout: &Layout) -> Option<V3> {
+        let line = self.lines[joint];
+        let Some(next) = self.next[joint] else {
+            let body = self.robot.joints[joint].body.outside(&self.world[joint]);
+            // Moments about a point of the axis.
+            let first = space::sub(body.first, space::scale(body.mass, line.point));
+            let height = space::dot(first, line.direction);
+            let across = space::sub(first, space::scale(height, line.direction));
+            let worth = layout.balanced[joint] && space::norm(across) > 1e-9 * space::norm(first);
+            return worth.then(|| normalised(across));
+        };
+        let direction = self.lines[next].direction;
+        if !parallel(line.direction, direction) {
+            return Some(normalised(space::cross(line.direction, direction)));
+        }
+        let between = space::sub(self.lines[next].point, line.point);
+        let height = space::dot(between, line.direction);
+        let across = space::sub(between, space::scale(height, line.direction));
+        (space::norm(across) > 1e-9).then(|| normalised(across))
+    }
+}
+
+/// The rotation that a joint about `axis` starts from: `axis` is its z, and it has as many zeros as there can be.
+fn rest(axis: V3) -> M3 {
+    for i in 0..3 {
+        if axis[i].abs() == 1.0 {
+            let x: V3 = std::array::from_fn(|j| f64::from(j == (i + 1) % 3));
+            return space::columns(x, space::cross(axis, x), axis);
+        }
+    }
+    match axis {
+        [0.0, y, z] => space::about(0, (-y).atan2(z)),
+        [x, 0.0, z] => space::about(1, x.atan2(z)),
+        [x, y, z] => space::product(&space::about(2, x.atan2(-y)), &space::about(0, z.acos())),
+    }
+}
+
+/// The links of a robot in canonical frames, and what they weigh.
+pub fn place(robot: &Robot, layout: &Layout) -> Vec<Link> {
+    let mut geometry = Geometry::new(robot, layout);
+    let mut links: Vec<Link> = Vec::with_capacity(robot.joints.len());
+    for (index, joint) in robot.joints.iter().enumerate() {
+        let carrier = joint.parent.map_or(Pose::IDENTITY, |parent| geometry.frames[parent]);
+        let line = geometry.lines[index];
+        let back = space::transpose(&carrier.rotation);
+        let axis = space::turn(&space::cleaned(&back), line.direction);
+        let axis = if joint.kind == Kind::Prismatic && layout.flipped[index] {
+            space::scale(-1.0, axis)
+        } else {
+            axis
+        };
+        let axis = normalised(axis.map(|x| if (x - x.round()).abs() < 1e-9 { x.round() } else { x }));
+        let beside = geometry.revolute(joint.parent).is_some_and(|parent| geometry.together(parent, index));
+        let mut link = Link {
+            name: joint.name.clone(),
+            kind: joint.kind,
+            parent: joint.parent,
+            parallel: beside && joint.kind == Kind::Revolute,
+            sign: 1.0,
+            offset: 0.0,
+            rest: IDENTITY,
+            origin: [0.0; 3],
+            axis,
+            body: Inertia::default(),
+            own: Pose::IDENTITY,
+        };
+        let frame = match joint.kind {
+            Kind::Prismatic => carrier,
+            Kind::Revolute => {
+                link.rest = if link.parallel { IDENTITY } else { rest(axis) };
+                link.axis = space::column(&link.rest, 2);
+                let mut frame = Pose {
+                    rotation: space::product(&carrier.rotation, &link.rest),
+                    origin: geometry.origin(index, layout),
+                };
+                if let Some(x) = geometry.x_axis(index, layout) {
+                    let [x, y, _] = space::turn(&space::transpose(&frame.rotation), x);
+                    let angle = y.atan2(x);
+                    let turns = (angle / std::f64::consts::FRAC_PI_2).round() * std::f64::consts::FRAC_PI_2;
+                    link.offset = if (angle - turns).abs() < 1e-9 { turns } else { angle };
+                }
+                link.offset += f64::from(layout.quarters[index]) * std::f64::consts::FRAC_PI_2;
+                frame.rotation = space::product(&frame.rotation, &space::about(2, link.offset));
+                link.origin = carrier.inverse().point(frame.origin);
+                let own = space::turn(&geometry.world[index].rotation, joint.axis);
+                link.sign = if space::dot(own, line.direction) < 0.0 { -1.0 } else { 1.0 };
+                frame
+            }
+        };
+        link.origin = space::cleaned_vector(link.origin, 1.0);
+        link.own = frame.inverse().then(&geometry.world[index]);
+        link.body = joint.body.outside(&link.own);
+        geometry.frames.push(frame);
+        links.push(link);
+    }
+    regroup(&mut links);
+    links
+}
+
+/// Moves to the link before it what has the same effect there. What a joint turns about its axis does not see: mass on the
+/// axis, however it is distributed. What slides keeps its orientation: all second moments.
+fn regroup(links: &mut [Link]) {
+    for index in (0..links.len()).rev() {
+        let link = &mut links[index];
+        let mut moved = Inertia::default();
+        match link.kind {
+            Kind::Revolute => {
+                let body = &mut link.body;
+                moved.mass = std::mem::take(&mut body.mass);
+                moved.first[2] = std::mem::take(&mut body.first[2]);
+                moved.second[2][2] = std::mem::take(&mut body.second[2][2]);
+            }
+            Kind::Prismatic => moved.second = std::mem::take(&mut link.body.second),
+        }
+        let pose = Pose { rotation: link.rest, origin: link.origin };
+        if let Some(parent) = link.parent {
+            links[parent].body = links[parent].body.plus(&moved.outside(&pose));
+        }
+    }
+    // What cancelled but for its last digits is nothing.
+    let size = |entries: &[f64]| entries.iter().fold(0.0, |size: f64, entry| size.max(entry.abs()));
+    let first = links.iter().map(|link| size(&link.body.first)).fold(0.0, f64::max);
+    let second = links.iter().map(|link| size(link.body.second.as_flattened())).fold(0.0, f64::max);
+    for link in links {
+        link.body.first = space::cleaned_vector(link.body.first, first);
+        link.body.second = link.body.second.map(|row| space::cleaned_vector(row, second));
+    }
+}

@@ -1,0 +1,103 @@
+//! A robot: a tree of joints that move, each with the body behind it. Fixed joints are merged away.
+
+pub mod dh;
+pub mod frames;
+pub mod space;
+mod tree;
+pub mod urdf;
+
+pub(crate) use tree::list;
+pub use tree::{Element, ElementKind, Tree};
+
+use space::{Inertia, Pose, V3};
+
+/// How a joint moves.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Kind {
+    /// It turns: revolute and continuous joints.
+    Revolute,
+    /// It slides.
+    Prismatic,
+}
+
+impl Kind {
+    /// The unit of its position.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Kind::Revolute => "rad",
+            Kind::Prismatic => "m",
+        }
+    }
+
+    /// The unit of its force.
+    pub fn force(self) -> &'static str {
+        match self {
+            Kind::Revolute => "N m",
+            Kind::Prismatic => "N",
+        }
+    }
+}
+
+/// A joint that moves, and the body that it carries.
+#[derive(Clone, Debug)]
+pub struct Joint {
+    /// Its name.
+    pub name: String,
+    /// How it moves.
+    pub kind: Kind,
+    /// The joint that carries it, which comes before it; none for one on the base.
+    pub parent: Option<usize>,
+    /// The body's frame at position 0, in that of the joint that carries it.
+    pub place: Pose,
+    /// The direction of its axis in its body's frame, of length 1.
+    pub axis: V3,
+    /// What its body weighs, all that is fixed to it included, in its frame.
+    pub body: Inertia,
+}
+
+/// A named frame: a link of the description.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// The link's name.
+    pub name: String,
+    /// The joint that carries it; none for one that is fixed to the base.
+    pub joint: Option<usize>,
+    /// Its place in that joint's body.
+    pub pose: Pose,
+}
+
+/// A robot on a fixed base.
+#[derive(Clone, Debug)]
+pub struct Robot {
+    /// Its name.
+    pub name: String,
+    /// The link that does not move.
+    pub base: String,
+    /// The joints, those that carry others first.
+    pub joints: Vec<Joint>,
+    /// The links.
+    pub frames: Vec<Frame>,
+    /// Acceleration of free fall in the base's frame, m/s².
+    pub gravity: V3,
+    /// What was decided on the way, to be told.
+    pub notes: Vec<String>,
+}
+
+/// Standard gravity as robot models have it, m/s².
+pub const GRAVITY: f64 = 9.81;
+/// Joints that a robot may have.
+pub const MAX_JOINTS: usize = 128;
+
+impl Robot {
+    /// The link of a name.
+    pub fn frame(&self, name: &str) -> Option<&Frame> {
+        self.frames.iter().find(|frame| frame.name == name)
+    }
+
+    /// Joints that carry no other.
+    pub fn leaves(&self) -> Vec<usize> {
+        (0..self.joints.len())
+            .filter(|&joint| !self.joints.iter().any(|other| other.parent == Some(joint)))
+            .collect()
+    }
+}

@@ -1,0 +1,125 @@
+//! Robots from URDF.
+
+use super::Kind;
+use super::space::{self, Inertia, Pose};
+use super::tree::{Element, ElementKind, Tree, rotation};
+use crate::Error;
+
+/// The largest description that is read, bytes.
+pub const MAX_BYTES: usize = 64 << 20;
+/// How far an angle may be from a multiple of a quarter turn to be taken for it, rad: descriptions write π/2 with 6 to 16 digits.
+pub const SNAP: f64 = 1e-6;
+
+/// A robot's description in URDF. Angles within `snap` of a multiple of π/2 are taken for it.
+///
+/// # Errors
+/// If it is not URDF, or has what the equations cannot express, with the line of the joint or link.
+pub fn read(source: &str, snap: f64) -> Result<Tree, Error> {
+    if source.len() > MAX_BYTES {
+        return Err(Error::plain(format!("the file is longer than {} MiB", MAX_BYTES >> 20)));
+    }
+    // This parser says where it is that a text is no XML.
+    let document = roxmltree::Document::parse(source).map_err(|error| {
+        let text = format!("this is no XML: {error}");
+        match error {
+            // It gives these the first line.
+            roxmltree::Error::UnclosedRootNode | roxmltree::Error::NoRootNode => Error::plain(text),
+            error => Error::on(error.pos().row as usize, text),
+        }
+    })?;
+    if document.root_element().tag_name().name() != "robot" {
+        let name = document.root_element().tag_name().name();
+        return Err(Error::plain(format!("this is no URDF: its element is `{name}`, not `robot`")));
+    }
+    let robot = urdf_rs::read_from_string(source).map_err(|error| not_urdf(source, &error.to_string()))?;
+    convert(&robot, snap).map_err(|error| error.located(source))
+}
+
+/// The parser's message, with the line of the value that it quotes.
+fn not_urdf(source: &str, message: &str) -> Error {
+    let text = message.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or("it cannot be read");
+    let text = format!("this is no URDF: {}", text.strip_prefix("custom: ").unwrap_or(text));
+    let quoted = message.rsplit_once('[').and_then(|(_, rest)| rest.split_once(']')).map(|(value, _)| value);
+    let at = quoted.and_then(|value| source.find(&format!("\"{value}\"")));
+    match at {
+        Some(at) => Error::on(1 + source[..at].matches('\n').count(), text),
+        None => Error::plain(text),
+    }
+}
+
+fn convert(robot: &urdf_rs::Robot, snap: f64) -> Result<Tree, Error> {
+    let mut snapped = 0;
+    let mut pose = |name: &str, origin: &urdf_rs::Pose| {
+        if !origin.xyz.iter().chain(origin.rpy.iter()).all(|x| x.is_finite()) {
+            return Err(Error::at(name, "its origin is not finite"));
+        }
+        let (rotation, count) = rotation(*origin.rpy, snap);
+        snapped += count;
+        Ok(Pose { rotation, origin: *origin.xyz })
+    };
+    if robot.links.is_empty() {
+        return Err(Error::plain("the robot has no link"));
+    }
+    let mut links: Vec<(String, Inertia)> = Vec::new();
+    let mut names = std::collections::HashSet::new();
+    for link in &robot.links {
+        if !names.insert(&link.name) {
+            return Err(Error::at(&link.name, "two links have this name"));
+        }
+        let mass = link.inertial.mass.value;
+        if !(mass.is_finite() && mass >= 0.0) {
+            return Err(Error::at(
+                &link.name,
+                format!("its mass is {mass}; a mass is finite and not negative"),
+            ));
+        }
+        let i = &link.inertial.inertia;
+        let tensor = [[i.ixx, i.ixy, i.ixz], [i.ixy, i.iyy, i.iyz], [i.ixz, i.iyz, i.izz]];
+        if !tensor.iter().flatten().all(|x| x.is_finite()) {
+            return Err(Error::at(&link.name, "its inertia is not finite"));
+        }
+        let frame = pose(&link.name, &link.inertial.origin)?;
+        links.push((link.name.clone(), Inertia::new(mass, [0.0; 3], &tensor).outside(&frame)));
+    }
+    let mut joints: Vec<Element> = Vec::new();
+    let mut notes = Vec::new();
+    let mut names = std::collections::HashSet::new();
+    for joint in &robot.joints {
+        use urdf_rs::JointType;
+        let name = &joint.name;
+        if !names.insert(name) {
+            return Err(Error::at(name, "two joints have this name"));
+        }
+        let kind = match joint.joint_type {
+            JointType::Revolute | JointType::Continuous => ElementKind::Moves(Kind::Revolute),
+            JointType::Prismatic => ElementKind::Moves(Kind::Prismatic),
+            JointType::Fixed => ElementKind::Fixed,
+            JointType::Floating | JointType::Planar | JointType::Spherical => {
+                let kind = format!("{:?}", joint.joint_type).to_lowercase();
+                let text = format!(
+                    "a {kind} joint: only revolute, continuous, prismatic and fixed ones are known; \
+                     take the part of the robot behind it with --base {}",
+                    joint.child.link
+                );
+                return Err(Error::at(name, text));
+            }
+        };
+        if let Some(mimic) = &joint.mimic {
+            notes.push(format!("`{name}` mimics `{}`: it is a joint of its own here", mimic.joint));
+        }
+        let Pose { rotation, origin } = pose(name, &joint.origin)?;
+        joints.push(Element {
+            name: name.clone(),
+            kind,
+            parent: joint.parent.link.clone(),
+            child: joint.child.link.clone(),
+            origin,
+            rotation: space::cleaned(&rotation),
+            axis: *joint.axis.xyz,
+        });
+    }
+    if snapped > 0 {
+        notes.push(format!("{snapped} angles within {snap} rad of a quarter turn were taken for it"));
+    }
+    Ok(Tree { name: robot.name.clone(), links, joints, notes })
+}
