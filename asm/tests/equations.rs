@@ -561,3 +561,53 @@ fn arrays_are_used_as_a_whole() {
     assert_eq!(warnings(" a = x\n"), ["register `t` is never used"]);
     assert_eq!(warnings(" t[1] = x\n a = x\n"), ["register `t` is written and never read"]);
 }
+
+/// A macro may write its result from several slots, and an argument may be computed for it.
+#[test]
+fn macros_are_functions() {
+    let text = ".schedule on\n.input x, y\n.output a\n\
+        .macro poly d, u, k\n d = u*u\n d = d + k\n fabs d, d\n.endm\n.macro twice d, u\n fadd d, u, u\n.endm\n\
+        .once\n wait p\n.period\np: a = poly(x - y, -2*4) + twice(poly(twice(y), x))*0.5\n wait p\n";
+    for machine in MACHINES {
+        let program = match assemble(text, machine) {
+            Ok(assembled) => assembled.program,
+            Err(report) => panic!("{}", report.render(false)),
+        };
+        let mut emulator = Emulator::new(&program).expect("it fits");
+        set(&mut emulator, &program, "x", 5.0f32.to_bits());
+        set(&mut emulator, &program, "y", 1.5f32.to_bits());
+        emulator.run_period(&[]).expect("it runs");
+        let a = emulator.register(program.outputs[0].register);
+        assert_eq!(a.map(f32::from_bits), Some(4.25 + 14.0), "{}", machine.name);
+    }
+}
+
+/// A register that has its place is written by the slot whose bank it lies in, where several have the unit.
+#[test]
+fn placed_registers_are_written_by_their_slot() {
+    for machine in MACHINES {
+        for (index, slot) in machine.slots.iter().enumerate() {
+            let hosts = |op: Op| {
+                let of = |slot: &takt_isa::Slot| {
+                    slot.units.iter().any(|unit| unit.functions.contains(&op.row().function))
+                };
+                machine.slots.iter().filter(|slot| of(slot)).count() > 1 && of(&machine.slots[index])
+            };
+            let some = takt_isa::ROWS.iter().find(|row| {
+                hosts(row.op)
+                    && row
+                        .forms
+                        .iter()
+                        .any(|form| form.contains("a, b") || form.contains("a + b") || form.contains("a & b"))
+            });
+            let Some(row) = some else { continue };
+            let text = format!(
+                ".schedule on\n.input a:bits, b:bits\n.output y:bits\n.reg t:bits @ {}7\n.once\n wait p\n.period\np: t = {}\n y = t\n wait p\n",
+                slot.bank.name, row.forms[0]
+            );
+            if let Err(report) = assemble(&text, machine) {
+                panic!("{} on {}: {}", row.mnemonic, machine.name, report.render(false));
+            }
+        }
+    }
+}

@@ -12,7 +12,7 @@ use std::sync::OnceLock;
 use takt_asm::{MemoryLoader, Options, Schedule};
 use takt_cosim::{Lockstep, LockstepError, Simulation, random};
 use takt_isa::timing::Cause;
-use takt_isa::{Bank, Function, Instruction, MACHINES, Machine, Program, ROWS, Slot, T1, T3};
+use takt_isa::{Bank, Function, Instruction, MACHINES, Machine, Program, ROWS, Slot, SlotIndex, T1, T3};
 
 /// `TAKT_PROGRAMS` random programs, 200 unless stated, from seed 0 on.
 #[test]
@@ -192,10 +192,10 @@ fn scheduled(machine: &'static Machine, mut simulation: Simulation, seeds: Range
 }
 
 /// How many operations of a function a slot of some programs has.
-fn operations(programs: &[Program], function: Function, slot: u8) -> usize {
+fn operations(programs: &[Program], function: Function, slot: SlotIndex) -> usize {
     let words = |program: &Program| {
         let slots = program.machine.slots.len();
-        program.code.iter().skip(usize::from(slot)).step_by(slots).copied().collect::<Vec<u64>>()
+        program.code.iter().skip(slot.index()).step_by(slots).copied().collect::<Vec<u64>>()
     };
     let decoded = programs.iter().flat_map(words).filter_map(|word| Instruction::decode(word).ok());
     decoded.filter(|instruction| instruction.op.row().function == function).count()

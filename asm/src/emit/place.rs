@@ -297,7 +297,10 @@ fn report(
         let names: Vec<&str> = rest
             .iter()
             .filter(|entry| same(entry))
-            .map(|entry| ir.registers[entry.0].name.as_str())
+            .map(|entry| match ir.registers[entry.0].name.as_str() {
+                "" => "a part of an equation",
+                name => name,
+            })
             .collect();
         let bank = slot.map_or(&machine.inputs, |slot| &machine.slot(slot).bank);
         let window = Window::of(bank, kind, machine.outputs_per_bank);

@@ -145,7 +145,7 @@ impl Expander<'_> {
                     _ => None,
                 };
                 let dest = target.unwrap_or_else(|| {
-                    let register = self.register(node.span);
+                    let register = self.result(&text, node.span);
                     results.insert(first + index, register);
                     Operand { kind: self.unnamed(register), span: node.span }
                 });
@@ -249,6 +249,14 @@ impl Expander<'_> {
     fn register(&mut self, span: Span) -> RegisterId {
         let registers = &mut self.context.declared.registers;
         registers.push(VirtualRegister::unnamed(span));
+        RegisterId::new(registers.len() - 1)
+    }
+
+    /// A register for what a macro gives. It has a name: operations of several slots may write it.
+    fn result(&mut self, of: &str, span: Span) -> RegisterId {
+        let registers = &mut self.context.declared.registers;
+        let name = format!("{of}.value{}", registers.len());
+        registers.push(VirtualRegister { name, ty: Type::F, ..VirtualRegister::unnamed(span) });
         RegisterId::new(registers.len() - 1)
     }
 

@@ -220,7 +220,10 @@ impl Resolver<'_> {
                         || operation.reads().contains(&value)
                 };
                 if !behind.iter().flat_map(|bundle| &bundle.operations).any(touches) {
-                    self.ir.bundles[bundle].operations[0].dest = Some(*target);
+                    // A register that has its place leaves fewer slots to choose from.
+                    let slots = self.writing(self.ir.bundles[bundle].operations[0].slots, Some(*target));
+                    let operation = &mut self.ir.bundles[bundle].operations[0];
+                    (operation.dest, operation.slots, operation.slot) = (Some(*target), slots, slots.first());
                     line.computed.remove(place);
                     self.written(*target, kind);
                     let register = &self.context.declared.registers[target.index()];

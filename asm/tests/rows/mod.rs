@@ -7,8 +7,10 @@ use takt_isa::{Bank, Machine, Slot, T3, Unit};
 
 const MUL: &[Unit] = &[MULTIPLY, DIVROOT, SINE, ARCTANGENT, ARCCOSINE];
 
-/// The slots of each row: names and units.
-const ROWS: &[(&str, &[(&str, &[Unit])])] = &[
+/// The slots of a row: names and units.
+type Slots = [(&'static str, &'static [Unit])];
+
+const ROWS: &[(&str, &Slots)] = &[
     ("second_adder", &[("mul", MUL), ("add", &[ADD, CONVERT]), ("aux", &[ALU, ADD, MEMORY, SEQUENCER])]),
     (
         "second_multiplier",
@@ -40,7 +42,7 @@ const ROWS: &[(&str, &[(&str, &[Unit])])] = &[
 ];
 
 /// A row with t3's registers, divided among its slots.
-fn row(name: &'static str, slots: &[(&'static str, &'static [Unit])]) -> Machine {
+fn row(name: &'static str, slots: &Slots) -> Machine {
     let depth = T3.inputs.base / slots.len() as u16;
     let banks = ["m", "a", "x", "y", "w"];
     let slot = |(number, (name, units)): (u16, &(&'static str, &'static [Unit]))| Slot {
