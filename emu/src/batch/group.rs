@@ -43,6 +43,7 @@ pub(crate) struct Group {
     written: Vec<RegisterSet>,
     published: Vec<RegisterSet>,
     /// Emulators without a lane.
+    #[allow(clippy::vec_box, reason = "they come from lanes, and go to lanes again, in their boxes")]
     spare: Vec<Box<Emulator>>,
     report: Option<PeriodReport>,
     nan_writes: Vec<Vec<PortWrite>>,
