@@ -43,8 +43,7 @@ pub(crate) struct Group {
     written: Vec<RegisterSet>,
     published: Vec<RegisterSet>,
     /// Emulators without a lane.
-    // Boxed: an emulator is large, and a lane that leaves takes one as it is.
-    #[allow(clippy::vec_box)]
+    #[allow(clippy::vec_box, reason = "they come from lanes, and go to lanes again, in their boxes")]
     spare: Vec<Box<Emulator>>,
     report: Option<PeriodReport>,
     nan_writes: Vec<Vec<PortWrite>>,
