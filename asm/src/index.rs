@@ -5,7 +5,7 @@
 //! expanded, as the body of a macro that nothing uses, is not resolved, and is not in it.
 
 use crate::context::{Binding, Context, ScopeKind};
-use crate::ir::{Ir, RegisterKind};
+use crate::ir::{Ir, RegisterId, RegisterKind};
 use crate::report::source::Span;
 use crate::syntax::ast::{Directive, DirectiveKind};
 use crate::syntax::expr::Value;
@@ -230,9 +230,10 @@ impl Builder<'_> {
 
     fn registers(&mut self, ir: &Ir) -> Vec<Option<u32>> {
         let mut numbers = Vec::with_capacity(ir.registers.len());
-        for register in &ir.registers {
+        for (index, register) in ir.registers.iter().enumerate() {
             let kind = match register.kind {
                 _ if register.name.is_empty() => None,
+                _ if self.context.declared.results.contains(&RegisterId::new(index)) => None,
                 RegisterKind::Plain => Some(SymbolKind::Register),
                 RegisterKind::State => Some(SymbolKind::State),
                 RegisterKind::Input => Some(SymbolKind::Input),

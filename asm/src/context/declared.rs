@@ -64,6 +64,8 @@ pub(crate) struct Declared {
     pub(crate) by_address: HashMap<Register, RegisterId>,
     /// Outputs with a given number.
     pub(crate) numbered: BTreeMap<u16, RegisterId>,
+    /// Registers that no line declares: what macros give in equations.
+    pub(crate) results: HashSet<RegisterId>,
     /// Registers that are declared with a type, rather than as floats by default.
     pub(crate) typed: HashSet<RegisterId>,
     /// What the source says of the types of operands that the instruction leaves open.
@@ -98,6 +100,7 @@ impl Declared {
             registers: vec![zero],
             by_address: HashMap::from([(Register::ZERO, RegisterId::ZERO)]),
             numbered: BTreeMap::new(),
+            results: HashSet::new(),
             typed: HashSet::new(),
             given: GivenTypes::default(),
             arrays: Vec::new(),

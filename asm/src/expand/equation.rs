@@ -257,7 +257,9 @@ impl Expander<'_> {
         let registers = &mut self.context.declared.registers;
         let name = format!("{of}.value{}", registers.len());
         registers.push(VirtualRegister { name, ty: Type::F, ..VirtualRegister::unnamed(span) });
-        RegisterId::new(registers.len() - 1)
+        let id = RegisterId::new(registers.len() - 1);
+        self.context.declared.results.insert(id);
+        id
     }
 
     /// A name for such a register that no source can write, so that a macro's operand can be it.
