@@ -411,5 +411,5 @@ fn equations_and_arrays() {
     assert_eq!(value(&console, "P[1,2]"), 3.0);
     assert_eq!(value(&console, "P[2, 1]*2 + P[2,2]"), 10.0);
     let said = console.execute("info P[2,1]").unwrap();
-    assert!(said.contains(":8:17-24)"), "{said}");
+    assert!(said.contains(":8:19-26)"), "{said}");
 }

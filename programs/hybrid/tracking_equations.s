@@ -1,4 +1,4 @@
-; One period of the hybrid robot's tracking algorithm, (7)-(37) of the founding paper, in equations: the same bits in the same cycles as
+; One period of the hybrid robot's tracking algorithm, (7)-(37) of the founding paper, in equations: the same bits, and on t3 and t1 the same cycles, as
 ; tracking.s, which says where a formula differs from the printed one, and why. The mission flies tracking.s.
 
 .include "robot.s"
