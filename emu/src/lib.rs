@@ -4,6 +4,19 @@
 //! period with named inputs, read any state, ask where the cycles went. To hear of every issue, writeback and tick, run it
 //! through [`Emulator::observed`]. Nothing here prints.
 //!
+//! ```
+//! # use takt_emu::{Emulator, Number};
+//! # fn run(program: &takt_isa::Program) -> Result<(), Box<dyn std::error::Error>> {
+//! let mut emulator = Emulator::new(program)?;
+//! for _ in 0..100 {
+//!     let report = emulator.run_period(&[("position", Number::Float(0.1))])?;
+//!     println!("{} cycles, force {:?}", report.cycles, emulator.output("force")?);
+//! }
+//! println!("{:?}", emulator.statistics());
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! There are two ways of execution and they agree in everything that can be seen. The *stepper* (`cycle`) goes cycle by
 //! cycle by the rules of [`takt_isa::timing`], which `docs/timing.md` says in prose. *Blocks* (`block`, `fast`) rest on
 //! what the machine promises: a straight line of bundles takes the same cycles every time. Each line's timing is found

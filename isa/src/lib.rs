@@ -5,6 +5,19 @@
 //! ([`manual`]), the rules of issue and writeback ([`timing`]). [`fp`] holds the bit-exact arithmetic kernels that the
 //! rows' meanings use. Registers, slots and bundles have types of their own ([`number`]), and what a bundle does to control is
 //! a [`Flow`].
+//!
+//! ```
+//! use takt_isa::{Instruction, Op, T3};
+//!
+//! let row = Op::from_mnemonic("fadd").expect("an instruction").row();
+//! let slot = T3.slots.iter().find(|slot| slot.unit_for(row.function).is_some()).expect("t3 has it");
+//! let unit = slot.units[slot.unit_for(row.function).expect("just found")];
+//! assert_eq!((slot.name, unit.latency), ("add", 5));
+//!
+//! let instruction = Instruction::bare(row.op);
+//! let word = instruction.encode().expect("it fits");
+//! assert_eq!(Instruction::decode(word), Ok(instruction));
+//! ```
 
 pub mod encode;
 pub mod flow;
