@@ -3,11 +3,10 @@
 
 use crate::block::Block;
 use crate::emulator::{Emulator, Recent, Status};
-use crate::event::Retire;
 use crate::execute::stack_fault;
 use crate::machine::{Pending, RegisterSet, State, Word};
-use crate::micro::{self, Context, Late, Outside};
-use takt_isa::fp::Flags;
+use crate::micro::{self, Context, Outside};
+use takt_isa::fp::{Flags, Value};
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Flow, Register};
 
@@ -48,8 +47,7 @@ impl Journal {
         (self.written, self.flags) = (state.written, state.flags);
         (self.kept_nans, self.counted_nans) = (state.nan_writes.kept.len(), state.nan_writes.count);
         self.registers.clear();
-        let pending = state.pending.iter().filter(|pending| pending.retire.cycle <= last);
-        let registers = pending.map(|pending| pending.register).chain(restore.iter().copied());
+        let registers = state.due(last).chain(restore.iter().copied());
         self.registers.extend(registers.map(|register| (register, state.get(register))));
     }
 
@@ -83,24 +81,15 @@ impl Emulator {
 impl Emulator {
     fn chain(&mut self, bound: Cycle, stop_at_wait: bool, journal: &mut Journal) -> Fast {
         loop {
-            if self.cache.is_full() {
-                self.drop_blocks();
-            }
-            let (entry, entered) = (self.front.next, self.front.delivered);
-            let id = match &self.recent {
-                Recent::Block { id, cycle } => {
-                    self.cache.successor(&self.code, &self.pauses, *id, *cycle, entry, entered)
-                }
-                Recent::List(recent) => self.cache.after(&self.code, &self.pauses, recent, entry, entered),
-            };
-            let Some(id) = id else { return Fast::Step { until: entered + 1 } };
+            let entered = self.front.delivered;
+            let Some(id) = self.next_block() else { return Fast::Step { until: entered + 1 } };
             let beyond_bound = self.beyond_bound().is_some();
             let last = entered + Cycle::from(self.cache.blocks[id as usize].last);
             if last >= bound {
                 return Fast::Step { until: bound.max(self.now + 1) };
             }
             self.begin_cycle();
-            let block = &mut self.cache.blocks[id as usize];
+            let block = &self.cache.blocks[id as usize];
             let (state, flow) = (&mut self.state, block.flow);
             if stack_fault(flow, state, self.code.machine).is_some()
                 || beyond_bound
@@ -109,17 +98,7 @@ impl Emulator {
             {
                 return Fast::Step { until: last + 1 };
             }
-            block.enter(self.front.from, entered - self.now);
-            block.runs += 1;
-            let address = block.end().previous();
-
-            self.now = last + 1;
-            self.recent = Recent::Block { id, cycle: last };
-            self.scoreboard = None;
-            while let Some(tick) = self.ticks.next().filter(|&tick| tick <= last) {
-                self.ticks.take(tick);
-                self.see_tick(tick, &mut None);
-            }
+            let address = self.after_block(id, last);
             self.follow(flow, address, last, &mut None);
             match flow {
                 Flow::Wait(_) if stop_at_wait || self.status != Status::Running => {
@@ -132,17 +111,54 @@ impl Emulator {
     }
 }
 
+impl Emulator {
+    /// The block to run next; none if the next bundle cannot begin one.
+    #[inline]
+    pub(crate) fn next_block(&mut self) -> Option<u32> {
+        if self.cache.is_full() {
+            self.drop_blocks();
+        }
+        let (entry, entered) = (self.front.next, self.front.delivered);
+        match &self.recent {
+            Recent::Block { id, cycle } => {
+                self.cache.successor(&self.code, &self.pauses, *id, *cycle, entry, entered)
+            }
+            Recent::List(recent) => self.cache.after(&self.code, &self.pauses, recent, entry, entered),
+        }
+    }
+
+    /// Goes on to the cycle after the last issue of a block that has run, `last`. Its last bundle.
+    #[inline]
+    pub(crate) fn after_block(&mut self, id: u32, last: Cycle) -> BundleAddress {
+        let block = &mut self.cache.blocks[id as usize];
+        if !block.verified {
+            self.state.written.insert_all(&block.writes);
+            block.verified = true;
+        }
+        block.enter(self.front.from, self.front.delivered - self.now);
+        block.runs += 1;
+        let address = block.end().previous();
+        self.now = last + 1;
+        self.recent = Recent::Block { id, cycle: last };
+        self.scoreboard = None;
+        while let Some(tick) = self.ticks.next().filter(|&tick| tick <= last) {
+            self.ticks.take(tick);
+            self.see_tick(tick, &mut None);
+        }
+        address
+    }
+}
+
 /// Whether everything that a block requires has been written, counting what is written back by its last issue. (What is
 /// not, the block cannot read.)
 pub(crate) fn has_required(state: &State, block: &Block, last: Cycle) -> bool {
     let mut written = state.written;
-    let pending = state.pending.iter().filter(|pending| pending.retire.cycle <= last);
-    pending.for_each(|pending| written.insert(pending.register));
+    state.due(last).for_each(|register| written.insert(register));
     written.contains_all(&block.required)
 }
 
 /// Runs a block entered in cycle `entered`. If it faults, nothing has happened, and the answer is false.
-fn run(block: &mut Block, state: &mut State, journal: &mut Journal, entered: Cycle) -> bool {
+fn run(block: &Block, state: &mut State, journal: &mut Journal, entered: Cycle) -> bool {
     let last = entered + Cycle::from(block.last);
     journal.begin(state, block, last);
     state.write_back_until(last);
@@ -163,28 +179,11 @@ fn run(block: &mut Block, state: &mut State, journal: &mut Journal, entered: Cyc
     }
     state.flags = flags;
     for (i, (late, &(flags, memory))) in block.late.iter().zip(&journal.late).enumerate() {
-        let Late { operation, register, address, offset } = *late;
-        let issued = entered + Cycle::from(offset);
-        let retire = Retire {
-            cycle: issued + Cycle::from(operation.latency),
-            issued,
-            address,
-            slot: operation.slot,
-            op: operation.op,
-            register: Some(register),
-            value: state.get(Word::late(i)),
-            flags,
-            memory,
-        };
-        let (output, float) = (operation.output, operation.float);
-        state.pending.push(Pending { retire, register, output, float });
+        let value = Value { bits: state.get(Word::late(i)), flags };
+        state.pending.push(late.pending(entered, value, memory));
     }
     for &(check, bits) in &journal.nans {
         state.nan_writes.record(block.checks[check as usize].write(entered, bits));
-    }
-    if !block.verified {
-        state.written.insert_all(&block.writes);
-        block.verified = true;
     }
     true
 }

@@ -259,6 +259,12 @@ impl State {
         Some(write)
     }
 
+    /// The registers of the results that are on their buses in cycle `last` or before.
+    pub(crate) fn due(&self, last: Cycle) -> impl Iterator<Item = Register> {
+        let due = self.pending.iter().filter(move |pending| pending.retire.cycle <= last);
+        due.map(|pending| pending.register)
+    }
+
     /// Writes back every result that is on its bus in cycle `last` or before. (The order does not matter to the state: no
     /// two pending results go to one register.)
     #[inline]

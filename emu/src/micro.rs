@@ -6,9 +6,9 @@
 //! register array, from which they become [`crate::machine::Pending`].
 
 use crate::code::Operation;
-use crate::event::PortWrite;
+use crate::event::{PortWrite, Retire};
 use crate::execute::data_address;
-use crate::machine::{RegisterSet, WORDS, Word};
+use crate::machine::{Pending, RegisterSet, WORDS, Word};
 use takt_isa::fp::{Flags, Host, Value, is_nan};
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Effect, Op, Register, SlotIndex, compute};
@@ -61,6 +61,26 @@ pub(crate) struct Late {
     pub(crate) address: BundleAddress,
     /// Cycle of its issue, from the block's entry.
     pub(crate) offset: u32,
+}
+
+impl Late {
+    /// The result, for a block entered in cycle `entered`.
+    pub(crate) fn pending(&self, entered: Cycle, value: Value, memory: Option<u32>) -> Pending {
+        let Late { operation, register, address, offset } = *self;
+        let issued = entered + Cycle::from(offset);
+        let retire = Retire {
+            cycle: issued + Cycle::from(operation.latency),
+            issued,
+            address,
+            slot: operation.slot,
+            op: operation.op,
+            register: Some(register),
+            value: value.bits,
+            flags: value.flags,
+            memory,
+        };
+        Pending { retire, register, output: operation.output, float: operation.float }
+    }
 }
 
 /// A write to an output port that carries binary32.

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::num::NonZeroU64;
 use takt_isa::program::Port;
 use takt_isa::timing::{self, Cycle};
-use takt_isa::{BundleAddress, Register, Type};
+use takt_isa::{BundleAddress, Program, Register, Type};
 
 /// Ticks to come and ticks that came.
 #[derive(Clone, Debug, Default)]
@@ -230,6 +230,27 @@ pub enum PeriodError {
     Halted,
 }
 
+/// The register of a program's input port, which is to take these values.
+pub(crate) fn input_for(
+    program: &Program,
+    name: &str,
+    values: impl IntoIterator<Item = Number>,
+) -> Result<Register, PortError> {
+    let Some(port) = program.inputs.iter().find(|port| port.name == name) else {
+        return Err(PortError::Unknown { name: name.to_owned(), kind: "input" });
+    };
+    if values.into_iter().any(|value| !value.fits(port.ty)) {
+        return Err(PortError::Type { name: name.to_owned(), ty: port.ty });
+    }
+    Ok(port.register)
+}
+
+/// A program's output port.
+pub(crate) fn output_for<'p>(program: &'p Program, name: &str) -> Result<&'p Port, PortError> {
+    let port = program.outputs.iter().find(|port| port.name == name);
+    port.ok_or_else(|| PortError::Unknown { name: name.to_owned(), kind: "output" })
+}
+
 impl Emulator {
     // ---- Ports.
 
@@ -249,7 +270,7 @@ impl Emulator {
     /// # Errors
     /// If the program has no such port, or one of another type.
     pub fn set_input(&mut self, name: &str, value: Number) -> Result<(), PortError> {
-        let register = self.input_for(name, value)?;
+        let register = input_for(&self.program, name, [value])?;
         self.state.set_input(register, value.bits());
         Ok(())
     }
@@ -277,20 +298,8 @@ impl Emulator {
     /// # Errors
     /// If the program has no such port.
     pub fn output(&self, name: &str) -> Result<Option<Number>, PortError> {
-        let Some(port) = self.output_port(name) else {
-            return Err(PortError::Unknown { name: name.to_owned(), kind: "output" });
-        };
+        let port = output_for(&self.program, name)?;
         Ok(self.output_bits(port.register).map(|bits| Number::of(port.ty, bits)))
-    }
-
-    fn input_for(&self, name: &str, value: Number) -> Result<Register, PortError> {
-        let Some(port) = self.input_port(name) else {
-            return Err(PortError::Unknown { name: name.to_owned(), kind: "input" });
-        };
-        if !value.fits(port.ty) {
-            return Err(PortError::Type { name: name.to_owned(), ty: port.ty });
-        }
-        Ok(port.register)
     }
 
     // ---- Ticks.
@@ -417,7 +426,7 @@ impl Emulator {
 
     pub(crate) fn set_inputs(&mut self, inputs: &[(&str, Number)]) -> Result<(), PortError> {
         for &(name, value) in inputs {
-            self.input_for(name, value)?;
+            input_for(&self.program, name, [value])?;
         }
         for &(name, value) in inputs {
             self.set_input(name, value)?;

@@ -1,12 +1,12 @@
 //! A group of lanes that go through the program together, and those that have left it for a while.
 //!
 //! What all lanes have in common stands once, in an ordinary [`Emulator`]: cycles, fetch, ticks, the bundles issued of late,
-//! which registers were written, the return stack, which results are underway. Of its own values it keeps none; those
+//! which registers were written, the return stack, which results are in flight. Of its own values it keeps none; those
 //! are rows of [`Lanes`]. A lane that branches differently from most, or is about to fault, is taken out: with its values and
 //! the common timeline it is an ordinary emulator, which runs to the end of the period and knows nothing of the batch. At
 //! the tick it joins again, if it is then where the others are.
 
-use super::lanes::{LANES, Lanes, Mask, Row, Underway};
+use super::lanes::{InFlight, LANES, Lanes, Mask, Row};
 use crate::block::{Ages, ages};
 use crate::emulator::{Emulator, MAX_CYCLE, Recent, Status};
 use crate::event::{PortWrite, Retire};
@@ -14,9 +14,8 @@ use crate::execute::stack_fault;
 use crate::fast::has_required;
 use crate::fault::LoadError;
 use crate::machine::{Pending, RegisterSet, State};
-use crate::micro::Late;
 use crate::system::{PeriodError, PeriodReport};
-use takt_isa::fp::Flags;
+use takt_isa::fp::{Flags, Value};
 use takt_isa::timing::{self, Cycle};
 use takt_isa::{BundleAddress, Flow, Program, Register};
 
@@ -268,18 +267,9 @@ impl Group {
 
     /// The next block, in every lane that is present.
     fn run_block(&mut self) -> Next {
-        let lead = &mut self.lead;
-        if lead.cache.is_full() {
-            lead.drop_blocks();
-        }
-        let (entry, entered) = (lead.front.next, lead.front.delivered);
-        let id = match &lead.recent {
-            Recent::Block { id, cycle } => {
-                lead.cache.successor(&lead.code, &lead.pauses, *id, *cycle, entry, entered)
-            }
-            Recent::List(recent) => lead.cache.after(&lead.code, &lead.pauses, recent, entry, entered),
-        };
-        let Some(id) = id else { return self.leave_all() };
+        let entered = self.lead.front.delivered;
+        let Some(id) = self.lead.next_block() else { return self.leave_all() };
+        let lead = &self.lead;
         let block = &lead.cache.blocks[id as usize];
         let (flow, last) = (block.flow, entered + Cycle::from(block.last));
         if last >= lead.cycle_limit
@@ -300,7 +290,7 @@ impl Group {
                 return Next::End;
             }
         }
-        let address = self.after_block(id, entered, last);
+        let address = self.after_block(id, last);
         self.go_on(flow, address, last)
     }
 
@@ -320,29 +310,16 @@ impl Group {
         })
     }
 
-    /// What a block that has run leaves behind in the timeline; its last bundle.
-    fn after_block(&mut self, id: u32, entered: Cycle, last: Cycle) -> BundleAddress {
+    /// What a block that has run leaves behind; its last bundle.
+    fn after_block(&mut self, id: u32, last: Cycle) -> BundleAddress {
         let Group { lead, lanes, offsets, .. } = self;
-        let block = &mut lead.cache.blocks[id as usize];
-        for late in &block.late {
-            lead.state.pending.push(pending(late, entered));
-        }
+        let entered = lead.front.delivered;
+        let block = &lead.cache.blocks[id as usize];
+        // Their values are in the lanes.
+        let late = block.late.iter().map(|late| late.pending(entered, Value::exact(0), None));
+        lead.state.pending.extend(late);
         lanes.end(block, entered, offsets);
-        if !block.verified {
-            lead.state.written.insert_all(&block.writes);
-            block.verified = true;
-        }
-        block.enter(lead.front.from, entered - lead.now);
-        block.runs += 1;
-        let address = block.end().previous();
-        lead.now = last + 1;
-        lead.recent = Recent::Block { id, cycle: last };
-        lead.scoreboard = None;
-        while let Some(tick) = lead.ticks.next().filter(|&tick| tick <= last) {
-            lead.ticks.take(tick);
-            lead.see_tick(tick, &mut None);
-        }
-        address
+        lead.after_block(id, last)
     }
 
     /// Goes on after the bundle at `address`, which issued in cycle `last`. Of lanes that branch, the larger part stays.
@@ -392,11 +369,11 @@ impl Group {
     // ---- Leaving and joining.
 
     fn leave_all(&mut self) -> Next {
-        (0..LANES)
-            .filter(|&lane| self.present[lane])
-            .collect::<Vec<_>>()
-            .into_iter()
-            .for_each(|lane| self.leave(lane));
+        for lane in 0..LANES {
+            if self.present[lane] {
+                self.leave(lane);
+            }
+        }
         Next::End
     }
 
@@ -488,12 +465,12 @@ impl Group {
         lead.state.clone_from(&first.state);
         // It may have written less than was found before.
         lead.cache.blocks.iter_mut().for_each(|block| block.verified = false);
-        let underway = lead.state.pending.iter().map(|pending| Underway {
+        let in_flight = lead.state.pending.iter().map(|pending| InFlight {
             values: [pending.retire.value; LANES],
             flags: [pending.retire.flags; LANES],
             memory: pending.retire.memory.map(|word| [word; LANES]),
         });
-        self.lanes.underway = underway.collect();
+        self.lanes.in_flight = in_flight.collect();
         true
     }
 
@@ -564,22 +541,4 @@ fn same_pending(common: &[Pending], others: &[Pending], by: i64) -> bool {
         (cycle.wrapping_add_signed(by), address, slot, op, pending.register)
     };
     common.iter().map(|pending| key(pending, by)).eq(others.iter().map(|pending| key(pending, 0)))
-}
-
-/// A late result of a block entered in cycle `entered`. Its values are in the lanes.
-fn pending(late: &Late, entered: Cycle) -> Pending {
-    let Late { operation, register, address, offset } = *late;
-    let issued = entered + Cycle::from(offset);
-    let retire = Retire {
-        cycle: issued + Cycle::from(operation.latency),
-        issued,
-        address,
-        slot: operation.slot,
-        op: operation.op,
-        register: Some(register),
-        value: 0,
-        flags: Flags::NONE,
-        memory: None,
-    };
-    Pending { retire, register, output: operation.output, float: operation.float }
 }

@@ -20,9 +20,9 @@ pub(crate) type Row = [u32; LANES];
 /// A set of lanes.
 pub(crate) type Mask = [bool; LANES];
 
-/// Of a result underway: the values of all lanes. What is the same for all is in the timeline's list, at the same place.
+/// Of a result in flight: the values of all lanes. What is the same for all is in the timeline's list, at the same place.
 #[derive(Clone, Debug)]
-pub(crate) struct Underway {
+pub(crate) struct InFlight {
     pub(crate) values: Row,
     pub(crate) flags: [Flags; LANES],
     /// The data words that it was loaded from, if it is a load.
@@ -42,10 +42,10 @@ pub(crate) struct Lanes {
     pub(crate) registers: Box<[Row; WORDS]>,
     pub(crate) memory: Vec<Row>,
     pub(crate) flags: [Flags; LANES],
-    pub(crate) underway: Vec<Underway>,
+    pub(crate) in_flight: Vec<InFlight>,
     pub(crate) nan_writes: Vec<NanWrites>,
     pub(crate) latches: Option<LatchedRows>,
-    late: Vec<Underway>,
+    late: Vec<InFlight>,
     nans: Vec<(u32, usize, u32)>,
     undo: Undo,
 }
@@ -58,7 +58,7 @@ struct Undo {
     kept: bool,
     /// Rows of memory before a store.
     stored: Vec<(usize, Row)>,
-    underway: Vec<Underway>,
+    in_flight: Vec<InFlight>,
     flags: [Flags; LANES],
     nans: Vec<(usize, u64)>,
 }
@@ -95,7 +95,7 @@ impl Lanes {
             registers: rows.try_into().unwrap_or_else(|_| Box::new([[0; LANES]; WORDS])),
             memory: state.memory.iter().map(|&word| [word; LANES]).collect(),
             flags: [state.flags; LANES],
-            underway: Vec::new(),
+            in_flight: Vec::new(),
             nan_writes: vec![NanWrites::default(); LANES],
             latches,
             late: Vec::new(),
@@ -109,7 +109,7 @@ impl Lanes {
     pub(crate) fn imitate(&mut self, lane: usize, model: usize) {
         self.registers.iter_mut().for_each(|row| row[lane] = row[model]);
         self.memory.iter_mut().for_each(|row| row[lane] = row[model]);
-        self.underway.iter_mut().for_each(|underway| underway.values[lane] = underway.values[model]);
+        self.in_flight.iter_mut().for_each(|in_flight| in_flight.values[lane] = in_flight.values[model]);
     }
 
     /// Takes the values of lane `lane` into a state.
@@ -121,10 +121,10 @@ impl Lanes {
             *word = row[lane];
         }
         state.flags = self.flags[lane];
-        for (pending, underway) in state.pending.iter_mut().zip(&self.underway) {
-            pending.retire.value = underway.values[lane];
-            pending.retire.flags = underway.flags[lane];
-            pending.retire.memory = underway.memory.map(|words| words[lane]);
+        for (pending, in_flight) in state.pending.iter_mut().zip(&self.in_flight) {
+            pending.retire.value = in_flight.values[lane];
+            pending.retire.flags = in_flight.flags[lane];
+            pending.retire.memory = in_flight.memory.map(|words| words[lane]);
         }
         state.nan_writes = std::mem::take(&mut self.nan_writes[lane]);
         if let (Some(latches), Some(rows)) = (&mut state.latches, &self.latches) {
@@ -142,10 +142,10 @@ impl Lanes {
             row[lane] = word;
         }
         self.flags[lane] = state.flags;
-        for (underway, pending) in self.underway.iter_mut().zip(&state.pending) {
-            underway.values[lane] = pending.retire.value;
-            underway.flags[lane] = pending.retire.flags;
-            if let (Some(words), Some(word)) = (&mut underway.memory, pending.retire.memory) {
+        for (in_flight, pending) in self.in_flight.iter_mut().zip(&state.pending) {
+            in_flight.values[lane] = pending.retire.value;
+            in_flight.flags[lane] = pending.retire.flags;
+            if let (Some(words), Some(word)) = (&mut in_flight.memory, pending.retire.memory) {
                 words[lane] = word;
             }
         }
@@ -189,7 +189,7 @@ impl Lanes {
                 continue;
             }
             let pending = state.pending.remove(i);
-            let Underway { values, flags, .. } = self.underway.remove(i);
+            let InFlight { values, flags, .. } = self.in_flight.remove(i);
             self.registers[pending.register.index()] = values;
             state.written.insert(pending.register);
             self.flags.iter_mut().zip(flags).for_each(|(all, flags)| *all |= flags);
@@ -215,16 +215,15 @@ impl Lanes {
         self.nans.clear();
         self.late.clear();
         if !block.late.is_empty() {
-            let none = Underway { values: [0; LANES], flags: [Flags::NONE; LANES], memory: None };
+            let none = InFlight { values: [0; LANES], flags: [Flags::NONE; LANES], memory: None };
             self.late.resize(block.late.len(), none);
         }
         self.undo.kept = block.restore.is_some();
         let Some(restore) = &block.restore else { return };
-        let pending = state.pending.iter().filter(|pending| pending.retire.cycle <= last);
-        let registers = pending.map(|pending| pending.register).chain(restore.iter().copied());
+        let registers = state.due(last).chain(restore.iter().copied());
         self.undo.registers.clear();
         self.undo.registers.extend(registers.map(|register| (register, self.registers[register.index()])));
-        self.undo.underway.clone_from(&self.underway);
+        self.undo.in_flight.clone_from(&self.in_flight);
         self.undo.flags = self.flags;
         self.undo.nans.clear();
         self.undo.nans.extend(self.nan_writes.iter().map(|writes| (writes.kept.len(), writes.count)));
@@ -238,7 +237,7 @@ impl Lanes {
         for &(address, row) in self.undo.stored.iter().rev() {
             self.memory[address] = row;
         }
-        self.underway.clone_from(&self.undo.underway);
+        self.in_flight.clone_from(&self.undo.in_flight);
         self.flags = self.undo.flags;
         for (writes, &(kept, count)) in self.nan_writes.iter_mut().zip(&self.undo.nans) {
             writes.kept.truncate(kept);
@@ -311,7 +310,7 @@ impl Lanes {
     #[inline(never)]
     fn finish_late(&mut self, number: usize, flags: [Flags; LANES], memory: Option<Row>) {
         if let Some(late) = self.late.get_mut(number) {
-            *late = Underway { values: self.registers[Word::late(number).index()], flags, memory };
+            *late = InFlight { values: self.registers[Word::late(number).index()], flags, memory };
         }
     }
 
@@ -372,9 +371,9 @@ impl Lanes {
         Ok(())
     }
 
-    /// After a block entered in cycle `entered`: its late results are underway, its NaNs recorded.
+    /// After a block entered in cycle `entered`: its late results are in flight, its NaNs recorded.
     pub(crate) fn end(&mut self, block: &Block, entered: Cycle, offsets: &[i64; LANES]) {
-        self.underway.append(&mut self.late);
+        self.in_flight.append(&mut self.late);
         for &(check, lane, bits) in &self.nans {
             let entered = entered.wrapping_add_signed(offsets[lane]);
             self.nan_writes[lane].record(block.checks[check as usize].write(entered, bits));

@@ -8,7 +8,7 @@ mod group;
 mod lanes;
 
 use crate::fault::LoadError;
-use crate::system::{Number, PeriodError, PeriodReport, PortError};
+use crate::system::{Number, PeriodError, PeriodReport, PortError, input_for, output_for};
 use group::Group;
 use lanes::LANES;
 use rayon::prelude::*;
@@ -94,13 +94,7 @@ impl Batch {
     /// If the program has no such port, or one of another type, or there are more values than lanes, or fewer. Nothing is set
     /// then.
     pub fn set_input<N: Into<Number> + Copy>(&mut self, name: &str, values: &[N]) -> Result<(), PortError> {
-        let Some(port) = self.program.inputs.iter().find(|port| port.name == name) else {
-            return Err(PortError::Unknown { name: name.to_owned(), kind: "input" });
-        };
-        let (register, ty) = (port.register, port.ty);
-        if values.iter().any(|&value| !value.into().fits(ty)) {
-            return Err(PortError::Type { name: name.to_owned(), ty });
-        }
+        let register = input_for(&self.program, name, values.iter().map(|&value| value.into()))?;
         let bits: Vec<u32> = values.iter().map(|&value| value.into().bits()).collect();
         self.set_input_bits(register, &bits)
     }
@@ -154,10 +148,7 @@ impl Batch {
     /// # Errors
     /// If the program has no such port.
     pub fn output(&self, lane: usize, name: &str) -> Result<Option<Number>, PortError> {
-        let Some(Port { register, ty, .. }) = self.program.outputs.iter().find(|port| port.name == name)
-        else {
-            return Err(PortError::Unknown { name: name.to_owned(), kind: "output" });
-        };
+        let Port { register, ty, .. } = output_for(&self.program, name)?;
         Ok(self.output_bits(lane, *register).map(|bits| Number::of(*ty, bits)))
     }
 
