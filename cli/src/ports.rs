@@ -5,8 +5,9 @@ use crate::select::suggest;
 use anyhow::{Context, Result, anyhow, bail};
 use std::io::{self, Read, Write};
 use std::path::Path;
+use takt_emu::{Row, Rows};
+use takt_isa::Type;
 use takt_isa::program::Port;
-use takt_isa::{Register, Type};
 
 /// A value as CSV and as JSON have it.
 pub(crate) use takt_debug::value::{json, text as format};
@@ -58,11 +59,6 @@ fn shown(text: &str) -> String {
     }
     start
 }
-
-/// Values of the input ports, register and bits.
-pub(crate) type Row = Vec<(Register, u32)>;
-/// Those of each period.
-pub(crate) type Rows = Vec<Row>;
 
 /// Inputs of one period after the other: the rows of a CSV, or zeros where there is none. Every command reads them here.
 pub(crate) enum Inputs {

@@ -154,7 +154,7 @@ pub fn serve(connection: &Connection, settings: Settings) -> bool {
             recv(done) -> done => if let Ok(done) = done { server.scheduled(done) },
             recv(timer) -> _ => server.due(),
         }
-        // What the client no longer wants is among what it sent since.
+        // What the client has cancelled is among what it sent since.
         queue.extend(connection.receiver.try_iter());
         while let Some(message) = queue.pop_front() {
             match message {
