@@ -7,6 +7,7 @@ mod reach;
 mod share;
 mod synth;
 mod venv;
+mod web;
 
 use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
@@ -47,6 +48,8 @@ enum Task {
     Formal(formal::Arguments),
     /// Compile for aarch64 Linux, macOS, Windows and wasm32, and run the core crates' tests on aarch64 (installs what it lacks).
     Reach(reach::Arguments),
+    /// Build the playground, a page for any file server, in target/playground (installs what it lacks); --test opens it in a browser.
+    Web(web::Arguments),
     /// Measure how fast emulator, assembler and lockstep are beside native code, GNU `as` and one another; print it and write
     /// docs/speed.md (a few minutes on an idle machine).
     Speed,
@@ -66,6 +69,7 @@ fn main() -> Result<()> {
         Task::Formal(arguments) => formal::formal(&arguments),
         Task::Synth(arguments) => synth::synth(&arguments),
         Task::Reach(arguments) => reach::reach(&arguments),
+        Task::Web(arguments) => web::web(&arguments),
         Task::Speed => speed(),
         Task::Fuzz { minutes } => fuzz(minutes),
     }
