@@ -3,7 +3,7 @@
 import { basicSetup } from "codemirror";
 import { Decoration, EditorView, GutterMarker, ViewPlugin, WidgetType, gutter, keymap } from "@codemirror/view";
 import { Compartment, EditorState, RangeSet, StateEffect, StateField } from "@codemirror/state";
-import { forceLinting, lintGutter, setDiagnostics } from "@codemirror/lint";
+import { lintGutter, setDiagnostics } from "@codemirror/lint";
 import {
   LSPClient, LSPPlugin, findReferencesKeymap, formatKeymap, hoverTooltips, jumpToDefinitionKeymap, renameKeymap, serverCompletion,
 } from "@codemirror/lsp-client";
@@ -186,7 +186,7 @@ export class Editor {
     this.handlers = new Set();
     client.connect({
       send: (message) => {
-        this.ask("lsp", JSON.parse(message)).then((said) => this.said(said), () => {});
+        this.ask("lsp", JSON.parse(message)).then((said) => this.said(client, said), () => {});
       },
       subscribe: (handler) => this.handlers.add(handler),
       unsubscribe: (handler) => this.handlers.delete(handler),
@@ -199,7 +199,9 @@ export class Editor {
     this.longPause = setTimeout(() => this.count(), 0);
   }
 
-  said(messages) {
+  /** Hands on what the server says to a client, if that is still there. */
+  said(client, messages) {
+    if (this.client !== client) return;
     for (const message of messages ?? []) for (const handler of this.handlers) handler(JSON.stringify(message));
   }
 
@@ -237,7 +239,7 @@ export class Editor {
     if (!client?.serverCapabilities) return;
     try {
       client.sync();
-      this.said(await this.ask("lsp.check"));
+      this.said(client, await this.ask("lsp.check"));
       const document = { textDocument: { uri: this.name } };
       const tokens = await client.request("textDocument/semanticTokens/full", document);
       if (this.client !== client || this.version !== version) return;
@@ -255,7 +257,7 @@ export class Editor {
     try {
       for (let more = true; more && this.client === client; ) {
         const answer = await this.ask("lsp.schedule");
-        this.said(answer.messages);
+        this.said(client, answer.messages);
         more = answer.more;
       }
       const doc = this.view.state.doc, document = { textDocument: { uri: this.name } };
@@ -330,5 +332,3 @@ export class Editor {
     this.view.focus();
   }
 }
-
-export { forceLinting };

@@ -14,7 +14,10 @@ const KEPT = "takt-playground";
 /** Periods that a call drives. */
 const DRIVE = 2000;
 
-const state = { name: "main.s", about: null, program: null, stale: true, run: null };
+/** Why a worker is stopped for another program. */
+const REPLACED = "another program was opened";
+
+const state = { works: 0, name: "main.s", about: null, program: null, stale: true, run: null };
 let machine, editor, plots, robot, errorChart;
 
 function notice(message) {
@@ -97,7 +100,7 @@ function kept() {
 }
 
 async function open({ name, source, inputs, machine: wanted }, assembleIt = true) {
-  if (machine.busy) machine.stop();
+  if (machine.busy) machine.stop(REPLACED);
   state.name = name || "main.s";
   if (wanted && [...el("machine").options].some((option) => option.value === wanted)) el("machine").value = wanted;
   el("table").value = inputs ?? "";
@@ -149,19 +152,23 @@ const asked = () => ({ name: state.name, source: editor.text, machine: el("machi
 
 /** Runs what the machine's worker is asked for; a stop or an error is told. */
 async function work(doing) {
+  const mine = ++state.works;
   notice();
   el("stop").hidden = false;
   el("assemble").disabled = true;
   try {
     return await doing();
   } catch (error) {
+    if (error instanceof Stopped && error.message === REPLACED) return;
     if (error instanceof Stopped) {
       state.stale = true;
       notice(`${error.message === "stopped" ? "Stopped." : `The machine stopped (${error.message}).`} The text is as it was; assemble again to go on.`);
     } else notice(error.message);
   } finally {
-    el("stop").hidden = machine.busy ? false : true;
-    el("assemble").disabled = false;
+    if (mine === state.works) {
+      el("stop").hidden = true;
+      el("assemble").disabled = false;
+    }
   }
 }
 
