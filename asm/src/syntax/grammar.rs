@@ -743,6 +743,19 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
             more
         })
     };
+    let range = is(Directive::Range)
+        .ignore_then(just(Token::At).or_not())
+        .then(ports())
+        .then_ignore(just(Token::Assign).labelled("`=`"))
+        .then(expr.clone().labelled("the least value"))
+        .then_ignore(comma())
+        .then(expr.clone().labelled("the largest value"))
+        .map(|(((at, registers), low), high)| DirectiveKind::Range {
+            registers,
+            placed: at.is_some(),
+            low,
+            high,
+        });
     let deadline = is(Directive::Deadline)
         .ignore_then(ports())
         .then_ignore(just(Token::Assign).labelled("`=`"))
@@ -770,7 +783,7 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
         .map(DirectiveKind::Loc);
     choice((
         bare, declare, float, word, constant, preset, space, branch, elif, rep, macro_, include, error, loc,
-        schedule, contract, fast, latched, loop_bound, deadline, order, late,
+        schedule, contract, fast, latched, loop_bound, range, deadline, order, late,
     ))
     .map_with(|kind, e| Body::Directive(kind, e.span()))
 }
