@@ -315,6 +315,8 @@ pub struct Ir {
     pub labels: Vec<Label>,
     /// Bounds of loops, by ascending position.
     pub loop_bounds: Vec<LoopBound>,
+    /// Between which values registers lie when a period begins, least and largest, in the order of the source.
+    pub ranges: Vec<(RegisterId, [u32; 2])>,
     /// What is demanded of ports, in the order of the source.
     pub demands: Vec<Demand>,
     /// Whether inputs are taken together at the tick, outputs published together at `wait`.

@@ -750,6 +750,19 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
             more
         })
     };
+    let range = is(Directive::Range)
+        .ignore_then(just(Token::At).or_not())
+        .then(ports())
+        .then_ignore(just(Token::Assign).labelled("`=`"))
+        .then(expr.clone().labelled("the least value"))
+        .then_ignore(comma())
+        .then(expr.clone().labelled("the largest value"))
+        .map(|(((at, registers), low), high)| DirectiveKind::Range {
+            registers,
+            placed: at.is_some(),
+            low,
+            high,
+        });
     let deadline = is(Directive::Deadline)
         .ignore_then(ports())
         .then_ignore(just(Token::Assign).labelled("`=`"))
@@ -796,6 +809,7 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
         fast.boxed(),
         latched.boxed(),
         loop_bound.boxed(),
+        range.boxed(),
         deadline.boxed(),
         order.boxed(),
         late.boxed(),
