@@ -7,7 +7,10 @@
 pub mod boards;
 mod document;
 pub mod kind;
+pub mod pll;
+pub mod protocol;
 pub mod system;
+pub mod top;
 pub mod twin;
 
 pub use boards::Board;
@@ -17,9 +20,13 @@ pub use system::System;
 
 /// The Verilog of the peripherals and of what is around the core, by file name.
 pub const VERILOG: &[(&str, &str)] = &[
+    ("takt_boot.v", include_str!("../verilog/takt_boot.v")),
+    ("takt_bridge.v", include_str!("../verilog/takt_bridge.v")),
     ("takt_digital_in.v", include_str!("../verilog/takt_digital_in.v")),
     ("takt_digital_out.v", include_str!("../verilog/takt_digital_out.v")),
+    ("takt_exchange.v", include_str!("../verilog/takt_exchange.v")),
     ("takt_filter.v", include_str!("../verilog/takt_filter.v")),
+    ("takt_guard.v", include_str!("../verilog/takt_guard.v")),
     ("takt_pwm.v", include_str!("../verilog/takt_pwm.v")),
     ("takt_quadrature.v", include_str!("../verilog/takt_quadrature.v")),
     ("takt_sigma_delta.v", include_str!("../verilog/takt_sigma_delta.v")),

@@ -52,7 +52,7 @@ const PROGRAM: &str = "
 ";
 
 fn program(source: &str) -> Program {
-    let loader = MemoryLoader::new([("p.s", source)]);
+    let loader = MemoryLoader::new(&[("p.s", source)]);
     assemble("p.s", &loader, &Options::default()).expect("the program assembles").program
 }
 
