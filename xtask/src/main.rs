@@ -4,6 +4,7 @@
 mod book;
 mod docs;
 mod formal;
+mod python;
 mod reach;
 mod share;
 mod synth;
@@ -26,7 +27,8 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Install what the tests need and is not there, then run formal verification's share and every test, optimised.
+    /// Install what the tests need and is not there, then run formal verification's share and every test, optimised, those of the
+    /// Python package included.
     Test {
         /// Exhaustive: all 2³² operands of every operation of one operand (about ten minutes on two cores).
         #[arg(long)]
@@ -56,6 +58,8 @@ enum Task {
     /// Measure how fast emulator, assembler and lockstep are beside native code, GNU `as` and one another; print it and write
     /// docs/speed.md (a few minutes on an idle machine).
     Speed,
+    /// Build the Python package's wheel, for every Python from 3.10 on (installs maturin in .venv).
+    Wheel(python::Arguments),
     /// Fuzz the assembler and the image loader, one after the other (installs cargo-fuzz if it is not there).
     Fuzz {
         /// Minutes for each target.
@@ -75,6 +79,7 @@ fn main() -> Result<()> {
         Task::Web(arguments) => web::web(&arguments),
         Task::Book(arguments) => book::book(&arguments),
         Task::Speed => speed(),
+        Task::Wheel(arguments) => python::wheel(&arguments),
         Task::Fuzz { minutes } => fuzz(minutes),
     }
 }
@@ -163,7 +168,8 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
     if full {
         tests.env("TAKT_FULL", "1");
     }
-    run(&mut tests)
+    run(&mut tests)?;
+    if rest.is_empty() { python::test() } else { Ok(()) }
 }
 
 /// Measures, prints, writes docs/speed.md.
