@@ -123,7 +123,10 @@ pub(crate) fn run(arguments: &Boards, color: bool, out: &mut Out) -> Result<()> 
         Command::Pins(pins) => self::pins(pins, color, out),
         Command::Check(check) => {
             let (board, system, program) = check.target.read(color)?;
-            let ports = system.peripherals.iter().map(|p| p.reads.iter().flatten().count() + p.writes.iter().flatten().count());
+            let ports = system
+                .peripherals
+                .iter()
+                .map(|p| p.reads.iter().flatten().count() + p.writes.iter().flatten().count());
             writeln!(
                 out,
                 "{}, {}: {} peripherals, {} of the program's ports on pins, a period of {} cycles at {} MHz",
@@ -182,7 +185,8 @@ fn pins(arguments: &Pins, color: bool, out: &mut Out) -> Result<()> {
     };
     let used = |pin: &str| system.as_ref().and_then(|system| system.at(pin));
     if arguments.json {
-        let pins = board.pins.iter().map(|(pin, site)| json!({ "pin": pin, "site": site, "used": used(pin) }));
+        let pins =
+            board.pins.iter().map(|(pin, site)| json!({ "pin": pin, "site": site, "used": used(pin) }));
         return output::json(&pins.collect::<Vec<_>>(), out);
     }
     for (pin, site) in &board.pins {
