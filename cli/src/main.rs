@@ -35,6 +35,7 @@ mod rtl;
 mod run;
 mod select;
 mod synthesis;
+mod system;
 mod trace;
 mod track;
 
