@@ -12,6 +12,7 @@ use takt_isa::Machine;
 use thiserror::Error;
 
 pub use crate::plan::synthesis_top;
+pub use takt_isa::timing::{ENDED_DELAY, INPUT_DELAY, LATCHED_INPUT_DELAY, TICK_DELAY};
 
 /// Why a machine has no circuit.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -51,12 +52,6 @@ pub struct Design {
     pub latched: u16,
 }
 
-/// Cycles between a value on the input port and the first bundle that may read it, less 1.
-pub const INPUT_DELAY: u64 = 3;
-/// The same for latched ports, between a value on the input port and the first tick that takes it.
-pub const LATCHED_INPUT_DELAY: u64 = 2;
-/// Cycles between the tick on its pin and the cycle in which it is seen.
-pub const TICK_DELAY: u64 = 1;
 /// Cycles for which reset must be held, so that nothing is left of what was before.
 pub const RESET_CYCLES: u64 = takt_isa::spec::units::MAX_LATENCY as u64;
 
