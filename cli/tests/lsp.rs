@@ -23,7 +23,10 @@ impl Session {
         }
         let mut client = Client::start(&folder, "lsp");
         let root = format!("file://{}", folder.path().display());
-        let capabilities = json!({ "workspace": { "inlayHint": { "refreshSupport": true } } });
+        let capabilities = json!({
+            "workspace": { "inlayHint": { "refreshSupport": true } },
+            "experimental": { "takt/counted": true },
+        });
         let answer = client.ask(
             "initialize",
             json!({ "capabilities": capabilities, "workspaceFolders": [{ "uri": root, "name": "test" }] }),
@@ -386,7 +389,7 @@ fn cycles_stand_beside_the_lines() {
     assert!(title.starts_with(&format!("period: {} cycles, bound ", cycles["worst"])), "{title}");
     assert_eq!(lenses[0]["range"]["start"]["line"], 5);
 
-    // Two lines more, above; what is counted moves with its line until it is counted anew.
+    // Two lines more, above; what is counted moves with its line until it is counted again.
     session.edit("main.s", MAIN, ".schedule on\n", "\n\n.schedule on\n");
     let after = lines(&session.ask("textDocument/inlayHint", params));
     let moved: Vec<_> = before.iter().map(|(line, text)| (line + 2, text.clone())).collect();
@@ -399,7 +402,7 @@ fn cycles_stand_beside_the_lines() {
 fn the_picture_has_each_operation_at_its_line() {
     let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
     session.open("main.s", MAIN);
-    let told = session.client.wait(|message| message["method"] == "$/takt/counted");
+    let told = session.client.wait(|message| message["method"] == "takt/counted");
     assert_eq!(told["params"]["uri"], session.uri("main.s"));
     let params = json!({ "textDocument": { "uri": session.uri("main.s") } });
     let picture = session.ask("takt/pipeline", params.clone());

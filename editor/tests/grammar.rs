@@ -9,7 +9,7 @@ fn is_as_generated(path: &str, generated: &str) {
         let name = Path::new(path).file_name().expect("it is a file");
         let fresh = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
         std::fs::write(&fresh, generated).expect("the folder is there");
-        panic!("editors/{path} is stale: `cargo xtask docs` writes it anew (as {})", fresh.display());
+        panic!("editors/{path} is stale: `cargo xtask docs` rewrites it (as {})", fresh.display());
     }
 }
 

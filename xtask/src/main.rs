@@ -1,12 +1,15 @@
 //! Project automation. `cargo xtask --help` lists what there is.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+mod book;
 mod docs;
 mod formal;
+mod python;
 mod reach;
 mod share;
 mod synth;
 mod venv;
+mod web;
 
 use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
@@ -24,7 +27,8 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Install what the tests need and is not there, then run formal verification's share and every test, optimised.
+    /// Install what the tests need and is not there, then run formal verification's share and every test, optimised, those of the
+    /// Python package included.
     Test {
         /// Exhaustive: all 2³² operands of every operation of one operand (about ten minutes on two cores).
         #[arg(long)]
@@ -47,11 +51,17 @@ enum Task {
     Formal(formal::Arguments),
     /// Compile for aarch64 Linux, macOS, Windows and wasm32, and run the core crates' tests on aarch64 (installs what it lacks).
     Reach(reach::Arguments),
+    /// Build the playground, a page for any file server, in target/playground (installs what it lacks); --test opens it in a browser.
+    Web(web::Arguments),
+    /// Write the documentation as a site, in target/book/site: docs/, the crates' documentation, the playground (installs mdbook).
+    Book(book::Arguments),
     /// Measure how fast emulator, assembler and lockstep are beside native code, GNU `as` and one another; print it and write
     /// docs/speed.md (a few minutes on an idle machine).
     Speed,
     /// Build the extension for VS Code, editors/vscode/dist/takt.vsix, with its tests (installs with npm what it lacks).
     Extension,
+    /// Build the Python package's wheel, for every Python from 3.10 on (installs maturin in .venv).
+    Wheel(python::Arguments),
     /// Fuzz the assembler and the image loader, one after the other (installs cargo-fuzz if it is not there).
     Fuzz {
         /// Minutes for each target.
@@ -68,8 +78,11 @@ fn main() -> Result<()> {
         Task::Formal(arguments) => formal::formal(&arguments),
         Task::Synth(arguments) => synth::synth(&arguments),
         Task::Reach(arguments) => reach::reach(&arguments),
+        Task::Web(arguments) => web::web(&arguments),
+        Task::Book(arguments) => book::book(&arguments),
         Task::Speed => speed(),
         Task::Extension => extension(),
+        Task::Wheel(arguments) => python::wheel(&arguments),
         Task::Fuzz { minutes } => fuzz(minutes),
     }
 }
@@ -170,7 +183,8 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
     if full {
         tests.env("TAKT_FULL", "1");
     }
-    run(&mut tests)
+    run(&mut tests)?;
+    if rest.is_empty() { python::test() } else { Ok(()) }
 }
 
 /// Measures, prints, writes docs/speed.md.
