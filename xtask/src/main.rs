@@ -58,10 +58,10 @@ enum Task {
     /// Measure how fast emulator, assembler and lockstep are beside native code, GNU `as` and one another; print it and write
     /// docs/speed.md (a few minutes on an idle machine).
     Speed,
-    /// Build the extension for VS Code, editors/vscode/dist/takt.vsix, with its tests (installs with npm what it lacks).
-    Extension,
     /// Build the Python package's wheel, for every Python from 3.10 on (installs maturin in .venv).
     Wheel(python::Arguments),
+    /// Build the extension for VS Code, editors/vscode/dist/takt.vsix, with its tests (installs with npm what it lacks).
+    Extension,
     /// Fuzz the assembler and the image loader, one after the other (installs cargo-fuzz if it is not there).
     Fuzz {
         /// Minutes for each target.
@@ -81,8 +81,8 @@ fn main() -> Result<()> {
         Task::Web(arguments) => web::web(&arguments),
         Task::Book(arguments) => book::book(&arguments),
         Task::Speed => speed(),
-        Task::Extension => extension(),
         Task::Wheel(arguments) => python::wheel(&arguments),
+        Task::Extension => extension(),
         Task::Fuzz { minutes } => fuzz(minutes),
     }
 }
