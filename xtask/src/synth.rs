@@ -340,7 +340,7 @@ fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Result<Synthes
         .iter()
         .map(|report| clock(report).map(|mhz| (mhz * 100.0).round() / 100.0))
         .collect::<Result<_>>()?;
-    let carries = halves_of_carries(&read(&folder.join("statistics.json"))?);
+    let carries = Some(halves_of_carries(&read(&folder.join("statistics.json"))?));
     row.resources = less(Resources { carries, ..ecp5(&reports[0])? }, design.wrapper);
     let middle = row.mhz.iter().position(|&mhz| Some(mhz) == row.median()).expect("there is a seed");
     row.critical_path = critical_path(&reports[middle]).context("nextpnr's report has no path")?;
@@ -410,8 +410,8 @@ fn ecp5(report: &Value) -> Result<Resources> {
 }
 
 /// Halves of carry chains' cells, each of which takes the place of a LUT4; from yosys' statistics.
-fn halves_of_carries(statistics: &Value) -> Option<u64> {
-    Some(2 * statistics["design"]["num_cells_by_type"]["CCU2C"].as_u64()?)
+fn halves_of_carries(statistics: &Value) -> u64 {
+    2 * statistics["design"]["num_cells_by_type"]["CCU2C"].as_u64().unwrap_or(0)
 }
 
 /// From yosys' statistics.
