@@ -34,7 +34,7 @@ const SITE: &str = "target/book/site";
 /// The documents in the order of the book, by part. A document that is in none is an error.
 const PARTS: &[(&str, &[&str])] = &[
     ("Writing programs", &["language", "examples", "library", "fast-code", "scheduling", "analysis", "editors", "playground"]),
-    ("Running them", &["debugging", "traces", "batch", "plant"]),
+    ("Running them", &["debugging", "traces", "batch", "plant", "system"]),
     ("The processor", &["isa", "timing", "trig", "image"]),
     ("The circuit", &["hardware", "headers", "synthesis"]),
     ("Robots", &["robot", "arm", "model", "models"]),
