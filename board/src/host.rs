@@ -1,6 +1,6 @@
 //! The host's side of the protocol: requests with retries, over any line.
 
-use crate::protocol::{self, Frame, LinkError, Line, Receiver, WORDS, record_words};
+use crate::protocol::{self, Frame, Line, LinkError, Receiver, WORDS, record_words};
 use std::collections::VecDeque;
 use takt_rtl::bench::LoadRecord;
 

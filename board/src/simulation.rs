@@ -215,7 +215,10 @@ fn build(circuit: &Circuit, board: &Board, system: &System, folder: &Path) -> Re
         inputs.len(),
         outputs.len()
     );
-    let lists = [("input", inputs.iter().map(|(name, _)| name).collect::<Vec<_>>()), ("output", outputs.iter().collect())];
+    let lists = [
+        ("input", inputs.iter().map(|(name, _)| name).collect::<Vec<_>>()),
+        ("output", outputs.iter().collect()),
+    ];
     for (what, names) in lists {
         let _ = writeln!(header, "static void {what}_pins(Vtop *top, CData **pins) {{");
         for name in names {

@@ -99,7 +99,8 @@ impl System {
     /// What is at a pin of the board: `motor.high`, `drive`.
     pub fn at(&self, pin: &str) -> Option<String> {
         let signals = SIGNALS.iter().zip(&self.signals);
-        let signal = signals.filter(|(_, at)| at.as_deref() == Some(pin)).map(|(signal, _)| signal.name.to_owned());
+        let signal =
+            signals.filter(|(_, at)| at.as_deref() == Some(pin)).map(|(signal, _)| signal.name.to_owned());
         let pins = self.peripherals.iter().flat_map(|peripheral| {
             let pins = peripheral.kind.pins.iter().zip(&peripheral.pins);
             pins.map(move |(own, at)| (at.as_deref(), || format!("{}.{}", peripheral.name, own.name)))
@@ -330,7 +331,9 @@ impl<'a> Reader<'a> {
             return None;
         };
         let parameters = kind.parameters.iter().map(|parameter| {
-            table.integer(parameter.name, parameter.least, parameter.most).map_or(parameter.default, |at| at.value)
+            table
+                .integer(parameter.name, parameter.least, parameter.most)
+                .map_or(parameter.default, |at| at.value)
         });
         let parameters = parameters.collect();
         let at_publish = kind.strobes.start

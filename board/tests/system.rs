@@ -218,9 +218,11 @@ fn board_runs_talks_and_fails_safe() {
     // A program that misses its deadlines, one that halts, one that makes no number.
     let instead = |what: &str| PROGRAM.replace("        mov     lit, 1\n", what);
     let nan = PROGRAM.replace("fmul    force, f, 0.25", "fdiv    force, zero, zero");
-    for (source, cause) in
-        [(instead(SLOW), "missed deadline"), (instead("        halt\n"), "halt"), (nan, "output that is no number")]
-    {
+    for (source, cause) in [
+        (instead(SLOW), "missed deadline"),
+        (instead("        halt\n"), "halt"),
+        (nan, "output that is no number"),
+    ] {
         let records = top::image(&program(&source)).expect("it fits");
         host.load(&records, top::RECORDS).expect("it is loaded");
         assert!(safe(&mut host.line), "while it is loaded");
@@ -228,7 +230,11 @@ fn board_runs_talks_and_fails_safe() {
         periods(&mut host.line, 8);
         assert!(safe(&mut host.line), "{cause}");
         let status = host.status().expect("status");
-        assert!(status.causes().any(|name| name == cause), "{cause}: {:?}", status.causes().collect::<Vec<_>>());
+        assert!(
+            status.causes().any(|name| name == cause),
+            "{cause}: {:?}",
+            status.causes().collect::<Vec<_>>()
+        );
     }
     assert!(host.register("misses").expect("a register") == 0, "of this program, none");
     // And back to the first one.

@@ -171,7 +171,10 @@ pub(crate) fn run(arguments: &Boards, color: bool, out: &mut Out) -> Result<()> 
         Command::Pins(pins) => self::pins(pins, color, out),
         Command::Check(check) => {
             let (board, system, program) = check.target.read(color)?;
-            let ports = system.peripherals.iter().map(|p| p.reads.iter().flatten().count() + p.writes.iter().flatten().count());
+            let ports = system
+                .peripherals
+                .iter()
+                .map(|p| p.reads.iter().flatten().count() + p.writes.iter().flatten().count());
             writeln!(
                 out,
                 "{}, {}: {} peripherals, {} of the program's ports on pins, a period of {} cycles at {} MHz",
@@ -230,7 +233,8 @@ fn pins(arguments: &Pins, color: bool, out: &mut Out) -> Result<()> {
     };
     let used = |pin: &str| system.as_ref().and_then(|system| system.at(pin));
     if arguments.json {
-        let pins = board.pins.iter().map(|(pin, site)| json!({ "pin": pin, "site": site, "used": used(pin) }));
+        let pins =
+            board.pins.iter().map(|(pin, site)| json!({ "pin": pin, "site": site, "used": used(pin) }));
         return output::json(&pins.collect::<Vec<_>>(), out);
     }
     for (pin, site) in &board.pins {
@@ -245,17 +249,28 @@ fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
     let folder = &arguments.output;
     if arguments.sources {
         let circuit = takt_board::build::write(&board, &system, &program, folder)?;
-        writeln!(out, "{} files in {}; the top level is {}.v", circuit.files.len() + 1, folder.display(), takt_board::top::TOP)?;
+        writeln!(
+            out,
+            "{} files in {}; the top level is {}.v",
+            circuit.files.len() + 1,
+            folder.display(),
+            takt_board::top::TOP
+        )?;
         return Ok(());
     }
-    let venv = std::env::var_os("TAKT_VENV").map_or_else(|| takt_cosim::cache_folder().join("tools"), PathBuf::from);
+    let venv =
+        std::env::var_os("TAKT_VENV").map_or_else(|| takt_cosim::cache_folder().join("tools"), PathBuf::from);
     let step = |what: &str| output::message(&format!("{what} …"));
     step("tools");
     let venv = Venv::with(&venv, &[YOSYS, NEXTPNR])?;
     let report = takt_board::build::build(&venv, &board, &system, &program, arguments.seed, folder, &step)?;
     writeln!(out, "{}: {} bytes, for {}", folder.join("takt.bit").display(), report.bytes, board.text)?;
     for (net, reached, needed) in &report.clocks {
-        writeln!(out, "clock {net}: {reached:.1} MHz, needed {needed:.1}: a margin of {:.1} %", (reached / needed - 1.0) * 100.0)?;
+        writeln!(
+            out,
+            "clock {net}: {reached:.1} MHz, needed {needed:.1}: a margin of {:.1} %",
+            (reached / needed - 1.0) * 100.0
+        )?;
     }
     for (name, (used, there)) in &report.used {
         writeln!(out, "{name:<16} {used:>7} of {there}")?;
@@ -277,7 +292,8 @@ struct Axis {
 
 impl Axis {
     fn new(text: &str, system: &System, sim: &Simulation) -> Result<Axis> {
-        let wrong = || anyhow!("--axis {text}: it is a PWM, a quadrature and a speed, as in motor,encoder,20000");
+        let wrong =
+            || anyhow!("--axis {text}: it is a PWM, a quadrature and a speed, as in motor,encoder,20000");
         let [motor, encoder, speed] = text.split(',').collect::<Vec<_>>()[..] else { return Err(wrong()) };
         let find = |name: &str, kind: &str| {
             let mut all = system.peripherals.iter();

@@ -27,8 +27,9 @@ struct Port {
 impl Port {
     fn open(&self) -> Result<Host<Serial>> {
         let name = self.port.display();
-        let line = Serial::open(&self.port, self.baud)
-            .with_context(|| format!("cannot open {name}: is the board plugged in, and may you use the port?"))?;
+        let line = Serial::open(&self.port, self.baud).with_context(|| {
+            format!("cannot open {name}: is the board plugged in, and may you use the port?")
+        })?;
         // Not the number of the last request of an earlier command.
         let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.subsec_micros());
         Host::connect(line, now as u8).with_context(|| format!("{name} at {} baud", self.baud))
@@ -55,7 +56,8 @@ pub(crate) struct LoadBoard {
 
 pub(crate) fn load(arguments: &LoadBoard, color: bool, out: &mut Out) -> Result<()> {
     files::check(&[("the program", &arguments.program)], &[])?;
-    let program = Load::new(arguments.machine.machine, color).with(&arguments.source).program(&arguments.program)?;
+    let program =
+        Load::new(arguments.machine.machine, color).with(&arguments.source).program(&arguments.program)?;
     let records = image(&program)?;
     let mut host = arguments.port.open()?;
     host.load(&records, RECORDS)?;
@@ -134,9 +136,11 @@ fn find(program: &Program, name: &str) -> Result<(u16, Type)> {
         return Ok((INPUTS + index.get(), port.ty));
     }
     let output = program.outputs.iter().find(|port| port.name == name);
-    let output = output.map(|port| (OUTPUTS + port.register.get() % program.machine.outputs_per_bank, port.ty));
+    let output =
+        output.map(|port| (OUTPUTS + port.register.get() % program.machine.outputs_per_bank, port.ty));
     output.ok_or_else(|| {
-        let names: Vec<&str> = program.inputs.iter().chain(&program.outputs).map(|port| port.name.as_str()).collect();
+        let names: Vec<&str> =
+            program.inputs.iter().chain(&program.outputs).map(|port| port.name.as_str()).collect();
         anyhow!("the program has no port `{name}`; there are {}", names.join(", "))
     })
 }
@@ -153,19 +157,23 @@ fn bits(text: &str, ty: Type) -> Option<u32> {
     match ty {
         Type::F => text.parse::<f32>().ok().map(f32::to_bits),
         Type::I => text.parse::<i32>().ok().map(|n| n as u32),
-        Type::B => text.strip_prefix("0x").map_or_else(|| text.parse().ok(), |hex| u32::from_str_radix(hex, 16).ok()),
+        Type::B => {
+            text.strip_prefix("0x").map_or_else(|| text.parse().ok(), |hex| u32::from_str_radix(hex, 16).ok())
+        }
     }
 }
 
 pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
-    let read = |path: &Path| Load::new(arguments.machine.machine, color).with(&arguments.source).program(path);
+    let read =
+        |path: &Path| Load::new(arguments.machine.machine, color).with(&arguments.source).program(path);
     let program = arguments.program.as_deref().map(read).transpose()?;
     let program = || program.as_ref().context("ports have names in the program: --program FILE");
     // What the command line says is checked before the line is opened.
     let mut settings = Vec::new();
     if let Command::Set { values } = &arguments.command {
         for value in values {
-            let (name, text) = value.split_once('=').with_context(|| format!("`{value}` is not `name=value`"))?;
+            let (name, text) =
+                value.split_once('=').with_context(|| format!("`{value}` is not `name=value`"))?;
             let (address, ty) = find(program()?, name)?;
             ensure!(address < OUTPUTS, "`{name}` is an output port, which the program sets");
             let bits = bits(text, ty).with_context(|| format!("`{text}` is no value of `{name}`"))?;
@@ -242,7 +250,10 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
             }
             let lost = host.register("lost")?;
             if lost > 0 {
-                crate::output::warning(&format!("{lost} frames were lost since power-up: --every takes more periods"), color);
+                crate::output::warning(
+                    &format!("{lost} frames were lost since power-up: --every takes more periods"),
+                    color,
+                );
             }
         }
     }
