@@ -71,6 +71,11 @@ impl Venv {
         }
     }
 
+    /// The path of one of its programs.
+    pub fn tool(&self, name: &str) -> PathBuf {
+        self.0.join("bin").join(name)
+    }
+
     /// Runs one of the tools in a folder. The tools see what lies there; paths are relative to it.
     ///
     /// # Errors
@@ -80,7 +85,7 @@ impl Venv {
         let mut path = self.0.join("bin").into_os_string();
         path.push(":");
         path.push(std::env::var_os("PATH").unwrap_or_default());
-        let mut command = Command::new(self.0.join("bin").join(tool));
+        let mut command = Command::new(self.tool(tool));
         command.env("PATH", path).args(arguments).current_dir(folder);
         match quiet(&mut command) {
             Ok(Ok(())) => Ok(()),

@@ -2,6 +2,7 @@
 //! terminal.
 
 mod account;
+mod accuracy;
 mod analyse;
 mod arm;
 mod asm;
@@ -37,6 +38,7 @@ mod rtl;
 mod run;
 mod select;
 mod synthesis;
+mod system;
 mod trace;
 mod track;
 
@@ -81,6 +83,7 @@ enum Command {
     Debug(debug::Debug),
     Analyse(analyse::Analyse),
     Bound(bound::Bound),
+    Accuracy(accuracy::Accuracy),
     Eval(eval::Eval),
     Fmt(fmt::Fmt),
     Lsp(lsp::Lsp),
@@ -107,6 +110,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Debug(debug) => debug::run(debug, color, out),
         Command::Analyse(analyse) => analyse::run(analyse, color, out),
         Command::Bound(bound) => bound::run(bound, color, out),
+        Command::Accuracy(accuracy) => accuracy::run(accuracy, color, out),
         Command::Eval(eval) => eval::run(eval, out),
         Command::Fmt(fmt) => fmt::run(fmt, out),
         Command::Lsp(lsp) => lsp::run(lsp),

@@ -1,5 +1,5 @@
-//! The Python environment with the open tools of synthesis, place and route, and formal verification: that of `takt board build`, in
-//! the project's folder.
+//! The Python environment with the open tools of synthesis, place and route, formal verification, and the package's tests: that of
+//! `takt board build`, in the project's folder.
 
 use crate::{apt_install, root};
 use anyhow::Result;
@@ -32,6 +32,11 @@ impl Venv {
             other => other?,
         };
         Ok(Venv(venv))
+    }
+
+    /// The path of one of its programs.
+    pub(crate) fn tool(&self, name: &str) -> PathBuf {
+        self.0.tool(name)
     }
 
     /// Runs one of the tools in a folder. The tools see what lies there; paths are relative to it.
