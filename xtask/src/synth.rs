@@ -16,6 +16,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use std::{fs, thread};
+use takt_board::tools::{MAPPING, OPTIONS};
 use takt_isa::spec::machines::MACHINES;
 use takt_isa::{Machine, UNITS, Unit};
 use takt_rtl::export::{export, synthesis_top};
@@ -28,12 +29,6 @@ const RECORD: &str = "docs/synthesis.json";
 const SEEDS: u32 = 5;
 /// What place and route strives for, in MHz: more than any design reaches.
 const TARGET_MHZ: u32 = 200;
-/// Options of `synth_lattice`. Without the slices' wide multiplexers the logic is a third less and not slower; short comparisons
-/// with constants on carry chains, which have to be entered and left, take more than in tables.
-const OPTIONS: &str = "-nowidelut -cmp2softlogic";
-/// What precedes it: a longer way of mapping logic, in which comparators come out at half the size; a machine loses a tenth.
-const MAPPING: &str = "scratchpad -copy abc9.script.flow2 abc9.script";
-
 /// Where the pins of a machine's top level are (those of the ULX3S board). Without a fixed place the placer takes ten times as long.
 const PINS: &str = "LOCATE COMP \"clk\" SITE \"G2\";
 LOCATE COMP \"rst\" SITE \"D6\";
