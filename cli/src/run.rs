@@ -81,8 +81,7 @@ Examples:
   takt run prog.s --inputs in.csv --deny all      for CI: status 3 if a flag is raised, …
   takt run prog.s --batch runs --outputs out.csv  a run for each CSV in the folder `runs`";
 
-/// Cycles in which a period ends, or nobody expects it to any more.
-pub(crate) const PERIOD_LIMIT: u64 = 1_000_000_000;
+pub(crate) use takt_analysis::follow::PERIOD_LIMIT;
 
 /// What the periods of a run came to.
 #[derive(Default)]

@@ -8,6 +8,7 @@ mod failure;
 mod interrupt;
 mod model;
 mod program;
+mod report;
 mod run;
 mod sim;
 
@@ -22,6 +23,8 @@ mod _takt {
     use crate::model::{expressions, robot, robot_functions};
     #[pymodule_export]
     use crate::program::{Program, assemble, flag_names, load, machines, nearest_name};
+    #[pymodule_export]
+    use crate::report::analyse;
     #[pymodule_export]
     use crate::run::{run, run_to_halt};
     #[pymodule_export]
