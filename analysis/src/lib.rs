@@ -1,5 +1,6 @@
-//! Timing analysis of programs: plain data out, nothing printed. `docs/analysis.md` says how it is done and why it is safe.
+//! Analysis of programs, their time and their accuracy: plain data out, nothing printed. `docs/analysis.md` says how it is done and why it is safe.
 //!
+//! - [`accuracy`]: the errors of a run's outputs against binary64, and where they come from.
 //! - [`bound`]: the best and the worst that each section of a program can take, from the program alone.
 //! - [`faster`]: what faster units would bring.
 //! - [`follow`]: a run up to the period that is looked at.
@@ -8,6 +9,7 @@
 //!   operations that sets the time, and what a faster unit would bring.
 //! - [`picture`]: the same as JSON, and drawn, as a page for a browser.
 
+pub mod accuracy;
 pub mod bound;
 mod error;
 pub mod faster;

@@ -5,7 +5,7 @@ use crate::files::{self, Out};
 use crate::load::Load;
 use crate::number;
 use crate::output;
-use crate::ports::{self, Rows};
+use crate::ports;
 use crate::select::{OptionalMachine, SourceArguments};
 use anyhow::{Result, bail};
 use clap::Args;
@@ -15,6 +15,7 @@ use takt_analysis::faster::{Candidate, faster};
 use takt_analysis::follow::{MOST_PERIODS, PERIODS, follow};
 use takt_analysis::picture::Picture;
 use takt_asm::schedule::BlockReport;
+use takt_emu::Rows;
 use takt_isa::timing::Cycle;
 use takt_isa::{Machine, Program};
 

@@ -386,7 +386,7 @@ fn cycles_stand_beside_the_lines() {
     assert!(title.starts_with(&format!("period: {} cycles, bound ", cycles["worst"])), "{title}");
     assert_eq!(lenses[0]["range"]["start"]["line"], 5);
 
-    // Two lines more, above; what is counted moves with its line until it is counted anew.
+    // Two lines more, above; what is counted moves with its line until it is counted again.
     session.edit("main.s", MAIN, ".schedule on\n", "\n\n.schedule on\n");
     let after = lines(&session.ask("textDocument/inlayHint", params));
     let moved: Vec<_> = before.iter().map(|(line, text)| (line + 2, text.clone())).collect();

@@ -11,7 +11,7 @@ fn the_grammar_is_as_generated() {
         let fresh = Path::new(env!("CARGO_TARGET_TMPDIR")).join("takt.tmLanguage.json");
         std::fs::write(&fresh, &generated).expect("the folder is there");
         panic!(
-            "editors/vscode/syntaxes/takt.tmLanguage.json is stale: `cargo xtask docs` writes it anew (as {})",
+            "editors/vscode/syntaxes/takt.tmLanguage.json is stale: `cargo xtask docs` rewrites it (as {})",
             fresh.display()
         );
     }

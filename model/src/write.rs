@@ -98,7 +98,7 @@ struct Writer<'a> {
     temporaries: usize,
 }
 
-/// The source of a function: a program that computes the outputs anew every period.
+/// The source of a function: a program that computes the outputs in every period.
 pub fn source(function: &Function) -> String {
     let nodes = function.nodes();
     let ports = function.inputs.iter().chain(function.outputs.iter().map(|(port, _)| port));
@@ -180,7 +180,7 @@ fn wrapped(names: &[String]) -> Vec<String> {
 
 /// An expression as it would be written, for messages; only the beginning of a long one.
 pub(crate) fn expression(graph: &Graph, inputs: &[Port], id: Id) -> String {
-    /// As deep and as long as one wants to read.
+    /// No deeper and longer than is readable.
     const DEPTH: usize = 6;
     const LENGTH: usize = 160;
     let text = Terms { graph, inputs, names: &HashMap::new(), depth: DEPTH }.operand(id).text;

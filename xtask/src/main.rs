@@ -1,6 +1,7 @@
 //! Project automation. `cargo xtask --help` lists what there is.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+mod book;
 mod docs;
 mod formal;
 mod python;
@@ -8,6 +9,7 @@ mod reach;
 mod share;
 mod synth;
 mod venv;
+mod web;
 
 use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
@@ -49,6 +51,10 @@ enum Task {
     Formal(formal::Arguments),
     /// Compile for aarch64 Linux, macOS, Windows and wasm32, and run the core crates' tests on aarch64 (installs what it lacks).
     Reach(reach::Arguments),
+    /// Build the playground, a page for any file server, in target/playground (installs what it lacks); --test opens it in a browser.
+    Web(web::Arguments),
+    /// Write the documentation as a site, in target/book/site: docs/, the crates' documentation, the playground (installs mdbook).
+    Book(book::Arguments),
     /// Measure how fast emulator, assembler and lockstep are beside native code, GNU `as` and one another; print it and write
     /// docs/speed.md (a few minutes on an idle machine).
     Speed,
@@ -70,6 +76,8 @@ fn main() -> Result<()> {
         Task::Formal(arguments) => formal::formal(&arguments),
         Task::Synth(arguments) => synth::synth(&arguments),
         Task::Reach(arguments) => reach::reach(&arguments),
+        Task::Web(arguments) => web::web(&arguments),
+        Task::Book(arguments) => book::book(&arguments),
         Task::Speed => speed(),
         Task::Wheel(arguments) => python::wheel(&arguments),
         Task::Fuzz { minutes } => fuzz(minutes),

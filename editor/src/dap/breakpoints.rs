@@ -250,7 +250,7 @@ fn check_log(session: &Session, log: &str) -> Result<(), String> {
 /// A log message with its values.
 pub(super) fn logged(session: &Session, log: &str) -> String {
     let value = |expression: &str| match session.parse(expression).and_then(|live| session.evaluate(&live)) {
-        Ok(value) => super::view::value_text(value),
+        Ok(value) => value.to_string(),
         Err(error) => format!("({})", error.lines().next().unwrap_or("")),
     };
     pieces(log).map(|piece| piece.map_or_else(value, str::to_owned)).collect()

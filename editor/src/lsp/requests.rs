@@ -43,7 +43,7 @@ impl Here<'_> {
     }
 }
 
-impl Server<'_> {
+impl Server {
     /// Answers a request from what the documents say now.
     pub(crate) fn answer(&mut self, method: &str, params: Value) -> Result<Value, Failed> {
         if !self.stale.is_empty() {
