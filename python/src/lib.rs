@@ -4,6 +4,7 @@
 //! What comes from Python is checked here as well as there: no argument makes it panic. Long work releases the interpreter
 //! and looks for Ctrl-C.
 
+mod accuracy;
 mod failure;
 mod interrupt;
 mod model;
@@ -17,6 +18,8 @@ use pyo3::prelude::*;
 /// The extension module of the package `takt`; use that one.
 #[pymodule]
 mod _takt {
+    #[pymodule_export]
+    use crate::accuracy::accuracy;
     #[pymodule_export]
     use crate::failure::Failure;
     #[pymodule_export]

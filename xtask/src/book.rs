@@ -37,7 +37,7 @@ const PARTS: &[(&str, &[&str])] = &[
         "Writing programs",
         &["language", "examples", "library", "fast-code", "scheduling", "analysis", "editors", "playground"],
     ),
-    ("Running them", &["debugging", "traces", "batch", "plant"]),
+    ("Running them", &["debugging", "traces", "batch", "plant", "python"]),
     ("The processor", &["isa", "timing", "trig", "image"]),
     ("The circuit", &["hardware", "headers", "synthesis"]),
     ("Robots", &["robot", "arm", "model", "models"]),
