@@ -37,6 +37,7 @@ mod rtl;
 mod run;
 mod select;
 mod synthesis;
+mod system;
 mod trace;
 mod track;
 

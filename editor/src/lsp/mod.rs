@@ -13,6 +13,7 @@ mod hover;
 mod inline;
 mod names;
 mod outline;
+mod pipeline;
 mod program;
 mod requests;
 mod text;
@@ -303,6 +304,9 @@ impl Server {
         let told = diagnostics::by_file(&full.files, &full.diagnostics, &root, self.client.encoding);
         program.full = Some(full);
         self.publish(&root, told);
+        // Clients that do not know it pass over it, as the protocol says of `$/`.
+        let counted = json!({ "uri": uri::of_path(&root) });
+        self.send(Notification::new("$/takt/counted".to_owned(), counted));
         if self.client.refreshes_hints {
             self.ask("workspace/inlayHint/refresh");
         }
