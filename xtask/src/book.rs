@@ -33,10 +33,13 @@ const SITE: &str = "target/book/site";
 
 /// The documents in the order of the book, by part. A document that is in none is an error.
 const PARTS: &[(&str, &[&str])] = &[
-    ("Writing programs", &["language", "examples", "library", "fast-code", "scheduling", "analysis", "editors", "playground"]),
-    ("Running them", &["debugging", "traces", "batch", "plant", "system"]),
+    (
+        "Writing programs",
+        &["language", "examples", "library", "fast-code", "scheduling", "analysis", "editors", "playground"],
+    ),
+    ("Running them", &["debugging", "traces", "batch", "plant", "system", "python"]),
     ("The processor", &["isa", "timing", "trig", "image"]),
-    ("The circuit", &["hardware", "headers", "synthesis", "machine-choice"]),
+    ("The circuit", &["hardware", "headers", "board", "protocol", "synthesis", "machine-choice"]),
     ("Robots", &["robot", "arm", "model", "models"]),
     ("Reference", &["glossary", "speed", "reach"]),
 ];
