@@ -81,7 +81,8 @@ fn the_exact_values_are_those_of_binary64() {
     for _ in 0..500 {
         let mut number = || 0.1 + random.below(1 << 20) as f32 / 1e6;
         let (x, z) = (number(), number());
-        let (shadow, emulator) = run(&program, Shadow::new(&program), &[floats(&program, &[("x", x), ("z", z)])]);
+        let (shadow, emulator) =
+            run(&program, Shadow::new(&program), &[floats(&program, &[("x", x), ("z", z)])]);
         let (x, z) = (f64::from(x), f64::from(z));
         let expected = (x * x + z * 0.75).sqrt() / x.sin().atan2(z) - x;
         let (value, exact, parts) = shadow.value(&emulator, program.outputs[0].register).unwrap();
@@ -220,8 +221,14 @@ fn the_shipped_programs_stay_within_their_bounds() {
         for path in ["hybrid/tracking.s", "examples/pi.s"] {
             let program = shipped(path, machine);
             let enclosure = enclose(&program).unwrap();
-            let named: Vec<_> = enclosure.hazards.iter().map(|h| program.word_place(h.word as usize)).collect();
-            assert!(enclosure.hazards.is_empty(), "{path} on {}: {named:?} {:?}", machine.name, enclosure.hazards);
+            let named: Vec<_> =
+                enclosure.hazards.iter().map(|h| program.word_place(h.word as usize)).collect();
+            assert!(
+                enclosure.hazards.is_empty(),
+                "{path} on {}: {named:?} {:?}",
+                machine.name,
+                enclosure.hazards
+            );
             assert!(enclosure.outputs.iter().all(|output| output.error.is_some()), "{path}");
             check(&program, &enclosure, 60, &mut random);
         }
@@ -243,7 +250,8 @@ fn hazards_name_the_operation_and_what_it_reads() {
         ("fmul y, b, b", "b = 0, 1e19", None),
     ];
     for (operation, range, expected) in cases {
-        let text = format!(".input a, b\n.output y\n.range a = 1, 2\n.range {range}\n{HEAD} {operation}\n wait p\n");
+        let text =
+            format!(".input a, b\n.output y\n.range a = 1, 2\n.range {range}\n{HEAD} {operation}\n wait p\n");
         let program = source(&text, &T3);
         let enclosure = enclose(&program).unwrap();
         let found: Vec<Problem> = enclosure.hazards.iter().map(|hazard| hazard.problem).collect();
@@ -260,11 +268,13 @@ fn hazards_name_the_operation_and_what_it_reads() {
 #[test]
 fn what_cannot_be_enclosed_says_what_is_needed() {
     let refused = |text: &str| enclose(&source(text, &T3)).unwrap_err().to_string();
-    let state = format!(".input a\n.range a = 0, 1\n.output y\n.state s\n{HEAD} fadd s, s, a\n mov y, s\n wait p\n");
+    let state =
+        format!(".input a\n.range a = 0, 1\n.output y\n.state s\n{HEAD} fadd s, s, a\n mov y, s\n wait p\n");
     assert!(refused(&state).contains("the state `s` is read here and has no range"), "{}", refused(&state));
     let input = format!(".input a\n.output y\n{HEAD} mov y, a\n wait p\n");
     assert!(refused(&input).contains("the input `a`"), "{}", refused(&input));
-    let endless = format!(".input a\n.range a = 0, 1\n.output y\n{HEAD}q: fmul y, a, a\n bnz a, q\n wait p\n");
+    let endless =
+        format!(".input a\n.range a = 0, 1\n.output y\n{HEAD}q: fmul y, a, a\n bnz a, q\n wait p\n");
     assert!(refused(&endless).contains(".loop_bound"), "{}", refused(&endless));
     // With a range it is followed; a range that a period does not keep is told.
     let program = source(&state.replace(".state s", ".state s\n.range s = 0, 10"), &T3);
@@ -287,10 +297,58 @@ fn loops_are_followed_turn_by_turn() {
     let enclosure = enclose(&program).unwrap();
     let output = &enclosure.outputs[0];
     let range = output.range.unwrap();
-    assert!(range.contains(0.9f64.powi(9)) && range.contains(1.1f64.powi(9)) && range.high < 3.0, "{range:?}");
+    assert!(
+        range.contains(0.9f64.powi(9)) && range.contains(1.1f64.powi(9)) && range.high < 3.0,
+        "{range:?}"
+    );
     // Eight roundings, the first of which seven products enlarge.
     let (error, least) = (output.error.unwrap(), 4.0 * ulp(1.1f64.powi(9)));
     assert!(error > 0.5 * least && error < 4.0 * least, "{error:e}");
     let mut random = Random::new(1);
     check(&program, &enclosure, 200, &mut random);
+}
+
+#[test]
+fn ranges_survive_images_and_disassembly() {
+    let text = "\
+.input  x, n:int
+.output y
+.state  s, q[2]
+.range  x = -pi, 2*pi
+.range  n = -5, 7
+.range  s, q = 0, 1
+.once
+        mov     s, zero
+        mov     q[1], zero
+        mov     q[2], zero
+        wait    p
+.period
+p:      fadd    y, s, x
+        fadd    s, q[1], q[2]
+        fadd    q[1], s, y
+        fadd    q[2], s, x
+        wait    p
+";
+    let program = source(text, &T3);
+    let ends: Vec<(f64, f64)> = program.ranges.iter().map(Range::ends).collect();
+    let pi = f64::from(std::f32::consts::PI);
+    // The states' bank comes before the inputs'; nothing reads `n`.
+    assert!(ends.contains(&(-pi, 2.0 * pi)) && ends.contains(&(-5.0, 7.0)), "{ends:?}");
+    assert_eq!(ends.iter().filter(|ends| **ends == (0.0, 1.0)).count(), 3, "{ends:?}");
+    let bytes = takt_asm::image::write(&program).unwrap();
+    assert_eq!(takt_asm::image::read(&bytes).unwrap().ranges, program.ranges);
+    let again = source(&takt_asm::disasm::disassemble(&program), &T3);
+    assert_eq!(again.ranges, program.ranges);
+
+    let refused = |line: &str| {
+        let text = format!(".input x\n.output y\n.range {line}\n{HEAD} mov y, x\n wait p\n");
+        let loader = MemoryLoader::new(&[]);
+        let result = takt_asm::assemble_bytes("test.s", text.into(), &loader, &Options::default());
+        result.err().map(|diagnostics| diagnostics.render(false)).unwrap_or_default()
+    };
+    assert!(refused("x = 2, 1").contains("its least value is above its largest"), "{}", refused("x = 2, 1"));
+    assert!(refused("x = 0, 1/0").contains("error"), "{}", refused("x = 0, 1/0"));
+    assert!(refused("z = 0, 1").contains('z'), "{}", refused("z = 0, 1"));
+    let twice = refused("x = 0, 1\n.range x = 0, 2");
+    assert!(twice.contains("this register has a range already"), "{twice}");
 }

@@ -14,8 +14,8 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_analysis::accuracy::{
-    Assumed, Decision, Enclosure, Hazard, Interval, Lost, OperationAccuracy, OutputAccuracy, OutputBound, Part, Problem,
-    Shadow, Worst, enclose,
+    Assumed, Decision, Enclosure, Hazard, Interval, Lost, OperationAccuracy, OutputAccuracy, OutputBound,
+    Part, Problem, Shadow, Worst, enclose,
 };
 use takt_emu::Emulator;
 use takt_isa::Program;
@@ -244,9 +244,7 @@ impl<'a> Measured<'a> {
                 "output": line.output,
             })
         };
-        let decision = |(&word, decision): (&u32, &Decision)| {
-            json!({ "place": self.place(word), "count": decision.count, "period": decision.period })
-        };
+        let decision = |(&word, decision): (&u32, &Decision)| json!({ "place": self.place(word), "count": decision.count, "period": decision.period });
         let lost = |(&word, lost): (&u32, &Lost)| {
             let why = if lost.infinite { "no finite number" } else { "taken as bits" };
             json!({ "place": self.place(word), "why": why, "count": lost.count, "period": lost.period })
@@ -338,11 +336,8 @@ impl<'a> Measured<'a> {
             writeln!(out, "\nerrors are not followed any further at")?;
         }
         for (&word, lost) in shadow.lost().iter().take(SHOWN) {
-            let why = if lost.infinite {
-                "a result that is no finite number"
-            } else {
-                "a value taken as bits"
-            };
+            let why =
+                if lost.infinite { "a result that is no finite number" } else { "a value taken as bits" };
             let (count, period) = (lost.count, lost.period);
             writeln!(out, "  {}: {why}, {count} times, first in period {period}", self.place(word))?;
         }
@@ -369,12 +364,14 @@ fn problem(problem: Problem) -> &'static str {
 }
 
 fn interval(interval: Option<Interval>) -> String {
-    interval.map_or_else(|| "anywhere".to_owned(), |Interval { low, high }| format!("[{low:.6e}, {high:.6e}]"))
+    interval
+        .map_or_else(|| "anywhere".to_owned(), |Interval { low, high }| format!("[{low:.6e}, {high:.6e}]"))
 }
 
 impl Bounded<'_> {
     fn parts(&self, output: &OutputBound) -> Vec<(Option<Location>, f64, f64)> {
-        let parts: Vec<Part> = output.parts.iter().map(|(word, error)| Part { word: *word, error: *error }).collect();
+        let parts: Vec<Part> =
+            output.parts.iter().map(|(word, error)| Part { word: *word, error: *error }).collect();
         by_line(self.program, &parts)
     }
 
@@ -429,16 +426,26 @@ impl Bounded<'_> {
         writeln!(out, "one period on {machine}, all inputs and states in their ranges, the states exact")?;
         let outputs = &enclosure.outputs;
         let width = outputs.iter().map(|output| output.name.len()).max().unwrap_or(0).max(6);
-        writeln!(out, "\n  {:<width$}  {:>32}  {:>12}  {:>9}  most of it from", "output", "range", "error up to", "ulp")?;
+        writeln!(
+            out,
+            "\n  {:<width$}  {:>32}  {:>12}  {:>9}  most of it from",
+            "output", "range", "error up to", "ulp"
+        )?;
         for output in outputs {
             let error = output.error.map_or_else(|| "-".to_owned(), |error| format!("{error:.3e}"));
             let ulps = output.ulps().map_or_else(|| "-".to_owned(), |ulps| format!("{ulps:.2}"));
             let lines = self.parts(output);
             let lines = lines.iter().take(SHOWN_PARTS);
-            let lines = lines.map(|(at, _, share)| format!("{} ({:.0} %)", line_text(program, *at), 100.0 * share));
+            let lines =
+                lines.map(|(at, _, share)| format!("{} ({:.0} %)", line_text(program, *at), 100.0 * share));
             let lines: Vec<String> = lines.collect();
             let range = interval(output.range);
-            writeln!(out, "  {:<width$}  {range:>32}  {error:>12}  {ulps:>9}  {}", output.name, lines.join(", "))?;
+            writeln!(
+                out,
+                "  {:<width$}  {range:>32}  {error:>12}  {ulps:>9}  {}",
+                output.name,
+                lines.join(", ")
+            )?;
         }
         writeln!(out, "  ulp: of the largest value in the range")?;
         if enclosure.hazards.is_empty() {

@@ -1,5 +1,6 @@
 //! `takt analyse`: where the cycles of one period went, bundle by bundle, and what would make it shorter.
 
+use crate::accuracy::Measured;
 use crate::fault;
 use crate::files::{self, Out};
 use crate::load::Load;
@@ -14,6 +15,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use takt_analysis::accuracy::Shadow;
 use takt_analysis::{Issued, Link, LinkKind, Trace, WhatIf};
 use takt_asm::schedule::BlockReport;
 use takt_emu::{Emulator, Status};
@@ -76,7 +78,7 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
     let program = &loaded.program;
     let rows = read_inputs(arguments, program)?;
     let followed = follow(arguments, program, &rows);
-    let (trace, period) = followed.map_err(|error| fault::told(error, &loaded, color))?;
+    let (trace, period, shadow) = followed.map_err(|error| fault::told(error, &loaded, color))?;
     let analysis = Analysis {
         chain: trace.critical_path(program),
         faster: faster(arguments, &load, program, &trace, &rows),
@@ -84,6 +86,7 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
         name: files::input_name(&arguments.file),
         period,
         trace,
+        shadow,
     };
     if let Some(path) = &arguments.html {
         // `</` would end the script.
@@ -117,8 +120,8 @@ fn read_inputs(arguments: &Analyse, program: &Program) -> Result<Rows> {
     Ok(rows)
 }
 
-/// Runs the program and follows the last period asked for; its number, 0 being what runs once.
-fn follow(arguments: &Analyse, program: &Program, rows: &Rows) -> Result<(Trace, u64)> {
+/// Runs the program and follows the last period asked for; its number, 0 being what runs once, and its errors, by themselves.
+fn follow(arguments: &Analyse, program: &Program, rows: &Rows) -> Result<(Trace, u64, Shadow)> {
     let wanted = arguments.periods.unwrap_or(rows.len() as u64);
     let mut emulator = Emulator::new(program)?;
     let set = |emulator: &mut Emulator, period: u64| -> Result<()> {
@@ -129,7 +132,12 @@ fn follow(arguments: &Analyse, program: &Program, rows: &Rows) -> Result<(Trace,
         Ok(())
     };
     set(&mut emulator, 0)?;
-    let mut trace = takt_analysis::trace(&mut emulator)?;
+    let look = |emulator: &mut Emulator| -> Result<(Trace, Shadow)> {
+        let mut shadow = Shadow::new(program);
+        shadow.run_period(&mut emulator.clone())?;
+        Ok((takt_analysis::trace(emulator)?, shadow))
+    };
+    let (mut trace, mut shadow) = look(&mut emulator)?;
     let mut period = 0;
     while period < wanted && !matches!(emulator.status(), Status::Halted { .. }) {
         period += 1;
@@ -138,13 +146,13 @@ fn follow(arguments: &Analyse, program: &Program, rows: &Rows) -> Result<(Trace,
         if period < wanted {
             emulator.run_period(&[]).with_context(which)?;
         } else {
-            trace = takt_analysis::trace(&mut emulator).with_context(which)?;
+            (trace, shadow) = look(&mut emulator).with_context(which)?;
         }
     }
     if period < wanted && (arguments.periods.is_some() || period > 0) {
         bail!("the program halts before period {wanted}; --periods {period} looks at the last");
     }
-    Ok((trace, period))
+    Ok((trace, period, shadow))
 }
 
 /// What a faster unit would bring: to the program as it is, and assembled for a machine that has it.
@@ -200,6 +208,7 @@ struct Analysis<'p> {
     name: String,
     period: u64,
     trace: Trace,
+    shadow: Shadow,
     chain: Vec<Link>,
     faster: Vec<Faster>,
 }
@@ -366,6 +375,7 @@ impl Analysis<'_> {
             "bundles": self.trace.issues.iter().enumerate().map(bundle).collect::<Vec<_>>(),
             "lines": self.lines().iter().map(line).collect::<Vec<_>>(),
             "critical_path": self.chain.iter().map(link).collect::<Vec<_>>(),
+            "accuracy": Measured::new(program, &self.shadow).json(),
             "one_cycle_less": self.faster.iter().map(faster).collect::<Vec<_>>(),
         })
     }
