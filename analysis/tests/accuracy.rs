@@ -197,7 +197,7 @@ fn random_line(machine: &'static Machine, random: &mut Random) -> String {
 fn no_run_exceeds_a_bound() {
     let mut random = Random::new(15);
     let (mut bounded, mut tight) = (0, 0);
-    for round in 0..600 {
+    for round in 0..240 {
         let machine = MACHINES[round % MACHINES.len()];
         let text = random_line(machine, &mut random);
         let program = source(&text, machine);
@@ -211,15 +211,16 @@ fn no_run_exceeds_a_bound() {
         tight += usize::from(most > 0.3);
     }
     // Bounds that nothing comes near to would prove little.
-    assert!(bounded > 400 && tight > 100, "{bounded} bounded, {tight} tight");
+    assert!(bounded > 160 && tight > 40, "{bounded} bounded, {tight} tight");
 }
 
 #[test]
 fn the_shipped_programs_stay_within_their_bounds() {
     let mut random = Random::new(3);
-    for machine in MACHINES {
-        for path in ["hybrid/tracking.s", "examples/pi.s"] {
-            let program = shipped(path, machine);
+    let pi = include_str!("../../programs/examples/pi.s");
+    for machine in [&T3, MACHINES[MACHINES.len() - 1]] {
+        let programs = [("tracking.s", shipped("hybrid/tracking.s", machine)), ("pi.s", source(pi, machine))];
+        for (path, program) in programs {
             let enclosure = enclose(&program).unwrap();
             let named: Vec<_> =
                 enclosure.hazards.iter().map(|h| program.word_place(h.word as usize)).collect();
@@ -269,7 +270,7 @@ fn hazards_name_the_operation_and_what_it_reads() {
 fn what_cannot_be_enclosed_says_what_is_needed() {
     let refused = |text: &str| enclose(&source(text, &T3)).unwrap_err().to_string();
     let state =
-        format!(".input a\n.range a = 0, 1\n.output y\n.state s\n{HEAD} fadd s, s, a\n mov y, s\n wait p\n");
+        format!(".input a\n.range a = 0, 1\n.output y\n.state s\n.preset s = 0\n{HEAD} fadd s, s, a\n mov y, s\n wait p\n");
     assert!(refused(&state).contains("the state `s` is read here and has no range"), "{}", refused(&state));
     let input = format!(".input a\n.output y\n{HEAD} mov y, a\n wait p\n");
     assert!(refused(&input).contains("the input `a`"), "{}", refused(&input));
