@@ -5,11 +5,13 @@
 //! - [`straight()`]: in which cycle each operation of a straight line issues, and what it waits for.
 //! - [`trace`]: where the cycles of one period, or of a run, went: every issue and what it waited for, the chain of
 //!   operations that sets the time, and what a faster unit would bring.
+//! - [`picture`]: the same as JSON, and drawn, as a page for a browser.
 
 pub mod accuracy;
 pub mod bound;
 mod error;
 mod graph;
+pub mod picture;
 mod straight;
 mod trace;
 

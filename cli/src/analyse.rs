@@ -6,23 +6,20 @@ use crate::files::{self, Out};
 use crate::load::Load;
 use crate::number;
 use crate::output;
-use crate::ports::{self, Rows};
+use crate::ports;
 use crate::select::{OptionalMachine, SourceArguments};
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use serde_json::{Value, json};
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_analysis::accuracy::Shadow;
-use takt_analysis::{Issued, Link, LinkKind, Trace, WhatIf};
+use takt_analysis::picture::{Faster, Picture, Reassembled, gained};
+use takt_analysis::{Link, Trace, WhatIf};
 use takt_asm::schedule::BlockReport;
-use takt_emu::{Emulator, Status};
-use takt_isa::program::Location;
-use takt_isa::spec::instructions::Function;
+use takt_emu::{Emulator, Rows, Status};
 use takt_isa::timing::{Cause, Cycle};
-use takt_isa::{BundleAddress, Instruction, Machine, Program, SlotIndex};
+use takt_isa::{Machine, Program, SlotIndex};
 
 /// Show where the cycles of a period went: every bundle, every stall, the chain that sets the time.
 ///
@@ -79,24 +76,17 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
     let rows = read_inputs(arguments, program)?;
     let followed = follow(arguments, program, &rows);
     let (trace, period, shadow) = followed.map_err(|error| fault::told(error, &loaded, color))?;
-    let analysis = Analysis {
-        chain: trace.critical_path(program),
-        faster: faster(arguments, &load, program, &trace, &rows),
-        program,
-        name: files::input_name(&arguments.file),
-        period,
-        trace,
-        shadow,
-    };
+    let faster = faster(arguments, &load, program, &trace, &rows);
+    let accuracy = Some(Measured::new(program, &shadow).json());
+    let picture =
+        Picture { faster, accuracy, ..Picture::new(program, files::input_name(&arguments.file), period, trace) };
     if let Some(path) = &arguments.html {
-        // `</` would end the script.
-        let data = serde_json::to_string(&analysis.json())?.replace("</", "<\\/");
-        files::write(path, include_str!("analyse.html").replace("/*DATA*/", &data).as_bytes())?;
+        files::write(path, picture.html().as_bytes())?;
     }
     if arguments.json {
-        output::json(&analysis.json(), out)?;
+        output::json(&picture.json(), out)?;
     } else if !arguments.html.as_deref().is_some_and(files::is_dash) {
-        analysis.text(out)?;
+        text(&picture, out)?;
     }
     Ok(())
 }
@@ -155,19 +145,6 @@ fn follow(arguments: &Analyse, program: &Program, rows: &Rows) -> Result<(Trace,
     Ok((trace, period, shadow))
 }
 
-/// What a faster unit would bring: to the program as it is, and assembled for a machine that has it.
-struct Faster {
-    what: WhatIf,
-    reassembled: Option<Reassembled>,
-}
-
-/// The program assembled for a machine with a faster unit.
-struct Reassembled {
-    cycles: Cycle,
-    /// What no schedule of its blocks can be shorter than.
-    least: Cycle,
-}
-
 fn faster(arguments: &Analyse, load: &Load, program: &Program, trace: &Trace, rows: &Rows) -> Vec<Faster> {
     // Standard input has been read; an image has no source.
     let source = Some(&arguments.file).filter(|file| !files::is_dash(file));
@@ -202,270 +179,83 @@ fn quicker(machine: &Machine, unit: Option<(SlotIndex, u8)>) -> &'static Machine
     Box::leak(Box::new(Machine { slots: Box::leak(slots.into()), refill, ..*machine }))
 }
 
-/// All that is known of the period.
-struct Analysis<'p> {
-    program: &'p Program,
-    name: String,
-    period: u64,
-    trace: Trace,
-    shadow: Shadow,
-    chain: Vec<Link>,
-    faster: Vec<Faster>,
+fn text(picture: &Picture<'_>, out: &mut Out) -> Result<()> {
+    let Picture { program, trace, .. } = picture;
+    let issues = &trace.issues;
+    let what =
+        if picture.period == 0 { "what runs once".to_owned() } else { format!("period {}", picture.period) };
+    let (machine, cycles) = (program.machine.name, trace.cycles);
+    writeln!(out, "{what} on {machine}: {cycles} cycles, {} bundles", issues.len())?;
+    let share = |count: u64| 100.0 * count as f64 / cycles.max(1) as f64;
+    let slots = picture.slots().into_iter();
+    let slots: Vec<String> =
+        slots.map(|(name, count)| format!("{name} {count} ({:.0} %)", share(count))).collect();
+    writeln!(out, "operations by slot, and their share of the cycles: {}", slots.join(", "))?;
+
+    let mut stalls: Vec<(usize, Cause, u32)> = Vec::new();
+    for (i, issue) in issues.iter().enumerate() {
+        stalls.extend(issue.stalls.iter().map(|&(cause, cycles)| (i, cause, cycles)));
+    }
+    stalls.sort_by_key(|&(i, _, cycles)| (Reverse(cycles), i));
+    let stalled: u32 = stalls.iter().map(|(_, _, cycles)| cycles).sum();
+    writeln!(out, "\nstalls: {}, {stalled} cycles; the longest:", stalls.len())?;
+    for &(i, cause, cycles) in stalls.iter().take(SHOWN) {
+        let (at, what) = (program.bundle_text(issues[i].address), program.cause_text(cause));
+        writeln!(out, "  {cycles:>5}  before cycle {:<5} {at}: {what}", picture.cycle(i))?;
+    }
+
+    let chain: Cycle = picture.chain.iter().map(|link| link.cycles).sum();
+    writeln!(out, "\nthe chain that sets the time: {} links, {chain} cycles, through", picture.chain.len())?;
+    for (kind, cycles) in picture.chain_by_kind() {
+        writeln!(out, "  {cycles:>5}  {kind}")?;
+    }
+    let mut links: Vec<&Link> = picture.chain.iter().filter(|link| link.cycles > 1).collect();
+    links.sort_by_key(|link| (Reverse(link.cycles), link.to));
+    links.truncate(SHOWN);
+    links.sort_by_key(|link| link.to);
+    writeln!(out, "its longest links:")?;
+    for link in links {
+        let (to, how) = (program.bundle_text(issues[link.to].address), picture.link(link));
+        writeln!(out, "  {:>5}  to cycle {:<5} {to}: {how}", link.cycles, picture.cycle(link.to))?;
+    }
+
+    faster_text(picture, out)
 }
 
-impl Analysis<'_> {
-    fn unit(&self, unit: Option<(SlotIndex, u8)>) -> &'static str {
-        unit.map_or("front end", |(slot, unit)| self.program.machine.slot(slot).units[usize::from(unit)].name)
+/// What a faster unit would bring; where that is more cycles than today, why.
+fn faster_text(picture: &Picture<'_>, out: &mut Out) -> Result<()> {
+    let today = picture.trace.cycles;
+    writeln!(out, "\none cycle less in      as it is      reassembled")?;
+    let gain = |new: Cycle| format!("{new} ({:+})", new.cast_signed() - today.cast_signed());
+    for Faster { what, reassembled } in &picture.faster {
+        let reassembled =
+            reassembled.as_ref().map_or_else(|| "-".to_owned(), |reassembled| gain(reassembled.cycles));
+        writeln!(out, "  {:<16} {:>12} {reassembled:>16}", picture.unit(what.unit), gain(what.cycles))?;
     }
-
-    fn bundle(&self, issue: usize) -> Vec<Instruction> {
-        self.program.bundle(self.trace.issues[issue].address).and_then(Result::ok).unwrap_or_default()
+    let worse: Vec<&WhatIf> =
+        picture.faster.iter().map(|faster| &faster.what).filter(|what| what.cycles > today).collect();
+    if !worse.is_empty() {
+        writeln!(out, "more as it is: in bundles packed for today's latencies, sooner results meet others")?;
     }
-
-    /// Cycles are counted from the tick or from reset: the first is 1.
-    fn cycle(&self, issue: usize) -> Cycle {
-        let last = self.trace.issues.last().map_or(0, |issue| issue.cycle);
-        self.trace.issues[issue].cycle + self.trace.cycles - last
+    for what in worse {
+        let stalls: Vec<String> = gained(what).map(|(kind, more)| format!("{kind} {more:+}")).collect();
+        writeln!(out, "  {:<16} stalled cycles: {}", picture.unit(what.unit), stalls.join(", "))?;
     }
-
-    /// What a link of the chain goes through, and the register that it is about.
-    fn through(&self, link: &Link) -> (String, Option<String>) {
-        let machine = self.program.machine;
-        let text = match link.kind {
-            LinkKind::Result { register } => {
-                let bundle = self.bundle(link.from);
-                let mut writers = bundle.iter().zip(machine.slots);
-                let writer = writers.find(|(instruction, slot)| instruction.writes(slot) == Some(register));
-                let unit = writer.and_then(|(instruction, slot)| {
-                    Some(slot.units[slot.unit_for(instruction.op.row().function)?].name)
-                });
-                return (unit.unwrap_or("?").to_owned(), Some(self.program.register_text(register)));
-            }
-            LinkKind::Unit { slot, unit } => format!("{} busy", self.unit(Some((slot, unit)))),
-            LinkKind::Drain => "drain".to_owned(),
-            LinkKind::WritePort { slot } => {
-                format!("write port of bank {}", machine.slot(slot).bank.name)
-            }
-            LinkKind::FrontEnd => "front end".to_owned(),
-            LinkKind::Order => "order of issue".to_owned(),
-        };
-        (text, None)
+    let worse = || picture.faster.iter().filter_map(|faster| Some((faster, faster.reassembled.as_ref()?)));
+    let worse = || worse().filter(|(_, reassembled)| reassembled.cycles > today);
+    if worse().next().is_some() {
+        writeln!(
+            out,
+            "more when reassembled: the search ended with a longer schedule, which proves nothing"
+        )?;
     }
-
-    fn link(&self, link: &Link) -> String {
-        match self.through(link) {
-            (unit, Some(register)) => format!("{register} through {unit}"),
-            (text, None) => text,
-        }
+    for (faster, reassembled) in worse() {
+        writeln!(
+            out,
+            "  {:<16} none takes fewer than {}",
+            picture.unit(faster.what.unit),
+            reassembled.least
+        )?;
     }
-
-    /// Cycles of the chain by what they go through.
-    fn chain_by_kind(&self) -> Vec<(String, Cycle)> {
-        let mut kinds: BTreeMap<String, Cycle> = BTreeMap::new();
-        for link in &self.chain {
-            *kinds.entry(self.through(link).0).or_default() += link.cycles;
-        }
-        let mut kinds: Vec<_> = kinds.into_iter().collect();
-        kinds.sort_by_key(|(_, cycles)| Reverse(*cycles));
-        kinds
-    }
-
-    /// Bundles and stalled cycles by source line.
-    fn lines(&self) -> BTreeMap<(u32, u32), (u64, Cycle)> {
-        let mut lines: BTreeMap<(u32, u32), (u64, Cycle)> = BTreeMap::new();
-        for issue in &self.trace.issues {
-            let Some(location) = self.program.location(issue.address) else { continue };
-            let line = lines.entry((location.file, location.line)).or_default();
-            line.0 += 1;
-            line.1 += issue.stalls.iter().map(|(_, cycles)| Cycle::from(*cycles)).sum::<Cycle>();
-        }
-        lines
-    }
-
-    /// Operations that each slot issued.
-    fn slots(&self) -> Vec<(&'static str, u64)> {
-        let mut counts: Vec<_> = self.program.machine.slots.iter().map(|slot| (slot.name, 0)).collect();
-        for issue in 0..self.trace.issues.len() {
-            for (count, instruction) in counts.iter_mut().zip(&self.bundle(issue)) {
-                count.1 += u64::from(instruction.op.row().function != Function::Idle);
-            }
-        }
-        counts
-    }
-
-    fn operation_json(
-        &self,
-        address: BundleAddress,
-        s: SlotIndex,
-        instruction: &Instruction,
-    ) -> Option<Value> {
-        let (program, slot) = (self.program, self.program.machine.slot(s));
-        let function = instruction.op.row().function;
-        let unit = &slot.units[slot.unit_for(function).filter(|_| function != Function::Idle)?];
-        let target = |address: BundleAddress| match program.nearest_label(address) {
-            Some((label, 0)) => label.to_owned(),
-            _ => address.to_string(),
-        };
-        Some(json!({
-            "slot": slot.name,
-            "unit": unit.name,
-            "text": instruction.text_with(program.machine, s, |register| program.register_text(register), target),
-            "place": program.operation_place(address, s),
-            "latency": instruction.writes(slot).map(|_| unit.latency),
-        }))
-    }
-
-    fn json(&self) -> Value {
-        let program = self.program;
-        let critical: BTreeSet<usize> = self.chain.iter().flat_map(|link| [link.from, link.to]).collect();
-        let stall = |(cause, cycles): &(Cause, u32)| {
-            let producer = match *cause {
-                Cause::Operand { producer, .. } | Cause::Destination { producer, .. } => Some(producer),
-                Cause::Branch { from } => Some(from),
-                _ => None,
-            };
-            json!({
-                "cause": cause.name(),
-                "cycles": cycles,
-                "text": program.cause_text(*cause),
-                "producer": producer,
-                "producer_place": producer.and_then(|address| program.bundle_place(address)),
-            })
-        };
-        let bundle = |(i, issue): (usize, &Issued)| {
-            let operations = self.bundle(i);
-            let operations = SlotIndex::all().zip(&operations);
-            json!({
-                "address": issue.address,
-                "cycle": self.cycle(i),
-                "place": program.bundle_place(issue.address),
-                "stalls": issue.stalls.iter().map(stall).collect::<Vec<_>>(),
-                "critical": critical.contains(&i),
-                "operations": operations
-                    .filter_map(|(s, instruction)| self.operation_json(issue.address, s, instruction))
-                    .collect::<Vec<_>>(),
-            })
-        };
-        let line = |(&(file, line), &(bundles, stalled)): (&(u32, u32), &(u64, Cycle))| {
-            let place = program.place_text(Location { file, line });
-            json!({ "place": place, "bundles": bundles, "stalled": stalled })
-        };
-        let link = |link: &Link| {
-            let (through, register) = self.through(link);
-            json!({
-                "from": link.from, "to": link.to, "cycles": link.cycles, "through": through, "register": register,
-            })
-        };
-        let faster = |faster: &Faster| {
-            let reassembled = faster.reassembled.as_ref();
-            json!({
-                "unit": self.unit(faster.what.unit),
-                "as_it_is": faster.what.cycles,
-                "reassembled": reassembled.map(|reassembled| reassembled.cycles),
-                "reassembled_least": reassembled.map(|reassembled| reassembled.least),
-                "stalls": gained(&faster.what).map(|(kind, more)| (kind.to_owned(), json!(more))).collect::<Value>(),
-            })
-        };
-        json!({
-            "program": self.name,
-            "machine": program.machine.name,
-            "period": self.period,
-            "cycles": self.trace.cycles,
-            "slots": self.slots().into_iter().collect::<BTreeMap<_, _>>(),
-            "bundles": self.trace.issues.iter().enumerate().map(bundle).collect::<Vec<_>>(),
-            "lines": self.lines().iter().map(line).collect::<Vec<_>>(),
-            "critical_path": self.chain.iter().map(link).collect::<Vec<_>>(),
-            "accuracy": Measured::new(program, &self.shadow).json(),
-            "one_cycle_less": self.faster.iter().map(faster).collect::<Vec<_>>(),
-        })
-    }
-
-    fn text(&self, out: &mut Out) -> Result<()> {
-        let Analysis { program, trace, .. } = self;
-        let issues = &trace.issues;
-        let what =
-            if self.period == 0 { "what runs once".to_owned() } else { format!("period {}", self.period) };
-        let (machine, cycles) = (program.machine.name, trace.cycles);
-        writeln!(out, "{what} on {machine}: {cycles} cycles, {} bundles", issues.len())?;
-        let share = |count: u64| 100.0 * count as f64 / cycles.max(1) as f64;
-        let slots = self.slots().into_iter();
-        let slots: Vec<String> =
-            slots.map(|(name, count)| format!("{name} {count} ({:.0} %)", share(count))).collect();
-        writeln!(out, "operations by slot, and their share of the cycles: {}", slots.join(", "))?;
-
-        let mut stalls: Vec<(usize, Cause, u32)> = Vec::new();
-        for (i, issue) in issues.iter().enumerate() {
-            stalls.extend(issue.stalls.iter().map(|&(cause, cycles)| (i, cause, cycles)));
-        }
-        stalls.sort_by_key(|&(i, _, cycles)| (Reverse(cycles), i));
-        let stalled: u32 = stalls.iter().map(|(_, _, cycles)| cycles).sum();
-        writeln!(out, "\nstalls: {}, {stalled} cycles; the longest:", stalls.len())?;
-        for &(i, cause, cycles) in stalls.iter().take(SHOWN) {
-            let (at, what) = (program.bundle_text(issues[i].address), program.cause_text(cause));
-            writeln!(out, "  {cycles:>5}  before cycle {:<5} {at}: {what}", self.cycle(i))?;
-        }
-
-        let chain: Cycle = self.chain.iter().map(|link| link.cycles).sum();
-        writeln!(out, "\nthe chain that sets the time: {} links, {chain} cycles, through", self.chain.len())?;
-        for (kind, cycles) in self.chain_by_kind() {
-            writeln!(out, "  {cycles:>5}  {kind}")?;
-        }
-        let mut links: Vec<&Link> = self.chain.iter().filter(|link| link.cycles > 1).collect();
-        links.sort_by_key(|link| (Reverse(link.cycles), link.to));
-        links.truncate(SHOWN);
-        links.sort_by_key(|link| link.to);
-        writeln!(out, "its longest links:")?;
-        for link in links {
-            let (to, how) = (program.bundle_text(issues[link.to].address), self.link(link));
-            writeln!(out, "  {:>5}  to cycle {:<5} {to}: {how}", link.cycles, self.cycle(link.to))?;
-        }
-
-        self.faster_text(out)
-    }
-
-    /// What a faster unit would bring; where that is more cycles than today, why.
-    fn faster_text(&self, out: &mut Out) -> Result<()> {
-        let today = self.trace.cycles;
-        writeln!(out, "\none cycle less in      as it is      reassembled")?;
-        let gain = |new: Cycle| format!("{new} ({:+})", new.cast_signed() - today.cast_signed());
-        for Faster { what, reassembled } in &self.faster {
-            let reassembled =
-                reassembled.as_ref().map_or_else(|| "-".to_owned(), |reassembled| gain(reassembled.cycles));
-            writeln!(out, "  {:<16} {:>12} {reassembled:>16}", self.unit(what.unit), gain(what.cycles))?;
-        }
-        let worse: Vec<&WhatIf> =
-            self.faster.iter().map(|faster| &faster.what).filter(|what| what.cycles > today).collect();
-        if !worse.is_empty() {
-            writeln!(
-                out,
-                "more as it is: in bundles packed for today's latencies, sooner results meet others"
-            )?;
-        }
-        for what in worse {
-            let stalls: Vec<String> = gained(what).map(|(kind, more)| format!("{kind} {more:+}")).collect();
-            writeln!(out, "  {:<16} stalled cycles: {}", self.unit(what.unit), stalls.join(", "))?;
-        }
-        let worse = || self.faster.iter().filter_map(|faster| Some((faster, faster.reassembled.as_ref()?)));
-        let worse = || worse().filter(|(_, reassembled)| reassembled.cycles > today);
-        if worse().next().is_some() {
-            writeln!(
-                out,
-                "more when reassembled: the search ended with a longer schedule, which proves nothing"
-            )?;
-        }
-        for (faster, reassembled) in worse() {
-            writeln!(
-                out,
-                "  {:<16} none takes fewer than {}",
-                self.unit(faster.what.unit),
-                reassembled.least
-            )?;
-        }
-        Ok(())
-    }
-}
-
-/// The stalls that a faster unit would add or take away, by kind.
-fn gained(what: &WhatIf) -> impl Iterator<Item = (&'static str, i64)> {
-    Cause::KINDS.into_iter().zip(what.stalls).filter(|(_, more)| *more != 0)
+    Ok(())
 }

@@ -7,6 +7,7 @@ mod analyse;
 mod arm;
 mod asm;
 mod batch;
+mod board;
 mod bound;
 mod completions;
 mod controller;
@@ -36,6 +37,7 @@ mod rtl;
 mod run;
 mod select;
 mod synthesis;
+mod system;
 mod trace;
 mod track;
 
@@ -86,6 +88,7 @@ enum Command {
     Lsp(lsp::Lsp),
     Dap(dap::Dap),
     Rtl(rtl::Rtl),
+    Board(board::Boards),
     Cosim(cosim::Cosim),
     Isa(isa::Isa),
     Machines(machines::Machines),
@@ -110,6 +113,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Lsp(lsp) => lsp::run(lsp),
         Command::Dap(dap) => dap::run(dap),
         Command::Rtl(rtl) => rtl::run(rtl, color, out),
+        Command::Board(board) => board::run(board, color, out),
         Command::Cosim(cosim) => cosim::run(cosim, color, out),
         Command::Isa(isa) => isa::run(isa, out),
         Command::Machines(machines) => machines::run(machines, out),

@@ -4,6 +4,7 @@ mod accuracy;
 pub mod console;
 pub mod fault;
 mod info;
+pub mod inputs;
 pub mod panes;
 pub mod session;
 pub mod trace;

@@ -330,21 +330,7 @@ impl Resolver<'_> {
         if places.len() != operands.len() {
             return Err(self.wrong_count(at, row, written, operands));
         }
-        let mut operation = Operation {
-            op,
-            slots,
-            slot: slots.first(),
-            dest: None,
-            sources: [RegisterId::ZERO; 3],
-            constant: Constant::None,
-            location: location.map(|(location, _)| location),
-            columns: location.and_then(|(_, columns)| columns),
-            span: written.span,
-            expansion: at.scope.0,
-            made: false,
-            order: 0,
-            written: (at.ast, number),
-        };
+        let mut operation = Operation::new(op, slots, written.span, location, at.scope.0, (at.ast, number));
         let mut failed = false;
         for (place, operand) in places.iter().zip(operands) {
             // All operands are looked at, whatever is wrong with one.
@@ -375,19 +361,8 @@ impl Resolver<'_> {
         };
         self.ir.raw.push(bits);
         Ok(Operation {
-            op: Op::nop,
-            slots: Slots::of(index),
-            slot: Some(index),
-            dest: None,
-            sources: [RegisterId::ZERO; 3],
             constant: Constant::Raw(self.ir.raw.len() as u32 - 1),
-            location: location.map(|(location, _)| location),
-            columns: location.and_then(|(_, columns)| columns),
-            span: written.span,
-            expansion: at.scope.0,
-            made: false,
-            order: 0,
-            written: (at.ast, number),
+            ..Operation::new(Op::nop, Slots::of(index), written.span, location, at.scope.0, (at.ast, number))
         })
     }
 

@@ -22,7 +22,7 @@ pub(crate) fn parameters<P: DeserializeOwned>(method: &str, params: Value) -> Re
     serde_json::from_value(params).map_err(error)
 }
 
-impl Server<'_> {
+impl Server {
     pub(crate) fn request(&mut self, request: Request) {
         let Request { id, method, params } = request;
         let result = match (self.phase, method.as_str()) {

@@ -1,0 +1,171 @@
+"""CasADi functions and SymPy expressions for `takt model`.
+
+    import takt_expressions
+    takt_expressions.casadi(f, "f.json")                      # a casadi.Function; MX functions are expanded
+    takt_expressions.sympy("f", {"q": [q1, q2]}, {"tau": [e1, e2]}, "f.json")
+
+and then `takt model f.json`. (The package `takt` goes the same way, without a file.) docs/model.md describes the format, which
+anything may write. Nothing is simplified here beyond what the tool itself does: that is `takt model`'s task. This module needs
+nothing but the tool whose expressions it reads.
+"""
+
+import json
+import math
+
+FORMAT = "takt-expressions 1"
+
+
+def _write(path, text):
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text)
+
+
+def _text(name, source, inputs, outputs, code):
+    """One instruction a line, so that a message can say where."""
+    head = {"format": FORMAT, "name": name, "source": source, "inputs": inputs, "outputs": outputs}
+    lines = ",\n".join("  " + json.dumps(step, allow_nan=False) for step in code)
+    return json.dumps(head)[:-1] + ', "code": [\n' + lines + "\n]}\n"
+
+
+def _finite(value):
+    value = float(value)
+    if not math.isfinite(value):
+        raise ValueError(f"the constant {value} has no meaning on the machine")
+    return value
+
+
+def casadi(function, path):
+    """Writes a `casadi.Function` of version 3.6 to 3.8, expanded to scalars."""
+    _write(path, casadi_text(function))
+
+
+def casadi_text(function):
+    """The same as text."""
+    import casadi as ca
+
+    f = function if function.is_a("SXFunction") else function.expand()
+    opcodes = {value: name[3:].lower() for name, value in vars(ca).items() if name.startswith("OP_")}
+
+    def argument(name, sparsity):
+        rows, columns = sparsity.shape
+        nonzeros = [list(place) for place in zip(*sparsity.get_triplet())]
+        return {"name": name, "rows": rows, "columns": columns, "nonzeros": nonzeros}
+
+    inputs = [argument(f.name_in(i), f.sparsity_in(i)) for i in range(f.n_in())]
+    outputs = [argument(f.name_out(i), f.sparsity_out(i)) for i in range(f.n_out())]
+    code = []
+    for k in range(f.n_instructions()):
+        op = opcodes.get(f.instruction_id(k), str(f.instruction_id(k)))
+        of, to = f.instruction_input(k), f.instruction_output(k)
+        if op == "input":
+            code.append({"op": op, "to": to[0], "port": of})
+        elif op == "output":
+            code.append({"op": op, "of": of, "port": to})
+        elif op == "const":
+            code.append({"op": op, "to": to[0], "value": _finite(f.instruction_constant(k))})
+        else:
+            code.append({"op": op, "to": to[0], "of": of})
+    return _text(f.name(), "CasADi " + ca.__version__, inputs, outputs, code)
+
+
+class _Sympy:
+    """Expressions to instructions, in places that are written once."""
+
+    FUNCTIONS = {
+        "sin": "sin", "cos": "cos", "tan": "tan", "asin": "asin", "acos": "acos", "atan": "atan", "atan2": "atan2",
+        "exp": "exp", "log": "log", "Abs": "fabs", "sign": "sign",
+    }
+    FOLDED = {"Add": "add", "Mul": "mul", "Min": "fmin", "Max": "fmax", "And": "and", "Or": "or"}
+    RELATIONS = {
+        "StrictLessThan": ("lt", False), "LessThan": ("le", False), "StrictGreaterThan": ("lt", True),
+        "GreaterThan": ("le", True), "Equality": ("eq", False), "Unequality": ("ne", False),
+    }
+
+    def __init__(self, sympy):
+        self.sympy, self.code, self.known = sympy, [], {}
+
+    def step(self, op, of=(), **more):
+        to = len(self.code)
+        self.code.append({"op": op, "to": to, **({"of": list(of)} if of else {}), **more})
+        return to
+
+    def place(self, e):
+        if e not in self.known:
+            self.known[e] = self.make(e)
+        return self.known[e]
+
+    def make(self, e):
+        name = type(e).__name__
+        if e.is_Number or e.is_NumberSymbol:
+            return self.step("const", value=_finite(e))
+        if e in (self.sympy.true, self.sympy.false):
+            return self.step("const", value=float(e == self.sympy.true))
+        if e.is_Symbol:
+            raise ValueError(f"the symbol {e} is no input")
+        if name == "Mul":
+            above, below = self.sympy.fraction(e)
+            if below != 1:
+                return self.step("div", [self.place(above), self.place(below)])
+            if e.args[0] == -1:
+                return self.step("neg", [self.place(self.sympy.Mul(*e.args[1:]))])
+        if name == "Pow":
+            base, power = e.args
+            if power == -1:
+                return self.step("inv", [self.place(base)])
+            return self.step("pow", [self.place(base), self.place(power)])
+        if name == "Not":
+            return self.step("not", [self.place(e.args[0])])
+        if name in self.RELATIONS:
+            op, swap = self.RELATIONS[name]
+            of = [self.place(a) for a in e.args]
+            return self.step(op, of[::-1] if swap else of)
+        if name == "Piecewise":
+            value = None
+            for branch, condition in reversed(e.args):
+                if condition == self.sympy.true:
+                    value = self.place(branch)
+                    continue
+                if value is None:
+                    raise ValueError(f"{e} has no value where none of its conditions holds")
+                value = self.step("if_else", [self.place(condition), self.place(branch), value])
+            return value
+        if name in self.FOLDED:
+            value = self.place(e.args[0])
+            for a in e.args[1:]:
+                value = self.step(self.FOLDED[name], [value, self.place(a)])
+            return value
+        # What has no meaning keeps its name: `takt model` says so, with the expression.
+        return self.step(self.FUNCTIONS.get(name, name), [self.place(a) for a in e.args])
+
+
+def sympy(name, inputs, outputs, path):
+    """Writes SymPy expressions. Inputs and outputs are dictionaries from a name to a symbol or an expression, or to a list or
+    Matrix of them."""
+    _write(path, sympy_text(name, inputs, outputs))
+
+
+def sympy_text(name, inputs, outputs):
+    """The same as text."""
+    import sympy as sp
+
+    def shaped(name, value):
+        matrix = value if isinstance(value, sp.MatrixBase) else sp.Matrix(value if isinstance(value, (list, tuple)) else [value])
+        rows, columns = matrix.shape
+        return {"name": name, "rows": rows, "columns": columns}, [matrix[i, j] for j in range(columns) for i in range(rows)]
+
+    walk = _Sympy(sp)
+    ins, outs = [shaped(*item) for item in inputs.items()], [shaped(*item) for item in outputs.items()]
+    for i, (_, symbols) in enumerate(ins):
+        for k, symbol in enumerate(symbols):
+            walk.known[symbol] = walk.step("input", port=[i, k])
+    shared, reduced = sp.cse([e for _, values in outs for e in values])
+    for symbol, e in shared:
+        walk.known[symbol] = walk.place(sp.sympify(e))
+    flat = iter(reduced)
+    for i, (_, values) in enumerate(outs):
+        for k in range(len(values)):
+            walk.step("output", [walk.place(sp.sympify(next(flat)))], port=[i, k])
+    for step in walk.code:
+        if step["op"] == "output":
+            del step["to"]
+    return _text(name, "SymPy " + sp.__version__, [i for i, _ in ins], [o for o, _ in outs], walk.code)
