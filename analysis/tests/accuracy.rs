@@ -269,8 +269,9 @@ fn hazards_name_the_operation_and_what_it_reads() {
 #[test]
 fn what_cannot_be_enclosed_says_what_is_needed() {
     let refused = |text: &str| enclose(&source(text, &T3)).unwrap_err().to_string();
-    let state =
-        format!(".input a\n.range a = 0, 1\n.output y\n.state s\n.preset s = 0\n{HEAD} fadd s, s, a\n mov y, s\n wait p\n");
+    let state = format!(
+        ".input a\n.range a = 0, 1\n.output y\n.state s\n.preset s = 0\n{HEAD} fadd s, s, a\n mov y, s\n wait p\n"
+    );
     assert!(refused(&state).contains("the state `s` is read here and has no range"), "{}", refused(&state));
     let input = format!(".input a\n.output y\n{HEAD} mov y, a\n wait p\n");
     assert!(refused(&input).contains("the input `a`"), "{}", refused(&input));

@@ -78,8 +78,11 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
     let (trace, period, shadow) = followed.map_err(|error| fault::told(error, &loaded, color))?;
     let faster = faster(arguments, &load, program, &trace, &rows);
     let accuracy = Some(Measured::new(program, &shadow).json());
-    let picture =
-        Picture { faster, accuracy, ..Picture::new(program, files::input_name(&arguments.file), period, trace) };
+    let picture = Picture {
+        faster,
+        accuracy,
+        ..Picture::new(program, files::input_name(&arguments.file), period, trace)
+    };
     if let Some(path) = &arguments.html {
         files::write(path, picture.html().as_bytes())?;
     }
