@@ -1,5 +1,6 @@
 //! A run up to the period that is looked at.
 
+use crate::accuracy::Shadow;
 use crate::{Trace, TraceError, trace};
 use takt_emu::{Emulator, LoadError, PeriodError, PortError, Status};
 use takt_isa::timing::Cycle;
@@ -50,8 +51,19 @@ pub enum FollowError {
     },
 }
 
-/// Runs the program and follows period `wanted`, or else the last of `rows`; gives its number, 0 being what runs once. `rows` has
-/// register and bits of the inputs of each period.
+/// A period that was looked at.
+#[derive(Clone, Debug)]
+pub struct Followed {
+    /// When everything happened.
+    pub trace: Trace,
+    /// Which period; 0 is what runs once.
+    pub period: u64,
+    /// How exact it was, by itself.
+    pub shadow: Shadow,
+}
+
+/// Runs the program and follows period `wanted`, or else the last of `rows`, which has register and bits of the
+/// inputs of each period.
 ///
 /// # Errors
 /// See [`FollowError`].
@@ -59,7 +71,7 @@ pub fn follow(
     program: &Program,
     rows: &[Vec<(Register, u32)>],
     wanted: Option<u64>,
-) -> Result<(Trace, u64), FollowError> {
+) -> Result<Followed, FollowError> {
     let given = wanted.is_some();
     let wanted = wanted.unwrap_or(rows.len() as u64);
     let mut emulator = Emulator::new(program)?;
@@ -71,6 +83,7 @@ pub fn follow(
         Ok(())
     };
     set(&mut emulator, 0)?;
+    let mut before = emulator.clone();
     let mut found = trace(&mut emulator).map_err(FollowError::Once)?;
     let mut period = 0;
     while period < wanted && !matches!(emulator.status(), Status::Halted { .. }) {
@@ -79,11 +92,15 @@ pub fn follow(
         if period < wanted {
             emulator.run_period(&[]).map_err(|source| FollowError::Period { period, source })?;
         } else {
+            before = emulator.clone();
             found = trace(&mut emulator).map_err(|source| FollowError::Trace { period, source })?;
         }
     }
     if period < wanted && (given || period > 0) {
         return Err(FollowError::Halted { wanted, halted: period });
     }
-    Ok((found, period))
+    let mut shadow = Shadow::new(program);
+    // It goes through what has been traced without a fault.
+    let _ = shadow.run_period(&mut before);
+    Ok(Followed { trace: found, period, shadow })
 }

@@ -1,5 +1,6 @@
 //! `takt analyse`: where the cycles of one period went, bundle by bundle, and what would make it shorter.
 
+use crate::accuracy::Measured;
 use crate::fault;
 use crate::files::{self, Out};
 use crate::load::Load;
@@ -12,7 +13,7 @@ use clap::Args;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_analysis::faster::{Candidate, faster};
-use takt_analysis::follow::{MOST_PERIODS, PERIODS, follow};
+use takt_analysis::follow::{Followed, MOST_PERIODS, PERIODS, follow};
 use takt_analysis::picture::Picture;
 use takt_asm::schedule::BlockReport;
 use takt_emu::Rows;
@@ -67,10 +68,11 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
     let rows = read_inputs(arguments, program)?;
     let name = files::input_name(&arguments.file);
     let followed = follow(program, &rows, arguments.periods);
-    let (trace, period) = followed.map_err(|error| fault::told(error.into(), &loaded, color))?;
-    let again = |program: &Program| Some(follow(program, &rows, arguments.periods).ok()?.0);
+    let Followed { trace, period, shadow } = followed.map_err(|error| fault::told(error.into(), &loaded, color))?;
+    let again = |program: &Program| Some(follow(program, &rows, arguments.periods).ok()?.trace);
     let faster = faster(program, &trace, &candidates(arguments, &load), &again);
-    let picture = Picture { faster, ..Picture::new(program, name, period, trace) };
+    let accuracy = Some(Measured::new(program, &shadow).json());
+    let picture = Picture { faster, accuracy, ..Picture::new(program, name, period, trace) };
     if let Some(path) = &arguments.html {
         files::write(path, picture.html().as_bytes())?;
     }
@@ -82,7 +84,7 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
     Ok(())
 }
 
-/// Makes the program anew for another machine, if its source can be read again.
+/// Assembles the program for another machine, if its source can be read again.
 fn candidates<'a>(
     arguments: &'a Analyse,
     load: &'a Load,

@@ -6,7 +6,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use takt_analysis::TraceError;
 use takt_analysis::faster::{Candidate, faster};
-use takt_analysis::follow::{FollowError, MOST_PERIODS, follow};
+use takt_analysis::follow::{FollowError, Followed, MOST_PERIODS, follow};
 use takt_analysis::picture::Picture;
 use takt_asm::schedule::BlockReport;
 use takt_emu::PeriodError;
@@ -44,9 +44,9 @@ pub(crate) fn analyse(
         Some(Candidate { program: assembled.program, spare })
     };
     let source = &*program.program;
-    let again = |program: &takt_isa::Program| Some(follow(program, &rows, wanted).ok()?.0);
+    let again = |program: &takt_isa::Program| Some(follow(program, &rows, wanted).ok()?.trace);
     let made = py.detach(|| {
-        let (trace, period) = follow(source, &rows, wanted)?;
+        let Followed { trace, period, .. } = follow(source, &rows, wanted)?;
         let faster = faster(source, &trace, &assemble, &again);
         let picture = Picture { faster, ..Picture::new(source, name, period, trace) };
         Ok((picture.text(), picture.json().to_string(), picture.html()))
