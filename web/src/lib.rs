@@ -17,10 +17,10 @@
 //!
 //! Nothing here knows the time or waits: whoever calls divides what is long.
 
-#[cfg(target_arch = "wasm32")]
-mod exports;
 mod examples;
 mod export;
+#[cfg(target_arch = "wasm32")]
+mod exports;
 mod language;
 mod program;
 mod run;

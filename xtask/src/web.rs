@@ -48,7 +48,9 @@ pub(crate) fn build() -> Result<()> {
     let mut bundle = Command::new("node");
     let compiled = root().join(format!("{TARGET}/{WASM}/release/takt_web.wasm"));
     run(bundle.arg("build.mjs").arg(compiled).arg(root().join(PAGE)).current_dir(page))?;
-    eprintln!("the playground is in {PAGE}: `python3 -m http.server -d {PAGE}` serves it on http://localhost:8000");
+    eprintln!(
+        "the playground is in {PAGE}: `python3 -m http.server -d {PAGE}` serves it on http://localhost:8000"
+    );
     Ok(())
 }
 
