@@ -1,10 +1,10 @@
 //! The playground: compiled for browsers, bundled, and tested in one.
 
 use crate::reach::{Toolchain, WASM};
-use crate::{apt_install, cargo, root, run, works};
+use crate::{apt_install, root, run, works};
 use anyhow::{Context, Result};
 use clap::Args;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What to do with it.
@@ -18,7 +18,7 @@ pub(crate) struct Arguments {
     bench: bool,
     /// Keep pictures of the page in this folder (with --test).
     #[arg(long, value_name = "FOLDER", requires = "test")]
-    screenshots: Option<std::path::PathBuf>,
+    screenshots: Option<PathBuf>,
 }
 
 /// Where the page is built; any file server can serve it.
@@ -55,7 +55,7 @@ pub(crate) fn build() -> Result<()> {
 }
 
 /// The page's folder, with what it needs from npm in the versions that are written down.
-fn packages() -> Result<std::path::PathBuf> {
+fn packages() -> Result<PathBuf> {
     if !works("node", "--version") || !works("npm", "--version") {
         apt_install(&["nodejs", "npm"])?;
     }
