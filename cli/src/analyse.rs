@@ -5,7 +5,7 @@ use crate::files::{self, Out};
 use crate::load::Load;
 use crate::number;
 use crate::output;
-use crate::ports::{self, Rows};
+use crate::ports;
 use crate::select::{OptionalMachine, SourceArguments};
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use takt_analysis::picture::{Faster, Picture, Reassembled, gained};
 use takt_analysis::{Link, Trace, WhatIf};
 use takt_asm::schedule::BlockReport;
-use takt_emu::{Emulator, Status};
+use takt_emu::{Emulator, Rows, Status};
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{Machine, Program, SlotIndex};
 

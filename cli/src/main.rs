@@ -2,10 +2,12 @@
 //! terminal.
 
 mod account;
+mod accuracy;
 mod analyse;
 mod arm;
 mod asm;
 mod batch;
+mod board;
 mod bound;
 mod completions;
 mod controller;
@@ -35,6 +37,7 @@ mod rtl;
 mod run;
 mod select;
 mod synthesis;
+mod system;
 mod trace;
 mod track;
 
@@ -79,11 +82,13 @@ enum Command {
     Debug(debug::Debug),
     Analyse(analyse::Analyse),
     Bound(bound::Bound),
+    Accuracy(accuracy::Accuracy),
     Eval(eval::Eval),
     Fmt(fmt::Fmt),
     Lsp(lsp::Lsp),
     Dap(dap::Dap),
     Rtl(rtl::Rtl),
+    Board(board::Boards),
     Cosim(cosim::Cosim),
     Isa(isa::Isa),
     Machines(machines::Machines),
@@ -102,11 +107,13 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Debug(debug) => debug::run(debug, color, out),
         Command::Analyse(analyse) => analyse::run(analyse, color, out),
         Command::Bound(bound) => bound::run(bound, color, out),
+        Command::Accuracy(accuracy) => accuracy::run(accuracy, color, out),
         Command::Eval(eval) => eval::run(eval, out),
         Command::Fmt(fmt) => fmt::run(fmt, out),
         Command::Lsp(lsp) => lsp::run(lsp),
         Command::Dap(dap) => dap::run(dap),
         Command::Rtl(rtl) => rtl::run(rtl, color, out),
+        Command::Board(board) => board::run(board, color, out),
         Command::Cosim(cosim) => cosim::run(cosim, color, out),
         Command::Isa(isa) => isa::run(isa, out),
         Command::Machines(machines) => machines::run(machines, out),

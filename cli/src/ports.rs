@@ -5,6 +5,8 @@ use crate::select::suggest;
 use anyhow::{Result, anyhow, bail};
 use std::io::{self, Write};
 use std::path::Path;
+use takt_debug::inputs::Table;
+use takt_emu::{Row, Rows};
 use takt_isa::program::Port;
 
 /// A value as CSV and as JSON have it.
@@ -22,11 +24,6 @@ pub(crate) fn write_row(out: &mut impl Write, fields: impl IntoIterator<Item = S
     row.push('\n');
     out.write_all(row.as_bytes())
 }
-
-pub(crate) use takt_debug::inputs::Row;
-use takt_debug::inputs::Table;
-/// Those of each period.
-pub(crate) type Rows = Vec<Row>;
 
 /// Inputs of one period after the other: the rows of a CSV, or zeros where there is none. Every command reads them here.
 pub(crate) enum Inputs {

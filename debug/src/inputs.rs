@@ -1,13 +1,10 @@
 //! Input ports from a table (CSV): one named column for each port, one row for each period.
 
-use crate::session::Rows;
 use std::io::{self, Read};
 use takt_asm::nearest;
+use takt_emu::{Row, Rows};
+use takt_isa::Type;
 use takt_isa::program::Port;
-use takt_isa::{Register, Type};
-
-/// Values of the input ports of one period, register and bits.
-pub type Row = Vec<(Register, u32)>;
 
 /// Every row of a table's text, at most `most`.
 ///

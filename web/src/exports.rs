@@ -3,7 +3,11 @@
 //! The page asks for room with [`takt_input`], writes a method, a line feed and its parameters there, and calls [`takt_call`] or
 //! [`takt_image`]; the answer has as many bytes as they return, at [`takt_output`]. An answer is `{"ok": …}` or `{"error": "…"}`.
 //! Nothing here is unsafe but that names are exported.
-#![allow(unsafe_code, unreachable_pub, reason = "an exported name is an unsafe attribute, and seen from outside the crate only")]
+#![allow(
+    unsafe_code,
+    unreachable_pub,
+    reason = "an exported name is an unsafe attribute, and seen from outside the crate only"
+)]
 
 use crate::Playground;
 use serde_json::{Value, json};

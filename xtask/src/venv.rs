@@ -1,4 +1,4 @@
-//! The Python environment with the open tools of synthesis, place and route, and formal verification.
+//! The Python environment with the open tools of synthesis, place and route, formal verification, and the package's tests.
 
 use crate::{apt_install, root, run, works};
 use anyhow::{Context, Result, bail};
@@ -41,6 +41,11 @@ impl Venv {
         Ok(Venv(folder))
     }
 
+    /// The path of one of its programs.
+    pub(crate) fn tool(&self, name: &str) -> PathBuf {
+        self.0.join("bin").join(name)
+    }
+
     /// Runs one of the tools in a folder. The tools see what lies there; paths are relative to it.
     ///
     /// # Errors
@@ -50,7 +55,7 @@ impl Venv {
         let mut path = self.0.join("bin").into_os_string();
         path.push(":");
         path.push(std::env::var_os("PATH").unwrap_or_default());
-        let output = Command::new(self.0.join("bin").join(tool))
+        let output = Command::new(self.tool(tool))
             .env("PATH", path)
             .args(arguments)
             .current_dir(folder)

@@ -13,6 +13,7 @@ mod hover;
 mod inline;
 mod names;
 mod outline;
+mod pipeline;
 mod program;
 mod requests;
 mod text;
@@ -153,7 +154,7 @@ pub fn serve(connection: &Connection, settings: Settings) -> bool {
             recv(done) -> done => if let Ok(done) = done { server.scheduled(done) },
             recv(timer) -> _ => server.due(),
         }
-        // What the client no longer wants is among what it sent since.
+        // What the client has cancelled is among what it sent since.
         queue.extend(connection.receiver.try_iter());
         while let Some(message) = queue.pop_front() {
             match message {
@@ -303,6 +304,9 @@ impl Server {
         let told = diagnostics::by_file(&full.files, &full.diagnostics, &root, self.client.encoding);
         program.full = Some(full);
         self.publish(&root, told);
+        // Clients that do not know it pass over it, as the protocol says of `$/`.
+        let counted = json!({ "uri": uri::of_path(&root) });
+        self.send(Notification::new("$/takt/counted".to_owned(), counted));
         if self.client.refreshes_hints {
             self.ask("workspace/inlayHint/refresh");
         }
