@@ -127,7 +127,8 @@ function showCycles() {
     put(` a period, in ${plural(run.cycles.length, "period")}${run.missed ? `, ${plural(run.missed, "deadline")} missed` : ""}`);
   } else if (run) put(`${plural(run.total, "cycle")}`, "b");
   // A block that is a whole period has the scheduler's bound: no schedule takes fewer.
-  const schedule = program.blocks.find((block) => periods.some((section) => section.name === block.label));
+  const whole = program.blocks.filter((block) => periods.some((section) => section.name === block.label));
+  const schedule = whole.reduce((most, block) => (most && most.cycles >= block.cycles ? most : block), null);
   if (schedule) put(` · no schedule takes fewer than ${schedule.bound}`);
   for (const section of periods) put(` · ${section.name} takes ${range(section.cycles)} whatever the inputs`);
   if (once) put(` · once ${range(once.cycles)}`);
