@@ -58,8 +58,8 @@ pub use output::{disasm, format, image, listing, names};
 pub use report::diag::{Diagnostic, Diagnostics};
 pub use report::levels::Levels;
 pub use report::{diag, levels, nearest, source};
-pub use syntax::ast::Directive;
-pub use syntax::{Expression, expr, tokens};
+pub use syntax::ast::{Directive, Operator};
+pub use syntax::{Expression, expr, read, tokens};
 
 /// What the assembler is to do.
 #[derive(Clone, Copy, Debug)]

@@ -121,7 +121,8 @@ impl Board {
 fn one_of<'a>(document: &Document<'_>, what: &str, given: &At<String>, all: &[&'a str]) -> Option<&'a str> {
     let found = all.iter().find(|name| **name == given.value).copied();
     if found.is_none() {
-        document.mistake(&given.place, format!("`{}` is no {what}; there are {}", given.value, all.join(", ")));
+        document
+            .mistake(&given.place, format!("`{}` is no {what}; there are {}", given.value, all.join(", ")));
     }
     found
 }
@@ -224,7 +225,8 @@ impl Sites<'_> {
             && (1..=2).contains(&digits.len())
             && digits.chars().all(|c| c.is_ascii_digit());
         if !right {
-            let text = format!("`{}` is no site; a site is a letter or two and a number, as in \"A10\"", site.value);
+            let text =
+                format!("`{}` is no site; a site is a letter or two and a number, as in \"A10\"", site.value);
             self.document.mistake(&site.place, text);
             return None;
         }

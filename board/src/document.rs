@@ -81,7 +81,13 @@ impl<'a> Document<'a> {
             Ok(table) => {
                 let place = 0..0;
                 let entries = table.into_inner();
-                Some(Table { document: self, name: "the file".to_owned(), place, entries, seen: RefCell::default() })
+                Some(Table {
+                    document: self,
+                    name: "the file".to_owned(),
+                    place,
+                    entries,
+                    seen: RefCell::default(),
+                })
             }
             Err(error) => {
                 self.mistake(&error.span().unwrap_or(0..0), error.message());
@@ -127,8 +133,7 @@ impl<'a> Table<'a> {
         match read(found.get_ref()) {
             Some(value) => Some(At { value, place: found.span() }),
             None => {
-                let text =
-                    format!("`{key}` is to be {expected}, not {}", written(found.get_ref()));
+                let text = format!("`{key}` is to be {expected}, not {}", written(found.get_ref()));
                 self.document.mistake(&found.span(), text);
                 None
             }
@@ -207,7 +212,8 @@ impl<'a> Table<'a> {
             match number(value.get_ref()) {
                 Some(n) => numbers.push((named(key), At { value: n, place: value.span() })),
                 None => {
-                    let text = format!("`{}` is to be a number, not {}", key.get_ref(), written(value.get_ref()));
+                    let text =
+                        format!("`{}` is to be a number, not {}", key.get_ref(), written(value.get_ref()));
                     self.document.mistake(&value.span(), text);
                 }
             }

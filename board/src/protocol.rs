@@ -74,12 +74,21 @@ pub const REGISTERS: [Register; 15] = [
     register(14, "lost", "r", "frames of the stream that were not sent, since power-up"),
 ];
 
+/// The registers as rows of the table in docs/protocol.md.
+pub fn markdown() -> String {
+    let row = |r: &Register| format!("| {} | {} | {} | {} |\n", r.address, r.name, r.access, r.text);
+    REGISTERS.iter().map(row).collect()
+}
+
 /// CRC-16/CCITT-FALSE: polynomial 0x1021, initially 0xffff, highest bit first.
 pub fn checksum(bytes: &[u8]) -> u16 {
     bytes.iter().fold(0xffff, |sum, &byte| {
-        (0..8).fold(sum ^ u16::from(byte) << 8, |sum, _| {
-            if sum & 0x8000 == 0 { sum << 1 } else { sum << 1 ^ 0x1021 }
-        })
+        (0..8).fold(
+            sum ^ u16::from(byte) << 8,
+            |sum, _| {
+                if sum & 0x8000 == 0 { sum << 1 } else { sum << 1 ^ 0x1021 }
+            },
+        )
     })
 }
 
@@ -149,7 +158,8 @@ impl Receiver {
                         }
                         let sum = u16::from_le_bytes([self.bytes[end], self.bytes[end + 1]]);
                         if checksum(&self.bytes[1..end]) == sum {
-                            let word = |bytes: &[u8]| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
+                            let word =
+                                |bytes: &[u8]| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
                             let frame = Frame {
                                 stream: self.bytes[0] == STREAM,
                                 number: *number,
@@ -179,6 +189,24 @@ impl Receiver {
     }
 }
 
+/// A line to a board.
+pub trait Line {
+    /// Sends bytes.
+    ///
+    /// # Errors
+    /// If the line is gone.
+    fn send(&mut self, bytes: &[u8]) -> std::io::Result<()>;
+
+    /// What has come, after waiting a little for it; nothing is no error.
+    ///
+    /// # Errors
+    /// If the line is gone.
+    fn receive(&mut self) -> std::io::Result<Vec<u8>>;
+
+    /// How often to wait for an answer until a request is made again.
+    fn patience(&self) -> u32;
+}
+
 /// Why the board did not do what was asked.
 #[derive(Debug, Error)]
 pub enum LinkError {
@@ -186,16 +214,22 @@ pub enum LinkError {
     #[error("the line is gone: {0}")]
     Line(#[from] std::io::Error),
     /// No answer, however often it was asked.
-    #[error("no answer in {0} attempts: is this the right port, with the right baud rate, and the board's bitstream loaded?")]
+    #[error(
+        "no answer in {0} attempts: is this the right port, with the right baud rate, and the board's bitstream loaded?"
+    )]
     Silence(u32),
     /// The program does not wait.
-    #[error("the program does not wait for its tick, so its ports cannot be read or set between periods; `takt live PORT stop` stops it")]
+    #[error(
+        "the program does not wait for its tick, so its ports cannot be read or set between periods; `takt live PORT stop` stops it"
+    )]
     Busy,
     /// Something else answers.
     #[error("what answers is no board of Takt: its register `id` is {0:#010x}")]
     Stranger(u32),
     /// The image came back different.
-    #[error("record {0} of the program came back different from what was written: the board stays stopped; try again")]
+    #[error(
+        "record {0} of the program came back different from what was written: the board stays stopped; try again"
+    )]
     Image(usize),
     /// The image is too big.
     #[error("the program takes {0} records; the board has room for {1}")]

@@ -99,7 +99,8 @@ impl System {
     /// What is at a pin of the board: `motor.high`, `drive`.
     pub fn at(&self, pin: &str) -> Option<String> {
         let signals = SIGNALS.iter().zip(&self.signals);
-        let signal = signals.filter(|(_, at)| at.as_deref() == Some(pin)).map(|(signal, _)| signal.name.to_owned());
+        let signal =
+            signals.filter(|(_, at)| at.as_deref() == Some(pin)).map(|(signal, _)| signal.name.to_owned());
         let pins = self.peripherals.iter().flat_map(|peripheral| {
             let pins = peripheral.kind.pins.iter().zip(&peripheral.pins);
             pins.map(move |(own, at)| (at.as_deref(), || format!("{}.{}", peripheral.name, own.name)))
@@ -137,11 +138,11 @@ impl System {
                     document.mistake(place, text);
                     continue;
                 };
-                if *direction == Direction::Input {
-                    if let Some(other) = driven.insert(port, &peripheral.name) {
-                        let text = format!("input port `{port}` is driven twice: `{other}` drives it, too");
-                        document.mistake(place, text);
-                    }
+                if *direction == Direction::Input
+                    && let Some(other) = driven.insert(port, &peripheral.name)
+                {
+                    let text = format!("input port `{port}` is driven twice: `{other}` drives it, too");
+                    document.mistake(place, text);
                 }
                 self.check_type(&document, peripheral, found, *direction, place);
             }
@@ -229,10 +230,10 @@ impl<'a> Reader<'a> {
             Some(at) => {
                 let place = at.place.clone();
                 let lead = cycles(at, 0);
-                if let (Some(lead), Some(period)) = (lead, period) {
-                    if lead >= period {
-                        mistake(&place, "`lead` is to be shorter than the period".to_owned());
-                    }
+                if let (Some(lead), Some(period)) = (lead, period)
+                    && lead >= period
+                {
+                    mistake(&place, "`lead` is to be shorter than the period".to_owned());
                 }
                 lead
             }
@@ -330,7 +331,9 @@ impl<'a> Reader<'a> {
             return None;
         };
         let parameters = kind.parameters.iter().map(|parameter| {
-            table.integer(parameter.name, parameter.least, parameter.most).map_or(parameter.default, |at| at.value)
+            table
+                .integer(parameter.name, parameter.least, parameter.most)
+                .map_or(parameter.default, |at| at.value)
         });
         let parameters = parameters.collect();
         let at_publish = kind.strobes.start

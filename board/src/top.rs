@@ -59,7 +59,8 @@ pub fn image(program: &Program) -> Result<Vec<LoadRecord>, TopError> {
     let records: Vec<_> = load_records(program)
         .into_iter()
         .filter(|record| {
-            record.value != 0 || !matches!(record.space, takt_rtl::bench::Space::Program | takt_rtl::bench::Space::Data)
+            record.value != 0
+                || !matches!(record.space, takt_rtl::bench::Space::Program | takt_rtl::bench::Space::Data)
         })
         .collect();
     if records.len() > RECORDS { Err(TopError::TooBig(records.len())) } else { Ok(records) }
@@ -98,7 +99,13 @@ pub fn circuit(board: &Board, system: &System, program: &Program) -> Result<Circ
         let _ = writeln!(hex, "{:018x}", u128::from(place) << 48 | u128::from(high) << 32 | u128::from(low));
     }
     put("image.hex", hex);
-    Ok(Circuit { files, ecp5: design.ecp5, pins: pins(board, system), clock: system.clock, records: records.len() })
+    Ok(Circuit {
+        files,
+        ecp5: design.ecp5,
+        pins: pins(board, system),
+        clock: system.clock,
+        records: records.len(),
+    })
 }
 
 /// Pins of the system's module that belong to peripherals and signals: name, direction, the board's pin.
@@ -137,7 +144,8 @@ fn around(system: &System, program: &Program, core: &str, records: usize, to_int
         Some(u32::from(port.register.get()) % u32::from(machine.outputs_per_bank))
     };
     let (mut pins, mut nets, mut parts) = (String::new(), String::new(), String::new());
-    let (mut inputs, mut outputs, mut taken, mut settings) = (String::new(), String::new(), String::new(), String::new());
+    let (mut inputs, mut outputs, mut taken, mut settings) =
+        (String::new(), String::new(), String::new(), String::new());
     let (mut in_count, mut out_count) = (0, 0);
     for (name, way, _) in own_pins(system) {
         let _ = write!(pins, ",\n    {} {name}", direction(way));
@@ -150,7 +158,8 @@ fn around(system: &System, program: &Program, core: &str, records: usize, to_int
             .zip(&peripheral.parameters)
             .map(|(parameter, value)| format!(".{}(32'd{value})", parameter.name.to_uppercase()))
             .collect();
-        let list = if parameters.is_empty() { String::new() } else { format!("#({}) ", parameters.join(", ")) };
+        let list =
+            if parameters.is_empty() { String::new() } else { format!("#({}) ", parameters.join(", ")) };
         let mut ports = vec![".clk(clk)".to_owned(), ".rst(rst)".to_owned()];
         if kind.strobes.enable {
             ports.push(".enable(drive)".to_owned());
@@ -297,7 +306,8 @@ fn top(board: &Board, system: &System) -> Result<String, TopError> {
     }
     for i in 0..board.leds.len().min(LAMPS) {
         let _ = write!(ports, ",\n    output wire led{i}");
-        let _ = writeln!(constants, "    assign led{i} = {}lamps[{i}];", if board.leds_high { "" } else { "~" });
+        let _ =
+            writeln!(constants, "    assign led{i} = {}lamps[{i}];", if board.leds_high { "" } else { "~" });
     }
     let pressed = match &board.reset {
         None => "1'b0".to_owned(),

@@ -74,7 +74,13 @@ fn stimulus(kind: &'static Kind, parameters: &[u32], seed: u64) -> Box<dyn FnMut
         if cycle >= until {
             until = cycle + if random.one_in(3) { hold } else { 1 + random.bits() % (2 * hold + 3) };
             upward ^= random.one_in(20);
-            place = place.wrapping_add(if random.one_in(30) { 2 } else if upward { 1 } else { 3 });
+            place = place.wrapping_add(if random.one_in(30) {
+                2
+            } else if upward {
+                1
+            } else {
+                3
+            });
         }
         if random.one_in(2000) {
             disabled = cycle + random.bits() % 30;

@@ -212,9 +212,7 @@ impl<'a> Measured<'a> {
                 "output": line.output,
             })
         };
-        let decision = |(&word, decision): (&u32, &takt_analysis::accuracy::Decision)| {
-            json!({ "place": self.place(word), "count": decision.count, "period": decision.period })
-        };
+        let decision = |(&word, decision): (&u32, &takt_analysis::accuracy::Decision)| json!({ "place": self.place(word), "count": decision.count, "period": decision.period });
         let lost = |(&word, lost): (&u32, &takt_analysis::accuracy::Lost)| {
             let why = if lost.infinite { "no finite number" } else { "taken as bits" };
             json!({ "place": self.place(word), "why": why, "count": lost.count, "period": lost.period })
@@ -306,11 +304,8 @@ impl<'a> Measured<'a> {
             writeln!(out, "\nerrors are not followed any further at")?;
         }
         for (&word, lost) in shadow.lost().iter().take(SHOWN) {
-            let why = if lost.infinite {
-                "a result that is no finite number"
-            } else {
-                "a value taken as bits"
-            };
+            let why =
+                if lost.infinite { "a result that is no finite number" } else { "a value taken as bits" };
             let (count, period) = (lost.count, lost.period);
             writeln!(out, "  {}: {why}, {count} times, first in period {period}", self.place(word))?;
         }

@@ -25,7 +25,6 @@ pub(crate) fn write_row(out: &mut impl Write, fields: impl IntoIterator<Item = S
     out.write_all(row.as_bytes())
 }
 
-
 /// Inputs of one period after the other: the rows of a CSV, or zeros where there is none. Every command reads them here.
 pub(crate) enum Inputs {
     /// All ports are 0, for as many periods as are asked for.

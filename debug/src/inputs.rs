@@ -3,8 +3,8 @@
 use std::io::{self, Read};
 use takt_asm::nearest;
 use takt_emu::{Row, Rows};
-use takt_isa::program::Port;
 use takt_isa::Type;
+use takt_isa::program::Port;
 
 /// Every row of a table's text, at most `most`.
 ///

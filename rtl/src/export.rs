@@ -45,8 +45,6 @@ pub struct Design {
     pub top: String,
     /// Verilog files, each with the one module of its name.
     pub files: Vec<DesignFile>,
-    /// The core on a few pins, for a synthesis without a board.
-    pub synthesis: String,
     /// Modules that take the place of those of the same name on Lattice ECP5.
     pub ecp5: Vec<DesignFile>,
     /// The core's parameter of that name: 0, or, for a program whose ports are latched, its
@@ -99,6 +97,5 @@ pub fn export(machine: &'static Machine, library: &Library) -> Result<Design, Ex
     }
     let ecp5 =
         ECP5.iter().map(|&(name, text)| DesignFile { name: format!("ecp5/{name}"), text: text.to_owned() });
-    let synthesis = parts::synthesis(&plan)?;
-    Ok(Design { machine, synthesis, top: plan.top(), files, ecp5: ecp5.collect(), latched: 0, plan })
+    Ok(Design { machine, top: plan.top(), files, ecp5: ecp5.collect(), latched: 0, plan })
 }

@@ -9,7 +9,8 @@ use takt_analysis::{SectionBounds, Span};
 use takt_asm::schedule::BlockReport;
 use takt_asm::{Assembled, MemoryLoader, Options, Search};
 use takt_debug::console::Console;
-use takt_debug::session::{self, Rows, Session};
+use takt_debug::session::{self, Session};
+use takt_emu::Rows;
 use takt_isa::program::Port;
 
 /// A program, and what it is run on.

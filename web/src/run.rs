@@ -6,7 +6,7 @@ use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use takt_analysis::picture::Picture;
 use takt_debug::fault::diagnose;
-use takt_debug::session::Rows;
+use takt_emu::Rows;
 use takt_emu::{Emulator, PeriodError, Status};
 use takt_isa::program::Port;
 use takt_isa::{Program, Register, Type};

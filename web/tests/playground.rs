@@ -36,7 +36,13 @@ fn every_example_assembles_and_runs() {
             let ran = call(&mut playground, "run", json!({ "begin": true, "periods": 3 }));
             assert_eq!(ran["fault"], Value::Null, "{}", example["name"]);
             let worst = &told["bounds"][1]["cycles"]["worst"];
-            assert!(ran["cycles"].as_array().expect("a list").iter().all(|cycles| cycles.as_u64() <= worst.as_u64()));
+            assert!(
+                ran["cycles"]
+                    .as_array()
+                    .expect("a list")
+                    .iter()
+                    .all(|cycles| cycles.as_u64() <= worst.as_u64())
+            );
         }
     }
 }
@@ -82,7 +88,11 @@ fn mistakes_are_told() {
     assert_eq!(told["inputs_error"], "inputs:3: column x: `two` is no number");
     let params = json!({ "name": "a.s", "source": "", "machine": "t9" });
     assert!(playground.call("assemble", params).is_err_and(|error| error.contains("machines: ")));
-    assert!(playground.call("assemble", Value::Null).is_err_and(|error| error.contains("parameters of `assemble`")));
+    assert!(
+        playground
+            .call("assemble", Value::Null)
+            .is_err_and(|error| error.contains("parameters of `assemble`"))
+    );
     assert!(playground.call("nothing", Value::Null).is_err());
     let params = json!({ "name": "", "source": "x".repeat(takt_web::SOURCE_BYTES + 1), "machine": "t3" });
     assert_eq!(playground.call("assemble", params), Err("the source has more than 4 MiB".to_owned()));
@@ -119,7 +129,10 @@ fn steps_forward_and_back() {
     assert!(views.windows(2).all(|pair| pair[0]["cycle"].as_u64() < pair[1]["cycle"].as_u64()));
     for view in views.iter().rev().skip(1) {
         let back = step(&mut playground, "back");
-        assert_eq!((&back["cycle"], &back["line"], &back["outputs"][0]["value"]), (&view["cycle"], &view["line"], &view["outputs"][0]["value"]));
+        assert_eq!(
+            (&back["cycle"], &back["line"], &back["outputs"][0]["value"]),
+            (&view["cycle"], &view["line"], &view["outputs"][0]["value"])
+        );
     }
     let end = step(&mut playground, "goto period 2");
     assert_eq!(end["outputs"][0]["value"], "6.0");
@@ -129,7 +142,8 @@ fn steps_forward_and_back() {
 fn the_robot_follows_the_path() {
     let mut playground = Playground::default();
     let about = call(&mut playground, "about", Value::Null);
-    let tracking = about["examples"].as_array().and_then(|list| list.iter().find(|one| one["track"] == true)).cloned();
+    let tracking =
+        about["examples"].as_array().and_then(|list| list.iter().find(|one| one["track"] == true)).cloned();
     let source = tracking.expect("one of them is")["source"].clone();
     let params = json!({ "name": "tracking.s", "source": source, "machine": "t3" });
     call(&mut playground, "assemble", params);
@@ -138,9 +152,14 @@ fn the_robot_follows_the_path() {
     assert_eq!(first["poses"].as_array().map(Vec::len), Some(2));
     let more = call(&mut playground, "track", json!({ "periods": 150 }));
     assert_eq!(more["done"], 300);
-    assert!(more["overall"].as_f64().is_some_and(|error| (0.0..1e-5).contains(&error)), "{}", more["overall"]);
+    assert!(
+        more["overall"].as_f64().is_some_and(|error| (0.0..1e-5).contains(&error)),
+        "{}",
+        more["overall"]
+    );
     assemble(&mut playground, DOUBLE, "");
-    let error = playground.call("track", json!({ "begin": true, "periods": 1 })).expect_err("it has other ports");
+    let error =
+        playground.call("track", json!({ "begin": true, "periods": 1 })).expect_err("it has other ports");
     assert!(error.contains("no tracking program"), "{error}");
 }
 
@@ -152,9 +171,12 @@ fn what_is_taken_away_is_what_the_command_line_writes() {
     assert_eq!(takt_asm::image::read(&image).expect("it was just written").inputs[0].name, "x");
     let verilog = call(&mut playground, "verilog", Value::Null);
     assert_eq!(verilog["top"], "takt_t3");
-    let program = verilog["files"].as_array().and_then(|files| files.iter().find(|file| file["name"] == "program.hex"));
+    let program =
+        verilog["files"].as_array().and_then(|files| files.iter().find(|file| file["name"] == "program.hex"));
     assert!(program.is_some_and(|file| file["text"].as_str().is_some_and(|text| text.lines().count() > 2)));
-    for (language, word) in [("c", "#ifndef"), ("rust", "pub const"), ("json", "\"schema\""), ("svd", "<device")] {
+    for (language, word) in
+        [("c", "#ifndef"), ("rust", "pub const"), ("json", "\"schema\""), ("svd", "<device")]
+    {
         let header = call(&mut playground, "header", json!({ "language": language }));
         assert!(header.as_str().is_some_and(|text| text.contains(word)), "{language}: {header}");
     }

@@ -33,10 +33,13 @@ const SITE: &str = "target/book/site";
 
 /// The documents in the order of the book, by part. A document that is in none is an error.
 const PARTS: &[(&str, &[&str])] = &[
-    ("Writing programs", &["language", "examples", "library", "fast-code", "scheduling", "analysis", "editors", "playground"]),
-    ("Running them", &["debugging", "traces", "batch", "plant", "system"]),
+    (
+        "Writing programs",
+        &["language", "examples", "library", "fast-code", "scheduling", "analysis", "editors", "playground"],
+    ),
+    ("Running them", &["debugging", "traces", "batch", "plant", "system", "python"]),
     ("The processor", &["isa", "timing", "trig", "image"]),
-    ("The circuit", &["hardware", "headers", "synthesis"]),
+    ("The circuit", &["hardware", "headers", "board", "protocol", "synthesis", "machine-choice"]),
     ("Robots", &["robot", "arm", "model", "models"]),
     ("Reference", &["glossary", "speed", "reach"]),
 ];
@@ -63,7 +66,9 @@ pub(crate) fn book(arguments: &Arguments) -> Result<()> {
         copy(&root().join("target/doc"), &site.join("api"))?;
     }
     let (pages, links) = check_links(&site)?;
-    println!("{pages} pages in {SITE}, {links} links checked: `python3 -m http.server -d {SITE}` serves them");
+    println!(
+        "{pages} pages in {SITE}, {links} links checked: `python3 -m http.server -d {SITE}` serves them"
+    );
     Ok(())
 }
 
@@ -71,7 +76,9 @@ pub(crate) fn book(arguments: &Arguments) -> Result<()> {
 fn mdbook() -> Result<PathBuf> {
     let is_it = |program: &Path| {
         let output = Command::new(program).arg("--version").output();
-        output.is_ok_and(|output| String::from_utf8_lossy(&output.stdout).trim().ends_with(&format!("v{MDBOOK}")))
+        output.is_ok_and(|output| {
+            String::from_utf8_lossy(&output.stdout).trim().ends_with(&format!("v{MDBOOK}"))
+        })
     };
     let own = root().join(TOOLS).join("bin/mdbook");
     for program in [PathBuf::from("mdbook"), own.clone()] {
@@ -175,7 +182,8 @@ fn fragment(program: &str) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
     let mut text = "p1=".to_owned();
     for chunk in compress_to_vec_zlib(program.as_bytes(), 9).chunks(3) {
-        let group = chunk.iter().fold(0u32, |group, byte| group << 8 | u32::from(*byte)) << (8 * (3 - chunk.len()));
+        let group =
+            chunk.iter().fold(0u32, |group, byte| group << 8 | u32::from(*byte)) << (8 * (3 - chunk.len()));
         for digit in 0..=chunk.len() {
             text.push(char::from(DIGITS[(group >> (18 - 6 * digit)) as usize & 63]));
         }
@@ -264,7 +272,8 @@ fn check_links(site: &Path) -> Result<(usize, usize)> {
         for link in links.filter(|link| !link.contains(':') && !link.starts_with("//") && !link.is_empty()) {
             let link = link.replace("&amp;", "&");
             let (file, place) = link.split_once('#').unwrap_or((&link, ""));
-            let target = if file.is_empty() { path.clone() } else { normal(&site.join(file.trim_start_matches('/'))) };
+            let target =
+                if file.is_empty() { path.clone() } else { normal(&site.join(file.trim_start_matches('/'))) };
             if target.starts_with(site.join("api")) && !has_api {
                 continue;
             }

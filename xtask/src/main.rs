@@ -60,6 +60,8 @@ enum Task {
     Speed,
     /// Build the Python package's wheel, for every Python from 3.10 on (installs maturin in .venv).
     Wheel(python::Arguments),
+    /// Build the extension for VS Code, editors/vscode/dist/takt.vsix, with its tests (installs with npm what it lacks).
+    Extension,
     /// Fuzz the assembler and the image loader, one after the other (installs cargo-fuzz if it is not there).
     Fuzz {
         /// Minutes for each target.
@@ -80,6 +82,7 @@ fn main() -> Result<()> {
         Task::Book(arguments) => book::book(&arguments),
         Task::Speed => speed(),
         Task::Wheel(arguments) => python::wheel(&arguments),
+        Task::Extension => extension(),
         Task::Fuzz { minutes } => fuzz(minutes),
     }
 }
@@ -123,7 +126,7 @@ const TOOLS: [(&str, &str, &str); 9] = [
     // The debug adapter by another one, in JavaScript.
     ("node", "--version", "nodejs"),
     ("npm", "--version", "npm"),
-    // The page of `takt analyse` is opened in a browser.
+    // The page of `takt analyse` and the extension's view are opened in a browser.
     ("chromium", "--version", "chromium"),
 ];
 
@@ -147,20 +150,32 @@ fn apt_install(packages: &[&str]) -> Result<()> {
     run(install.env("DEBIAN_FRONTEND", "noninteractive"))
 }
 
-/// Installs with npm the debug adapter's client, in the versions that are written down.
-fn install_client() -> Result<()> {
-    let folder = root().join("cli/tests/clients/dap");
+/// Installs with npm what a folder's package-lock.json writes down.
+fn npm_install(folder: &Path) -> Result<()> {
     if folder.join("node_modules").is_dir() {
         return Ok(());
     }
-    run(Command::new("npm").args(["ci", "--no-audit", "--no-fund"]).current_dir(folder))
+    run(Command::new("npm").args(["ci", "--no-audit", "--no-fund", "--ignore-scripts"]).current_dir(folder))
+}
+
+/// Checks, tests and packs the extension for VS Code.
+fn extension() -> Result<()> {
+    install()?;
+    let folder = root().join("editors/vscode");
+    npm_install(&folder)?;
+    for script in ["check", "test", "package"] {
+        run(Command::new("npm").args(["run", "--silent", script]).current_dir(&folder))?;
+    }
+    Ok(())
 }
 
 fn test(full: bool, rest: &[String]) -> Result<()> {
     install()?;
     venv::Venv::with(&venv::MODELS)?;
-    install_client()?;
+    // The debug adapter's client.
+    npm_install(&root().join("cli/tests/clients/dap"))?;
     if rest.is_empty() {
+        extension()?;
         formal::formal(&formal::Arguments::SHARE)?;
     }
     let mut tests = cargo();

@@ -26,8 +26,17 @@ struct Target {
 /// The command and with it everything it is made of.
 const WHOLE: &[&str] = &["takt"];
 /// What needs no operating system.
-const LIBRARIES: &[&str] =
-    &["takt-isa", "takt-asm", "takt-emu", "takt-analysis", "takt-debug", "takt-programs", "takt-rtl", "takt-editor", "takt-web"];
+const LIBRARIES: &[&str] = &[
+    "takt-isa",
+    "takt-asm",
+    "takt-emu",
+    "takt-analysis",
+    "takt-debug",
+    "takt-programs",
+    "takt-rtl",
+    "takt-editor",
+    "takt-web",
+];
 
 const TARGETS: [Target; 4] = [
     Target { triple: "aarch64-apple-darwin", packages: WHOLE },
@@ -83,7 +92,9 @@ impl Toolchain {
             command.env("RUSTC", DEBIAN_RUSTC).env("RUSTC_BOOTSTRAP", "1");
             command.arg("-Zbuild-std=std,panic_abort");
             // Debian's compiler looks for a linker that Debian has not; rustup's own has it.
-            if triple == WASM && let Some(linker) = rust_lld() {
+            if triple == WASM
+                && let Some(linker) = rust_lld()
+            {
                 command.env("CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER", linker);
             }
         }

@@ -41,12 +41,22 @@ pub(crate) fn build() -> Result<()> {
     run(compile.args(["--release", "-p", "takt-web"]))?;
     let glue = format!("{TARGET}/glue");
     let mut bindgen = cargo();
-    bindgen.args(["run", "--quiet", "--manifest-path", "web/bindgen/Cargo.toml", "--target-dir", BINDGEN, "--"]);
+    bindgen.args([
+        "run",
+        "--quiet",
+        "--manifest-path",
+        "web/bindgen/Cargo.toml",
+        "--target-dir",
+        BINDGEN,
+        "--",
+    ]);
     run(bindgen.arg(format!("{TARGET}/{WASM}/release/takt_web.wasm")).arg(&glue))?;
     let page = packages()?;
     let mut bundle = Command::new("node");
     run(bundle.arg("build.mjs").arg(root().join(glue)).arg(root().join(PAGE)).current_dir(page))?;
-    eprintln!("the playground is in {PAGE}: `python3 -m http.server -d {PAGE}` serves it on http://localhost:8000");
+    eprintln!(
+        "the playground is in {PAGE}: `python3 -m http.server -d {PAGE}` serves it on http://localhost:8000"
+    );
     Ok(())
 }
 

@@ -52,12 +52,19 @@ impl Affine {
 
     pub(super) fn range(&self) -> Interval {
         let radius = self.radius();
-        if radius == 0.0 { Interval::point(self.center) } else { Interval::point(self.center).widened(radius) }
+        if radius == 0.0 {
+            Interval::point(self.center)
+        } else {
+            Interval::point(self.center).widened(radius)
+        }
     }
 
     /// The magnitudes of its terms by symbol, and what is not any symbol's.
     pub(super) fn shares(&self) -> (impl Iterator<Item = (u32, f64)> + '_, f64) {
-        (self.terms.iter().map(|(symbol, coefficient)| (*symbol, coefficient.abs())), self.slack + self.center.abs())
+        (
+            self.terms.iter().map(|(symbol, coefficient)| (*symbol, coefficient.abs())),
+            self.slack + self.center.abs(),
+        )
     }
 
     pub(super) fn neg(&self) -> Affine {

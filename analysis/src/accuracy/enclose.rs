@@ -332,7 +332,8 @@ impl Explorer<'_> {
         let mut position = Vec::new();
         let level = |depth: usize, position: &mut Position| {
             let turned = state.turns.iter().filter(|((level, _), _)| *level == depth);
-            let mut turned: Vec<(BundleAddress, u32)> = turned.map(|((_, head), turns)| (*head, *turns)).collect();
+            let mut turned: Vec<(BundleAddress, u32)> =
+                turned.map(|((_, head), turns)| (*head, *turns)).collect();
             // An outer loop has the larger body.
             turned.sort_by_key(|(head, _)| std::cmp::Reverse(self.graph.loops[head].body.len()));
             for (head, turns) in turned {
@@ -508,7 +509,11 @@ impl Explorer<'_> {
         let largest = f64::from(f32::MAX);
         let mut number = Number { actual, exact, ..number.clone() };
         if bound == 0.0 || number.grid.is_some_and(fits) {
-            return if magnitude <= largest { Ok(Value::Float(Rc::new(number))) } else { Err(Problem::Overflow) };
+            return if magnitude <= largest {
+                Ok(Value::Float(Rc::new(number)))
+            } else {
+                Err(Problem::Overflow)
+            };
         }
         let local = bound * ulp(magnitude);
         // `!` so that a NaN counts.

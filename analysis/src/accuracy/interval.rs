@@ -108,7 +108,8 @@ impl Interval {
 
     pub(super) fn square(self) -> Interval {
         let (low, high) = (self.low.abs(), self.high.abs());
-        let (least, most) = if self.contains(0.0) { (0.0, low.max(high)) } else { (low.min(high), low.max(high)) };
+        let (least, most) =
+            if self.contains(0.0) { (0.0, low.max(high)) } else { (low.min(high), low.max(high)) };
         Interval::new(down(product(least, least)), up(product(most, most)))
     }
 

@@ -271,7 +271,9 @@ fn linear(
     // The form may reach beyond the range, the number does not.
     let spread = slope.radius() * range.widened(middle.abs() * f64::EPSILON).radius();
     let fixed = away.scale(Interval::point(slope.middle()));
-    let line = fixed.add(&Affine::constant(at.middle())).widened((spread + at.radius()) * (1.0 + 4.0 * f64::EPSILON));
+    let line = fixed
+        .add(&Affine::constant(at.middle()))
+        .widened((spread + at.radius()) * (1.0 + 4.0 * f64::EPSILON));
     if line.radius() > 4.0 * hull.radius() { Affine::free(hull) } else { line }
 }
 
@@ -378,7 +380,8 @@ impl Real for Operand {
             let exact = x.exact.sqrt();
             // |√A - √a| ≤ √|A - a|.
             let most = Interval::point(x.error.range().magnitude()).sqrt().high;
-            let error = if x.error.is_zero() { Affine::constant(0.0) } else { Affine::constant(0.0).widened(most) };
+            let error =
+                if x.error.is_zero() { Affine::constant(0.0) } else { Affine::constant(0.0).widened(most) };
             Ok(Number { actual: x.actual.sqrt(), exact, form: Affine::free(exact), error, grid: None })
         })
     }

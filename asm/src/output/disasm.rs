@@ -95,7 +95,8 @@ impl<'p> Writer<'p> {
             let named = inputs.iter().chain(outputs).chain(registers).find(|port| {
                 port.register == range.register && port.ty == range.ty && !port.name.contains('[')
             });
-            let name = named.map_or_else(|| format!("@{}", self.place(range.register)), |port| port.name.clone());
+            let name =
+                named.map_or_else(|| format!("@{}", self.place(range.register)), |port| port.name.clone());
             let (low, high) = (range.low, range.high);
             let ends = match range.ty {
                 Type::F => format!("{:?}, {:?}", f32::from_bits(low), f32::from_bits(high)),

@@ -459,6 +459,12 @@ pub enum Operator {
 }
 
 impl Operator {
+    /// Every operator.
+    pub const ALL: [Operator; 18] = {
+        use Operator::*;
+        [Eq, Ne, Lt, Le, Gt, Ge, Or, And, Shl, Shr, Add, Sub, Mul, Div, Rem, Complement, Not, Power]
+    };
+
     /// How the source writes it.
     pub const fn text(self) -> &'static str {
         match self {

@@ -27,14 +27,17 @@ pub trait Twin {
 
 /// The twin of a peripheral with these parameters, in the order of its table; what is missing has its default.
 pub fn of(kind: &Kind, parameters: &[u32]) -> Option<Box<dyn Twin>> {
-    let value =
-        |i: usize| parameters.get(i).copied().unwrap_or_else(|| kind.parameters.get(i).map_or(0, |p| p.default));
+    let value = |i: usize| {
+        parameters.get(i).copied().unwrap_or_else(|| kind.parameters.get(i).map_or(0, |p| p.default))
+    };
     Some(match kind.name {
         "quadrature" => Box::new(Quadrature::new(value(0))),
         "step" => Box::new(Step::new(value(0))),
         "pwm" => Box::new(Pwm::new(value(0), value(1), value(2) != 0)),
         "sigma-delta" => Box::new(SigmaDelta::new(value(0) != 0)),
-        "spi" => Box::new(Spi::new(value(0), value(1), value(2) != 0, value(3) != 0, value(4) != 0, value(5))),
+        "spi" => {
+            Box::new(Spi::new(value(0), value(1), value(2) != 0, value(3) != 0, value(4) != 0, value(5)))
+        }
         "digital-in" => Box::new(DigitalIn::new(value(0), value(1) != 0)),
         "digital-out" => Box::new(DigitalOut::new(value(0) != 0)),
         _ => return None,

@@ -26,17 +26,7 @@ impl Pwm {
     /// With half a period and dead time in cycles.
     pub fn new(half: u32, dead: u32, signed: bool) -> Pwm {
         let zero = if signed { half } else { 0 };
-        Pwm {
-            half,
-            dead,
-            zero,
-            next: zero,
-            on: zero,
-            place: 0,
-            back: false,
-            stood: [0; 2],
-            pins: [false; 2],
-        }
+        Pwm { half, dead, zero, next: zero, on: zero, place: 0, back: false, stood: [0; 2], pins: [false; 2] }
     }
 }
 

@@ -51,8 +51,10 @@ int main() {
 fn wrapper(parts: &[Part]) -> (String, usize, usize) {
     let (mut text, mut takes, mut drives) = (String::new(), 0, 0);
     for part in parts {
-        let parameters: Vec<_> = part.parameters.iter().map(|(name, value)| format!(".{name}({value})")).collect();
-        let list = if parameters.is_empty() { String::new() } else { format!("#({}) ", parameters.join(", ")) };
+        let parameters: Vec<_> =
+            part.parameters.iter().map(|(name, value)| format!(".{name}({value})")).collect();
+        let list =
+            if parameters.is_empty() { String::new() } else { format!("#({}) ", parameters.join(", ")) };
         let _ = write!(text, "    {} {list}{} (.clk(clk)", part.module, part.name);
         for (name, width) in &part.takes {
             let _ = write!(text, ", .{name}(in[{} +: {width}])", 32 * takes);
@@ -123,7 +125,8 @@ pub(crate) fn compare(
         .stdout(Stdio::piped())
         .spawn()
         .expect("what was built can be started");
-    let (mut stdin, mut stdout) = (process.stdin.take().expect("piped"), process.stdout.take().expect("piped"));
+    let (mut stdin, mut stdout) =
+        (process.stdin.take().expect("piped"), process.stdout.take().expect("piped"));
     let stimuli: Vec<Vec<Vec<u32>>> = (0..RESET + cycles)
         .map(|cycle| {
             let stimulus = |part: &mut Part| {

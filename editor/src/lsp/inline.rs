@@ -74,7 +74,7 @@ mod tests {
     fn ask(server: &mut Inline, method: &str, params: Value) -> Value {
         let said = server.receive(Request::new(1.into(), method.to_owned(), params).into());
         let answer = said.into_iter().find_map(|message| match message {
-            Message::Response(response) => response.result,
+            Message::Response(response) => response.response_result.ok(),
             _ => None,
         });
         answer.unwrap_or_default()

@@ -13,6 +13,7 @@ mod hover;
 mod inline;
 mod names;
 mod outline;
+mod pipeline;
 mod program;
 mod requests;
 mod text;
@@ -92,6 +93,8 @@ struct Client {
     snippets: bool,
     refreshes_hints: bool,
     refreshes_lenses: bool,
+    /// It wants to be told when a program is counted, for a picture of its own.
+    wants_counted: bool,
 }
 
 /// How far the session is.
@@ -303,6 +306,10 @@ impl Server {
         let told = diagnostics::by_file(&full.files, &full.diagnostics, &root, self.client.encoding);
         program.full = Some(full);
         self.publish(&root, told);
+        if self.client.wants_counted {
+            let counted = json!({ "uri": uri::of_path(&root) });
+            self.send(Notification::new("takt/counted".to_owned(), counted));
+        }
         if self.client.refreshes_hints {
             self.ask("workspace/inlayHint/refresh");
         }

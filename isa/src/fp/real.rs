@@ -8,12 +8,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 ///
 /// Comparisons and conversions to integers are *decisions*: their value is an integer, 1 or 0 for a comparison.
 pub trait Real:
-    Clone
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
+    Clone + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
     /// The square root.
     #[must_use]
