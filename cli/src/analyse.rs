@@ -68,7 +68,8 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
     let rows = read_inputs(arguments, program)?;
     let name = files::input_name(&arguments.file);
     let followed = follow(program, &rows, arguments.periods);
-    let Followed { trace, period, shadow } = followed.map_err(|error| fault::told(error.into(), &loaded, color))?;
+    let Followed { trace, period, shadow } =
+        followed.map_err(|error| fault::told(error.into(), &loaded, color))?;
     let again = |program: &Program| Some(follow(program, &rows, arguments.periods).ok()?.trace);
     let faster = faster(program, &trace, &candidates(arguments, &load), &again);
     let accuracy = Some(Measured::new(program, &shadow).json());
