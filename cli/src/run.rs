@@ -181,7 +181,16 @@ impl Run {
         }
         let (inputs, outputs) = (inputs.as_deref(), outputs.as_deref());
         let (periods, max_cycles) = (*periods, *max_cycles);
-        Ok(system::run::Arguments { file, source, inputs, outputs, periods, max_cycles, stats: *stats, json: *json })
+        Ok(system::run::Arguments {
+            file,
+            source,
+            inputs,
+            outputs,
+            periods,
+            max_cycles,
+            stats: *stats,
+            json: *json,
+        })
     }
 }
 

@@ -23,7 +23,8 @@ fn run_drives_a_system_by_base_ticks() {
     assert_eq!(json["ticks"], 10);
     assert_eq!(json["fifos"]["moves"]["pushed"], 2);
     let core = &json["cores"]["servo"];
-    let stalls: u64 = core["stalls"].as_object().unwrap().values().map(|cycles| cycles.as_u64().unwrap()).sum();
+    let stalls: u64 =
+        core["stalls"].as_object().unwrap().values().map(|cycles| cycles.as_u64().unwrap()).sum();
     assert_eq!(core["bundles"].as_u64().unwrap() + stalls, core["cycles"]["total"].as_u64().unwrap());
 }
 
@@ -49,7 +50,10 @@ fn bound_follows_a_command_through_the_cores() {
 fn what_a_system_is_not() {
     let folder = Folder::new();
     folder.write("a.s", ".input x\n.output y\n.once\n wait p\n.period\np: mov y, x\n wait p\n");
-    folder.write("loads.s", ".input x\n.output y\n.once\n wait p\n.period\np: ld y, 4000[zero]\n fadd y, x, x\n wait p\n");
+    folder.write(
+        "loads.s",
+        ".input x\n.output y\n.once\n wait p\n.period\np: ld y, 4000[zero]\n fadd y, x, x\n wait p\n",
+    );
     let system = |program: &str| {
         format!(
             "tick = 500\n\n[[core]]\nname = \"a\"\nprogram = \"{program}\"\n\n[[wire]]\nfrom = \"host.x\"\nto = \"a.x\"\n\n\

@@ -1,10 +1,10 @@
 //! From the file to a checked description, or to what is wrong with it.
 
 use crate::description::{
-    Core, Description, End, Field, Link, LinkKind, MAX_CORES, MAX_DEPTH, MAX_LATENCY, MAX_TICK,
-    MIN_LATENCY, Status,
+    Core, Description, End, Field, Link, LinkKind, MAX_CORES, MAX_DEPTH, MAX_LATENCY, MAX_TICK, MIN_LATENCY,
+    Status,
 };
-use crate::file::{CoreTable, File, FifoTable, SnapshotTable, StatusTable, WireTable};
+use crate::file::{CoreTable, FifoTable, File, SnapshotTable, StatusTable, WireTable};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -170,7 +170,8 @@ impl<'m> Checker<'m> {
         let tick = self.number(&file.tick, "the base tick", 1, MAX_TICK);
         if file.core.is_empty() {
             let help = "a core: `[[core]]` with `name` and `program`";
-            self.mistakes.add("core", 0..0, "a system without a core".to_owned()).help = Some(help.to_owned());
+            self.mistakes.add("core", 0..0, "a system without a core".to_owned()).help =
+                Some(help.to_owned());
         }
         if let Some(extra) = file.core.get(MAX_CORES) {
             let text = format!("{} cores; a system has at most {MAX_CORES}", file.core.len());
@@ -199,7 +200,8 @@ impl<'m> Checker<'m> {
             let (lanes, period) = (description.snapshot_lanes(number), core.period(tick));
             if self.mistakes.list.is_empty() && period < lanes + LEAST_PERIOD {
                 let least = lanes + LEAST_PERIOD;
-                let place = file.core.get(number).and_then(|core| core.tick.as_ref()).unwrap_or(&file.tick).span();
+                let place =
+                    file.core.get(number).and_then(|core| core.tick.as_ref()).unwrap_or(&file.tick).span();
                 let text = format!(
                     "core `{}` has a tick every {period} cycles and needs {least} at least: {LEAST_PERIOD}, and \
                      one for each of its {lanes} values from snapshots",
@@ -247,8 +249,10 @@ impl<'m> Checker<'m> {
         let mut good = self.name(&table.name, "core");
         let name = table.name.get_ref();
         if let Some(first) = self.link_names.get(name).cloned() {
-            let diagnostic = self.mistakes.add("name", table.name.span(), format!("two cores named `{name}`"));
-            *diagnostic = diagnostic.clone().also(span(first), "the first").help("another name for one of them");
+            let diagnostic =
+                self.mistakes.add("name", table.name.span(), format!("two cores named `{name}`"));
+            *diagnostic =
+                diagnostic.clone().also(span(first), "the first").help("another name for one of them");
             good = false;
         }
         self.link_names.insert(name.clone(), table.name.span());
@@ -277,7 +281,8 @@ impl<'m> Checker<'m> {
                 let near = nearest(wanted.get_ref(), names.iter().copied());
                 let text = format!("there is no machine `{}`", wanted.get_ref());
                 let diagnostic = self.mistakes.add("machine", wanted.span(), text);
-                *diagnostic = diagnostic.clone().help(format!("machines: {}", names.join(", "))).did_you_mean(near);
+                *diagnostic =
+                    diagnostic.clone().help(format!("machines: {}", names.join(", "))).did_you_mean(near);
                 return Ok(None);
             }
         }
@@ -354,7 +359,8 @@ impl<'m> Checker<'m> {
             (End::Host, Some(link)) => (format!("{link}.{name}"), "output of the system"),
         };
         if let Some(first) = self.driven.get(&key).cloned() {
-            let diagnostic = self.mistakes.add("drivers", place, format!("two drivers of the {what} `{key}`"));
+            let diagnostic =
+                self.mistakes.add("drivers", place, format!("two drivers of the {what} `{key}`"));
             let help = "each port has one driver: leave one of the links out, or give it a port of its own";
             *diagnostic = diagnostic.clone().also(span(first), "the first").help(help);
             return false;
@@ -426,7 +432,9 @@ impl<'m> Checker<'m> {
         if let Some(latency) = latency.filter(|latency| *latency.get_ref() == 0) {
             let text = match self.closed(&link) {
                 Some(way) => format!("a loop of zero latency: {way}"),
-                None => format!("a latency of 0: a value takes {MIN_LATENCY} cycles from core to core at least"),
+                None => {
+                    format!("a latency of 0: a value takes {MIN_LATENCY} cycles from core to core at least")
+                }
             };
             self.mistakes.add("latency", latency.span(), text).help = Some(LATENCY_HELP.to_owned());
         }
@@ -523,11 +531,11 @@ impl<'m> Checker<'m> {
         if let Some(first) = self.link_names.insert(name.get_ref().clone(), name.span()) {
             let text = format!("`{}` is the name of something else", name.get_ref());
             let diagnostic = self.mistakes.add("name", name.span(), text);
-            *diagnostic = diagnostic.clone().also(span(first), "the first").help("another name for one of them");
+            *diagnostic =
+                diagnostic.clone().also(span(first), "the first").help("another name for one of them");
             return None;
         }
-        let (sender, receiver) =
-            (self.end(from.get_ref(), from.span()), self.end(to.get_ref(), to.span()));
+        let (sender, receiver) = (self.end(from.get_ref(), from.span()), self.end(to.get_ref(), to.span()));
         let (sender, receiver) = (sender?, receiver?);
         (good && self.one_inside(sender, receiver, to.span())).then_some((sender, receiver))
     }
@@ -573,8 +581,9 @@ impl<'m> Checker<'m> {
         match (end, port) {
             (End::Host, None) => Some(None),
             (End::Host, Some(port)) => {
-                self.mistakes.add("port", port.span(), format!("`{key}` at the host, who has no such port")).help =
-                    Some(format!("leave `{key}` out"));
+                self.mistakes
+                    .add("port", port.span(), format!("`{key}` at the host, who has no such port"))
+                    .help = Some(format!("leave `{key}` out"));
                 None
             }
             (End::Core(_), Some(port)) => {
@@ -603,7 +612,8 @@ impl<'m> Checker<'m> {
             Some(port) => self.action("strobe", from, Some(port), table.name.span()),
         };
         let (Some(latency), Some(fields), Some(strobe)) = (latency, fields, strobe) else { return };
-        let link = Link { name: name.clone(), from, to, latency, fields, kind: LinkKind::Snapshot { strobe } };
+        let link =
+            Link { name: name.clone(), from, to, latency, fields, kind: LinkKind::Snapshot { strobe } };
         self.add(link, table.latency.as_ref(), table.name.span());
     }
 
@@ -623,9 +633,15 @@ impl<'m> Checker<'m> {
         let sender = self.status(name, from, table.sender.as_ref());
         let receiver = self.status(name, to, table.receiver.as_ref());
         let (Some(latency), Some(depth), Some(fields)) = (latency, depth, fields) else { return };
-        let (Some(push), Some(pop), Some(sender), Some(receiver)) = (push, pop, sender, receiver) else { return };
+        let (Some(push), Some(pop), Some(sender), Some(receiver)) = (push, pop, sender, receiver) else {
+            return;
+        };
         let kind = LinkKind::Fifo { depth: depth as u32, push, pop, sender, receiver };
-        self.add(Link { name: name.clone(), from, to, latency, fields, kind }, table.latency.as_ref(), table.name.span());
+        self.add(
+            Link { name: name.clone(), from, to, latency, fields, kind },
+            table.latency.as_ref(),
+            table.name.span(),
+        );
     }
 
     fn status(
@@ -653,7 +669,12 @@ impl<'m> Checker<'m> {
                 continue;
             };
             if found.ty == Type::F {
-                let text = format!("`{}` takes {}, and `{}` is an integer", found.name, type_name(found.ty), status.name());
+                let text = format!(
+                    "`{}` takes {}, and `{}` is an integer",
+                    found.name,
+                    type_name(found.ty),
+                    status.name()
+                );
                 self.mistakes.add("type", port.span(), text).help =
                     Some(format!("declare it `.input {}:int`", found.name));
                 good = false;
@@ -668,16 +689,21 @@ impl<'m> Checker<'m> {
     fn undriven(&mut self, file: &File) {
         for core in &self.cores {
             let free = |port: &&Port| !self.driven.contains_key(&format!("{}.{}", core.name, port.name));
-            let free: Vec<&str> = core.program.inputs.iter().filter(free).map(|port| port.name.as_str()).collect();
+            let free: Vec<&str> =
+                core.program.inputs.iter().filter(free).map(|port| port.name.as_str()).collect();
             let Some(first) = free.first() else { continue };
-            let Some(table) = file.core.iter().find(|table| *table.name.get_ref() == core.name) else { continue };
+            let Some(table) = file.core.iter().find(|table| *table.name.get_ref() == core.name) else {
+                continue;
+            };
             let ports = if free.len() == 1 { "input port" } else { "input ports" };
             let text = format!("nothing drives the {ports} {} of core `{}`", free.join(", "), core.name);
-            let help = format!("`[[wire]]` with `from = \"{HOST}.{first}\"`, `to = \"{}.{first}\"`", core.name);
+            let help =
+                format!("`[[wire]]` with `from = \"{HOST}.{first}\"`, `to = \"{}.{first}\"`", core.name);
             self.mistakes.add("port", table.name.span(), text).help = Some(help);
         }
     }
 }
 
-const LATENCY_HELP: &str = "the cycles from the writeback of a value to the first bundle that reads it: 4 or more";
+const LATENCY_HELP: &str =
+    "the cycles from the writeback of a value to the first bundle that reads it: 4 or more";
 const _: () = assert!(MIN_LATENCY == 4, "say so in the help");

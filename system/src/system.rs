@@ -199,7 +199,9 @@ impl System {
                     (Source::Status { link, side, .. }, Source::Status { link: l, side: s, .. }) => {
                         (link, side) == (l, s)
                     }
-                    (known, source) => known.link() == source.link() && matches!(source, Source::Field { .. }),
+                    (known, source) => {
+                        known.link() == source.link() && matches!(source, Source::Field { .. })
+                    }
                 };
                 if !sources.iter().any(same) {
                     sources.push(lane.source);
@@ -219,7 +221,17 @@ impl System {
             });
         }
         let links = description.links.iter().map(state).collect();
-        Ok(System { description, cores, links, now: 0, until: 0, start: None, starting: false, fault: None, events: None })
+        Ok(System {
+            description,
+            cores,
+            links,
+            now: 0,
+            until: 0,
+            start: None,
+            starting: false,
+            fault: None,
+            events: None,
+        })
     }
 
     // ---- What there is to see.
@@ -308,7 +320,8 @@ impl System {
     pub fn set_input(&mut self, name: &str, bits: u32) -> Result<(), HostError> {
         let description = Arc::clone(&self.description);
         let mut found = false;
-        for (number, link) in description.links.iter().enumerate().filter(|(_, link)| link.from == End::Host) {
+        for (number, link) in description.links.iter().enumerate().filter(|(_, link)| link.from == End::Host)
+        {
             match &mut self.links[number] {
                 LinkState::Wire { .. } => {
                     if link.fields.first().is_some_and(|field| field.from == name) {
@@ -317,7 +330,8 @@ impl System {
                     }
                 }
                 LinkState::Snapshot { working, .. } | LinkState::Fifo { working, .. } => {
-                    let Some(name) = name.strip_prefix(&link.name).and_then(|rest| rest.strip_prefix('.')) else {
+                    let Some(name) = name.strip_prefix(&link.name).and_then(|rest| rest.strip_prefix('.'))
+                    else {
                         continue;
                     };
                     if let Some(field) = link.fields.iter().position(|field| field.from == name) {
@@ -338,7 +352,9 @@ impl System {
         let description = Arc::clone(&self.description);
         let now = self.now;
         match (description.links.get(link), self.links.get_mut(link)) {
-            (Some(known), Some(LinkState::Snapshot { working, published, .. })) if known.from == End::Host => {
+            (Some(known), Some(LinkState::Snapshot { working, published, .. }))
+                if known.from == End::Host =>
+            {
                 published.push_back((now + known.transit() + 1, working.clone()));
                 Ok(())
             }
@@ -457,9 +473,8 @@ impl System {
                             // The others run as far: an earlier one may show.
                             self.until = self.until.min(fault.cycle + 1);
                             let name = self.description.cores[core].name.clone();
-                            let earlier = |known: &SystemFault| {
-                                (known.fault.cycle, known.core) <= (fault.cycle, core)
-                            };
+                            let earlier =
+                                |known: &SystemFault| (known.fault.cycle, known.core) <= (fault.cycle, core);
                             if !self.fault.as_ref().is_some_and(earlier) {
                                 self.fault = Some(SystemFault { core, name, fault });
                             }
@@ -513,7 +528,9 @@ impl System {
         match end {
             End::Host => self.until.max(self.now),
             End::Core(core) => match &self.cores[core] {
-                state if state.halted || matches!(state.emulator.status(), Status::Faulted(_)) => Cycle::MAX / 2,
+                state if state.halted || matches!(state.emulator.status(), Status::Faulted(_)) => {
+                    Cycle::MAX / 2
+                }
                 state => state.emulator.now(),
             },
         }
@@ -750,7 +767,9 @@ impl System {
             if link.from == here {
                 match &link.kind {
                     LinkKind::Wire => self.send_wire(number, link, writes, waited),
-                    LinkKind::Snapshot { strobe } => self.send_snapshot(number, link, *strobe, writes, waited),
+                    LinkKind::Snapshot { strobe } => {
+                        self.send_snapshot(number, link, *strobe, writes, waited)
+                    }
                     LinkKind::Fifo { push: Some(push), .. } => {
                         let LinkState::Fifo { working, fifo } = &mut self.links[number] else { continue };
                         follow(link, *push, writes, working, |cycle, entry| {
@@ -890,12 +909,9 @@ fn state(link: &Link) -> LinkState {
             host: VecDeque::new(),
             shown: link.fields.first().map_or(0, |field| field.initial),
         },
-        LinkKind::Snapshot { .. } => LinkState::Snapshot {
-            working: initial(),
-            published: VecDeque::new(),
-            shown: initial(),
-            taken: 0,
-        },
+        LinkKind::Snapshot { .. } => {
+            LinkState::Snapshot { working: initial(), published: VecDeque::new(), shown: initial(), taken: 0 }
+        }
         LinkKind::Fifo { depth, .. } => {
             LinkState::Fifo { working: initial(), fifo: Box::new(Fifo::new(depth)) }
         }
