@@ -23,7 +23,10 @@ impl Session {
         }
         let mut client = Client::start(&folder, "lsp");
         let root = format!("file://{}", folder.path().display());
-        let capabilities = json!({ "workspace": { "inlayHint": { "refreshSupport": true } } });
+        let capabilities = json!({
+            "workspace": { "inlayHint": { "refreshSupport": true } },
+            "experimental": { "takt/counted": true },
+        });
         let answer = client.ask(
             "initialize",
             json!({ "capabilities": capabilities, "workspaceFolders": [{ "uri": root, "name": "test" }] }),
@@ -399,7 +402,7 @@ fn cycles_stand_beside_the_lines() {
 fn the_picture_has_each_operation_at_its_line() {
     let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
     session.open("main.s", MAIN);
-    let told = session.client.wait(|message| message["method"] == "$/takt/counted");
+    let told = session.client.wait(|message| message["method"] == "takt/counted");
     assert_eq!(told["params"]["uri"], session.uri("main.s"));
     let params = json!({ "textDocument": { "uri": session.uri("main.s") } });
     let picture = session.ask("takt/pipeline", params.clone());

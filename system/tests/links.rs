@@ -87,8 +87,9 @@ fn a_fifo_keeps_the_order_and_says_what_it_refused() {
         system.run_until(start + 600 * period - 1).unwrap();
         taken.push(system.output("o").unwrap());
     }
-    let counts = system.fifo_counts(0).unwrap();
-    assert_eq!(counts.pushed - counts.popped, system.fifo_entries(0).len() as u64);
+    let fifo = description.link_named("q").unwrap();
+    let counts = system.fifo_counts(fifo).unwrap();
+    assert_eq!(counts.pushed - counts.popped, system.fifo_entries(fifo).len() as u64);
     assert_eq!(counts.pushed + counts.overflows, 30);
     assert_eq!((counts.most, counts.underflows), (4, 0));
     // Empty at the first tick; then in order, without the refused ones.

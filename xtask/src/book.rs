@@ -37,9 +37,9 @@ const PARTS: &[(&str, &[&str])] = &[
         "Writing programs",
         &["language", "examples", "library", "fast-code", "scheduling", "analysis", "editors", "playground"],
     ),
-    ("Running them", &["debugging", "traces", "batch", "plant", "python"]),
+    ("Running them", &["debugging", "traces", "batch", "plant", "system", "python"]),
     ("The processor", &["isa", "timing", "trig", "image"]),
-    ("The circuit", &["hardware", "headers", "synthesis"]),
+    ("The circuit", &["hardware", "headers", "board", "protocol", "synthesis", "machine-choice"]),
     ("Robots", &["robot", "arm", "model", "models"]),
     ("Reference", &["glossary", "speed", "reach"]),
 ];

@@ -70,7 +70,7 @@ impl Host {
     }
 
     /// Does what a row says; how many entries did not fit.
-    fn write(&self, system: &mut System, row: &ports::Row) -> Result<u64> {
+    fn write(&self, system: &mut System, row: &takt_emu::Row) -> Result<u64> {
         let (inputs, pushes) = row.split_at(self.inputs.len());
         for (input, (_, bits)) in self.inputs.iter().zip(inputs) {
             system.set_input(&input.name, *bits)?;

@@ -93,6 +93,8 @@ struct Client {
     snippets: bool,
     refreshes_hints: bool,
     refreshes_lenses: bool,
+    /// It wants to be told when a program is counted, for a picture of its own.
+    wants_counted: bool,
 }
 
 /// How far the session is.
@@ -304,9 +306,10 @@ impl Server {
         let told = diagnostics::by_file(&full.files, &full.diagnostics, &root, self.client.encoding);
         program.full = Some(full);
         self.publish(&root, told);
-        // Clients that do not know it pass over it, as the protocol says of `$/`.
-        let counted = json!({ "uri": uri::of_path(&root) });
-        self.send(Notification::new("$/takt/counted".to_owned(), counted));
+        if self.client.wants_counted {
+            let counted = json!({ "uri": uri::of_path(&root) });
+            self.send(Notification::new("takt/counted".to_owned(), counted));
+        }
         if self.client.refreshes_hints {
             self.ask("workspace/inlayHint/refresh");
         }

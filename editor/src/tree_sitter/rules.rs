@@ -110,6 +110,14 @@ fn operands(directive: Directive) -> Option<Rule> {
         Schedule | Contract | Ports => name(),
         Fast | Order => blanks(name()),
         Deadline => seq([blanks(name()), assigned()]),
+        Range => seq([
+            optional(text("@")),
+            blanks(field("name", name())),
+            text("="),
+            field("least", expression()),
+            text(","),
+            field("largest", expression()),
+        ]),
         Late => seq([blanks(name()), optional(assigned())]),
         Macro | EndMacro | Rep | EndRep | If | Elif | Else | EndIf | Raw => return None,
     })

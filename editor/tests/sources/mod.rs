@@ -383,6 +383,15 @@ impl Writer<'_> {
                 self.names();
                 self.assigned();
             }
+            Range => {
+                if self.chance(2) {
+                    self.put("@");
+                }
+                self.names();
+                self.assigned();
+                self.put(",");
+                self.expression(In::Line, 2);
+            }
             Late => {
                 self.names();
                 if self.chance(2) {

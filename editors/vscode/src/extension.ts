@@ -25,7 +25,15 @@ async function start() {
       synchronize: { fileEvents: vscode.workspace.createFileSystemWatcher('**/*.s') },
     },
   );
-  client.onNotification('$/takt/counted', () => beside?.counted());
+  client.registerFeature({
+    getState: () => ({ kind: 'static' }),
+    fillClientCapabilities: (capabilities) => {
+      capabilities.experimental = { ...capabilities.experimental, 'takt/counted': true };
+    },
+    initialize: () => undefined,
+    clear: () => undefined,
+  });
+  client.onNotification('takt/counted', () => beside?.counted());
   try {
     await client.start();
   } catch (error) {

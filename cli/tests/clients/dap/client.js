@@ -65,6 +65,7 @@ async function main() {
   found.cycle = await run(() => client.customRequest('takt/gotoCycle', { cycle: 9 }));
   found.atCycle = (await client.evaluateRequest({ expression: 'cycle', context: 'watch' })).body.result;
   found.noCycle = await client.customRequest('takt/gotoCycle', { cycle: -1 }).catch((error) => error.message);
+  await run(() => client.customRequest('takt/gotoCycle', { cycle: 45 }));
   await client.setBreakpointsRequest({ source: { path: program }, breakpoints: [{ line: 8, logMessage: 'back' }] });
   found.beginning = await run((a) => client.reverseContinueRequest(a));
   await client.setBreakpointsRequest({ source: { path: program }, breakpoints: [] });
