@@ -576,7 +576,7 @@ class Program:
         for index, element in enumerate(array.elements):
             if element is not None:
                 whole[..., index] = ports[element] if isinstance(element, str) else element
-        return whole.reshape(*lead, *array.shape)
+        return whole.reshape((*lead, *array.shape))
 
     def __repr__(self) -> str:
         def names(ports: Mapping[str, Port], arrays: Sequence[Array]) -> str:
