@@ -52,7 +52,7 @@ pub enum FollowError {
 }
 
 /// A period that was looked at.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Followed {
     /// When everything happened.
     pub trace: Trace,
