@@ -2,6 +2,8 @@
 //!
 //! - [`accuracy`]: the errors of a run's outputs against binary64, and where they come from.
 //! - [`bound`]: the best and the worst that each section of a program can take, from the program alone.
+//! - [`faster`]: what faster units would bring.
+//! - [`follow`]: a run up to the period that is looked at.
 //! - [`straight()`]: in which cycle each operation of a straight line issues, and what it waits for.
 //! - [`trace`]: where the cycles of one period, or of a run, went: every issue and what it waited for, the chain of
 //!   operations that sets the time, and what a faster unit would bring.
@@ -10,9 +12,12 @@
 pub mod accuracy;
 pub mod bound;
 mod error;
+pub mod faster;
+pub mod follow;
 mod graph;
 pub mod picture;
 mod straight;
+mod text;
 mod trace;
 
 pub use bound::{Bounds, SectionBounds, Span, bound};

@@ -39,13 +39,15 @@ pub struct Picture<'p> {
     pub chain: Vec<Link>,
     /// What faster units would bring.
     pub faster: Vec<Faster>,
+    /// What its lines do to accuracy, as `takt accuracy --json` has it.
+    pub accuracy: Option<Value>,
 }
 
 impl<'p> Picture<'p> {
-    /// A period of a program; `faster` is left empty.
+    /// A period of a program; `faster` and `accuracy` are left empty.
     pub fn new(program: &'p Program, name: impl Into<String>, period: u64, trace: Trace) -> Picture<'p> {
         let chain = trace.critical_path(program);
-        Picture { program, name: name.into(), period, trace, chain, faster: Vec::new() }
+        Picture { program, name: name.into(), period, trace, chain, faster: Vec::new(), accuracy: None }
     }
 
     /// The name of a unit, or of the front end.
@@ -219,6 +221,7 @@ impl<'p> Picture<'p> {
             "bundles": self.trace.issues.iter().enumerate().map(bundle).collect::<Vec<_>>(),
             "lines": self.lines().iter().map(line).collect::<Vec<_>>(),
             "critical_path": self.chain.iter().map(link).collect::<Vec<_>>(),
+            "accuracy": self.accuracy,
             "one_cycle_less": self.faster.iter().map(faster).collect::<Vec<_>>(),
         })
     }

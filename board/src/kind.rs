@@ -56,6 +56,9 @@ pub struct Strobes {
     pub start: bool,
 }
 
+/// A port of a module: its name and its bits.
+pub type Port = (String, u32);
+
 /// A kind of peripheral.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kind {
@@ -217,7 +220,7 @@ impl Kind {
 
     /// The ports of its module in the order in which tests and generator connect them, with widths; first those that it takes, then
     /// those that it drives. The clock is not among them.
-    pub fn ports(&self) -> (Vec<(String, u32)>, Vec<(String, u32)>) {
+    pub fn ports(&self) -> (Vec<Port>, Vec<Port>) {
         let mut takes = vec![("rst".to_owned(), 1)];
         let strobe = |name: &str, there: bool| there.then(|| (name.to_owned(), 1));
         takes.extend(strobe("enable", self.strobes.enable));
@@ -233,4 +236,29 @@ impl Kind {
         let reads = self.reads.iter().map(|register| (format!("r_{}", register.name), 32));
         (takes, pins(Direction::Output).chain(reads).collect())
     }
+}
+
+/// Every kind as a row of the table in docs/board.md.
+pub fn markdown() -> String {
+    let registers = |registers: &[Register]| {
+        let texts = registers.iter().map(|register| format!("`{}`: {}", register.name, register.text));
+        texts.collect::<Vec<_>>().join("; ")
+    };
+    let row = |kind: &Kind| {
+        let pins = kind.pins.iter().map(|pin| match pin.optional {
+            true => format!("{} (optional)", pin.name),
+            false => pin.name.to_owned(),
+        });
+        let parameters = kind.parameters.iter().map(|p| format!("`{}` ({}): {}", p.name, p.default, p.text));
+        format!(
+            "| `{}`: {} | {} | {} | {} | {} |\n",
+            kind.name,
+            kind.text,
+            pins.collect::<Vec<_>>().join(", "),
+            registers(kind.reads),
+            registers(kind.writes),
+            parameters.collect::<Vec<_>>().join("; ")
+        )
+    };
+    KINDS.iter().map(row).collect()
 }

@@ -5,16 +5,24 @@
 //! of the program are their registers.
 
 pub mod boards;
+pub mod build;
 mod document;
+pub mod host;
 pub mod kind;
 pub mod pll;
 pub mod protocol;
+pub mod serial;
+pub mod simulation;
 pub mod system;
+#[cfg(unix)]
+pub mod terminal;
+pub mod tools;
 pub mod top;
 pub mod twin;
 
 pub use boards::Board;
 pub use document::Mistake;
+pub use host::Host;
 pub use kind::Kind;
 pub use system::System;
 

@@ -74,6 +74,12 @@ pub const REGISTERS: [Register; 15] = [
     register(14, "lost", "r", "frames of the stream that were not sent, since power-up"),
 ];
 
+/// The registers as rows of the table in docs/protocol.md.
+pub fn markdown() -> String {
+    let row = |r: &Register| format!("| {} | {} | {} | {} |\n", r.address, r.name, r.access, r.text);
+    REGISTERS.iter().map(row).collect()
+}
+
 /// CRC-16/CCITT-FALSE: polynomial 0x1021, initially 0xffff, highest bit first.
 pub fn checksum(bytes: &[u8]) -> u16 {
     bytes.iter().fold(0xffff, |sum, &byte| {
@@ -181,6 +187,24 @@ impl Receiver {
             self.dropped += 1;
         }
     }
+}
+
+/// A line to a board.
+pub trait Line {
+    /// Sends bytes.
+    ///
+    /// # Errors
+    /// If the line is gone.
+    fn send(&mut self, bytes: &[u8]) -> std::io::Result<()>;
+
+    /// What has come, after waiting a little for it; nothing is no error.
+    ///
+    /// # Errors
+    /// If the line is gone.
+    fn receive(&mut self) -> std::io::Result<Vec<u8>>;
+
+    /// How often to wait for an answer until a request is made again.
+    fn patience(&self) -> u32;
 }
 
 /// Why the board did not do what was asked.

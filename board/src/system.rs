@@ -138,11 +138,11 @@ impl System {
                     document.mistake(place, text);
                     continue;
                 };
-                if *direction == Direction::Input {
-                    if let Some(other) = driven.insert(port, &peripheral.name) {
-                        let text = format!("input port `{port}` is driven twice: `{other}` drives it, too");
-                        document.mistake(place, text);
-                    }
+                if *direction == Direction::Input
+                    && let Some(other) = driven.insert(port, &peripheral.name)
+                {
+                    let text = format!("input port `{port}` is driven twice: `{other}` drives it, too");
+                    document.mistake(place, text);
                 }
                 self.check_type(&document, peripheral, found, *direction, place);
             }
@@ -230,10 +230,10 @@ impl<'a> Reader<'a> {
             Some(at) => {
                 let place = at.place.clone();
                 let lead = cycles(at, 0);
-                if let (Some(lead), Some(period)) = (lead, period) {
-                    if lead >= period {
-                        mistake(&place, "`lead` is to be shorter than the period".to_owned());
-                    }
+                if let (Some(lead), Some(period)) = (lead, period)
+                    && lead >= period
+                {
+                    mistake(&place, "`lead` is to be shorter than the period".to_owned());
                 }
                 lead
             }

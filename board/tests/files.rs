@@ -47,7 +47,8 @@ const PROGRAM: &str = "
 .input n:int bad:int
 .output force
 .period
-        itof force, n
+period:
+        itof    force, n
         wait period
 ";
 
@@ -121,7 +122,7 @@ const WRONG: &[(&str, &str, &str)] = &[
         "27:18: a scale is a power of two from 2^-60 to 2^60, as 0.5, 1 or 16, not 10: multiply by the rest in the program",
     ),
     ("scale = { duty", "scale = { force", "27:11: `force` is no register of a pwm that a program writes"),
-    ("high = \"gp2\", ", "", "23:1: `high` is missing in [pins]"),
+    ("high = \"gp2\", ", "", "23:8: `high` is missing in [pins]"),
     ("period = 400.0", "period = 0.1", "4:10: 0.1 µs are 5 cycles of 50 MHz; there may be 64 to 1073741824"),
     ("lead = 5", "lead = 400", "5:8: `lead` is to be shorter than the period"),
     (
@@ -158,11 +159,11 @@ fn ports_must_be_the_programs() {
     };
     assert_eq!(
         said(&PROGRAM.replace("bad", "worse")),
-        "robot.toml:19:38: the program has no input port `bad`; there are n, worse"
+        "robot.toml:19:33: the program has no input port `bad`; there are n, worse"
     );
-    let float = PROGRAM.replace("n:int", "n").replace("itof force, n", "fadd force, n, n");
+    let float = PROGRAM.replace("n:int", "n").replace("itof    force, n", "fadd force, n, n");
     assert!(said(&float).contains("19:19: input port `n` is a number with point"), "{}", said(&float));
-    let integer = PROGRAM.replace("force\n", "force:int\n").replace("itof force, n", "mov force, n");
+    let integer = PROGRAM.replace("force\n", "force:int\n").replace("itof    force, n", "mov force, n");
     assert!(
         said(&integer).contains("26:18: output port `force` is an integer, which is not scaled"),
         "{}",
@@ -189,4 +190,25 @@ fn a_site_is_taken_once() {
         mistakes[0].text.contains("`iCE40` is no device; there are LFE5U-25F, LFE5U-45F, LFE5U-85F"),
         "{mistakes:?}"
     );
+}
+
+/// The tables in the documents are those of the code; `TAKT_BLESS=1` writes them.
+#[test]
+fn documents_have_the_tables() {
+    for (name, heading, rows) in [
+        ("board.md", "| kind | pins |", takt_board::kind::markdown()),
+        ("protocol.md", "| address | register |", takt_board::protocol::markdown()),
+    ] {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs").join(name);
+        let text = std::fs::read_to_string(&path).expect("the document");
+        let heading = text.find(heading).expect("the table's heading");
+        let begin = heading + text[heading..].match_indices('\n').nth(1).expect("its two lines").0 + 1;
+        let end = begin + text[begin..].find("\n\n").map_or(text.len() - begin, |end| end + 1);
+        if std::env::var_os("TAKT_BLESS").is_some() {
+            let text = format!("{}{rows}{}", &text[..begin], &text[end..]);
+            std::fs::write(&path, text).expect("the document can be written");
+        } else {
+            assert_eq!(text[begin..end], rows, "{name}: TAKT_BLESS=1 writes the table");
+        }
+    }
 }

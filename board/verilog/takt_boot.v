@@ -4,7 +4,7 @@
 //   The memory holds records {space, slot, address, value}, as the core's loader takes them; space 3 is an input port. Its contents
 //   at power-up are those of the file IMAGE. count of them are valid.
 //   boot: high for a cycle starts it, at any time: reset is high from the next cycle on, until program and data memory have been
-//   written with zeros and all records have been written, and 128 cycles longer. A boot during a boot begins it again.
+//   written with zeros, input ports too, and all records have been written, and 128 cycles longer. A boot during a boot begins it again.
 //   The host writes a record in parts of 32 bits; the part 2 completes it: 0 low and 1 high bits of the value, 2 place = {slot,
 //   space, address}. part_read: of the record `at`, a cycle after it stands.
 
@@ -13,7 +13,8 @@ module takt_boot #(
     parameter BITS    = 11,   // of a record's number
     parameter SLOTS   = 3,
     parameter CODE    = 10,   // bits of a bundle's address
-    parameter DATA    = 10    // bits of a data word's address
+    parameter DATA    = 10,   // bits of a data word's address
+    parameter INPUTS  = 8     // bits of an input port's number; the last is not one
 ) (
     input  wire            clk,
     input  wire            rst,
@@ -41,18 +42,21 @@ module takt_boot #(
     reg  [31:0]     low;
     reg  [15:0]     high;
     reg  [BITS:0]   next;
-    reg  [15:0]     clears;     // program words of each slot, then data
+    reg  [15:0]     clears;     // program words of each slot, then data, then input ports
     reg  [2:0]      slot;
     reg  [6:0]      settles;
     reg  [1:0]      state;      // 0: at rest, 1: zeros, 2: records, 3: settles
-    reg             valid, clearing, clears_data;
+    reg             valid, clearing, clears_data, clears_input;
     reg  [15:0]     cleared;
     reg  [2:0]      cleared_slot;
 
     wire [BITS-1:0] read_at = state == 2'd0 ? at : next[BITS-1:0];
     localparam [15:0] LAST_CODE = (1 << CODE) - 1;
     localparam [15:0] LAST_DATA = (1 << DATA) - 1;
-    localparam [2:0]  LAST_SLOT = SLOTS;  // one more than program memory has: data
+    localparam [15:0] LAST_PORT = (1 << INPUTS) - 2;
+    // Beyond the slots of program memory.
+    localparam [2:0]  DATA_SLOT = SLOTS, PORT_SLOT = SLOTS + 1;
+    wire [15:0] last_clear = slot == PORT_SLOT ? LAST_PORT : slot == DATA_SLOT ? LAST_DATA : LAST_CODE;
 
     always @(posedge clk) begin
         record <= records[read_at];
@@ -73,25 +77,26 @@ module takt_boot #(
     end
 
     assign load         = clearing | (valid & record[65:64] != 2'd3);
-    assign input_write  = valid & record[65:64] == 2'd3;
+    assign input_write  = clears_input | (valid & record[65:64] == 2'd3);
     assign load_space   = clearing ? {1'b0, clears_data} : record[65:64];
     assign load_slot    = clearing ? cleared_slot : record[68:66];
-    assign load_address = clearing ? cleared : record[63:48];
-    assign load_value   = clearing ? 48'd0 : record[47:0];
+    assign load_address = clearing | clears_input ? cleared : record[63:48];
+    assign load_value   = clearing | clears_input ? 48'd0 : record[47:0];
 
     always @(posedge clk) begin
         valid        <= state == 2'd2 & next != count;
-        clearing     <= state == 2'd1;
-        clears_data  <= slot == LAST_SLOT;
+        clearing     <= state == 2'd1 & slot != PORT_SLOT;
+        clears_input <= state == 2'd1 & slot == PORT_SLOT;
+        clears_data  <= slot == DATA_SLOT;
         cleared      <= clears;
-        cleared_slot <= slot == LAST_SLOT ? 3'd0 : slot;
+        cleared_slot <= slot == DATA_SLOT ? 3'd0 : slot;
         case (state)
             2'd1: begin
                 clears <= clears + 16'd1;
-                if (clears == (slot == LAST_SLOT ? LAST_DATA : LAST_CODE)) begin
+                if (clears == last_clear) begin
                     clears <= 16'd0;
                     slot   <= slot + 3'd1;
-                    if (slot == LAST_SLOT) state <= 2'd2;
+                    if (slot == PORT_SLOT) state <= 2'd2;
                 end
             end
             2'd2: begin

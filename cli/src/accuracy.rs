@@ -1,26 +1,31 @@
-//! `takt accuracy`: how far the outputs are from binary64, and which lines lose it.
+//! `takt accuracy`: how far the outputs are from binary64, and which lines lose it; or how far they can be at most.
 
 use crate::fault;
 use crate::files::{self, Out};
 use crate::load::Load;
 use crate::number;
-use crate::output;
+use crate::output::{self, Failure};
 use crate::ports::Inputs;
 use crate::select::{OptionalMachine, SourceArguments};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::io::Write;
-use std::path::PathBuf;
-use takt_analysis::accuracy::{OperationAccuracy, OutputAccuracy, Part, Shadow, Worst};
+use std::path::{Path, PathBuf};
+use takt_analysis::accuracy::{
+    Assumed, Decision, Enclosure, Hazard, Interval, Lost, OperationAccuracy, OutputAccuracy, OutputBound,
+    Part, Problem, Shadow, Worst, enclose,
+};
 use takt_emu::Emulator;
 use takt_isa::Program;
 use takt_isa::program::Location;
 
-/// Measure the outputs' errors against binary64, and the source lines that they come from.
+/// Measure the outputs' errors against binary64, or bound them for every run, and name the lines that they come from.
 ///
-/// Runs the program on recorded inputs, and beside it the same operations in binary64.
+/// With --inputs, runs the program on recorded inputs, and beside it the same operations in binary64. Without, follows every way through a
+/// period for all inputs and states within their `.range`: bounds each output's error, and shows that there is no NaN, no overflow and no
+/// division by zero, or names the operations where there may be (status 1).
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Accuracy {
@@ -32,12 +37,12 @@ pub(crate) struct Accuracy {
     source: SourceArguments,
     /// CSV with one named column for each input port and one row for each period; `-` is standard input.
     #[arg(long, value_name = "CSV")]
-    inputs: PathBuf,
+    inputs: Option<PathBuf>,
     /// Run at most this many periods.
-    #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
+    #[arg(long, value_name = "N", requires = "inputs", value_parser = number::count, allow_hyphen_values = true)]
     periods: Option<u64>,
     /// Let each period begin with exact values: errors that states carry from period to period are left out.
-    #[arg(long)]
+    #[arg(long, requires = "inputs")]
     each_period: bool,
     /// Print the result as JSON.
     #[arg(long)]
@@ -46,6 +51,7 @@ pub(crate) struct Accuracy {
 
 const EXAMPLES: &str = "\
 Examples:
+  takt accuracy prog.s                                bounds that no run exceeds, from the ranges in the source
   takt accuracy prog.s --inputs in.csv                errors against binary64, and the lines that they come from
   takt accuracy prog.s --inputs in.csv --each-period  without what states carry from period to period";
 
@@ -55,11 +61,26 @@ const SHOWN: usize = 12;
 const SHOWN_PARTS: usize = 3;
 
 pub(crate) fn run(arguments: &Accuracy, color: bool, out: &mut Out) -> Result<()> {
-    files::check(&[("FILE", &arguments.file), ("--inputs", &arguments.inputs)], &[])?;
+    let mut reads = vec![("FILE", arguments.file.as_path())];
+    reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
+    files::check(&reads, &[])?;
     let loaded =
         Load::new(arguments.machine.machine, color).with(&arguments.source).with_source(&arguments.file)?;
     let program = &loaded.program;
-    let shadow = measure(arguments, program).map_err(|error| fault::told(error, &loaded, color))?;
+    let Some(inputs) = &arguments.inputs else {
+        let enclosure = enclose(program).map_err(|error| anyhow!("no bound: {error}"))?;
+        let bounded = Bounded { program, enclosure: &enclosure };
+        if arguments.json {
+            let mut value = bounded.json();
+            value["program"] = json!(files::input_name(&arguments.file));
+            output::json(&value, out)?;
+        } else {
+            bounded.text(out)?;
+        }
+        let safe = enclosure.hazards.is_empty();
+        return if safe { Ok(()) } else { Err(Failure::Reported.into()) };
+    };
+    let shadow = measure(arguments, inputs, program).map_err(|error| fault::told(error, &loaded, color))?;
     let measured = Measured::new(program, &shadow);
     if arguments.json {
         let mut value = measured.json();
@@ -70,8 +91,8 @@ pub(crate) fn run(arguments: &Accuracy, color: bool, out: &mut Out) -> Result<()
     measured.text(arguments.each_period, out)
 }
 
-fn measure(arguments: &Accuracy, program: &Program) -> Result<Shadow> {
-    let mut inputs = Inputs::open(Some(&arguments.inputs), &program.inputs)?;
+fn measure(arguments: &Accuracy, inputs: &Path, program: &Program) -> Result<Shadow> {
+    let mut inputs = Inputs::open(Some(inputs), &program.inputs)?;
     let mut emulator = Emulator::new(program)?;
     let mut shadow = Shadow::new(program);
     if arguments.each_period {
@@ -107,6 +128,33 @@ pub(crate) struct Line {
     output: Option<String>,
 }
 
+fn location(program: &Program, word: u32) -> Option<Location> {
+    *program.lines.get(word as usize)?
+}
+
+fn place(program: &Program, word: u32) -> String {
+    program.word_place(word as usize).unwrap_or_else(|| format!("word {word}"))
+}
+
+fn line_text(program: &Program, location: Option<Location>) -> String {
+    location.map_or_else(|| "(no source line)".to_owned(), |location| program.place_text(location))
+}
+
+/// The lines that an error comes from, with the sum of their shares, and the part that each has of all that was added up; the
+/// largest first.
+fn by_line(program: &Program, parts: &[Part]) -> Vec<(Option<Location>, f64, f64)> {
+    let mut lines: BTreeMap<_, (Option<Location>, f64)> = BTreeMap::new();
+    for part in parts {
+        let location = location(program, part.word);
+        let key = location.map(|location| (location.file, location.line));
+        lines.entry(key).or_insert((location, 0.0)).1 += part.error;
+    }
+    let all: f64 = lines.values().map(|(_, error)| error.abs()).sum();
+    let mut lines: Vec<_> = lines.into_values().map(|(at, error)| (at, error, error.abs() / all)).collect();
+    lines.sort_by(|a, b| b.2.total_cmp(&a.2));
+    lines
+}
+
 /// What was measured of a program.
 pub(crate) struct Measured<'a> {
     program: &'a Program,
@@ -118,35 +166,19 @@ impl<'a> Measured<'a> {
         Measured { program, shadow }
     }
 
-    fn location(&self, word: u32) -> Option<Location> {
-        *self.program.lines.get(word as usize)?
+    fn by_line(&self, parts: &[Part]) -> Vec<(Option<Location>, f64, f64)> {
+        by_line(self.program, parts)
     }
 
     fn place(&self, word: u32) -> String {
-        self.program.word_place(word as usize).unwrap_or_else(|| format!("word {word}"))
-    }
-
-    /// The lines that an error comes from, with the sum of their shares, and the part that each has of all that was added up; the
-    /// largest first.
-    fn by_line(&self, parts: &[Part]) -> Vec<(Option<Location>, f64, f64)> {
-        let mut lines: BTreeMap<_, (Option<Location>, f64)> = BTreeMap::new();
-        for part in parts {
-            let location = self.location(part.word);
-            let key = location.map(|location| (location.file, location.line));
-            lines.entry(key).or_insert((location, 0.0)).1 += part.error;
-        }
-        let all: f64 = lines.values().map(|(_, error)| error.abs()).sum();
-        let mut lines: Vec<_> =
-            lines.into_values().map(|(at, error)| (at, error, error.abs() / all)).collect();
-        lines.sort_by(|a, b| b.2.total_cmp(&a.2));
-        lines
+        place(self.program, word)
     }
 
     /// Lines by place, those that add most to an output's error first.
     pub(crate) fn lines(&self) -> Vec<(Location, Line)> {
         let mut lines: BTreeMap<(u32, u32), (Location, Line)> = BTreeMap::new();
         for (&word, operation) in self.shadow.operations() {
-            let Some(location) = self.location(word) else { continue };
+            let Some(location) = location(self.program, word) else { continue };
             let entry = lines.entry((location.file, location.line)).or_insert((location, Line::default()));
             let known = &mut entry.1.accuracy;
             known.count += operation.count;
@@ -172,7 +204,7 @@ impl<'a> Measured<'a> {
     }
 
     fn line_text(&self, location: Option<Location>) -> String {
-        location.map_or_else(|| "(no source line)".to_owned(), |location| self.program.place_text(location))
+        line_text(self.program, location)
     }
 
     /// The result, but for the program's name.
@@ -212,8 +244,8 @@ impl<'a> Measured<'a> {
                 "output": line.output,
             })
         };
-        let decision = |(&word, decision): (&u32, &takt_analysis::accuracy::Decision)| json!({ "place": self.place(word), "count": decision.count, "period": decision.period });
-        let lost = |(&word, lost): (&u32, &takt_analysis::accuracy::Lost)| {
+        let decision = |(&word, decision): (&u32, &Decision)| json!({ "place": self.place(word), "count": decision.count, "period": decision.period });
+        let lost = |(&word, lost): (&u32, &Lost)| {
             let why = if lost.infinite { "no finite number" } else { "taken as bits" };
             json!({ "place": self.place(word), "why": why, "count": lost.count, "period": lost.period })
         };
@@ -308,6 +340,133 @@ impl<'a> Measured<'a> {
                 if lost.infinite { "a result that is no finite number" } else { "a value taken as bits" };
             let (count, period) = (lost.count, lost.period);
             writeln!(out, "  {}: {why}, {count} times, first in period {period}", self.place(word))?;
+        }
+        Ok(())
+    }
+}
+
+/// What was proved of a program.
+struct Bounded<'a> {
+    program: &'a Program,
+    enclosure: &'a Enclosure,
+}
+
+/// What may go wrong, in words.
+fn problem(problem: Problem) -> &'static str {
+    match problem {
+        Problem::DivisionByZero => "the divisor may be zero",
+        Problem::Domain => "the operand may lie where the function has no value",
+        Problem::Overflow => "the result may be too large for binary32",
+        Problem::NotFinite => "an operand may be infinite or a NaN",
+        Problem::Bits => "an operand is bits that nothing encloses as a number",
+        Problem::Told => "an earlier problem",
+    }
+}
+
+fn interval(interval: Option<Interval>) -> String {
+    interval
+        .map_or_else(|| "anywhere".to_owned(), |Interval { low, high }| format!("[{low:.6e}, {high:.6e}]"))
+}
+
+impl Bounded<'_> {
+    fn parts(&self, output: &OutputBound) -> Vec<(Option<Location>, f64, f64)> {
+        let parts: Vec<Part> =
+            output.parts.iter().map(|(word, error)| Part { word: *word, error: *error }).collect();
+        by_line(self.program, &parts)
+    }
+
+    fn operands(&self, hazard: &Hazard) -> Vec<(String, Option<Interval>)> {
+        let named = hazard.operands.iter();
+        named.map(|(register, range)| (self.program.register_text(*register), *range)).collect()
+    }
+
+    fn json(&self) -> Value {
+        let Bounded { program, enclosure } = self;
+        let ends = |interval: Option<Interval>| interval.map(|Interval { low, high }| [low, high]);
+        let output = |output: &OutputBound| {
+            let lines = self.parts(output).into_iter().map(|(location, error, share)| {
+                json!({ "place": line_text(program, location), "error": error, "share": share })
+            });
+            json!({
+                "name": output.name,
+                "range": ends(output.range),
+                "error": output.error,
+                "ulp": output.ulps(),
+                "lines": lines.collect::<Vec<_>>(),
+            })
+        };
+        let hazard = |hazard: &Hazard| {
+            let operands = self.operands(hazard).into_iter();
+            let operands = operands.map(|(name, range)| json!({ "name": name, "range": ends(range) }));
+            json!({
+                "place": place(program, hazard.word),
+                "problem": problem(hazard.problem),
+                "operands": operands.collect::<Vec<_>>(),
+            })
+        };
+        let assumed = |Assumed { range, found }: &Assumed| {
+            json!({
+                "name": program.register_text(range.register),
+                "range": range.ends(),
+                "found": ends(*found),
+            })
+        };
+        json!({
+            "machine": program.machine.name,
+            "outputs": enclosure.outputs.iter().map(output).collect::<Vec<_>>(),
+            "hazards": enclosure.hazards.iter().map(hazard).collect::<Vec<_>>(),
+            "assumed": enclosure.assumed.iter().map(assumed).collect::<Vec<_>>(),
+            "operations": enclosure.operations,
+        })
+    }
+
+    fn text(&self, out: &mut Out) -> Result<()> {
+        let Bounded { program, enclosure } = self;
+        let machine = program.machine.name;
+        writeln!(out, "one period on {machine}, all inputs and states in their ranges, the states exact")?;
+        let outputs = &enclosure.outputs;
+        let width = outputs.iter().map(|output| output.name.len()).max().unwrap_or(0).max(6);
+        writeln!(
+            out,
+            "\n  {:<width$}  {:>32}  {:>12}  {:>9}  most of it from",
+            "output", "range", "error up to", "ulp"
+        )?;
+        for output in outputs {
+            let error = output.error.map_or_else(|| "-".to_owned(), |error| format!("{error:.3e}"));
+            let ulps = output.ulps().map_or_else(|| "-".to_owned(), |ulps| format!("{ulps:.2}"));
+            let lines = self.parts(output);
+            let lines = lines.iter().take(SHOWN_PARTS);
+            let lines =
+                lines.map(|(at, _, share)| format!("{} ({:.0} %)", line_text(program, *at), 100.0 * share));
+            let lines: Vec<String> = lines.collect();
+            let range = interval(output.range);
+            writeln!(
+                out,
+                "  {:<width$}  {range:>32}  {error:>12}  {ulps:>9}  {}",
+                output.name,
+                lines.join(", ")
+            )?;
+        }
+        writeln!(out, "  ulp: of the largest value in the range")?;
+        if enclosure.hazards.is_empty() {
+            writeln!(out, "\nno NaN, no overflow, no division by zero is possible")?;
+        } else {
+            writeln!(out, "\nnot excluded")?;
+        }
+        for hazard in &enclosure.hazards {
+            let operands = self.operands(hazard).into_iter();
+            let operands: Vec<String> =
+                operands.map(|(name, range)| format!("{name} in {}", interval(range))).collect();
+            let what = problem(hazard.problem);
+            writeln!(out, "  {}: {what}: {}", place(program, hazard.word), operands.join(", "))?;
+        }
+        if !enclosure.assumed.is_empty() {
+            writeln!(out, "\nranges that a period is not shown to keep; they are taken as promised")?;
+        }
+        for Assumed { range, found } in &enclosure.assumed {
+            let (low, high) = range.ends();
+            let name = program.register_text(range.register);
+            writeln!(out, "  {name}: [{low:.6e}, {high:.6e}], may be left in {}", interval(*found))?;
         }
         Ok(())
     }

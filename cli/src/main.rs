@@ -21,6 +21,7 @@ mod fault;
 mod files;
 mod fmt;
 mod isa;
+mod live;
 mod load;
 mod lsp;
 mod machines;
@@ -89,6 +90,8 @@ enum Command {
     Dap(dap::Dap),
     Rtl(rtl::Rtl),
     Board(board::Boards),
+    Load(live::LoadBoard),
+    Live(live::Live),
     Cosim(cosim::Cosim),
     Isa(isa::Isa),
     Machines(machines::Machines),
@@ -114,6 +117,8 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Dap(dap) => dap::run(dap),
         Command::Rtl(rtl) => rtl::run(rtl, color, out),
         Command::Board(board) => board::run(board, color, out),
+        Command::Load(load) => live::load(load, color, out),
+        Command::Live(live) => live::live(live, color, out),
         Command::Cosim(cosim) => cosim::run(cosim, color, out),
         Command::Isa(isa) => isa::run(isa, out),
         Command::Machines(machines) => machines::run(machines, out),

@@ -6,6 +6,9 @@ use crate::track::Tracking;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use takt_analysis::accuracy::enclose;
+use takt_isa::Program;
+use takt_isa::program::Port;
 use takt_programs::accuracy::MaxError;
 
 /// Table 2 of the paper: platform, clock in MHz, time of one period in µs.
@@ -84,7 +87,7 @@ pub(crate) fn text(tracking: &Tracking) -> String {
     );
     time_table(tracking, &mut out);
     operation_table(&tracking.account, &mut out);
-    error_table(&totals.accuracy.errors, fused_operations(program), &mut out);
+    error_table(&totals.accuracy.errors, &bounds(program), fused_operations(program), &mut out);
 
     let _ = writeln!(out, "\nLargest tracking error of the tool{:>11}", "µm");
     for (name, error) in [("while cutting", totals.error.cutting), ("over everything", totals.error.overall)]
@@ -164,30 +167,49 @@ fn operation_table(account: &Account, out: &mut String) {
     let _ = writeln!(out, "  {:<22}{paper:>10}{all:>10}", "all");
 }
 
+/// What the outputs of [`ERRORS`] cannot exceed, where the program's ranges lead to a bound (`takt accuracy`): after the forces and
+/// torques, in the order of the outputs.
+fn bounds(program: &Program) -> Vec<Option<f64>> {
+    let enclosure = enclose(program).ok();
+    let bound = |output: &Port| {
+        let mut bounds = enclosure.iter().flat_map(|enclosure| &enclosure.outputs);
+        bounds.find(|bound| bound.register == output.register)?.error
+    };
+    let first = program.outputs.len().saturating_sub(ERRORS.len());
+    program.outputs[first..].iter().map(bound).collect()
+}
+
 /// Table 3.
-fn error_table(errors: &[MaxError], fused: usize, out: &mut String) {
+fn error_table(errors: &[MaxError], bounds: &[Option<f64>], fused: usize, out: &mut String) {
     let _ = writeln!(
         out,
-        "\nLargest |binary32 - binary64|{:>12}{:>8}{:>12}{:>12}{:>12}",
-        "Takt", "ulp", "paper PC", "DSP", "FPGA"
+        "\nLargest |binary32 - binary64|{:>12}{:>8}{:>12}{:>12}{:>12}{:>12}",
+        "Takt", "ulp", "at most", "paper PC", "DSP", "FPGA"
     );
-    let mut row = |name: &str, ours: f64, ulps: Option<f64>, paper: [f64; 3]| {
+    let mut row = |name: &str, ours: f64, ulps: Option<f64>, most: Option<f64>, paper: [f64; 3]| {
+        let most = most.map_or_else(|| "-".to_owned(), |most| format!("{most:.4e}"));
         let ulps = ulps.map_or(String::new(), |ulps| format!("{ulps:.2}"));
         let [pc, dsp, fpga] = paper;
-        let _ = writeln!(out, "  {name:<27}{ours:>12.4e}{ulps:>8}{pc:>12.4e}{dsp:>12.4e}{fpga:>12.4e}");
+        let _ =
+            writeln!(out, "  {name:<27}{ours:>12.4e}{ulps:>8}{most:>12}{pc:>12.4e}{dsp:>12.4e}{fpga:>12.4e}");
     };
-    for ((name, unit, paper), error) in ERRORS.iter().zip(errors) {
-        row(&format!("{name}, {unit}"), error.absolute, Some(error.ulps_of_largest()), *paper);
+    let bound = |row: usize| bounds.get(row).copied().flatten();
+    for (i, ((name, unit, paper), error)) in ERRORS.iter().zip(errors).enumerate() {
+        row(&format!("{name}, {unit}"), error.absolute, Some(error.ulps_of_largest()), bound(i), *paper);
     }
     for (kind, rows) in KINDS {
         let paper = [0, 1, 2].map(|column| largest(ERRORS[rows.clone()].iter().map(|row| row.2[column])));
+        let most = rows.clone().map(bound).collect::<Option<Vec<f64>>>();
+        let most = most.map(|bounds| largest(bounds.into_iter()));
         let ours = largest(errors[rows].iter().map(|error| error.absolute));
-        row(&format!("largest {kind}"), ours, None, paper);
+        row(&format!("largest {kind}"), ours, None, most, paper);
     }
     let _ = writeln!(out, "  Of the program, {}.", rounding(fused));
     out.push_str(
-        "  ulp: of the largest value that the output takes. The paper's arm lengths are unknown: compare the largest of a\n  \
-         kind. Angles are the reference as it comes in, rounded to binary32; the paper's are unknown (ours reach π).\n",
+        "  ulp: of the largest value that the output takes. At most: what rounding in one period can add up to, over all\n  \
+         inputs within the program's .range (docs/accuracy.md); constants and inputs count as exact there. -: not bounded.\n  \
+         The paper's arm lengths are unknown: compare the largest of a kind. Angles are the reference as it comes in,\n  \
+         rounded to binary32; the paper's are unknown (ours reach π).\n",
     );
 }
 
@@ -218,6 +240,7 @@ pub(crate) fn json(tracking: &Tracking) -> Value {
         "bundles": tracking.account.bundles,
         "fused_operations": fused_operations(&tracking.program),
         "max_error": by_name(|error| error.absolute),
+        "max_error_bound": ERRORS.iter().map(|(name, ..)| *name).zip(bounds(&tracking.program)).collect::<BTreeMap<_, _>>(),
         "max_error_ulp": by_name(MaxError::ulps_of_largest),
         "tracking_error_m": {"cutting": totals.error.cutting, "overall": totals.error.overall},
         "stalls": tracking.account.stalls_json(),

@@ -83,8 +83,7 @@ Examples:
   takt run prog.s --batch runs --outputs out.csv  a run for each CSV in the folder `runs`
   takt run system.toml --inputs in.csv --stats    several cores: a base tick for each row (docs/system.md)";
 
-/// Cycles in which a period ends, or nobody expects it to any more.
-pub(crate) const PERIOD_LIMIT: u64 = 1_000_000_000;
+pub(crate) use takt_analysis::follow::PERIOD_LIMIT;
 
 /// What the periods of a run came to.
 #[derive(Default)]
@@ -182,7 +181,16 @@ impl Run {
         }
         let (inputs, outputs) = (inputs.as_deref(), outputs.as_deref());
         let (periods, max_cycles) = (*periods, *max_cycles);
-        Ok(system::run::Arguments { file, source, inputs, outputs, periods, max_cycles, stats: *stats, json: *json })
+        Ok(system::run::Arguments {
+            file,
+            source,
+            inputs,
+            outputs,
+            periods,
+            max_cycles,
+            stats: *stats,
+            json: *json,
+        })
     }
 }
 

@@ -15,15 +15,18 @@ fn run_drives_a_system_by_base_ticks() {
     let folder = Folder::new();
     let (toml, csv) = (speed("speed.toml"), speed("speed.csv"));
     let text = folder.line(&format!("run {toml} --inputs {csv} --stats")).ok();
-    insta::assert_snapshot!("system_run", text);
+    assert!(text.starts_with("10 base ticks of 125000 cycles\n"), "{text}");
+    assert!(text.contains("\n  moves: 2 entries in"), "{text}");
     let rows = folder.line(&format!("run {toml} --inputs {csv} --outputs -")).ok();
-    insta::assert_snapshot!("system_outputs", rows);
+    assert!(rows.starts_with("u,seen.peak,seen.values\n"), "{rows}");
+    assert_eq!(rows.lines().count(), 11, "{rows}");
     let json: Value =
         serde_json::from_str(&folder.line(&format!("run {toml} --inputs {csv} --json")).ok()).unwrap();
     assert_eq!(json["ticks"], 10);
     assert_eq!(json["fifos"]["moves"]["pushed"], 2);
     let core = &json["cores"]["servo"];
-    let stalls: u64 = core["stalls"].as_object().unwrap().values().map(|cycles| cycles.as_u64().unwrap()).sum();
+    let stalls: u64 =
+        core["stalls"].as_object().unwrap().values().map(|cycles| cycles.as_u64().unwrap()).sum();
     assert_eq!(core["bundles"].as_u64().unwrap() + stalls, core["cycles"]["total"].as_u64().unwrap());
 }
 
@@ -31,7 +34,8 @@ fn run_drives_a_system_by_base_ticks() {
 fn bound_follows_a_command_through_the_cores() {
     let folder = Folder::new();
     let toml = speed("speed.toml");
-    insta::assert_snapshot!("system_bound", folder.line(&format!("bound {toml}")).ok());
+    let text = folder.line(&format!("bound {toml}")).ok();
+    assert!(text.contains("through profile, servo, watch"), "{text}");
     let json: Value = serde_json::from_str(&folder.line(&format!("bound {toml} --json")).ok()).unwrap();
     let ways = json["latencies"].as_array().unwrap();
     let worst = |end: &str| {
@@ -49,7 +53,10 @@ fn bound_follows_a_command_through_the_cores() {
 fn what_a_system_is_not() {
     let folder = Folder::new();
     folder.write("a.s", ".input x\n.output y\n.once\n wait p\n.period\np: mov y, x\n wait p\n");
-    folder.write("loads.s", ".input x\n.output y\n.once\n wait p\n.period\np: ld y, 4000[zero]\n fadd y, x, x\n wait p\n");
+    folder.write(
+        "loads.s",
+        ".input x\n.output y\n.once\n wait p\n.period\np: ld y, 4000[zero]\n fadd y, x, x\n wait p\n",
+    );
     let system = |program: &str| {
         format!(
             "tick = 500\n\n[[core]]\nname = \"a\"\nprogram = \"{program}\"\n\n[[wire]]\nfrom = \"host.x\"\nto = \"a.x\"\n\n\
@@ -61,24 +68,20 @@ fn what_a_system_is_not() {
     folder.write("faults.toml", system("loads.s"));
     folder.write("asm.toml", system("wrong.s"));
     folder.write("wrong.s", ".output y\n fadd y, q, 1\n halt\n");
-    let mut all = String::new();
-    for line in [
-        "run missing.toml --periods 1",
-        "run right.toml",
-        "run right.toml --periods 1 --tick 5",
-        "run right.toml --periods 1 --machine t1",
-        "run faults.toml --periods 1",
-        "run asm.toml --periods 1",
-        "run nowhere.toml --periods 1",
-        "bound missing.toml",
-        "bound right.toml --machine t1",
-        "asm right.toml",
-        "disasm right.toml",
-        "analyse right.toml",
+    for (line, said) in [
+        ("run missing.toml --periods 1", "there is no program b.s"),
+        ("run right.toml", "goes on from tick to tick"),
+        ("run right.toml --periods 1 --tick 5", "--tick with a system"),
+        ("run right.toml --periods 1 --machine t1", "--machine with a system"),
+        ("run faults.toml --periods 1", "core a"),
+        ("run asm.toml --periods 1", "wrong.s"),
+        ("run nowhere.toml --periods 1", "nowhere.toml"),
+        ("bound missing.toml", "there is no program b.s"),
+        ("bound right.toml --machine t1", "--machine with a system"),
+        ("asm right.toml", "is a system, and one program is wanted"),
     ] {
         let done = folder.line(line);
         assert_ne!(done.status, Some(0), "{line}");
-        all.push_str(&format!("$ takt {line}\n{}\n", done.stderr));
+        assert!(done.stderr.contains(said), "{line}: {}", done.stderr);
     }
-    insta::assert_snapshot!("system_mistakes", all);
 }

@@ -1,6 +1,7 @@
 //! Commands in, text out: what a prompt, a script and the command line of a full-screen view share. One table gives
 //! dispatch, help and completion.
 
+use crate::accuracy;
 use crate::info;
 use crate::panes::{self, Flying, Kind, Panes};
 use crate::session::{Live, Place, Session, Shown, Stop, Test, Unit, Where, Why, hex_float, ulp_distance};
@@ -54,6 +55,7 @@ commands! {
     "stops" "" "" Completion::None, |c, _| Ok(c.stops()), "List breakpoints and watchpoints.";
     "print" "p" "EXPR, …" Completion::Names, Console::print, "Print values: as float, hexadecimal float, integer, bits. `x:int` reads x as an integer.";
     "info" "i" "NAME" Completion::Names, Console::info, "What a name stands for: its registers, the bundles that write and read them, and which is at hand (`>`).";
+    "accuracy" "a" "[NAME]" Completion::Names, |c, a| accuracy::accuracy(&mut c.session, a), "The error of a register, or of the outputs, against binary64 from reset to here, and the lines that it comes from.";
     "set" "" "PLACE = EXPR" Completion::Names, Console::set, "Set a register, port or data word (`table[3]`). What was run beyond this position is forgotten.";
     "ulp" "" "EXPR, EXPR" Completion::Names, Console::ulp, "The distance of two values in units in the last place of the second.";
     "check" "" "EXPR" Completion::Names, Console::check, "Fail if an expression is zero: a script then ends with exit status 1.";

@@ -1,5 +1,6 @@
 //! What an engineer looks at a running program with: traces, and debug sessions. Plain data in and out; nothing here prints.
 
+mod accuracy;
 pub mod console;
 pub mod fault;
 mod info;

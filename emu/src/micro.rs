@@ -81,7 +81,13 @@ impl Late {
             flags: value.flags,
             memory,
         };
-        Pending { retire, register, output: operation.output, float: operation.float, watched: operation.watched }
+        Pending {
+            retire,
+            register,
+            output: operation.output,
+            float: operation.float,
+            watched: operation.watched,
+        }
     }
 }
 

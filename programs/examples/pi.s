@@ -35,3 +35,7 @@ period:
         fadd    di, di, back
         fadd    s, s, di
         wait    period
+
+; For `takt accuracy`: what the encoder and the reference can say, and what the integrator can hold.
+.range  w_ref, w = -1000, 1000
+.range  s = -2*UMAX, 2*UMAX

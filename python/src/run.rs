@@ -136,6 +136,9 @@ pub(crate) fn run_to_halt(
         let mut interrupt = Interrupt::new();
         loop {
             interrupt.check_now()?;
+            if matches!(emulator.status(), Status::Waiting { .. }) && emulator.next_tick().is_none() {
+                return Ok(Ok(Stop::Idle));
+            }
             let until = emulator.now().saturating_add(SLICE);
             match emulator.run_until(until) {
                 Ok(Stop::Reached | Stop::Paused) => {}

@@ -25,9 +25,11 @@ from takt._errors import (
 )
 from takt._program import (
     DEFAULT_MACHINE,
+    Accuracy,
     Analysis,
     Array,
     Bound,
+    Largest,
     Model,
     Port,
     Program,
@@ -43,6 +45,7 @@ from takt._takt import Fault
 
 __all__ = [
     "DEFAULT_MACHINE",
+    "Accuracy",
     "Analysis",
     "Array",
     "AssemblyError",
@@ -51,6 +54,7 @@ __all__ = [
     "Diagnostic",
     "Fault",
     "FaultError",
+    "Largest",
     "Model",
     "ModelError",
     "NoBoundError",

@@ -63,6 +63,35 @@ class Array:
 
 
 @dataclass(frozen=True)
+class Largest:
+    """The largest error of a kind that an output has had, and when."""
+
+    #: In the output's unit, in ulps, or as a part of the exact value.
+    error: float
+    #: The period, from 0.
+    period: int
+    #: What the output was.
+    value: float
+    #: What it is in binary64.
+    exact: float
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """The errors of an output at the ends of the periods, against the same operations in binary64."""
+
+    name: str
+    #: Periods at whose end it was compared.
+    periods: int
+    #: The largest in the output's own unit, in ulps, and in relation to the exact value; None if it never was a finite number.
+    absolute: Largest | None
+    ulp: Largest | None
+    relative: Largest | None
+    #: Where the largest absolute error comes from, the largest share first: place (`law.s:12`) and share, which add up to it.
+    operations: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
 class Model:
     """What a program was made of."""
 
@@ -368,8 +397,50 @@ class Program:
         made, fault = _takt.analyse(self._core, name or next(iter(self.sources), "program"), words.tolist(), wanted)
         if fault is not None:
             raise FaultError(fault)
-        assert made is not None
+        if made is None:
+            raise RuntimeError("there is neither an analysis nor a fault")
         return Analysis(*made)
+
+    def accuracy(
+        self, inputs: Mapping[str, ArrayLike], *, each_period: bool = False, max_cycles: int = MAX_CYCLES
+    ) -> dict[str, Accuracy]:
+        """The errors of the outputs against binary64, and the operations that they come from, by output port.
+
+        Args:
+            inputs: Values as `run` takes them, of one run.
+            each_period: Let each period begin with exact values: errors that states carry from period to period are left out.
+            max_cycles: A period that takes more is a fault.
+
+        Raises:
+            FaultError: the program came to a fault.
+        """
+        given = self._by_port(inputs)
+        self._all_given(given)
+        lead = self._lead({what: shape for what, shape, _ in given.values()})
+        if len(lead) > 1:
+            raise ValueError(f"the accuracy is that of one run, and the inputs have {lead[0]}")
+        words = np.empty((lead[0] if lead else 1, len(given)), np.uint32)
+        for column, port in enumerate(self.inputs):
+            words[:, column] = given[port][2]
+        limit = _count("max_cycles", max_cycles) or MAX_CYCLES
+        outputs, fault = _takt.accuracy(self._core, words, each_period, limit)
+        if fault is not None:
+            raise FaultError(fault)
+
+        def largest(of: tuple[float, int, float, float] | None) -> Largest | None:
+            return None if of is None else Largest(*of)
+
+        return {
+            one["name"]: Accuracy(
+                one["name"],
+                one["periods"],
+                largest(one["absolute"]),
+                largest(one["ulp"]),
+                largest(one["relative"]),
+                tuple(one["operations"]),
+            )
+            for one in outputs
+        }
 
     # ---- Running it.
 
@@ -401,9 +472,7 @@ class Program:
         """
         tick, max_cycles = _count("tick", tick), _count("max_cycles", max_cycles) or MAX_CYCLES
         given = self._by_port(inputs or {})
-        missing = [f"`{name}`" for name in self.inputs if name not in given]
-        if missing:
-            raise ValueError(f"no values for the input{'s' if len(missing) > 1 else ''} {', '.join(missing)}")
+        self._all_given(given)
         lead = self._lead({what: shape for what, shape, _ in given.values()})
         if periods is not None:
             wanted = _count("periods", periods, least=0) or 0
@@ -484,6 +553,11 @@ class Program:
                     give(element, what, flat[..., index])
         return ports
 
+    def _all_given(self, given: Mapping[str, Any]) -> None:
+        missing = [f"`{name}`" for name in self.inputs if name not in given]
+        if missing:
+            raise ValueError(f"no values for the input{'s' if len(missing) > 1 else ''} {', '.join(missing)}")
+
     @staticmethod
     def _lead(shapes: Mapping[str, tuple[int, ...]]) -> tuple[int, ...]:
         """The shape that inputs have together: (), (periods,) or (runs, periods)."""
@@ -502,7 +576,7 @@ class Program:
         for index, element in enumerate(array.elements):
             if element is not None:
                 whole[..., index] = ports[element] if isinstance(element, str) else element
-        return whole.reshape(*lead, *array.shape)
+        return whole.reshape((*lead, *array.shape))
 
     def __repr__(self) -> str:
         def names(ports: Mapping[str, Port], arrays: Sequence[Array]) -> str:

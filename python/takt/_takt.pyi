@@ -60,6 +60,16 @@ class Model(TypedDict):
     outputs: list[_Shaped]
     joints: list[str]
 
+_Largest = tuple[float, int, float, float]
+
+class Measured(TypedDict):
+    name: str
+    periods: int
+    absolute: _Largest | None
+    ulp: _Largest | None
+    relative: _Largest | None
+    operations: list[tuple[str, float]]
+
 _Span = tuple[int, int]
 
 @final
@@ -147,3 +157,6 @@ def robot(
     machine: str,
 ) -> Model: ...
 def expressions(text: str, name: str, exact: bool, without: list[str], machine: str) -> Model: ...
+def accuracy(
+    program: Program, inputs: NDArray[np.uint32], each_period: bool, max_cycles: int
+) -> tuple[list[Measured], Fault | None]: ...

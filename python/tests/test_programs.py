@@ -288,3 +288,18 @@ def test_an_analysis_is_the_pages_picture():
     assert program.analyse(period=0).data["period"] == 0
     with pytest.raises(takt.FaultError, match="reads data word 5000"):
         takt.assemble(TABLE).analyse({"i": [1, 5000]})
+
+
+def test_the_accuracy_is_that_of_binary64():
+    program = takt.assemble(LAW, name="law.s")
+    inputs = states(100)
+    found = program.accuracy(inputs)["u"]
+    # The same in binary64: inputs are rounded, then nothing is.
+    q, qr = (np.float64(np.float32(inputs[name])) for name in ("q", "qr"))
+    e = qr - q
+    exact = e * 40 + np.diff(e, prepend=0.0) * 3
+    error = np.abs(program.run(inputs).outputs["u"] - exact)
+    assert found.periods == 100 and found.absolute.period == error.argmax()
+    assert abs(found.absolute.error) == pytest.approx(error.max(), rel=1e-6)
+    assert sum(share for _, share in found.operations) == pytest.approx(found.absolute.error, rel=1e-6)
+    assert {place.split(":")[0] for place, _ in found.operations} == {"law.s"}

@@ -253,7 +253,8 @@ impl Description {
         let here = End::Core(core);
         let mut lanes = Vec::new();
         for snapshots in [true, false] {
-            for (number, link) in self.links.iter().enumerate().filter(|(_, l)| l.is_snapshot() == snapshots) {
+            for (number, link) in self.links.iter().enumerate().filter(|(_, l)| l.is_snapshot() == snapshots)
+            {
                 if link.to == here {
                     let fields = link.fields.iter().enumerate();
                     lanes.extend(fields.filter_map(|(field, names)| {

@@ -35,7 +35,9 @@ pub struct Latency {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LatencyError {
     /// A period can end too late for the next tick.
-    #[error("core {core}: a period can take {worst} cycles, and must take fewer than {period} to keep its tick")]
+    #[error(
+        "core {core}: a period can take {worst} cycles, and must take fewer than {period} to keep its tick"
+    )]
     Deadline {
         /// The core.
         core: String,
@@ -122,7 +124,10 @@ fn follow(
     match description.links[last].to {
         End::Host => {
             if found.len() >= MAX_WAYS {
-                return Err(LatencyError::Limit { limit: MAX_WAYS as u64, what: "ways from inputs to outputs" });
+                return Err(LatencyError::Limit {
+                    limit: MAX_WAYS as u64,
+                    what: "ways from inputs to outputs",
+                });
             }
             found.push(measure(description, spans, way)?);
         }
@@ -154,7 +159,9 @@ impl Grid {
     /// The first tick in a cycle or after it.
     fn from(self, cycle: i64) -> i64 {
         let past = cycle - self.offset;
-        self.offset + past.div_euclid(self.period) * self.period + if past.rem_euclid(self.period) > 0 { self.period } else { 0 }
+        self.offset
+            + past.div_euclid(self.period) * self.period
+            + if past.rem_euclid(self.period) > 0 { self.period } else { 0 }
     }
 }
 
@@ -212,8 +219,10 @@ fn measure(
     way: &[usize],
 ) -> Result<Latency, LatencyError> {
     let links: Vec<&Link> = way.iter().map(|link| &description.links[*link]).collect();
-    let cores: Vec<usize> =
-        links.iter().filter_map(|link| if let End::Core(core) = link.to { Some(core) } else { None }).collect();
+    let cores: Vec<usize> = links
+        .iter()
+        .filter_map(|link| if let End::Core(core) = link.to { Some(core) } else { None })
+        .collect();
     let (mut best, mut worst) = (i64::MAX, 0);
     if let Some(&first) = cores.first() {
         let every = description.cores[first].every;

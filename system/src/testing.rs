@@ -30,7 +30,11 @@ pub fn random_system(seed: u64, machines: &[&'static Machine]) -> (String, BTree
         inputs.push(program.inputs.iter().map(|port| port.name.clone()).collect::<Vec<_>>());
         outputs.push(program.outputs.iter().map(|port| port.name.clone()).collect::<Vec<_>>());
         let path = format!("core{core}.s");
-        let _ = writeln!(text, "\n[[core]]\nname = \"c{core}\"\nprogram = \"{path}\"\nmachine = \"{}\"", machine.name);
+        let _ = writeln!(
+            text,
+            "\n[[core]]\nname = \"c{core}\"\nprogram = \"{path}\"\nmachine = \"{}\"",
+            machine.name
+        );
         if random.once_in(2) {
             let _ = writeln!(text, "tick = {}\noffset = {}", 1 + random.below(3), random.below(40));
         }
@@ -52,10 +56,16 @@ pub fn random_system(seed: u64, machines: &[&'static Machine]) -> (String, BTree
                 true => format!("h{}", random.bits() % 1_000_000),
                 false => outputs[sender][random.below(outputs[sender].len() as u32) as usize].clone(),
             };
-            let own = |random: &mut Random| outputs[core][random.below(outputs[core].len() as u32) as usize].clone();
+            let own = |random: &mut Random| {
+                outputs[core][random.below(outputs[core].len() as u32) as usize].clone()
+            };
             let kind = random.below(3);
             if kind == 0 {
-                let _ = write!(text, "\n[[wire]]\nfrom = \"{from}.{}\"\nto = \"c{core}.{last}\"\n", output(&mut random));
+                let _ = write!(
+                    text,
+                    "\n[[wire]]\nfrom = \"{from}.{}\"\nto = \"c{core}.{last}\"\n",
+                    output(&mut random)
+                );
                 text.push_str(&latency(&mut random));
                 continue;
             }
@@ -95,8 +105,11 @@ pub fn random_system(seed: u64, machines: &[&'static Machine]) -> (String, BTree
         }
     }
     // What the host sees.
-    let all: Vec<(usize, &String)> =
-        outputs.iter().enumerate().flat_map(|(core, ports)| ports.iter().map(move |port| (core, port))).collect();
+    let all: Vec<(usize, &String)> = outputs
+        .iter()
+        .enumerate()
+        .flat_map(|(core, ports)| ports.iter().map(move |port| (core, port)))
+        .collect();
     for _ in 0..2 {
         number += 1;
         let (core, port) = all[random.below(all.len() as u32) as usize];
@@ -120,7 +133,10 @@ pub fn random_system(seed: u64, machines: &[&'static Machine]) -> (String, BTree
 ///
 /// # Errors
 /// What is wrong with the file.
-pub fn describe(text: &str, programs: &BTreeMap<String, Program>) -> Result<Description, ReadError<Infallible>> {
+pub fn describe(
+    text: &str,
+    programs: &BTreeMap<String, Program>,
+) -> Result<Description, ReadError<Infallible>> {
     read("system.toml", text, |request| {
         programs.get(request.path).cloned().ok_or_else(|| ProgramError::Missing {
             message: format!("there is no program {}", request.path),
@@ -406,7 +422,8 @@ impl Reference {
                 // Taken is what was published before this cycle.
                 if let (End::Core(core), Some(start)) = (link.to, self.start) {
                     let known = &description.cores[core];
-                    let (first, period) = (start + known.offset - description.taking(core), known.period(description.tick));
+                    let (first, period) =
+                        (start + known.offset - description.taking(core), known.period(description.tick));
                     let waits = self.cores[core].waits.last().is_some_and(|since| since + ENDED_DELAY <= now)
                         && matches!(self.cores[core].emulator.status(), takt_emu::Status::Waiting { .. });
                     if now >= first && (now - first).is_multiple_of(period) && waits {
@@ -445,7 +462,11 @@ impl Reference {
                     }
                     for &(status, value) in status.iter().flatten() {
                         if receiver.iter().any(|(wanted, _)| *wanted == status) {
-                            self.arrive(core, Source::Status { link: number, side: Side::Receiver, status }, value);
+                            self.arrive(
+                                core,
+                                Source::Status { link: number, side: Side::Receiver, status },
+                                value,
+                            );
                         }
                     }
                 }
@@ -453,7 +474,11 @@ impl Reference {
                 if let End::Core(core) = link.from {
                     for (status, value) in back.into_iter().flatten() {
                         if sender.iter().any(|(wanted, _)| *wanted == status) {
-                            self.arrive(core, Source::Status { link: number, side: Side::Sender, status }, value);
+                            self.arrive(
+                                core,
+                                Source::Status { link: number, side: Side::Sender, status },
+                                value,
+                            );
                         }
                     }
                 }

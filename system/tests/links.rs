@@ -23,7 +23,8 @@ fn system(text: &str, programs: &[(&str, &str)]) -> Description {
 /// Counts its periods on `n`.
 const COUNT: &str = ".output n:int\n.state c:int\n.once\n mov c, zero\n mov n, zero\n wait p\n.period\np: iadd c, c, 1\n nop\n nop\n nop\n nop\n nop\n mov n, c\n wait p\n";
 /// Shows its input `i` in each period on `o`.
-const SHOW: &str = ".input i:int\n.output o:int\n.once\n mov o, zero\n wait p\n.period\np: mov o, i\n wait p\n";
+const SHOW: &str =
+    ".input i:int\n.output o:int\n.once\n mov o, zero\n wait p\n.period\np: mov o, i\n wait p\n";
 
 fn pair(link: &str, offset: u64) -> Description {
     let text = format!(
@@ -55,7 +56,8 @@ fn a_wire_is_read_from_its_latency_on() {
 fn a_snapshot_is_taken_before_the_tick() {
     let mut seen = Vec::new();
     for offset in 0..60 {
-        let link = "[[snapshot]]\nname = \"s\"\nfrom = \"a\"\nto = \"b\"\nports = [\"n -> i\"]\nlatency = 10\n";
+        let link =
+            "[[snapshot]]\nname = \"s\"\nfrom = \"a\"\nto = \"b\"\nports = [\"n -> i\"]\nlatency = 10\n";
         let description = pair(link, offset);
         let mut system = System::new(&description).unwrap();
         let start = system.run_to_start(10_000).unwrap().unwrap();
@@ -69,7 +71,9 @@ fn a_snapshot_is_taken_before_the_tick() {
 #[test]
 fn a_fifo_keeps_the_order_and_says_what_it_refused() {
     // `a` pushes its count in every period, `b` takes one in every third.
-    let push = COUNT.replace(".output n:int", ".output n:int, push:int").replace(" mov n, c\n", " mov n, c\n mov push, c\n");
+    let push = COUNT
+        .replace(".output n:int", ".output n:int, push:int")
+        .replace(" mov n, c\n", " mov n, c\n mov push, c\n");
     let take = ".input i:int, e:int\n.output o:int, pop:int\n.once\n mov o, zero\n wait p\n.period\np: bnz e, no\n mov o, i\n mov pop, zero\nno: wait p\n";
     let text = "tick = 200\n[[core]]\nname = \"a\"\nprogram = \"a\"\nmachine = \"t1\"\n[[core]]\nname = \"b\"\nprogram = \"b\"\n\
                 machine = \"t1\"\ntick = 3\n[[fifo]]\nname = \"q\"\nfrom = \"a\"\nto = \"b\"\ndepth = 4\nports = [\"n -> i\"]\npush = \"push\"\npop = \"pop\"\n\
@@ -83,8 +87,9 @@ fn a_fifo_keeps_the_order_and_says_what_it_refused() {
         system.run_until(start + 600 * period - 1).unwrap();
         taken.push(system.output("o").unwrap());
     }
-    let counts = system.fifo_counts(0).unwrap();
-    assert_eq!(counts.pushed - counts.popped, system.fifo_entries(0).len() as u64);
+    let fifo = description.link_named("q").unwrap();
+    let counts = system.fifo_counts(fifo).unwrap();
+    assert_eq!(counts.pushed - counts.popped, system.fifo_entries(fifo).len() as u64);
     assert_eq!(counts.pushed + counts.overflows, 30);
     assert_eq!((counts.most, counts.underflows), (4, 0));
     // Empty at the first tick; then in order, without the refused ones.

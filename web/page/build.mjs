@@ -1,4 +1,4 @@
-// Bundles the page: `node build.mjs FOLDER-OF-WASM OUT`. The first holds takt.js and takt_bg.wasm, as takt-bindgen writes them.
+// Bundles the page: `node build.mjs TAKT.WASM OUT`.
 import { build } from "esbuild";
 import { cpSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join, resolve } from "node:path";
@@ -10,12 +10,9 @@ mkdirSync(out, { recursive: true });
 await build({
   entryPoints: [join(page, "src/main.js"), join(page, "src/worker.js")],
   outdir: out, bundle: true, minify: true, format: "esm", target: "es2022", legalComments: "eof", logLevel: "warning",
-  alias: { "takt-wasm": join(wasm, "takt.js") },
-  // The glue can fetch its own WebAssembly beside itself; here the page hands it over.
-  define: { "import.meta.url": '""' },
 });
 cpSync(join(page, "index.html"), join(out, "index.html"));
-writeFileSync(join(out, "takt.wasm.gz"), gzipSync(readFileSync(join(wasm, "takt_bg.wasm")), { level: 9 }));
+writeFileSync(join(out, "takt.wasm.gz"), gzipSync(bare(readFileSync(wasm)), { level: 9 }));
 let total = 0;
 for (const name of ["index.html", "main.css", "main.js", "worker.js", "takt.wasm.gz"]) {
   const bytes = readFileSync(join(out, name)), size = name.endsWith(".gz") ? bytes.length : gzipSync(bytes).length;
@@ -27,4 +24,20 @@ const LIMIT = 2_000_000;
 if (total >= LIMIT) {
   console.error(`the page has ${total} bytes compressed; it may have ${LIMIT}`);
   process.exit(1);
+}
+
+/** WebAssembly without its custom sections (number 0), which hold names for debuggers. */
+function bare(bytes) {
+  const parts = [bytes.subarray(0, 8)];
+  for (let at = 8; at < bytes.length; ) {
+    const start = at, id = bytes[at++];
+    let length = 0;
+    for (let shift = 0, more = true; more; shift += 7) {
+      length += (bytes[at] & 0x7f) * 2 ** shift;
+      more = bytes[at++] >= 0x80;
+    }
+    at += length;
+    if (id !== 0) parts.push(bytes.subarray(start, at));
+  }
+  return Buffer.concat(parts);
 }

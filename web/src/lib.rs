@@ -1,7 +1,7 @@
 //! The playground: what a page in a browser asks of Takt.
 //!
 //! [`Playground::call`] takes a method and its parameters as JSON and answers in JSON, so that everything here is tested
-//! without a browser. In one, `binding` hands the texts across. The page itself is in `page/`; nothing of the language is in it:
+//! without a browser. In one, `exports` hands the texts across. The page itself is in `page/`; nothing of the language is in it:
 //! colours, diagnostics and completion come from [`takt_editor::lsp`], the pipeline's picture from [`takt_analysis::picture`].
 //!
 //! | method | what it does |
@@ -17,10 +17,10 @@
 //!
 //! Nothing here knows the time or waits: whoever calls divides what is long.
 
-#[cfg(target_arch = "wasm32")]
-mod binding;
 mod examples;
 mod export;
+#[cfg(target_arch = "wasm32")]
+mod exports;
 mod language;
 mod program;
 mod run;

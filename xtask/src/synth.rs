@@ -16,6 +16,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use std::{fs, thread};
+use takt_board::tools::{MAPPING, OPTIONS};
 use takt_isa::spec::machines::MACHINES;
 use takt_isa::{Machine, UNITS, Unit};
 use takt_rtl::export::{export, synthesis_top};
@@ -28,12 +29,6 @@ const RECORD: &str = "docs/synthesis.json";
 const SEEDS: u32 = 5;
 /// What place and route strives for, in MHz: more than any design reaches.
 const TARGET_MHZ: u32 = 200;
-/// Options of `synth_lattice`. Without the slices' wide multiplexers the logic is a third less and not slower; short comparisons
-/// with constants on carry chains, which have to be entered and left, take more than in tables.
-const OPTIONS: &str = "-nowidelut -cmp2softlogic";
-/// What precedes it: a longer way of mapping logic, in which comparators come out at half the size; a machine loses a tenth.
-const MAPPING: &str = "scratchpad -copy abc9.script.flow2 abc9.script";
-
 /// Where the pins of a machine's top level are (those of the ULX3S board). Without a fixed place the placer takes ten times as long.
 const PINS: &str = "LOCATE COMP \"clk\" SITE \"G2\";
 LOCATE COMP \"rst\" SITE \"D6\";
@@ -340,7 +335,7 @@ fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Result<Synthes
         .iter()
         .map(|report| clock(report).map(|mhz| (mhz * 100.0).round() / 100.0))
         .collect::<Result<_>>()?;
-    let carries = halves_of_carries(&read(&folder.join("statistics.json"))?);
+    let carries = Some(halves_of_carries(&read(&folder.join("statistics.json"))?));
     row.resources = less(Resources { carries, ..ecp5(&reports[0])? }, design.wrapper);
     let middle = row.mhz.iter().position(|&mhz| Some(mhz) == row.median()).expect("there is a seed");
     row.critical_path = critical_path(&reports[middle]).context("nextpnr's report has no path")?;
@@ -410,8 +405,8 @@ fn ecp5(report: &Value) -> Result<Resources> {
 }
 
 /// Halves of carry chains' cells, each of which takes the place of a LUT4; from yosys' statistics.
-fn halves_of_carries(statistics: &Value) -> Option<u64> {
-    Some(2 * statistics["design"]["num_cells_by_type"]["CCU2C"].as_u64()?)
+fn halves_of_carries(statistics: &Value) -> u64 {
+    2 * statistics["design"]["num_cells_by_type"]["CCU2C"].as_u64().unwrap_or(0)
 }
 
 /// From yosys' statistics.

@@ -1,10 +1,10 @@
 //! The playground: compiled for browsers, bundled, and tested in one.
 
 use crate::reach::{Toolchain, WASM};
-use crate::{apt_install, cargo, root, run, works};
+use crate::{apt_install, root, run, works};
 use anyhow::{Context, Result};
 use clap::Args;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What to do with it.
@@ -18,14 +18,15 @@ pub(crate) struct Arguments {
     bench: bool,
     /// Keep pictures of the page in this folder (with --test).
     #[arg(long, value_name = "FOLDER", requires = "test")]
-    screenshots: Option<std::path::PathBuf>,
+    screenshots: Option<PathBuf>,
 }
 
 /// Where the page is built; any file server can serve it.
 pub(crate) const PAGE: &str = "target/playground";
 /// What is compiled on the way.
 const TARGET: &str = "target/web";
-const BINDGEN: &str = "target/bindgen";
+/// What works once for a keystroke need not be as fast as the emulator: it is compiled in half the time, and smaller.
+const LEVELS: [(&str, u8); 3] = [("takt-editor", 1), ("takt-analysis", 1), ("takt-web", 1)];
 
 pub(crate) fn web(arguments: &Arguments) -> Result<()> {
     build()?;
@@ -38,22 +39,15 @@ pub(crate) fn web(arguments: &Arguments) -> Result<()> {
 /// Builds the page.
 pub(crate) fn build() -> Result<()> {
     let mut compile = Toolchain::find(&[WASM])?.cargo("build", WASM, TARGET);
-    run(compile.args(["--release", "-p", "takt-web"]))?;
-    let glue = format!("{TARGET}/glue");
-    let mut bindgen = cargo();
-    bindgen.args([
-        "run",
-        "--quiet",
-        "--manifest-path",
-        "web/bindgen/Cargo.toml",
-        "--target-dir",
-        BINDGEN,
-        "--",
-    ]);
-    run(bindgen.arg(format!("{TARGET}/{WASM}/release/takt_web.wasm")).arg(&glue))?;
+    compile.args(["--release", "-p", "takt-web"]);
+    for (package, level) in LEVELS {
+        compile.args(["--config", &format!("profile.release.package.{package}.opt-level={level}")]);
+    }
+    run(&mut compile)?;
     let page = packages()?;
     let mut bundle = Command::new("node");
-    run(bundle.arg("build.mjs").arg(root().join(glue)).arg(root().join(PAGE)).current_dir(page))?;
+    let compiled = root().join(format!("{TARGET}/{WASM}/release/takt_web.wasm"));
+    run(bundle.arg("build.mjs").arg(compiled).arg(root().join(PAGE)).current_dir(page))?;
     eprintln!(
         "the playground is in {PAGE}: `python3 -m http.server -d {PAGE}` serves it on http://localhost:8000"
     );
@@ -61,7 +55,7 @@ pub(crate) fn build() -> Result<()> {
 }
 
 /// The page's folder, with what it needs from npm in the versions that are written down.
-fn packages() -> Result<std::path::PathBuf> {
+fn packages() -> Result<PathBuf> {
     if !works("node", "--version") || !works("npm", "--version") {
         apt_install(&["nodejs", "npm"])?;
     }

@@ -141,3 +141,52 @@ impl Real for Probe {
         if self.bits != 0 { yes } else { no }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::ulp;
+    use super::*;
+    use takt_emu::testing::Random;
+    use takt_isa::fp::Host;
+    use takt_isa::{ROWS, Type, compute, real};
+
+    /// Every row's two meanings agree up to the row's rounding, over words of all kinds.
+    #[test]
+    fn a_row_means_the_same_in_both() {
+        let mut random = Random::new(64);
+        for row in ROWS {
+            let Some(most) = row.ulp else { continue };
+            let mut compared = 0;
+            for _ in 0..20_000 {
+                // Numbers of like size, or anything.
+                let word = |random: &mut Random| match random.below(3) {
+                    0 => random.word(),
+                    _ => (random.below(1 << 20) as f32 / 3e5 - 1.7).to_bits(),
+                };
+                let [a, b, c] = [(); 3].map(|()| word(&mut random));
+                let bits = compute::<Host>(row.op, a, b, c).bits;
+                let probe = |bits: u32| Probe::new(f64::from(f32::from_bits(bits)), bits);
+                let exact = real(row.op, probe(a), probe(b), probe(c)).unwrap().value;
+                if row.result_type() == Type::I {
+                    let operands = [a, b, c].map(f32::from_bits);
+                    let float = row.source_type(0) == Type::F;
+                    let wraps = !float && (exact < -2147483648.0 || exact > 2147483647.0);
+                    if wraps || float && operands.iter().any(|operand| operand.is_nan()) {
+                        continue;
+                    }
+                    assert_eq!(exact, f64::from(bits.cast_signed()), "{}({a:08x}, {b:08x})", row.mnemonic);
+                } else {
+                    let value = f64::from(f32::from_bits(bits));
+                    if !value.is_finite() || !exact.is_finite() || ulp(exact).is_infinite() {
+                        continue;
+                    }
+                    // A product and a sum in binary64 round themselves.
+                    let error = (value - exact).abs() / ulp(exact);
+                    assert!(error <= most + 1e-3, "{}({a:08x}, {b:08x}, {c:08x}): {error} ulp", row.mnemonic);
+                }
+                compared += 1;
+            }
+            assert!(compared > 5_000, "{}: {compared}", row.mnemonic);
+        }
+    }
+}

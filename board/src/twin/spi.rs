@@ -56,7 +56,7 @@ impl Spi {
             self.now[1] = self.now[1].wrapping_add(1);
             return;
         }
-        let first = half % 2 == 0;
+        let first = half.is_multiple_of(2);
         self.clock = first != self.polarity;
         let before = self.shift;
         if first != self.second_edge {
@@ -90,7 +90,7 @@ impl Twin for Spi {
                     self.now[2] = self.now[2].wrapping_add(1);
                 }
                 self.at = Some(at + 1);
-                if (at + 1) % self.half == 0 {
+                if (at + 1).is_multiple_of(self.half) {
                     self.edge(at / self.half);
                 }
             }

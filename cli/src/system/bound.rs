@@ -20,14 +20,14 @@ pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
     let mut bounds = Vec::new();
     for core in &description.cores {
         bounds.push(
-            takt_analysis::bound(&core.program).map_err(|error| anyhow!("core {}: no bound: {error}", core.name))?,
+            takt_analysis::bound(&core.program)
+                .map_err(|error| anyhow!("core {}: no bound: {error}", core.name))?,
         );
     }
     let deadline = arguments.deadline.map(|deadline| deadline.cycles(arguments.clock));
     let ways = latencies(&description, &bounds).map_err(|error| anyhow!("no end-to-end bound: {error}"));
-    let late = |ways: &[Latency]| {
-        deadline.map(|deadline| ways.iter().filter(|way| way.worst > deadline).count())
-    };
+    let late =
+        |ways: &[Latency]| deadline.map(|deadline| ways.iter().filter(|way| way.worst > deadline).count());
     let verdict = ways.as_ref().ok().and_then(|ways| late(ways));
     if arguments.json {
         let ways = ways?;
@@ -85,7 +85,11 @@ fn write_text(arguments: &Bound, description: &Description, bounds: &[Bounds], o
     for (core, bounds) in description.cores.iter().zip(bounds) {
         let period = core.period(description.tick);
         let time = microseconds(period, arguments.clock);
-        writeln!(out, "\n{}: {} on {}, a tick every {period} ({time})", core.name, core.path, core.program.machine.name)?;
+        writeln!(
+            out,
+            "\n{}: {} on {}, a tick every {period} ({time})",
+            core.name, core.path, core.program.machine.name
+        )?;
         write_sections(&core.program, bounds, arguments.clock, out)?;
     }
     Ok(())

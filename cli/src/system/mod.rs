@@ -22,8 +22,9 @@ pub(crate) struct LoadedSystem {
 /// Reads a system's file and its programs, which are looked for beside it.
 pub(crate) fn load(path: &Path, source: &SourceArguments, color: bool) -> Result<LoadedSystem> {
     let name = files::input_name(path);
-    let text = String::from_utf8(files::read(path, TEXT_BYTES)?)
-        .map_err(|error| anyhow!("{name} is no text: byte {} is not UTF-8", error.utf8_error().valid_up_to()))?;
+    let text = String::from_utf8(files::read(path, TEXT_BYTES)?).map_err(|error| {
+        anyhow!("{name} is no text: byte {} is not UTF-8", error.utf8_error().valid_up_to())
+    })?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut programs = Vec::new();
     let read = takt_system::read(&name, &text, |request: &Request<'_>| {
@@ -49,10 +50,12 @@ fn missing(asked: &str, file: &Path) -> ProgramError<anyhow::Error> {
         true => (format!("{asked} is a folder, not a program"), None),
         false => (format!("there is no program {asked}"), None),
     };
-    let folder = file.parent().map(|folder| if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
+    let folder =
+        file.parent().map(|folder| if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
     if let (Some(folder), Some(wanted)) = (folder, file.file_name()) {
         let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-        let names: Vec<String> = entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+        let names: Vec<String> =
+            entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
         let near = nearest(&wanted.to_string_lossy(), names.iter().map(String::as_str));
         help = Some(match near {
             Some(near) => format!("did you mean `{}`?", Path::new(asked).with_file_name(near).display()),

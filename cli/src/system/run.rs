@@ -64,12 +64,13 @@ impl Host {
         // The table of inputs wants a register; nobody asks for it here.
         let port = |name, ty| Port { name, register: Register::ZERO, ty };
         let inputs = self.inputs.iter().map(|input| port(input.name.clone(), input.ty));
-        let pushes = self.pushes.iter().map(|link| port(format!("{}.{PUSH}", description.links[*link].name), Type::I));
+        let pushes =
+            self.pushes.iter().map(|link| port(format!("{}.{PUSH}", description.links[*link].name), Type::I));
         inputs.chain(pushes).collect()
     }
 
     /// Does what a row says; how many entries did not fit.
-    fn write(&self, system: &mut System, row: &ports::Row) -> Result<u64> {
+    fn write(&self, system: &mut System, row: &takt_emu::Row) -> Result<u64> {
         let (inputs, pushes) = row.split_at(self.inputs.len());
         for (input, (_, bits)) in self.inputs.iter().zip(inputs) {
             system.set_input(&input.name, *bits)?;
@@ -192,7 +193,8 @@ fn drive(
         *last = host.read(system)?;
         if let Some(outputs) = &mut outputs {
             let values = host.outputs.iter().zip(&*last);
-            let values = values.map(|(output, bits)| bits.map_or(String::new(), |bits| ports::format(output.ty, bits)));
+            let values = values
+                .map(|(output, bits)| bits.map_or(String::new(), |bits| ports::format(output.ty, bits)));
             ports::write_row(outputs, values)?;
             if live {
                 outputs.flush()?;
@@ -230,7 +232,9 @@ impl Ran<'_> {
             (core.name.clone(), value)
         });
         let outputs = host.outputs.iter().zip(last);
-        let outputs = outputs.map(|(output, bits)| (output.name.clone(), json!(bits.map(|bits| ports::json(output.ty, bits)))));
+        let outputs = outputs.map(|(output, bits)| {
+            (output.name.clone(), json!(bits.map(|bits| ports::json(output.ty, bits))))
+        });
         let fifos = self.fifos().map(|(name, counts)| {
             let value = json!({
                 "pushed": counts.pushed,

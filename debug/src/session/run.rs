@@ -5,7 +5,7 @@ use super::interest::Interest;
 use super::stops::{Stop, Watcher, Where};
 use super::{CHECKPOINTS, Core, Cycle, End, Live, SLICE, Session, Unit, WINDOW, Why};
 use std::sync::atomic::Ordering;
-use takt_emu::{PeriodError, Upcoming};
+use takt_emu::{Emulator, PeriodError, Upcoming};
 use takt_isa::program::Location;
 use takt_isa::{BundleAddress, Flow};
 
@@ -71,6 +71,32 @@ impl Session {
         }
         let checkpoint = self.core.checkpoint();
         self.checkpoints.push(checkpoint);
+    }
+
+    /// Runs again from the beginning to this position, and shows the machine after each cycle in which a bundle issued, with that
+    /// bundle. The session stays where it is.
+    ///
+    /// # Returns
+    /// [`Why::Done`], or that it was interrupted.
+    pub fn replay(&mut self, visit: &mut dyn FnMut(&Emulator, BundleAddress)) -> Why {
+        let here = self.cycle();
+        let Some(beginning) = self.checkpoints.first().map(Core::restore) else { return Why::Start };
+        let core = std::mem::replace(&mut self.core, beginning);
+        self.make_edits();
+        let mut why = Why::Done;
+        while self.cycle() < here {
+            let now = self.cycle();
+            let upcoming = self.core.emulator.upcoming().filter(|upcoming| upcoming.issue.cycle == now);
+            if let Err(end) = self.slice(now + 1) {
+                why = end;
+                break;
+            }
+            if let Some(Upcoming { address, .. }) = upcoming {
+                visit(&self.core.emulator, address);
+            }
+        }
+        self.core = core;
+        why
     }
 
     /// The cycles of the checkpoints.

@@ -127,7 +127,8 @@ function showCycles() {
     put(` a period, in ${plural(run.cycles.length, "period")}${run.missed ? `, ${plural(run.missed, "deadline")} missed` : ""}`);
   } else if (run) put(`${plural(run.total, "cycle")}`, "b");
   // A block that is a whole period has the scheduler's bound: no schedule takes fewer.
-  const schedule = program.blocks.find((block) => periods.some((section) => section.name === block.label));
+  const whole = program.blocks.filter((block) => periods.some((section) => section.name === block.label));
+  const schedule = whole.reduce((most, block) => (most && most.cycles >= block.cycles ? most : block), null);
   if (schedule) put(` · no schedule takes fewer than ${schedule.bound}`);
   for (const section of periods) put(` · ${section.name} takes ${range(section.cycles)} whatever the inputs`);
   if (once) put(` · once ${range(once.cycles)}`);
@@ -285,7 +286,7 @@ function drive() {
       over = part.over;
       const seconds = (performance.now() - begun) / 1000;
       el("robot-fault").textContent = text(part.fault);
-      el("drove").textContent = `${(part.done * part.sample_time).toFixed(1)} s of ${(part.all * part.sample_time).toFixed(1)} s of path; ${plural(part.longest, "cycle")} at most; largest tool error ${(part.cutting * 1e6).toFixed(2)} µm cutting, ${(part.overall * 1e6).toFixed(2)} µm overall; ${(part.operations / seconds / 1e6).toFixed(1)} million operations/s here`;
+      el("drove").textContent = `${(part.done * part.sample_time).toFixed(1)} s of ${(part.all * part.sample_time).toFixed(1)} s of path; ${plural(part.cycles, "cycle")} a period, ${part.longest} at most; largest tool error ${(part.cutting * 1e6).toFixed(2)} µm cutting, ${(part.overall * 1e6).toFixed(2)} µm overall; ${(part.operations / seconds / 1e6).toFixed(1)} million operations/s here`;
     }
     robot.over = true;
     const { poses } = robot;

@@ -16,9 +16,9 @@ export function chart(parent, { title, x, label, curves, height = 190 }) {
   const width = () => Math.max(240, parent.clientWidth - 8);
   const plot = new uPlot({
     title, width: width(), height, scales: { x: { time: false } }, axes: [{ ...axis, label }, { ...axis, size: 64 }],
-    series: [{ label }, ...curves.map(({ name, values, show, stepped }, i) => ({
-      label: name, show, stroke: COLOURS[i % COLOURS.length], width: 1.4, points: { show: values.length < 40 },
-      paths: stepped ? uPlot.paths.stepped({ align: 1 }) : undefined,
+    series: [{ label }, ...curves.map(({ name, values, stepped }, i) => ({
+      label: name, stroke: COLOURS[i % COLOURS.length], width: 1.4, points: { show: values.length < 40 },
+      ...(stepped && { paths: uPlot.paths.stepped({ align: 1 }) }),
     }))],
   }, [x, ...curves.map((curve) => curve.values)], element);
   const observer = new ResizeObserver(() => parent.clientWidth && plot.setSize({ width: width(), height }));

@@ -1,27 +1,32 @@
 // A playground in a thread of its own: requests come in, answers go out, in order. The page makes two, one for the language
 // server and one for the machine, so that neither keeps the page or the other waiting.
-import init, { Playground } from "takt-wasm";
 
-let playground;
+let takt;
+
+/** Asks the WebAssembly (`web/src/exports.rs`): what goes in and comes out are bytes. */
+function ask(request, call) {
+  const bytes = new TextEncoder().encode(request);
+  const at = takt.takt_input(bytes.length);
+  new Uint8Array(takt.memory.buffer, at, bytes.length).set(bytes);
+  const length = call();
+  return new Uint8Array(takt.memory.buffer, takt.takt_output(), length);
+}
+
 const ready = new Promise((resolve, reject) => {
   self.addEventListener("message", async ({ data }) => {
     if (data.module) {
-      try {
-        await init({ module_or_path: data.module });
-        playground = new Playground();
-        resolve();
-      } catch (error) {
-        reject(error);
-      }
+      // It asks nothing of its host: an import would be a mistake of the build, and fails here.
+      WebAssembly.instantiate(data.module, {}).then(({ exports }) => resolve((takt = exports)), reject);
       return;
     }
     const { id, method, params } = data;
     try {
       await ready;
       if (method === "image") {
-        self.postMessage({ id, ok: playground.image() });
+        self.postMessage({ id, ok: ask("", takt.takt_image).slice() });
       } else {
-        const { ok, error } = JSON.parse(playground.call(method, JSON.stringify(params ?? null)));
+        const answer = ask(`${method}\n${JSON.stringify(params ?? null)}`, takt.takt_call);
+        const { ok, error } = JSON.parse(new TextDecoder().decode(answer));
         self.postMessage(error === undefined ? { id, ok } : { id, error });
       }
     } catch (error) {

@@ -1,11 +1,12 @@
 //! From the file to a checked description, or to what is wrong with it.
 
+mod links;
+
 use crate::description::{
-    Core, Description, End, Field, Link, LinkKind, MAX_CORES, MAX_DEPTH, MAX_LATENCY, MAX_TICK,
-    MIN_LATENCY, Status,
+    Core, Description, End, Field, Link, MAX_CORES, MAX_LATENCY, MAX_TICK, MIN_LATENCY,
 };
-use crate::file::{CoreTable, File, FifoTable, SnapshotTable, StatusTable, WireTable};
-use std::collections::HashMap;
+use crate::file::{CoreTable, File};
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 use std::sync::Arc;
 use takt_asm::diag::{Diagnostic, Diagnostics};
@@ -13,7 +14,7 @@ use takt_asm::nearest;
 use takt_asm::source::{Sources, Span};
 use takt_asm::type_name;
 use takt_isa::program::Port;
-use takt_isa::{MACHINES, Machine, Program, Register, Type};
+use takt_isa::{MACHINES, Machine, Program, Type};
 use toml::Spanned;
 
 /// Cycles that a core needs between its ticks beside those in which its snapshots go in.
@@ -130,13 +131,13 @@ struct Checker<'m> {
     mistakes: &'m mut Mistakes,
     cores: Vec<Core>,
     /// Cores by name; `None` for one whose own mistakes are told already.
-    names: HashMap<String, Option<usize>>,
+    names: BTreeMap<String, Option<usize>>,
     links: Vec<Link>,
+    /// Links of latency 0, with their places.
+    zero: Vec<(usize, Range<usize>)>,
     link_names: Places,
     /// What drives an input port, or an output of the system: `core.port`.
     driven: Places,
-    /// The keys that have the links' latencies, or else their tables' first keys.
-    latencies: Vec<Range<usize>>,
     /// What the host drives, with its type.
     host_types: HashMap<String, Type>,
 }
@@ -153,11 +154,11 @@ impl<'m> Checker<'m> {
         Checker {
             mistakes,
             cores: Vec::new(),
-            names: HashMap::new(),
+            names: BTreeMap::new(),
             links: Vec::new(),
+            zero: Vec::new(),
             link_names: Places::new(),
             driven: Places::new(),
-            latencies: Vec::new(),
             host_types: HashMap::new(),
         }
     }
@@ -170,7 +171,8 @@ impl<'m> Checker<'m> {
         let tick = self.number(&file.tick, "the base tick", 1, MAX_TICK);
         if file.core.is_empty() {
             let help = "a core: `[[core]]` with `name` and `program`";
-            self.mistakes.add("core", 0..0, "a system without a core".to_owned()).help = Some(help.to_owned());
+            self.mistakes.add("core", 0..0, "a system without a core".to_owned()).help =
+                Some(help.to_owned());
         }
         if let Some(extra) = file.core.get(MAX_CORES) {
             let text = format!("{} cores; a system has at most {MAX_CORES}", file.core.len());
@@ -190,6 +192,7 @@ impl<'m> Checker<'m> {
         file.wire.iter().for_each(|wire| self.wire(wire));
         file.snapshot.iter().for_each(|snapshot| self.snapshot(snapshot));
         file.fifo.iter().for_each(|fifo| self.fifo(fifo));
+        self.zero_latencies();
         if self.mistakes.list.is_empty() {
             self.undriven(file);
         }
@@ -199,7 +202,8 @@ impl<'m> Checker<'m> {
             let (lanes, period) = (description.snapshot_lanes(number), core.period(tick));
             if self.mistakes.list.is_empty() && period < lanes + LEAST_PERIOD {
                 let least = lanes + LEAST_PERIOD;
-                let place = file.core.get(number).and_then(|core| core.tick.as_ref()).unwrap_or(&file.tick).span();
+                let place =
+                    file.core.get(number).and_then(|core| core.tick.as_ref()).unwrap_or(&file.tick).span();
                 let text = format!(
                     "core `{}` has a tick every {period} cycles and needs {least} at least: {LEAST_PERIOD}, and \
                      one for each of its {lanes} values from snapshots",
@@ -247,8 +251,10 @@ impl<'m> Checker<'m> {
         let mut good = self.name(&table.name, "core");
         let name = table.name.get_ref();
         if let Some(first) = self.link_names.get(name).cloned() {
-            let diagnostic = self.mistakes.add("name", table.name.span(), format!("two cores named `{name}`"));
-            *diagnostic = diagnostic.clone().also(span(first), "the first").help("another name for one of them");
+            let diagnostic =
+                self.mistakes.add("name", table.name.span(), format!("two cores named `{name}`"));
+            *diagnostic =
+                diagnostic.clone().also(span(first), "the first").help("another name for one of them");
             good = false;
         }
         self.link_names.insert(name.clone(), table.name.span());
@@ -277,7 +283,8 @@ impl<'m> Checker<'m> {
                 let near = nearest(wanted.get_ref(), names.iter().copied());
                 let text = format!("there is no machine `{}`", wanted.get_ref());
                 let diagnostic = self.mistakes.add("machine", wanted.span(), text);
-                *diagnostic = diagnostic.clone().help(format!("machines: {}", names.join(", "))).did_you_mean(near);
+                *diagnostic =
+                    diagnostic.clone().help(format!("machines: {}", names.join(", "))).did_you_mean(near);
                 return Ok(None);
             }
         }
@@ -354,7 +361,8 @@ impl<'m> Checker<'m> {
             (End::Host, Some(link)) => (format!("{link}.{name}"), "output of the system"),
         };
         if let Some(first) = self.driven.get(&key).cloned() {
-            let diagnostic = self.mistakes.add("drivers", place, format!("two drivers of the {what} `{key}`"));
+            let diagnostic =
+                self.mistakes.add("drivers", place, format!("two drivers of the {what} `{key}`"));
             let help = "each port has one driver: leave one of the links out, or give it a port of its own";
             *diagnostic = diagnostic.clone().also(span(first), "the first").help(help);
             return false;
@@ -422,20 +430,38 @@ impl<'m> Checker<'m> {
         latency
     }
 
-    fn add(&mut self, link: Link, latency: Option<&Spanned<i64>>, place: Range<usize>) {
+    fn add(&mut self, link: Link, latency: Option<&Spanned<i64>>) {
         if let Some(latency) = latency.filter(|latency| *latency.get_ref() == 0) {
-            let text = match self.closed(&link) {
-                Some(way) => format!("a loop of zero latency: {way}"),
-                None => format!("a latency of 0: a value takes {MIN_LATENCY} cycles from core to core at least"),
-            };
-            self.mistakes.add("latency", latency.span(), text).help = Some(LATENCY_HELP.to_owned());
+            self.zero.push((self.links.len(), latency.span()));
         }
-        self.latencies.push(place);
         self.links.push(link);
     }
 
+    /// Tells of latencies of 0: of a loop once, at its first link.
+    fn zero_latencies(&mut self) {
+        let mut told: Vec<Vec<String>> = Vec::new();
+        for (number, place) in std::mem::take(&mut self.zero) {
+            let text = match self.closed(&self.links[number]) {
+                Some(way) => {
+                    let mut cores = way.clone();
+                    cores.sort();
+                    cores.dedup();
+                    if told.contains(&cores) {
+                        continue;
+                    }
+                    told.push(cores);
+                    format!("a loop of zero latency: {}", way.join(" -> "))
+                }
+                None => {
+                    format!("a latency of 0: a value takes {MIN_LATENCY} cycles from core to core at least")
+                }
+            };
+            self.mistakes.add("latency", place, text).help = Some(LATENCY_HELP.to_owned());
+        }
+    }
+
     /// The way back from where a link of zero latency leads to where it comes from, over others of zero latency.
-    fn closed(&self, last: &Link) -> Option<String> {
+    fn closed(&self, last: &Link) -> Option<Vec<String>> {
         let mut ways = vec![vec![last.to]];
         let mut seen = vec![last.to];
         while let Some(way) = ways.pop() {
@@ -445,8 +471,7 @@ impl<'m> Checker<'m> {
                     End::Host => HOST.to_owned(),
                     End::Core(number) => self.cores[*number].name.clone(),
                 };
-                let names: Vec<String> = [last.from].iter().chain(&way).map(name).collect();
-                return Some(names.join(" -> "));
+                return Some([last.from].iter().chain(&way).map(name).collect());
             }
             for link in self.links.iter().filter(|link| link.latency == 0 && link.from == here) {
                 if link.to == last.from || !seen.contains(&link.to) {
@@ -458,226 +483,25 @@ impl<'m> Checker<'m> {
         None
     }
 
-    fn wire(&mut self, table: &WireTable) {
-        let mut ends = Vec::new();
-        for (input, value) in [(false, &table.from), (true, &table.to)] {
-            let Some((core, port)) = value.get_ref().split_once('.') else {
-                let text = format!("`{}` names no port", value.get_ref());
-                self.mistakes.add("port", value.span(), text).help =
-                    Some("the core and its port, `core.port`; outside of the system, `host.name`".to_owned());
-                return;
-            };
-            let Some(end) = self.end(core, value.span()) else { return };
-            let found = self.port(end, port, input, value.span());
-            ends.push((end, found));
-        }
-        let (Some((to, to_port)), Some((from, from_port))) = (ends.pop(), ends.pop()) else { return };
-        if !self.one_inside(from, to, table.to.span()) {
-            return;
-        }
-        let latency = self.latency(table.latency.as_ref());
-        let named = to_port.as_ref().map(|port| port.name.clone());
-        let field = self.field((from_port, table.from.span()), (to_port, table.to.span()), (from, to));
-        let Some(name) = named else { return };
-        if !self.drive(to, None, &name, table.to.span()) {
-            return;
-        }
-        let (Some(field), Some(latency)) = (field, latency) else { return };
-        if from == End::Host {
-            let ty = *self.host_types.entry(field.from.clone()).or_insert(field.ty);
-            if ty != field.ty && ty != Type::B && field.ty != Type::B {
-                let text = format!(
-                    "`host.{}` is {} elsewhere, and `{}` takes {}",
-                    field.from,
-                    type_name(ty),
-                    field.to,
-                    type_name(field.ty)
-                );
-                self.mistakes.add("type", table.to.span(), text).help = Some("another name".to_owned());
-                return;
-            }
-        }
-        let name = format!("{} -> {}", table.from.get_ref(), table.to.get_ref());
-        let link = Link { name, from, to, latency, fields: vec![field], kind: LinkKind::Wire };
-        self.add(link, table.latency.as_ref(), table.from.span());
-    }
-
-    fn one_inside(&mut self, from: End, to: End, place: Range<usize>) -> bool {
-        let inside = from != End::Host || to != End::Host;
-        if !inside {
-            self.mistakes.add("core", place, "a link from the host to the host".to_owned()).help =
-                Some("one end is a core".to_owned());
-        }
-        inside
-    }
-
-    /// Name, ends and latency of a link with a name.
-    fn named(
-        &mut self,
-        name: &Spanned<String>,
-        what: &str,
-        from: &Spanned<String>,
-        to: &Spanned<String>,
-    ) -> Option<(End, End)> {
-        let good = self.name(name, what);
-        if let Some(first) = self.link_names.insert(name.get_ref().clone(), name.span()) {
-            let text = format!("`{}` is the name of something else", name.get_ref());
-            let diagnostic = self.mistakes.add("name", name.span(), text);
-            *diagnostic = diagnostic.clone().also(span(first), "the first").help("another name for one of them");
-            return None;
-        }
-        let (sender, receiver) =
-            (self.end(from.get_ref(), from.span()), self.end(to.get_ref(), to.span()));
-        let (sender, receiver) = (sender?, receiver?);
-        (good && self.one_inside(sender, receiver, to.span())).then_some((sender, receiver))
-    }
-
-    /// The fields of a link with a name: `port`, or `port -> port` where the two are named differently.
-    fn fields(
-        &mut self,
-        link: &str,
-        ports: &Spanned<Vec<Spanned<String>>>,
-        (from, to): (End, End),
-    ) -> Option<Vec<Field>> {
-        if ports.get_ref().is_empty() {
-            self.mistakes.add("port", ports.span(), "a link without a port".to_owned()).help =
-                Some("`ports = [\"x\", \"y -> y_reference\"]`".to_owned());
-            return None;
-        }
-        let mut fields = Vec::new();
-        for entry in ports.get_ref() {
-            let (a, b) = match entry.get_ref().split_once("->") {
-                Some((a, b)) => (a.trim(), b.trim()),
-                None => (entry.get_ref().trim(), entry.get_ref().trim()),
-            };
-            let sender = self.port(from, a, false, entry.span());
-            let receiver = self.port(to, b, true, entry.span());
-            let named = receiver.as_ref().map(|port| port.name.clone());
-            let field = self.field((sender, entry.span()), (receiver, entry.span()), (from, to));
-            let Some(name) = named else { continue };
-            if self.drive(to, Some(link), &name, entry.span()) {
-                fields.extend(field);
-            }
-        }
-        (fields.len() == ports.get_ref().len()).then_some(fields)
-    }
-
-    /// An output port of a core that asks for something, or `None` at the host, who has no ports.
-    fn action(
-        &mut self,
-        key: &str,
-        end: End,
-        port: Option<&Spanned<String>>,
-        place: Range<usize>,
-    ) -> Option<Option<Register>> {
-        match (end, port) {
-            (End::Host, None) => Some(None),
-            (End::Host, Some(port)) => {
-                self.mistakes.add("port", port.span(), format!("`{key}` at the host, who has no such port")).help =
-                    Some(format!("leave `{key}` out"));
-                None
-            }
-            (End::Core(_), Some(port)) => {
-                let found = self.port(end, port.get_ref(), false, port.span())?;
-                Some(found.port.map(|port| port.register))
-            }
-            (End::Core(number), None) => {
-                let text = format!("no `{key}` port");
-                let help = format!(
-                    "`{key} = \"port\"`: the output port of `{}` whose writes do it",
-                    self.cores[number].name
-                );
-                self.mistakes.add("port", place, text).help = Some(help);
-                None
-            }
-        }
-    }
-
-    fn snapshot(&mut self, table: &SnapshotTable) {
-        let Some((from, to)) = self.named(&table.name, "snapshot", &table.from, &table.to) else { return };
-        let latency = self.latency(table.latency.as_ref());
-        let name = table.name.get_ref();
-        let fields = self.fields(name, &table.ports, (from, to));
-        let strobe = match &table.strobe {
-            None => Some(None),
-            Some(port) => self.action("strobe", from, Some(port), table.name.span()),
-        };
-        let (Some(latency), Some(fields), Some(strobe)) = (latency, fields, strobe) else { return };
-        let link = Link { name: name.clone(), from, to, latency, fields, kind: LinkKind::Snapshot { strobe } };
-        self.add(link, table.latency.as_ref(), table.name.span());
-    }
-
-    fn fifo(&mut self, table: &FifoTable) {
-        let Some((from, to)) = self.named(&table.name, "FIFO", &table.from, &table.to) else { return };
-        let latency = self.latency(table.latency.as_ref());
-        let depth = self.number(&table.depth, "a FIFO's depth", 1, MAX_DEPTH.into());
-        if depth.is_none()
-            && let Some(last) = self.mistakes.list.last_mut()
-        {
-            last.help = Some("the entries that it holds".to_owned());
-        }
-        let name = table.name.get_ref();
-        let fields = self.fields(name, &table.ports, (from, to));
-        let push = self.action("push", from, table.push.as_ref(), table.name.span());
-        let pop = self.action("pop", to, table.pop.as_ref(), table.name.span());
-        let sender = self.status(name, from, table.sender.as_ref());
-        let receiver = self.status(name, to, table.receiver.as_ref());
-        let (Some(latency), Some(depth), Some(fields)) = (latency, depth, fields) else { return };
-        let (Some(push), Some(pop), Some(sender), Some(receiver)) = (push, pop, sender, receiver) else { return };
-        let kind = LinkKind::Fifo { depth: depth as u32, push, pop, sender, receiver };
-        self.add(Link { name: name.clone(), from, to, latency, fields, kind }, table.latency.as_ref(), table.name.span());
-    }
-
-    fn status(
-        &mut self,
-        link: &str,
-        end: End,
-        table: Option<&StatusTable>,
-    ) -> Option<Vec<(Status, Register)>> {
-        let Some(table) = table else { return Some(Vec::new()) };
-        let ports = [&table.empty, &table.full, &table.count, &table.overflow, &table.underflow];
-        let mut list = Vec::new();
-        let mut good = true;
-        for (status, port) in Status::ALL.into_iter().zip(ports) {
-            let Some(port) = port else { continue };
-            if end == End::Host {
-                let text = format!("`{}` at the host, who has no ports", status.name());
-                self.mistakes.add("port", port.span(), text).help =
-                    Some("leave it out: the host is told in any case".to_owned());
-                good = false;
-                continue;
-            }
-            let found = self.port(end, port.get_ref(), true, port.span()).and_then(|found| found.port);
-            let Some(found) = found else {
-                good = false;
-                continue;
-            };
-            if found.ty == Type::F {
-                let text = format!("`{}` takes {}, and `{}` is an integer", found.name, type_name(found.ty), status.name());
-                self.mistakes.add("type", port.span(), text).help =
-                    Some(format!("declare it `.input {}:int`", found.name));
-                good = false;
-            }
-            good &= self.drive(end, Some(link), &found.name, port.span());
-            list.push((status, found.register));
-        }
-        good.then_some(list)
-    }
-
     /// Input ports that nothing drives.
     fn undriven(&mut self, file: &File) {
         for core in &self.cores {
             let free = |port: &&Port| !self.driven.contains_key(&format!("{}.{}", core.name, port.name));
-            let free: Vec<&str> = core.program.inputs.iter().filter(free).map(|port| port.name.as_str()).collect();
+            let free: Vec<&str> =
+                core.program.inputs.iter().filter(free).map(|port| port.name.as_str()).collect();
             let Some(first) = free.first() else { continue };
-            let Some(table) = file.core.iter().find(|table| *table.name.get_ref() == core.name) else { continue };
+            let Some(table) = file.core.iter().find(|table| *table.name.get_ref() == core.name) else {
+                continue;
+            };
             let ports = if free.len() == 1 { "input port" } else { "input ports" };
             let text = format!("nothing drives the {ports} {} of core `{}`", free.join(", "), core.name);
-            let help = format!("`[[wire]]` with `from = \"{HOST}.{first}\"`, `to = \"{}.{first}\"`", core.name);
+            let help =
+                format!("`[[wire]]` with `from = \"{HOST}.{first}\"`, `to = \"{}.{first}\"`", core.name);
             self.mistakes.add("port", table.name.span(), text).help = Some(help);
         }
     }
 }
 
-const LATENCY_HELP: &str = "the cycles from the writeback of a value to the first bundle that reads it: 4 or more";
+const LATENCY_HELP: &str =
+    "the cycles from the writeback of a value to the first bundle that reads it: 4 or more";
 const _: () = assert!(MIN_LATENCY == 4, "say so in the help");

@@ -28,7 +28,8 @@ fn told(text: &str) -> String {
     }
 }
 
-const CORES: &str = "tick = 1000\n[[core]]\nname = \"a\"\nprogram = \"a.s\"\n[[core]]\nname = \"b\"\nprogram = \"a.s\"\n";
+const CORES: &str =
+    "tick = 1000\n[[core]]\nname = \"a\"\nprogram = \"a.s\"\n[[core]]\nname = \"b\"\nprogram = \"a.s\"\n";
 const RIGHT: &str = "[[wire]]\nfrom = \"host.n\"\nto = \"a.n\"\n[[wire]]\nfrom = \"host.m\"\nto = \"b.n\"\n\
                      [[wire]]\nfrom = \"a.y\"\nto = \"b.x\"\nlatency = 9\n[[wire]]\nfrom = \"b.y\"\nto = \"a.x\"\n";
 
@@ -45,7 +46,9 @@ fn mistakes() {
         assert!(text.contains(from), "{from}");
         text.replacen(from, to, 1)
     };
-    let fifo = |rest: &str| with(&format!("[[fifo]]\nname = \"q\"\nfrom = \"a\"\nto = \"b\"\nports = [\"y -> x\"]\n{rest}"));
+    let fifo = |rest: &str| {
+        with(&format!("[[fifo]]\nname = \"q\"\nfrom = \"a\"\nto = \"b\"\nports = [\"y -> x\"]\n{rest}"))
+    };
     let cases: Vec<(&str, String)> = vec![
         ("an empty file", String::new()),
         ("no TOML", "tick = = 3".to_owned()),
@@ -73,10 +76,16 @@ fn mistakes() {
         ("a loop of zero latency", changed("latency = 9", "latency = 0") + "latency = 0\n"),
         ("a FIFO of depth 0", fifo("depth = 0\npush = \"k\"\npop = \"k\"\n")),
         ("a FIFO without push", fifo("depth = 1\npop = \"k\"\n")),
-        ("a FIFO with its status on a float port", fifo("depth = 1\npush = \"k\"\npop = \"k\"\nsender = { full = \"x\" }\n")),
+        (
+            "a FIFO with its status on a float port",
+            fifo("depth = 1\npush = \"k\"\npop = \"k\"\nsender = { full = \"x\" }\n"),
+        ),
         ("a link named like a core", fifo("").replacen("\"q\"", "\"a\"", 1) + "depth = 1\n"),
         ("a link from host to host", changed("to = \"a.n\"", "to = \"host.k\"")),
-        ("a snapshot without ports", with("[[snapshot]]\nname = \"s\"\nfrom = \"a\"\nto = \"b\"\nports = []\n")),
+        (
+            "a snapshot without ports",
+            with("[[snapshot]]\nname = \"s\"\nfrom = \"a\"\nto = \"b\"\nports = []\n"),
+        ),
         (
             "a tick too short for its snapshots",
             changed("tick = 1000", "tick = 16").replace(

@@ -1,0 +1,64 @@
+//! `accuracy`: how far registers are from binary64, as text.
+
+use crate::session::{Place, Session, Why};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use takt_analysis::accuracy::{Part, Shadow, ulp};
+use takt_isa::{Program, Register, Type};
+
+/// Lines that are named of those an error comes from.
+const LISTED: usize = 3;
+
+/// The errors of a register, or of the outputs that carry binary32, from reset to this position.
+///
+/// # Errors
+/// If the name is no register's, or the way from reset to here was interrupted.
+pub(crate) fn accuracy(session: &mut Session, name: &str) -> Result<String, String> {
+    let registers: Vec<(String, Register)> = if name.is_empty() {
+        let ports = session.program().outputs.iter().filter(|port| port.ty == Type::F);
+        ports.map(|port| (port.name.clone(), port.register)).collect()
+    } else {
+        let live = session.parse(name)?;
+        match session.place(&live)? {
+            Some((Place::Register(register), Type::F, _)) => vec![(live.text().to_owned(), register)],
+            Some((Place::Register(_), ..)) => {
+                return Err(format!("`{name}` is no float: integers have no error"));
+            }
+            _ => return Err(format!("`{name}` is no register")),
+        }
+    };
+    let mut shadow = Shadow::new(session.program());
+    if session.replay(&mut |emulator, address| shadow.issued(emulator, address)) == Why::Interrupted {
+        return Err("interrupted on the way from reset to here".to_owned());
+    }
+    let mut text = String::new();
+    let width = registers.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+    for (name, register) in &registers {
+        let flies = if session.arrives(*register).is_some() { "  (a new value is in flight)" } else { "" };
+        let _ = match shadow.value(session.emulator(), *register) {
+            None => writeln!(text, "{name:<width$}  no finite number{flies}"),
+            Some((_, _, parts)) if parts.is_empty() => writeln!(text, "{name:<width$}  exact{flies}"),
+            Some((value, exact, parts)) => {
+                let error = value - exact;
+                let (ulps, lines) = (error.abs() / ulp(exact), lines(session.program(), &parts));
+                writeln!(text, "{name:<width$}  {error:+.3e} ({ulps:.2} ulp) of {exact:e}: {lines}{flies}")
+            }
+        };
+    }
+    Ok(text)
+}
+
+/// The lines that an error comes from, those that add most first.
+fn lines(program: &Program, parts: &[Part]) -> String {
+    let mut lines: BTreeMap<String, f64> = BTreeMap::new();
+    for part in parts {
+        let location = program.lines.get(part.word as usize).copied().flatten();
+        let place = location.map_or_else(|| "(no source line)".to_owned(), |at| program.place_text(at));
+        *lines.entry(place).or_default() += part.error;
+    }
+    let mut lines: Vec<(String, f64)> = lines.into_iter().collect();
+    lines.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+    let shown: Vec<String> =
+        lines.iter().take(LISTED).map(|(place, error)| format!("{place} {error:+.2e}")).collect();
+    shown.join(", ")
+}
