@@ -109,7 +109,6 @@ fn operands(directive: Directive) -> Option<Rule> {
         Loc => separated(symbol("_bars"), choice([symbol("location"), name()])),
         Schedule | Contract | Ports => name(),
         Fast | Order => blanks(name()),
-        Range => seq([optional(text("@")), blanks(name()), assigned(), text(","), expression()]),
         Deadline => seq([blanks(name()), assigned()]),
         Range => seq([
             optional(text("@")),
