@@ -18,6 +18,7 @@ mod eval;
 mod fault;
 mod files;
 mod fmt;
+mod friction;
 mod isa;
 mod load;
 mod lsp;
