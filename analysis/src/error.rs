@@ -78,6 +78,26 @@ pub enum Refusal {
         /// Bundles in the program.
         bundles: u32,
     },
+    /// An input or a state without a range.
+    #[error(
+        "{} `{name}` is read here and has no range: write `.range {name} = least, largest`",
+        if *.input { "the input" } else { "the state" }
+    )]
+    NoRange {
+        /// Its name.
+        name: String,
+        /// Whether it is an input port.
+        input: bool,
+    },
+    /// A data word that keeps a value from one period to another.
+    #[error(
+        "data word {word} is read here before this period has written it, and the program changes it: keep the \
+         value in a `.state` with a `.range`"
+    )]
+    NoRangeOfWord {
+        /// The word.
+        word: u32,
+    },
     /// More than the analysis takes on.
     #[error("more than {limit} {what}: the analysis gives up")]
     Limit {

@@ -22,7 +22,7 @@
 //!
 //! `syntax` reads a file; `expand` writes out macros, repetitions and includes, and declares; `resolve` gives every name its
 //! meaning; `check` looks at the whole program (types, who writes what); `contract` fuses products into sums; `homes` finds
-//! each operation a slot and each value its place; `schedule` packs bundles, and chooses anew among the slots that can take an operation;
+//! each operation a slot and each value its place; `schedule` packs bundles, and chooses again among the slots that can take an operation;
 //! `emit` places registers and makes words; `output` is what can be made of the result. `context` is what the stages before
 //! `schedule` share, `report` how mistakes are told. A stage uses those before it, never one after it.
 //!
@@ -58,8 +58,8 @@ pub use output::{disasm, format, image, listing, names};
 pub use report::diag::{Diagnostic, Diagnostics};
 pub use report::levels::Levels;
 pub use report::{diag, levels, nearest, source};
-pub use syntax::ast::Directive;
-pub use syntax::{Expression, expr, tokens};
+pub use syntax::ast::{Directive, Operator};
+pub use syntax::{Expression, expr, read, tokens};
 
 /// What the assembler is to do.
 #[derive(Clone, Copy, Debug)]

@@ -385,7 +385,7 @@ fn equal_parts_are_computed_once() {
     assert_eq!(once("", " a = t*u + 1\n bz n, period\n b = t*u - 1"), 2);
     assert_eq!(once("", " a = t*u + 1\n clrflags\n b = t*u - 1"), 2);
     assert_eq!(once("", " a = t*u + 1\n .loop_bound 3\n b = t*u - 1"), 2);
-    // A port that may change is read anew in each equation; a latched one is not.
+    // A port that may change is read again in each equation; a latched one is not.
     assert_eq!(once("", " a = x*y + 1\n b = x*y - 1"), 2);
     assert_eq!(once(".ports latched", " a = x*y + 1\n b = x*y - 1"), 1);
     // The order of a sum is kept: these are different parts.

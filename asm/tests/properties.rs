@@ -5,7 +5,7 @@ mod rows;
 
 use proptest::prelude::*;
 use takt_asm::{Expression, disasm, image};
-use takt_isa::program::{Location, LoopBound, Port, Section, Space, Symbol};
+use takt_isa::program::{Location, LoopBound, Port, Range, Section, Space, Symbol};
 use takt_isa::shape::Field;
 use takt_isa::{BankIndex, BundleAddress, Instruction, MACHINES, Machine, Program, ROWS, Register, Type};
 
@@ -271,7 +271,13 @@ prop_compose! {
             _ => None,
         };
         let lines = (0..code.len()).map(|i| location(&lines[i])).collect();
+        let mut ranges: Vec<Range> = inputs.iter().filter(|port| port.ty != Type::B && port.register.get() % 2 == 0).map(|port| {
+            let (low, high) = if port.ty == Type::F { ((-1.5f32).to_bits(), 0.25f32.to_bits()) } else { ((-7i32).cast_unsigned(), 7) };
+            Range { register: port.register, ty: port.ty, low, high }
+        }).collect();
+        ranges.sort_by_key(|range| range.register);
         Program {
+            ranges,
             machine,
             code,
             data,

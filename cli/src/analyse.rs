@@ -5,22 +5,19 @@ use crate::files::{self, Out};
 use crate::load::Load;
 use crate::number;
 use crate::output;
-use crate::ports::{self, Rows};
+use crate::ports;
 use crate::select::{OptionalMachine, SourceArguments};
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use clap::Args;
-use serde_json::{Value, json};
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use takt_analysis::{Issued, Link, LinkKind, Trace, WhatIf};
+use takt_analysis::faster::{Candidate, faster};
+use takt_analysis::follow::{MOST_PERIODS, PERIODS, follow};
+use takt_analysis::picture::Picture;
 use takt_asm::schedule::BlockReport;
-use takt_emu::{Emulator, Status};
-use takt_isa::program::Location;
-use takt_isa::spec::instructions::Function;
-use takt_isa::timing::{Cause, Cycle};
-use takt_isa::{BundleAddress, Instruction, Machine, Program, SlotIndex};
+use takt_emu::Rows;
+use takt_isa::timing::Cycle;
+use takt_isa::{Machine, Program};
 
 /// Show where the cycles of a period went: every bundle, every stall, the chain that sets the time.
 ///
@@ -56,13 +53,6 @@ Examples:
   takt analyse prog.s --periods 0         what runs once
   takt analyse prog.s --inputs in.csv     the last period of recorded inputs";
 
-/// Periods without `--inputs`.
-const PERIODS: u64 = 2;
-/// Periods that are run at most on the way to the one to look at.
-const MOST_PERIODS: u64 = 1_000_000;
-/// Lines of each list of the text; --json has all.
-const SHOWN: usize = 12;
-
 pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()> {
     let mut reads = vec![("FILE", arguments.file.as_path())];
     reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
@@ -75,27 +65,38 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
     let loaded = load.with_source(&arguments.file)?;
     let program = &loaded.program;
     let rows = read_inputs(arguments, program)?;
-    let followed = follow(arguments, program, &rows);
-    let (trace, period) = followed.map_err(|error| fault::told(error, &loaded, color))?;
-    let analysis = Analysis {
-        chain: trace.critical_path(program),
-        faster: faster(arguments, &load, program, &trace, &rows),
-        program,
-        name: files::input_name(&arguments.file),
-        period,
-        trace,
-    };
+    let name = files::input_name(&arguments.file);
+    let followed = follow(program, &rows, arguments.periods);
+    let (trace, period) = followed.map_err(|error| fault::told(error.into(), &loaded, color))?;
+    let again = |program: &Program| Some(follow(program, &rows, arguments.periods).ok()?.0);
+    let faster = faster(program, &trace, &candidates(arguments, &load), &again);
+    let picture = Picture { faster, ..Picture::new(program, name, period, trace) };
     if let Some(path) = &arguments.html {
-        // `</` would end the script.
-        let data = serde_json::to_string(&analysis.json())?.replace("</", "<\\/");
-        files::write(path, include_str!("analyse.html").replace("/*DATA*/", &data).as_bytes())?;
+        files::write(path, picture.html().as_bytes())?;
     }
     if arguments.json {
-        output::json(&analysis.json(), out)?;
+        output::json(&picture.json(), out)?;
     } else if !arguments.html.as_deref().is_some_and(files::is_dash) {
-        analysis.text(out)?;
+        out.write_all(picture.text().as_bytes())?;
     }
     Ok(())
+}
+
+/// Makes the program anew for another machine, if its source can be read again.
+fn candidates<'a>(
+    arguments: &'a Analyse,
+    load: &'a Load,
+) -> impl Fn(&'static Machine) -> Option<Candidate> + 'a {
+    // Standard input has been read; an image has no source.
+    let source = Some(&arguments.file).filter(|file| !files::is_dash(file));
+    let source = source.and_then(|file| Load::source(file).ok());
+    move |machine| {
+        let load = Load { machine: Some(machine), ..load.clone() };
+        let assembled = load.assemble(&arguments.file, source.clone()?).ok()?;
+        let above = |block: &BlockReport| Cycle::from(block.cycles.saturating_sub(block.bound.cycles()));
+        let spare = assembled.blocks.iter().map(|block| (block.address, above(block))).collect();
+        Some(Candidate { program: assembled.program, spare })
+    }
 }
 
 /// The inputs of the periods up to the one to look at.
@@ -115,347 +116,4 @@ fn read_inputs(arguments: &Analyse, program: &Program) -> Result<Rows> {
         bail!("{} has {} row{plural}, so there is no such period", files::input_name(path), rows.len());
     }
     Ok(rows)
-}
-
-/// Runs the program and follows the last period asked for; its number, 0 being what runs once.
-fn follow(arguments: &Analyse, program: &Program, rows: &Rows) -> Result<(Trace, u64)> {
-    let wanted = arguments.periods.unwrap_or(rows.len() as u64);
-    let mut emulator = Emulator::new(program)?;
-    let set = |emulator: &mut Emulator, period: u64| -> Result<()> {
-        for &(register, bits) in rows.get(period.saturating_sub(1) as usize).into_iter().flatten() {
-            emulator.set_input_bits(register, bits)?;
-        }
-        emulator.set_cycle_limit(emulator.now() + crate::run::PERIOD_LIMIT);
-        Ok(())
-    };
-    set(&mut emulator, 0)?;
-    let mut trace = takt_analysis::trace(&mut emulator)?;
-    let mut period = 0;
-    while period < wanted && !matches!(emulator.status(), Status::Halted { .. }) {
-        period += 1;
-        set(&mut emulator, period)?;
-        let which = || format!("period {period}");
-        if period < wanted {
-            emulator.run_period(&[]).with_context(which)?;
-        } else {
-            trace = takt_analysis::trace(&mut emulator).with_context(which)?;
-        }
-    }
-    if period < wanted && (arguments.periods.is_some() || period > 0) {
-        bail!("the program halts before period {wanted}; --periods {period} looks at the last");
-    }
-    Ok((trace, period))
-}
-
-/// What a faster unit would bring: to the program as it is, and assembled for a machine that has it.
-struct Faster {
-    what: WhatIf,
-    reassembled: Option<Reassembled>,
-}
-
-/// The program assembled for a machine with a faster unit.
-struct Reassembled {
-    cycles: Cycle,
-    /// What no schedule of its blocks can be shorter than.
-    least: Cycle,
-}
-
-fn faster(arguments: &Analyse, load: &Load, program: &Program, trace: &Trace, rows: &Rows) -> Vec<Faster> {
-    // Standard input has been read; an image has no source.
-    let source = Some(&arguments.file).filter(|file| !files::is_dash(file));
-    let source = source.and_then(|file| Load::source(file).ok());
-    let reassembled = |what: &WhatIf| {
-        let machine = Some(quicker(program.machine, what.unit));
-        let assembled = Load { machine, ..load.clone() }.assemble(&arguments.file, source.clone()?).ok()?;
-        let found = follow(arguments, &assembled.program, rows).ok()?.0;
-        let visits = |address| found.issues.iter().filter(|issue| issue.address == address).count() as Cycle;
-        let spare = |block: &BlockReport| Cycle::from(block.cycles.saturating_sub(block.bound.cycles()));
-        let spare: Cycle = assembled.blocks.iter().map(|block| visits(block.address) * spare(block)).sum();
-        Some(Reassembled { cycles: found.cycles, least: found.cycles.saturating_sub(spare) })
-    };
-    trace.what_if(program).into_iter().map(|what| Faster { reassembled: reassembled(&what), what }).collect()
-}
-
-/// A machine with one cycle less in a unit, or in the front end. It is never given back: there are as many as units.
-fn quicker(machine: &Machine, unit: Option<(SlotIndex, u8)>) -> &'static Machine {
-    let mut slots = machine.slots.to_vec();
-    let mut refill = machine.refill;
-    match unit {
-        Some((slot, unit)) => {
-            let slot = &mut slots[slot.index()];
-            let mut units = slot.units.to_vec();
-            let row = &mut units[usize::from(unit)];
-            row.latency -= 1;
-            row.interval = row.interval.saturating_sub(1).max(1);
-            slot.units = Box::leak(units.into());
-        }
-        None => refill -= 1,
-    }
-    Box::leak(Box::new(Machine { slots: Box::leak(slots.into()), refill, ..*machine }))
-}
-
-/// All that is known of the period.
-struct Analysis<'p> {
-    program: &'p Program,
-    name: String,
-    period: u64,
-    trace: Trace,
-    chain: Vec<Link>,
-    faster: Vec<Faster>,
-}
-
-impl Analysis<'_> {
-    fn unit(&self, unit: Option<(SlotIndex, u8)>) -> &'static str {
-        unit.map_or("front end", |(slot, unit)| self.program.machine.slot(slot).units[usize::from(unit)].name)
-    }
-
-    fn bundle(&self, issue: usize) -> Vec<Instruction> {
-        self.program.bundle(self.trace.issues[issue].address).and_then(Result::ok).unwrap_or_default()
-    }
-
-    /// Cycles are counted from the tick or from reset: the first is 1.
-    fn cycle(&self, issue: usize) -> Cycle {
-        let last = self.trace.issues.last().map_or(0, |issue| issue.cycle);
-        self.trace.issues[issue].cycle + self.trace.cycles - last
-    }
-
-    /// What a link of the chain goes through, and the register that it is about.
-    fn through(&self, link: &Link) -> (String, Option<String>) {
-        let machine = self.program.machine;
-        let text = match link.kind {
-            LinkKind::Result { register } => {
-                let bundle = self.bundle(link.from);
-                let mut writers = bundle.iter().zip(machine.slots);
-                let writer = writers.find(|(instruction, slot)| instruction.writes(slot) == Some(register));
-                let unit = writer.and_then(|(instruction, slot)| {
-                    Some(slot.units[slot.unit_for(instruction.op.row().function)?].name)
-                });
-                return (unit.unwrap_or("?").to_owned(), Some(self.program.register_text(register)));
-            }
-            LinkKind::Unit { slot, unit } => format!("{} busy", self.unit(Some((slot, unit)))),
-            LinkKind::Drain => "drain".to_owned(),
-            LinkKind::WritePort { slot } => {
-                format!("write port of bank {}", machine.slot(slot).bank.name)
-            }
-            LinkKind::FrontEnd => "front end".to_owned(),
-            LinkKind::Order => "order of issue".to_owned(),
-        };
-        (text, None)
-    }
-
-    fn link(&self, link: &Link) -> String {
-        match self.through(link) {
-            (unit, Some(register)) => format!("{register} through {unit}"),
-            (text, None) => text,
-        }
-    }
-
-    /// Cycles of the chain by what they go through.
-    fn chain_by_kind(&self) -> Vec<(String, Cycle)> {
-        let mut kinds: BTreeMap<String, Cycle> = BTreeMap::new();
-        for link in &self.chain {
-            *kinds.entry(self.through(link).0).or_default() += link.cycles;
-        }
-        let mut kinds: Vec<_> = kinds.into_iter().collect();
-        kinds.sort_by_key(|(_, cycles)| Reverse(*cycles));
-        kinds
-    }
-
-    /// Bundles and stalled cycles by source line.
-    fn lines(&self) -> BTreeMap<(u32, u32), (u64, Cycle)> {
-        let mut lines: BTreeMap<(u32, u32), (u64, Cycle)> = BTreeMap::new();
-        for issue in &self.trace.issues {
-            let Some(location) = self.program.location(issue.address) else { continue };
-            let line = lines.entry((location.file, location.line)).or_default();
-            line.0 += 1;
-            line.1 += issue.stalls.iter().map(|(_, cycles)| Cycle::from(*cycles)).sum::<Cycle>();
-        }
-        lines
-    }
-
-    /// Operations that each slot issued.
-    fn slots(&self) -> Vec<(&'static str, u64)> {
-        let mut counts: Vec<_> = self.program.machine.slots.iter().map(|slot| (slot.name, 0)).collect();
-        for issue in 0..self.trace.issues.len() {
-            for (count, instruction) in counts.iter_mut().zip(&self.bundle(issue)) {
-                count.1 += u64::from(instruction.op.row().function != Function::Idle);
-            }
-        }
-        counts
-    }
-
-    fn operation_json(
-        &self,
-        address: BundleAddress,
-        s: SlotIndex,
-        instruction: &Instruction,
-    ) -> Option<Value> {
-        let (program, slot) = (self.program, self.program.machine.slot(s));
-        let function = instruction.op.row().function;
-        let unit = &slot.units[slot.unit_for(function).filter(|_| function != Function::Idle)?];
-        let target = |address: BundleAddress| match program.nearest_label(address) {
-            Some((label, 0)) => label.to_owned(),
-            _ => address.to_string(),
-        };
-        Some(json!({
-            "slot": slot.name,
-            "unit": unit.name,
-            "text": instruction.text_with(program.machine, s, |register| program.register_text(register), target),
-            "place": program.operation_place(address, s),
-            "latency": instruction.writes(slot).map(|_| unit.latency),
-        }))
-    }
-
-    fn json(&self) -> Value {
-        let program = self.program;
-        let critical: BTreeSet<usize> = self.chain.iter().flat_map(|link| [link.from, link.to]).collect();
-        let stall = |(cause, cycles): &(Cause, u32)| {
-            let producer = match *cause {
-                Cause::Operand { producer, .. } | Cause::Destination { producer, .. } => Some(producer),
-                Cause::Branch { from } => Some(from),
-                _ => None,
-            };
-            json!({
-                "cause": cause.name(),
-                "cycles": cycles,
-                "text": program.cause_text(*cause),
-                "producer": producer,
-                "producer_place": producer.and_then(|address| program.bundle_place(address)),
-            })
-        };
-        let bundle = |(i, issue): (usize, &Issued)| {
-            let operations = self.bundle(i);
-            let operations = SlotIndex::all().zip(&operations);
-            json!({
-                "address": issue.address,
-                "cycle": self.cycle(i),
-                "place": program.bundle_place(issue.address),
-                "stalls": issue.stalls.iter().map(stall).collect::<Vec<_>>(),
-                "critical": critical.contains(&i),
-                "operations": operations
-                    .filter_map(|(s, instruction)| self.operation_json(issue.address, s, instruction))
-                    .collect::<Vec<_>>(),
-            })
-        };
-        let line = |(&(file, line), &(bundles, stalled)): (&(u32, u32), &(u64, Cycle))| {
-            let place = program.place_text(Location { file, line });
-            json!({ "place": place, "bundles": bundles, "stalled": stalled })
-        };
-        let link = |link: &Link| {
-            let (through, register) = self.through(link);
-            json!({
-                "from": link.from, "to": link.to, "cycles": link.cycles, "through": through, "register": register,
-            })
-        };
-        let faster = |faster: &Faster| {
-            let reassembled = faster.reassembled.as_ref();
-            json!({
-                "unit": self.unit(faster.what.unit),
-                "as_it_is": faster.what.cycles,
-                "reassembled": reassembled.map(|reassembled| reassembled.cycles),
-                "reassembled_least": reassembled.map(|reassembled| reassembled.least),
-                "stalls": gained(&faster.what).map(|(kind, more)| (kind.to_owned(), json!(more))).collect::<Value>(),
-            })
-        };
-        json!({
-            "program": self.name,
-            "machine": program.machine.name,
-            "period": self.period,
-            "cycles": self.trace.cycles,
-            "slots": self.slots().into_iter().collect::<BTreeMap<_, _>>(),
-            "bundles": self.trace.issues.iter().enumerate().map(bundle).collect::<Vec<_>>(),
-            "lines": self.lines().iter().map(line).collect::<Vec<_>>(),
-            "critical_path": self.chain.iter().map(link).collect::<Vec<_>>(),
-            "one_cycle_less": self.faster.iter().map(faster).collect::<Vec<_>>(),
-        })
-    }
-
-    fn text(&self, out: &mut Out) -> Result<()> {
-        let Analysis { program, trace, .. } = self;
-        let issues = &trace.issues;
-        let what =
-            if self.period == 0 { "what runs once".to_owned() } else { format!("period {}", self.period) };
-        let (machine, cycles) = (program.machine.name, trace.cycles);
-        writeln!(out, "{what} on {machine}: {cycles} cycles, {} bundles", issues.len())?;
-        let share = |count: u64| 100.0 * count as f64 / cycles.max(1) as f64;
-        let slots = self.slots().into_iter();
-        let slots: Vec<String> =
-            slots.map(|(name, count)| format!("{name} {count} ({:.0} %)", share(count))).collect();
-        writeln!(out, "operations by slot, and their share of the cycles: {}", slots.join(", "))?;
-
-        let mut stalls: Vec<(usize, Cause, u32)> = Vec::new();
-        for (i, issue) in issues.iter().enumerate() {
-            stalls.extend(issue.stalls.iter().map(|&(cause, cycles)| (i, cause, cycles)));
-        }
-        stalls.sort_by_key(|&(i, _, cycles)| (Reverse(cycles), i));
-        let stalled: u32 = stalls.iter().map(|(_, _, cycles)| cycles).sum();
-        writeln!(out, "\nstalls: {}, {stalled} cycles; the longest:", stalls.len())?;
-        for &(i, cause, cycles) in stalls.iter().take(SHOWN) {
-            let (at, what) = (program.bundle_text(issues[i].address), program.cause_text(cause));
-            writeln!(out, "  {cycles:>5}  before cycle {:<5} {at}: {what}", self.cycle(i))?;
-        }
-
-        let chain: Cycle = self.chain.iter().map(|link| link.cycles).sum();
-        writeln!(out, "\nthe chain that sets the time: {} links, {chain} cycles, through", self.chain.len())?;
-        for (kind, cycles) in self.chain_by_kind() {
-            writeln!(out, "  {cycles:>5}  {kind}")?;
-        }
-        let mut links: Vec<&Link> = self.chain.iter().filter(|link| link.cycles > 1).collect();
-        links.sort_by_key(|link| (Reverse(link.cycles), link.to));
-        links.truncate(SHOWN);
-        links.sort_by_key(|link| link.to);
-        writeln!(out, "its longest links:")?;
-        for link in links {
-            let (to, how) = (program.bundle_text(issues[link.to].address), self.link(link));
-            writeln!(out, "  {:>5}  to cycle {:<5} {to}: {how}", link.cycles, self.cycle(link.to))?;
-        }
-
-        self.faster_text(out)
-    }
-
-    /// What a faster unit would bring; where that is more cycles than today, why.
-    fn faster_text(&self, out: &mut Out) -> Result<()> {
-        let today = self.trace.cycles;
-        writeln!(out, "\none cycle less in      as it is      reassembled")?;
-        let gain = |new: Cycle| format!("{new} ({:+})", new.cast_signed() - today.cast_signed());
-        for Faster { what, reassembled } in &self.faster {
-            let reassembled =
-                reassembled.as_ref().map_or_else(|| "-".to_owned(), |reassembled| gain(reassembled.cycles));
-            writeln!(out, "  {:<16} {:>12} {reassembled:>16}", self.unit(what.unit), gain(what.cycles))?;
-        }
-        let worse: Vec<&WhatIf> =
-            self.faster.iter().map(|faster| &faster.what).filter(|what| what.cycles > today).collect();
-        if !worse.is_empty() {
-            writeln!(
-                out,
-                "more as it is: in bundles packed for today's latencies, sooner results meet others"
-            )?;
-        }
-        for what in worse {
-            let stalls: Vec<String> = gained(what).map(|(kind, more)| format!("{kind} {more:+}")).collect();
-            writeln!(out, "  {:<16} stalled cycles: {}", self.unit(what.unit), stalls.join(", "))?;
-        }
-        let worse = || self.faster.iter().filter_map(|faster| Some((faster, faster.reassembled.as_ref()?)));
-        let worse = || worse().filter(|(_, reassembled)| reassembled.cycles > today);
-        if worse().next().is_some() {
-            writeln!(
-                out,
-                "more when reassembled: the search ended with a longer schedule, which proves nothing"
-            )?;
-        }
-        for (faster, reassembled) in worse() {
-            writeln!(
-                out,
-                "  {:<16} none takes fewer than {}",
-                self.unit(faster.what.unit),
-                reassembled.least
-            )?;
-        }
-        Ok(())
-    }
-}
-
-/// The stalls that a faster unit would add or take away, by kind.
-fn gained(what: &WhatIf) -> impl Iterator<Item = (&'static str, i64)> {
-    Cause::KINDS.into_iter().zip(what.stalls).filter(|(_, more)| *more != 0)
 }

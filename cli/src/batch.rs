@@ -4,14 +4,14 @@ use crate::fault;
 use crate::files::{self, Out};
 use crate::load::Loaded;
 use crate::output::{self, Failure};
-use crate::ports::{self, Rows};
+use crate::ports;
 use crate::run::PERIOD_LIMIT;
 use anyhow::{Context, Result, bail};
 use serde_json::{Value, json};
 use std::io::Write;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
-use takt_emu::{Batch, PeriodError};
+use takt_emu::{Batch, PeriodError, Rows};
 use takt_isa::fp::Flags;
 
 /// Runs at most (about 9 kB each), and periods of all runs together.

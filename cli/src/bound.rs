@@ -1,10 +1,11 @@
 //! `takt bound`: the best and the worst that each section can take, from the program alone.
 
 use crate::files::{self, Out};
-use crate::load::Load;
+use crate::load::{self, Load};
 use crate::number::{self, Time};
 use crate::output::{self, Failure};
 use crate::select::{self, OptionalMachine, SourceArguments};
+use crate::system;
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use serde_json::{Value, json};
@@ -21,28 +22,29 @@ use takt_isa::timing::Cycle;
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Bound {
-    /// Source or image; `-` is standard input.
-    file: PathBuf,
+    /// Source or image, `-` being standard input; or a system, a `.toml` file.
+    pub(crate) file: PathBuf,
     #[command(flatten)]
-    machine: OptionalMachine,
+    pub(crate) machine: OptionalMachine,
     #[command(flatten)]
-    source: SourceArguments,
+    pub(crate) source: SourceArguments,
     /// Fail (status 1) unless every period ends before the next tick, this time after its own: `100us`, `0.1ms`, or a
     /// number of cycles.
     #[arg(long, value_name = "TIME", value_parser = number::time, allow_hyphen_values = true)]
-    deadline: Option<Time>,
+    pub(crate) deadline: Option<Time>,
     /// Clock in MHz, for a deadline in seconds and for cycles to time.
     #[arg(long, value_name = "MHZ", default_value_t = select::PAPER_CLOCK, value_parser = number::clock, allow_hyphen_values = true)]
-    clock: f64,
+    pub(crate) clock: f64,
     /// Print the result as JSON.
     #[arg(long)]
-    json: bool,
+    pub(crate) json: bool,
 }
 
 const EXAMPLES: &str = "\
 Examples:
   takt bound prog.s                                  best and worst of every section
-  takt bound prog.s --deadline 100us --clock 125MHz  for CI: status 1 if a period can take longer";
+  takt bound prog.s --deadline 100us --clock 125MHz  for CI: status 1 if a period can take longer
+  takt bound system.toml                             of each core, and from the host's inputs to outputs";
 
 /// The deadline against the worst period.
 struct Verdict {
@@ -59,6 +61,9 @@ impl Verdict {
 
 pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
     files::check(&[("FILE", &arguments.file)], &[])?;
+    if load::is_system(&arguments.file) {
+        return system::bound::run(arguments, color, out);
+    }
     let program =
         Load::new(arguments.machine.machine, color).with(&arguments.source).program(&arguments.file)?;
     let bounds = takt_analysis::bound(&program).map_err(|error| anyhow!("no bound: {error}"))?;
@@ -78,7 +83,8 @@ pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
     }
 }
 
-fn result_json(arguments: &Bound, program: &Program, bounds: &Bounds, verdict: Option<&Verdict>) -> Value {
+/// The sections' bounds, as JSON.
+pub(crate) fn sections_json(program: &Program, bounds: &Bounds) -> Value {
     let span = |span: Span| json!({ "best": span.best, "worst": span.worst });
     let section = |section: &SectionBounds| {
         let mut value = json!({
@@ -95,10 +101,14 @@ fn result_json(arguments: &Bound, program: &Program, bounds: &Bounds, verdict: O
         }
         value
     };
+    bounds.sections.iter().map(section).collect()
+}
+
+fn result_json(arguments: &Bound, program: &Program, bounds: &Bounds, verdict: Option<&Verdict>) -> Value {
     json!({
         "program": files::input_name(&arguments.file),
         "machine": program.machine.name,
-        "sections": bounds.sections.iter().map(section).collect::<Vec<_>>(),
+        "sections": sections_json(program, bounds),
         "deadline": verdict.map(|verdict| json!({
             "cycles": verdict.deadline,
             "clock_mhz": arguments.clock,
@@ -108,24 +118,17 @@ fn result_json(arguments: &Bound, program: &Program, bounds: &Bounds, verdict: O
     })
 }
 
-fn write_text(
-    arguments: &Bound,
-    program: &Program,
-    bounds: &Bounds,
-    verdict: Option<&Verdict>,
-    out: &mut Out,
-) -> Result<()> {
+/// The sections' bounds, as a table.
+pub(crate) fn write_sections(program: &Program, bounds: &Bounds, clock: f64, out: &mut Out) -> Result<()> {
     let text = |span: Span| match span.best == span.worst {
         true => span.worst.to_string(),
         false => format!("{} to {}", span.best, span.worst),
     };
-    let (clock, refill) = (arguments.clock, program.machine.refill);
-    let microseconds = |cycles: Cycle| format!("{:.3} µs", cycles as f64 / clock);
-    writeln!(out, "cycles on {}, whatever the inputs", program.machine.name)?;
+    let refill = program.machine.refill;
     let width = bounds.sections.iter().map(|section| section.name.len()).max().unwrap_or(0);
     for section in &bounds.sections {
         let place = section.location.map_or_else(String::new, |location| program.place_text(location));
-        let (name, time) = (&section.name, microseconds(section.cycles.worst));
+        let (name, time) = (&section.name, microseconds(section.cycles.worst, clock));
         writeln!(out, "  {name:<width$}  {:>12}  {time:>12}  {place}", text(section.cycles))?;
     }
     for section in bounds.sections.iter().filter(|section| !section.once) {
@@ -137,9 +140,27 @@ fn write_text(
             text(section.missed)
         )?;
     }
+    Ok(())
+}
+
+/// Cycles as a time.
+pub(crate) fn microseconds(cycles: Cycle, clock: f64) -> String {
+    format!("{:.3} µs", cycles as f64 / clock)
+}
+
+fn write_text(
+    arguments: &Bound,
+    program: &Program,
+    bounds: &Bounds,
+    verdict: Option<&Verdict>,
+    out: &mut Out,
+) -> Result<()> {
+    let clock = arguments.clock;
+    writeln!(out, "cycles on {}, whatever the inputs", program.machine.name)?;
+    write_sections(program, bounds, clock, out)?;
     if let Some(verdict) = verdict {
         let Verdict { deadline, worst } = *verdict;
-        let time = microseconds(deadline);
+        let time = microseconds(deadline, clock);
         if verdict.kept() {
             let spare = deadline - 1 - worst;
             writeln!(out, "deadline of {deadline} cycles ({time} at {clock} MHz): kept, {spare} to spare")?;

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_cosim::{Difference, Lockstep, LockstepError, Model, Simulation, cache_folder, random};
-use takt_emu::Fault;
+use takt_emu::{Fault, Row};
 use takt_isa::{MACHINES, Machine, Program};
 use takt_rtl::{Design, Library, export};
 
@@ -148,7 +148,7 @@ enum Stopped {
     Fault(Fault),
 }
 
-fn run_rows(program: &Program, rows: &[ports::Row], simulation: Simulation) -> Result<Ran, LockstepError> {
+fn run_rows(program: &Program, rows: &[Row], simulation: Simulation) -> Result<Ran, LockstepError> {
     let first = rows.first().map(Vec::as_slice).unwrap_or_default();
     let mut lockstep = Lockstep::new(program, simulation, first)?;
     let mut periods = 0;

@@ -103,6 +103,11 @@ pub(crate) struct Watch {
 }
 
 impl DenyArguments {
+    /// Whether anything is denied.
+    pub(crate) fn is_given(&self) -> bool {
+        !self.deny.is_empty()
+    }
+
     pub(crate) fn watch(&self) -> Watch {
         let denied = |what: &What| self.deny.iter().any(|words| words.0.contains(what));
         let findings = What::all().into_iter().filter(denied);

@@ -45,6 +45,11 @@ impl From<Assembled> for Loaded {
     }
 }
 
+/// Whether a file describes a system of several cores, and is no program: its name says so, for every command.
+pub(crate) fn is_system(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+}
+
 impl Load {
     /// With the scheduler as the source says.
     pub(crate) fn new(machine: impl Into<Option<&'static Machine>>, color: bool) -> Load {
@@ -68,9 +73,18 @@ impl Load {
         }
     }
 
+    /// What is in the file of a program.
+    fn bytes(path: &Path) -> Result<Vec<u8>> {
+        if is_system(path) {
+            let name = files::input_name(path);
+            bail!("{name} is a system, and one program is wanted; `takt run` and `takt bound` take systems");
+        }
+        files::read(path, IMAGE_BYTES)
+    }
+
     /// The text of a source.
     pub(crate) fn source(path: &Path) -> Result<Vec<u8>> {
-        let bytes = files::read(path, IMAGE_BYTES)?;
+        let bytes = Load::bytes(path)?;
         if image::is_image(&bytes) {
             bail!("{} is an image already; `takt disasm` turns it into source", files::input_name(path));
         }
@@ -84,7 +98,7 @@ impl Load {
 
     /// As [`Load::program`], with its source, if that is at hand.
     pub(crate) fn with_source(&self, path: &Path) -> Result<Loaded> {
-        let bytes = files::read(path, IMAGE_BYTES)?;
+        let bytes = Load::bytes(path)?;
         let name = files::input_name(path);
         let loaded = if image::is_image(&bytes) {
             let (program, debug) =

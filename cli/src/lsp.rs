@@ -47,6 +47,7 @@ pub(crate) fn run(arguments: &Lsp) -> Result<()> {
         levels: arguments.source.warnings.iter().copied().collect(),
         folders: arguments.source.folders.clone(),
         library: takt_programs::LIBRARY,
+        beside: &[],
         library_folder: library_folder(),
         deadline: arguments.deadline.as_ref().map(|deadline| deadline.cycles(arguments.clock)),
     };

@@ -2,10 +2,12 @@
 //! terminal.
 
 mod account;
+mod accuracy;
 mod analyse;
 mod arm;
 mod asm;
 mod batch;
+mod board;
 mod bound;
 mod completions;
 mod controller;
@@ -20,6 +22,7 @@ mod files;
 mod fmt;
 mod friction;
 mod isa;
+mod live;
 mod load;
 mod lsp;
 mod machines;
@@ -36,6 +39,7 @@ mod rtl;
 mod run;
 mod select;
 mod synthesis;
+mod system;
 mod trace;
 mod track;
 
@@ -80,11 +84,15 @@ enum Command {
     Debug(debug::Debug),
     Analyse(analyse::Analyse),
     Bound(bound::Bound),
+    Accuracy(accuracy::Accuracy),
     Eval(eval::Eval),
     Fmt(fmt::Fmt),
     Lsp(lsp::Lsp),
     Dap(dap::Dap),
     Rtl(rtl::Rtl),
+    Board(board::Boards),
+    Load(live::LoadBoard),
+    Live(live::Live),
     Cosim(cosim::Cosim),
     Isa(isa::Isa),
     Machines(machines::Machines),
@@ -103,11 +111,15 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Debug(debug) => debug::run(debug, color, out),
         Command::Analyse(analyse) => analyse::run(analyse, color, out),
         Command::Bound(bound) => bound::run(bound, color, out),
+        Command::Accuracy(accuracy) => accuracy::run(accuracy, color, out),
         Command::Eval(eval) => eval::run(eval, out),
         Command::Fmt(fmt) => fmt::run(fmt, out),
         Command::Lsp(lsp) => lsp::run(lsp),
         Command::Dap(dap) => dap::run(dap),
         Command::Rtl(rtl) => rtl::run(rtl, color, out),
+        Command::Board(board) => board::run(board, color, out),
+        Command::Load(load) => live::load(load, color, out),
+        Command::Live(live) => live::live(live, color, out),
         Command::Cosim(cosim) => cosim::run(cosim, color, out),
         Command::Isa(isa) => isa::run(isa, out),
         Command::Machines(machines) => machines::run(machines, out),

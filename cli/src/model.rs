@@ -10,7 +10,6 @@ use serde_json::{Value, json};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_asm::Assembled;
-use takt_isa::Machine;
 use takt_isa::timing::Cycle;
 use takt_model::functions::{Function, Options, What, derive};
 use takt_model::graph::{Count, Delays, Rewrites};
@@ -20,7 +19,7 @@ use takt_model::{instructions, write};
 /// Turn a robot's description, or expressions of CasADi or SymPy, into a program in equations.
 ///
 /// FILE is a robot in URDF, a table of Denavit-Hartenberg parameters (.csv), or a list of instructions (.json) that
-/// `takt_expressions.py` writes from CasADi functions and SymPy expressions. The operations that it takes are printed,
+/// the Python module `takt_expressions` writes from CasADi functions and SymPy expressions. The operations that it takes are printed,
 /// and the cycles on the machine beside the bound that no schedule can beat.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
@@ -130,8 +129,7 @@ fn gain(text: &str) -> Result<f64, String> {
 }
 
 fn angle(text: &str) -> Result<f64, String> {
-    /// Beyond this it would be another geometry.
-    const MOST: f64 = 0.01;
+    const MOST: f64 = urdf::MAX_SNAP;
     match text.parse::<f64>() {
         Ok(angle) if (0.0..=MOST).contains(&angle) => Ok(angle),
         Ok(_) => Err(format!("between 0 and {MOST} rad")),
@@ -165,7 +163,7 @@ pub(crate) fn run(arguments: &Model, color: bool, out: &mut Out) -> Result<()> {
     if !alone && !arguments.json {
         write_counts(&function, &count, out)?;
     }
-    fits(&function, machine)?;
+    write::fits(&function, machine)?;
     let name = arguments.output.clone().filter(|path| !files::is_dash(path));
     let name = name.unwrap_or_else(|| PathBuf::from("model.s"));
     let load = Load::new(machine, color);
@@ -226,21 +224,6 @@ fn function(arguments: &Model, delays: &Delays) -> Result<Function> {
     let robot = tree.robot(base, tip).map_err(|error| told(error.located(&text)))?;
     let options = Options { rewrites, delays: *delays, tip, kp: arguments.kp, kd: arguments.kd };
     derive(&robot, what, &options).map_err(told)
-}
-
-/// Whether the machine has the ports.
-fn fits(function: &Function, machine: &Machine) -> Result<()> {
-    let inputs = write::inputs_read(function).iter().filter(|read| **read).count();
-    let outputs = function.outputs.len() - write::constants(function).len();
-    let most = usize::from(machine.input_count());
-    if inputs > most {
-        bail!("it does not fit: it has {inputs} inputs, {} has {most} input ports", machine.name);
-    }
-    let most = usize::from(machine.outputs_per_bank);
-    if outputs > most {
-        bail!("it does not fit: it has {outputs} outputs, {} has {most} output ports", machine.name);
-    }
-    Ok(())
 }
 
 fn built(assembled: &Assembled) -> Result<Built> {

@@ -5,12 +5,13 @@ use crate::batch;
 use crate::deny::{Denials, DenyArguments, Watch};
 use crate::fault;
 use crate::files::{self, Out};
-use crate::load::Load;
+use crate::load::{self, Load};
 use crate::nan::NanWrites;
 use crate::number;
 use crate::output::{self, Failure};
 use crate::ports::{self, Inputs};
 use crate::select::{OptionalMachine, SourceArguments};
+use crate::system;
 use crate::trace::{Trace, TraceArguments};
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -30,7 +31,7 @@ use takt_emu::{Emulator, Stop};
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Run {
-    /// Source or image; `-` is standard input.
+    /// Source or image, `-` being standard input; or a system, a `.toml` file.
     file: PathBuf,
     #[command(flatten)]
     machine: OptionalMachine,
@@ -79,10 +80,10 @@ Examples:
   takt run prog.takt --inputs in.csv --outputs -  outputs and cycles of every period
   takt run prog.s --periods 3 --trace out.vcd     waveforms for GTKWave or Surfer
   takt run prog.s --inputs in.csv --deny all      for CI: status 3 if a flag is raised, …
-  takt run prog.s --batch runs --outputs out.csv  a run for each CSV in the folder `runs`";
+  takt run prog.s --batch runs --outputs out.csv  a run for each CSV in the folder `runs`
+  takt run system.toml --inputs in.csv --stats    several cores: a base tick for each row (docs/system.md)";
 
-/// Cycles in which a period ends, or nobody expects it to any more.
-pub(crate) const PERIOD_LIMIT: u64 = 1_000_000_000;
+pub(crate) use takt_analysis::follow::PERIOD_LIMIT;
 
 /// What the periods of a run came to.
 #[derive(Default)]
@@ -106,6 +107,9 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
         writes.push(("--json", Path::new("-")));
     }
     files::check(&reads, &writes)?;
+    if load::is_system(&arguments.file) {
+        return system::run::run(&arguments.of_system()?, color, out);
+    }
     let has_periods = arguments.inputs.is_some() || arguments.periods.is_some() || batch.is_some();
     if arguments.outputs.is_some() && !has_periods {
         return Err(Failure::Usage(
@@ -159,6 +163,35 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
         output::message(&String::from_utf8_lossy(&text));
     }
     ran.denials.verdict()
+}
+
+impl Run {
+    /// What `takt run` of a system takes of it.
+    fn of_system(&self) -> Result<system::run::Arguments<'_>> {
+        let Run { file, source, inputs, outputs, periods, max_cycles, stats, json, .. } = self;
+        let given = [
+            ("--machine", self.machine.machine.is_some(), "the system's file names each core's"),
+            ("--tick", self.tick.is_some(), "the system's file has it"),
+            ("--batch", self.batch.is_some(), "a system runs once"),
+            ("--trace", self.trace.given().is_some(), "a system has no trace"),
+            ("--deny", self.deny.is_given(), "a system's run is not watched"),
+        ];
+        if let Some((option, _, why)) = given.into_iter().find(|(_, given, _)| *given) {
+            return Err(Failure::Usage(format!("{option} with a system: {why}")).into());
+        }
+        let (inputs, outputs) = (inputs.as_deref(), outputs.as_deref());
+        let (periods, max_cycles) = (*periods, *max_cycles);
+        Ok(system::run::Arguments {
+            file,
+            source,
+            inputs,
+            outputs,
+            periods,
+            max_cycles,
+            stats: *stats,
+            json: *json,
+        })
+    }
 }
 
 /// Who looks on while the program runs.

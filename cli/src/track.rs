@@ -19,7 +19,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::io::Write;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
-use takt_emu::{Emulator, PeriodReport};
+use takt_emu::{Emulator, PeriodReport, Rows};
 use takt_isa::Program;
 use takt_programs::accuracy::Accuracy;
 use takt_programs::hybrid::closed_loop::{ClosedLoop, Record, TrackingError};
@@ -283,7 +283,7 @@ pub(crate) struct ClosedLoopArguments {
 /// What a program was given in a closed loop, and where to look.
 pub(crate) struct Recording {
     pub(crate) loaded: Loaded,
-    pub(crate) inputs: ports::Rows,
+    pub(crate) inputs: Rows,
     pub(crate) tick: Option<NonZeroU64>,
     /// The period that is worth a look.
     pub(crate) period: u64,

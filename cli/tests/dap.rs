@@ -332,4 +332,15 @@ fn a_client_that_is_not_ours_works_with_it() {
     assert_eq!(stop("reverse"), ("function breakpoint", 12));
     assert_eq!(found["count"], "2");
     assert_eq!(found["terminated"], "terminated");
+    assert_eq!((stop("cycle").0, &found["atCycle"]), ("goto", &json!("9")));
+    assert!(found["noCycle"].as_str().unwrap().contains("`cycle` is a whole number"), "{found:#}");
+    assert_eq!(stop("beginning").0, "entry");
+    assert_eq!(found["filters"], json!(["invalid", "overflow", "missed", "nan"]));
+    assert_eq!((&found["gone"], &found["period"]), (&json!("goto"), &json!("3")));
+    for value in found["hex"].as_array().unwrap() {
+        assert!(value.as_str().unwrap().starts_with("0x"), "{found:#}");
+    }
+    assert_eq!(found["ulp"]["name"], "1 ulp");
+    assert_eq!((&found["port"], &found["another"]), (&json!("data breakpoint"), &json!(true)));
+    assert_eq!(found["nan"], true);
 }

@@ -23,7 +23,10 @@ impl Session {
         }
         let mut client = Client::start(&folder, "lsp");
         let root = format!("file://{}", folder.path().display());
-        let capabilities = json!({ "workspace": { "inlayHint": { "refreshSupport": true } } });
+        let capabilities = json!({
+            "workspace": { "inlayHint": { "refreshSupport": true } },
+            "experimental": { "takt/counted": true },
+        });
         let answer = client.ask(
             "initialize",
             json!({ "capabilities": capabilities, "workspaceFolders": [{ "uri": root, "name": "test" }] }),
@@ -386,11 +389,62 @@ fn cycles_stand_beside_the_lines() {
     assert!(title.starts_with(&format!("period: {} cycles, bound ", cycles["worst"])), "{title}");
     assert_eq!(lenses[0]["range"]["start"]["line"], 5);
 
-    // Two lines more, above; what is counted moves with its line until it is counted anew.
+    // Two lines more, above; what is counted moves with its line until it is counted again.
     session.edit("main.s", MAIN, ".schedule on\n", "\n\n.schedule on\n");
     let after = lines(&session.ask("textDocument/inlayHint", params));
     let moved: Vec<_> = before.iter().map(|(line, text)| (line + 2, text.clone())).collect();
     assert_eq!(after, moved);
+    session.end();
+}
+
+/// The view of the pipeline: the cycles of the inlay hints, and lines that follow what is written.
+#[test]
+fn the_picture_has_each_operation_at_its_line() {
+    let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
+    session.open("main.s", MAIN);
+    let told = session.client.wait(|message| message["method"] == "takt/counted");
+    assert_eq!(told["params"]["uri"], session.uri("main.s"));
+    let params = json!({ "textDocument": { "uri": session.uri("main.s") } });
+    let picture = session.ask("takt/pipeline", params.clone());
+    let trace = session.folder.line("analyse main.s --json").stdout;
+    let trace: Value = serde_json::from_str(&trace).unwrap();
+    let of_period = |bundle: &&Value| bundle["from"] == "period";
+    let bundles = picture["bundles"].as_array().unwrap();
+    // What stands in the same straight line issues as it ran, from its first bundle on.
+    let ran = trace["bundles"].as_array().unwrap();
+    let first = ran[0]["cycle"].as_u64().unwrap();
+    let mut compared = 0;
+    for (bundle, ran) in bundles.iter().filter(of_period).zip(ran) {
+        assert_eq!(bundle["address"], ran["address"]);
+        assert_eq!(bundle["cycle"].as_u64().unwrap() - 1, ran["cycle"].as_u64().unwrap() - first, "{bundle}");
+        for (operation, ran) in
+            bundle["operations"].as_array().unwrap().iter().zip(ran["operations"].as_array().unwrap())
+        {
+            for part in ["slot", "unit", "text", "latency"] {
+                assert_eq!(operation[part], ran[part], "{part}");
+            }
+            let file = operation["file"].as_u64().unwrap() as usize;
+            let uri = picture["files"][file].as_str().unwrap();
+            let place =
+                format!("{}:{}", uri.rsplit('/').next().unwrap(), operation["line"].as_u64().unwrap() + 1);
+            assert_eq!(place, ran["place"].as_str().unwrap());
+            compared += 1;
+        }
+    }
+    assert!(compared > 3, "{picture:#}");
+    session.edit("main.s", MAIN, ".schedule on\n", "\n\n.schedule on\n");
+    let moved = session.ask("takt/pipeline", params);
+    let line = |picture: &Value| {
+        let all = picture["bundles"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .flat_map(|bundle| bundle["operations"].as_array().unwrap());
+        let here = session.uri("main.s");
+        let lines = all.filter(|one| picture["files"][one["file"].as_u64().unwrap() as usize] == *here);
+        lines.map(|one| one["line"].as_u64().unwrap()).collect::<Vec<_>>()
+    };
+    assert_eq!(line(&moved), line(&picture).iter().map(|line| line + 2).collect::<Vec<_>>());
     session.end();
 }
 

@@ -41,7 +41,7 @@ const COMMON: &[Fault] = &[
     ("takt_source", "advance ? r_is_next : i_is_next", "r_is_next"),
     ("takt_source", "~advance & ~i_taken & ~i_is_next", "~advance"),
     ("takt_source", "~next_fresh & ~next_input", "1'b0"),
-    ("takt_bank", "show ? read : 32'd0", "read"),
+    ("takt_source", "copy[32*k +: 32] & {32{shown[k]}}", "copy[32*k +: 32]"),
     // A bundle at fault.
     ("takt_in_flight", "above[j+1] & ~((above_fresh[j+1] | above_recent[j+1]) & cancel)", "above[j+1]"),
     // The unit's interval.
@@ -69,6 +69,7 @@ const OF_T3: &[Fault] = &[
     ("takt_arccosine", "negative_19 ? HALF_TURN - shifted : shifted", "shifted"),
     ("takt_hazard", "(|r_at2) | r_on_issue_early", "|r_at2"),
     ("takt_hazard", "m_at2 | (m_on_issue & i_early)", "m_at2"),
+    ("takt_program", "{48-LOW{legal}}", "{48-LOW{1'b1}}"),
 ];
 
 /// Likewise of t1.
@@ -98,7 +99,8 @@ fn generated_for_t3(plan: &Plan) -> Vec<MadeFault> {
             (mul.illegal(Stage::Decode) | net::D_OUTSIDE).to_string(),
             mul.illegal(Stage::Decode).to_string(),
         ),
-        (plan.decoder(mul), decode::is_stray(Shape::Dab).to_string(), "1'b0".to_owned()),
+        // Of two operands, what is stray does not reach the decoder: `takt_program`.
+        (plan.decoder(mul), decode::is_stray(Shape::Da).to_string(), "1'b0".to_owned()),
     ]
 }
 

@@ -579,19 +579,13 @@ fn parts(text: &str) -> Vec<&str> {
     parts
 }
 
-/// A computed value.
+/// A computed value, and what binary32 makes of it.
 fn number(value: Value) -> String {
-    match value {
-        Value::Int(value) => value.to_string(),
-        Value::Real(value) => {
-            let near = value as f32;
-            let exact = f64::from(near) == value;
-            let text = if exact { format!("{near:?}") } else { format!("{value:?}") };
-            if exact {
-                format!("{text}  {}", hex_float(near))
-            } else {
-                format!("{text}  (binary32: {near:?})")
-            }
-        }
+    let Value::Real(real) = value else { return value.to_string() };
+    let near = real as f32;
+    if f64::from(near) == real {
+        format!("{value}  {}", hex_float(near))
+    } else {
+        format!("{value}  (binary32: {near:?})")
     }
 }

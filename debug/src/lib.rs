@@ -3,6 +3,7 @@
 pub mod console;
 pub mod fault;
 mod info;
+pub mod inputs;
 pub mod panes;
 pub mod session;
 pub mod trace;

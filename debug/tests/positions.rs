@@ -3,7 +3,8 @@
 use std::num::NonZeroU64;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
-use takt_debug::session::{Options, Rows, Session, Stop, Test, Unit, Why};
+use takt_debug::session::{Options, Session, Stop, Test, Unit, Why};
+use takt_emu::Rows;
 use takt_emu::testing::{Options as ProgramOptions, Random, input_ports, random_program};
 use takt_emu::{Emulator, Event, PeriodError};
 use takt_isa::program::Location;

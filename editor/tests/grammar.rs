@@ -1,18 +1,23 @@
-//! The grammar that editors read is the one that the tables give.
+//! The grammars that editors read are the ones that the tables give.
 
 use std::path::Path;
+use takt_editor::{grammar, tree_sitter};
+
+fn is_as_generated(path: &str, generated: &str) {
+    let there = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../editors").join(path));
+    if there.unwrap_or_default() != generated {
+        let name = Path::new(path).file_name().expect("it is a file");
+        let fresh = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+        std::fs::write(&fresh, generated).expect("the folder is there");
+        panic!("editors/{path} is stale: `cargo xtask docs` rewrites it (as {})", fresh.display());
+    }
+}
 
 #[test]
-fn the_grammar_is_as_generated() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../editors/vscode/syntaxes/takt.tmLanguage.json");
-    let generated = takt_editor::grammar::textmate_text();
-    let there = std::fs::read_to_string(path).unwrap_or_default();
-    if there != generated {
-        let fresh = Path::new(env!("CARGO_TARGET_TMPDIR")).join("takt.tmLanguage.json");
-        std::fs::write(&fresh, &generated).expect("the folder is there");
-        panic!(
-            "editors/vscode/syntaxes/takt.tmLanguage.json is stale: `cargo xtask docs` writes it anew (as {})",
-            fresh.display()
-        );
-    }
+fn the_grammars_are_as_generated() {
+    is_as_generated("vscode/syntaxes/takt.tmLanguage.json", &grammar::textmate_text());
+    is_as_generated("tree-sitter-takt/src/grammar.json", &tree_sitter::grammar_text());
+    is_as_generated("tree-sitter-takt/queries/highlights.scm", &tree_sitter::highlights());
+    is_as_generated("helix/queries/takt/highlights.scm", &tree_sitter::helix_highlights());
+    is_as_generated("tree-sitter-takt/queries/folds.scm", &tree_sitter::folds());
 }

@@ -6,9 +6,24 @@ vim.api.nvim_create_autocmd({ 'BufRead', 'BufNewFile' }, {
   callback = function(event) vim.bo[event.buf].filetype = 'takt' end,
 })
 
+-- Colours and folds by tree-sitter, if its parser is installed (docs/editors.md).
+local function colour(buffer)
+  if #vim.api.nvim_get_runtime_file('parser/takt.so', false) == 0 then return end
+  if vim.treesitter.start then
+    vim.treesitter.start(buffer, 'takt')
+  else
+    -- Before 0.8.
+    vim.treesitter.highlighter.new(vim.treesitter.get_parser(buffer, 'takt'))
+  end
+  if vim.treesitter.foldexpr then
+    vim.wo.foldmethod, vim.wo.foldexpr, vim.wo.foldlevel = 'expr', 'v:lua.vim.treesitter.foldexpr()', 99
+  end
+end
+
 vim.api.nvim_create_autocmd('FileType', {
   pattern = 'takt',
   callback = function(event)
+    colour(event.buf)
     vim.bo[event.buf].commentstring = '; %s'
     local folder = vim.fn.fnamemodify(vim.api.nvim_buf_get_name(event.buf), ':p:h')
     local command = vim.list_extend({ 'takt', 'lsp' }, options)

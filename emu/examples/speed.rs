@@ -129,6 +129,7 @@ fn period() -> Program {
         outputs: Vec::new(),
         registers: Vec::new(),
         symbols: Vec::new(),
+        ranges: Vec::new(),
         loop_bounds: Vec::new(),
         parts: Vec::new(),
         latched: false,

@@ -1,6 +1,7 @@
 //! A program prepared for execution: every word decoded and checked once.
 
 use crate::fault::LoadError;
+use crate::machine::RegisterSet;
 use takt_isa::program::{IllegalWord, LoopBound};
 use takt_isa::spec::check::MAX_SLOTS;
 use takt_isa::timing::Bundle;
@@ -21,6 +22,8 @@ pub(crate) struct Operation {
     pub(crate) output: bool,
     /// Whether that port carries binary32, so that a NaN is to be reported.
     pub(crate) float: bool,
+    /// Whether somebody wants to know of every write to that port.
+    pub(crate) watched: bool,
 }
 
 impl Operation {
@@ -40,6 +43,7 @@ pub(crate) struct Decoded {
 }
 
 /// Every bundle of a program: executable, or the slot and the reason why not.
+#[derive(Clone)]
 pub(crate) struct Code {
     pub(crate) machine: &'static Machine,
     bundles: Vec<Result<Decoded, (SlotIndex, IllegalWord)>>,
@@ -74,12 +78,22 @@ impl Code {
                     constant: instruction.constant,
                     output,
                     float: output && ty.unwrap_or(row.result_type()) == Type::F,
+                    watched: false,
                 });
             }
             let (flow, timing) = (Flow::of(&instructions), Bundle::new(machine, &instructions));
             Ok(Decoded { operations: operations.into(), flow, timing, reach })
         });
         Ok(Code { machine, bundles: bundles.collect(), loops: program.loop_bounds.clone() })
+    }
+
+    /// Marks the operations that write these output ports.
+    pub(crate) fn watch(&mut self, registers: &RegisterSet) {
+        let operations = self.bundles.iter_mut().flatten().flat_map(|bundle| bundle.operations.iter_mut());
+        for operation in operations {
+            operation.watched =
+                operation.output && operation.dest.is_some_and(|register| registers.contains(register));
+        }
     }
 
     /// Bundles in the program.

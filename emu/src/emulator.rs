@@ -5,7 +5,7 @@ use crate::code::Code;
 use crate::event::{Event, PortWrite, Retire};
 use crate::fast::{Fast, Journal};
 use crate::fault::{Fault, FaultKind, LoadError};
-use crate::machine::State;
+use crate::machine::{RegisterSet, State};
 use crate::statistics::{Statistics, Tally};
 use crate::system::{Period, PeriodReport, Ticks};
 use std::collections::BTreeSet;
@@ -285,6 +285,22 @@ impl Emulator {
         }
     }
 
+    /// Keeps every write to these output ports, latched or not, until [`Emulator::take_port_writes`]. (Runs stay as fast as
+    /// they are; an observer, who hears of everything, slows them down.)
+    pub fn set_watched(&mut self, ports: impl IntoIterator<Item = Register>) {
+        let mut watched = RegisterSet::default();
+        ports.into_iter().for_each(|port| watched.insert(port));
+        Arc::make_mut(&mut self.code).watch(&watched);
+        self.drop_blocks();
+    }
+
+    /// The writes to watched output ports whose writeback was since this was last asked, by cycle.
+    pub fn take_port_writes(&mut self) -> Vec<PortWrite> {
+        let mut writes = std::mem::take(&mut self.state.port_writes);
+        writes.sort_by_key(|write| (write.cycle, write.slot));
+        writes
+    }
+
     /// Forgets the blocks, but not what they did.
     pub(crate) fn drop_blocks(&mut self) {
         self.list_recent();
@@ -337,6 +353,14 @@ impl Emulator {
     /// A fault; asked again, the same one.
     pub fn run_to_wait(&mut self) -> Result<Stop, Fault> {
         self.drive(Goal { wait: true, ..self.goal() }, &mut None)
+    }
+
+    /// Runs until a `wait` has issued, but no further than until `cycle` cycles have passed since reset.
+    ///
+    /// # Errors
+    /// A fault; asked again, the same one.
+    pub fn run_to_wait_until(&mut self, cycle: Cycle) -> Result<Stop, Fault> {
+        self.drive(Goal { until: cycle, wait: true, ..self.goal() }, &mut None)
     }
 
     /// Runs until the machine halts, or waits and no tick is going to come.
@@ -511,6 +535,11 @@ impl Emulator {
         let mut writes = std::mem::take(&mut self.state.nan_writes.kept);
         writes.sort_unstable();
         writes
+    }
+
+    /// The last period that ended since this was last asked, without its NaNs ([`Emulator::take_nan_writes`]).
+    pub fn take_period(&mut self) -> Option<PeriodReport> {
+        self.report.take()
     }
 
     /// Where the cycles went since reset.

@@ -107,8 +107,8 @@ pub(crate) fn issue(
         };
         match operation.dest {
             Some(register) => {
-                let (output, float) = (operation.output, operation.float);
-                state.pending.push(Pending { retire, register, output, float });
+                let Operation { output, float, watched, .. } = *operation;
+                state.pending.push(Pending { retire, register, output, float, watched });
             }
             None => retired(retire),
         }

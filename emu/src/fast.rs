@@ -32,6 +32,8 @@ pub(crate) struct Journal {
     counted_nans: u64,
     stored: Vec<(u32, u32)>,
     nans: Vec<(u32, u32)>,
+    writes: Vec<(u32, u32)>,
+    logged: usize,
     late: Vec<(Flags, Option<u32>)>,
 }
 
@@ -40,11 +42,13 @@ impl Journal {
     fn begin(&mut self, state: &State, block: &Block, last: Cycle) {
         self.stored.clear();
         self.nans.clear();
+        self.writes.clear();
         self.late.clear();
         self.late.resize(block.late.len(), (Flags::NONE, None));
         let Some(restore) = &block.restore else { return };
         self.pending.clone_from(&state.pending);
         (self.written, self.flags) = (state.written, state.flags);
+        self.logged = state.port_writes.len();
         (self.kept_nans, self.counted_nans) = (state.nan_writes.kept.len(), state.nan_writes.count);
         self.registers.clear();
         let registers = state.due(last).chain(restore.iter().copied());
@@ -64,6 +68,7 @@ impl Journal {
         (state.written, state.flags) = (self.written, self.flags);
         state.nan_writes.kept.truncate(self.kept_nans);
         state.nan_writes.count = self.counted_nans;
+        state.port_writes.truncate(self.logged);
     }
 }
 
@@ -169,6 +174,7 @@ fn run(block: &Block, state: &mut State, journal: &mut Journal, entered: Cycle) 
         late: &mut journal.late,
         stored: &mut journal.stored,
         nans: &mut journal.nans,
+        writes: &mut journal.writes,
     };
     let (head, tail) = block.micros.split_at(block.split);
     let ran = micro::run::<false>(head, &mut context).and_then(|()| micro::run::<true>(tail, &mut context));
@@ -185,5 +191,7 @@ fn run(block: &Block, state: &mut State, journal: &mut Journal, entered: Cycle) 
     for &(check, bits) in &journal.nans {
         state.nan_writes.record(block.checks[check as usize].write(entered, bits));
     }
+    let writes = journal.writes.iter();
+    state.port_writes.extend(writes.map(|&(check, bits)| block.checks[check as usize].write(entered, bits)));
     true
 }

@@ -47,4 +47,4 @@ pub use event::{Event, PortWrite, Retire};
 pub use fault::{Fault, FaultKind, LoadError, ShownFault};
 pub use machine::MAX_NAN_WRITES;
 pub use statistics::Statistics;
-pub use system::{Number, PeriodError, PeriodReport, PortError};
+pub use system::{Number, PeriodError, PeriodReport, PortError, Row, Rows};

@@ -93,6 +93,8 @@ pub(crate) struct Pending {
     pub(crate) output: bool,
     /// Whether a NaN is to be reported.
     pub(crate) float: bool,
+    /// Whether the write is kept until somebody takes it.
+    pub(crate) watched: bool,
 }
 
 /// NaNs that went out.
@@ -122,6 +124,8 @@ pub(crate) struct State {
     /// In the order of issue.
     pub(crate) pending: Vec<Pending>,
     pub(crate) nan_writes: NanWrites,
+    /// Writes to watched ports since somebody took them.
+    pub(crate) port_writes: Vec<PortWrite>,
     /// What is beside the registers if ports are latched.
     pub(crate) latches: Option<Box<Latches>>,
 }
@@ -177,6 +181,7 @@ impl State {
             flags: Flags::NONE,
             pending: Vec::new(),
             nan_writes: NanWrites::default(),
+            port_writes: Vec::new(),
             latches: None,
         };
         state.written.insert(Register::ZERO);
@@ -255,6 +260,9 @@ impl State {
         let write = PortWrite { cycle, slot, address, register: pending.register, value, nan };
         if nan {
             self.nan_writes.record(write);
+        }
+        if pending.watched {
+            self.port_writes.push(write);
         }
         Some(write)
     }

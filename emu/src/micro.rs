@@ -32,6 +32,8 @@ pub(crate) enum Kind {
     ClearFlags,
     /// Looks whether register `a` holds a NaN, for check number `constant`.
     Check,
+    /// Keeps what register `a` holds, for check number `constant`.
+    Watch,
 }
 
 /// A pre-decoded operation.
@@ -79,11 +81,17 @@ impl Late {
             flags: value.flags,
             memory,
         };
-        Pending { retire, register, output: operation.output, float: operation.float }
+        Pending {
+            retire,
+            register,
+            output: operation.output,
+            float: operation.float,
+            watched: operation.watched,
+        }
     }
 }
 
-/// A write to an output port that carries binary32.
+/// A write to an output port that carries binary32, or is watched.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Check {
     slot: SlotIndex,
@@ -91,13 +99,16 @@ pub(crate) struct Check {
     address: BundleAddress,
     /// Cycle of its writeback, from the block's entry.
     offset: u32,
+    float: bool,
+    watched: bool,
 }
 
 impl Check {
     /// The event, for a block entered in cycle `entered`.
     pub(crate) fn write(&self, entered: Cycle, value: u32) -> PortWrite {
-        let Check { slot, register, address, offset } = *self;
-        PortWrite { cycle: entered + Cycle::from(offset), slot, address, register, value, nan: true }
+        let Check { slot, register, address, offset, float, .. } = *self;
+        let nan = float && is_nan(value);
+        PortWrite { cycle: entered + Cycle::from(offset), slot, address, register, value, nan }
     }
 }
 
@@ -144,9 +155,10 @@ impl Emitter {
                 }
                 Some(register) => {
                     self.writes.insert(register);
-                    if operation.float {
+                    let Operation { slot, float, watched, .. } = *operation;
+                    if float || watched {
                         let offset = offset + operation.latency;
-                        self.checks.push(Check { slot: operation.slot, register, address, offset });
+                        self.checks.push(Check { slot, register, address, offset, float, watched });
                     }
                     register.into()
                 }
@@ -171,9 +183,12 @@ impl Emitter {
         }
         self.order(bundle);
         for (i, check) in self.checks.iter().enumerate().skip(first_check) {
-            let (kind, a, constant) = (Kind::Check, check.register.into(), i as u32);
-            let zero = Register::ZERO.into();
-            self.micros.push(Micro { kind, op: Op::nop, dest: zero, a, b: zero, c: zero, constant });
+            let (a, constant, zero) = (check.register.into(), i as u32, Register::ZERO.into());
+            for (kind, wanted) in [(Kind::Check, check.float), (Kind::Watch, check.watched)] {
+                if wanted {
+                    self.micros.push(Micro { kind, op: Op::nop, dest: zero, a, b: zero, c: zero, constant });
+                }
+            }
         }
     }
 
@@ -218,6 +233,8 @@ pub(crate) struct Context<'a> {
     pub(crate) stored: &'a mut Vec<(u32, u32)>,
     /// Checks that found a NaN, with its bits.
     pub(crate) nans: &'a mut Vec<(u32, u32)>,
+    /// Checks of ports that are watched, with the bits written.
+    pub(crate) writes: &'a mut Vec<(u32, u32)>,
 }
 
 /// A load or store left the memory: the block has not run, and what it changed is to be restored.
@@ -256,6 +273,10 @@ pub(crate) fn run<const TAIL: bool>(micros: &[Micro], context: &mut Context<'_>)
                 if is_nan(a) {
                     context.nans.push((micro.constant, a));
                 }
+                continue;
+            }
+            Kind::Watch => {
+                context.writes.push((micro.constant, a));
                 continue;
             }
         };

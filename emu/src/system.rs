@@ -9,6 +9,11 @@ use takt_isa::program::Port;
 use takt_isa::timing::{self, Cycle};
 use takt_isa::{BundleAddress, Program, Register, Type};
 
+/// Inputs of a period: registers of input ports, and their bits.
+pub type Row = Vec<(Register, u32)>;
+/// Those of one period after the other.
+pub type Rows = Vec<Row>;
+
 /// Ticks to come and ticks that came.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Ticks {

@@ -215,6 +215,7 @@ impl Generator {
             registers: Vec::new(),
             symbols: Vec::new(),
             loop_bounds: self.loop_bounds,
+            ranges: Vec::new(),
             parts: Vec::new(),
             latched: false,
             sections: vec![section("once", 0, period), section("period", period, end)],

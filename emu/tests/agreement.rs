@@ -45,6 +45,7 @@ fn assert_same(seed: u64, fast: &mut Emulator, step: &mut Emulator) {
     assert_eq!(fast.deadline_missed(), step.deadline_missed(), "{}", context("missed"));
     let writes = fast.take_nan_writes();
     assert_eq!(writes, step.take_nan_writes(), "{}", context("NaN writes"));
+    assert_eq!(fast.take_port_writes(), step.take_port_writes(), "{}", context("watched ports"));
 }
 
 /// The two emulators of a program, with random inputs. One input in some programs stays unset.
@@ -55,6 +56,9 @@ fn pair(program: &Program, random: &mut Random, wild: bool) -> [Emulator; 2] {
             fast.set_input_bits(input, random.word()).unwrap();
         }
     }
+    // Some output ports are watched.
+    let outputs = program.outputs.iter().map(|port| port.register);
+    fast.set_watched(outputs.filter(|_| random.once_in(2)).collect::<Vec<_>>());
     let mut step = fast.clone();
     step.set_blocks(false);
     [fast, step]

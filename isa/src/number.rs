@@ -78,7 +78,7 @@ below! {
 }
 
 below! {
-    /// An issue slot, by its place in a bundle, from 0. ([`crate::Machine::slot`] wants one that the machine has.)
+    /// An issue slot, by its place in a bundle, from 0. ([`crate::Machine::slot`] takes one that the machine has.)
     SlotIndex(u8) 8
 }
 

@@ -31,6 +31,8 @@ pub struct Program {
     pub sections: Vec<Section>,
     /// How often loops may turn, by ascending address.
     pub loop_bounds: Vec<LoopBound>,
+    /// Between which values inputs and states lie when a period begins, by ascending register.
+    pub ranges: Vec<Range>,
     /// Source files, as the source names them.
     pub files: Vec<String>,
     /// Where each operation comes from, parallel to `code`; `None` for filler.
@@ -102,6 +104,41 @@ pub struct LoopBound {
     pub address: BundleAddress,
     /// Turns of one run at most; at least 1.
     pub most: u32,
+}
+
+/// Between which values a register lies whenever a period begins: a promise of the source, on which static bounds of errors rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Range {
+    /// The register: an input port or one that outlives the period.
+    pub register: Register,
+    /// How the ends are read: binary32, or a signed integer.
+    pub ty: Type,
+    /// The least value's bits.
+    pub low: u32,
+    /// The largest value's bits.
+    pub high: u32,
+}
+
+impl Range {
+    /// The least and the largest value as numbers.
+    pub fn ends(&self) -> (f64, f64) {
+        let value = |bits: u32| match self.ty {
+            Type::F => f64::from(f32::from_bits(bits)),
+            Type::I | Type::B => f64::from(bits.cast_signed()),
+        };
+        (value(self.low), value(self.high))
+    }
+
+    /// Why it is none; `None` if it is one.
+    pub fn mistake(&self) -> Option<&'static str> {
+        let (low, high) = self.ends();
+        match () {
+            () if self.ty == Type::B => Some("bits as such have no order"),
+            () if !low.is_finite() || !high.is_finite() => Some("its ends must be finite"),
+            () if low > high => Some("its least value is above its largest"),
+            () => None,
+        }
+    }
 }
 
 /// A place in a source.

@@ -23,6 +23,15 @@ use crate::spec::units::MAX_LATENCY;
 /// A cycle's number; cycle 0 is the first after reset.
 pub type Cycle = u64;
 
+/// Cycles between a value on a core's input pins and the first cycle in which a bundle that issues reads it.
+pub const INPUT_DELAY: Cycle = 3;
+/// The same for latched ports, between a value on the input pins and the first tick that takes it.
+pub const LATCHED_INPUT_DELAY: Cycle = 2;
+/// Cycles between the tick on its pin and the cycle in which it is seen.
+pub const TICK_DELAY: Cycle = 1;
+/// Cycles between the issue of a `wait` and the cycle in which the pins tell of it.
+pub const ENDED_DELAY: Cycle = 2;
+
 /// Why a cycle issued nothing.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
 pub enum Cause {

@@ -1,8 +1,8 @@
-//! Other tools' expressions: a list of scalar instructions as JSON, which `model/python/takt_expressions.py` writes from
+//! Other tools' expressions: a list of scalar instructions as JSON, which the Python module `takt_expressions` writes from
 //! CasADi functions and SymPy expressions. docs/model.md has the format.
 
 use crate::Error;
-use crate::functions::{Function, Port};
+use crate::functions::{Array, Function, Port};
 use crate::graph::{Binary, Expr, Graph, Id, Rewrites, Unary};
 use serde::Deserialize;
 use std::collections::HashMap;
@@ -58,14 +58,31 @@ struct Step {
 }
 
 impl Argument {
+    /// Row and column of each scalar.
+    fn places(&self) -> Vec<[usize; 2]> {
+        let dense = || (0..self.columns).flat_map(|j| (0..self.rows).map(move |i| [i, j])).collect();
+        self.nonzeros.clone().unwrap_or_else(dense)
+    }
+
+    /// The array that it is, whose ports begin with that number. (Its ports are known to lie within it.)
+    fn array(&self, first: usize) -> Array {
+        let shape = match (self.rows, self.columns) {
+            (1, 1) => Vec::new(),
+            (count, 1) | (1, count) => vec![count],
+            (rows, columns) => vec![rows, columns],
+        };
+        let mut elements = vec![None; self.rows * self.columns];
+        for (number, [i, j]) in self.places().into_iter().enumerate() {
+            elements[i * self.columns + j] = Some(first + number);
+        }
+        Array { name: self.name.clone(), shape, elements }
+    }
+
     fn ports(&self) -> Result<Vec<Port>, Error> {
         let wrong = |text: String| Error::plain(format!("`{}`: {text}", self.name));
         if self.rows.saturating_mul(self.columns) > MAX_PORTS {
             return Err(wrong(format!("{} by {} is more than {MAX_PORTS} scalars", self.rows, self.columns)));
         }
-        let dense =
-            || (0..self.columns).flat_map(|j| (0..self.rows).map(move |i| [i, j])).collect::<Vec<_>>();
-        let places = self.nonzeros.clone().unwrap_or_else(dense);
         let plain: String =
             self.name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
         let plain = if plain.starts_with(|c: char| c.is_ascii_digit()) || plain.is_empty() {
@@ -85,7 +102,7 @@ impl Argument {
             };
             Ok(Port { name, text })
         };
-        places.into_iter().map(port).collect()
+        self.places().into_iter().map(port).collect()
     }
 }
 
@@ -115,6 +132,7 @@ pub fn read(source: &str, rewrites: Rewrites) -> Result<Function, Error> {
         }
     }
     first.push(ports.len());
+    let starts = first.clone();
     let outputs = file.outputs.iter().map(Argument::ports).collect::<Result<Vec<_>, _>>()?;
     let graph = Graph::new(rewrites);
     let nodes = {
@@ -129,8 +147,11 @@ pub fn read(source: &str, rewrites: Rewrites) -> Result<Function, Error> {
         reader.outputs
     };
     let nothing = graph.constant(0.0).id();
+    let input_arrays = file.inputs.iter().zip(&starts).map(|(input, first)| input.array(*first)).collect();
+    let mut output_arrays = Vec::new();
     let mut named = Vec::new();
     for (i, ports) in outputs.into_iter().enumerate() {
+        output_arrays.push(file.outputs[i].array(named.len()));
         for (k, port) in ports.into_iter().enumerate() {
             // What a sparse function does not write is zero.
             named.push((port, nodes.get(&[i, k]).copied().unwrap_or(nothing)));
@@ -139,7 +160,15 @@ pub fn read(source: &str, rewrites: Rewrites) -> Result<Function, Error> {
     unique(ports.iter().chain(named.iter().map(|(port, _)| port)))?;
     let from = if file.source.is_empty() { String::new() } else { format!(", from {}", file.source) };
     let title = format!("{}{from}", file.name);
-    Ok(Function { title, notes: Vec::new(), inputs: ports, outputs: named, graph })
+    Ok(Function {
+        title,
+        notes: Vec::new(),
+        inputs: ports,
+        outputs: named,
+        input_arrays,
+        output_arrays,
+        graph,
+    })
 }
 
 fn unique<'a>(ports: impl Iterator<Item = &'a Port>) -> Result<(), Error> {

@@ -2,10 +2,12 @@
 //!
 //! Everything that depends on the language that is written stands here.
 
+use crate::Error;
 use crate::functions::{Function, Port};
 use crate::graph::{Binary, Graph, Id, Node, Unary};
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write;
+use takt_isa::Machine;
 
 /// Columns that a line should not go beyond, and the length from which an expression gets a name of its own.
 const WIDTH: usize = 110;
@@ -63,6 +65,26 @@ pub fn inputs_read(function: &Function) -> Vec<bool> {
     read
 }
 
+/// Whether a machine has the ports for a function.
+///
+/// # Errors
+/// If not, with the numbers.
+pub fn fits(function: &Function, machine: &Machine) -> Result<(), Error> {
+    let inputs = inputs_read(function).iter().filter(|read| **read).count();
+    let outputs = function.outputs.len() - constants(function).len();
+    let limits = [
+        (inputs, "input", usize::from(machine.input_count())),
+        (outputs, "output", usize::from(machine.outputs_per_bank)),
+    ];
+    match limits.into_iter().find(|(count, _, most)| count > most) {
+        Some((count, kind, most)) => Err(Error::plain(format!(
+            "it does not fit: it has {count} {kind}s, {} has {most} {kind} ports",
+            machine.name
+        ))),
+        None => Ok(()),
+    }
+}
+
 struct Writer<'a> {
     function: &'a Function,
     uses: Vec<u32>,
@@ -76,7 +98,7 @@ struct Writer<'a> {
     temporaries: usize,
 }
 
-/// The source of a function: a program that computes the outputs anew every period.
+/// The source of a function: a program that computes the outputs in every period.
 pub fn source(function: &Function) -> String {
     let nodes = function.nodes();
     let ports = function.inputs.iter().chain(function.outputs.iter().map(|(port, _)| port));
@@ -158,7 +180,7 @@ fn wrapped(names: &[String]) -> Vec<String> {
 
 /// An expression as it would be written, for messages; only the beginning of a long one.
 pub(crate) fn expression(graph: &Graph, inputs: &[Port], id: Id) -> String {
-    /// As deep and as long as one wants to read.
+    /// No deeper and longer than is readable.
     const DEPTH: usize = 6;
     const LENGTH: usize = 160;
     let text = Terms { graph, inputs, names: &HashMap::new(), depth: DEPTH }.operand(id).text;

@@ -118,7 +118,16 @@ fn written(rewrites: Rewrites, make: fn(Expr<'_>, Expr<'_>, Expr<'_>) -> Id) -> 
     let port = |name: &str| Port { name: name.to_owned(), text: String::new() };
     let inputs = vec![port("x"), port("y"), port("z")];
     let outputs = vec![(port("out"), id)];
-    let function = Function { title: String::new(), notes: Vec::new(), inputs, outputs, graph };
+    let (input_arrays, output_arrays) = (Vec::new(), Vec::new());
+    let function = Function {
+        title: String::new(),
+        notes: Vec::new(),
+        inputs,
+        outputs,
+        input_arrays,
+        output_arrays,
+        graph,
+    };
     let source = takt_model::write::source(&function.optimised(&Delays::of(&takt_isa::T3)));
     let lines = source.lines().filter_map(|line| line.trim().split_once(" = "));
     lines.map(|(name, value)| format!("{name} = {value}")).collect::<Vec<_>>().join("; ")

@@ -192,7 +192,7 @@ fn the_table_is_what_comes_out() {
             let line = line(case, what, &row);
             // But for the errors, which depend on the number of states.
             let fixed = line.rsplitn(4, '|').last().expect("columns");
-            assert!(table.contains(fixed), "docs/models.md has not: {line}\nTAKT_BLESS=1 writes it anew");
+            assert!(table.contains(fixed), "docs/models.md has not: {line}\nTAKT_BLESS=1 rewrites it");
             assert!(row.error < 1e-6, "{line}");
         }
     }

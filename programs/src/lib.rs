@@ -5,6 +5,7 @@
 //! - [`hybrid`] is the five-axis hybrid robot of the founding paper: kinematics, dynamics, the tracking
 //!   controller in binary64 and in native binary32, the plant, and the loop that joins them;
 //! - [`arm`] is the six-axis arm of the second founding paper: kinematics in binary64, and the measurement of its programs;
+//! - [`listings`] finds the assembler listings of documents;
 //! - [`accuracy`] measures binary32 results against binary64.
 //!
 //! Everything but the six-axis arm (mm, degrees) is in SI units (m, rad, s, kg, N, N·m), nothing here prints, and no input makes it panic.
@@ -13,6 +14,7 @@ pub mod accuracy;
 pub mod arm;
 pub mod gcode;
 pub mod hybrid;
+pub mod listings;
 pub mod path;
 pub mod real;
 pub mod trajectory;

@@ -1,8 +1,8 @@
 // takt_bank: one copy of a register bank; one port writes, one reads.
 //
 // Contract
-//   value holds in cycle t + 2 the word at read_index of cycle t, as writes of cycle t - 1 and before have left it, if show was
-//   high in t + 1, else 0: so copies of several banks need only be ORed. What is read in the very cycle in which it is written is undefined: takt_source does not use it. The second cycle is the block RAM's own
+//   value holds in cycle t + 2 the word at read_index of cycle t, as writes of cycle t - 1 and before have left it. What is read
+//   in the very cycle in which it is written is undefined: takt_source does not use it. The second cycle is the block RAM's own
 //   delay, half a cycle, and the way from it.
 
 module takt_bank #(
@@ -13,7 +13,6 @@ module takt_bank #(
     input  wire [INDEX-1:0] write_index,
     input  wire [31:0]      write_value,
     input  wire [INDEX-1:0] read_index,
-    input  wire             show,
     output reg  [31:0]      value
 );
 
@@ -24,7 +23,7 @@ module takt_bank #(
     always @(posedge clk) begin
         if (write) words[write_index] <= write_value;
         read  <= words[read_index];
-        value <= show ? read : 32'd0;
+        value <= read;
     end
 
 endmodule

@@ -2,10 +2,13 @@
 //
 // Contract
 //   word holds in cycle t + 1 the word at read_address of cycle t, and then keeps it until the next read.
+//   LOW: low bits that every operation of the slot has 0; they are not kept. A word with one of them is illegal, and is kept as
+//   the word 0, which is, too.
 
 module takt_program #(
     parameter DEPTH   = 1024,
-    parameter ADDRESS = 10    // bits of an address
+    parameter ADDRESS = 10,   // bits of an address
+    parameter LOW     = 0
 ) (
     input  wire               clk,
     input  wire               write,
@@ -13,15 +16,26 @@ module takt_program #(
     input  wire [47:0]        write_word,
     input  wire               read,
     input  wire [ADDRESS-1:0] read_address,
-    output reg  [47:0]        word
+    output wire [47:0]        word
 );
 
     (* no_rw_check *)
-    reg [47:0] words [0:DEPTH-1];
+    reg [47:LOW] words [0:DEPTH-1];
+    reg [47:LOW] kept;
+
+    wire legal = ~|(write_word & ((48'd1 << LOW) - 48'd1));
 
     always @(posedge clk) begin
-        if (write) words[write_address] <= write_word;
-        if (read) word <= words[read_address];
+        if (write) words[write_address] <= write_word[47:LOW] & {48-LOW{legal}};
+        if (read) kept <= words[read_address];
     end
+
+    generate
+        if (LOW == 0) begin : g_all
+            assign word = kept;
+        end else begin : g_high
+            assign word = {kept, {LOW{1'b0}}};
+        end
+    endgenerate
 
 endmodule

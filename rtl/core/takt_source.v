@@ -88,14 +88,16 @@ module takt_source #(
 
     wire [INDEX-1:0]  read_index = advance ? m_index : r_index;
     wire [SLOTS:0]    next_copy  = {r_bank[SLOTS], r_copy} & {(SLOTS + 1){next_fresh}};
-    wire [32*SLOTS+31:0] copy;  // of the bundle that was in read in the last cycle, or 0
+    wire [32*SLOTS+31:0] copy;   // of the bundle that was in read in the last cycle
+    reg  [SLOTS:0]       shown;  // the copy that is its operand: a mask behind the copies, which are block RAMs' own output registers
+    always @(posedge clk) shown <= next_copy;
 
     genvar s;
     generate
         if (LATCHED == 0) begin : g_inputs
             takt_bank #(.INDEX(INDEX)) inputs (
                 .clk(clk), .write(input_write), .write_index(input_write_index), .write_value(input_write_value),
-                .read_index(read_index), .show(next_copy[SLOTS]), .value(copy[32*SLOTS +: 32])
+                .read_index(read_index), .value(copy[32*SLOTS +: 32])
             );
             wire unused = &{1'b0, m_place, input_write_place};
         end else begin : g_latched_inputs
@@ -103,13 +105,13 @@ module takt_source #(
             always @(posedge clk) if (advance) r_place <= m_place;
             takt_bank #(.INDEX(INPUTS + 1)) inputs (
                 .clk(clk), .write(input_write), .write_index({input_write_place, input_write_index[INPUTS-1:0]}), .write_value(input_write_value),
-                .read_index({advance ? m_place : r_place, read_index[INPUTS-1:0]}), .show(next_copy[SLOTS]), .value(copy[32*SLOTS +: 32])
+                .read_index({advance ? m_place : r_place, read_index[INPUTS-1:0]}), .value(copy[32*SLOTS +: 32])
             );
         end
         for (s = 0; s < SLOTS; s = s + 1) begin : g_slot
             takt_bank #(.INDEX(INDEX)) bank (
                 .clk(clk), .write(writes[s]), .write_index(in_flight_index[s*DEPTH*INDEX +: INDEX]),
-                .write_value(result[32*s +: 32]), .read_index(read_index), .show(next_copy[s]), .value(copy[32*s +: 32])
+                .write_value(result[32*s +: 32]), .read_index(read_index), .value(copy[32*s +: 32])
             );
         end
     endgenerate
@@ -131,7 +133,7 @@ module takt_source #(
     integer    k;
     always @* begin
         value = bus | recent | i_status;
-        for (k = 0; k <= SLOTS; k = k + 1) value = value | copy[32*k +: 32];
+        for (k = 0; k <= SLOTS; k = k + 1) value = value | (copy[32*k +: 32] & {32{shown[k]}});
     end
 
     always @(posedge clk) begin

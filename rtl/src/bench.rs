@@ -97,7 +97,7 @@ pub fn folder(
     files.push(put(format!("{top}.f"), list(&[], false)));
     files.push(put(format!("{top}_ecp5.f"), list(&[], true)));
     files.push(put(format!("{bench_name}.f"), list(std::slice::from_ref(&bench_file), false)));
-    files.push(put(synthesis, design.synthesis.clone()));
+    files.push(put(synthesis, wishbone::on_few_pins(design)));
     files.push(put(format!("{}.v", wishbone::name(design)), wishbone::wrapper(design, latched)));
     files.push(put(bench_file, bench(machine, top, latched)));
     let nothing = || "// no program: `takt rtl --program FILE` writes one\n".to_owned();

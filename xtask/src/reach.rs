@@ -3,7 +3,7 @@
 use crate::{apt_install, cargo, run, works};
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Which of it.
@@ -26,16 +26,27 @@ struct Target {
 /// The command and with it everything it is made of.
 const WHOLE: &[&str] = &["takt"];
 /// What needs no operating system.
-const LIBRARIES: &[&str] =
-    &["takt-isa", "takt-asm", "takt-emu", "takt-analysis", "takt-debug", "takt-programs", "takt-rtl"];
+const LIBRARIES: &[&str] = &[
+    "takt-isa",
+    "takt-asm",
+    "takt-emu",
+    "takt-analysis",
+    "takt-debug",
+    "takt-programs",
+    "takt-rtl",
+    "takt-editor",
+    "takt-web",
+];
 
 const TARGETS: [Target; 4] = [
     Target { triple: "aarch64-apple-darwin", packages: WHOLE },
     Target { triple: "x86_64-pc-windows-msvc", packages: WHOLE },
-    Target { triple: "wasm32-unknown-unknown", packages: LIBRARIES },
+    Target { triple: WASM, packages: LIBRARIES },
     Target { triple: AARCH64, packages: WHOLE },
 ];
 
+/// What browsers run.
+pub(crate) const WASM: &str = "wasm32-unknown-unknown";
 const AARCH64: &str = "aarch64-unknown-linux-gnu";
 /// The crates whose results must be the same bits on every host.
 const TESTED: [&str; 3] = ["takt-isa", "takt-asm", "takt-emu"];
@@ -43,7 +54,7 @@ const TESTED: [&str; 3] = ["takt-isa", "takt-asm", "takt-emu"];
 const SCALE: &str = "0.002";
 
 /// Where the standard libraries of the targets come from.
-enum Toolchain {
+pub(crate) enum Toolchain {
     /// rustup has them, compiled.
     Rustup,
     /// Debian's compiler builds them from its source.
@@ -54,9 +65,10 @@ const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 const DEBIAN_SOURCE: &str = "/usr/lib/rustlib/src/rust/library/std";
 
 impl Toolchain {
-    fn find() -> Result<Toolchain> {
+    /// What compiles for these targets.
+    pub(crate) fn find(triples: &[&str]) -> Result<Toolchain> {
         let mut rustup = Command::new("rustup");
-        rustup.args(["target", "add"]).args(TARGETS.iter().map(|target| target.triple));
+        rustup.args(["target", "add"]).args(triples);
         if run(&mut rustup).is_ok() {
             return Ok(Toolchain::Rustup);
         }
@@ -70,27 +82,47 @@ impl Toolchain {
         Ok(Toolchain::Debian)
     }
 
-    /// Cargo with a subcommand for a target.
-    fn cargo(&self, subcommand: &str, triple: &str) -> Command {
+    /// Cargo with a subcommand for a target; what it makes goes to a folder of its own, because the compiler may differ from the
+    /// project's.
+    pub(crate) fn cargo(&self, subcommand: &str, triple: &str, folder: &str) -> Command {
         let mut command = cargo();
-        command.args([subcommand, "--target", triple, "--target-dir", "target/reach"]);
-        // What is only checked need not be fast; the standard library is compiled all the same.
-        command.env("CARGO_PROFILE_DEV_OPT_LEVEL", "0").env("CARGO_PROFILE_DEV_DEBUG", "0");
-        command.env("CARGO_PROFILE_TEST_DEBUG", "0");
+        command.args([subcommand, "--target", triple, "--target-dir", folder]);
         if let Toolchain::Debian = self {
             // Building the standard library is unstable; the second variable admits it on the stable compiler.
             command.env("RUSTC", DEBIAN_RUSTC).env("RUSTC_BOOTSTRAP", "1");
             command.arg("-Zbuild-std=std,panic_abort");
+            // Debian's compiler looks for a linker that Debian has not; rustup's own has it.
+            if triple == WASM
+                && let Some(linker) = rust_lld()
+            {
+                command.env("CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER", linker);
+            }
         }
         command
     }
 }
 
+/// The linker that comes with the project's compiler.
+fn rust_lld() -> Option<PathBuf> {
+    let output = Command::new("rustc").args(["--print", "target-libdir"]).output().ok()?;
+    let folder = PathBuf::from(String::from_utf8(output.stdout).ok()?.trim());
+    Some(folder.parent()?.join("bin/rust-lld")).filter(|path| path.exists())
+}
+
+/// For the targets of this command, without optimisation: what is only checked need not be fast; the standard library is compiled
+/// all the same.
+fn plain(toolchain: &Toolchain, subcommand: &str, triple: &str) -> Command {
+    let mut command = toolchain.cargo(subcommand, triple, "target/reach");
+    command.env("CARGO_PROFILE_DEV_OPT_LEVEL", "0").env("CARGO_PROFILE_DEV_DEBUG", "0");
+    command.env("CARGO_PROFILE_TEST_DEBUG", "0");
+    command
+}
+
 pub(crate) fn reach(arguments: &Arguments) -> Result<()> {
-    let toolchain = Toolchain::find()?;
+    let toolchain = Toolchain::find(&TARGETS.map(|target| target.triple))?;
     for Target { triple, packages } in TARGETS {
         let packages = packages.iter().flat_map(|package| ["-p", package]);
-        let mut check = toolchain.cargo("check", triple);
+        let mut check = plain(&toolchain, "check", triple);
         if triple == AARCH64 && !arguments.check {
             // The tests' profile: one standard library for both.
             check.args(["--profile", "test"]);
@@ -100,7 +132,7 @@ pub(crate) fn reach(arguments: &Arguments) -> Result<()> {
     if arguments.check {
         return Ok(());
     }
-    let mut tests = toolchain.cargo("test", AARCH64);
+    let mut tests = plain(&toolchain, "test", AARCH64);
     tests.arg("--no-fail-fast").args(arguments.packages.iter().flat_map(|package| ["-p", package]));
     tests.env("TAKT_TEST_SCALE", SCALE);
     if std::env::consts::ARCH != "aarch64" {

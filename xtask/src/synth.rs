@@ -13,14 +13,15 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Command;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use std::{fs, thread};
+use takt_board::tools::{MAPPING, OPTIONS};
 use takt_isa::spec::machines::MACHINES;
 use takt_isa::{Machine, UNITS, Unit};
 use takt_rtl::export::{export, synthesis_top};
 use takt_rtl::synthesis::{self, Resources, Synthesis};
-use takt_rtl::{Circuit, Library};
+use takt_rtl::{Circuit, Library, wishbone};
 
 /// Where measurements are recorded; [`takt_rtl::synthesis::committed`] has them.
 const RECORD: &str = "docs/synthesis.json";
@@ -28,12 +29,6 @@ const RECORD: &str = "docs/synthesis.json";
 const SEEDS: u32 = 5;
 /// What place and route strives for, in MHz: more than any design reaches.
 const TARGET_MHZ: u32 = 200;
-/// Options of `synth_lattice`. Without the slices' wide multiplexers the logic is a third less and not slower; short comparisons
-/// with constants on carry chains, which have to be entered and left, take more than in tables.
-const OPTIONS: &str = "-nowidelut -cmp2softlogic";
-/// What precedes it: a longer way of mapping logic, in which comparators come out at half the size; a machine loses a tenth.
-const MAPPING: &str = "scratchpad -copy abc9.script.flow2 abc9.script";
-
 /// Where the pins of a machine's top level are (those of the ULX3S board). Without a fixed place the placer takes ten times as long.
 const PINS: &str = "LOCATE COMP \"clk\" SITE \"G2\";
 LOCATE COMP \"rst\" SITE \"D6\";
@@ -50,7 +45,7 @@ pub(crate) struct Arguments {
     /// Units alone between registers instead; `all` for every one.
     #[arg(long, num_args = 1..)]
     unit: Vec<String>,
-    /// The device: Lattice ECP5 of 24,000 or 84,000 LUT4, or Intel Cyclone V, where resources are counted only.
+    /// The device: Lattice ECP5 of 24,000, 44,000 or 84,000 LUT4, or Intel Cyclone V, where resources are counted only.
     #[arg(long, value_enum, default_value_t = Device::Ecp5Large)]
     device: Device,
     /// Speed grade of the ECP5.
@@ -59,9 +54,22 @@ pub(crate) struct Arguments {
     /// Seeds of place and route, from 1 on. A measurement with fewer seeds than the recorded one does not replace it.
     #[arg(long, default_value_t = SEEDS, value_parser = clap::value_parser!(u32).range(1..=100))]
     seeds: u32,
+    /// One seed only, and nothing is recorded.
+    #[arg(long, conflicts_with_all = ["seeds", "jobs"])]
+    seed: Option<u32>,
+    /// What place and route strives for, in MHz; nothing is recorded unless it is the usual 200.
+    #[arg(long, default_value_t = TARGET_MHZ, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    freq: u32,
     /// Seeds at a time (each takes half a gigabyte); as many as there are cores unless stated.
     #[arg(long)]
     jobs: Option<usize>,
+}
+
+impl Arguments {
+    /// The seeds that are measured.
+    fn seeds(&self) -> Vec<u32> {
+        self.seed.map_or_else(|| (1..=self.seeds).collect(), |seed| vec![seed])
+    }
 }
 
 /// A device to synthesise for.
@@ -69,6 +77,8 @@ pub(crate) struct Arguments {
 enum Device {
     #[value(name = "85k")]
     Ecp5Large,
+    #[value(name = "45k")]
+    Ecp5Middle,
     #[value(name = "25k")]
     Ecp5Small,
     #[value(name = "cyclonev")]
@@ -80,6 +90,7 @@ impl Device {
     const fn names(self) -> (&'static str, &'static str) {
         match self {
             Device::Ecp5Large => ("LFE5U-85F", "--85k"),
+            Device::Ecp5Middle => ("LFE5U-45F", "--45k"),
             Device::Ecp5Small => ("LFE5U-25F", "--25k"),
             Device::CycloneV => ("Cyclone V", ""),
         }
@@ -103,8 +114,12 @@ pub(crate) fn synth(arguments: &Arguments) -> Result<()> {
     let mut measured = Vec::new();
     for design in designs {
         let row = measure(&venv, design, arguments)?;
-        println!("{}", in_words(&row));
+        println!("{}", in_words(&row, &arguments.seeds()));
         measured.push(row);
+    }
+    if arguments.seed.is_some() || arguments.freq != TARGET_MHZ {
+        println!("not recorded: it takes seeds from 1 on, and the target of {TARGET_MHZ} MHz");
+        return Ok(());
     }
     let mut rows = recorded()?;
     for new in measured {
@@ -144,6 +159,7 @@ fn designs(arguments: &Arguments) -> Result<Vec<Design>> {
     let mut library = Library::load(&root().join("rtl/units")).context("cannot read rtl/units")?;
     let ecp5 = arguments.device != Device::CycloneV;
     if ecp5 {
+        // Of what units share; the core's are in its files.
         let product = fs::read_to_string(root().join("rtl/ecp5/takt_product.v"))?;
         library.put("common/takt_product.v", product);
     }
@@ -169,7 +185,7 @@ fn designs(arguments: &Arguments) -> Result<Vec<Design>> {
     Ok(designs)
 }
 
-/// A machine with its memories, as `takt rtl` writes it: on a few pins, what serves verification only left out.
+/// A machine with its memories as `takt rtl` writes it: its bus slave on a few pins, what serves verification only left out.
 fn core(machine: &'static Machine, library: &Library, ecp5: bool) -> Result<Design> {
     let core = export(machine, library)?;
     let mut files = BTreeMap::new();
@@ -177,9 +193,10 @@ fn core(machine: &'static Machine, library: &Library, ecp5: bool) -> Result<Desi
         let name = file.name.rsplit('/').next().unwrap_or(&file.name);
         files.insert(name.to_owned(), file.text.clone());
     }
-    files.insert("synthesis.v".to_owned(), core.synthesis);
-    let wrapper = Resources::default();
-    Ok(Design { name: machine.name.to_owned(), files, top: synthesis_top(machine), pins: PINS, wrapper })
+    files.insert("wishbone.v".to_owned(), wishbone::wrapper(&core, 0));
+    files.insert("synthesis.v".to_owned(), wishbone::on_few_pins(&core));
+    let top = synthesis_top(machine);
+    Ok(Design { name: machine.name.to_owned(), files, top, pins: PINS, wrapper: wishbone::PINS })
 }
 
 /// A unit between registers, on few pins: the operands come out of a shift register and a second register, the results go
@@ -245,7 +262,8 @@ fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Result<Synthes
         design.files.keys().filter(|name| name.ends_with(".v")).map(String::as_str).collect();
 
     let started = Instant::now();
-    let progress = ProgressBar::new(u64::from(arguments.seeds) + 1);
+    let seeds = arguments.seeds();
+    let progress = ProgressBar::new(seeds.len() as u64 + 1);
     progress.set_style(ProgressStyle::with_template("{prefix} {bar:24} {msg} ({elapsed})")?);
     progress.set_prefix(design.name.clone());
     progress.enable_steady_tick(Duration::from_secs(1));
@@ -281,7 +299,8 @@ fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Result<Synthes
     progress.set_message("place and route");
     let place = |seed: u32| -> Result<Value> {
         let report = format!("report-{}-{seed}.json", arguments.grade);
-        let [grade, target, number] = [u32::from(arguments.grade), TARGET_MHZ, seed].map(|n| n.to_string());
+        let [grade, target, number] =
+            [u32::from(arguments.grade), arguments.freq, seed].map(|n| n.to_string());
         let command = [
             option,
             "--package",
@@ -308,7 +327,7 @@ fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Result<Synthes
         Ok(report)
     };
     let jobs = arguments.jobs.unwrap_or_else(|| thread::available_parallelism().map_or(1, usize::from));
-    let reports = parallel(arguments.seeds, jobs, place)?;
+    let reports = parallel(&seeds, jobs, place)?;
     progress.finish_and_clear();
 
     row.grade = Some(arguments.grade);
@@ -316,29 +335,28 @@ fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Result<Synthes
         .iter()
         .map(|report| clock(report).map(|mhz| (mhz * 100.0).round() / 100.0))
         .collect::<Result<_>>()?;
-    row.resources = less(ecp5(&reports[0])?, design.wrapper);
+    let carries = Some(halves_of_carries(&read(&folder.join("statistics.json"))?));
+    row.resources = less(Resources { carries, ..ecp5(&reports[0])? }, design.wrapper);
     let middle = row.mhz.iter().position(|&mhz| Some(mhz) == row.median()).expect("there is a seed");
     row.critical_path = critical_path(&reports[middle]).context("nextpnr's report has no path")?;
     write!(row.tools, ", {}", NEXTPNR.replace("yowasp-", "").replace("==", " "))?;
     Ok(row)
 }
 
-/// Calls `work` with 1 to `count`, in at most `jobs` threads.
-fn parallel<T: Send>(count: u32, jobs: usize, work: impl Fn(u32) -> Result<T> + Sync) -> Result<Vec<T>> {
-    let (next, results) = (AtomicU32::new(1), Mutex::new(BTreeMap::new()));
+/// Calls `work` with each of `seeds`, in at most `jobs` threads; after an error with no more of them.
+fn parallel<T: Send>(seeds: &[u32], jobs: usize, work: impl Fn(u32) -> Result<T> + Sync) -> Result<Vec<T>> {
+    let (next, results) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
     thread::scope(|scope| {
-        for _ in 0..jobs.clamp(1, count as usize) {
+        for _ in 0..jobs.clamp(1, seeds.len().max(1)) {
             scope.spawn(|| {
                 loop {
-                    let number = next.fetch_add(1, Ordering::Relaxed);
-                    if number > count {
-                        break;
-                    }
-                    let result = work(number);
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(&seed) = seeds.get(index) else { break };
+                    let result = work(seed);
                     if result.is_err() {
-                        next.store(count + 1, Ordering::Relaxed);
+                        next.store(seeds.len(), Ordering::Relaxed);
                     }
-                    results.lock().expect("no thread panics").insert(number, result);
+                    results.lock().expect("no thread panics").insert(index, result);
                 }
             });
         }
@@ -379,10 +397,16 @@ fn ecp5(report: &Value) -> Result<Resources> {
     };
     Ok(Resources {
         luts: used("TRELLIS_COMB")?,
+        carries: None,
         flip_flops: used("TRELLIS_FF")?,
         multipliers: used("MULT18X18D")?,
         block_rams: used("DP16KD")?,
     })
+}
+
+/// Halves of carry chains' cells, each of which takes the place of a LUT4; from yosys' statistics.
+fn halves_of_carries(statistics: &Value) -> u64 {
+    2 * statistics["design"]["num_cells_by_type"]["CCU2C"].as_u64().unwrap_or(0)
 }
 
 /// From yosys' statistics.
@@ -394,6 +418,7 @@ fn cyclone(statistics: &Value) -> Resources {
     };
     Resources {
         luts: count("MISTRAL_ALUT") + count("MISTRAL_NOT") + 2 * count("MISTRAL_MLAB"),
+        carries: None,
         flip_flops: count("MISTRAL_FF"),
         multipliers: count("MISTRAL_MUL"),
         block_rams: count("MISTRAL_M10K"),
@@ -453,19 +478,15 @@ fn signal(name: &str) -> String {
 
 // ---- What is written
 
-fn in_words(row: &Synthesis) -> String {
-    let Resources { luts, flip_flops, multipliers, block_rams } = row.resources;
+fn in_words(row: &Synthesis, seeds: &[u32]) -> String {
+    let Resources { luts, carries, flip_flops, multipliers, block_rams } = row.resources;
     let mut text = format!("{} on {}", row.design, row.device);
     if let (Some(grade), Some(least), Some(median), Some(greatest)) =
         (row.grade, row.least(), row.median(), row.greatest())
     {
-        let _ = write!(
-            text,
-            ", speed grade {grade}\n  clock after place and route, seeds 1 to {}:",
-            row.mhz.len()
-        );
-        for mhz in &row.mhz {
-            let _ = write!(text, " {mhz:.1}");
+        let _ = write!(text, ", speed grade {grade}\n  clock after place and route, by seed:");
+        for (seed, mhz) in seeds.iter().zip(&row.mhz) {
+            let _ = write!(text, " {seed}: {mhz:.1}");
         }
         let _ = write!(
             text,
@@ -475,7 +496,11 @@ fn in_words(row: &Synthesis) -> String {
     }
     let _ = write!(
         text,
-        "\n  {luts} LUTs, {flip_flops} flip-flops, {multipliers} multipliers, {block_rams} block RAMs"
+        "\n  {luts} LUTs{}, {flip_flops} flip-flops, {multipliers} multipliers, {block_rams} block RAMs",
+        carries.map_or_else(String::new, |carries| format!(
+            " ({} LUT4, {carries} halves of carry cells)",
+            luts - carries
+        ))
     );
     if MACHINES.iter().any(|machine| machine.name == row.design) {
         let (clock, [luts, flip_flops, memory, multipliers]) = PAPER;
@@ -500,19 +525,20 @@ How fast the circuit is and how much of a device it takes, after place and route
 measures it and writes this file; the first run installs the tools (400 MB) in `.venv`, or in the folder that `TAKT_VENV` names.\n
 Clocks are nextpnr's, for the slowest conditions of the speed grade, with the seeds 1, 2, … up to the stated
 number. The median (of an even number, the lower of the two in the middle) is the clock that the README and `takt track`
-use. LUTs are nextpnr's TRELLIS_COMB, including carry chains and memories in logic. Multipliers have 18 x 18 bits, block
-RAMs 18 kbit.\n",
+use. The total is nextpnr's TRELLIS_COMB: LUT4, those of memories in logic included, and the halves of carry chains' cells,
+which take a LUT4's place each (older rows have the total only). Multipliers have 18 x 18 bits, block RAMs 18 kbit.
+`--seed N` measures one seed, `--freq F` with another target than 200 MHz; neither is recorded.\n",
     );
     let is_machine = |row: &&Synthesis| MACHINES.iter().any(|machine| machine.name == row.design);
     let (machines, units): (Vec<_>, Vec<_>) = rows.iter().partition(is_machine);
     let placed = |rows: &[&Synthesis]| rows.iter().any(|row| row.grade.is_some());
     if placed(&machines) {
-        text += "\n## Machines\n\nWith their memories, and with the shift register and the parity that replace pins (about 230 flip-flops, 30 LUT4).\n`cargo xtask synth --machine t3 --device 85k --grade 8`, and so on.\n";
+        text += "\n## Machines\n\nWith their memories, as a Wishbone slave between registers that are not counted (in rows before 2026-11-22: the core on a shift register).\n`cargo xtask synth --machine t3 --device 85k --grade 8`, and so on.\n";
         text += &table(&machines);
         let (clock, [luts, flip_flops, memory, multipliers]) = PAPER;
         let _ = writeln!(
             text,
-            "| the paper's FPGA3 | Stratix III EP3SL150 | | | {clock} | | {luts} | {flip_flops} | {multipliers} | {memory} kB |"
+            "| the paper's FPGA3 | Stratix III EP3SL150 | | | {clock} | | | | {luts} ALUTs | {flip_flops} | {multipliers} | {memory} kB |"
         );
         text += "\nThe last line is the processor of the founding paper (its tables 2 and 4). Longest paths, of the median seed:\n\n";
         for row in machines.iter().filter(|row| row.grade.is_some()) {
@@ -537,7 +563,7 @@ The nearest open relative of the paper's Stratix III. Resources after synthesis 
 Multipliers have up to 27 x 27 bits, block RAMs 10 kbit. `cargo xtask synth --device cyclonev`.\n
 | design | ALUTs | flip-flops | multipliers | block RAMs | date |\n|---|---|---|---|---|---|\n";
         for row in counted {
-            let Resources { luts, flip_flops, multipliers, block_rams } = row.resources;
+            let Resources { luts, flip_flops, multipliers, block_rams, .. } = row.resources;
             let _ = writeln!(
                 text,
                 "| {} | {luts} | {flip_flops} | {multipliers} | {block_rams} | {} |",
@@ -558,7 +584,7 @@ Multipliers have up to 27 x 27 bits, block RAMs 10 kbit. `cargo xtask synth --de
 
 fn table(rows: &[&Synthesis]) -> String {
     let mut text = String::from(
-        "\n| design | device and grade | seeds | MHz least | median | greatest | LUT4 | flip-flops | multipliers | block RAMs | date |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
+        "\n| design | device and grade | seeds | MHz least | median | greatest | LUT4 | carry halves | total | flip-flops | multipliers | block RAMs | date |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for row in rows {
         let (Some(grade), Some(least), Some(median), Some(greatest)) =
@@ -566,10 +592,12 @@ fn table(rows: &[&Synthesis]) -> String {
         else {
             continue;
         };
-        let Resources { luts, flip_flops, multipliers, block_rams } = row.resources;
+        let Resources { luts, carries, flip_flops, multipliers, block_rams } = row.resources;
+        let apart =
+            carries.map_or_else(|| " | ".to_owned(), |carries| format!("{} | {carries}", luts - carries));
         let _ = writeln!(
             text,
-            "| {} | {}-{grade} | {} | {least:.1} | {median:.1} | {greatest:.1} | {luts} | {flip_flops} | {multipliers} | {block_rams} | {} |",
+            "| {} | {}-{grade} | {} | {least:.1} | {median:.1} | {greatest:.1} | {apart} | {luts} | {flip_flops} | {multipliers} | {block_rams} | {} |",
             row.design,
             row.device,
             row.mhz.len(),

@@ -45,7 +45,7 @@ pub(crate) struct Context {
     pub(crate) scopes: Scopes,
     pub(crate) declared: Declared,
     pub(crate) reports: Reports,
-    /// Which names stand where, if somebody wants to know ([`index`](crate::index)).
+    /// Which names stand where, if an editor asks for it ([`index`](crate::index)).
     pub(crate) notes: Option<Notes>,
     /// Arguments and templates under evaluation, one within the other.
     depth: usize,

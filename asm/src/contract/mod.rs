@@ -194,7 +194,7 @@ fn has_place(ir: &Ir, (bundle, number): Where, fusion: &Fusion) -> bool {
     // A branch on what its own bundle computes cannot wait for a copy.
     let branches =
         others().any(|other| other.redirects() && dest.is_some_and(|dest| other.reads().contains(&dest)));
-    // Nor does it go elsewhere than the source wants the sum.
+    // Nor does it go anywhere but where the source puts the sum.
     let named =
         dest.is_some_and(|dest| operations[number].slots != homes::able(ir, dest, operations[number].op));
     !branches && !named && matching::is_possible(&slots)

@@ -3,13 +3,13 @@
 pub(crate) mod place;
 
 use crate::emit::place::Placement;
-use crate::ir::{Constant, Ir, Operation, RegisterKind, numbered};
+use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, numbered};
 use crate::limits::NAME_BYTES;
 use crate::report::diag::{Diagnostic, Sink};
 use crate::report::source::Span;
 use std::collections::{BTreeMap, HashSet};
-use takt_isa::program::{LoopBound, Port, Section, Space, Symbol};
-use takt_isa::{BundleAddress, Instruction, Program, Register, SlotIndex};
+use takt_isa::program::{LoopBound, Port, Range, Section, Space, Symbol};
+use takt_isa::{BundleAddress, Instruction, Program, Register, SlotIndex, Type};
 
 /// A program, and which of its words a macro, a repetition or the assembler itself made (as indices into its code, ascending).
 pub(crate) struct Emitted {
@@ -67,6 +67,7 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
         symbols: symbols(ir),
         sections: sections(ir),
         loop_bounds: loop_bounds(ir),
+        ranges: ranges(ir, placement),
         files: ir.files.clone(),
         lines,
         // Those of equations are known where the sources are.
@@ -194,6 +195,19 @@ fn loop_bounds(ir: &Ir) -> Vec<LoopBound> {
         .into_iter()
         .map(|(address, most)| LoopBound { address: BundleAddress::new(address), most })
         .collect()
+}
+
+/// The ranges of registers that have a place: what nothing uses has none.
+fn ranges(ir: &Ir, placement: &Placement) -> Vec<Range> {
+    let range = |&(id, [low, high]): &(RegisterId, [u32; 2])| {
+        let register = placement.addresses[id.index()]?;
+        let ty = if ir.register(id).ty == Type::I { Type::I } else { Type::F };
+        Some(Range { register, ty, low, high })
+    };
+    let mut ranges: Vec<Range> = ir.ranges.iter().filter_map(range).collect();
+    ranges.sort_by_key(|range| range.register);
+    ranges.dedup_by_key(|range| range.register);
+    ranges
 }
 
 /// Gives every named thing a name of its own. The source's names are; those that the assembler makes, of a macro's locals and

@@ -104,6 +104,8 @@ pub(crate) struct Flat {
     pub(crate) presets: Vec<Preset>,
     pub(crate) loop_bounds: Vec<LoopBound>,
     pub(crate) timing: Vec<Timing>,
+    /// Each `.range`: where it stands, and the directive.
+    pub(crate) ranges: Vec<(At, u32)>,
     /// What `.ports` says, `latched` or not, and where.
     pub(crate) ports: Option<(bool, Span)>,
     /// What each `.loc` says; the first is none at all.
@@ -190,6 +192,7 @@ impl<'l> Expander<'l> {
             presets: Vec::new(),
             loop_bounds: Vec::new(),
             timing: Vec::new(),
+            ranges: Vec::new(),
             ports: None,
             locs: vec![Vec::new()],
             files: Vec::new(),
@@ -596,6 +599,8 @@ impl<'l> Expander<'l> {
             DirectiveKind::Fast(words) => self.fast = self.allowed(at, words)?,
             DirectiveKind::Ports(word) => self.ports(at, *word)?,
             DirectiveKind::LoopBound(most) => self.loop_bound(at, *most, span)?,
+            // Registers may be declared further down.
+            DirectiveKind::Range { .. } => self.flat.ranges.push((at, directive)),
             DirectiveKind::Deadline(..) | DirectiveKind::Order(_) | DirectiveKind::Late(..) => {
                 if self.section == Section::Data {
                     let error =

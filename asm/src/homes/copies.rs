@@ -7,7 +7,6 @@ use crate::ir::runs::{self, Run};
 use crate::ir::{Bundle, Constant, Ir, Operation, RegisterId, RegisterKind};
 use crate::schedule;
 use smallvec::SmallVec;
-use takt_isa::program::Space;
 use takt_isa::{BundleAddress, Effect, Op};
 
 /// A bundle of a run that copies are put into.
@@ -71,15 +70,7 @@ pub(crate) fn insert(ir: &mut Ir, homes: &mut Homes, copies: &[Copy]) {
         }
     }
     moved[count] = bundles.len() as u32;
-    let relocate = |position: u32| moved.get(position as usize).copied().unwrap_or(position);
-    ir.period = relocate(ir.period);
-    for label in ir.labels.iter_mut().filter(|label| label.space == Space::Code) {
-        label.position = relocate(label.position);
-    }
-    for bound in &mut ir.loop_bounds {
-        bound.position = relocate(bound.position);
-    }
-    ir.bundles = bundles;
+    ir.replace_bundles(bundles, |position: u32| moved.get(position as usize).copied().unwrap_or(position));
 }
 
 /// The bundle of a run before which a value must be home: where control leaves, and for an output port also the next write

@@ -5,7 +5,7 @@
 //! is settled first and what follows from it; where there is one, in the order of the source, for the first slot. A bundle that
 //! cannot do as its registers would have it goes its own way: `resolve` has seen to it that there is one.
 //!
-//! What the scheduler packs it gives slots anew, as long as a register stays in one bank.
+//! The scheduler chooses the slots again of what it packs, as long as a register stays in one bank.
 
 use crate::homes;
 use crate::ir::flow::Flow;

@@ -142,6 +142,32 @@ impl Operation {
     /// In [`Operation::written`] the operation that no tree has: one that computes a part of an equation, where its span is.
     pub(crate) const COMPUTED: u32 = u32::MAX;
 
+    /// One that reads and writes nothing yet; it executes in the first of the slots unless another is chosen.
+    pub(crate) fn new(
+        op: Op,
+        slots: Slots,
+        span: Span,
+        location: Option<(Location, Option<Columns>)>,
+        expansion: u32,
+        written: (u32, u32),
+    ) -> Operation {
+        Operation {
+            op,
+            slots,
+            slot: slots.first(),
+            dest: None,
+            sources: [RegisterId::ZERO; 3],
+            constant: Constant::None,
+            location: location.map(|(location, _)| location),
+            columns: location.and_then(|(_, columns)| columns),
+            span,
+            expansion,
+            made: false,
+            order: 0,
+            written,
+        }
+    }
+
     /// Whether it computes a part of an equation.
     pub(crate) fn is_computed(&self) -> bool {
         self.written.1 == Operation::COMPUTED
@@ -289,6 +315,8 @@ pub struct Ir {
     pub labels: Vec<Label>,
     /// Bounds of loops, by ascending position.
     pub loop_bounds: Vec<LoopBound>,
+    /// Between which values registers lie when a period begins, least and largest, in the order of the source.
+    pub ranges: Vec<(RegisterId, [u32; 2])>,
     /// What is demanded of ports, in the order of the source.
     pub demands: Vec<Demand>,
     /// Whether inputs are taken together at the tick, outputs published together at `wait`.
@@ -312,6 +340,18 @@ impl Ir {
     #[inline]
     pub fn register(&self, id: RegisterId) -> &VirtualRegister {
         &self.registers[id.index()]
+    }
+
+    /// Replaces the bundles, and moves what stands between them by `moved`: from a bundle's old number to its new one.
+    pub(crate) fn replace_bundles(&mut self, bundles: Vec<Bundle>, moved: impl Fn(u32) -> u32) {
+        self.period = moved(self.period);
+        for label in self.labels.iter_mut().filter(|label| label.space == Space::Code) {
+            label.position = moved(label.position);
+        }
+        for bound in &mut self.loop_bounds {
+            bound.position = moved(bound.position);
+        }
+        self.bundles = bundles;
     }
 
     /// Every operation, in order.

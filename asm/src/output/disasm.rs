@@ -90,6 +90,20 @@ impl<'p> Writer<'p> {
             let value = f32::from_bits(*bits);
             self.line(format_args!(".preset @{place} = 0x{bits:08x}  ; {value:?}"));
         }
+        for range in &self.program.ranges {
+            // A name with indices is no name for a directive; a place has no type.
+            let named = inputs.iter().chain(outputs).chain(registers).find(|port| {
+                port.register == range.register && port.ty == range.ty && !port.name.contains('[')
+            });
+            let name =
+                named.map_or_else(|| format!("@{}", self.place(range.register)), |port| port.name.clone());
+            let (low, high) = (range.low, range.high);
+            let ends = match range.ty {
+                Type::F => format!("{:?}, {:?}", f32::from_bits(low), f32::from_bits(high)),
+                Type::I | Type::B => format!("{}, {}", low.cast_signed(), high.cast_signed()),
+            };
+            self.line(format_args!(".range  {name} = {ends}"));
+        }
         // The order in which `.loc` first names the files is theirs in the program.
         for file in files {
             self.line(format_args!(".loc {} 1", quoted(file)));

@@ -6,7 +6,7 @@ use crate::context::{At, Reported, Wanted, type_name, words};
 use crate::expand::equation::Results;
 use crate::expand::{Fast, Item, SourcePlace};
 use crate::ir::given::Kind;
-use crate::ir::{Bundle, Constant, Operation, RegisterId, RegisterKind, VirtualRegister};
+use crate::ir::{Bundle, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
@@ -358,19 +358,9 @@ impl Resolver<'_> {
     ) {
         let slots = self.writing(slots, Some(dest));
         let operation = Operation {
-            op,
-            slots,
-            slot: slots.first(),
             dest: Some(dest),
             sources,
-            constant: Constant::None,
-            location: line.location.map(|(location, _)| location),
-            columns: line.location.and_then(|(_, columns)| columns),
-            span,
-            expansion: at.scope.0,
-            made: false,
-            order: 0,
-            written: (at.ast, Operation::COMPUTED),
+            ..Operation::new(op, slots, span, line.location, at.scope.0, (at.ast, Operation::COMPUTED))
         };
         let operations = SmallVec::from_elem(operation, 1);
         self.push(Bundle { operations, explicit: false, scheduled: line.scheduled });

@@ -221,30 +221,24 @@ impl Resolver<'_> {
                 NodeKind::Prefix(operator) => {
                     let terms = take(1);
                     match terms[..] {
-                        [Term { part: Part::Constant(value, _), .. }] => {
-                            let value = expr::prefix(operator, value);
-                            constant(
-                                self.folded(at, value, node.span)?,
-                                here.1.first - id.first,
-                                index,
-                                node.span,
-                            )
-                        }
+                        [Term { part: Part::Constant(value, _), .. }] => constant(
+                            self.folded(at, expr::prefix(operator, value), node.span)?,
+                            plan.parts[index as usize],
+                            index,
+                            node.span,
+                        ),
                         _ => self.apply(at, line, operator.text(), &terms, here, Kind::None)?,
                     }
                 }
                 NodeKind::Infix(operator) => {
                     let terms = take(2);
                     match (terms[0].value(), terms[1].value()) {
-                        (Some(a), Some(b)) => {
-                            let value = expr::infix(operator, a, b);
-                            constant(
-                                self.folded(at, value, node.span)?,
-                                here.1.first - id.first,
-                                index,
-                                node.span,
-                            )
-                        }
+                        (Some(a), Some(b)) => constant(
+                            self.folded(at, expr::infix(operator, a, b), node.span)?,
+                            plan.parts[index as usize],
+                            index,
+                            node.span,
+                        ),
                         _ => self.apply(at, line, operator.text(), &terms, here, Kind::None)?,
                     }
                 }
@@ -257,15 +251,12 @@ impl Resolver<'_> {
                     let terms = take(count as usize);
                     let values: Option<Vec<Value>> = terms.iter().map(Term::value).collect();
                     match (name.function(), values) {
-                        (Some(function), Some(values)) => {
-                            let value = expr::call(function, &values);
-                            constant(
-                                self.folded(at, value, node.span)?,
-                                here.1.first - id.first,
-                                index,
-                                node.span,
-                            )
-                        }
+                        (Some(function), Some(values)) => constant(
+                            self.folded(at, expr::call(function, &values), node.span)?,
+                            plan.parts[index as usize],
+                            index,
+                            node.span,
+                        ),
                         _ => self.function(at, line, name, &terms, here)?,
                     }
                 }

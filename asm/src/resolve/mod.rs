@@ -11,7 +11,7 @@ pub(crate) mod serialise;
 mod sharing;
 mod slots;
 
-use crate::context::{At, Context, Reported, ScopeId};
+use crate::context::{Array, At, Binding, Context, Reported, ScopeId};
 use crate::expand::load::Loader;
 use crate::expand::{self, Data, Flat, Item, SourcePlace, Timing};
 use crate::ir::given::Kind;
@@ -24,9 +24,9 @@ use crate::syntax::ast::*;
 use smallvec::SmallVec;
 use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
-use takt_isa::program::Location;
+use takt_isa::program::{Location, Range};
 use takt_isa::spec::instructions::Function;
-use takt_isa::{Op, ROWS, Slots, Type};
+use takt_isa::{Op, ROWS, Register, Slots, Type};
 
 /// The most cycles that a demand on ports can name: many times what a program memory holds.
 const MAX_CYCLES: u32 = 1 << 24;
@@ -50,6 +50,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         period: 0,
         labels: Vec::new(),
         loop_bounds: Vec::new(),
+        ranges: Vec::new(),
         demands: Vec::new(),
         latched: flat.ports.is_some_and(|(latched, _)| latched),
         numbers: BTreeMap::new(),
@@ -89,6 +90,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
     resolver.entered();
     resolver.data();
     resolver.presets();
+    resolver.ranges();
     for timing in std::mem::take(&mut resolver.flat.timing) {
         // What goes wrong is in the report.
         if let Ok(demand) = resolver.demand(&timing) {
@@ -328,21 +330,7 @@ impl Resolver<'_> {
         if places.len() != operands.len() {
             return Err(self.wrong_count(at, row, written, operands));
         }
-        let mut operation = Operation {
-            op,
-            slots,
-            slot: slots.first(),
-            dest: None,
-            sources: [RegisterId::ZERO; 3],
-            constant: Constant::None,
-            location: location.map(|(location, _)| location),
-            columns: location.and_then(|(_, columns)| columns),
-            span: written.span,
-            expansion: at.scope.0,
-            made: false,
-            order: 0,
-            written: (at.ast, number),
-        };
+        let mut operation = Operation::new(op, slots, written.span, location, at.scope.0, (at.ast, number));
         let mut failed = false;
         for (place, operand) in places.iter().zip(operands) {
             // All operands are looked at, whatever is wrong with one.
@@ -373,19 +361,8 @@ impl Resolver<'_> {
         };
         self.ir.raw.push(bits);
         Ok(Operation {
-            op: Op::nop,
-            slots: Slots::of(index),
-            slot: Some(index),
-            dest: None,
-            sources: [RegisterId::ZERO; 3],
             constant: Constant::Raw(self.ir.raw.len() as u32 - 1),
-            location: location.map(|(location, _)| location),
-            columns: location.and_then(|(_, columns)| columns),
-            span: written.span,
-            expansion: at.scope.0,
-            made: false,
-            order: 0,
-            written: (at.ast, number),
+            ..Operation::new(Op::nop, Slots::of(index), written.span, location, at.scope.0, (at.ast, number))
         })
     }
 
@@ -488,5 +465,65 @@ impl Resolver<'_> {
                 self.context.report(preset.at.scope, error);
             }
         }
+    }
+
+    fn ranges(&mut self) {
+        let mut seen: HashMap<RegisterId, Span> = HashMap::new();
+        for (at, directive) in std::mem::take(&mut self.flat.ranges) {
+            let ast = Rc::clone(&self.context.asts[at.ast as usize]);
+            let DirectiveKind::Range { registers, placed, low, high } =
+                &ast.directives[directive as usize].kind
+            else {
+                continue;
+            };
+            for name in registers {
+                // What goes wrong is in the report.
+                let Ok((members, ty)) = self.range_registers(at, *name, *placed) else { continue };
+                let mut end = |end: &Expr| {
+                    let value = self.context.value(at, end.id)?;
+                    self.bits(at, value, ty, (*end).into())
+                };
+                let (Ok(least), Ok(largest)) = (end(low), end(high)) else { continue };
+                let range = Range { register: Register::ZERO, ty, low: least, high: largest };
+                if let Some(mistake) = range.mistake() {
+                    let span = Span { end: high.span.end, ..low.span };
+                    self.context.error(at.scope, "range", span, format!("this is no range: {mistake}"));
+                    continue;
+                }
+                for register in members {
+                    if let Some(first) = seen.insert(register, name.span) {
+                        let message = "this register has a range already";
+                        let error =
+                            Diagnostic::error("declared-twice", name.span, message).also(first, "here");
+                        self.context.report(at.scope, error);
+                        break;
+                    }
+                    self.ir.ranges.push((register, [least, largest]));
+                }
+            }
+        }
+    }
+
+    /// The registers that a `.range` names, of an array all, and their type.
+    fn range_registers(
+        &mut self,
+        at: At,
+        name: Name,
+        placed: bool,
+    ) -> Result<(Vec<RegisterId>, Type), Reported> {
+        if !placed {
+            let id = self.context.spelled(at, name.name, name.span)?;
+            if let Binding::Array(number) = self.context.lookup(at.scope, id) {
+                let Array { first, sizes, .. } = &self.context.declared.arrays[number as usize];
+                let count = sizes.iter().product::<u32>() as usize;
+                let members: Vec<RegisterId> =
+                    (first.index()..first.index() + count).map(RegisterId::new).collect();
+                let ty = self.context.declared.registers[first.index()].ty;
+                return Ok((members, ty));
+            }
+        }
+        let (register, ty) = self.preset_register(at, name, placed)?;
+        // A place has no type: its range is one of floats.
+        Ok((vec![register], if placed { Type::F } else { ty }))
     }
 }

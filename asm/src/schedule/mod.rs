@@ -112,15 +112,7 @@ pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
         bundles.extend(packed);
     }
     let end = bundles.len() as u32;
-    let relocate = |position: u32| moved.get(&position).copied().unwrap_or(end);
-    ir.period = relocate(ir.period);
-    for label in ir.labels.iter_mut().filter(|label| label.space == Space::Code) {
-        label.position = relocate(label.position);
-    }
-    for bound in &mut ir.loop_bounds {
-        bound.position = relocate(bound.position);
-    }
-    ir.bundles = bundles;
+    ir.replace_bundles(bundles, |position: u32| moved.get(&position).copied().unwrap_or(end));
     report
 }
 

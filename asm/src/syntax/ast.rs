@@ -317,6 +317,8 @@ pub(crate) enum DirectiveKind {
     Ports(Name),
     /// `.loop_bound`.
     LoopBound(Expr),
+    /// `.range`, the registers, whether `@` stands before them, the least and the largest value.
+    Range { registers: Vec<Name>, placed: bool, low: Expr, high: Expr },
     /// `.deadline`, the ports, and the cycle.
     Deadline(Vec<Name>, Expr),
     /// `.order` and the ports.
@@ -394,6 +396,7 @@ directives! {
     Fast ".fast" "reassociate reciprocal|off" "What equations may do beyond what is written.";
     Ports ".ports" "latched|direct" "Whether inputs are taken together at the tick and outputs published together at `wait`.";
     LoopBound ".loop_bound" "turns" "The bundle that follows heads a loop of at most so many iterations.";
+    Range ".range" "a, b = least, largest" "Between which values inputs or states lie when a period begins: `takt accuracy` rests on it.";
     Deadline ".deadline" "port, port = cycle" "Each output is written for the last time in that cycle or before.";
     Order ".order" "port, port, …" "Every use of one port comes before the first of the next.";
     Late ".late" "port, port = cycles" "The inputs are read as late as the length of the schedule allows.";
@@ -456,6 +459,12 @@ pub enum Operator {
 }
 
 impl Operator {
+    /// Every operator.
+    pub const ALL: [Operator; 18] = {
+        use Operator::*;
+        [Eq, Ne, Lt, Le, Gt, Ge, Or, And, Shl, Shr, Add, Sub, Mul, Div, Rem, Complement, Not, Power]
+    };
+
     /// How the source writes it.
     pub const fn text(self) -> &'static str {
         match self {

@@ -22,6 +22,19 @@ pub enum Value {
     Real(f64),
 }
 
+/// In the fewest digits that say it exactly; those of binary32 where it holds the value.
+impl std::fmt::Display for Value {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match *self {
+            Value::Int(value) => write!(f, "{value}"),
+            Value::Real(value) if f64::from(value as f32).to_bits() == value.to_bits() => {
+                write!(f, "{:?}", value as f32)
+            }
+            Value::Real(value) => write!(f, "{value:?}"),
+        }
+    }
+}
+
 /// Constants that every program knows unless it declares the name itself.
 pub const BUILTINS: [(&str, Value); 5] = [
     ("pi", Value::Real(std::f64::consts::PI)),

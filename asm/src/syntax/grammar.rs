@@ -462,7 +462,8 @@ pub(crate) fn line<'t, 'a: 't, E: LineError<'t>>(
             let builder: &mut Builder<'a> = e.state();
             Expr { id: builder.expr(first), span }
         })
-        .labelled("an expression");
+        .labelled("an expression")
+        .boxed();
 
     let place = just(Token::At)
         .ignore_then(name_ref.clone())
@@ -525,11 +526,15 @@ pub(crate) fn line<'t, 'a: 't, E: LineError<'t>>(
         .boxed();
     let operands = operand.separated_by(just(Token::Comma).labelled("`,`")).collect::<Vec<()>>();
 
-    let operation =
-        name.clone().labelled("an instruction").then(operands).map_with(|(mnemonic, count), e| {
+    let operation = name
+        .clone()
+        .labelled("an instruction")
+        .then(operands)
+        .map_with(|(mnemonic, count), e| {
             let span = e.span();
             push_operation(e.state(), mnemonic, count.len(), span);
-        });
+        })
+        .boxed();
     let raw = just(Token::Directive(Directive::Raw))
         .labelled("an instruction")
         .map_with(|_, e| e.span())
@@ -546,7 +551,8 @@ pub(crate) fn line<'t, 'a: 't, E: LineError<'t>>(
                 2,
                 span,
             );
-        });
+        })
+        .boxed();
     let bundle = operation
         .or(raw)
         .separated_by(just(Token::Bars).labelled("`||`"))
@@ -554,7 +560,7 @@ pub(crate) fn line<'t, 'a: 't, E: LineError<'t>>(
         .collect::<Vec<()>>()
         .map(|count| Body::Bundle(count.len() as u32));
 
-    let directive = directive(name.clone(), expr).boxed();
+    let directive = directive(name.clone().boxed(), expr).boxed();
     let body = bundle.or(directive).labelled("an instruction or a directive").or(empty().to(Body::Empty));
     // A plain label takes one look ahead; only a template is read twice.
     let label = name.then_ignore(just(Token::Colon)).or_not();
@@ -569,7 +575,7 @@ pub(crate) fn line<'t, 'a: 't, E: LineError<'t>>(
 /// The parser of a line that holds an equation: an optional label, what is written, `=`, and what is computed.
 pub(crate) fn equation<'t, 'a: 't, E: LineError<'t>>() -> impl Parser<'t, Tokens<'t>, Line, Extra<'a, E>> {
     let expression = expression(true).boxed();
-    let name = name_ref(expression.clone()).map_with(|name, e| Name { name, span: e.span() });
+    let name = name_ref(expression.clone()).map_with(|name, e| Name { name, span: e.span() }).boxed();
     let place = just(Token::At)
         .ignore_then(name.clone())
         .map_with(|name, e| Operand { kind: OperandKind::Place(name.name), span: e.span() });
@@ -579,7 +585,7 @@ pub(crate) fn equation<'t, 'a: 't, E: LineError<'t>>() -> impl Parser<'t, Tokens
         Operand { kind: OperandKind::Element(builder.element(name, starts)), span }
     });
     let plain = name.clone().map(|name| Operand { kind: OperandKind::Name(name.name), span: name.span });
-    let target = choice((place, element, plain)).labelled("a register to write");
+    let target = choice((place, element, plain)).labelled("a register to write").boxed();
     let value = here()
         .then(expression)
         .map_with(|(first, ()), e| {
@@ -587,7 +593,8 @@ pub(crate) fn equation<'t, 'a: 't, E: LineError<'t>>() -> impl Parser<'t, Tokens
             let builder: &mut Builder<'a> = e.state();
             Expr { id: builder.expr(first), span }
         })
-        .labelled("an expression");
+        .labelled("an expression")
+        .boxed();
     let comma = || just(Token::Comma).labelled("`,`");
     let body = target
         .separated_by(comma())
@@ -743,6 +750,19 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
             more
         })
     };
+    let range = is(Directive::Range)
+        .ignore_then(just(Token::At).or_not())
+        .then(ports())
+        .then_ignore(just(Token::Assign).labelled("`=`"))
+        .then(expr.clone().labelled("the least value"))
+        .then_ignore(comma())
+        .then(expr.clone().labelled("the largest value"))
+        .map(|(((at, registers), low), high)| DirectiveKind::Range {
+            registers,
+            placed: at.is_some(),
+            low,
+            high,
+        });
     let deadline = is(Directive::Deadline)
         .ignore_then(ports())
         .then_ignore(just(Token::Assign).labelled("`=`"))
@@ -768,9 +788,31 @@ fn directive<'t, 'a: 't, E: LineError<'t>>(
     let loc = is(Directive::Loc)
         .ignore_then(at.separated_by(just(Token::Bars).labelled("`||`")).at_least(1).collect::<Vec<_>>())
         .map(DirectiveKind::Loc);
-    choice((
-        bare, declare, float, word, constant, preset, space, branch, elif, rep, macro_, include, error, loc,
-        schedule, contract, fast, latched, loop_bound, deadline, order, late,
-    ))
+    // Boxed, so that the type of the whole stays small: a nested one took the compiler half a minute.
+    choice([
+        bare.boxed(),
+        declare.boxed(),
+        float.boxed(),
+        word.boxed(),
+        constant.boxed(),
+        preset.boxed(),
+        space.boxed(),
+        branch.boxed(),
+        elif.boxed(),
+        rep.boxed(),
+        macro_.boxed(),
+        include.boxed(),
+        error.boxed(),
+        loc.boxed(),
+        schedule.boxed(),
+        contract.boxed(),
+        fast.boxed(),
+        latched.boxed(),
+        loop_bound.boxed(),
+        range.boxed(),
+        deadline.boxed(),
+        order.boxed(),
+        late.boxed(),
+    ])
     .map_with(|kind, e| Body::Directive(kind, e.span()))
 }

@@ -22,7 +22,8 @@ use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Duration;
 use takt_debug::console::{Console, first_mistake};
-use takt_debug::session::{Control, Options, Rows, Session, Unit, Why};
+use takt_debug::session::{Control, Options, Session, Unit, Why};
+use takt_emu::Rows;
 
 /// Step through a program, forward and back, and look at everything.
 ///

@@ -31,7 +31,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use takt_asm::diag::Diagnostics;
 use takt_asm::expr::Value;
 use takt_asm::names::Names;
-use takt_emu::{Emulator, Fault, LoadError, PeriodReport, Retire, Status};
+use takt_emu::{Emulator, Fault, LoadError, PeriodReport, Retire, Rows, Status};
 use takt_isa::program::Location;
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{BundleAddress, Program, Register, SlotIndex, Type};
@@ -46,9 +46,6 @@ const SLICE: Cycle = 1 << 20;
 const WINDOW: Cycle = 1 << 6;
 /// Cycles for which a command runs unless told otherwise.
 pub const RUN_LIMIT: Cycle = 1_000_000_000;
-
-/// Inputs of periods: for each, registers of input ports and their bits.
-pub type Rows = Vec<Vec<(Register, u32)>>;
 
 /// What a session is about.
 #[derive(Clone, Default)]

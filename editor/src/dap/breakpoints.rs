@@ -59,6 +59,14 @@ pub(super) struct More {
     pub(super) condition: Option<String>,
 }
 
+impl More {
+    /// Whether what must hold besides does.
+    pub(super) fn holds(&self, session: &Session) -> bool {
+        let value = |condition: &String| session.parse(condition).and_then(|live| session.evaluate(&live));
+        self.condition.as_ref().is_none_or(|condition| value(condition).is_ok_and(|value| !value.is_zero()))
+    }
+}
+
 /// The breakpoints by number, and which of them were asked for together: those of one source, or of one kind.
 #[derive(Debug, Default)]
 pub(super) struct Breakpoints {
@@ -250,7 +258,7 @@ fn check_log(session: &Session, log: &str) -> Result<(), String> {
 /// A log message with its values.
 pub(super) fn logged(session: &Session, log: &str) -> String {
     let value = |expression: &str| match session.parse(expression).and_then(|live| session.evaluate(&live)) {
-        Ok(value) => super::view::value_text(value),
+        Ok(value) => value.to_string(),
         Err(error) => format!("({})", error.lines().next().unwrap_or("")),
     };
     pieces(log).map(|piece| piece.map_or_else(value, str::to_owned)).collect()

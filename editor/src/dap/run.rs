@@ -112,10 +112,7 @@ impl Server<'_> {
             Then::Initialized => self.event("initialized", json!({})),
             Then::Enter => self.stopped("entry", None, None),
             Then::Continue => self.resume(),
-            Then::Back => {
-                let why = session.resume_back();
-                self.tell(why, "breakpoint");
-            }
+            Then::Back => self.resume_back(),
             Then::Step(unit, over) => {
                 let depth = session.emulator().stack().len();
                 let mut why = session.step(unit);
@@ -156,11 +153,7 @@ impl Server<'_> {
                     let Some(more) = debugged.breakpoints.more.get_mut(&id) else {
                         return self.tell(why, "breakpoint");
                     };
-                    let holds = |condition: &String| {
-                        let live = session.parse(condition);
-                        live.and_then(|live| session.evaluate(&live)).is_ok_and(|value| !value.is_zero())
-                    };
-                    if more.condition.as_ref().is_some_and(|condition| !holds(condition)) {
+                    if !more.holds(session) {
                         continue;
                     }
                     more.met += 1;
@@ -177,6 +170,22 @@ impl Server<'_> {
                 }
                 why => return self.tell(why, "breakpoint"),
             }
+        }
+    }
+
+    /// Runs back to what stops: past what only logs, or would not stop here. How often a breakpoint was met counts forward only.
+    fn resume_back(&mut self) {
+        loop {
+            let Some(debugged) = &mut self.debugged else { return };
+            let session = &mut debugged.console.session;
+            let why = session.resume_back();
+            if let Why::Stop { id, .. } = why
+                && let Some(more) = debugged.breakpoints.more.get(&id)
+                && (more.log.is_some() || !more.holds(session))
+            {
+                continue;
+            }
+            return self.tell(why, "breakpoint");
         }
     }
 

@@ -3,7 +3,6 @@
 use crate::dap::breakpoints::address;
 use crate::dap::{Answer, Debugged, number, text};
 use serde_json::{Value as Json, json};
-use takt_asm::expr::Value;
 use takt_debug::panes::{flight, stalls};
 use takt_debug::session::{Place, Shown};
 use takt_isa::program::{Location, Port};
@@ -27,17 +26,6 @@ const MACHINE: u64 = 6;
 /// From here on, the registers of each bank; then the ways to read each register.
 const BANKS: u64 = 16;
 const VIEWS: u64 = 64;
-
-/// A value of an expression, in the fewest digits.
-pub(super) fn value_text(value: Value) -> String {
-    match value {
-        Value::Int(value) => value.to_string(),
-        Value::Real(value) if f64::from(value as f32).to_bits() == value.to_bits() => {
-            format!("{:?}", value as f32)
-        }
-        Value::Real(value) => format!("{value:?}"),
-    }
-}
 
 /// A register's bits as they are shown.
 fn shown(ty: Type, bits: Option<u32>, hex: bool) -> String {
@@ -261,7 +249,7 @@ impl Debugged {
                     (VIEWS + u64::from(register.get()), Some(ty), shown(ty, bits, hex))
                 }
                 Some((Place::Word(_), ty, bits)) => (0, Some(ty), shown(ty, bits, hex)),
-                None => (0, None, value_text(session.evaluate(&live)?)),
+                None => (0, None, session.evaluate(&live)?.to_string()),
             };
             Ok((reference, ty, value))
         });

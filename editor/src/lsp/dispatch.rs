@@ -22,7 +22,7 @@ pub(crate) fn parameters<P: DeserializeOwned>(method: &str, params: Value) -> Re
     serde_json::from_value(params).map_err(error)
 }
 
-impl Server<'_> {
+impl Server {
     pub(crate) fn request(&mut self, request: Request) {
         let Request { id, method, params } = request;
         let result = match (self.phase, method.as_str()) {
@@ -66,8 +66,10 @@ impl Server<'_> {
         let document = params.capabilities.text_document.unwrap_or_default();
         let workspace = params.capabilities.workspace.unwrap_or_default();
         let item = document.completion.and_then(|completion| completion.completion_item);
+        let experimental = params.capabilities.experimental.unwrap_or_default();
         self.client = Client {
             encoding,
+            wants_counted: experimental["takt/counted"] == true,
             snippets: item.and_then(|item| item.snippet_support).unwrap_or(false),
             refreshes_hints: workspace.inlay_hint.and_then(|hint| hint.refresh_support).unwrap_or(false),
             refreshes_lenses: workspace.code_lens.and_then(|lens| lens.refresh_support).unwrap_or(false),

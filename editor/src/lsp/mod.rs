@@ -10,8 +10,10 @@ mod complete;
 mod diagnostics;
 mod dispatch;
 mod hover;
+mod inline;
 mod names;
 mod outline;
+mod pipeline;
 mod program;
 mod requests;
 mod text;
@@ -19,6 +21,8 @@ mod timing;
 mod uri;
 mod worker;
 mod workspace;
+
+pub use inline::Inline;
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use lsp_server::{Connection, ErrorCode, Message, Notification, Request, RequestId, Response};
@@ -51,6 +55,8 @@ pub struct Settings {
     pub folders: Vec<PathBuf>,
     /// The library: names and texts.
     pub library: &'static [(&'static str, &'static str)],
+    /// What a document that lies nowhere can include by name: names and texts.
+    pub beside: &'static [(&'static str, &'static str)],
     /// Where a copy of the library is put when an editor is to open it; it is not opened if there is none.
     pub library_folder: Option<PathBuf>,
     /// Cycles that a period may take.
@@ -65,6 +71,7 @@ impl Default for Settings {
             levels: options.levels,
             folders: Vec::new(),
             library: &[],
+            beside: &[],
             library_folder: None,
             deadline: None,
         }
@@ -86,6 +93,8 @@ struct Client {
     snippets: bool,
     refreshes_hints: bool,
     refreshes_lenses: bool,
+    /// It wants to be told when a program is counted, for a picture of its own.
+    wants_counted: bool,
 }
 
 /// How far the session is.
@@ -97,9 +106,14 @@ enum Phase {
     Ending,
 }
 
-struct Server<'c> {
+/// Tells the time, where there is one to tell.
+type Clock = fn() -> Option<Instant>;
+
+struct Server {
     settings: Settings,
-    sender: &'c Sender<Message>,
+    sender: Sender<Message>,
+    /// What time it is; nothing is put off without a clock.
+    clock: Clock,
     client: Client,
     phase: Phase,
     workspace: Workspace,
@@ -115,7 +129,8 @@ struct Server<'c> {
     took: Duration,
     /// For each file, what each program says of it.
     published: BTreeMap<PathBuf, BTreeMap<PathBuf, Vec<Diagnostic>>>,
-    worker: Worker,
+    /// The thread that schedules, if there is one.
+    worker: Option<Worker>,
     /// Requests of the server's own so far.
     asked: i32,
 }
@@ -123,22 +138,9 @@ struct Server<'c> {
 /// Serves a client until it says `exit` or goes. True if it said so in order.
 pub fn serve(connection: &Connection, settings: Settings) -> bool {
     let (done_sender, done): (_, Receiver<Done>) = unbounded();
-    let mut server = Server {
-        worker: Worker::new(settings.clone(), done_sender.clone()),
-        settings,
-        sender: &connection.sender,
-        client: Client::default(),
-        phase: Phase::Starting,
-        workspace: Workspace::default(),
-        programs: BTreeMap::new(),
-        stale: BTreeSet::new(),
-        read_at: None,
-        unscheduled: BTreeSet::new(),
-        schedule_at: None,
-        took: Duration::ZERO,
-        published: BTreeMap::new(),
-        asked: 0,
-    };
+    let worker = Worker::new(settings.clone(), done_sender.clone());
+    let clock = || Some(Instant::now());
+    let mut server = Server::new(settings, connection.sender.clone(), clock, Some(worker));
     // So that the channel outlives the thread.
     let _kept = done_sender;
     let mut queue: VecDeque<Message> = VecDeque::new();
@@ -154,7 +156,7 @@ pub fn serve(connection: &Connection, settings: Settings) -> bool {
             recv(done) -> done => if let Ok(done) = done { server.scheduled(done) },
             recv(timer) -> _ => server.due(),
         }
-        // What the client no longer wants is among what it sent since.
+        // What the client has cancelled is among what it sent since.
         queue.extend(connection.receiver.try_iter());
         while let Some(message) = queue.pop_front() {
             match message {
@@ -188,7 +190,27 @@ fn plural(number: u64, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }
 
-impl Server<'_> {
+impl Server {
+    fn new(settings: Settings, sender: Sender<Message>, clock: Clock, worker: Option<Worker>) -> Server {
+        Server {
+            settings,
+            sender,
+            clock,
+            client: Client::default(),
+            phase: Phase::Starting,
+            workspace: Workspace::default(),
+            programs: BTreeMap::new(),
+            stale: BTreeSet::new(),
+            read_at: None,
+            unscheduled: BTreeSet::new(),
+            schedule_at: None,
+            took: Duration::ZERO,
+            published: BTreeMap::new(),
+            worker,
+            asked: 0,
+        }
+    }
+
     fn send(&self, message: impl Into<Message>) {
         // If nobody receives it, the client is gone, and the loop will see that.
         let _ = self.sender.send(message.into());
@@ -213,7 +235,7 @@ impl Server<'_> {
         let of = |(root, program): (&PathBuf, &Program)| program.front.files.of(path).map(|_| root.clone());
         roots.extend(self.programs.iter().filter_map(of));
         self.stale.extend(roots);
-        self.read_at = Some(Instant::now() + self.took.clamp(PAUSE.0, PAUSE.1));
+        self.read_at = (self.clock)().map(|now| now + self.took.clamp(PAUSE.0, PAUSE.1));
     }
 
     /// Everything is to be read again.
@@ -232,9 +254,9 @@ impl Server<'_> {
             self.schedule_at = None;
             let texts = self.workspace.texts();
             for root in std::mem::take(&mut self.unscheduled) {
-                if let Some(program) = self.programs.get(&root) {
+                if let (Some(program), Some(worker)) = (self.programs.get(&root), &self.worker) {
                     let open = texts.clone();
-                    self.worker.start(Job { root, generation: program.generation, open });
+                    worker.start(Job { root, generation: program.generation, open });
                 }
             }
         }
@@ -250,28 +272,28 @@ impl Server<'_> {
             self.programs.keys().filter(|root| !wanted.contains(*root)).cloned().collect();
         for root in gone {
             self.programs.remove(&root);
-            self.worker.forget(&root);
+            self.worker.iter().for_each(|worker| worker.forget(&root));
             self.publish(&root, BTreeMap::new());
         }
         let texts = self.workspace.texts();
-        let started = Instant::now();
+        let started = (self.clock)();
         for root in std::mem::take(&mut self.stale).into_iter().filter(|root| wanted.contains(root)) {
             let (front, checked) = program::check(&self.settings, &root, &texts);
             drop(checked);
             let before = self.programs.remove(&root);
             let generation = before.as_ref().map_or(0, |before| before.generation) + 1;
-            self.worker.is_at(&root, generation);
+            self.worker.iter().for_each(|worker| worker.is_at(&root, generation));
             let told = diagnostics::by_file(&front.files, &front.diagnostics, &root, self.client.encoding);
             // A program with mistakes is not scheduled.
             if !front.diagnostics.has_errors() {
                 self.unscheduled.insert(root.clone());
-                self.schedule_at = Some(Instant::now() + LONG_PAUSE);
+                self.schedule_at = (self.clock)().map(|now| now + LONG_PAUSE);
             }
             let full = before.and_then(|before| before.full);
             self.programs.insert(root.clone(), Program { front, full, generation });
             self.publish(&root, told);
         }
-        self.took = started.elapsed();
+        self.took = started.map_or(Duration::ZERO, |started| started.elapsed());
     }
 
     /// The second thread is done with a program.
@@ -284,6 +306,10 @@ impl Server<'_> {
         let told = diagnostics::by_file(&full.files, &full.diagnostics, &root, self.client.encoding);
         program.full = Some(full);
         self.publish(&root, told);
+        if self.client.wants_counted {
+            let counted = json!({ "uri": uri::of_path(&root) });
+            self.send(Notification::new("takt/counted".to_owned(), counted));
+        }
         if self.client.refreshes_hints {
             self.ask("workspace/inlayHint/refresh");
         }

@@ -50,7 +50,7 @@ pub(crate) fn renamable(front: &Front, offset: u32) -> Result<(Span, String), St
 
 /// The edits that give a name another one, in every program that a file is of.
 ///
-/// The programs are read anew with the edits: each must declare and name the same as before, under the new name, and have
+/// The programs are read again with the edits: each must declare and name the same as before, under the new name, and have
 /// no new mistake.
 pub(crate) fn rename(
     settings: &Settings,

@@ -140,7 +140,7 @@ pub(crate) fn check(settings: &Settings, root: &Path, open: &Open) -> (Front, Ch
     let options = Options { machine: settings.machine, levels: settings.levels, ..Options::default() };
     let check = |project: &dyn Loader, name: &str| takt_asm::check(name, project, &options);
     let checked = if folder.as_os_str().is_empty() {
-        let mut alone = MemoryLoader::default();
+        let mut alone = MemoryLoader::new(settings.beside);
         if let Some(text) = open.get(root) {
             alone.add(UNNAMED, text.as_bytes());
         }

@@ -1,6 +1,7 @@
 //! The answers to requests about a document.
 
 use crate::lsp::dispatch::parameters;
+use crate::lsp::pipeline::{self, Pipeline};
 use crate::lsp::program::{Counted, File, Front, Full};
 use crate::lsp::text::Text;
 use crate::lsp::{Server, complete, diagnostics, hover, names, outline, timing, uri};
@@ -43,7 +44,7 @@ impl Here<'_> {
     }
 }
 
-impl Server<'_> {
+impl Server {
     /// Answers a request from what the documents say now.
     pub(crate) fn answer(&mut self, method: &str, params: Value) -> Result<Value, Failed> {
         if !self.stale.is_empty() {
@@ -79,6 +80,10 @@ impl Server<'_> {
             "textDocument/codeLens" => {
                 let document = self.document_of(&params)?;
                 value(self.lenses(&document)?)
+            }
+            "takt/pipeline" => {
+                let document = self.document_of(&params)?;
+                value(self.pipeline(&document)?)
             }
             "textDocument/codeAction" => value(self.fixes(&parameters(method, params)?)),
             "textDocument/formatting" => {
@@ -283,6 +288,18 @@ impl Server<'_> {
             })
         });
         Ok(hints.collect())
+    }
+
+    /// The picture of the program that a document is of; none before it is counted.
+    fn pipeline(&self, uri: &Uri) -> Result<Option<Pipeline>, Failed> {
+        let here = self.here(uri)?;
+        let Some((counted, moved)) = here.counted().and_then(|counted| Some((counted, here.moved()?))) else {
+            return Ok(None);
+        };
+        let path = |name: &str| here.full?.files.named(name)?.path.as_deref().and_then(uri::of_path);
+        // Lines of this document follow what is written; those of others are as they were counted.
+        let line = |name: &str, line| if *here.file.name == *name { moved.line(line) } else { Some(line) };
+        Ok(Some(pipeline::pipeline(counted, path, line)))
     }
 
     fn lenses(&self, uri: &Uri) -> Result<Vec<CodeLens>, Failed> {

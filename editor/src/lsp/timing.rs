@@ -66,10 +66,27 @@ fn cycle(program: &Program, issue: &StraightIssue) -> String {
     if program.sections.iter().any(|section| section.start == issue.from) {
         return issue.cycle.to_string();
     }
-    match program.nearest_label(issue.from) {
-        Some((label, 0)) => format!("{label} {}", issue.cycle),
-        _ => format!("@{} {}", issue.from, issue.cycle),
+    format!("{} {}", cycle_from(program, issue.from), issue.cycle)
+}
+
+/// From where cycles count: a section's or a label's name, or a bundle, `@12`.
+pub(crate) fn cycle_from(program: &Program, from: BundleAddress) -> String {
+    if let Some(section) = program.sections.iter().find(|section| section.start == from) {
+        return section.name.to_string();
     }
+    match program.nearest_label(from) {
+        Some((label, 0)) => label.to_owned(),
+        _ => format!("@{from}"),
+    }
+}
+
+/// An operation with the program's names for its registers and its target.
+pub(crate) fn operation_text(program: &Program, slot: SlotIndex, instruction: &Instruction) -> String {
+    let name = |register| program.register_text(register);
+    instruction.text_with(program.machine, slot, name, |target| match program.nearest_label(target) {
+        Some((label, 0)) => label.to_owned(),
+        _ => target.to_string(),
+    })
 }
 
 fn short(counted: &Counted, words: &[Word]) -> String {
@@ -103,12 +120,7 @@ fn explained(counted: &Counted, words: &[Word]) -> String {
         let word = program.words(address).and_then(|words| words.get(slot.index()).copied());
         let Some(instruction) = word.and_then(|word| Instruction::decode(word).ok()) else { continue };
         let name = |register| program.register_text(register);
-        let operation = instruction.text_with(program.machine, slot, name, |target| {
-            match program.nearest_label(target) {
-                Some((label, 0)) => label.to_owned(),
-                _ => target.to_string(),
-            }
-        });
+        let operation = operation_text(program, slot, &instruction);
         let slot_name = program.machine.slots[slot.index()].name;
         let _ = write!(
             text,

@@ -49,7 +49,7 @@ impl Workspace {
         Arc::new(self.open.iter().map(|(path, text)| (path.clone(), Arc::clone(&text.text))).collect())
     }
 
-    /// Looks anew at the sources on the disk: those of the client's folders and those beside open ones.
+    /// Reads the sources on the disk again: those of the client's folders and those beside open ones.
     pub(crate) fn scan(&mut self) {
         let mut found = BTreeMap::new();
         let mut folders: Vec<(PathBuf, usize)> =

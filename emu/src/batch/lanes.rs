@@ -272,6 +272,8 @@ impl Lanes {
             Kind::Store => return self.store(micro, present),
             Kind::ReadFlags => registers[dest] = self.flags.map(|flags| flags.bits().into()),
             Kind::ClearFlags => self.flags = [Flags::NONE; LANES],
+            // Nobody watches the ports of a batch.
+            Kind::Watch => return Ok(()),
             Kind::Check => {
                 let row = &registers[micro.a.index()];
                 let mut any = false;

@@ -22,6 +22,7 @@ pub(crate) fn program(machine: &'static Machine, source: &str) -> Program {
         registers: Vec::new(),
         symbols: Vec::new(),
         loop_bounds: Vec::new(),
+        ranges: Vec::new(),
         parts: Vec::new(),
         latched: false,
         sections: Vec::new(),

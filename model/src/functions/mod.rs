@@ -78,6 +78,27 @@ pub struct Port {
     pub text: String,
 }
 
+/// Inputs or outputs that are one array.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Array {
+    /// Its name.
+    pub name: String,
+    /// Its dimensions; none if it is a number.
+    pub shape: Vec<usize>,
+    /// Which input or output each element is, the last index fastest; none of a structural zero. Those above the diagonal of a symmetric
+    /// matrix are those below it.
+    pub elements: Vec<Option<usize>>,
+}
+
+impl Array {
+    /// An array whose elements are the inputs or outputs from `first` on.
+    pub fn new(name: &str, first: usize, shape: &[usize]) -> Array {
+        let count = shape.iter().product::<usize>();
+        let elements = (first..first + count).map(Some).collect();
+        Array { name: name.to_owned(), shape: shape.to_vec(), elements }
+    }
+}
+
 /// Named outputs as a graph of named inputs.
 pub struct Function {
     /// What is computed.
@@ -88,6 +109,10 @@ pub struct Function {
     pub inputs: Vec<Port>,
     /// The outputs and their nodes.
     pub outputs: Vec<(Port, Id)>,
+    /// The arrays that the inputs are.
+    pub input_arrays: Vec<Array>,
+    /// And the outputs.
+    pub output_arrays: Vec<Array>,
     /// The graph.
     pub graph: Graph,
 }

@@ -2,7 +2,7 @@
 //! taken.
 
 use super::links::{Angles, Motion};
-use super::{Function, Port, What, inverse, kinematics, mass};
+use super::{Array, Function, Port, What, inverse, kinematics, mass};
 use crate::Error;
 use crate::graph::{Delays, Expr, Graph, Id, Rewrites};
 use crate::robot::frames::{self, Layout, Link};
@@ -188,6 +188,20 @@ pub(super) fn port_names(robot: &Robot) -> Vec<String> {
 struct Inputs<'g> {
     graph: &'g Graph,
     ports: Vec<Port>,
+    arrays: Vec<Array>,
+}
+
+/// The outputs and the arrays that they are.
+struct Outputs {
+    ports: Vec<(Port, Id)>,
+    arrays: Vec<Array>,
+}
+
+impl Outputs {
+    /// Those that are one array.
+    fn array(name: &str, shape: &[usize], ports: Vec<(Port, Id)>) -> Outputs {
+        Outputs { arrays: vec![Array::new(name, 0, shape)], ports }
+    }
 }
 
 impl<'g> Inputs<'g> {
@@ -200,6 +214,7 @@ impl<'g> Inputs<'g> {
         unit: &dyn Fn(Kind) -> String,
     ) -> Vec<Expr<'g>> {
         let names = port_names(robot);
+        self.arrays.push(Array::new(what, self.ports.len(), &[robot.joints.len()]));
         let mut inputs = Vec::new();
         for (joint, name) in robot.joints.iter().zip(names) {
             inputs.push(self.graph.input(self.ports.len()));
@@ -218,12 +233,13 @@ fn write(
     attempt: &Attempt,
 ) -> Function {
     let graph = Graph::new(options.rewrites);
-    let (inputs, outputs) = {
-        let mut inputs = Inputs { graph: &graph, ports: Vec::new() };
+    let (inputs, input_arrays, outputs) = {
+        let mut inputs = Inputs { graph: &graph, ports: Vec::new(), arrays: Vec::new() };
         let outputs = equations(&mut inputs, robot, what, options, tip, attempt);
-        (inputs.ports, outputs)
+        (inputs.ports, inputs.arrays, outputs)
     };
-    Function { title: String::new(), notes: Vec::new(), inputs, outputs, graph }
+    let Outputs { ports: outputs, arrays: output_arrays } = outputs;
+    Function { title: String::new(), notes: Vec::new(), inputs, outputs, input_arrays, output_arrays, graph }
 }
 
 fn equations(
@@ -233,7 +249,7 @@ fn equations(
     options: &Options<'_>,
     tip: Option<Tip<'_>>,
     attempt: &Attempt,
-) -> Vec<(Port, Id)> {
+) -> Outputs {
     let graph = inputs.graph;
     let mut links = frames::place(robot, &attempt.layout);
     let mut gravity = robot.gravity;
@@ -257,12 +273,11 @@ fn equations(
     let q = inputs.joints(robot, "q", "position", &position);
     let outputs = |what: &str, text: &str, unit: &dyn Fn(Kind) -> String, values: Vec<Expr<'_>>| {
         let ports = robot.joints.iter().zip(&names).zip(values);
-        ports
-            .map(|((joint, name), value)| {
-                let text = format!("{text} of {}, {}", joint.name, unit(joint.kind));
-                (Port { name: format!("{what}_{name}"), text }, value.id())
-            })
-            .collect::<Vec<_>>()
+        let ports = ports.map(|((joint, name), value)| {
+            let text = format!("{text} of {}, {}", joint.name, unit(joint.kind));
+            (Port { name: format!("{what}_{name}"), text }, value.id())
+        });
+        Outputs::array(what, &[count], ports.collect())
     };
     let inverse = |links: &[Link], qd: &[Expr<'_>], qdd: &[Expr<'_>]| -> Vec<Id> {
         let again = |list: &[Expr<'_>], i: usize| graph.expr(list[i].id());
@@ -294,14 +309,17 @@ fn equations(
             let angles = Angles::new(graph, &links, &q, attempt.sums);
             let matrix = mass::matrix(graph, &links, &angles, &q);
             let mut ports = Vec::new();
+            let mut elements = vec![None; count * count];
             for (row, entries) in matrix.iter().enumerate() {
                 for (column, entry) in entries.iter().enumerate() {
                     let text = format!("inertia of {} and {}", links[row].name, links[column].name);
                     let port = Port { name: format!("M_{}_{}", row + 1, column + 1), text };
+                    elements[row * count + column] = Some(ports.len());
+                    elements[column * count + row] = Some(ports.len());
                     ports.push((port, entry.unwrap_or_else(|| graph.constant(0.0)).id()));
                 }
             }
-            ports
+            Outputs { ports, arrays: vec![Array { elements, ..Array::new("M", 0, &[count, count]) }] }
         }
         What::ForwardDynamics => {
             let qd = inputs.joints(robot, "qd", "velocity", &speed);
@@ -313,12 +331,14 @@ fn equations(
             outputs("qdd", "acceleration", &rate, mass::solve(&links, matrix, forces))
         }
         What::ForwardKinematics | What::Jacobian => {
-            let Some((_, joint, pose)) = tip else { return Vec::new() };
+            let Some((_, joint, pose)) = tip else {
+                return Outputs { ports: Vec::new(), arrays: Vec::new() };
+            };
             let pose = aligned(&mut links, joint, &pose);
             let angles = Angles::new(graph, &links, &q, attempt.sums);
             if what == What::Jacobian {
                 let columns = kinematics::jacobian(graph, &links, &angles, &q, joint, &pose);
-                return jacobian_ports(graph, robot, &columns);
+                return Outputs::array("J", &[6, count], jacobian_ports(graph, robot, &columns));
             }
             let (rotation, position) =
                 kinematics::pose(graph, &links, &angles, &q, joint, &pose, attempt.split);
@@ -333,7 +353,7 @@ fn equations(
                 let port = Port { name: format!("p_{axis}"), text: format!("position along {axis}, m") };
                 ports.push((port, entry.id()));
             }
-            ports
+            Outputs { ports, arrays: vec![Array::new("R", 0, &[3, 3]), Array::new("p", 9, &[3])] }
         }
     }
 }

@@ -223,7 +223,7 @@ enum Carrier {
 
 /// Names for a message, not too many of them.
 pub(crate) fn list(names: &[&str]) -> String {
-    /// As many as one wants to read.
+    /// No more than are readable.
     const SHOWN: usize = 40;
     let mut text = names.iter().take(SHOWN).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
     if names.len() > SHOWN {

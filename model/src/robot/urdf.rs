@@ -9,6 +9,8 @@ use crate::Error;
 pub const MAX_BYTES: usize = 64 << 20;
 /// How far an angle may be from a multiple of a quarter turn to be taken for it, rad: descriptions write π/2 with 6 to 16 digits.
 pub const SNAP: f64 = 1e-6;
+/// The most that it may be, rad: beyond, it would be another geometry.
+pub const MAX_SNAP: f64 = 0.01;
 
 /// A robot's description in URDF. Angles within `snap` of a multiple of π/2 are taken for it.
 ///

@@ -4,27 +4,19 @@ use crate::{assemble_text, common};
 use std::path::Path;
 use takt_emu::Emulator;
 use takt_isa::MACHINES;
+use takt_programs::listings::{Listing, listings};
 
 const DOCUMENTS: &[&str] = &["docs/fast-code.md", "docs/examples.md", "docs/library.md"];
-
-/// The listings of a document, each with its name: ```` ```asm ```` behind a line `<!-- listing: NAME -->`.
-fn listings(text: &str) -> Vec<(&str, &str)> {
-    let mut found = Vec::new();
-    for part in text.split("<!-- listing: ").skip(1) {
-        let (name, rest) = part.split_once(" -->\n```asm\n").expect("a listing follows its name");
-        let (listing, _) = rest.split_once("```").expect("it ends");
-        found.push((name, listing));
-    }
-    assert_eq!(found.len(), text.matches("```asm").count(), "every listing has a name");
-    found
-}
 
 #[test]
 fn listings_take_what_the_documents_say() {
     for document in DOCUMENTS {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(document);
         let text = std::fs::read_to_string(path).expect("the document is there");
-        for (name, listing) in listings(&text) {
+        let listings = listings(&text);
+        assert!(!listings.is_empty(), "{document} has listings");
+        for Listing { name, line, text: listing, .. } in listings {
+            let name = name.unwrap_or_else(|| panic!("{document}:{line}: the listing has a name"));
             let mut costs = Vec::new();
             for machine in MACHINES {
                 let assembled = assemble_text(machine, &format!("{name}.s"), listing);
@@ -39,4 +31,27 @@ fn listings_take_what_the_documents_say() {
             common::check_table(document, name, &format!("Cycles of a period: {}.", costs.join(", ")));
         }
     }
+}
+
+/// What the book opens in the playground.
+#[test]
+fn every_listing_is_of_a_program_that_assembles() {
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
+    let mut documents: Vec<_> = std::fs::read_dir(docs)
+        .expect("it is there")
+        .map(|entry| entry.expect("it can be read").path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "md"))
+        .collect();
+    documents.sort();
+    let mut count = 0;
+    for path in documents {
+        let text = std::fs::read_to_string(&path).expect("it is text");
+        for Listing { line, program, .. } in listings(&text) {
+            let name = path.file_name().expect("it has one").to_string_lossy();
+            // The name is in the message if it does not assemble.
+            assemble_text(&takt_isa::T3, &format!("{name}:{line}"), &program);
+            count += 1;
+        }
+    }
+    assert!(count >= 11, "{count} listings");
 }

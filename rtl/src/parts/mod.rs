@@ -10,7 +10,6 @@ mod loader;
 mod operands;
 mod ports;
 mod status;
-mod synthesis;
 mod write_back;
 
 use crate::plan::names::net;
@@ -26,8 +25,7 @@ impl Plan {
 
 /// The core, with a default for its parameter `LATCHED`.
 pub(crate) fn core(plan: &Plan, latched: u16) -> Result<String, ModuleError> {
-    let ports = ports::ports(plan).into_iter().map(|(port, _)| port).collect();
-    let mut m = Module::new(&plan.top(), heading(plan), ports);
+    let mut m = Module::new(&plan.top(), heading(plan), ports::ports(plan));
     m.takes(Parameter {
         net: net::LATCHED.clone(),
         value: u32::from(latched),
@@ -51,11 +49,6 @@ pub(crate) fn core(plan: &Plan, latched: u16) -> Result<String, ModuleError> {
 /// A slot's decoder.
 pub(crate) fn decoder(plan: &Plan, slot: &SlotPlan) -> Result<String, ModuleError> {
     decoder::module(plan, slot)
-}
-
-/// The core on a few pins.
-pub(crate) fn synthesis(plan: &Plan) -> Result<String, ModuleError> {
-    synthesis::module(plan)
 }
 
 fn heading(plan: &Plan) -> Vec<String> {

@@ -3,11 +3,10 @@
 use crate::export::{INPUT_DELAY, RESET_CYCLES};
 use crate::plan::Plan;
 use crate::plan::names::net;
-use crate::verilog::{Direction, Net, Port};
+use crate::verilog::{Direction, Port};
 
-/// The ports, in order. Those that a synthesis without a board leaves out are marked: they serve verification only, or who integrates
-/// the core.
-pub(super) fn ports(plan: &Plan) -> Vec<(Port, bool)> {
+/// The ports, in order.
+pub(super) fn ports(plan: &Plan) -> Vec<Port> {
     let machine = plan.machine;
     let input = |net| Port::new(Direction::Input, net);
     let output = |net| Port::new(Direction::Output, net);
@@ -75,20 +74,10 @@ pub(super) fn ports(plan: &Plan) -> Vec<(Port, bool)> {
         output(plan.retire_value()),
         output(plan.retire_flags()).remark("{invalid, divide by zero, overflow}"),
     ];
-    let marked = |mark| move |port| (port, mark);
-    let status = [output(net::STATUS).remark("the sticky flags")];
-    let used = ports.into_iter().map(marked(false));
-    let used = used.chain(by_number.into_iter().map(marked(true))).chain(rest.map(marked(false)));
-    used.chain(verification.into_iter().map(marked(true))).chain(status.map(marked(false))).collect()
+    ports.extend(by_number.into_iter().chain(rest).chain(verification));
+    ports.push(output(net::STATUS).remark("the sticky flags"));
+    ports
 }
 
 const RESET: &str = "synchronous; held for 64 cycles or more";
 const _: () = assert!(RESET_CYCLES == 64, "say so in the remark");
-
-/// The same, by name: what drives the core from outside and what it delivers, the clock and reset apart.
-pub(super) fn used(plan: &Plan, direction: Direction) -> impl Iterator<Item = Net> {
-    ports(plan).into_iter().filter_map(move |(port, left_out)| {
-        let wanted = port.direction == direction && !left_out;
-        (wanted && port.net != net::CLK && port.net != net::RST).then_some(port.net)
-    })
-}

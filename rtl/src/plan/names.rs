@@ -41,11 +41,6 @@ impl Plan {
         format!("takt_{}", self.machine.name)
     }
 
-    /// The module for a synthesis without a board: the core between a shift register and a parity.
-    pub fn synthesis_top(&self) -> String {
-        super::synthesis_top(self.machine)
-    }
-
     /// The module of a slot's decoder.
     pub fn decoder(&self, slot: &SlotPlan) -> String {
         format!("{}_decode_{}", self.top(), slot.name())

@@ -93,6 +93,11 @@ fn has_bit(effect: Effect) -> bool {
 }
 
 impl SlotPlan {
+    /// Low bits of a word that are 0 in every operation of the slot: the third operand's and the immediate's, where none has one.
+    pub(crate) fn low_zeros(&self) -> u32 {
+        self.rows.iter().fold(0, |mask, row| mask | row.shape.mask()).trailing_zeros()
+    }
+
     pub(super) fn new(
         slot: &'static Slot,
         number: u32,

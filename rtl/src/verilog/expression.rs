@@ -227,11 +227,6 @@ impl Expr {
         Expr::Reduce("&", Box::new(self))
     }
 
-    /// Whether an odd number of bits is 1.
-    pub fn parity(self) -> Expr {
-        Expr::Reduce("^", Box::new(self))
-    }
-
     /// Whether it equals another one.
     pub fn is(self, other: impl Into<Expr>) -> Expr {
         Expr::Compare("==", Box::new(self), Box::new(other.into()))

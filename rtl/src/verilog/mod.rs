@@ -94,7 +94,6 @@ pub(crate) struct Parameter {
 enum Kind {
     Wire,
     Reg,
-    Integer,
 }
 
 /// A statement of an always block.
@@ -104,8 +103,6 @@ pub(crate) enum Statement {
     Set { left: Expr, right: Expr, remark: Option<&'static str> },
     /// Only if the condition is 1.
     If { condition: Expr, body: Vec<Statement> },
-    /// For each value of the variable from 0 up to `count - 1`.
-    For { variable: Net, count: u32, body: Vec<Statement> },
     /// The arm whose number `of` is; else the default.
     Case { of: Expr, arms: Vec<Arm>, default: Vec<Statement> },
 }
@@ -145,10 +142,6 @@ impl Statement {
             }
             Statement::If { condition, body } => {
                 condition.nets(see);
-                body.iter().for_each(|statement| statement.nets(see));
-            }
-            Statement::For { variable, body, .. } => {
-                see(variable);
                 body.iter().for_each(|statement| statement.nets(see));
             }
             Statement::Case { of, arms, default } => {
@@ -341,10 +334,6 @@ impl Module {
     /// A register with a comment behind it.
     pub(crate) fn reg(&mut self, net: Net, remark: &'static str) {
         self.add(Item::Nets { kind: Kind::Reg, nets: vec![net], value: None, remark: Some(remark) });
-    }
-
-    pub(crate) fn integer(&mut self, net: Net) {
-        self.nets(Kind::Integer, [net]);
     }
 
     /// A wire and what it is.

@@ -93,7 +93,6 @@ fn write_item(v: &mut String, item: &Item) {
             let kind = match kind {
                 Kind::Wire => "wire",
                 Kind::Reg => "reg",
-                Kind::Integer => "integer",
             };
             let range = nets.first().map_or_else(String::new, super::Net::range_text);
             let head = format!("    {kind} {range}");
@@ -170,10 +169,6 @@ fn write_statements(v: &mut String, statements: &[Statement], operator: &str, in
                 }
                 Statement::If { condition, body } => {
                     write_body(v, &format!("{:indent$}if ({condition})", ""), body, operator, indent);
-                }
-                Statement::For { variable: i, count, body } => {
-                    let head = format!("{:indent$}for ({i} = 0; {i} < {count}; {i} = {i} + 1)", "");
-                    write_body(v, &head, body, operator, indent);
                 }
                 Statement::Case { of, arms, default } => {
                     let _ = writeln!(v, "{:indent$}case ({of})", "");

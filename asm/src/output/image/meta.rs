@@ -3,7 +3,7 @@
 use super::validate::{NO_BANK, wrong_port};
 use super::{ImageError, VERSION};
 use serde::{Deserialize, Serialize};
-use takt_isa::program::{Columns, Location, Port, Section, Symbol};
+use takt_isa::program::{Columns, Location, Port, Range, Section, Symbol};
 use takt_isa::{BundleAddress, Machine, Program, Register, Type};
 
 #[derive(Serialize, Deserialize)]
@@ -17,6 +17,9 @@ pub(super) struct Meta {
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     latched: bool,
     registers: Vec<MetaPort>,
+    /// Left out if there is none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    ranges: Vec<MetaRange>,
     sections: Vec<MetaSection>,
     files: Vec<String>,
     /// For each word of code its file and line.
@@ -48,6 +51,16 @@ pub(super) enum MetaType {
     Float,
     Int,
     Bits,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MetaRange {
+    register: u16,
+    #[serde(rename = "type")]
+    ty: MetaType,
+    low: u32,
+    high: u32,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -88,6 +101,12 @@ impl Meta {
             };
             ports.iter().map(port).collect()
         };
+        let range = |range: &Range| MetaRange {
+            register: range.register.get(),
+            ty: range.ty.into(),
+            low: range.low,
+            high: range.high,
+        };
         let section = |section: &Section| MetaSection {
             name: section.name.clone(),
             start: section.start,
@@ -100,6 +119,7 @@ impl Meta {
             outputs: ports(&program.outputs),
             latched: program.latched,
             registers: ports(&program.registers),
+            ranges: program.ranges.iter().map(range).collect(),
             sections: program.sections.iter().map(section).collect(),
             files: program.files.clone(),
             lines: program
@@ -140,6 +160,11 @@ impl Meta {
             };
             ports.into_iter().map(port).collect()
         };
+        let range = |MetaRange { register, ty, low, high }: MetaRange| {
+            let reason = "there is no such register";
+            let known = Register::new(register.into()).ok_or(ImageError::Range { register, reason })?;
+            Ok(Range { register: known, ty: ty.into(), low, high })
+        };
         let section = |MetaSection { name, start, end }| Section { name, start, end };
         Ok(Program {
             machine,
@@ -152,6 +177,7 @@ impl Meta {
             registers: ports("register", self.registers)?,
             symbols,
             loop_bounds: Vec::new(),
+            ranges: self.ranges.into_iter().map(range).collect::<Result<_, ImageError>>()?,
             sections: self.sections.into_iter().map(section).collect(),
             files: self.files,
             lines: self

@@ -152,6 +152,14 @@ pub enum ImageError {
         /// What is wrong.
         reason: &'static str,
     },
+    /// A range is of no register, is none, or is out of order.
+    #[error("the range of register {register}: {reason}")]
+    Range {
+        /// The register's address.
+        register: u16,
+        /// What is wrong.
+        reason: &'static str,
+    },
     /// The format cannot hold it.
     #[error("an image cannot hold this program: {0}")]
     Unwritable(String),

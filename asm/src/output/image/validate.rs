@@ -77,6 +77,7 @@ pub(super) fn program(program: &Program) -> Result<(), ImageError> {
     labels(program)?;
     sections(program)?;
     loops(program)?;
+    ranges(program)?;
     lines(program)
 }
 
@@ -93,6 +94,25 @@ fn loops(program: &Program) -> Result<(), ImageError> {
             return Err(ImageError::Loop { address, reason });
         }
         last = Some(address);
+    }
+    Ok(())
+}
+
+fn ranges(program: &Program) -> Result<(), ImageError> {
+    let mut last = None;
+    for range in &program.ranges {
+        let register = range.register;
+        let reason = match range.mistake() {
+            _ if !program.machine.has_register(register) || register == Register::ZERO => {
+                "there is no such register"
+            }
+            _ if last.is_some_and(|last| last >= register) => "ranges are not in ascending order",
+            mistake => mistake.unwrap_or_default(),
+        };
+        if !reason.is_empty() {
+            return Err(ImageError::Range { register: register.get(), reason });
+        }
+        last = Some(register);
     }
     Ok(())
 }

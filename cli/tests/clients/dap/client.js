@@ -61,11 +61,61 @@ async function main() {
   await client.setFunctionBreakpointsRequest({ breakpoints: [{ name: 'add' }] });
   found.reverse = await run((a) => client.reverseContinueRequest(a));
   await client.setFunctionBreakpointsRequest({ breakpoints: [] });
+  // Our own requests; and log points, which are no stops on the way back.
+  found.cycle = await run(() => client.customRequest('takt/gotoCycle', { cycle: 9 }));
+  found.atCycle = (await client.evaluateRequest({ expression: 'cycle', context: 'watch' })).body.result;
+  found.noCycle = await client.customRequest('takt/gotoCycle', { cycle: -1 }).catch((error) => error.message);
+  await run(() => client.customRequest('takt/gotoCycle', { cycle: 45 }));
+  await client.setBreakpointsRequest({ source: { path: program }, breakpoints: [{ line: 8, logMessage: 'back' }] });
+  found.beginning = await run((a) => client.reverseContinueRequest(a));
+  await client.setBreakpointsRequest({ source: { path: program }, breakpoints: [] });
+  found.filters = capabilities.exceptionBreakpointFilters.map((filter) => filter.filter);
+  await client.setExceptionBreakpointsRequest({ filters: found.filters });
   found.halted = await run((a) => client.continueRequest(a));
   found.count = (await client.evaluateRequest({ expression: 'count', context: 'watch' })).body.result;
   const over = client.waitForEvent('terminated');
   await client.continueRequest({ threadId });
   found.terminated = (await over).event;
+  await client.stop();
+  await closedLoop();
+}
+
+// Attached to the closed loop: periods, hexadecimal values, what a port becomes.
+async function closedLoop() {
+  const client = new DebugClient(takt, 'dap', 'takt', { cwd: folder });
+  client.defaultTimeout = 60000;
+  await client.start();
+  await client.initializeRequest();
+  await Promise.all([
+    client.waitForEvent('initialized'),
+    client.attachRequest({ track: true, periods: 10 }),
+  ]);
+  const entry = client.waitForEvent('stopped');
+  await client.configurationDoneRequest();
+  await entry;
+  const evaluate = async (expression, format) =>
+    (await client.evaluateRequest({ expression, context: 'watch', format })).body.result;
+  const run = async (request) => {
+    const stopped = client.waitForEvent('stopped');
+    await request;
+    return (await stopped).body.reason;
+  };
+  found.gone = await run(client.customRequest('takt/gotoPeriod', { period: 3 }));
+  found.period = await evaluate('period');
+  const scopes = (await client.scopesRequest({ frameId: 0 })).body.scopes;
+  const outputs = scopes.find((scope) => scope.name === 'Outputs').variablesReference;
+  const rows = (await client.variablesRequest({ variablesReference: outputs, format: { hex: true } })).body.variables;
+  found.hex = rows.map((row) => row.value);
+  const views = rows.find((row) => row.variablesReference > 0).variablesReference;
+  found.ulp = (await client.variablesRequest({ variablesReference: views })).body.variables.at(-1);
+  const info = (await client.dataBreakpointInfoRequest({ name: rows[0].name })).body;
+  const before = await evaluate(rows[0].name);
+  await client.setDataBreakpointsRequest({ breakpoints: [{ dataId: info.dataId }] });
+  found.port = await run(client.continueRequest({ threadId: 1 }));
+  found.another = (await evaluate(rows[0].name)) !== before;
+  // No NaN comes: it runs to the end of the periods.
+  const checked = await client.setDataBreakpointsRequest({ breakpoints: [{ dataId: info.dataId, condition: 'nan' }] });
+  found.nan = checked.body.breakpoints[0].verified;
   await client.stop();
 }
 

@@ -4,8 +4,9 @@
     takt_expressions.casadi(f, "f.json")                      # a casadi.Function; MX functions are expanded
     takt_expressions.sympy("f", {"q": [q1, q2]}, {"tau": [e1, e2]}, "f.json")
 
-and then `takt model f.json`. docs/model.md describes the format, which anything may write. Nothing is simplified here
-beyond what the tool itself does: that is `takt model`'s task.
+and then `takt model f.json`. (The package `takt` goes the same way, without a file.) docs/model.md describes the format, which
+anything may write. Nothing is simplified here beyond what the tool itself does: that is `takt model`'s task. This module needs
+nothing but the tool whose expressions it reads.
 """
 
 import json
@@ -14,12 +15,16 @@ import math
 FORMAT = "takt-expressions 1"
 
 
-def _write(path, name, source, inputs, outputs, code):
+def _write(path, text):
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text)
+
+
+def _text(name, source, inputs, outputs, code):
     """One instruction a line, so that a message can say where."""
     head = {"format": FORMAT, "name": name, "source": source, "inputs": inputs, "outputs": outputs}
     lines = ",\n".join("  " + json.dumps(step, allow_nan=False) for step in code)
-    with open(path, "w", encoding="utf-8") as file:
-        file.write(json.dumps(head)[:-1] + ', "code": [\n' + lines + "\n]}\n")
+    return json.dumps(head)[:-1] + ', "code": [\n' + lines + "\n]}\n"
 
 
 def _finite(value):
@@ -31,6 +36,11 @@ def _finite(value):
 
 def casadi(function, path):
     """Writes a `casadi.Function` of version 3.6 to 3.8, expanded to scalars."""
+    _write(path, casadi_text(function))
+
+
+def casadi_text(function):
+    """The same as text."""
     import casadi as ca
 
     f = function if function.is_a("SXFunction") else function.expand()
@@ -55,7 +65,7 @@ def casadi(function, path):
             code.append({"op": op, "to": to[0], "value": _finite(f.instruction_constant(k))})
         else:
             code.append({"op": op, "to": to[0], "of": of})
-    _write(path, f.name(), "CasADi " + ca.__version__, inputs, outputs, code)
+    return _text(f.name(), "CasADi " + ca.__version__, inputs, outputs, code)
 
 
 class _Sympy:
@@ -131,6 +141,11 @@ class _Sympy:
 def sympy(name, inputs, outputs, path):
     """Writes SymPy expressions. Inputs and outputs are dictionaries from a name to a symbol or an expression, or to a list or
     Matrix of them."""
+    _write(path, sympy_text(name, inputs, outputs))
+
+
+def sympy_text(name, inputs, outputs):
+    """The same as text."""
     import sympy as sp
 
     def shaped(name, value):
@@ -153,4 +168,4 @@ def sympy(name, inputs, outputs, path):
     for step in walk.code:
         if step["op"] == "output":
             del step["to"]
-    _write(path, name, "SymPy " + sp.__version__, [i for i, _ in ins], [o for o, _ in outs], walk.code)
+    return _text(name, "SymPy " + sp.__version__, [i for i, _ in ins], [o for o, _ in outs], walk.code)

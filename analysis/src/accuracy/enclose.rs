@@ -1,0 +1,632 @@
+//! Bounds of every output's error, over every run whose inputs and states begin a period within their `.range`.
+//!
+//! Every way through a section is followed, loops turn by turn, as [`bound`](crate::bound()) follows them; ways that meet are joined.
+//! What a register may hold is a [`Value`]; the rows' meaning gives the results, and their `ulp` what rounding adds.
+
+use super::affine::Affine;
+use super::interval::Interval;
+use super::ulp;
+use super::value::{MAX_PATTERNS, Number, Operand, Problem, Value};
+use crate::error::{BoundError, Refusal, place};
+use crate::graph::{Edge, Graph};
+use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
+use takt_isa::fp::Host;
+use takt_isa::program::{Port, Range};
+use takt_isa::{
+    BundleAddress, Effect, Flow, Instruction, Program, Register, Row, SlotIndex, Type, compute, real,
+};
+
+/// Bundles that are gone through at most, over all sections.
+pub const MAX_BUNDLES: u64 = 1 << 18;
+/// Words of data memory that a load may read at most, where its address is not known for certain.
+const MAX_WORDS: usize = 4096;
+
+/// The bound of an output's error.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OutputBound {
+    /// Its name.
+    pub name: String,
+    /// Its register.
+    pub register: Register,
+    /// What it may be; `None` if a problem leaves that open.
+    pub range: Option<Interval>,
+    /// The magnitude of its error at most.
+    pub error: Option<f64>,
+    /// What each operation's rounding adds to that at most, by word, the largest first.
+    pub parts: Vec<(u32, f64)>,
+}
+
+impl OutputBound {
+    /// The bound in ulps of the output's largest value.
+    pub fn ulps(&self) -> Option<f64> {
+        Some(self.error? / ulp(self.range?.magnitude()))
+    }
+}
+
+/// What may go wrong at an operation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hazard {
+    /// Index into [`Program::code`].
+    pub word: u32,
+    /// What.
+    pub problem: Problem,
+    /// What the operation reads: its registers, and what they may hold as numbers, where that is known.
+    pub operands: Vec<(Register, Option<Interval>)>,
+}
+
+/// A state that was not shown to stay in its range.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Assumed {
+    /// The state.
+    pub range: Range,
+    /// What the period may leave in it.
+    pub found: Option<Interval>,
+}
+
+/// What holds for every period whose inputs and states begin it within their ranges, the states free of error.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Enclosure {
+    /// The outputs that carry binary32 and that a period writes.
+    pub outputs: Vec<OutputBound>,
+    /// Operations that may have no number as their result. If there are none: no NaN, no overflow, no division by zero.
+    pub hazards: Vec<Hazard>,
+    /// States whose range the source promises and nothing proves.
+    pub assumed: Vec<Assumed>,
+    /// Operations gone through.
+    pub operations: u64,
+}
+
+/// Encloses what every period of a program computes; of a program without periods, the run to its `halt`.
+///
+/// # Errors
+/// Where that cannot be followed: a loop without bound, a state or an input without a range, more ways than [`MAX_BUNDLES`].
+pub fn enclose(program: &Program) -> Result<Enclosure, BoundError> {
+    let graph = Graph::new(program)?;
+    let mut explorer = Explorer {
+        program,
+        graph,
+        symbols: Vec::new(),
+        hazards: BTreeMap::new(),
+        outputs: BTreeMap::new(),
+        left: BTreeMap::new(),
+        bundles: 0,
+        operations: 0,
+        stored: BTreeSet::new(),
+    };
+    explorer.stored = explorer.stores();
+    let mut seen = BTreeSet::new();
+    let mut sections = vec![(true, BundleAddress::RESET)];
+    let mut once_outputs = BTreeMap::new();
+    while let Some((once, address)) = sections.pop() {
+        if !seen.insert((once, address)) {
+            continue;
+        }
+        for target in explorer.section(once, address)? {
+            sections.push((false, target));
+        }
+        if once {
+            // Outputs are compared at the ends of periods.
+            once_outputs = std::mem::take(&mut explorer.outputs);
+            explorer.left.clear();
+        }
+    }
+    if seen.len() == 1 {
+        explorer.outputs = once_outputs;
+    }
+    Ok(explorer.finish())
+}
+
+/// Everything that an instruction may read at a point of the program.
+#[derive(Clone)]
+struct State {
+    registers: BTreeMap<Register, Value>,
+    /// Words that this period has written.
+    memory: BTreeMap<u32, Value>,
+    /// Return addresses, and the turns of the loops that are being turned.
+    calls: Vec<BundleAddress>,
+    turns: BTreeMap<(usize, BundleAddress), u32>,
+}
+
+/// Where a way has come to. Ways that come first in this order can still lead to those behind.
+type Position = Vec<u32>;
+
+struct Explorer<'p> {
+    program: &'p Program,
+    graph: Graph<'p>,
+    /// The word whose rounding a symbol stands for; `None` for an input's or state's value.
+    symbols: Vec<Option<u32>>,
+    hazards: BTreeMap<(u32, Problem), Vec<(Register, Option<Interval>)>>,
+    outputs: BTreeMap<Register, Value>,
+    /// What states hold at the end of a period.
+    left: BTreeMap<Register, Value>,
+    bundles: u64,
+    operations: u64,
+    /// Words of data memory that the program may change; all, if it stores where its registers say.
+    stored: BTreeSet<u32>,
+}
+
+impl Explorer<'_> {
+    fn symbol(&mut self, word: Option<u32>) -> u32 {
+        self.symbols.push(word);
+        (self.symbols.len() - 1) as u32
+    }
+
+    fn error(&self, address: BundleAddress, refusal: Refusal) -> BoundError {
+        BoundError::new(self.program, address, refusal)
+    }
+
+    /// Data words that a store may write.
+    fn stores(&self) -> BTreeSet<u32> {
+        let depth = self.program.machine.data_depth;
+        let mut stored = BTreeSet::new();
+        let instructions = self.program.code.iter().filter_map(|word| Instruction::decode(*word).ok());
+        for store in instructions.filter(|instruction| instruction.effect() == Effect::Store) {
+            match store.sources[0] == Register::ZERO {
+                true => stored.extend([store.constant]),
+                false => stored.extend(0..depth),
+            }
+        }
+        stored
+    }
+
+    /// What is known when a section begins.
+    fn begin(&mut self, once: bool) -> State {
+        let mut registers: BTreeMap<Register, Value> =
+            self.program.constants.iter().map(|(register, bits)| (*register, Value::bits(*bits))).collect();
+        if !once {
+            // What the program writes may be another by now.
+            for word in self.program.code.chunks_exact(self.program.machine.slots.len()) {
+                for (word, slot) in word.iter().zip(self.program.machine.slots) {
+                    if let Some(register) = Instruction::decode(*word).ok().and_then(|i| i.writes(slot)) {
+                        registers.remove(&register);
+                    }
+                }
+            }
+        }
+        registers.insert(Register::ZERO, Value::bits(0));
+        for range in &self.program.ranges {
+            if once && !self.program.machine.is_input(range.register) {
+                continue;
+            }
+            let value = self.ranged(range);
+            registers.insert(range.register, value);
+        }
+        State { registers, memory: BTreeMap::new(), calls: Vec::new(), turns: BTreeMap::new() }
+    }
+
+    fn ranged(&mut self, range: &Range) -> Value {
+        let (low, high) = range.ends();
+        let symbol = self.symbol(None);
+        let grid = (range.ty == Type::I).then_some(0);
+        let number = Rc::new(Number::of(Interval::new(low, high), symbol, grid));
+        match range.ty {
+            Type::F => Value::Float(number),
+            Type::I | Type::B => Value::Integer(number),
+        }
+    }
+
+    /// Follows every way from a section's beginning; where its `wait`s go on.
+    fn section(&mut self, once: bool, address: BundleAddress) -> Result<Vec<BundleAddress>, BoundError> {
+        let mut ways: BTreeMap<Position, (BundleAddress, State)> = BTreeMap::new();
+        let begin = self.begin(once);
+        self.join(&mut ways, address, begin)?;
+        let mut targets = Vec::new();
+        while let Some((_, (address, mut state))) = ways.pop_first() {
+            self.bundles += 1;
+            if self.bundles > MAX_BUNDLES {
+                let limit = Refusal::Limit { limit: MAX_BUNDLES, what: "bundles on the way here" };
+                return Err(self.error(address, limit));
+            }
+            let flow = self.graph.node(address)?.flow;
+            let before = match flow {
+                Flow::Branch { register, .. } => Some(self.read(&state, register, address)?),
+                _ => None,
+            };
+            self.execute(address, &mut state)?;
+            let next = address.next();
+            match flow {
+                Flow::Next => self.go(&mut ways, address, next, false, state)?,
+                Flow::Jump(target) => self.go(&mut ways, address, target, true, state)?,
+                Flow::Branch { zero, target, .. } => {
+                    let (may_zero, may_set) = before.map_or((true, true), |value| value.tested());
+                    let (taken, not) = if zero { (may_zero, may_set) } else { (may_set, may_zero) };
+                    if not {
+                        self.go(&mut ways, address, next, false, state.clone())?;
+                    }
+                    if taken {
+                        self.go(&mut ways, address, target, true, state)?;
+                    }
+                }
+                Flow::Call(target) => {
+                    if state.calls.len() as u32 >= self.program.machine.stack_depth {
+                        let depth = self.program.machine.stack_depth;
+                        return Err(self.error(address, Refusal::StackOverflow { needed: depth + 1, depth }));
+                    }
+                    state.calls.push(next);
+                    self.join(&mut ways, target, state)?;
+                }
+                Flow::Return => {
+                    let Some(target) = state.calls.pop() else {
+                        return Err(self.error(address, Refusal::StackUnderflow));
+                    };
+                    let depth = state.calls.len();
+                    state.turns.retain(|(level, _), _| *level <= depth);
+                    self.join(&mut ways, target, state)?;
+                }
+                Flow::Wait(target) => {
+                    if !state.calls.is_empty() {
+                        return Err(self.error(address, Refusal::WaitInSubroutine));
+                    }
+                    targets.push(target);
+                    self.end(&state);
+                }
+                Flow::Halt => self.end(&state),
+            }
+        }
+        Ok(targets)
+    }
+
+    /// Goes on to a bundle; a jump backwards is a turn more of the loop that it heads.
+    fn go(
+        &mut self,
+        ways: &mut BTreeMap<Position, (BundleAddress, State)>,
+        from: BundleAddress,
+        to: BundleAddress,
+        jump: bool,
+        mut state: State,
+    ) -> Result<(), BoundError> {
+        let depth = state.calls.len();
+        // What is left is not being turned any more.
+        state.turns.retain(|(level, head), _| *level < depth || self.graph.loops[head].body.contains(&to));
+        if jump && to <= from {
+            let Some(turned) = self.graph.loops.get(&to) else {
+                let refusal = Refusal::Unbounded { closed: place(self.program, from) };
+                return Err(self.error(to, refusal));
+            };
+            debug_assert!(turned.exits.iter().all(|Edge { to, .. }| !turned.body.contains(to)));
+            let turns = state.turns.entry((depth, to)).or_insert(1);
+            *turns += 1;
+            if *turns > turned.most {
+                // The promise of the source: it does not come to this.
+                return Ok(());
+            }
+        } else if self.graph.loops.contains_key(&to) {
+            state.turns.insert((depth, to), 1);
+        }
+        self.join(ways, to, state)
+    }
+
+    /// Adds a way; where another has come to the same place, both are one from here on.
+    fn join(
+        &mut self,
+        ways: &mut BTreeMap<Position, (BundleAddress, State)>,
+        address: BundleAddress,
+        state: State,
+    ) -> Result<(), BoundError> {
+        let position = self.position(address, &state);
+        match ways.get_mut(&position) {
+            None => {
+                ways.insert(position, (address, state));
+            }
+            Some((_, known)) => {
+                for (register, value) in &state.registers {
+                    let joined = known.registers.get(register).unwrap_or(&Value::Unknown).join(value);
+                    known.registers.insert(*register, joined);
+                }
+                known.registers.retain(|register, _| state.registers.contains_key(register));
+                let words: BTreeSet<u32> = known.memory.keys().chain(state.memory.keys()).copied().collect();
+                for word in words {
+                    let initial = || self.initial(word);
+                    let a = known.memory.get(&word).cloned().unwrap_or_else(initial);
+                    let b = state.memory.get(&word).cloned().unwrap_or_else(initial);
+                    known.memory.insert(word, a.join(&b));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Calls and turns from the outermost to the innermost, then the bundle.
+    fn position(&self, address: BundleAddress, state: &State) -> Position {
+        let mut position = Vec::new();
+        let level = |depth: usize, position: &mut Position| {
+            let turned = state.turns.iter().filter(|((level, _), _)| *level == depth);
+            let mut turned: Vec<(BundleAddress, u32)> =
+                turned.map(|((_, head), turns)| (*head, *turns)).collect();
+            // An outer loop has the larger body.
+            turned.sort_by_key(|(head, _)| std::cmp::Reverse(self.graph.loops[head].body.len()));
+            for (head, turns) in turned {
+                position.extend([head.get(), turns]);
+            }
+        };
+        for (depth, back) in state.calls.iter().enumerate() {
+            level(depth, &mut position);
+            // The call itself lies before its return address.
+            position.push(back.get() - 1);
+        }
+        level(state.calls.len(), &mut position);
+        position.push(address.get());
+        position
+    }
+
+    /// The value of a register, which must be known.
+    fn read(&self, state: &State, register: Register, address: BundleAddress) -> Result<Value, BoundError> {
+        match state.registers.get(&register) {
+            Some(Value::Unknown) | None => {
+                let name = self.program.register_text(register);
+                let input = self.program.machine.is_input(register);
+                Err(self.error(address, Refusal::NoRange { name, input }))
+            }
+            Some(value) => Ok(value.clone()),
+        }
+    }
+
+    /// A data word that this period has not written.
+    fn initial(&self, word: u32) -> Value {
+        match self.stored.contains(&word) {
+            true => Value::Unknown,
+            false => Value::bits(self.program.data.get(word as usize).copied().unwrap_or(0)),
+        }
+    }
+
+    fn execute(&mut self, address: BundleAddress, state: &mut State) -> Result<(), BoundError> {
+        let Some(Ok(instructions)) = self.program.bundle(address) else { return Ok(()) };
+        let machine = self.program.machine;
+        let mut written = Vec::new();
+        for ((number, slot), instruction) in machine.numbered_slots().zip(&instructions) {
+            let value = self.operation(address, number, instruction, state)?;
+            if let (Some(register), Some(value)) = (instruction.writes(slot), value) {
+                written.push((register, value));
+            }
+        }
+        state.registers.extend(written);
+        Ok(())
+    }
+
+    fn operation(
+        &mut self,
+        address: BundleAddress,
+        slot: SlotIndex,
+        instruction: &Instruction,
+        state: &mut State,
+    ) -> Result<Option<Value>, BoundError> {
+        let word = (address.index() * self.program.machine.slots.len() + slot.index()) as u32;
+        let mut operands = [(); 3].map(|()| Value::bits(0));
+        for (operand, register) in operands.iter_mut().zip(instruction.reads()) {
+            *operand = self.read(state, *register, address)?;
+        }
+        self.operations += u64::from(instruction.effect() != Effect::Nothing);
+        Ok(match instruction.effect() {
+            Effect::Compute => Some(self.compute(word, instruction, &operands)),
+            Effect::Immediate => Some(Value::bits(instruction.constant)),
+            Effect::Load => {
+                let mut loaded: Option<Value> = None;
+                for word in self.addresses(instruction, &operands[0], address)? {
+                    let value = state.memory.get(&word).cloned().unwrap_or_else(|| self.initial(word));
+                    if value == Value::Unknown {
+                        return Err(self.error(address, Refusal::NoRangeOfWord { word }));
+                    }
+                    loaded = Some(loaded.map_or(value.clone(), |known| known.join(&value)));
+                }
+                Some(loaded.unwrap_or(Value::Broken))
+            }
+            Effect::Store => {
+                let words = self.addresses(instruction, &operands[0], address)?;
+                let certain = words.len() == 1;
+                for word in words {
+                    let known = state.memory.get(&word).cloned().unwrap_or_else(|| self.initial(word));
+                    let value = if certain { operands[1].clone() } else { known.join(&operands[1]) };
+                    state.memory.insert(word, value);
+                }
+                None
+            }
+            Effect::ReadFlags => Some(Value::Any),
+            _ => None,
+        })
+    }
+
+    /// The data words that a load or store may touch.
+    fn addresses(
+        &self,
+        instruction: &Instruction,
+        base: &Value,
+        address: BundleAddress,
+    ) -> Result<Vec<u32>, BoundError> {
+        let depth = self.program.machine.data_depth;
+        let words: Vec<u32> = match base {
+            Value::Patterns(patterns) => {
+                patterns.iter().map(|base| instruction.constant.wrapping_add(*base)).collect()
+            }
+            Value::Integer(number) => {
+                let offset = f64::from(instruction.constant);
+                let (low, high) = (number.actual.low + offset, number.actual.high + offset);
+                let within = low.max(0.0) as u32..=high.clamp(0.0, f64::from(depth)) as u32;
+                within.take(MAX_WORDS + 1).collect()
+            }
+            _ => (0..depth).collect(),
+        };
+        // An address beyond the memory is a fault, after which nothing is computed.
+        let words: Vec<u32> = words.into_iter().filter(|word| *word < depth).collect();
+        if words.len() > MAX_WORDS {
+            let what = "data words that one operation may touch";
+            return Err(self.error(address, Refusal::Limit { limit: MAX_WORDS as u64, what }));
+        }
+        Ok(words)
+    }
+
+    fn compute(&mut self, word: u32, instruction: &Instruction, operands: &[Value; 3]) -> Value {
+        let (op, row) = (instruction.op, instruction.op.row());
+        let sources = row.shape.sources();
+        let integer = row.result_type() == Type::I;
+        if row.ulp.is_none() || integer {
+            if let Some(value) = patterns(operands, sources, |a, b, c| compute::<Host>(op, a, b, c).bits) {
+                return value;
+            }
+            if row.ulp.is_none() {
+                return Value::Any;
+            }
+        }
+        let operand = |i: usize| Operand(Ok(operands[i].clone()));
+        let Some(Operand(result)) = real(op, operand(0), operand(1), operand(2)) else { return Value::Any };
+        let value = match result {
+            Ok(Value::Float(number)) if integer => {
+                // A sum of integers wraps where it does not fit.
+                let whole = Interval::new(f64::from(i32::MIN), f64::from(i32::MAX));
+                return if number.actual.within(whole) { Value::Integer(number) } else { Value::Any };
+            }
+            Ok(value) if row.result_type() != Type::F => return value,
+            Ok(Value::Float(number)) => self.round(word, row, &number, instruction, operands),
+            Ok(value) => Ok(value),
+            Err(problem) => Err(problem),
+        };
+        value.unwrap_or_else(|problem| {
+            if problem != Problem::Told {
+                let value = |value: &Value| value.float().ok().map(|number| number.actual);
+                let reads = instruction.reads().iter().zip(operands);
+                let reads: Vec<_> = reads.map(|(register, operand)| (*register, value(operand))).collect();
+                self.hazards.entry((word, problem)).or_insert(reads);
+            }
+            // Whichever way a decision falls, it is followed.
+            if integer { Value::patterns(BTreeSet::from([0, 1])) } else { Value::Broken }
+        })
+    }
+
+    /// An operation's result in binary32, from its exact result on what the run has.
+    fn round(
+        &mut self,
+        word: u32,
+        row: &Row,
+        number: &Number,
+        instruction: &Instruction,
+        operands: &[Value; 3],
+    ) -> Result<Value, Problem> {
+        let exact = number.exact.meet(number.form.range());
+        let actual = number.actual.meet(exact + number.error.range());
+        let bound = row.ulp.unwrap_or(0.0);
+        let magnitude = actual.magnitude();
+        let fits = |grid: i32| grid >= -149 && magnitude <= 2f64.powi((24 + grid).min(127));
+        let largest = f64::from(f32::MAX);
+        let mut number = Number { actual, exact, ..number.clone() };
+        if bound == 0.0 || number.grid.is_some_and(fits) {
+            return if magnitude <= largest {
+                Ok(Value::Float(Rc::new(number)))
+            } else {
+                Err(Problem::Overflow)
+            };
+        }
+        let local = bound * ulp(magnitude);
+        // `!` so that a NaN counts.
+        if !(magnitude + local <= largest) || !number.error.range().is_finite() {
+            return Err(Problem::Overflow);
+        }
+        // All operands known to the bit: so is the result.
+        let known = patterns(operands, instruction.op.row().shape.sources(), |a, b, c| {
+            compute::<Host>(instruction.op, a, b, c).bits
+        });
+        if let Some(Value::Patterns(known)) = &known
+            && let (1, Some(bits)) = (known.len(), known.first())
+        {
+            let value = Interval::point(f64::from(f32::from_bits(*bits)));
+            let constant = Affine::free(value - number.exact);
+            number.error = if operands.iter().all(is_exact) { constant } else { number.error };
+            number.actual = value;
+            return Ok(Value::Float(Rc::new(number)));
+        }
+        let symbol = self.symbol(Some(word));
+        number.error = number.error.with(symbol, local);
+        number.actual = match bound == 0.5 {
+            // Rounding to nearest keeps the order.
+            true => Interval::new(f64::from(actual.low as f32), f64::from(actual.high as f32)),
+            false => actual.widened(local),
+        };
+        number.actual = number.actual.meet(number.exact + number.error.range());
+        Ok(Value::Float(Rc::new(number)))
+    }
+
+    /// A period ends.
+    fn end(&mut self, state: &State) {
+        let ports = self.program.outputs.iter().filter(|port| port.ty == Type::F);
+        for Port { register, .. } in ports {
+            if let Some(value) = state.registers.get(register).filter(|value| **value != Value::Unknown) {
+                join_into(&mut self.outputs, *register, value);
+            }
+        }
+        for range in &self.program.ranges {
+            if let Some(value) = state.registers.get(&range.register) {
+                join_into(&mut self.left, range.register, value);
+            }
+        }
+    }
+
+    fn finish(self) -> Enclosure {
+        let output = |port: &Port| {
+            let value = self.outputs.get(&port.register)?;
+            let number = value.float().ok();
+            let mut shares: BTreeMap<u32, f64> = BTreeMap::new();
+            for (symbol, share) in number.iter().flat_map(|number| number.error.shares().0) {
+                if let Some(word) = self.symbols[symbol as usize] {
+                    *shares.entry(word).or_default() += share;
+                }
+            }
+            let mut parts: Vec<(u32, f64)> = shares.into_iter().collect();
+            parts.sort_by(|a, b| b.1.total_cmp(&a.1));
+            Some(OutputBound {
+                name: port.name.clone(),
+                register: port.register,
+                range: number.as_ref().map(|number| number.actual),
+                error: number.as_ref().map(|number| number.error.range().magnitude()),
+                parts,
+            })
+        };
+        let assumed = |range: &Range| {
+            let value = self.left.get(&range.register)?;
+            let found = match value {
+                Value::Integer(number) => Some(number.actual),
+                value => value.float().ok().map(|number| number.actual),
+            };
+            let (low, high) = range.ends();
+            let shown = found.is_some_and(|found| found.within(Interval::new(low, high)));
+            (!shown).then_some(Assumed { range: *range, found })
+        };
+        let outputs = self.program.outputs.iter().filter(|port| port.ty == Type::F).filter_map(output);
+        let hazard = |((word, problem), operands): (&(u32, Problem), &Vec<_>)| Hazard {
+            word: *word,
+            problem: *problem,
+            operands: operands.clone(),
+        };
+        Enclosure {
+            outputs: outputs.collect(),
+            hazards: self.hazards.iter().map(hazard).collect(),
+            assumed: self.program.ranges.iter().filter_map(assumed).collect(),
+            operations: self.operations,
+        }
+    }
+}
+
+fn join_into(values: &mut BTreeMap<Register, Value>, register: Register, value: &Value) {
+    let joined = values.get(&register).map_or_else(|| value.clone(), |known| known.join(value));
+    values.insert(register, joined);
+}
+
+/// Whether an operand is what it would be exactly.
+fn is_exact(value: &Value) -> bool {
+    matches!(value, Value::Patterns(_))
+}
+
+/// What an operation makes of every combination of its operands' patterns, if these are known and not too many.
+fn patterns(operands: &[Value; 3], sources: usize, of: impl Fn(u32, u32, u32) -> u32) -> Option<Value> {
+    let mut lists: [Vec<u32>; 3] = [vec![0], vec![0], vec![0]];
+    for (list, operand) in lists.iter_mut().zip(operands).take(sources) {
+        match operand {
+            Value::Patterns(patterns) => *list = patterns.iter().copied().collect(),
+            _ => return None,
+        }
+    }
+    let [a, b, c] = &lists;
+    if a.len() * b.len() * c.len() > MAX_PATTERNS {
+        return None;
+    }
+    let all = a.iter().flat_map(|a| b.iter().flat_map(move |b| c.iter().map(move |c| (*a, *b, *c))));
+    Some(Value::patterns(all.map(|(a, b, c)| of(a, b, c)).collect()))
+}

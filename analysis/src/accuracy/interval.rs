@@ -1,0 +1,265 @@
+//! Intervals of reals whose ends are binary64, rounded outwards.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// All reals from `low` to `high`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    /// The least.
+    pub low: f64,
+    /// The largest.
+    pub high: f64,
+}
+
+/// Products below this may have lost digits to underflow: they count as inexact.
+const TINY: f64 = 1e-280;
+
+/// The sum and the sign of what is missing to the exact one; NaN if that is not known.
+fn sum(a: f64, b: f64) -> (f64, f64) {
+    let s = a + b;
+    let back = s - a;
+    (s, (a - (s - back)) + (b - back))
+}
+
+fn product(a: f64, b: f64) -> (f64, f64) {
+    if a == 0.0 || b == 0.0 {
+        return (0.0, 0.0);
+    }
+    let p = a * b;
+    (p, if p.abs() < TINY { f64::NAN } else { a.mul_add(b, -p) })
+}
+
+fn quotient(a: f64, b: f64) -> (f64, f64) {
+    let q = a / b;
+    let rest = if q.abs() < TINY && a != 0.0 { f64::NAN } else { (-q).mul_add(b, a) };
+    (q, rest * b.signum())
+}
+
+/// The nearest binary64 at or below the exact value.
+fn down((value, rest): (f64, f64)) -> f64 {
+    if rest >= 0.0 { value } else { value.next_down() }
+}
+
+fn up((value, rest): (f64, f64)) -> f64 {
+    if rest <= 0.0 { value } else { value.next_up() }
+}
+
+impl Interval {
+    pub(super) const ZERO: Interval = Interval { low: 0.0, high: 0.0 };
+    pub(super) const ALL: Interval = Interval { low: f64::NEG_INFINITY, high: f64::INFINITY };
+
+    pub(super) fn new(low: f64, high: f64) -> Interval {
+        Interval { low, high }
+    }
+
+    pub(super) fn point(value: f64) -> Interval {
+        Interval::new(value, value)
+    }
+
+    /// What a correctly rounded function gives at both ends, rounded outwards.
+    fn outward(low: f64, high: f64) -> Interval {
+        Interval::new(low.next_down(), high.next_up())
+    }
+
+    /// The largest magnitude.
+    pub fn magnitude(self) -> f64 {
+        self.low.abs().max(self.high.abs())
+    }
+
+    /// A number in the middle, or near it.
+    pub(super) fn middle(self) -> f64 {
+        let middle = self.low / 2.0 + self.high / 2.0;
+        if middle.is_finite() { middle.clamp(self.low, self.high) } else { 0.0 }
+    }
+
+    /// The distance of its ends from its middle, at most.
+    pub(super) fn radius(self) -> f64 {
+        let middle = self.middle();
+        up(sum(self.high, -middle)).max(up(sum(middle, -self.low)))
+    }
+
+    /// Whether a number is in it.
+    pub fn contains(self, value: f64) -> bool {
+        self.low <= value && value <= self.high
+    }
+
+    pub(super) fn within(self, outer: Interval) -> bool {
+        outer.low <= self.low && self.high <= outer.high
+    }
+
+    pub(super) fn hull(self, other: Interval) -> Interval {
+        Interval::new(self.low.min(other.low), self.high.max(other.high))
+    }
+
+    /// What is in both. Both enclose one value, so that something is; if rounding leaves nothing, either will do.
+    pub(super) fn meet(self, other: Interval) -> Interval {
+        let both = Interval::new(self.low.max(other.low), self.high.min(other.high));
+        if both.low <= both.high { both } else { self }
+    }
+
+    pub(super) fn is_finite(self) -> bool {
+        self.low.is_finite() && self.high.is_finite()
+    }
+
+    pub(super) fn widened(self, by: f64) -> Interval {
+        self + Interval::new(-by, by)
+    }
+
+    pub(super) fn square(self) -> Interval {
+        let (low, high) = (self.low.abs(), self.high.abs());
+        let (least, most) =
+            if self.contains(0.0) { (0.0, low.max(high)) } else { (low.min(high), low.max(high)) };
+        Interval::new(down(product(least, least)), up(product(most, most)))
+    }
+
+    /// Of what is not negative.
+    pub(super) fn sqrt(self) -> Interval {
+        let root = |value: f64| {
+            let root = value.max(0.0).sqrt();
+            (root, (-root).mul_add(root, value.max(0.0)))
+        };
+        // The last operand's rest may vanish in underflow.
+        let low = if self.low > TINY { down(root(self.low)) } else { 0.0 };
+        let high = if self.high > TINY { up(root(self.high)) } else { root(self.high).0.next_up() };
+        Interval::new(low, high)
+    }
+
+    /// Whether a number `at` + k·2π may be in it.
+    fn meets(self, at: f64) -> bool {
+        let slack = 1e-9;
+        ((self.low - at) / TAU - slack).ceil() <= ((self.high - at) / TAU + slack).floor()
+    }
+
+    pub(super) fn sin(self) -> Interval {
+        if !self.is_finite() || self.radius() > PI || self.magnitude() > 1e6 {
+            return Interval::new(-1.0, 1.0);
+        }
+        let (a, b) = (core_math::sin(self.low), core_math::sin(self.high));
+        let ends = Interval::outward(a.min(b), a.max(b));
+        let low = if self.meets(-FRAC_PI_2) { -1.0 } else { ends.low.max(-1.0) };
+        let high = if self.meets(FRAC_PI_2) { 1.0 } else { ends.high.min(1.0) };
+        Interval::new(low, high)
+    }
+
+    pub(super) fn cos(self) -> Interval {
+        if !self.is_finite() || self.radius() > PI || self.magnitude() > 1e6 {
+            return Interval::new(-1.0, 1.0);
+        }
+        let (a, b) = (core_math::cos(self.low), core_math::cos(self.high));
+        let ends = Interval::outward(a.min(b), a.max(b));
+        let low = if self.meets(PI) { -1.0 } else { ends.low.max(-1.0) };
+        let high = if self.meets(0.0) { 1.0 } else { ends.high.min(1.0) };
+        Interval::new(low, high)
+    }
+
+    /// Of numbers in [-1, 1].
+    pub(super) fn acos(self) -> Interval {
+        let ends = Interval::outward(
+            core_math::acos(self.high.clamp(-1.0, 1.0)),
+            core_math::acos(self.low.clamp(-1.0, 1.0)),
+        );
+        ends.meet(Interval::new(0.0, PI.next_up()))
+    }
+
+    /// Whether the box of points (`x`, self) holds the origin or crosses the cut along the negative axis.
+    pub(super) fn meets_cut(self, x: Interval) -> bool {
+        self.contains(0.0) && x.low <= 0.0
+    }
+
+    /// The angle of the points (`x`, self).
+    pub(super) fn atan2(self, x: Interval) -> Interval {
+        if self.meets_cut(x) {
+            return Interval::new(-PI.next_up(), PI.next_up());
+        }
+        let corners = [(self.low, x.low), (self.low, x.high), (self.high, x.low), (self.high, x.high)];
+        let angles = corners.map(|(y, x)| core_math::atan2(y, x));
+        Interval::outward(
+            angles.into_iter().fold(f64::INFINITY, f64::min),
+            angles.into_iter().fold(f64::NEG_INFINITY, f64::max),
+        )
+    }
+
+    pub(super) fn abs(self) -> Interval {
+        if self.contains(0.0) {
+            Interval::new(0.0, self.magnitude())
+        } else if self.low > 0.0 {
+            self
+        } else {
+            -self
+        }
+    }
+
+    pub(super) fn minimum(self, other: Interval) -> Interval {
+        Interval::new(self.low.min(other.low), self.high.min(other.high))
+    }
+
+    pub(super) fn sign(self) -> Interval {
+        let sign = |value: f64| if value == 0.0 { 0.0 } else { value.signum() };
+        Interval::new(sign(self.low), sign(self.high))
+    }
+}
+
+impl Add for Interval {
+    type Output = Interval;
+
+    fn add(self, other: Interval) -> Interval {
+        Interval::new(down(sum(self.low, other.low)), up(sum(self.high, other.high)))
+    }
+}
+
+impl Sub for Interval {
+    type Output = Interval;
+
+    fn sub(self, other: Interval) -> Interval {
+        self + -other
+    }
+}
+
+impl Neg for Interval {
+    type Output = Interval;
+
+    fn neg(self) -> Interval {
+        Interval::new(-self.high, -self.low)
+    }
+}
+
+/// The least and the largest of four results, each with the sign of what is missing.
+fn extremes(of: [(f64, f64); 4]) -> Interval {
+    let low = of.into_iter().map(down).fold(f64::INFINITY, f64::min);
+    let high = of.into_iter().map(up).fold(f64::NEG_INFINITY, f64::max);
+    // An infinity times zero is none of the products of numbers.
+    if low.is_nan() || high.is_nan() { Interval::ALL } else { Interval::new(low, high) }
+}
+
+impl Mul for Interval {
+    type Output = Interval;
+
+    fn mul(self, other: Interval) -> Interval {
+        let (a, b) = (self, other);
+        extremes([
+            product(a.low, b.low),
+            product(a.low, b.high),
+            product(a.high, b.low),
+            product(a.high, b.high),
+        ])
+    }
+}
+
+impl Div for Interval {
+    type Output = Interval;
+
+    /// Everything if the divisor may be zero.
+    fn div(self, other: Interval) -> Interval {
+        let (a, b) = (self, other);
+        if b.contains(0.0) || !a.is_finite() || !b.is_finite() {
+            return Interval::ALL;
+        }
+        extremes([
+            quotient(a.low, b.low),
+            quotient(a.low, b.high),
+            quotient(a.high, b.low),
+            quotient(a.high, b.high),
+        ])
+    }
+}

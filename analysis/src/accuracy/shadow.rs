@@ -1,0 +1,477 @@
+//! Binary64 beside the bit-exact run.
+
+use super::probe::Probe;
+use super::ulp;
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+use takt_emu::{Emulator, Fault, Status, Step};
+use takt_isa::fp::Host;
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Effect, Instruction, Op, Program, Register, Type, compute, real};
+
+/// An operation's share of an error: the word of the program and what it adds, with its sign.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Part {
+    /// Index into [`Program::code`].
+    pub word: u32,
+    /// Its share, in the unit of the value.
+    pub error: f64,
+}
+
+/// The largest error of a kind that an output has had.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Worst {
+    /// The error, in the unit asked for: that of the output, ulps of the exact value, or a part of it.
+    pub error: f64,
+    /// The period, from 1; 0 is what runs once.
+    pub period: u64,
+    /// What the output was.
+    pub value: f64,
+    /// What it is in binary64.
+    pub exact: f64,
+}
+
+/// The errors of an output at the ends of the periods.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OutputAccuracy {
+    /// Its name.
+    pub name: String,
+    /// Its register.
+    pub register: Register,
+    /// The largest in the output's own unit; `None` if it never was a finite number.
+    pub absolute: Option<Worst>,
+    /// The largest in ulps.
+    pub ulp: Option<Worst>,
+    /// The largest as a part of the exact value, which is not zero then.
+    pub relative: Option<Worst>,
+    /// Where the largest absolute error comes from: the shares add up to it. The largest first.
+    pub parts: Vec<Part>,
+    /// Periods at whose end it was compared.
+    pub periods: u64,
+}
+
+/// What an operation does to accuracy.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OperationAccuracy {
+    /// How often it was executed.
+    pub count: u64,
+    /// Its own rounding at most, in ulps of its exact result.
+    pub rounding: f64,
+    /// Leading binary digits that were equal in the terms of its sum, at most, where a term carried an error: it grows by as many
+    /// digits in relation to the result.
+    pub cancelled: f64,
+    /// The period of that.
+    pub cancelled_in: u64,
+    /// How often a term of its sum that is not zero was too small to change the result.
+    pub absorbed: u64,
+}
+
+/// A decision of the run that binary64 would have made otherwise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Decision {
+    /// How often.
+    pub count: u64,
+    /// First in this period.
+    pub period: u64,
+}
+
+/// Where the comparison with binary64 had to begin anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lost {
+    /// How often.
+    pub count: u64,
+    /// First in this period.
+    pub period: u64,
+    /// Whether a value was infinite or a NaN; else a value with an error was taken as bits.
+    pub infinite: bool,
+}
+
+/// A register or data word.
+#[derive(Clone)]
+struct Cell {
+    /// What the run has there. If it is something else now (an input, a value set by hand), the cell tells nothing of it.
+    bits: u32,
+    real: f64,
+    /// By word, ascending.
+    parts: Rc<[Part]>,
+}
+
+/// The same program in binary64, beside a run.
+///
+/// Loads, stores, jumps and operations on integers are those of the run: binary64 follows it. Wherever it would have decided
+/// otherwise, that is counted ([`Shadow::decisions`]).
+#[derive(Clone)]
+pub struct Shadow {
+    program: Rc<Program>,
+    registers: BTreeMap<Register, Cell>,
+    memory: BTreeMap<u32, Cell>,
+    operations: BTreeMap<u32, OperationAccuracy>,
+    decisions: BTreeMap<u32, Decision>,
+    lost: BTreeMap<u32, Lost>,
+    outputs: Vec<OutputAccuracy>,
+    period: u64,
+    /// Whether each period begins with exact values.
+    afresh: bool,
+}
+
+/// What an operation gives.
+struct Outcome {
+    bits: u32,
+    /// The value in binary64 and where the difference comes from; `None` if there is none.
+    shadow: Option<(f64, Vec<Part>)>,
+}
+
+impl Outcome {
+    fn exact(bits: u32) -> Outcome {
+        Outcome { bits, shadow: None }
+    }
+}
+
+/// An operand.
+struct Operand {
+    bits: u32,
+    value: f64,
+    real: f64,
+    parts: Rc<[Part]>,
+}
+
+impl Operand {
+    fn error(&self) -> f64 {
+        if self.parts.is_empty() { 0.0 } else { self.value - self.real }
+    }
+}
+
+/// Numbers that are added to round to integers: binary32 has no fraction there, and what is added is smaller.
+const ROUNDERS: [f64; 2] = [8_388_608.0, 12_582_912.0];
+
+impl Shadow {
+    /// Beside a run from reset.
+    pub fn new(program: &Program) -> Shadow {
+        let ports = program.outputs.iter().filter(|port| port.ty == Type::F);
+        let output = |port: &takt_isa::program::Port| OutputAccuracy {
+            name: port.name.clone(),
+            register: port.register,
+            absolute: None,
+            ulp: None,
+            relative: None,
+            parts: Vec::new(),
+            periods: 0,
+        };
+        Shadow {
+            outputs: ports.map(output).collect(),
+            program: Rc::new(program.clone()),
+            registers: BTreeMap::new(),
+            memory: BTreeMap::new(),
+            operations: BTreeMap::new(),
+            decisions: BTreeMap::new(),
+            lost: BTreeMap::new(),
+            period: 0,
+            afresh: false,
+        }
+    }
+
+    /// Lets each period begin with exact values: errors are those of one period, which is what static bounds speak of.
+    #[must_use]
+    pub fn each_period_afresh(self) -> Shadow {
+        Shadow { afresh: true, ..self }
+    }
+
+    /// Runs the machine to the next `wait` or `halt` and follows it. If it waits for a tick that nobody has asked for, the tick comes
+    /// when the front end has refilled, as in [`Emulator::run_period`]. The outputs are compared at the end.
+    ///
+    /// # Returns
+    /// Whether the machine goes on: false once it has halted.
+    ///
+    /// # Errors
+    /// The program's fault.
+    pub fn run_period(&mut self, emulator: &mut Emulator) -> Result<bool, Fault> {
+        if let Status::Waiting { since, .. } = *emulator.status() {
+            emulator.tick_at(emulator.now().max(since + Cycle::from(emulator.machine().refill)));
+            self.begin_period();
+        }
+        loop {
+            match emulator.step_cycle()? {
+                Step::Halted => return Ok(false),
+                Step::Stalled { .. } => {}
+                Step::Issued { address, .. } => {
+                    self.issued(emulator, address);
+                    match emulator.status() {
+                        Status::Running => {}
+                        status => {
+                            let halted = matches!(status, Status::Halted { .. });
+                            if self.period > 0 || halted {
+                                self.compare(emulator);
+                            }
+                            return Ok(!halted);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// A period begins.
+    pub fn begin_period(&mut self) {
+        self.period += 1;
+        if self.afresh {
+            self.registers.clear();
+            self.memory.clear();
+        }
+    }
+
+    /// A bundle has issued in the cycle that has just passed: registers are as it read them.
+    pub fn issued(&mut self, emulator: &Emulator, address: BundleAddress) {
+        let program = Rc::clone(&self.program);
+        let Some(Ok(instructions)) = program.bundle(address) else { return };
+        // The interlocks see to it that a bundle reads what all before it write: results may be entered at once.
+        let mut written = Vec::new();
+        let machine = program.machine;
+        for ((number, slot), instruction) in machine.numbered_slots().zip(&instructions) {
+            let word = (address.index() * machine.slots.len() + number.index()) as u32;
+            let outcome = self.execute(emulator, instruction, word);
+            if let Some(register) = instruction.writes(slot) {
+                written.push((register, outcome.unwrap_or(Outcome::exact(0))));
+            }
+        }
+        for (register, outcome) in written {
+            put(&mut self.registers, register, outcome);
+        }
+    }
+
+    fn execute(&mut self, emulator: &Emulator, instruction: &Instruction, word: u32) -> Option<Outcome> {
+        let mut operands = [(); 3].map(|()| Operand::exact(0));
+        for (operand, &register) in operands.iter_mut().zip(instruction.reads()) {
+            *operand = Operand::of(self.registers.get(&register), emulator.register(register).unwrap_or(0));
+        }
+        let address = instruction.constant.wrapping_add(operands[0].bits);
+        match instruction.effect() {
+            Effect::Compute => Some(self.compute(instruction.op, &operands, word)),
+            Effect::Load => {
+                let bits = emulator.memory().get(address as usize).copied().unwrap_or(0);
+                Some(Operand::of(self.memory.get(&address), bits).outcome())
+            }
+            Effect::Store => {
+                let [_, stored, _] = operands;
+                put(&mut self.memory, address, stored.outcome());
+                None
+            }
+            Effect::Immediate => Some(Outcome::exact(instruction.constant)),
+            // What these write is an integer: whoever reads it finds the bits.
+            _ => None,
+        }
+    }
+
+    fn compute(&mut self, op: Op, operands: &[Operand; 3], word: u32) -> Outcome {
+        let [a, b, c] = operands;
+        let bits = compute::<Host>(op, a.bits, b.bits, c.bits).bits;
+        let period = self.period;
+        let evaluate = |shadowed: usize| {
+            let probe = |i: usize| {
+                let operand = &operands[i];
+                Probe::new(if i < shadowed { operand.real } else { operand.value }, operand.bits)
+            };
+            real(op, probe(0), probe(1), probe(2))
+        };
+        let carries = operands.iter().any(|operand| !operand.parts.is_empty());
+        let row = op.row();
+        let (Some(plain), Some(bound)) = (evaluate(0), row.ulp) else {
+            if carries {
+                lose(&mut self.lost, word, period, false);
+            }
+            return Outcome::exact(bits);
+        };
+        if row.result_type() == Type::I {
+            if evaluate(3).is_some_and(|shadow| shadow.value != f64::from(bits.cast_signed())) {
+                decide(&mut self.decisions, word, period);
+            }
+            return Outcome::exact(bits);
+        }
+        let value = f64::from(f32::from_bits(bits));
+        let local = if bound == 0.0 { 0.0 } else { value - plain.value };
+        let operation = self.operations.entry(word).or_default();
+        operation.count += 1;
+        if let Some(terms) = plain.sum {
+            if let Some(nearest) = rounds_to_integer(terms) {
+                // Meant as a decision: the nearest integer.
+                let shadow = evaluate(3).and_then(|shadow| rounds_to_integer(shadow.sum?));
+                if carries && shadow != Some(nearest) {
+                    decide(&mut self.decisions, word, period);
+                }
+                return Outcome::exact(bits);
+            }
+            operation.sum(terms, plain.value, value, carries, period);
+        }
+        if !carries && local == 0.0 {
+            return Outcome::exact(bits);
+        }
+        operation.rounding = operation.rounding.max((local / ulp(plain.value)).abs());
+        let exact = if carries { evaluate(3).map_or(f64::NAN, |probe| probe.value) } else { plain.value };
+        if !value.is_finite() || !exact.is_finite() {
+            lose(&mut self.lost, word, period, true);
+            return Outcome::exact(bits);
+        }
+        // One operand after the other from its value in the run to that in binary64: the steps add up to the whole.
+        let mut parts: Vec<Part> = Vec::new();
+        let mut before = plain.value;
+        for (i, operand) in operands.iter().enumerate().filter(|(_, operand)| !operand.parts.is_empty()) {
+            let after = evaluate(i + 1).map_or(before, |probe| probe.value);
+            let error = operand.error();
+            if error != 0.0 && before != after {
+                parts = merge(&parts, &operand.parts, (before - after) / error);
+            }
+            before = after;
+        }
+        if local != 0.0 {
+            parts = merge(&parts, &[Part { word, error: local }], 1.0);
+        }
+        Outcome { bits, shadow: Some((exact, parts)) }
+    }
+
+    /// Compares the outputs, at the end of a period.
+    pub fn compare(&mut self, emulator: &Emulator) {
+        let mut outputs = std::mem::take(&mut self.outputs);
+        for output in &mut outputs {
+            let Some((value, exact, parts)) = self.value(emulator, output.register) else { continue };
+            output.periods += 1;
+            let error = (value - exact).abs();
+            let worst = |error| Worst { error, period: self.period, value, exact };
+            if output.absolute.is_none_or(|known| error > known.error) {
+                output.absolute = Some(worst(error));
+                output.parts = parts.to_vec();
+                output.parts.sort_by(|a, b| b.error.abs().total_cmp(&a.error.abs()));
+            }
+            keep(&mut output.ulp, worst(error / ulp(exact)));
+            if exact != 0.0 {
+                keep(&mut output.relative, worst(error / exact.abs()));
+            }
+        }
+        self.outputs = outputs;
+    }
+
+    /// A register that holds a finite number: its value, that in binary64, and where the difference comes from.
+    pub fn value(&self, emulator: &Emulator, register: Register) -> Option<(f64, f64, Rc<[Part]>)> {
+        let operand = Operand::of(self.registers.get(&register), emulator.register(register)?);
+        operand.value.is_finite().then_some((operand.value, operand.real, operand.parts))
+    }
+
+    /// The outputs that carry binary32, in the order of their declaration.
+    pub fn outputs(&self) -> &[OutputAccuracy] {
+        &self.outputs
+    }
+
+    /// The operations with a meaning in the reals that have been executed, by word.
+    pub fn operations(&self) -> &BTreeMap<u32, OperationAccuracy> {
+        &self.operations
+    }
+
+    /// Decisions that binary64 would have made otherwise, by the word that made them.
+    pub fn decisions(&self) -> &BTreeMap<u32, Decision> {
+        &self.decisions
+    }
+
+    /// Words behind which errors are not followed any more.
+    pub fn lost(&self) -> &BTreeMap<u32, Lost> {
+        &self.lost
+    }
+
+    /// Periods that have begun.
+    pub fn periods(&self) -> u64 {
+        self.period
+    }
+}
+
+impl Operand {
+    fn exact(bits: u32) -> Operand {
+        let value = f64::from(f32::from_bits(bits));
+        Operand { bits, value, real: value, parts: Rc::default() }
+    }
+
+    fn of(cell: Option<&Cell>, bits: u32) -> Operand {
+        let exact = Operand::exact(bits);
+        match cell.filter(|cell| cell.bits == bits) {
+            Some(cell) => Operand { real: cell.real, parts: Rc::clone(&cell.parts), ..exact },
+            None => exact,
+        }
+    }
+
+    fn outcome(&self) -> Outcome {
+        let shadow = (!self.parts.is_empty()).then(|| (self.real, self.parts.to_vec()));
+        Outcome { bits: self.bits, shadow }
+    }
+}
+
+impl OperationAccuracy {
+    /// Looks at a sum: its terms, the exact result and that of the run.
+    fn sum(&mut self, terms: [f64; 2], exact: f64, value: f64, carries: bool, period: u64) {
+        let [large, small] = if terms[0].abs() >= terms[1].abs() { terms } else { [terms[1], terms[0]] };
+        if small != 0.0 && value == large && exact != large {
+            self.absorbed += 1;
+        }
+        if carries && large != 0.0 && large.is_finite() {
+            // Nothing is left: all digits that there are.
+            let digits = if exact == 0.0 { 24.0 } else { (large / exact).abs().log2() };
+            if digits > self.cancelled.max(1.0) {
+                (self.cancelled, self.cancelled_in) = (digits, period);
+            }
+        }
+    }
+}
+
+/// The nearest integer to one term of a sum, if the other is there to round it.
+fn rounds_to_integer(terms: [f64; 2]) -> Option<f64> {
+    let [a, b] = terms;
+    let of = |rounder: f64, value: f64| {
+        (ROUNDERS.contains(&rounder.abs()) && value.abs() <= 4_194_304.0).then(|| value.round_ties_even())
+    };
+    of(a, b).or_else(|| of(b, a))
+}
+
+fn put<K: Ord>(cells: &mut BTreeMap<K, Cell>, place: K, outcome: Outcome) {
+    match outcome.shadow {
+        Some((real, parts)) => {
+            cells.insert(place, Cell { bits: outcome.bits, real, parts: parts.into() });
+        }
+        None => {
+            cells.remove(&place);
+        }
+    }
+}
+
+fn keep(known: &mut Option<Worst>, worst: Worst) {
+    if known.is_none_or(|known| worst.error > known.error) {
+        *known = Some(worst);
+    }
+}
+
+fn decide(decisions: &mut BTreeMap<u32, Decision>, word: u32, period: u64) {
+    decisions.entry(word).or_insert(Decision { count: 0, period }).count += 1;
+}
+
+fn lose(lost: &mut BTreeMap<u32, Lost>, word: u32, period: u64, infinite: bool) {
+    lost.entry(word).or_insert(Lost { count: 0, period, infinite }).count += 1;
+}
+
+/// One list of parts and a multiple of another, both by word.
+fn merge(a: &[Part], b: &[Part], factor: f64) -> Vec<Part> {
+    let mut merged = Vec::with_capacity(a.len() + b.len());
+    let (mut i, mut j) = (0, 0);
+    loop {
+        let (x, y) = (a.get(i).copied(), b.get(j).map(|part| Part { error: part.error * factor, ..*part }));
+        let take = match (x, y) {
+            (None, None) => return merged,
+            (Some(x), Some(y)) => x.word.cmp(&y.word),
+            (Some(_), None) => Ordering::Less,
+            (None, Some(_)) => Ordering::Greater,
+        };
+        i += usize::from(take != Ordering::Greater);
+        j += usize::from(take != Ordering::Less);
+        let error = |part: Option<Part>| part.map_or(0.0, |part| part.error);
+        let part = match take {
+            Ordering::Less => x,
+            Ordering::Greater => y,
+            Ordering::Equal => x.map(|part| Part { error: part.error + error(y), ..part }),
+        };
+        merged.extend(part);
+    }
+}

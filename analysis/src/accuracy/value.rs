@@ -1,0 +1,548 @@
+//! What a register may hold, over every run: the domain in which the rows' meaning gives enclosures.
+
+use super::affine::Affine;
+use super::interval::Interval;
+use std::collections::BTreeSet;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::rc::Rc;
+use takt_isa::fp::{Real, SIN_LIMIT};
+
+/// Bit patterns that are told apart at most.
+pub(super) const MAX_PATTERNS: usize = 1024;
+/// All integers of 32 bits.
+const INTEGERS: Interval = Interval { low: -2_147_483_648.0, high: 2_147_483_647.0 };
+
+/// A number: what the run has, what exact arithmetic would have, and their difference.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Number {
+    /// What the run may have.
+    pub(super) actual: Interval,
+    /// What exact arithmetic may have.
+    pub(super) exact: Interval,
+    /// The same, with what it has in common with others.
+    pub(super) form: Affine,
+    /// What the run has, less what exact arithmetic has.
+    pub(super) error: Affine,
+    /// What the run has is a multiple of 2 to this power.
+    pub(super) grid: Option<i32>,
+}
+
+/// What a register may hold.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Value {
+    /// One of these bit patterns.
+    Patterns(Rc<BTreeSet<u32>>),
+    /// A finite binary32.
+    Float(Rc<Number>),
+    /// A signed integer. It has no error.
+    Integer(Rc<Number>),
+    /// Any 32 bits.
+    Any,
+    /// What follows from a problem that has been told.
+    Broken,
+    /// Nothing that this period has written, and no range says what.
+    Unknown,
+}
+
+impl Number {
+    pub(super) fn point(value: f64) -> Number {
+        let at = Interval::point(value);
+        let grid = grid_of(value);
+        Number { actual: at, exact: at, form: Affine::constant(value), error: Affine::constant(0.0), grid }
+    }
+
+    /// Exactly known to be in an interval.
+    pub(super) fn of(range: Interval, symbol: u32, grid: Option<i32>) -> Number {
+        if range.low == range.high {
+            return Number::point(range.low);
+        }
+        let error = Affine::constant(0.0);
+        Number { actual: range, exact: range, form: Affine::of(range, symbol), error, grid }
+    }
+
+    fn join(&self, other: &Number) -> Number {
+        Number {
+            actual: self.actual.hull(other.actual),
+            exact: self.exact.hull(other.exact),
+            form: self.form.join(&other.form),
+            error: self.error.join(&other.error),
+            grid: self.grid.zip(other.grid).map(|(a, b)| a.min(b)),
+        }
+    }
+
+    /// Where the value lies in the run or exactly: what a derivative between the two is taken over.
+    fn both(&self) -> Interval {
+        self.actual.hull(self.exact)
+    }
+}
+
+/// The largest power of two that a number is a multiple of; that of zero is out of every number's way.
+fn grid_of(value: f64) -> Option<i32> {
+    if value == 0.0 {
+        return Some(200);
+    }
+    let bits = value.to_bits();
+    let exponent = (bits >> 52 & 0x7ff) as i32;
+    if exponent == 0 || exponent == 0x7ff {
+        return None;
+    }
+    let fraction = bits & ((1 << 52) - 1) | 1 << 52;
+    Some(exponent - 1075 + fraction.trailing_zeros() as i32)
+}
+
+impl Value {
+    pub(super) fn bits(bits: u32) -> Value {
+        Value::Patterns(Rc::new(BTreeSet::from([bits])))
+    }
+
+    pub(super) fn patterns(patterns: BTreeSet<u32>) -> Value {
+        if patterns.len() > MAX_PATTERNS { Value::Any } else { Value::Patterns(Rc::new(patterns)) }
+    }
+
+    /// The value of one register on two ways that meet.
+    pub(super) fn join(&self, other: &Value) -> Value {
+        match (self, other) {
+            // What merely looks alike gets a place of its own: see the product.
+            (Value::Float(a), Value::Float(b)) if Rc::ptr_eq(a, b) => self.clone(),
+            (Value::Unknown, _) | (_, Value::Unknown) => Value::Unknown,
+            (Value::Broken, _) | (_, Value::Broken) => Value::Broken,
+            (Value::Any, _) | (_, Value::Any) => Value::Any,
+            (Value::Patterns(a), Value::Patterns(b)) => {
+                let joined: BTreeSet<u32> = a.union(b).copied().collect();
+                if joined.len() <= MAX_PATTERNS {
+                    return Value::Patterns(Rc::new(joined));
+                }
+                match (self.float(), other.float()) {
+                    (Ok(a), Ok(b)) => Value::Float(Rc::new(a.join(&b))),
+                    _ => Value::Any,
+                }
+            }
+            (Value::Float(_), _) | (_, Value::Float(_)) => match (self.float(), other.float()) {
+                (Ok(a), Ok(b)) => Value::Float(Rc::new(a.join(&b))),
+                _ => Value::Any,
+            },
+            (Value::Integer(_), _) | (_, Value::Integer(_)) => match (self.integer(), other.integer()) {
+                (Ok(a), Ok(b)) => Value::Integer(Rc::new(a.join(&b))),
+                _ => Value::Any,
+            },
+        }
+    }
+
+    /// As a binary32 operand.
+    pub(super) fn float(&self) -> Result<Rc<Number>, Problem> {
+        match self {
+            Value::Float(number) => Ok(Rc::clone(number)),
+            Value::Patterns(patterns) => {
+                let mut values = patterns.iter().map(|bits| f64::from(f32::from_bits(*bits)));
+                let number = hull(&mut values).ok_or(Problem::NotFinite)?;
+                Ok(Rc::new(number))
+            }
+            Value::Integer(_) | Value::Any => Err(Problem::Bits),
+            Value::Broken | Value::Unknown => Err(Problem::Told),
+        }
+    }
+
+    /// As a signed integer.
+    fn integer(&self) -> Result<Rc<Number>, Problem> {
+        match self {
+            Value::Integer(number) => Ok(Rc::clone(number)),
+            Value::Patterns(patterns) => {
+                let mut values = patterns.iter().map(|bits| f64::from(bits.cast_signed()));
+                Ok(Rc::new(hull(&mut values).ok_or(Problem::NotFinite)?))
+            }
+            Value::Any | Value::Float(_) => {
+                let form = Affine::free(INTEGERS);
+                let error = Affine::constant(0.0);
+                Ok(Rc::new(Number { actual: INTEGERS, exact: INTEGERS, form, error, grid: Some(0) }))
+            }
+            Value::Broken | Value::Unknown => Err(Problem::Told),
+        }
+    }
+
+    /// Whether the bits may be all zero, and whether one may be set.
+    pub(super) fn tested(&self) -> (bool, bool) {
+        match self {
+            Value::Patterns(patterns) => (patterns.contains(&0), patterns.iter().any(|bits| *bits != 0)),
+            Value::Integer(number) => (number.actual.contains(0.0), number.actual != Interval::ZERO),
+            Value::Float(number) => (number.actual.contains(0.0), true),
+            Value::Any | Value::Broken | Value::Unknown => (true, true),
+        }
+    }
+}
+
+/// What holds all of some finite numbers; `None` if one is none.
+fn hull(values: &mut dyn Iterator<Item = f64>) -> Option<Number> {
+    let mut number: Option<Number> = None;
+    for value in values {
+        if !value.is_finite() {
+            return None;
+        }
+        let point = Number::point(value);
+        number = Some(match number {
+            None => point,
+            Some(known) => {
+                let range = known.actual.hull(point.actual);
+                let grid = known.grid.zip(point.grid).map(|(a, b)| a.min(b));
+                let (form, error) = (Affine::free(range), Affine::constant(0.0));
+                Number { actual: range, exact: range, form, error, grid }
+            }
+        });
+    }
+    number
+}
+
+/// Why an operation has no enclosure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Problem {
+    /// The divisor may be zero.
+    DivisionByZero,
+    /// The operand may lie where the function has no value, so that the result may be a NaN.
+    Domain,
+    /// The result may be too large for binary32.
+    Overflow,
+    /// An operand may be infinite or a NaN: a pattern of bits that says so.
+    NotFinite,
+    /// An operand is bits that nothing encloses as a number.
+    Bits,
+    /// What an earlier problem leads to: that one is told.
+    Told,
+}
+
+/// What an instruction computes with: an operand, or what has become of it.
+#[derive(Clone, Debug)]
+pub(super) struct Operand(pub(super) Result<Value, Problem>);
+
+impl Operand {
+    fn number(&self) -> Result<Rc<Number>, Problem> {
+        self.0.as_ref().map_err(|problem| *problem)?.float()
+    }
+
+    fn float(number: Number) -> Operand {
+        Operand(Ok(Value::Float(Rc::new(number))))
+    }
+
+    fn one(&self, of: impl FnOnce(&Number) -> Result<Number, Problem>) -> Operand {
+        Operand(self.number().and_then(|number| of(&number)).map(|number| Value::Float(Rc::new(number))))
+    }
+
+    fn two(&self, other: &Operand, of: impl FnOnce(&Number, &Number) -> Result<Number, Problem>) -> Operand {
+        let both = self.number().and_then(|a| Ok((a, other.number()?)));
+        Operand(both.and_then(|(a, b)| of(&a, &b)).map(|number| Value::Float(Rc::new(number))))
+    }
+
+    fn decide(&self, other: &Operand, of: impl FnOnce(Interval, Interval) -> (bool, bool)) -> Operand {
+        let both = self.number().and_then(|a| Ok((a.actual, other.number()?.actual)));
+        Operand(both.map(|(a, b)| {
+            let (yes, no) = of(a, b);
+            let may = [(yes, 1), (no, 0)].into_iter().filter(|(may, _)| *may).map(|(_, bits)| bits);
+            Value::patterns(may.collect())
+        }))
+    }
+
+    /// A function with this value and derivative.
+    fn smooth(
+        &self,
+        value: impl Fn(Interval) -> Interval,
+        derivative: impl Fn(Interval) -> Interval,
+    ) -> Operand {
+        self.one(|x| {
+            let exact = value(x.exact);
+            let form = linear(&x.form, x.exact, &value, derivative(x.exact), exact);
+            let error = x.error.scale(derivative(x.both()));
+            Ok(Number { actual: value(x.actual), exact, form, error, grid: None })
+        })
+    }
+}
+
+/// A function of a form as a form, by the mean value theorem; its interval where that is narrower.
+fn linear(
+    form: &Affine,
+    range: Interval,
+    value: &impl Fn(Interval) -> Interval,
+    slope: Interval,
+    hull: Interval,
+) -> Affine {
+    if !slope.is_finite() {
+        return Affine::free(hull);
+    }
+    let middle = range.middle();
+    let at = value(Interval::point(middle));
+    let away = form.sub(&Affine::constant(middle));
+    // The form may reach beyond the range, the number does not.
+    let spread = slope.radius() * range.widened(middle.abs() * f64::EPSILON).radius();
+    let fixed = away.scale(Interval::point(slope.middle()));
+    let line = fixed
+        .add(&Affine::constant(at.middle()))
+        .widened((spread + at.radius()) * (1.0 + 4.0 * f64::EPSILON));
+    if line.radius() > 4.0 * hull.radius() { Affine::free(hull) } else { line }
+}
+
+impl Add for Operand {
+    type Output = Operand;
+
+    fn add(self, other: Operand) -> Operand {
+        self.two(&other, |a, b| {
+            let form = a.form.add(&b.form);
+            Ok(Number {
+                actual: a.actual + b.actual,
+                exact: (a.exact + b.exact).meet(form.range()),
+                error: a.error.add(&b.error),
+                grid: a.grid.zip(b.grid).map(|(a, b)| a.min(b)),
+                form,
+            })
+        })
+    }
+}
+
+impl Neg for Operand {
+    type Output = Operand;
+
+    fn neg(self) -> Operand {
+        self.one(|a| {
+            Ok(Number {
+                actual: -a.actual,
+                exact: -a.exact,
+                form: a.form.neg(),
+                error: a.error.neg(),
+                grid: a.grid,
+            })
+        })
+    }
+}
+
+impl Sub for Operand {
+    type Output = Operand;
+
+    fn sub(self, other: Operand) -> Operand {
+        self + -other
+    }
+}
+
+impl Mul for Operand {
+    type Output = Operand;
+
+    fn mul(self, other: Operand) -> Operand {
+        self.two(&other, |a, b| {
+            // The same number, not one that looks alike: every result has a place of its own.
+            let square = std::ptr::eq(a, b);
+            let form = a.form.mul(&b.form);
+            let (actual, exact) = match square {
+                true => (a.actual.square(), a.exact.square()),
+                false => (a.actual * b.actual, a.exact * b.exact),
+            };
+            let crossed = a.form.mul(&b.error).add(&b.form.mul(&a.error));
+            // Where the form is wider than the number, the interval says more.
+            let plain = b.error.scale(a.exact).add(&a.error.scale(b.exact));
+            let crossed = if plain.radius() < crossed.radius() { plain } else { crossed };
+            Ok(Number {
+                actual,
+                exact: exact.meet(form.range()),
+                error: crossed.add(&a.error.mul(&b.error)),
+                grid: a.grid.zip(b.grid).map(|(a, b)| a + b),
+                form,
+            })
+        })
+    }
+}
+
+impl Div for Operand {
+    type Output = Operand;
+
+    fn div(self, other: Operand) -> Operand {
+        self.two(&other, |a, b| {
+            if b.actual.contains(0.0) || b.exact.contains(0.0) {
+                return Err(Problem::DivisionByZero);
+            }
+            let one = Interval::point(1.0);
+            let inverse = |x: Interval| one / x;
+            let slope = -(one / b.exact.square());
+            let inverted = linear(&b.form, b.exact, &inverse, slope, inverse(b.exact));
+            let form = a.form.mul(&inverted);
+            let exact = (a.exact / b.exact).meet(form.range());
+            // (a + da)/(b + db) - a/b = (da - a/b·db)/(b + db).
+            let error = a.error.sub(&b.error.scale(exact)).scale(one / b.actual);
+            Ok(Number { actual: a.actual / b.actual, exact, form, error, grid: None })
+        })
+    }
+}
+
+impl Real for Operand {
+    fn sqrt(self) -> Operand {
+        let slope = |x: Interval| Interval::point(0.5) / x.sqrt();
+        let steep = self.number().is_ok_and(|x| x.both().low <= 0.0);
+        if !steep {
+            return self.smooth(Interval::sqrt, slope);
+        }
+        self.one(|x| {
+            if x.actual.low < 0.0 {
+                return Err(Problem::Domain);
+            }
+            let exact = x.exact.sqrt();
+            // |√A - √a| ≤ √|A - a|.
+            let most = Interval::point(x.error.range().magnitude()).sqrt().high;
+            let error =
+                if x.error.is_zero() { Affine::constant(0.0) } else { Affine::constant(0.0).widened(most) };
+            Ok(Number { actual: x.actual.sqrt(), exact, form: Affine::free(exact), error, grid: None })
+        })
+    }
+
+    fn sin(self) -> Operand {
+        self.bounded_angle().smooth(Interval::sin, Interval::cos)
+    }
+
+    fn cos(self) -> Operand {
+        self.bounded_angle().smooth(Interval::cos, |x| -x.sin())
+    }
+
+    fn atan2(self, x: Operand) -> Operand {
+        self.two(&x, |y, x| {
+            let (actual, exact) = (y.actual.atan2(x.actual), y.exact.atan2(x.exact));
+            let (all_y, all_x) = (y.both(), x.both());
+            let error = if y.error.is_zero() && x.error.is_zero() {
+                Affine::constant(0.0)
+            } else if all_y.meets_cut(all_x) {
+                // The angle may be on one side of the cut in the run, and on the other exactly.
+                Affine::free(actual - exact)
+            } else {
+                let square = all_x.square() + all_y.square();
+                y.error.scale(all_x / square).add(&x.error.scale(-(all_y / square)))
+            };
+            let form = if y.exact.meets_cut(x.exact) {
+                Affine::free(exact)
+            } else {
+                let square = x.exact.square() + y.exact.square();
+                let (by_y, by_x) = (x.exact / square, -(y.exact / square));
+                let at = Interval::point(y.exact.middle()).atan2(Interval::point(x.exact.middle()));
+                let part = |number: &Number, slope: Interval| {
+                    let away = number.form.sub(&Affine::constant(number.exact.middle()));
+                    let spread = slope.radius() * number.exact.radius() * (1.0 + 4.0 * f64::EPSILON);
+                    away.scale(Interval::point(slope.middle())).widened(spread)
+                };
+                let line = part(y, by_y).add(&part(x, by_x));
+                let line = line.add(&Affine::constant(at.middle())).widened(at.radius());
+                if line.radius() > 4.0 * exact.radius() { Affine::free(exact) } else { line }
+            };
+            Ok(Number { actual, exact, form, error, grid: None })
+        })
+    }
+
+    fn acos(self) -> Operand {
+        let one = Interval::point(1.0);
+        let slope = move |x: Interval| -(one / (one - x.square()).sqrt());
+        if self.number().is_ok_and(|x| x.both().within(Interval::new(-0.999, 0.999))) {
+            return self.smooth(Interval::acos, slope);
+        }
+        self.one(|x| {
+            if !x.actual.within(Interval::new(-1.0, 1.0)) {
+                return Err(Problem::Domain);
+            }
+            let exact = x.exact.acos();
+            // The arccosine is steepest at ±1: no step of this size changes it by more than the one there.
+            let step = x.error.range().magnitude();
+            let most = (one - Interval::point(step.min(2.0))).acos().high;
+            let error = if step == 0.0 { Affine::constant(0.0) } else { Affine::constant(0.0).widened(most) };
+            Ok(Number { actual: x.actual.acos(), exact, form: Affine::free(exact), error, grid: None })
+        })
+    }
+
+    fn abs(self) -> Operand {
+        match self.number() {
+            Ok(x) if x.actual.low >= 0.0 && x.exact.low >= 0.0 => self,
+            Ok(x) if x.actual.high <= 0.0 && x.exact.high <= 0.0 => -self,
+            _ => self.one(|x| {
+                let exact = x.exact.abs();
+                let error = x.error.join(&x.error.neg());
+                Ok(Number { actual: x.actual.abs(), exact, form: Affine::free(exact), error, grid: x.grid })
+            }),
+        }
+    }
+
+    fn sign(self) -> Operand {
+        self.one(|x| {
+            let (actual, exact) = (x.actual.sign(), x.exact.sign());
+            let error = match x.error.is_zero() || actual == exact && exact.low == exact.high {
+                true => Affine::constant(0.0),
+                false => Affine::free(actual - exact),
+            };
+            Ok(Number { actual, exact, form: Affine::free(exact), error, grid: Some(0) })
+        })
+    }
+
+    fn minimum(self, other: Operand) -> Operand {
+        match self.number().and_then(|a| Ok((a, other.number()?))) {
+            Ok((a, b)) if a.actual.high <= b.actual.low && a.exact.high <= b.exact.low => self,
+            Ok((a, b)) if b.actual.high <= a.actual.low && b.exact.high <= a.exact.low => other,
+            _ => self.two(&other, |a, b| {
+                let exact = a.exact.minimum(b.exact);
+                Ok(Number {
+                    actual: a.actual.minimum(b.actual),
+                    exact,
+                    form: Affine::free(exact),
+                    // It lies between the errors of both.
+                    error: a.error.join(&b.error),
+                    grid: a.grid.zip(b.grid).map(|(a, b)| a.min(b)),
+                })
+            }),
+        }
+    }
+
+    fn maximum(self, other: Operand) -> Operand {
+        -((-self).minimum(-other))
+    }
+
+    fn saturate(self, bound: Operand) -> Operand {
+        let limit = bound.abs();
+        self.minimum(limit.clone()).maximum(-limit)
+    }
+
+    fn integer(self) -> Operand {
+        let number = self.0.and_then(|value| value.integer());
+        Operand(number.map(Value::Float))
+    }
+
+    fn nearest(self) -> Operand {
+        Operand(self.number().map(|x| {
+            let nearest = |value: f64| value.round_ties_even().clamp(INTEGERS.low, INTEGERS.high);
+            let range = Interval::new(nearest(x.actual.low), nearest(x.actual.high));
+            let (form, error) = (Affine::free(range), Affine::constant(0.0));
+            Value::Integer(Rc::new(Number { actual: range, exact: range, form, error, grid: Some(0) }))
+        }))
+    }
+
+    fn equal(self, other: Operand) -> Operand {
+        self.decide(&other, |a, b| {
+            let apart = a.high < b.low || b.high < a.low;
+            let same = a.low == a.high && a == b;
+            (!apart, !same)
+        })
+    }
+
+    fn less(self, other: Operand) -> Operand {
+        self.decide(&other, |a, b| (a.low < b.high, a.high >= b.low))
+    }
+
+    fn less_or_equal(self, other: Operand) -> Operand {
+        self.decide(&other, |a, b| (a.low <= b.high, a.high > b.low))
+    }
+
+    fn choose(self, yes: Operand, no: Operand) -> Operand {
+        match self.0.as_ref().map_or((true, true), Value::tested) {
+            (false, _) => yes,
+            (_, false) => no,
+            _ => Operand(yes.0.and_then(|yes| Ok(yes.join(&no.0?)))),
+        }
+    }
+}
+
+impl Operand {
+    /// An angle that the kernels of sine and cosine take.
+    fn bounded_angle(self) -> Operand {
+        let limit = f64::from(f32::from_bits(SIN_LIMIT));
+        let within = |x: &Number| x.actual.within(Interval::new(-limit, limit));
+        match self.number() {
+            Ok(x) if !within(&x) => Operand(Err(Problem::Domain)),
+            Ok(x) => Operand::float(Number::clone(&x)),
+            Err(problem) => Operand(Err(problem)),
+        }
+    }
+}

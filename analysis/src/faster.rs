@@ -1,0 +1,62 @@
+//! What a faster unit would bring: to the program as it is, and assembled for a machine that has it.
+
+use crate::picture::{Faster, Reassembled};
+use crate::{Trace, WhatIf};
+use std::collections::HashMap;
+use std::sync::{LazyLock, Mutex, PoisonError};
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Machine, Program, SlotIndex};
+
+/// A program that was assembled for another machine.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// The program.
+    pub program: Program,
+    /// For each block that the scheduler packed its first bundle, and its cycles above its bound.
+    pub spare: Vec<(BundleAddress, Cycle)>,
+}
+
+/// What each unit of a trace would bring. `assemble` makes the program anew for a machine, and `follow` runs that as the trace was made;
+/// where one gives nothing, only the program as it is is looked at.
+pub fn faster(
+    program: &Program,
+    trace: &Trace,
+    assemble: &dyn Fn(&'static Machine) -> Option<Candidate>,
+    follow: &dyn Fn(&Program) -> Option<Trace>,
+) -> Vec<Faster> {
+    let reassembled = |what: &WhatIf| {
+        let Candidate { program, spare } = assemble(quicker(program.machine, what.unit))?;
+        let found = follow(&program)?;
+        let visits = |address| found.issues.iter().filter(|issue| issue.address == address).count() as Cycle;
+        let spare: Cycle = spare.iter().map(|(address, spare)| visits(*address) * spare).sum();
+        Some(Reassembled { cycles: found.cycles, least: found.cycles.saturating_sub(spare) })
+    };
+    trace.what_if(program).into_iter().map(|what| Faster { reassembled: reassembled(&what), what }).collect()
+}
+
+/// Of a machine, by its address, the one with a quicker unit, or front end.
+type Quicker = HashMap<(usize, Option<(SlotIndex, u8)>), &'static Machine>;
+
+/// A machine with one cycle less in a unit, or in the front end. Each is made once and never given back: there are as many as units.
+fn quicker(machine: &'static Machine, unit: Option<(SlotIndex, u8)>) -> &'static Machine {
+    static KNOWN: LazyLock<Mutex<Quicker>> = LazyLock::new(Mutex::default);
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    known.entry((std::ptr::from_ref(machine).addr(), unit)).or_insert_with(|| made(machine, unit))
+}
+
+fn made(machine: &Machine, unit: Option<(SlotIndex, u8)>) -> &'static Machine {
+    let mut slots = machine.slots.to_vec();
+    let mut refill = machine.refill;
+    match unit {
+        Some((slot, unit)) => {
+            let slot = &mut slots[slot.index()];
+            let mut units = slot.units.to_vec();
+            let row = &mut units[usize::from(unit)];
+            row.latency -= 1;
+            row.interval = row.interval.saturating_sub(1).max(1);
+            slot.units = Box::leak(units.into());
+        }
+        None => refill -= 1,
+    }
+    Box::leak(Box::new(Machine { slots: Box::leak(slots.into()), refill, ..*machine }))
+}

@@ -1,0 +1,230 @@
+//! A period as a picture: every bundle, every stall, the chain that sets the time; as JSON, and as a page for a browser.
+
+use crate::{Issued, Link, LinkKind, Trace, WhatIf};
+use serde_json::{Value, json};
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
+use takt_isa::program::Location;
+use takt_isa::spec::instructions::Function;
+use takt_isa::timing::{Cause, Cycle};
+use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
+
+/// What a faster unit would bring: to the program as it is, and assembled for a machine that has it.
+pub struct Faster {
+    /// In which unit, and what to the program as it is.
+    pub what: WhatIf,
+    /// To the program assembled for a machine that has it, if that was tried.
+    pub reassembled: Option<Reassembled>,
+}
+
+/// The program assembled for a machine with a faster unit.
+pub struct Reassembled {
+    /// Cycles of the same period.
+    pub cycles: Cycle,
+    /// What no schedule of its blocks can be shorter than.
+    pub least: Cycle,
+}
+
+/// All that is known of a period.
+pub struct Picture<'p> {
+    /// The program.
+    pub program: &'p Program,
+    /// Its name.
+    pub name: String,
+    /// The number of the period, from 1; 0 is what runs once.
+    pub period: u64,
+    /// Where its cycles went.
+    pub trace: Trace,
+    /// The chain that sets its time.
+    pub chain: Vec<Link>,
+    /// What faster units would bring.
+    pub faster: Vec<Faster>,
+}
+
+impl<'p> Picture<'p> {
+    /// A period of a program; `faster` is left empty.
+    pub fn new(program: &'p Program, name: impl Into<String>, period: u64, trace: Trace) -> Picture<'p> {
+        let chain = trace.critical_path(program);
+        Picture { program, name: name.into(), period, trace, chain, faster: Vec::new() }
+    }
+
+    /// The name of a unit, or of the front end.
+    pub fn unit(&self, unit: Option<(SlotIndex, u8)>) -> &'static str {
+        unit.map_or("front end", |(slot, unit)| self.program.machine.slot(slot).units[usize::from(unit)].name)
+    }
+
+    fn bundle(&self, issue: usize) -> Vec<Instruction> {
+        self.program.bundle(self.trace.issues[issue].address).and_then(Result::ok).unwrap_or_default()
+    }
+
+    /// The cycle in which a bundle issues, counted from the tick or from reset: the first is 1.
+    pub fn cycle(&self, issue: usize) -> Cycle {
+        let last = self.trace.issues.last().map_or(0, |issue| issue.cycle);
+        self.trace.issues[issue].cycle + self.trace.cycles - last
+    }
+
+    /// What a link of the chain goes through, and the register that it is about.
+    fn through(&self, link: &Link) -> (String, Option<String>) {
+        let machine = self.program.machine;
+        let text = match link.kind {
+            LinkKind::Result { register } => {
+                let bundle = self.bundle(link.from);
+                let mut writers = bundle.iter().zip(machine.slots);
+                let writer = writers.find(|(instruction, slot)| instruction.writes(slot) == Some(register));
+                let unit = writer.and_then(|(instruction, slot)| {
+                    Some(slot.units[slot.unit_for(instruction.op.row().function)?].name)
+                });
+                return (unit.unwrap_or("?").to_owned(), Some(self.program.register_text(register)));
+            }
+            LinkKind::Unit { slot, unit } => format!("{} busy", self.unit(Some((slot, unit)))),
+            LinkKind::Drain => "drain".to_owned(),
+            LinkKind::WritePort { slot } => {
+                format!("write port of bank {}", machine.slot(slot).bank.name)
+            }
+            LinkKind::FrontEnd => "front end".to_owned(),
+            LinkKind::Order => "order of issue".to_owned(),
+        };
+        (text, None)
+    }
+
+    /// A link of the chain, in words.
+    pub fn link(&self, link: &Link) -> String {
+        match self.through(link) {
+            (unit, Some(register)) => format!("{register} through {unit}"),
+            (text, None) => text,
+        }
+    }
+
+    /// Cycles of the chain by what they go through.
+    pub fn chain_by_kind(&self) -> Vec<(String, Cycle)> {
+        let mut kinds: BTreeMap<String, Cycle> = BTreeMap::new();
+        for link in &self.chain {
+            *kinds.entry(self.through(link).0).or_default() += link.cycles;
+        }
+        let mut kinds: Vec<_> = kinds.into_iter().collect();
+        kinds.sort_by_key(|(_, cycles)| Reverse(*cycles));
+        kinds
+    }
+
+    /// Bundles and stalled cycles by source line.
+    fn lines(&self) -> BTreeMap<(u32, u32), (u64, Cycle)> {
+        let mut lines: BTreeMap<(u32, u32), (u64, Cycle)> = BTreeMap::new();
+        for issue in &self.trace.issues {
+            let Some(location) = self.program.location(issue.address) else { continue };
+            let line = lines.entry((location.file, location.line)).or_default();
+            line.0 += 1;
+            line.1 += issue.stalls.iter().map(|(_, cycles)| Cycle::from(*cycles)).sum::<Cycle>();
+        }
+        lines
+    }
+
+    /// Operations that each slot issued.
+    pub fn slots(&self) -> Vec<(&'static str, u64)> {
+        let mut counts: Vec<_> = self.program.machine.slots.iter().map(|slot| (slot.name, 0)).collect();
+        for issue in 0..self.trace.issues.len() {
+            for (count, instruction) in counts.iter_mut().zip(&self.bundle(issue)) {
+                count.1 += u64::from(instruction.op.row().function != Function::Idle);
+            }
+        }
+        counts
+    }
+
+    fn operation_json(
+        &self,
+        address: BundleAddress,
+        s: SlotIndex,
+        instruction: &Instruction,
+    ) -> Option<Value> {
+        let (program, slot) = (self.program, self.program.machine.slot(s));
+        let function = instruction.op.row().function;
+        let unit = &slot.units[slot.unit_for(function).filter(|_| function != Function::Idle)?];
+        let target = |address: BundleAddress| match program.nearest_label(address) {
+            Some((label, 0)) => label.to_owned(),
+            _ => address.to_string(),
+        };
+        Some(json!({
+            "slot": slot.name,
+            "unit": unit.name,
+            "text": instruction.text_with(program.machine, s, |register| program.register_text(register), target),
+            "place": program.operation_place(address, s),
+            "latency": instruction.writes(slot).map(|_| unit.latency),
+        }))
+    }
+
+    /// The picture as a page for a browser, which needs nothing else.
+    pub fn html(&self) -> String {
+        // `</` would end the script.
+        let data = self.json().to_string().replace("</", "<\\/");
+        include_str!("picture.html").replace("/*DATA*/", &data)
+    }
+
+    /// What the picture is drawn from.
+    pub fn json(&self) -> Value {
+        let program = self.program;
+        let critical: BTreeSet<usize> = self.chain.iter().flat_map(|link| [link.from, link.to]).collect();
+        let stall = |(cause, cycles): &(Cause, u32)| {
+            let producer = match *cause {
+                Cause::Operand { producer, .. } | Cause::Destination { producer, .. } => Some(producer),
+                Cause::Branch { from } => Some(from),
+                _ => None,
+            };
+            json!({
+                "cause": cause.name(),
+                "cycles": cycles,
+                "text": program.cause_text(*cause),
+                "producer": producer,
+                "producer_place": producer.and_then(|address| program.bundle_place(address)),
+            })
+        };
+        let bundle = |(i, issue): (usize, &Issued)| {
+            let operations = self.bundle(i);
+            let operations = SlotIndex::all().zip(&operations);
+            json!({
+                "address": issue.address,
+                "cycle": self.cycle(i),
+                "place": program.bundle_place(issue.address),
+                "stalls": issue.stalls.iter().map(stall).collect::<Vec<_>>(),
+                "critical": critical.contains(&i),
+                "operations": operations
+                    .filter_map(|(s, instruction)| self.operation_json(issue.address, s, instruction))
+                    .collect::<Vec<_>>(),
+            })
+        };
+        let line = |(&(file, line), &(bundles, stalled)): (&(u32, u32), &(u64, Cycle))| {
+            let place = program.place_text(Location { file, line });
+            json!({ "place": place, "bundles": bundles, "stalled": stalled })
+        };
+        let link = |link: &Link| {
+            let (through, register) = self.through(link);
+            json!({
+                "from": link.from, "to": link.to, "cycles": link.cycles, "through": through, "register": register,
+            })
+        };
+        let faster = |faster: &Faster| {
+            let reassembled = faster.reassembled.as_ref();
+            json!({
+                "unit": self.unit(faster.what.unit),
+                "as_it_is": faster.what.cycles,
+                "reassembled": reassembled.map(|reassembled| reassembled.cycles),
+                "reassembled_least": reassembled.map(|reassembled| reassembled.least),
+                "stalls": gained(&faster.what).map(|(kind, more)| (kind.to_owned(), json!(more))).collect::<Value>(),
+            })
+        };
+        json!({
+            "program": self.name,
+            "machine": program.machine.name,
+            "period": self.period,
+            "cycles": self.trace.cycles,
+            "slots": self.slots().into_iter().collect::<BTreeMap<_, _>>(),
+            "bundles": self.trace.issues.iter().enumerate().map(bundle).collect::<Vec<_>>(),
+            "lines": self.lines().iter().map(line).collect::<Vec<_>>(),
+            "critical_path": self.chain.iter().map(link).collect::<Vec<_>>(),
+            "one_cycle_less": self.faster.iter().map(faster).collect::<Vec<_>>(),
+        })
+    }
+}
+
+/// The stalls that a faster unit would add or take away, by kind.
+pub fn gained(what: &WhatIf) -> impl Iterator<Item = (&'static str, i64)> {
+    Cause::KINDS.into_iter().zip(what.stalls).filter(|(_, more)| *more != 0)
+}

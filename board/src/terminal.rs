@@ -1,0 +1,69 @@
+//! A pseudo-terminal, at which a simulated board has its UART for any host.
+
+use rustix::fs::{OFlags, fcntl_setfl};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{self, OptionalActions};
+use std::ffi::OsStr;
+use std::fs::{File, OpenOptions};
+use std::io::{self, ErrorKind, Read, Write};
+use std::os::unix::ffi::OsStrExt;
+use std::path::{Path, PathBuf};
+
+/// The end of a pseudo-terminal that is the board's.
+#[derive(Debug)]
+pub struct Terminal {
+    own: File,
+    /// Kept open: without a host, the line would otherwise be gone.
+    _host: File,
+    path: PathBuf,
+}
+
+impl Terminal {
+    /// A new one.
+    ///
+    /// # Errors
+    /// If the system has none.
+    pub fn new() -> io::Result<Terminal> {
+        let own = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
+        grantpt(&own)?;
+        unlockpt(&own)?;
+        let name = ptsname(&own, Vec::new())?;
+        let path = PathBuf::from(OsStr::from_bytes(name.to_bytes()));
+        let host = OpenOptions::new().read(true).write(true).open(&path)?;
+        let mut settings = termios::tcgetattr(&host)?;
+        settings.make_raw();
+        termios::tcsetattr(&host, OptionalActions::Now, &settings)?;
+        fcntl_setfl(&own, OFlags::RDWR | OFlags::NONBLOCK)?;
+        Ok(Terminal { own: File::from(own), _host: host, path })
+    }
+
+    /// What the host opens.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What the host has sent; nothing is no error.
+    ///
+    /// # Errors
+    /// If the line is gone.
+    pub fn receive(&mut self) -> io::Result<Vec<u8>> {
+        let mut bytes = vec![0; 4096];
+        match self.own.read(&mut bytes) {
+            Ok(count) => bytes.truncate(count),
+            Err(error) if error.kind() == ErrorKind::WouldBlock => bytes.clear(),
+            Err(error) => return Err(error),
+        }
+        Ok(bytes)
+    }
+
+    /// Sends to the host. What nobody reads is lost, as on a wire.
+    ///
+    /// # Errors
+    /// If the line is gone.
+    pub fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        match self.own.write(bytes) {
+            Err(error) if error.kind() != ErrorKind::WouldBlock => Err(error),
+            _ => Ok(()),
+        }
+    }
+}

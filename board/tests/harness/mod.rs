@@ -1,0 +1,166 @@
+//! Peripherals in Verilator: all of them in one simulation, each compared with its twin in every cycle.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use takt_board::twin::Twin;
+
+/// A module under test.
+pub(crate) struct Part {
+    pub(crate) name: String,
+    pub(crate) module: &'static str,
+    pub(crate) parameters: Vec<(String, u32)>,
+    pub(crate) takes: Vec<(String, u32)>,
+    pub(crate) drives: Vec<(String, u32)>,
+    pub(crate) twin: Box<dyn Twin>,
+    /// Inputs of a cycle, the reset apart, from its number.
+    pub(crate) stimulus: Box<dyn FnMut(u32) -> Vec<u32>>,
+}
+
+/// Cycles of reset at the beginning, before anything is compared: registers start with random values.
+const RESET: u32 = 40;
+
+const DRIVER: &str = r#"
+#include "Vparts.h"
+#include <cstdint>
+#include <cstdio>
+#include <vector>
+int main() {
+    VerilatedContext context;
+    context.randReset(2);
+    context.randSeed(1);
+    Vparts parts(&context);
+    std::vector<uint32_t> in(TAKES), out(DRIVES);
+    parts.clk = 0;
+    while (fread(in.data(), 4, TAKES, stdin) == TAKES) {
+        for (unsigned i = 0; i < TAKES; i++) parts.in[i] = in[i];
+        parts.clk = 0;
+        parts.eval();
+        for (unsigned i = 0; i < DRIVES; i++) out[i] = parts.out[i];
+        fwrite(out.data(), 4, DRIVES, stdout);
+        parts.clk = 1;
+        parts.eval();
+    }
+    return 0;
+}
+"#;
+
+/// A module with all parts, each signal in a word of its own.
+fn wrapper(parts: &[Part]) -> (String, usize, usize) {
+    let (mut text, mut takes, mut drives) = (String::new(), 0, 0);
+    for part in parts {
+        let parameters: Vec<_> =
+            part.parameters.iter().map(|(name, value)| format!(".{name}({value})")).collect();
+        let list =
+            if parameters.is_empty() { String::new() } else { format!("#({}) ", parameters.join(", ")) };
+        let _ = write!(text, "    {} {list}{} (.clk(clk)", part.module, part.name);
+        for (name, width) in &part.takes {
+            let _ = write!(text, ", .{name}(in[{} +: {width}])", 32 * takes);
+            takes += 1;
+        }
+        let mut padding = String::new();
+        for (name, width) in &part.drives {
+            let _ = write!(text, ", .{name}(out[{} +: {width}])", 32 * drives);
+            if *width < 32 {
+                let _ = writeln!(
+                    padding,
+                    "    assign out[{} +: {}] = 0;",
+                    32 * drives + *width as usize,
+                    32 - width
+                );
+            }
+            drives += 1;
+        }
+        let _ = writeln!(text, ");\n{padding}");
+    }
+    let text = format!(
+        "module parts (input wire clk, input wire [{}:0] in, output wire [{}:0] out);\n{text}endmodule\n",
+        32 * takes - 1,
+        32 * drives - 1
+    );
+    (text, takes, drives)
+}
+
+fn run(command: &mut Command) -> String {
+    let output = command.output().unwrap_or_else(|error| {
+        panic!("{command:?}: {error}: `cargo xtask test` installs what the tests need")
+    });
+    let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{command:?}:\n{text}");
+    text.into_owned()
+}
+
+/// Builds all parts from these files.
+fn build(name: &str, files: &[(&str, String)], parts: &[Part]) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("parts-{name}-{}", std::process::id()));
+    fs::create_dir_all(&folder).expect("the target folder can be written");
+    let write = |name: &str, text: &str| fs::write(folder.join(name), text).expect("it can be written");
+    let (top, takes, drives) = wrapper(parts);
+    write("parts.v", &top);
+    write("driver.cpp", &format!("#define TAKES {takes}\n#define DRIVES {drives}\n{DRIVER}"));
+    for (name, text) in files {
+        write(name, text);
+    }
+    let mut command = Command::new("verilator");
+    command.current_dir(&folder).args(["--cc", "--exe", "--build", "-O3", "--x-assign", "unique"]);
+    command.args(["--x-initial", "unique", "-Wno-fatal", "--prefix", "Vparts", "--top-module", "parts"]);
+    command.args(["-CFLAGS", "-O1", "-MAKEFLAGS", "OPT_FAST=-O1 OPT_SLOW=-O0 OPT_GLOBAL=-O1"]);
+    command.args(["driver.cpp", "parts.v"]).args(files.iter().map(|(name, _)| *name));
+    run(&mut command);
+    folder
+}
+
+/// Runs so many cycles and says of each part in which cycle it first differed from its twin, and how.
+pub(crate) fn compare(
+    name: &str,
+    files: &[(&str, String)],
+    parts: &mut [Part],
+    cycles: u32,
+) -> Vec<Option<String>> {
+    let folder = build(name, files, parts);
+    let mut process = Command::new(folder.join("obj_dir/Vparts"))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("what was built can be started");
+    let (mut stdin, mut stdout) =
+        (process.stdin.take().expect("piped"), process.stdout.take().expect("piped"));
+    let stimuli: Vec<Vec<Vec<u32>>> = (0..RESET + cycles)
+        .map(|cycle| {
+            let stimulus = |part: &mut Part| {
+                let mut inputs = vec![u32::from(cycle < RESET)];
+                inputs.extend((part.stimulus)(cycle));
+                assert_eq!(inputs.len(), part.takes.len(), "{}", part.name);
+                inputs
+            };
+            parts.iter_mut().map(stimulus).collect()
+        })
+        .collect();
+    let bytes: Vec<u8> = stimuli.iter().flatten().flatten().flat_map(|word| word.to_le_bytes()).collect();
+    let writer = std::thread::spawn(move || stdin.write_all(&bytes));
+    let mut answer = Vec::new();
+    stdout.read_to_end(&mut answer).expect("the simulation answers");
+    writer.join().expect("no panic").expect("the simulation listens");
+    assert!(process.wait().expect("it ends").success());
+    let mut words = answer.chunks_exact(4).map(|bytes| u32::from_le_bytes(bytes.try_into().expect("four")));
+    let mut differences: Vec<Option<String>> = parts.iter().map(|_| None).collect();
+    for (cycle, inputs) in stimuli.iter().enumerate() {
+        for ((part, inputs), difference) in parts.iter_mut().zip(inputs).zip(&mut differences) {
+            let circuit: Vec<u32> = words.by_ref().take(part.drives.len()).collect();
+            assert_eq!(circuit.len(), part.drives.len(), "the simulation ended early");
+            let twin = part.twin.outputs();
+            if cycle >= RESET as usize && twin != circuit && difference.is_none() {
+                let names: Vec<_> = part.drives.iter().map(|(name, _)| name.as_str()).collect();
+                *difference = Some(format!(
+                    "{}: cycle {cycle}: {names:?}: the circuit has {circuit:x?}, the twin {twin:x?}",
+                    part.name
+                ));
+            }
+            part.twin.clock(inputs);
+        }
+    }
+    fs::remove_dir_all(&folder).expect("the target folder can be written");
+    differences
+}

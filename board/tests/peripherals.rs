@@ -1,0 +1,295 @@
+//! Every peripheral's circuit against its twin, in every cycle; and faults planted in the circuits, which must be found.
+
+mod harness;
+
+use harness::{Part, compare};
+use std::cell::RefCell;
+use std::rc::Rc;
+use takt_board::twin::{self, Tick, UartReceive, UartSend};
+use takt_board::{Kind, VERILOG, kind};
+
+/// Cycles of a comparison.
+const CYCLES: u32 = 30_000;
+
+/// xorshift64*.
+#[derive(Clone)]
+struct Random(u64);
+
+impl Random {
+    fn bits(&mut self) -> u32 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 32) as u32
+    }
+
+    fn one_in(&mut self, n: u32) -> bool {
+        self.bits() % n == 0
+    }
+
+    /// Numbers near the edges of `span`, within it, and any.
+    fn value(&mut self, span: u32) -> u32 {
+        let near = self.bits() % 3;
+        let value = match self.bits() % 6 {
+            0 => near,
+            1 => span.wrapping_sub(1).wrapping_add(near),
+            2 | 3 => self.bits() % (span + 1),
+            4 => [0, 1 << 31, u32::MAX, i32::MAX as u32][self.bits() as usize % 4],
+            _ => self.bits(),
+        };
+        if self.bits() % 2 == 0 { value.wrapping_neg() } else { value }
+    }
+}
+
+/// Parameters to test a kind with, in the order of its table: shortest, usual, longest that a short run can see.
+fn variants(kind: &Kind) -> Vec<Vec<u32>> {
+    match kind.name {
+        "quadrature" | "step" => vec![vec![1], vec![3], vec![10]],
+        "pwm" => vec![vec![1, 0, 1], vec![20, 3, 1], vec![33, 0, 0], vec![50, 60, 0], vec![7, 1, 0]],
+        "sigma-delta" => vec![vec![0], vec![1]],
+        "spi" => vec![
+            vec![3, 1, 0, 0, 0, 1],
+            vec![3, 16, 0, 0, 1, 0x8001],
+            vec![4, 24, 1, 0, 0, 0],
+            vec![3, 32, 0, 1, 1, 0xdead_beef],
+            vec![5, 12, 1, 1, 1, 0xfff],
+        ],
+        "digital-in" => vec![vec![1, 0], vec![20, 1], vec![300, 0]],
+        "digital-out" => vec![vec![0], vec![1]],
+        other => panic!("write the stimuli of {other}"),
+    }
+}
+
+/// What stands on a kind's inputs, the reset apart.
+fn stimulus(kind: &'static Kind, parameters: &[u32], seed: u64) -> Box<dyn FnMut(u32) -> Vec<u32>> {
+    let mut random = Random(seed | 1);
+    let (takes, _) = kind.ports();
+    let names: Vec<String> = takes.into_iter().skip(1).map(|(name, _)| name).collect();
+    let hold = if matches!(kind.name, "quadrature" | "step" | "digital-in") { parameters[0] } else { 1 };
+    let span = if kind.name == "pwm" { parameters[0] } else { 1 << 15 };
+    // Pins that stay for a while, near what the filter lets pass, and those of an encoder: in order, mostly.
+    let mut levels = vec![(0, 0); names.len()];
+    let (mut place, mut upward, mut until, mut disabled) = (0_u32, true, 0, 0);
+    Box::new(move |cycle| {
+        if cycle >= until {
+            until = cycle + if random.one_in(3) { hold } else { 1 + random.bits() % (2 * hold + 3) };
+            upward ^= random.one_in(20);
+            place = place.wrapping_add(if random.one_in(30) {
+                2
+            } else if upward {
+                1
+            } else {
+                3
+            });
+        }
+        if random.one_in(2000) {
+            disabled = cycle + random.bits() % 30;
+        }
+        let mut value = |i: usize, name: &str| match name {
+            "enable" => u32::from(cycle >= disabled),
+            "start" => random.one_in(if cycle % 4096 < 1024 { 20 } else { 400 }).into(),
+            "take" => random.one_in(11).into(),
+            "put" => random.one_in(if cycle % 4096 < 1024 { 5 } else { 150 }).into(),
+            "pin_a" => u32::from((place + 1) & 2 != 0),
+            "pin_b" => u32::from(place & 2 != 0),
+            "w_level" => random.bits() % 3,
+            name if name.starts_with("w_") => random.value(span),
+            _ => {
+                let (level, until) = &mut levels[i];
+                if cycle >= *until {
+                    *level ^= 1;
+                    *until = cycle + 1 + random.bits() % (2 * hold + 2);
+                }
+                *level
+            }
+        };
+        names.iter().enumerate().map(|(i, name)| value(i, name)).collect()
+    })
+}
+
+/// Every kind with every variant, then what every board has.
+fn parts() -> Vec<Part> {
+    let mut parts = Vec::new();
+    for kind in kind::KINDS {
+        for (i, values) in variants(kind).into_iter().enumerate() {
+            let (takes, drives) = kind.ports();
+            assert_eq!(values.len(), kind.parameters.len());
+            let parameters = kind.parameters.iter().zip(&values);
+            parts.push(Part {
+                name: format!("{}_{i}", kind.module),
+                module: kind.module,
+                parameters: parameters.map(|(p, &value)| (p.name.to_uppercase(), value)).collect(),
+                takes,
+                drives,
+                twin: twin::of(kind, &values).expect("every kind has a twin"),
+                stimulus: stimulus(kind, &values, 1000 * parts.len() as u64 + 17),
+            });
+        }
+    }
+    let ports = |names: &[(&str, u32)]| names.iter().map(|&(name, width)| (name.to_owned(), width)).collect();
+    let mut random = Random(5);
+    let mut settings = [0, 5, 0];
+    parts.push(Part {
+        name: "tick".to_owned(),
+        module: "takt_tick",
+        parameters: Vec::new(),
+        takes: ports(&[("rst", 1), ("run", 1), ("period", 32), ("lead", 32)]),
+        drives: ports(&[("tick", 1), ("early", 1), ("left", 32)]),
+        twin: Box::new(Tick::default()),
+        stimulus: Box::new(move |_| {
+            if random.one_in(100) {
+                settings = [u32::from(!random.one_in(3)), random.bits() % 30, random.bits() % 40];
+            }
+            settings.to_vec()
+        }),
+    });
+    for divide in [4_u32, 7, 16] {
+        let mut random = Random(u64::from(divide));
+        // Bytes as another sender makes them, up to 1/40 too fast or too slow, and noise between them.
+        let (mut line, mut next) = (Vec::new(), 0);
+        parts.push(Part {
+            name: format!("receive_{divide}"),
+            module: "takt_uart_receive",
+            parameters: vec![("DIVIDE".to_owned(), divide)],
+            takes: ports(&[("rst", 1), ("pin_receive", 1)]),
+            drives: ports(&[("valid", 1), ("data", 8), ("broken", 1)]),
+            twin: Box::new(UartReceive::new(divide)),
+            stimulus: Box::new(move |_| {
+                if next == line.len() {
+                    (line, next) = (Vec::new(), 0);
+                    let noise = random.one_in(6);
+                    let byte = random.bits() % 256;
+                    let frame = byte << 1 | if random.one_in(20) { 0 } else { 1 << 9 };
+                    for cycle in 0..10 * divide {
+                        let bit = frame >> (cycle / divide) & 1;
+                        line.push(if noise && random.one_in(9) { bit ^ 1 } else { bit });
+                    }
+                    line.extend(vec![1; (random.bits() % (2 * divide)) as usize]);
+                }
+                next += 1;
+                vec![line[next - 1]]
+            }),
+        });
+        let mut random = Random(u64::from(divide) + 90);
+        parts.push(Part {
+            name: format!("send_{divide}"),
+            module: "takt_uart_send",
+            parameters: vec![("DIVIDE".to_owned(), divide)],
+            takes: ports(&[("rst", 1), ("start", 1), ("data", 8)]),
+            drives: ports(&[("ready", 1), ("pin_send", 1)]),
+            twin: Box::new(UartSend::new(divide)),
+            stimulus: Box::new(move |_| vec![random.one_in(3).into(), random.bits() % 256]),
+        });
+    }
+    parts
+}
+
+fn files() -> Vec<(&'static str, String)> {
+    VERILOG.iter().map(|&(name, text)| (name, text.to_owned())).collect()
+}
+
+#[test]
+fn every_peripheral_is_its_twin() {
+    let differences = compare("all", &files(), &mut parts(), CYCLES);
+    let found: Vec<String> = differences.into_iter().flatten().collect();
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+/// Faults: file, text that occurs there once, and what takes its place. Those of one round are planted together, for every module
+/// is compared by itself.
+const FAULTS: &[&[(&str, &str, &str)]] = &[
+    &[
+        ("takt_quadrature.v", "at_index <= count", "at_index <= count + 32'd1"),
+        ("takt_step.v", "if (step & ~was)", "if (step)"),
+        ("takt_pwm.v", "on[16:1] + {15'd0, on[0]}", "on[16:1]"),
+        ("takt_sigma_delta.v", "|wanted[32:16] ? 17'd65536", "|wanted[32:16] ? 17'd65535"),
+        ("takt_digital_in.v", "pin_in ^ (INVERT != 0)", "pin_in"),
+        ("takt_digital_out.v", "SAFE != 0;", "1'b0;"),
+        ("takt_spi.v", "~active & half != END - 7'd1", "~active"),
+        ("takt_tick.v", "lead < period", "lead <= period"),
+        ("takt_uart_receive.v", "bits == 4'd10 & s1 ? 4'd0 : ", ""),
+        ("takt_uart_send.v", "bits  <= 4'd10;", "bits  <= 4'd9;"),
+    ],
+    &[
+        ("takt_quadrature.v", "wire both = (a ^ was_a) & (b ^ was_b)", "wire both = 1'b0"),
+        ("takt_step.v", "direction ? count", "pin_direction ? count"),
+        ("takt_pwm.v", "pulse & since_rise == LATE", "pulse"),
+        ("takt_sigma_delta.v", "{1'b0, sum} + value", "{1'b0, sum} + (value | 17'd1)"),
+        ("takt_digital_in.v", "level & ~was", "level ^ was"),
+        ("takt_digital_out.v", "|w_level", "w_level[0]"),
+        ("takt_spi.v", "if (start & busy) lost", "if (start & ~busy) lost"),
+        ("takt_tick.v", "left == ahead + 32'd1", "left == ahead"),
+        ("takt_uart_receive.v", "DIVIDE / 2 - 1", "DIVIDE / 2 - 2"),
+        ("takt_uart_send.v", "{1'b1, shift[9:1]}", "{1'b0, shift[9:1]}"),
+    ],
+    &[("takt_filter.v", "rst | s1 == level", "rst")],
+    &[("takt_pwm.v", "wanted[33] ? 17'd0 :", ""), ("takt_spi.v", "(shift & mask) | extend", "shift & mask")],
+];
+
+#[test]
+fn planted_faults_are_found() {
+    for (round, faults) in FAULTS.iter().enumerate() {
+        let mut files = files();
+        for (name, what, by) in *faults {
+            let (_, text) = files.iter_mut().find(|(file, _)| file == name).expect("there is the file");
+            assert_eq!(text.matches(what).count(), 1, "{name}: {what}");
+            *text = text.replace(what, by);
+        }
+        let mut parts = parts();
+        let differences = compare(&format!("faults{round}"), &files, &mut parts, CYCLES / 3);
+        for (name, what, _) in *faults {
+            let module = name.trim_end_matches(".v");
+            // The filter's fault shows where a filter is.
+            let is_hit = |part: &Part| part.module == module || module == "takt_filter";
+            let hit = parts.iter().zip(&differences).any(|(part, found)| is_hit(part) && found.is_some());
+            assert!(hit, "{name}: the fault in `{what}` was not found");
+        }
+    }
+}
+
+/// What the contracts promise in numbers, on the twins: the circuits are equal to them.
+#[test]
+fn contracts_hold() {
+    let (pwm, spi) = (Kind::from_name("pwm").expect("a kind"), Kind::from_name("spi").expect("a kind"));
+    for (half, dead) in [(50, 0), (50, 4)] {
+        for duty in [-60_i32, -50, -49, -1, 0, 1, 30, 49, 50, 60] {
+            let mut twin = twin::of(pwm, &[half, dead, 1]).expect("a twin");
+            let (mut high, mut low) = (0, 0);
+            for cycle in 0..400 {
+                if cycle >= 300 {
+                    let pins = twin.outputs();
+                    assert!(pins[0] & pins[1] == 0, "both pins");
+                    (high, low) = (high + pins[0], low + pins[1]);
+                }
+                twin.clock(&[0, 1, (cycle == 0).into(), duty as u32]);
+            }
+            let on = (duty.clamp(-50, 50) + 50) as u32;
+            let less = |on: u32| if on == 100 { 100 } else { on.saturating_sub(dead) };
+            assert_eq!((high, low), (less(on), less(100 - on)), "duty {duty}, dead {dead}");
+        }
+    }
+    // A frame of SPI as a converter sees it, in all four modes.
+    for (polarity, phase) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+        let mut twin = twin::of(spi, &[4, 12, polarity, phase, 0, 0xa53]).expect("a twin");
+        let seen = Rc::new(RefCell::new(Vec::new()));
+        let (mut answer, mut was, mut selected) = (0x5c6_u32, polarity, 0);
+        for cycle in 0..200 {
+            let pins = twin.outputs();
+            let (clock, select, out) = (pins[0], pins[1], pins[2]);
+            selected += u32::from(select == 0);
+            if select == 0 && clock != was {
+                let first = (clock != polarity) == (phase == 0);
+                if first {
+                    seen.borrow_mut().push(out);
+                } else if phase == 0 || seen.borrow().len() < 12 {
+                    answer <<= u32::from(!seen.borrow().is_empty());
+                }
+            }
+            was = clock;
+            twin.clock(&[0, (cycle == 3).into(), 1, 0, answer >> 11 & 1, 0]);
+        }
+        let sent = seen.borrow().iter().fold(0, |sent, bit| sent << 1 | bit);
+        assert_eq!((seen.borrow().len(), sent, selected), (12, 0xa53, 4 * 25), "mode {polarity}{phase}");
+        assert_eq!(twin.outputs()[3..5], [0x5c6, 1], "mode {polarity}{phase}");
+    }
+}

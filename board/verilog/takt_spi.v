@@ -1,0 +1,86 @@
+// takt_spi: an SPI master for a converter: one frame at each start.
+//
+// Contract
+//   A frame is BITS bits, the highest first, a bit in 2 * HALF cycles. POLARITY is the level of the clock at rest; data is sampled
+//   at its first edge (PHASE 0) or its second. pin_select falls HALF cycles before the first bit and rises HALF cycles after the
+//   last edge; a frame lasts HALF * (2 * BITS + 1) cycles. A start during a frame is not one, and lost goes up by one.
+//   put: w_send is taken; start sends what was taken last, bits BITS - 1 to 0.
+//   received is what the last whole frame brought (SIGNED: with its highest bit as sign), frames how many there were.
+//   take: registers r_… hold from the next cycle on what they are in this one.
+//   rst: pins at rest, registers 0. A converter is not switched off by enable: what is safe for it is a value that is sent.
+
+module takt_spi #(
+    parameter HALF     = 4,   // 3 to 65535: pin_in is two cycles late
+    parameter BITS     = 16,  // 1 to 32
+    parameter POLARITY = 0,
+    parameter PHASE    = 0,
+    parameter SIGNED   = 0,
+    parameter SEND     = 0    // what is sent until the first put
+) (
+    input  wire        clk,
+    input  wire        rst,
+    input  wire        start,
+    input  wire        take,
+    input  wire        put,
+    input  wire        pin_in,
+    input  wire [31:0] w_send,
+    output reg         pin_clock,
+    output reg         pin_out,
+    output reg         pin_select,
+    output reg  [31:0] r_received,
+    output reg  [31:0] r_frames,
+    output reg  [31:0] r_lost
+);
+
+    localparam [15:0] LAST  = HALF - 1;
+    localparam [6:0]  END  = 2 * BITS;  // the last half of a frame
+
+    reg  [31:0] send, shift, received, frames, lost;
+    reg  [15:0] wait_for;
+    reg  [6:0]  half;      // 0: before the first bit
+    reg         busy, s0, s1;
+
+    wire        step    = busy & wait_for == LAST;
+    // At the end of a half the clock goes to its active level (even ones) or back (odd ones); it stays at the end of the last.
+    wire        active  = ~half[0];
+    wire        samples = step & half != END & (active ^ (PHASE != 0));
+    wire        moves   = step & half != END & (PHASE != 0 ? active : ~active & half != END - 7'd1);
+    wire [31:0] first   = send << (32 - BITS);
+    wire [31:0] extend  = {32{SIGNED != 0 & shift[BITS-1]}} << (BITS - 1) << 1;
+    wire [31:0] mask    = ~(32'hffffffff << (BITS - 1) << 1);
+
+    always @(posedge clk) begin
+        {s1, s0} <= {s0, pin_in};
+        if (put) send <= w_send;
+        if (take) {r_received, r_frames, r_lost} <= {received, frames, lost};
+        wait_for <= step | ~busy ? 16'd0 : wait_for + 16'd1;
+        if (start & busy) lost <= lost + 32'd1;
+        if (start & ~busy) begin
+            busy       <= 1'b1;
+            half       <= 7'd0;
+            shift      <= first;
+            pin_out    <= first[31];
+            pin_select <= 1'b0;
+        end
+        if (step) begin
+            half <= half + 7'd1;
+            if (half != END) pin_clock <= active ^ (POLARITY != 0);
+            if (half == END) begin
+                busy       <= 1'b0;
+                pin_select <= 1'b1;
+                pin_out    <= 1'b0;
+                received   <= (shift & mask) | extend;
+                frames     <= frames + 32'd1;
+            end
+        end
+        if (samples) shift <= {shift[30:0], s1};
+        if (moves) pin_out <= shift[31];
+        if (rst) begin
+            busy <= 1'b0;
+            send <= SEND;
+            {pin_clock, pin_out, pin_select} <= {POLARITY != 0, 2'b01};
+            {received, frames, lost, r_received, r_frames, r_lost} <= 192'd0;
+        end
+    end
+
+endmodule

@@ -1,0 +1,39 @@
+// takt_tick: the period's tick, and one ahead of it.
+//
+// Contract
+//   run: high for a cycle at tick every `period` cycles, the first time `lead` + 2 cycles after run has risen; at early `lead` cycles before each
+//   (with a lead of 0, in the same cycle). A lead of a period or more is taken as 0; a period below 2 gives no tick.
+//   left: cycles until the next tick. A new period or lead counts from the next tick on.
+//   While run is 0 nothing happens.
+
+module takt_tick (
+    input  wire        clk,
+    input  wire        rst,
+    input  wire        run,
+    input  wire [31:0] period,
+    input  wire [31:0] lead,
+    output reg         tick,
+    output reg         early,
+    output reg  [31:0] left
+);
+
+    reg  [31:0] ahead;
+    reg         runs;
+    wire        last  = left == 32'd1;
+    wire        valid = period >= 32'd2;
+    wire [31:0] used  = lead < period ? lead : 32'd0;
+
+    always @(posedge clk) begin
+        tick  <= runs & last;
+        early <= runs & (ahead == 32'd0 ? last : left == ahead + 32'd1);
+        if (~runs | last) ahead <= used;
+        if (~runs) left <= used + 32'd1;
+        else left <= last ? period : left - 32'd1;
+        runs <= run & valid;
+        if (rst) begin
+            {tick, early, runs} <= 3'd0;
+            left <= 32'd0;
+        end
+    end
+
+endmodule

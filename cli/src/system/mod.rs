@@ -1,0 +1,72 @@
+//! Systems of several cores: their files, and the commands that take them.
+
+pub(crate) mod bound;
+pub(crate) mod run;
+
+use crate::fault;
+use crate::files;
+use crate::load::{Load, Loaded};
+use crate::output::Failure;
+use crate::select::SourceArguments;
+use anyhow::{Result, anyhow};
+use std::path::Path;
+use takt_asm::nearest;
+use takt_system::{Description, ProgramError, ReadError, Request, SystemFault, TEXT_BYTES};
+
+/// A system and, for each core, its program with what is known of its source.
+pub(crate) struct LoadedSystem {
+    pub(crate) description: Description,
+    pub(crate) programs: Vec<Loaded>,
+}
+
+/// Reads a system's file and its programs, which are looked for beside it.
+pub(crate) fn load(path: &Path, source: &SourceArguments, color: bool) -> Result<LoadedSystem> {
+    let name = files::input_name(path);
+    let text = String::from_utf8(files::read(path, TEXT_BYTES)?).map_err(|error| {
+        anyhow!("{name} is no text: byte {} is not UTF-8", error.utf8_error().valid_up_to())
+    })?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut programs = Vec::new();
+    let read = takt_system::read(&name, &text, |request: &Request<'_>| {
+        let file = folder.join(request.path);
+        if !file.is_file() {
+            return Err(missing(request.path, &file));
+        }
+        let loaded = Load::new(request.machine, color).with(source).with_source(&file);
+        let loaded = loaded.map_err(ProgramError::Invalid)?;
+        let program = loaded.program.clone();
+        programs.push(loaded);
+        Ok(program)
+    });
+    match read {
+        Ok(description) => Ok(LoadedSystem { description, programs }),
+        Err(ReadError::Mistakes(mistakes)) => Err(Failure::Diagnostics(mistakes.render(color)).into()),
+        Err(ReadError::Program(error)) => Err(error),
+    }
+}
+
+fn missing(asked: &str, file: &Path) -> ProgramError<anyhow::Error> {
+    let (message, mut help) = match file.is_dir() {
+        true => (format!("{asked} is a folder, not a program"), None),
+        false => (format!("there is no program {asked}"), None),
+    };
+    let folder =
+        file.parent().map(|folder| if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
+    if let (Some(folder), Some(wanted)) = (folder, file.file_name()) {
+        let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        let names: Vec<String> =
+            entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+        let near = nearest(&wanted.to_string_lossy(), names.iter().map(String::as_str));
+        help = Some(match near {
+            Some(near) => format!("did you mean `{}`?", Path::new(asked).with_file_name(near).display()),
+            None => "programs are looked for beside the system's file".to_owned(),
+        });
+    }
+    ProgramError::Missing { message, help }
+}
+
+/// A core's fault, with its source line.
+pub(crate) fn told(fault: &SystemFault, system: &LoadedSystem, color: bool) -> anyhow::Error {
+    let note = format!("core {}", fault.name);
+    Failure::Diagnostics(fault::rendered(&fault.fault, &system.programs[fault.core], &note, color)).into()
+}

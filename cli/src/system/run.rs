@@ -1,0 +1,315 @@
+//! `takt run SYSTEM.toml`: a base tick for each row of inputs.
+
+use super::{LoadedSystem, load, told};
+use crate::account::Account;
+use crate::files::{self, Out};
+use crate::output;
+use crate::ports::{self, Inputs};
+use crate::run::PERIOD_LIMIT;
+use crate::select::SourceArguments;
+use anyhow::{Result, bail};
+use serde_json::{Map, Value, json};
+use std::io::Write;
+use std::path::Path;
+use takt_isa::program::Port;
+use takt_isa::timing::Cycle;
+use takt_isa::{Register, Type};
+use takt_system::{Description, End, LinkKind, System, SystemPort};
+
+/// What a run of a system takes of `takt run`.
+pub(crate) struct Arguments<'a> {
+    pub(crate) file: &'a Path,
+    pub(crate) source: &'a SourceArguments,
+    pub(crate) inputs: Option<&'a Path>,
+    pub(crate) outputs: Option<&'a Path>,
+    pub(crate) periods: Option<u64>,
+    pub(crate) max_cycles: Option<u64>,
+    pub(crate) stats: bool,
+    pub(crate) json: bool,
+}
+
+/// The column that says whether a row's entry goes into a FIFO.
+const PUSH: &str = "push";
+
+/// The host's side of a run: columns, and what they do.
+struct Host {
+    inputs: Vec<SystemPort>,
+    /// Snapshots from the host.
+    snapshots: Vec<usize>,
+    /// FIFOs from the host.
+    pushes: Vec<usize>,
+    /// FIFOs to the host.
+    pops: Vec<usize>,
+    outputs: Vec<SystemPort>,
+}
+
+impl Host {
+    fn new(description: &Description) -> Host {
+        let links = |wanted: &dyn Fn(&takt_system::Link) -> bool| -> Vec<usize> {
+            let numbered = description.links.iter().enumerate();
+            numbered.filter(|(_, link)| wanted(link)).map(|(number, _)| number).collect()
+        };
+        let fifo = |link: &takt_system::Link| matches!(link.kind, LinkKind::Fifo { .. });
+        Host {
+            inputs: description.inputs(),
+            snapshots: links(&|link| link.is_snapshot() && link.from == End::Host),
+            pushes: links(&|link| fifo(link) && link.from == End::Host),
+            pops: links(&|link| fifo(link) && link.to == End::Host),
+            outputs: description.outputs(),
+        }
+    }
+
+    /// The columns of the inputs: their values come in this order.
+    fn columns(&self, description: &Description) -> Vec<Port> {
+        // The table of inputs wants a register; nobody asks for it here.
+        let port = |name, ty| Port { name, register: Register::ZERO, ty };
+        let inputs = self.inputs.iter().map(|input| port(input.name.clone(), input.ty));
+        let pushes =
+            self.pushes.iter().map(|link| port(format!("{}.{PUSH}", description.links[*link].name), Type::I));
+        inputs.chain(pushes).collect()
+    }
+
+    /// Does what a row says; how many entries did not fit.
+    fn write(&self, system: &mut System, row: &takt_emu::Row) -> Result<u64> {
+        let (inputs, pushes) = row.split_at(self.inputs.len());
+        for (input, (_, bits)) in self.inputs.iter().zip(inputs) {
+            system.set_input(&input.name, *bits)?;
+        }
+        for &link in &self.snapshots {
+            system.publish(link)?;
+        }
+        let mut refused = 0;
+        for (&link, (_, push)) in self.pushes.iter().zip(pushes) {
+            if *push != 0 && !system.push(link)? {
+                refused += 1;
+            }
+        }
+        Ok(refused)
+    }
+
+    /// The outputs as the host sees them now. Of each FIFO one entry is taken; none where it is empty.
+    fn read(&self, system: &mut System) -> Result<Vec<Option<u32>>> {
+        let mut heads = Vec::new();
+        for &link in &self.pops {
+            heads.push((link, system.pop(link)?));
+        }
+        let value = |output: &SystemPort| -> Result<Option<u32>> {
+            match heads.iter().find(|(link, _)| *link == output.link) {
+                Some((_, entry)) => Ok(entry.as_ref().map(|entry| entry[output.field])),
+                None => Ok(Some(system.output(&output.name)?)),
+            }
+        };
+        self.outputs.iter().map(value).collect()
+    }
+}
+
+/// What a run came to.
+struct Ran<'a> {
+    arguments: &'a Arguments<'a>,
+    loaded: &'a LoadedSystem,
+    system: &'a System,
+    host: &'a Host,
+    /// Base ticks, or none if it ran until all cores had halted.
+    ticks: Option<u64>,
+    last: Vec<Option<u32>>,
+    refused: u64,
+}
+
+pub(crate) fn run(arguments: &Arguments<'_>, color: bool, out: &mut Out) -> Result<()> {
+    let loaded = load(arguments.file, arguments.source, color)?;
+    let description = &loaded.description;
+    let host = Host::new(description);
+    let mut system = System::new(description)?;
+    let mut ran = (Vec::new(), 0, 0);
+    let has_ticks = arguments.inputs.is_some() || arguments.periods.is_some();
+    let result = drive(arguments, &loaded, &host, &mut system, has_ticks, &mut ran);
+    if let Some(fault) = system.fault() {
+        return Err(told(fault, &loaded, color));
+    }
+    result?;
+    let (last, ticks, refused) = ran;
+    let ticks = has_ticks.then_some(ticks);
+    let ran = Ran { arguments, loaded: &loaded, system: &system, host: &host, ticks, last, refused };
+    if arguments.json {
+        output::json(&ran.json(), out)?;
+    } else if !arguments.outputs.is_some_and(files::is_dash) {
+        ran.text(out)?;
+    } else if arguments.stats {
+        let mut text = Vec::new();
+        ran.text(&mut text)?;
+        output::message(&String::from_utf8_lossy(&text));
+    }
+    Ok(())
+}
+
+fn drive(
+    arguments: &Arguments<'_>,
+    loaded: &LoadedSystem,
+    host: &Host,
+    system: &mut System,
+    has_ticks: bool,
+    (last, ticks, refused): &mut (Vec<Option<u32>>, u64, u64),
+) -> Result<()> {
+    let description = &loaded.description;
+    let columns = host.columns(description);
+    let limit = arguments.max_cycles.unwrap_or(PERIOD_LIMIT);
+    let stop = |system: &System| {
+        let flag = "`--max-cycles` sets the limit";
+        anyhow::anyhow!("the system has run for {} cycles and does not come to an end ({flag})", system.now())
+    };
+    let mut inputs = Inputs::open(arguments.inputs, &columns)?;
+    let mut outputs = arguments.outputs.map(Out::create).transpose()?;
+    let live = arguments.inputs.is_some_and(files::is_live);
+    if let Some(outputs) = &mut outputs {
+        ports::write_row(outputs, host.outputs.iter().map(|output| output.name.clone()))?;
+        outputs.flush()?;
+    }
+    let start = system.run_to_start(limit)?;
+    if !has_ticks {
+        if start.is_some() && !system.halted() {
+            bail!("the system goes on from tick to tick: give it base ticks with --inputs or --periods");
+        }
+        *last = host.read(system)?;
+        return if system.halted() { Ok(()) } else { Err(stop(system)) };
+    }
+    let Some(start) = start else {
+        if system.halted() {
+            bail!("every core has halted before the first tick: there are no periods to run");
+        }
+        return Err(stop(system));
+    };
+    // The host writes so early that the periods which begin at the tick read it.
+    let mut next: Cycle = start - description.lead();
+    while arguments.periods.is_none_or(|most| *ticks < most) {
+        let Some(row) = inputs.next()? else { break };
+        system.run_until(next)?;
+        *refused += host.write(system, row)?;
+        next += description.tick;
+        if arguments.max_cycles.is_some_and(|most| next > most) {
+            return Err(stop(system));
+        }
+        system.run_until(next)?;
+        *ticks += 1;
+        *last = host.read(system)?;
+        if let Some(outputs) = &mut outputs {
+            let values = host.outputs.iter().zip(&*last);
+            let values = values
+                .map(|(output, bits)| bits.map_or(String::new(), |bits| ports::format(output.ty, bits)));
+            ports::write_row(outputs, values)?;
+            if live {
+                outputs.flush()?;
+            }
+        }
+    }
+    outputs.map_or(Ok(()), Out::finish)
+}
+
+impl Ran<'_> {
+    /// The FIFOs, each with what has happened to it.
+    fn fifos(&self) -> impl Iterator<Item = (&str, takt_system::FifoCounts)> {
+        let links = self.loaded.description.links.iter().enumerate();
+        links.filter_map(|(number, link)| Some((link.name.as_str(), self.system.fifo_counts(number)?)))
+    }
+
+    fn json(&self) -> Value {
+        let Ran { arguments, loaded, system, host, ticks, last, refused } = self;
+        let cores = loaded.description.cores.iter().enumerate().map(|(number, core)| {
+            let statistics = system.core(number).statistics();
+            let (account, periods) = (Account::of(&statistics), system.periods(number));
+            let value = json!({
+                "program": core.path,
+                "machine": core.program.machine.name,
+                "periods": periods.count,
+                "cycles": { "min": periods.shortest, "max": periods.longest, "total": account.cycles },
+                "deadlines_missed": statistics.missed + statistics.lost,
+                "snapshots_skipped": periods.skipped,
+                "nan_writes": statistics.nan_writes,
+                "flags": system.core(number).flags().to_string(),
+                "bundles": account.bundles,
+                "operations": account.operations,
+                "stalls": account.stalls_json(),
+            });
+            (core.name.clone(), value)
+        });
+        let outputs = host.outputs.iter().zip(last);
+        let outputs = outputs.map(|(output, bits)| {
+            (output.name.clone(), json!(bits.map(|bits| ports::json(output.ty, bits))))
+        });
+        let fifos = self.fifos().map(|(name, counts)| {
+            let value = json!({
+                "pushed": counts.pushed,
+                "popped": counts.popped,
+                "overflows": counts.overflows,
+                "underflows": counts.underflows,
+                "most": counts.most,
+            });
+            (name.to_owned(), value)
+        });
+        json!({
+            "system": files::input_name(arguments.file),
+            "ticks": ticks,
+            "first_tick": system.start(),
+            "cycles": system.now(),
+            "cores": cores.collect::<Map<_, _>>(),
+            "fifos": fifos.collect::<Map<_, _>>(),
+            "refused": refused,
+            "outputs": outputs.collect::<Map<_, _>>(),
+        })
+    }
+
+    fn text(&self, out: &mut impl Write) -> Result<()> {
+        let Ran { arguments, loaded, system, host, ticks, last, .. } = self;
+        let description = &loaded.description;
+        match ticks {
+            None => writeln!(out, "every core has halted")?,
+            Some(1) => writeln!(out, "1 base tick of {} cycles", description.tick)?,
+            Some(ticks) => writeln!(out, "{ticks} base ticks of {} cycles", description.tick)?,
+        }
+        let width = description.cores.iter().map(|core| core.name.len()).max().unwrap_or(0);
+        for (number, core) in description.cores.iter().enumerate() {
+            let (periods, statistics) = (system.periods(number), system.core(number).statistics());
+            let machine = core.program.machine.name;
+            write!(out, "  {:<width$}  {machine}: {} periods", core.name, periods.count)?;
+            if periods.count > 0 {
+                write!(out, ", {}", periods.shortest)?;
+                if periods.shortest != periods.longest {
+                    write!(out, " to {}", periods.longest)?;
+                }
+                write!(out, " cycles each")?;
+            }
+            write!(out, ", {} deadlines missed", statistics.missed + statistics.lost)?;
+            if periods.skipped > 0 {
+                write!(out, ", snapshots skipped at {} ticks", periods.skipped)?;
+            }
+            if statistics.nan_writes > 0 {
+                write!(out, ", NaN written to output ports {} times", statistics.nan_writes)?;
+            }
+            writeln!(out, ", exception flags: {}", system.core(number).flags())?;
+        }
+        for (name, counts) in self.fifos() {
+            let takt_system::FifoCounts { pushed, popped, overflows, underflows, most } = counts;
+            writeln!(
+                out,
+                "  {name}: {pushed} entries in, {popped} out, {most} at most; {overflows} refused when full, {underflows} \
+                 asked for when empty"
+            )?;
+        }
+        if arguments.inputs.is_none() && !host.inputs.is_empty() {
+            writeln!(out, "  without --inputs the system's inputs are 0")?;
+        }
+        if arguments.outputs.is_none() {
+            for (output, bits) in host.outputs.iter().zip(last) {
+                let value = bits.map(|bits| ports::format(output.ty, bits));
+                writeln!(out, "  {} = {}", output.name, value.as_deref().unwrap_or("(nothing)"))?;
+            }
+        }
+        if arguments.stats {
+            for (number, core) in description.cores.iter().enumerate() {
+                let account = Account::of(&system.core(number).statistics());
+                writeln!(out, "\n{}: cycles, waiting for the tick left out:", core.name)?;
+                out.write_all(account.stall_table(&core.program, 5).as_bytes())?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,88 @@
+//! Systems of several cores on the command line.
+
+mod common;
+
+use common::Folder;
+use serde_json::Value;
+
+/// The system that comes with the repository.
+fn speed(name: &str) -> String {
+    format!("{}/../programs/systems/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
+#[test]
+fn run_drives_a_system_by_base_ticks() {
+    let folder = Folder::new();
+    let (toml, csv) = (speed("speed.toml"), speed("speed.csv"));
+    let text = folder.line(&format!("run {toml} --inputs {csv} --stats")).ok();
+    insta::assert_snapshot!("system_run", text);
+    let rows = folder.line(&format!("run {toml} --inputs {csv} --outputs -")).ok();
+    insta::assert_snapshot!("system_outputs", rows);
+    let json: Value =
+        serde_json::from_str(&folder.line(&format!("run {toml} --inputs {csv} --json")).ok()).unwrap();
+    assert_eq!(json["ticks"], 10);
+    assert_eq!(json["fifos"]["moves"]["pushed"], 2);
+    let core = &json["cores"]["servo"];
+    let stalls: u64 =
+        core["stalls"].as_object().unwrap().values().map(|cycles| cycles.as_u64().unwrap()).sum();
+    assert_eq!(core["bundles"].as_u64().unwrap() + stalls, core["cycles"]["total"].as_u64().unwrap());
+}
+
+#[test]
+fn bound_follows_a_command_through_the_cores() {
+    let folder = Folder::new();
+    let toml = speed("speed.toml");
+    insta::assert_snapshot!("system_bound", folder.line(&format!("bound {toml}")).ok());
+    let json: Value = serde_json::from_str(&folder.line(&format!("bound {toml} --json")).ok()).unwrap();
+    let ways = json["latencies"].as_array().unwrap();
+    let worst = |end: &str| {
+        let way = ways.iter().find(|way| way["inputs"][0] == "moves.target" && way["outputs"][0] == end);
+        way.unwrap()["worst"].as_u64().unwrap()
+    };
+    // A command that comes just too late for a tick waits for the next one.
+    assert!(worst("u") > 125_000 && worst("u") < 2 * 125_000, "{}", worst("u"));
+    let late = folder.line(&format!("bound {toml} --deadline {}", worst("u") - 1));
+    assert_eq!(late.status, Some(1));
+    folder.line(&format!("bound {toml} --deadline {}", worst("seen.peak"))).ok();
+}
+
+#[test]
+fn what_a_system_is_not() {
+    let folder = Folder::new();
+    folder.write("a.s", ".input x\n.output y\n.once\n wait p\n.period\np: mov y, x\n wait p\n");
+    folder.write(
+        "loads.s",
+        ".input x\n.output y\n.once\n wait p\n.period\np: ld y, 4000[zero]\n fadd y, x, x\n wait p\n",
+    );
+    let system = |program: &str| {
+        format!(
+            "tick = 500\n\n[[core]]\nname = \"a\"\nprogram = \"{program}\"\n\n[[wire]]\nfrom = \"host.x\"\nto = \"a.x\"\n\n\
+             [[wire]]\nfrom = \"a.y\"\nto = \"host.y\"\n"
+        )
+    };
+    folder.write("right.toml", system("a.s"));
+    folder.write("missing.toml", system("b.s"));
+    folder.write("faults.toml", system("loads.s"));
+    folder.write("asm.toml", system("wrong.s"));
+    folder.write("wrong.s", ".output y\n fadd y, q, 1\n halt\n");
+    let mut all = String::new();
+    for line in [
+        "run missing.toml --periods 1",
+        "run right.toml",
+        "run right.toml --periods 1 --tick 5",
+        "run right.toml --periods 1 --machine t1",
+        "run faults.toml --periods 1",
+        "run asm.toml --periods 1",
+        "run nowhere.toml --periods 1",
+        "bound missing.toml",
+        "bound right.toml --machine t1",
+        "asm right.toml",
+        "disasm right.toml",
+        "analyse right.toml",
+    ] {
+        let done = folder.line(line);
+        assert_ne!(done.status, Some(0), "{line}");
+        all.push_str(&format!("$ takt {line}\n{}\n", done.stderr));
+    }
+    insta::assert_snapshot!("system_mistakes", all);
+}

@@ -1,0 +1,115 @@
+//! The server without threads and without a clock, for hosts that have neither: a page in a browser.
+
+use crate::lsp::worker::Done;
+use crate::lsp::{Phase, Server, Settings, program};
+use crossbeam_channel::{Receiver, unbounded};
+use lsp_server::Message;
+
+/// A server that works while it is called and not otherwise. Its host calls [`Inline::check`] when the client pauses, and
+/// [`Inline::schedule`] when the pause is longer.
+pub struct Inline {
+    server: Server,
+    sent: Receiver<Message>,
+}
+
+impl Inline {
+    /// A server before `initialize`.
+    pub fn new(settings: Settings) -> Inline {
+        let (sender, sent) = unbounded();
+        Inline { server: Server::new(settings, sender, || None, None), sent }
+    }
+
+    /// Takes a message of the client's; what the server says to it.
+    pub fn receive(&mut self, message: Message) -> Vec<Message> {
+        match message {
+            Message::Notification(notification) => self.server.notification(notification),
+            Message::Request(request) => self.server.request(request),
+            Message::Response(_) => {}
+        }
+        self.said()
+    }
+
+    /// Reads and checks what has changed; what the server says of it.
+    pub fn check(&mut self) -> Vec<Message> {
+        if self.server.phase == Phase::Running && !self.server.stale.is_empty() {
+            self.server.read();
+        }
+        self.said()
+    }
+
+    /// Schedules one program that has changed and counts its cycles; what the server says of it, and whether there are more.
+    pub fn schedule(&mut self) -> (Vec<Message>, bool) {
+        let mut said = self.check();
+        if let Some(root) = self.server.unscheduled.pop_first()
+            && let Some(generation) = self.server.programs.get(&root).map(|program| program.generation)
+        {
+            let texts = self.server.workspace.texts();
+            let (_, checked) = program::check(&self.server.settings, &root, &texts);
+            let full = program::finish(&root, checked);
+            self.server.scheduled(Done { root, generation, full });
+        }
+        said.extend(self.said());
+        (said, !self.server.unscheduled.is_empty())
+    }
+
+    fn said(&self) -> Vec<Message> {
+        self.sent.try_iter().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lsp_server::{Notification, Request};
+    use serde_json::{Value, json};
+
+    fn settings() -> Settings {
+        Settings { beside: &[("part.s", ".const half = 0.5\n")], ..Settings::default() }
+    }
+
+    fn notify(server: &mut Inline, method: &str, params: Value) -> Vec<Message> {
+        server.receive(Notification::new(method.to_owned(), params).into())
+    }
+
+    fn ask(server: &mut Inline, method: &str, params: Value) -> Value {
+        let said = server.receive(Request::new(1.into(), method.to_owned(), params).into());
+        let answer = said.into_iter().find_map(|message| match message {
+            Message::Response(response) => response.response_result.ok(),
+            _ => None,
+        });
+        answer.unwrap_or_default()
+    }
+
+    fn diagnostics(said: &[Message]) -> Vec<Value> {
+        let published = said.iter().filter_map(|message| match message {
+            Message::Notification(Notification { method, params }) => {
+                (method == "textDocument/publishDiagnostics").then(|| params["diagnostics"].clone())
+            }
+            _ => None,
+        });
+        published.collect()
+    }
+
+    /// What the two threads of [`crate::lsp::serve`] do comes of calls alone: diagnostics at the pause, cycles after the longer one.
+    #[test]
+    fn works_when_called() {
+        let mut server = Inline::new(settings());
+        ask(&mut server, "initialize", json!({ "capabilities": {} }));
+        let source = ".include \"part.s\"\n.input x\n.output y\n.period\n.schedule on\nstart:\n    fmul y, x, half\n    wait start\n";
+        let document = |text: &str| json!({ "textDocument": { "uri": "main.s", "languageId": "takt", "version": 1, "text": text } });
+        let opened = notify(&mut server, "textDocument/didOpen", document(source));
+        assert!(opened.is_empty(), "nothing is read while the client types: {opened:?}");
+        assert_eq!(diagnostics(&server.check()), [json!([])]);
+        let hints = json!({ "textDocument": { "uri": "main.s" }, "range": { "start": { "line": 0, "character": 0 }, "end": { "line": 99, "character": 0 } } });
+        assert_eq!(ask(&mut server, "textDocument/inlayHint", hints.clone()), json!([]));
+        let (_, more) = server.schedule();
+        assert!(!more, "there is one program");
+        let counted = ask(&mut server, "textDocument/inlayHint", hints);
+        assert!(counted.as_array().is_some_and(|hints| !hints.is_empty()), "{counted}");
+
+        let change = json!({ "textDocument": { "uri": "main.s", "version": 2 }, "contentChanges": [{ "text": "    fmull\n" }] });
+        notify(&mut server, "textDocument/didChange", change);
+        let told = diagnostics(&server.check());
+        assert!(told.iter().any(|told| told.to_string().contains("fmull")), "{told:?}");
+    }
+}

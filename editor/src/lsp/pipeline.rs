@@ -1,0 +1,112 @@
+//! The picture of the pipeline, for a view beside the source: what each bundle issues and when, and the lines that it comes
+//! from. The same cycles as in the inlay hints.
+
+use crate::lsp::program::Counted;
+use crate::lsp::timing::{cycle_from, operation_text};
+use lsp_types::Uri;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use takt_isa::program::Location;
+use takt_isa::spec::instructions::Function;
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Instruction, SlotIndex};
+
+/// Bundles of a picture at most.
+const BUNDLES: usize = 4096;
+
+/// The picture.
+#[derive(Serialize)]
+pub(crate) struct Pipeline {
+    machine: &'static str,
+    /// The files that operations come from; `None` for one that no editor can open.
+    files: Vec<Option<Uri>>,
+    bundles: Vec<Bundle>,
+    /// Bundles that are not shown.
+    more: usize,
+}
+
+#[derive(Serialize)]
+struct Bundle {
+    address: BundleAddress,
+    /// Where its cycles count from: a section, a label, or a bundle.
+    from: String,
+    cycle: Cycle,
+    stalls: Vec<Stall>,
+    operations: Vec<Operation>,
+}
+
+#[derive(Serialize)]
+struct Stall {
+    /// Its kind, as `takt analyse` names it.
+    cause: &'static str,
+    cycles: u32,
+    text: String,
+}
+
+#[derive(Serialize)]
+struct Operation {
+    slot: &'static str,
+    unit: &'static str,
+    text: String,
+    /// Cycles to its result; `None` if it has none.
+    latency: Option<u32>,
+    /// Index of its file, and its line there, from 0.
+    file: Option<usize>,
+    line: Option<u32>,
+}
+
+/// The picture of a program. `line` is where a line of the counted text, from 0, stands in the file now; `uri` is the file.
+pub(crate) fn pipeline(
+    counted: &Counted,
+    uri: impl Fn(&str) -> Option<Uri>,
+    line: impl Fn(&str, u32) -> Option<u32>,
+) -> Pipeline {
+    let program = &counted.assembled.program;
+    let mut files = Vec::new();
+    let mut numbers: BTreeMap<u32, usize> = BTreeMap::new();
+    let mut place = |location: &Location| {
+        let name = program.files.get(location.file as usize)?;
+        let number = *numbers.entry(location.file).or_insert_with(|| {
+            files.push(uri(name));
+            files.len() - 1
+        });
+        Some((number, line(name, location.line.saturating_sub(1))?))
+    };
+    let bundles = counted.issues.iter().take(BUNDLES).map(|issue| {
+        let locations = program.locations(issue.address);
+        let words = program.words(issue.address).unwrap_or_default();
+        let operation = |(slot, word): (SlotIndex, &u64)| {
+            let instruction = Instruction::decode(*word).ok()?;
+            let of = program.machine.slot(slot);
+            let function = instruction.op.row().function;
+            let unit = &of.units[of.unit_for(function).filter(|_| function != Function::Idle)?];
+            let place = locations.get(slot.index()).copied().flatten().and_then(|location| place(&location));
+            Some(Operation {
+                slot: of.name,
+                unit: unit.name,
+                text: operation_text(program, slot, &instruction),
+                latency: instruction.writes(of).map(|_| unit.latency),
+                file: place.map(|place| place.0),
+                line: place.map(|place| place.1),
+            })
+        };
+        Bundle {
+            address: issue.address,
+            from: cycle_from(program, issue.from),
+            cycle: issue.cycle,
+            stalls: issue
+                .stalls
+                .iter()
+                .map(|&(cause, cycles)| Stall {
+                    cause: cause.name(),
+                    cycles,
+                    text: program.cause_text(cause),
+                })
+                .collect(),
+            operations: SlotIndex::all().zip(words).filter_map(operation).collect(),
+        }
+    });
+    let bundles: Vec<Bundle> = bundles.collect();
+    let more = counted.issues.len() - bundles.len();
+    Pipeline { machine: program.machine.name, files, bundles, more }
+}

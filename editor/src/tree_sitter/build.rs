@@ -1,0 +1,86 @@
+//! The combinators of a tree-sitter grammar, as its `grammar.json` writes them.
+
+use serde_json::{Value, json};
+
+/// A rule, or a part of one.
+#[derive(Clone, PartialEq)]
+pub(super) struct Rule(pub(super) Value);
+
+/// Nothing at all.
+pub(super) fn blank() -> Rule {
+    Rule(json!({ "type": "BLANK" }))
+}
+
+pub(super) fn symbol(name: impl AsRef<str>) -> Rule {
+    Rule(json!({ "type": "SYMBOL", "name": name.as_ref() }))
+}
+
+/// A text as it stands.
+pub(super) fn text(value: &str) -> Rule {
+    Rule(json!({ "type": "STRING", "value": value }))
+}
+
+/// A token by its regular expression.
+pub(super) fn pattern(value: &str) -> Rule {
+    Rule(json!({ "type": "PATTERN", "value": value }))
+}
+
+/// A token that nothing, not even a blank, precedes.
+pub(super) fn immediate(rule: Rule) -> Rule {
+    Rule(json!({ "type": "IMMEDIATE_TOKEN", "content": rule.0 }))
+}
+
+pub(super) fn seq<const N: usize>(members: [Rule; N]) -> Rule {
+    let members: Vec<Value> = members.into_iter().map(|member| member.0).collect();
+    Rule(json!({ "type": "SEQ", "members": members }))
+}
+
+pub(super) fn choice(members: impl IntoIterator<Item = Rule>) -> Rule {
+    let members: Vec<Value> = members.into_iter().map(|member| member.0).collect();
+    Rule(json!({ "type": "CHOICE", "members": members }))
+}
+
+pub(super) fn optional(rule: Rule) -> Rule {
+    choice([rule, blank()])
+}
+
+pub(super) fn repeat(rule: Rule) -> Rule {
+    Rule(json!({ "type": "REPEAT", "content": rule.0 }))
+}
+
+pub(super) fn repeat1(rule: Rule) -> Rule {
+    Rule(json!({ "type": "REPEAT1", "content": rule.0 }))
+}
+
+/// One or more, separated.
+pub(super) fn separated(separator: Rule, rule: Rule) -> Rule {
+    seq([rule.clone(), repeat(seq([separator, rule]))])
+}
+
+/// One or more, separated by commas.
+pub(super) fn commas(rule: Rule) -> Rule {
+    separated(text(","), rule)
+}
+
+/// One or more, separated by blanks or commas.
+pub(super) fn blanks(rule: Rule) -> Rule {
+    separated(optional(text(",")), rule)
+}
+
+/// Which operand of its node a part is.
+pub(super) fn field(name: &str, rule: Rule) -> Rule {
+    Rule(json!({ "type": "FIELD", "name": name, "content": rule.0 }))
+}
+
+/// A part that appears in the tree by another name.
+pub(super) fn alias(rule: Rule, name: &str) -> Rule {
+    Rule(json!({ "type": "ALIAS", "content": rule.0, "named": true, "value": name }))
+}
+
+pub(super) fn left(precedence: u16, rule: Rule) -> Rule {
+    Rule(json!({ "type": "PREC_LEFT", "value": precedence, "content": rule.0 }))
+}
+
+pub(super) fn right(precedence: u16, rule: Rule) -> Rule {
+    Rule(json!({ "type": "PREC_RIGHT", "value": precedence, "content": rule.0 }))
+}

@@ -1,0 +1,70 @@
+//! What tree-sitter's nodes look like: colours and folds. No node is captured twice, since editors differ in which of two
+//! captures counts.
+
+use takt_asm::Directive;
+use takt_asm::expr::{BUILTINS, Function};
+use takt_isa::ROWS;
+
+const HEADER: &str = "; Generated from the tables by `cargo xtask docs`; do not edit.\n\n";
+
+/// Words as a predicate or a list of nodes names them.
+fn quoted<'w>(words: impl IntoIterator<Item = &'w str>) -> String {
+    words.into_iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(" ")
+}
+
+/// `highlights.scm` with the captures of Helix, which has names of its own for a few.
+pub fn helix_highlights() -> String {
+    highlights().replace("@number", "@constant.numeric")
+}
+
+/// `highlights.scm`.
+pub fn highlights() -> String {
+    let mnemonics = quoted(ROWS.iter().map(|row| row.mnemonic));
+    let functions = quoted(Function::ALL.iter().map(|function| function.name()));
+    let constants = quoted(BUILTINS.iter().map(|builtin| builtin.0));
+    let directives = quoted(Directive::ALL.iter().map(|directive| directive.name()));
+    format!(
+        r##"{HEADER}(comment) @comment
+(text) @string
+(library) @string.special.path
+(number) @number
+
+[{directives}] @keyword.directive
+
+(operation mnemonic: (identifier) @keyword (#any-of? @keyword {mnemonics}))
+(operation mnemonic: (identifier) @function.macro (#not-any-of? @function.macro {mnemonics}))
+(macro_definition name: (identifier) @function.macro)
+(macro_definition parameter: (identifier) @variable.parameter)
+(label name: (identifier) @label)
+[(template_begin) (template_middle) (template_end)] @variable
+(const_directive name: (identifier) @constant)
+(cast type: (identifier) @type)
+(declaration type: (identifier) @type)
+(call function: (identifier) @function.builtin (#any-of? @function.builtin {functions}))
+
+([
+  (binary (identifier) @constant.builtin)
+  (unary operand: (identifier) @constant.builtin)
+  (parenthesized (identifier) @constant.builtin)
+  (call (identifier) @constant.builtin)
+  (choice (identifier) @constant.builtin)
+  (const_directive value: (identifier) @constant.builtin)
+  (float_directive (identifier) @constant.builtin)
+  (equation value: (identifier) @constant.builtin)
+] (#any-of? @constant.builtin {constants}))
+
+(binary operator: _ @operator)
+(unary operator: _ @operator)
+(choice ["?" ":"] @operator)
+"||" @operator
+"=" @operator
+["(" ")" "[" "]"] @punctuation.bracket
+"," @punctuation.delimiter
+"##
+    )
+}
+
+/// `folds.scm`.
+pub fn folds() -> String {
+    format!("{HEADER}[\n  (macro_definition)\n  (repetition)\n  (conditional)\n] @fold\n")
+}

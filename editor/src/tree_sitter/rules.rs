@@ -1,0 +1,388 @@
+//! The rules: `takt_asm`'s grammar of a line, and of the blocks that lines make.
+//!
+//! tree-sitter looks for those tokens only that can stand at a place, the assembler always for the longest of all. Where that
+//! makes a difference, the longer token is among those looked for, followed by what never comes ([`NEVER`]).
+
+use super::build::*;
+use takt_asm::{Directive, Operator};
+
+/// The two kinds of line, whose expressions differ.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum In {
+    /// Operations and directives: a bracket behind an expression is a memory operand's.
+    Line,
+    /// Equations: a bracket behind a name is an element's of an array.
+    Equation,
+}
+
+impl In {
+    /// A rule's name in this kind of line.
+    fn name(self, rule: &str) -> String {
+        match self {
+            In::Line => format!("_line_{rule}"),
+            In::Equation => format!("_equation_{rule}"),
+        }
+    }
+
+    /// A rule of this kind of line, which appears in the tree by its common name.
+    fn node(self, rule: &str) -> Rule {
+        alias(symbol(self.name(rule)), rule)
+    }
+
+    fn expression(self) -> Rule {
+        symbol(self.name("expression"))
+    }
+
+    /// A name, plain or with braces. Written out at its place, so that a plain name is the same in both kinds of line.
+    fn any_name(self) -> Rule {
+        choice([symbol("identifier"), self.node("template")])
+    }
+}
+
+/// What no text can be: a token that takes every letter and digit there is, then a digit.
+const NEVER: &str = "_never";
+
+const NEWLINE: &str = "\n";
+
+/// What tree-sitter may follow in two ways until a later token decides.
+pub(super) fn conflicts() -> Vec<Vec<String>> {
+    let both = |rule: &str| vec![In::Line.name(rule), In::Equation.name(rule)];
+    vec![
+        // A line that begins with `p[i` or `l{i` is an equation or an operation.
+        both("atom"),
+        both("call"),
+        // `t[b` is an element of an array, or an offset and a register.
+        vec!["_line_element".into(), "_line_atom".into()],
+    ]
+}
+
+/// Rules that stand for themselves.
+pub(super) fn inlined() -> Vec<String> {
+    vec!["_label".into()]
+}
+
+/// All rules, the first the start.
+pub(super) fn rules() -> Vec<(String, Rule)> {
+    let mut rules =
+        vec![("source_file".to_owned(), seq([optional(symbol("_lines")), optional(symbol("_line"))]))];
+    let mut add = |name: &str, rule: Rule| rules.push((name.to_owned(), rule));
+    lines(&mut add);
+    for (directive, rule) in
+        Directive::ALL.iter().filter_map(|directive| Some((directive, operands(*directive)?)))
+    {
+        add(&directive_rule(*directive), seq([text(directive.name()), rule]));
+    }
+    operations(&mut add);
+    expressions(In::Line, &mut add);
+    expressions(In::Equation, &mut add);
+    tokens(&mut add);
+    rules
+}
+
+/// The name of a directive's rule, `loop_bound_directive`.
+fn directive_rule(directive: Directive) -> String {
+    format!("{}_directive", &directive.name()[1..])
+}
+
+/// What follows a directive that has a rule of its own: not one that opens, parts or closes a block, nor `.raw`, which
+/// stands in bundles.
+fn operands(directive: Directive) -> Option<Rule> {
+    use Directive::*;
+    let expression = || In::Line.expression();
+    let name = || In::Line.any_name();
+    let named = || field("name", name());
+    let assigned = || seq([text("="), field("value", expression())]);
+    Some(match directive {
+        Once | Period | Data => blank(),
+        Reg | State | Input | Output => blanks(symbol("declaration")),
+        Const => seq([named(), assigned()]),
+        Preset => seq([optional(text("@")), named(), assigned()]),
+        Float | Word => commas(expression()),
+        Space | LoopBound => expression(),
+        Include => choice([
+            symbol("text"),
+            symbol("library"),
+            // These are operators, not the beginning of a library file's name.
+            seq([choice([Operator::Shl, Operator::Le].map(|operator| text(operator.text()))), symbol(NEVER)]),
+        ]),
+        Error => symbol("text"),
+        Loc => separated(symbol("_bars"), choice([symbol("location"), name()])),
+        Schedule | Contract | Ports => name(),
+        Fast | Order => blanks(name()),
+        Deadline => seq([blanks(name()), assigned()]),
+        Range => seq([
+            optional(text("@")),
+            blanks(field("name", name())),
+            text("="),
+            field("least", expression()),
+            text(","),
+            field("largest", expression()),
+        ]),
+        Late => seq([blanks(name()), optional(assigned())]),
+        Macro | EndMacro | Rep | EndRep | If | Elif | Else | EndIf | Raw => return None,
+    })
+}
+
+/// Lines, and the blocks that they make.
+fn lines(add: &mut impl FnMut(&str, Rule)) {
+    let end = |directive: Directive| text(directive.name());
+    let expression = || In::Line.expression();
+    // A macro is defined in no block but branches: within macros and repetitions the rules are others.
+    for (suffix, macros) in [("", true), ("_within", false)] {
+        let rule = |name: &str| format!("{name}{suffix}");
+        let mut blocks = vec!["_conditional", "_repetition"];
+        blocks.extend(macros.then_some("_macro"));
+        let block = blocks.into_iter().map(|name| {
+            let rule = if name == "_conditional" { rule(name) } else { name.to_owned() };
+            let shown = match name {
+                "_macro" => "macro_definition",
+                _ => &name[1..],
+            };
+            alias(symbol(rule), shown)
+        });
+        add(
+            &rule("_line"),
+            choice([symbol("_plain_line"), seq([optional(symbol("_label")), choice(block)])]),
+        );
+        add(&rule("_lines"), repeat1(choice([text(NEWLINE), seq([symbol(rule("_line")), text(NEWLINE)])])));
+        // The lines of a block; a label may stand before what closes it.
+        let lines = symbol(rule("_lines"));
+        add(&rule("_body"), choice([seq([lines, optional(symbol("_label"))]), symbol("_label")]));
+        let body = || optional(alias(symbol(rule("_body")), "body"));
+        let branch = |directive: Directive, condition: Option<Rule>| match condition {
+            Some(condition) => seq([end(directive), field("condition", condition), text(NEWLINE), body()]),
+            None => seq([end(directive), text(NEWLINE), body()]),
+        };
+        add(&rule("_elif"), branch(Directive::Elif, Some(expression())));
+        add(&rule("_else"), branch(Directive::Else, None));
+        add(
+            &rule("_conditional"),
+            seq([
+                branch(Directive::If, Some(expression())),
+                repeat(alias(symbol(rule("_elif")), "elif_clause")),
+                optional(alias(symbol(rule("_else")), "else_clause")),
+                end(Directive::EndIf),
+            ]),
+        );
+    }
+    let body = || optional(alias(symbol("_body_within"), "body"));
+    let name = |role: &str| field(role, In::Line.any_name());
+    add(
+        "_macro",
+        seq([
+            text(Directive::Macro.name()),
+            name("name"),
+            repeat(seq([optional(text(",")), name("parameter")])),
+            text(NEWLINE),
+            body(),
+            end(Directive::EndMacro),
+        ]),
+    );
+    add(
+        "_repetition",
+        seq([
+            text(Directive::Rep.name()),
+            name("variable"),
+            text(","),
+            field("first", expression()),
+            text(","),
+            field("last", expression()),
+            text(NEWLINE),
+            body(),
+            end(Directive::EndRep),
+        ]),
+    );
+    let directives = Directive::ALL.iter().filter(|directive| operands(**directive).is_some());
+    let directives = directives.map(|directive| symbol(directive_rule(*directive)));
+    let body = choice(std::iter::once(symbol("bundle")).chain(directives));
+    let label = choice([symbol("label"), In::Equation.node("label")]);
+    add(
+        "_plain_line",
+        choice([
+            symbol("_label"),
+            seq([optional(symbol("_label")), body]),
+            seq([optional(label), symbol("equation")]),
+        ]),
+    );
+    // A label without braces is the same before either kind of line.
+    add("_label", choice([symbol("label"), In::Line.node("label")]));
+    add("label", seq([field("name", symbol("identifier")), text(":")]));
+    for kind in [In::Line, In::Equation] {
+        add(&kind.name("label"), seq([field("name", kind.node("template")), text(":")]));
+    }
+}
+
+/// Bundles and equations, and what directives are made of.
+fn operations(add: &mut impl FnMut(&str, Rule)) {
+    let (line, equation) = (In::Line, In::Equation);
+    let name = || line.any_name();
+    // `.rawx` is no directive, nor `.raw` and a name: the same holds of every directive, which can all stand here.
+    let unknown = seq([symbol("directive_name"), symbol(NEVER)]);
+    let operation = choice([symbol("operation"), symbol("raw_operation"), unknown]);
+    add("bundle", separated(symbol("_bars"), operation));
+    // A line that ends in bars continues on the next.
+    add("_bars", seq([text("||"), repeat(text(NEWLINE))]));
+    let operand = || symbol("_operand");
+    add("operation", seq([field("mnemonic", name()), optional(commas(field("operand", operand())))]));
+    add(
+        "raw_operation",
+        seq([text(Directive::Raw.name()), field("slot", name()), field("word", line.expression())]),
+    );
+    let cast = |of: Rule| seq([of, text(":"), field("type", name())]);
+    let operand = || choice([line.node("place"), symbol("memory"), line.node("element"), line.expression()]);
+    add("_operand", choice([operand(), symbol("cast")]));
+    add("cast", cast(operand()));
+    let base = || choice([line.node("place"), line.expression()]);
+    add(
+        "memory",
+        seq([
+            optional(field("offset", line.expression())),
+            text("["),
+            field("base", choice([base(), alias(symbol("_base_cast"), "cast")])),
+            text("]"),
+        ]),
+    );
+    add("_base_cast", cast(base()));
+    // With one index it may be a place in memory, and is that.
+    add(
+        &line.name("element"),
+        seq([
+            field("array", name()),
+            text("["),
+            line.expression(),
+            text(","),
+            commas(line.expression()),
+            text("]"),
+        ]),
+    );
+    for kind in [line, equation] {
+        add(&kind.name("place"), seq([text("@"), kind.any_name()]));
+    }
+    let target = choice([equation.node("place"), equation.node("element"), equation.any_name()]);
+    add(
+        "equation",
+        seq([commas(field("target", target)), text("="), commas(field("value", equation.expression()))]),
+    );
+    let sizes = seq([text("["), commas(field("size", line.expression())), text("]")]);
+    add(
+        "declaration",
+        seq([
+            field("name", name()),
+            optional(sizes),
+            optional(seq([text(":"), field("type", name())])),
+            optional(seq([text("@"), field("place", line.expression())])),
+        ]),
+    );
+    let columns = seq([text("["), line.expression(), text(","), line.expression(), text("]")]);
+    add(
+        "location",
+        seq([field("file", symbol("text")), field("line", line.expression()), optional(columns)]),
+    );
+}
+
+/// Expressions in one kind of line.
+fn expressions(kind: In, add: &mut impl FnMut(&str, Rule)) {
+    let expression = || kind.expression();
+    add(
+        &kind.name("expression"),
+        choice(
+            ["unary", "binary", "choice"]
+                .map(|rule| kind.node(rule))
+                .into_iter()
+                .chain([symbol(kind.name("atom"))]),
+        ),
+    );
+    let mut atoms = vec![symbol("number"), kind.any_name(), kind.node("call"), kind.node("parenthesized")];
+    atoms.push(symbol(NEVER));
+    if kind == In::Equation {
+        atoms.push(kind.node("element"));
+        add(
+            &kind.name("element"),
+            seq([field("array", kind.any_name()), text("["), commas(expression()), text("]")]),
+        );
+    }
+    add(&kind.name("atom"), choice(atoms));
+    add(&kind.name("parenthesized"), seq([text("("), expression(), text(")")]));
+    add(
+        &kind.name("call"),
+        seq([field("function", symbol("identifier")), text("("), optional(commas(expression())), text(")")]),
+    );
+    // Choices bind least, then the operators by their precedence, then those before an operand; only a power binds closer.
+    let operator = |operator: &Operator| field("operator", text(operator.text()));
+    let highest = Operator::Power.precedence();
+    add(
+        &kind.name("choice"),
+        right(
+            0,
+            seq([
+                field("condition", expression()),
+                text("?"),
+                field("then", expression()),
+                text(":"),
+                field("else", expression()),
+            ]),
+        ),
+    );
+    let prefixes = Operator::ALL.iter().filter(|operator| operator.is_prefix());
+    add(
+        &kind.name("unary"),
+        right(highest - 1, seq([choice(prefixes.map(operator)), field("operand", expression())])),
+    );
+    let infixes = Operator::ALL.iter().filter(|operator| operator.precedence() > 0);
+    add(
+        &kind.name("binary"),
+        choice(infixes.map(|infix| {
+            let parts = seq([field("left", expression()), operator(infix), field("right", expression())]);
+            let associate = if *infix == Operator::Power { right } else { left };
+            associate(infix.precedence(), parts)
+        })),
+    );
+    let part = |begin: &str| seq([symbol(begin), expression()]);
+    add(
+        &kind.name("template"),
+        seq([part("template_begin"), repeat(part("template_middle")), symbol("template_end")]),
+    );
+}
+
+/// Tokens, as the assembler's lexer has them.
+fn tokens(add: &mut impl FnMut(&str, Rule)) {
+    let operators = || Operator::ALL.iter().map(|operator| text(operator.text()));
+    // Whatever tokens a library file's name is made of.
+    let tokens = ["identifier", "number", "text", "template_begin", "template_middle", "template_end"];
+    let tokens = tokens.into_iter().chain(["directive_name"]).map(|token| alias(symbol(token), "path"));
+    let signs = [",", ":", "(", ")", "[", "]", "@", "=", "?"].map(text);
+    let closing = Operator::Gt.text();
+    let operators = operators().filter(|operator| *operator != text(closing));
+    let slashes = seq([pattern("//"), symbol(NEVER)]);
+    let part = choice(tokens.chain(signs).chain(operators).chain([symbol("_bars"), symbol(NEVER), slashes]));
+    add("library", seq([text(Operator::Lt.text()), repeat1(part), text(closing)]));
+
+    add("comment", pattern(";[^\\n]*"));
+    add("text", pattern("\"([^\"\\\\\\n]|\\\\[^\\n])*\""));
+    add("directive_name", pattern("\\.[A-Za-z_][A-Za-z0-9_]*"));
+    add("identifier", pattern("[A-Za-z_][A-Za-z0-9_.]*"));
+    add("template_begin", pattern("([A-Za-z_][A-Za-z0-9_.]*)?\\{"));
+    add("template_middle", pattern("\\}[A-Za-z0-9_.]*\\{"));
+    add("template_end", pattern("\\}[A-Za-z0-9_.]*"));
+    let exponent = "[eE][+-]?[0-9]+";
+    let (digit, digits) = ("[0-9A-Fa-f]", "[0-9A-Fa-f_]*");
+    add(
+        "number",
+        pattern(
+            &[
+                "[0-9][0-9_]*".to_owned(),
+                format!("[0-9][0-9_]*\\.[0-9_]*({exponent})?"),
+                format!("[0-9][0-9_]*{exponent}"),
+                format!("\\.[0-9][0-9_]*({exponent})?"),
+                // At least one digit stands among the separators.
+                format!("0[xX]_*{digit}{digits}"),
+                "0[bB]_*[01][01_]*".to_owned(),
+                format!("0[xX]_*({digit}{digits}(\\.{digits})?|\\._*{digit}{digits})[pP][+-]?[0-9]+"),
+            ]
+            .join("|"),
+        ),
+    );
+    // Behind `number`, which of the two is taken where both are as long.
+    add("_no_number", pattern("[0-9][0-9A-Za-z_.]*"));
+    add(NEVER, seq([symbol("_no_number"), immediate(pattern("[0-9]"))]));
+}

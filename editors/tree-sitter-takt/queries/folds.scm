@@ -1,0 +1,7 @@
+; Generated from the tables by `cargo xtask docs`; do not edit.
+
+[
+  (macro_definition)
+  (repetition)
+  (conditional)
+] @fold

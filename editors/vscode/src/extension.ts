@@ -1,0 +1,133 @@
+// Takt in VS Code: `takt lsp` and `takt dap`, started and asked, and the view of the pipeline. What there is to know of the
+// language, they know.
+import * as vscode from 'vscode';
+import { LanguageClient } from 'vscode-languageclient/node';
+import { Beside } from './beside';
+import type { Pipeline } from './pipeline';
+import { COMMANDS, words, type Definition } from './tasks';
+
+let client: LanguageClient | undefined;
+let beside: Beside | undefined;
+
+function settings(): { program: string; options: string[] } {
+  const settings = vscode.workspace.getConfiguration('takt');
+  return { program: settings.get('command', 'takt'), options: settings.get('arguments', []) };
+}
+
+async function start() {
+  const { program, options } = settings();
+  client = new LanguageClient(
+    'takt',
+    'Takt',
+    { command: program, args: ['lsp', ...options] },
+    {
+      documentSelector: [{ language: 'takt' }],
+      synchronize: { fileEvents: vscode.workspace.createFileSystemWatcher('**/*.s') },
+    },
+  );
+  client.registerFeature({
+    getState: () => ({ kind: 'static' }),
+    fillClientCapabilities: (capabilities) => {
+      capabilities.experimental = { ...capabilities.experimental, 'takt/counted': true };
+    },
+    initialize: () => undefined,
+    clear: () => undefined,
+  });
+  client.onNotification('takt/counted', () => beside?.counted());
+  try {
+    await client.start();
+  } catch (error) {
+    const open = 'Open the setting';
+    const text = `Takt: \`${program} lsp\` does not start (setting takt.command): ${(error as Error).message}`;
+    void vscode.window.showErrorMessage(text, open).then((chosen) => {
+      if (chosen === open) void vscode.commands.executeCommand('workbench.action.openSettings', 'takt.command');
+    });
+  }
+}
+
+async function restart() {
+  await client?.stop().catch(() => undefined);
+  await start();
+}
+
+/** Asks for a number and sends it to the session that is debugged. */
+function goTo(what: 'cycle' | 'period') {
+  return async () => {
+    const session = vscode.debug.activeDebugSession;
+    const text = await vscode.window.showInputBox({
+      prompt: `Go to which ${what}?`,
+      validateInput: (text) => (/^\d+$/.test(text) ? undefined : 'a whole number'),
+    });
+    if (!session || text === undefined) return;
+    try {
+      await session.customRequest(what === 'cycle' ? 'takt/gotoCycle' : 'takt/gotoPeriod', { [what]: Number(text) });
+    } catch (error) {
+      void vscode.window.showErrorMessage(`Takt: ${(error as Error).message}`);
+    }
+  };
+}
+
+function task(definition: Definition, scope: vscode.TaskScope | vscode.WorkspaceFolder): vscode.Task | undefined {
+  const found = words(settings().program, definition);
+  if (typeof found === 'string') {
+    void vscode.window.showErrorMessage(`Takt: in the task: ${found}`);
+    return undefined;
+  }
+  const [program, ...rest] = found;
+  const execution = new vscode.ProcessExecution(program!, rest);
+  return new vscode.Task(definition, scope, `${definition.command} ${definition.file}`, 'takt', execution, '$takt');
+}
+
+const tasks: vscode.TaskProvider = {
+  provideTasks() {
+    const document = vscode.window.activeTextEditor?.document;
+    if (document?.languageId !== 'takt' || document.uri.scheme !== 'file') return [];
+    const file = vscode.workspace.asRelativePath(document.uri, false);
+    const scope = vscode.workspace.getWorkspaceFolder(document.uri) ?? vscode.TaskScope.Workspace;
+    return COMMANDS.flatMap((command) => task({ type: 'takt', command, file }, scope) ?? []);
+  },
+  resolveTask({ definition, scope }) {
+    return task(definition as Definition, scope ?? vscode.TaskScope.Workspace);
+  },
+};
+
+const configurations: vscode.DebugConfigurationProvider = {
+  // Without a launch.json: the file at hand.
+  resolveDebugConfiguration(_, configuration) {
+    if (configuration.type) return configuration;
+    const document = vscode.window.activeTextEditor?.document;
+    if (document?.languageId !== 'takt') return undefined;
+    return { type: 'takt', request: 'launch', name: 'Takt', program: document.fileName };
+  },
+};
+
+export async function activate(context: vscode.ExtensionContext) {
+  beside = new Beside(context.extensionUri, async (uri) => {
+    const textDocument = { uri: client!.code2ProtocolConverter.asUri(uri) };
+    return client!.sendRequest<Pipeline | null>('takt/pipeline', { textDocument });
+  });
+  context.subscriptions.push(
+    beside,
+    vscode.debug.registerDebugAdapterDescriptorFactory('takt', {
+      createDebugAdapterDescriptor: () => new vscode.DebugAdapterExecutable(settings().program, ['dap']),
+    }),
+    vscode.debug.registerDebugConfigurationProvider('takt', configurations),
+    vscode.tasks.registerTaskProvider('takt', tasks),
+    vscode.commands.registerCommand('takt.restart', restart),
+    vscode.commands.registerCommand('takt.pipeline', async () => {
+      const editor = vscode.window.activeTextEditor;
+      if (editor?.document.languageId === 'takt') await beside?.open(editor);
+      else void vscode.window.showInformationMessage('Takt: the pipeline is that of a Takt source: open one.');
+    }),
+    vscode.commands.registerCommand('takt.gotoCycle', goTo('cycle')),
+    vscode.commands.registerCommand('takt.gotoPeriod', goTo('period')),
+    vscode.workspace.onDidChangeConfiguration((change) => {
+      if (change.affectsConfiguration('takt')) void restart();
+    }),
+  );
+  await start();
+}
+
+export function deactivate() {
+  return client?.stop();
+}

@@ -1,0 +1,26 @@
+// package.json against the sources: what it names is there, and every command has code.
+import assert from 'node:assert/strict';
+import { existsSync, readFileSync } from 'node:fs';
+import { test } from 'node:test';
+
+const manifest = JSON.parse(readFileSync('package.json', 'utf8'));
+const { contributes } = manifest;
+
+test('files that the manifest names are there', () => {
+  const steps = contributes.walkthroughs[0].steps.map((step: { media: { markdown: string } }) => step.media.markdown);
+  const paths = [...contributes.grammars, ...contributes.snippets].map((one: { path: string }) => one.path);
+  for (const path of [...steps, ...paths, contributes.languages[0].configuration]) assert.ok(existsSync(path), path);
+});
+
+test('each command is registered, and no other', () => {
+  const source = readFileSync('src/extension.ts', 'utf8');
+  const registered = [...source.matchAll(/registerCommand\('([^']+)'/g)].map((match) => match[1]).sort();
+  assert.deepEqual(contributes.commands.map((one: { command: string }) => one.command).sort(), registered);
+});
+
+test('the problem matcher reads what takt says', () => {
+  const [first, second] = contributes.problemMatchers[0].pattern;
+  const said = 'error[unknown-instruction]: there is no instruction `fadf`\n  ┌─ main.s:12:9\n'.split('\n');
+  assert.deepEqual(said[0]!.match(new RegExp(first.regexp))!.slice(1), ['error', 'unknown-instruction', 'there is no instruction `fadf`']);
+  assert.deepEqual(said[1]!.match(new RegExp(second.regexp))!.slice(1), ['main.s', '12', '9']);
+});

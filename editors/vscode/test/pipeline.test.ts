@@ -1,0 +1,63 @@
+// The picture's data: rows, columns, what the cursor and a click mean.
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { explain, fromView, layout, rowsOf, sameDocument, type Bundle, type Pipeline } from '../src/pipeline';
+
+const operation = (line: number | null, latency: number | null, file: number | null = 0) =>
+  ({ slot: 'mul', unit: 'multiply', text: `op ${line}`, latency, file, line });
+const bundle = (from: string, cycle: number, operations: Bundle['operations'], stalls: Bundle['stalls'] = []): Bundle =>
+  ({ address: 7, from, cycle, stalls, operations });
+
+const picture: Pipeline = {
+  machine: 't3',
+  files: ['file:///p/a%20b.s', null],
+  bundles: [
+    bundle('once', 1, [operation(0, 4), operation(1, 2)]),
+    bundle('once', 3, []),
+    bundle('period', 1, [operation(4, null)]),
+    bundle('period', 6, [operation(4, 3), operation(9, 1, 1)], [{ cause: 'operand', cycles: 4, text: 'x of bundle 2' }]),
+    // A second stretch of the same name begins anew.
+    bundle('period', 1, [operation(null, 1, null)]),
+  ],
+  more: 0,
+};
+
+test('rows stand in the columns of their cycles, stretch after stretch', () => {
+  const { rows, stretches, columns } = layout(picture);
+  assert.deepEqual(rows.map((row) => row.column), [0, 0, 2, 4, 9, 9, 12]);
+  assert.deepEqual(rows.map((row) => row.first), [true, false, true, true, true, false, true]);
+  assert.deepEqual(stretches, [
+    { from: 'once', start: 0, rows: [0, 3] },
+    { from: 'period', start: 4, rows: [3, 6] },
+    { from: 'period', start: 12, rows: [6, 7] },
+  ]);
+  assert.equal(columns, 13);
+  assert.deepEqual(layout({ ...picture, bundles: [] }), { rows: [], stretches: [], columns: 0 });
+});
+
+test('the cursor finds its rows, in its own document only', () => {
+  const { rows } = layout(picture);
+  assert.deepEqual(rowsOf(picture, rows, 'file:///p/a b.s', [4, 4]), [3, 4]);
+  assert.deepEqual(rowsOf(picture, rows, 'file:///p/a%20b.s', [1, 9]), [1, 3, 4]);
+  assert.deepEqual(rowsOf(picture, rows, 'file:///p/b.s', [0, 99]), []);
+});
+
+test('URIs are compared by what they mean', () => {
+  assert.ok(sameDocument('file:///c%3A/x.s', 'file:///c:/x.s'));
+  assert.ok(!sameDocument('file:///a.s', 'file:///b.s'));
+  assert.ok(sameDocument('file:///%', 'file:///%'));
+});
+
+test('only messages of the protocol are heard', () => {
+  assert.deepEqual(fromView({ type: 'ready', more: 1 }), { type: 'ready' });
+  assert.deepEqual(fromView({ type: 'reveal', uri: 'file:///a.s', line: 3 }), { type: 'reveal', uri: 'file:///a.s', line: 3 });
+  for (const wrong of [null, 3, 'ready', {}, { type: 'reveal' }, { type: 'reveal', uri: 'a', line: -1 }, { type: 'reveal', uri: 'a', line: 1.5 }]) {
+    assert.equal(fromView(wrong), undefined);
+  }
+});
+
+test('a row explains itself', () => {
+  const { rows } = layout(picture);
+  assert.equal(explain(rows[4]!), 'cycle 6 from period, bundle 7, slot mul\nop 4\nunit multiply, result after 3 cycles\n4 cycles lost: x of bundle 2');
+  assert.equal(explain(rows[2]!), 'cycle 3 from once, bundle 7');
+});

@@ -1,0 +1,61 @@
+//! What the operations mean in the real numbers: the meaning before it is rounded.
+//!
+//! An instruction's row says it beside its kernel, once, over any [`Real`]: binary64 beside a run, intervals over every run.
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// A domain in which rows are evaluated without binary32's rounding: numbers, intervals, whatever stands for them.
+///
+/// Comparisons and conversions to integers are *decisions*: their value is an integer, 1 or 0 for a comparison.
+pub trait Real:
+    Clone + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+{
+    /// The square root.
+    #[must_use]
+    fn sqrt(self) -> Self;
+    /// The sine, in radians.
+    #[must_use]
+    fn sin(self) -> Self;
+    /// The cosine, in radians.
+    #[must_use]
+    fn cos(self) -> Self;
+    /// The angle of the point (`x`, self), in [-π, π].
+    #[must_use]
+    fn atan2(self, x: Self) -> Self;
+    /// The arccosine, in [0, π].
+    #[must_use]
+    fn acos(self) -> Self;
+    /// The magnitude.
+    #[must_use]
+    fn abs(self) -> Self;
+    /// -1, 0 or 1.
+    #[must_use]
+    fn sign(self) -> Self;
+    /// The smaller one.
+    #[must_use]
+    fn minimum(self, other: Self) -> Self;
+    /// The larger one.
+    #[must_use]
+    fn maximum(self, other: Self) -> Self;
+    /// Kept within ±|`bound`|.
+    #[must_use]
+    fn saturate(self, bound: Self) -> Self;
+    /// The number that the operand's bits stand for as a signed integer.
+    #[must_use]
+    fn integer(self) -> Self;
+    /// The nearest integer, to even, within 32 bits: a decision.
+    #[must_use]
+    fn nearest(self) -> Self;
+    /// Whether they are equal: a decision.
+    #[must_use]
+    fn equal(self, other: Self) -> Self;
+    /// Whether self is less: a decision.
+    #[must_use]
+    fn less(self, other: Self) -> Self;
+    /// Whether self is less or equal: a decision.
+    #[must_use]
+    fn less_or_equal(self, other: Self) -> Self;
+    /// `yes` if any of self's bits is set, else `no`.
+    #[must_use]
+    fn choose(self, yes: Self, no: Self) -> Self;
+}

@@ -1,0 +1,20 @@
+; Watches an actuator: the largest magnitude that it was given, and how many values there were.
+
+.schedule on
+
+.input  u                               ; V
+.output peak                            ; V
+.output values:int
+
+.once
+        mov     peak, zero
+        mov     values, zero
+        wait    period
+
+.period
+period:
+.reg    a
+        fabs    a, u
+        fmax    peak, peak, a
+        iadd    values, values, 1
+        wait    period

@@ -1,0 +1,95 @@
+//! The errors of a run's outputs against binary64: `takt accuracy`.
+
+use crate::failure::{self, Failure};
+use crate::interrupt::Interrupt;
+use crate::program::Program;
+use crate::run::{loaded, port_error};
+use numpy::{PyReadonlyArray, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use std::num::NonZeroU64;
+use takt_analysis::accuracy::{OutputAccuracy, Part, Shadow, Worst};
+use takt_emu::{Emulator, Fault};
+
+/// An error, the period from 0, what the output was, and what it is in binary64.
+type Largest = (f64, u64, f64, f64);
+
+/// What was measured of an output.
+#[derive(IntoPyObject)]
+pub(crate) struct Measured {
+    name: String,
+    periods: u64,
+    absolute: Option<Largest>,
+    ulp: Option<Largest>,
+    relative: Option<Largest>,
+    /// Place of an operation, and its share of the largest absolute error.
+    operations: Vec<(String, f64)>,
+}
+
+impl Measured {
+    fn of(output: &OutputAccuracy, program: &takt_isa::Program) -> Measured {
+        let largest = |worst: Option<Worst>| {
+            worst.map(|Worst { error, period, value, exact }| (error, period.saturating_sub(1), value, exact))
+        };
+        let place = |part: &Part| {
+            let place = program.word_place(part.word as usize);
+            (place.unwrap_or_else(|| format!("word {}", part.word)), part.error)
+        };
+        Measured {
+            name: output.name.clone(),
+            periods: output.periods,
+            absolute: largest(output.absolute),
+            ulp: largest(output.ulp),
+            relative: largest(output.relative),
+            operations: output.parts.iter().map(place).collect(),
+        }
+    }
+}
+
+/// Runs the program over words by period and input port, and beside it the same operations in binary64.
+#[pyfunction]
+pub(crate) fn accuracy(
+    py: Python<'_>,
+    program: &Program,
+    inputs: PyReadonlyArray<'_, u32, numpy::Ix2>,
+    each_period: bool,
+    max_cycles: NonZeroU64,
+) -> PyResult<(Vec<Measured>, Option<Failure>)> {
+    let ports = &program.program.inputs;
+    if inputs.shape().get(1) != Some(&ports.len()) {
+        let text = format!("inputs of shape {:?}; the program has {}", inputs.shape(), ports.len());
+        return Err(PyValueError::new_err(text));
+    }
+    let words = inputs.as_slice().map_err(|_| PyValueError::new_err("inputs is not contiguous"))?;
+    let periods = inputs.shape().first().copied().unwrap_or(0);
+    let row = |period: usize| &words[period * ports.len()..][..ports.len()];
+    let measured = || -> PyResult<Result<Vec<Measured>, (Fault, usize)>> {
+        let mut emulator = loaded(Emulator::new(&program.program))?;
+        let shadow = Shadow::new(&program.program);
+        let mut shadow = if each_period { shadow.each_period_afresh() } else { shadow };
+        let mut interrupt = Interrupt::new();
+        'run: for period in 0..periods {
+            for (port, bits) in ports.iter().zip(row(period)) {
+                emulator.set_input_bits(port.register, *bits).map_err(port_error)?;
+            }
+            // What runs once sees the first period's inputs.
+            for _ in 0..if period == 0 { 2 } else { 1 } {
+                interrupt.check_now()?;
+                emulator.set_cycle_limit(emulator.now().saturating_add(max_cycles.get()));
+                match shadow.run_period(&mut emulator) {
+                    Ok(true) => {}
+                    Ok(false) => break 'run,
+                    Err(fault) => return Ok(Err((fault, period))),
+                }
+            }
+        }
+        Ok(Ok(shadow.outputs().iter().map(|output| Measured::of(output, &program.program)).collect()))
+    };
+    Ok(match py.detach(measured)? {
+        Ok(outputs) => (outputs, None),
+        Err((fault, period)) => {
+            let failure = failure::of_fault(&fault, (0, period), &program.program, &program.sources);
+            (Vec::new(), Some(failure))
+        }
+    })
+}

@@ -1,0 +1,105 @@
+//! What ended a run early, as Python sees it.
+
+use pyo3::prelude::*;
+use takt_debug::fault::diagnose;
+use takt_emu::{Fault, FaultKind, PeriodError};
+use takt_isa::Program;
+
+/// What ended a run.
+#[pyclass(name = "Fault", frozen, get_all, module = "takt")]
+#[derive(Clone, Debug)]
+pub(crate) struct Failure {
+    /// The run of a batch, from 0.
+    pub(crate) run: usize,
+    /// The period in which it happened, from 0.
+    pub(crate) period: usize,
+    /// What happened, in a word or two, as `data address`; `halted` if the program has halted.
+    pub(crate) kind: String,
+    /// What happened.
+    pub(crate) message: String,
+    /// The cycle, counted from reset.
+    pub(crate) cycle: Option<u64>,
+    /// The bundle's address.
+    pub(crate) bundle: Option<u32>,
+    /// The slot of the operation, where it is one operation's.
+    pub(crate) slot: Option<String>,
+    /// The source file, as far as the program knows it.
+    pub(crate) file: Option<String>,
+    /// The line in it, from 1.
+    pub(crate) line: Option<u32>,
+    /// The whole message, with the source line if that is at hand.
+    pub(crate) text: String,
+}
+
+#[pymethods]
+impl Failure {
+    fn __repr__(&self) -> String {
+        let place = match (&self.file, self.line) {
+            (Some(file), Some(line)) => format!("{file}:{line}: "),
+            _ => String::new(),
+        };
+        format!("<Fault in run {}, period {}: {place}{}>", self.run, self.period, self.message)
+    }
+
+    fn __str__(&self) -> &str {
+        &self.text
+    }
+}
+
+/// The failure of a period.
+pub(crate) fn of_period(
+    error: &PeriodError,
+    (run, period): (usize, usize),
+    program: &Program,
+    sources: &[(String, String)],
+) -> Failure {
+    match error {
+        PeriodError::Fault(fault) => of_fault(fault, (run, period), program, sources),
+        PeriodError::Halted => plain("halted", error.to_string(), (run, period)),
+        PeriodError::Port(error) => plain("port", error.to_string(), (run, period)),
+    }
+}
+
+/// A failure without a place in the program.
+pub(crate) fn plain(kind: &str, message: String, (run, period): (usize, usize)) -> Failure {
+    Failure {
+        run,
+        period,
+        kind: kind.to_owned(),
+        text: message.clone(),
+        message,
+        cycle: None,
+        bundle: None,
+        slot: None,
+        file: None,
+        line: None,
+    }
+}
+
+/// A fault at its source line.
+pub(crate) fn of_fault(
+    fault: &Fault,
+    (run, period): (usize, usize),
+    program: &Program,
+    sources: &[(String, String)],
+) -> Failure {
+    let mut diagnostics = diagnose(fault, program, sources);
+    for diagnostic in &mut diagnostics.list {
+        if let (FaultKind::CycleLimit { .. }, Some(help)) = (&fault.kind, &mut diagnostic.help) {
+            help.push_str(" (`max_cycles` sets the limit)");
+        }
+    }
+    let location = fault.location(program);
+    Failure {
+        run,
+        period,
+        kind: fault.kind.name().to_owned(),
+        message: fault.show(program).message(),
+        cycle: Some(fault.cycle),
+        bundle: Some(fault.address.get()),
+        slot: fault.slot.map(|slot| program.machine.slot(slot).name.to_owned()),
+        file: location.and_then(|location| program.files.get(location.file as usize).cloned()),
+        line: location.map(|location| location.line),
+        text: diagnostics.render(false).trim_end().to_owned(),
+    }
+}

@@ -1,0 +1,35 @@
+//! The extension module of the Python package `takt`: programs, runs and models for the Python code in `python/takt`, which
+//! gives them names, shapes and types of NumPy. docs/python.md is about the package.
+//!
+//! What comes from Python is checked here as well as there: no argument makes it panic. Long work releases the interpreter
+//! and looks for Ctrl-C.
+
+mod accuracy;
+mod failure;
+mod interrupt;
+mod model;
+mod program;
+mod report;
+mod run;
+mod sim;
+
+use pyo3::prelude::*;
+
+/// The extension module of the package `takt`; use that one.
+#[pymodule]
+mod _takt {
+    #[pymodule_export]
+    use crate::accuracy::accuracy;
+    #[pymodule_export]
+    use crate::failure::Failure;
+    #[pymodule_export]
+    use crate::model::{expressions, robot, robot_functions};
+    #[pymodule_export]
+    use crate::program::{Program, assemble, flag_names, load, machines, nearest_name};
+    #[pymodule_export]
+    use crate::report::analyse;
+    #[pymodule_export]
+    use crate::run::{run, run_to_halt};
+    #[pymodule_export]
+    use crate::sim::Sim;
+}

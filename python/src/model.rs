@@ -1,0 +1,176 @@
+//! Sources from robots' descriptions and from other tools' expressions: `takt_model`, for `takt.urdf`, `takt.casadi`, ….
+
+use crate::program::{machine, suggest};
+use pyo3::exceptions::PyValueError;
+use pyo3::import_exception;
+use pyo3::prelude::*;
+use takt_model::functions::{Array, Function, Options, Port, What, derive};
+use takt_model::graph::{Delays, Rewrites};
+use takt_model::robot::{Tree, dh, urdf};
+use takt_model::{Error, instructions, write};
+
+import_exception!(takt._errors, ModelError);
+
+/// An element of an array of ports.
+#[derive(IntoPyObject)]
+enum Element {
+    /// The port's name.
+    Port(String),
+    /// An output that needs no port.
+    Constant(f64),
+    /// An input without effect.
+    None(Option<u8>),
+}
+
+/// Name, dimensions and elements, the last index fastest.
+type Shaped = (String, Vec<usize>, Vec<Element>);
+
+/// A source, and what its ports are.
+#[derive(IntoPyObject)]
+pub(crate) struct Model {
+    source: String,
+    title: String,
+    notes: Vec<String>,
+    operations: usize,
+    /// What each port is, and its unit.
+    texts: Vec<(String, String)>,
+    inputs: Vec<Shaped>,
+    outputs: Vec<Shaped>,
+    joints: Vec<String>,
+}
+
+impl Model {
+    fn of(function: &Function, joints: Vec<String>) -> Model {
+        let read = write::inputs_read(function);
+        let input = |index: Option<usize>| match index.filter(|index| read[*index]) {
+            Some(index) => Element::Port(function.inputs[index].name.clone()),
+            None => Element::None(None),
+        };
+        let output = |index: Option<usize>| match index.map(|index| &function.outputs[index]) {
+            None => Element::Constant(0.0),
+            Some((port, id)) => {
+                let name = || Element::Port(port.name.clone());
+                function.graph.value(*id).map_or_else(name, Element::Constant)
+            }
+        };
+        let shaped = |arrays: &[Array], element: &dyn Fn(Option<usize>) -> Element| {
+            let array = |array: &Array| {
+                let elements = array.elements.iter().map(|index| element(*index)).collect();
+                (array.name.clone(), array.shape.clone(), elements)
+            };
+            arrays.iter().map(array).collect()
+        };
+        let ports = function.inputs.iter().chain(function.outputs.iter().map(|(port, _)| port));
+        let text = |port: &Port| (port.name.clone(), port.text.clone());
+        Model {
+            source: write::source(function),
+            title: function.title.clone(),
+            notes: function.notes.clone(),
+            operations: function.count().total(),
+            texts: ports.map(text).collect(),
+            inputs: shaped(&function.input_arrays, &input),
+            outputs: shaped(&function.output_arrays, &output),
+            joints,
+        }
+    }
+}
+
+/// An error with its place; `name` is what was read.
+fn told(name: &str, error: Error) -> PyErr {
+    let text = match error.line {
+        Some(line) => format!("{name}:{line}: {error}"),
+        None => format!("{name}: {error}"),
+    };
+    ModelError::new_err((text, error.line))
+}
+
+fn rewrites(exact: bool, without: &[String]) -> PyResult<Rewrites> {
+    let mut rewrites = if exact { Rewrites::EXACT } else { Rewrites::ALL };
+    for name in without {
+        if !rewrites.without(name) {
+            let names = Rewrites::NAMES.map(|(name, _)| name);
+            let near = suggest(name, names);
+            let text =
+                format!("without: there is no rewriting `{name}`{near} (there are: {})", names.join(", "));
+            return Err(PyValueError::new_err(text));
+        }
+    }
+    Ok(rewrites)
+}
+
+/// The functions of a robot: name and description.
+#[pyfunction]
+pub(crate) fn robot_functions() -> Vec<(&'static str, &'static str)> {
+    What::ALL.iter().map(|(_, name, text)| (*name, *text)).collect()
+}
+
+/// A function of a robot that is described in URDF, or by a table of Denavit-Hartenberg parameters.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+pub(crate) fn robot(
+    py: Python<'_>,
+    text: &str,
+    name: &str,
+    table: bool,
+    function: &str,
+    base: Option<&str>,
+    tip: Option<&str>,
+    gains: (f64, f64),
+    snap: f64,
+    exact: bool,
+    without: Vec<String>,
+    machine: &str,
+) -> PyResult<Model> {
+    let what = What::from_name(function).ok_or_else(|| {
+        let names = What::ALL.map(|(_, name, _)| name);
+        let near = suggest(function, names);
+        let text =
+            format!("there is no function `{function}` of a robot{near} (functions: {})", names.join(", "));
+        PyValueError::new_err(text)
+    })?;
+    for (gain, name) in [(gains.0, "kp"), (gains.1, "kd")] {
+        if !gain.is_finite() || gain < 0.0 {
+            return Err(PyValueError::new_err(format!(
+                "{name} is {gain}: a gain is finite and not negative"
+            )));
+        }
+    }
+    if !(0.0..=urdf::MAX_SNAP).contains(&snap) {
+        let text = format!("snap is {snap}: it is between 0 and {} rad", urdf::MAX_SNAP);
+        return Err(PyValueError::new_err(text));
+    }
+    let machine = self::machine(machine)?;
+    let delays = Delays::of(machine);
+    let rewrites = rewrites(exact, &without)?;
+    let made = || {
+        let tree: Tree = if table { dh::read(text, name, snap)? } else { urdf::read(text, snap)? };
+        let robot = tree.robot(base, tip).map_err(|error| error.located(text))?;
+        let options = Options { rewrites, delays, tip, kp: gains.0, kd: gains.1 };
+        let function = derive(&robot, what, &options)?;
+        write::fits(&function, machine)?;
+        let joints = robot.joints.iter().map(|joint| joint.name.clone()).collect();
+        Ok(Model::of(&function, joints))
+    };
+    py.detach(made).map_err(|error| told(name, error))
+}
+
+/// A list of instructions, as `takt_expressions` makes it.
+#[pyfunction]
+pub(crate) fn expressions(
+    py: Python<'_>,
+    text: &str,
+    name: &str,
+    exact: bool,
+    without: Vec<String>,
+    machine: &str,
+) -> PyResult<Model> {
+    let machine = self::machine(machine)?;
+    let delays = Delays::of(machine);
+    let rewrites = rewrites(exact, &without)?;
+    let made = || {
+        let function = instructions::read(text, rewrites)?.optimised(&delays);
+        write::fits(&function, machine)?;
+        Ok(Model::of(&function, Vec::new()))
+    };
+    py.detach(made).map_err(|error| told(name, error))
+}

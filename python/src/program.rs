@@ -1,0 +1,295 @@
+//! Programs: from a source or an image, and what is known of them without running them.
+
+use crate::sim::Sim;
+use pyo3::exceptions::PyValueError;
+use pyo3::import_exception;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use std::num::NonZeroU64;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use takt_asm::diag::Diagnostics;
+use takt_asm::levels::Wish;
+use takt_asm::limits::IMAGE_BYTES;
+use takt_asm::names::DebugInfo;
+use takt_asm::{Assembled, Contract, FileLoader, Options, Schedule, Search, disasm, image, listing, nearest};
+use takt_isa::fp::Flags;
+use takt_isa::program::Port;
+use takt_isa::{MACHINES, Machine, Type};
+
+import_exception!(takt._errors, AssemblyError);
+import_exception!(takt._errors, NoBoundError);
+
+/// A program in the machine's memories.
+#[pyclass(frozen, module = "takt._takt")]
+pub(crate) struct Program {
+    pub(crate) program: Arc<takt_isa::Program>,
+    /// Texts, by the names that the program has for them.
+    pub(crate) sources: Arc<Vec<(String, String)>>,
+    /// What is known of one that was assembled here.
+    pub(crate) assembled: Option<Assembled>,
+    /// How it was assembled.
+    recipe: Option<Recipe>,
+    /// And of one from an image.
+    debug: Option<DebugInfo>,
+}
+
+/// How a source becomes a program.
+#[derive(Clone)]
+struct Recipe {
+    text: Vec<u8>,
+    name: String,
+    folder: PathBuf,
+    include: Vec<PathBuf>,
+    options: Options,
+}
+
+impl Recipe {
+    fn assemble(&self) -> Result<Assembled, Diagnostics> {
+        let search = Search::new(FileLoader::new(&self.folder));
+        let search = self.include.iter().fold(search, Search::folder).library(takt_programs::LIBRARY);
+        takt_asm::assemble_bytes(&self.name, self.text.clone(), &search, &self.options)
+    }
+}
+
+/// `; did you mean …?` if one of the names is near.
+pub(crate) fn suggest<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+    nearest(name, names).map_or(String::new(), |near| format!("; did you mean `{near}`?"))
+}
+
+pub(crate) fn machine(name: &str) -> PyResult<&'static Machine> {
+    Machine::from_name(name).ok_or_else(|| {
+        let names = || MACHINES.iter().map(|machine| machine.name);
+        let near = suggest(name, names());
+        let names: Vec<&str> = names().collect();
+        PyValueError::new_err(format!("there is no machine `{name}`{near} (machines: {})", names.join(", ")))
+    })
+}
+
+/// One of a few words.
+fn choice<T: Copy>(what: &str, given: &str, choices: &[(&str, T)]) -> PyResult<T> {
+    let found = choices.iter().find(|(name, _)| *name == given);
+    found.map(|(_, value)| *value).ok_or_else(|| {
+        let names: Vec<String> = choices.iter().map(|(name, _)| format!("'{name}'")).collect();
+        let near = suggest(given, choices.iter().map(|(name, _)| *name));
+        PyValueError::new_err(format!("{what} is '{given}'{near} (it is one of {})", names.join(", ")))
+    })
+}
+
+/// The machines: name and description.
+#[pyfunction]
+pub(crate) fn machines() -> Vec<(&'static str, &'static str)> {
+    MACHINES.iter().map(|machine| (machine.name, machine.text)).collect()
+}
+
+/// The exception flags: bit and name.
+#[pyfunction]
+pub(crate) fn flag_names() -> Vec<(u8, &'static str)> {
+    Flags::NAMES.iter().map(|(flag, name)| (flag.bits(), *name)).collect()
+}
+
+/// The name most like a misspelt one, if one is near enough to be meant.
+#[pyfunction]
+#[pyo3(name = "nearest")]
+pub(crate) fn nearest_name(name: &str, names: Vec<String>) -> Option<String> {
+    nearest(name, names.iter().map(String::as_str))
+}
+
+/// Assembles a text. Included files are looked for in `folder`, then in `include`, then in Takt's library.
+#[pyfunction]
+#[pyo3(signature = (text, name, folder, include, machine, schedule, contract, effort, warnings))]
+#[allow(clippy::too_many_arguments)]
+pub(crate) fn assemble(
+    py: Python<'_>,
+    text: Vec<u8>,
+    name: &str,
+    folder: PathBuf,
+    include: Vec<PathBuf>,
+    machine: &str,
+    schedule: &str,
+    contract: &str,
+    effort: Option<u32>,
+    warnings: Vec<String>,
+) -> PyResult<Program> {
+    let wishes = warnings.iter().map(|wish| {
+        wish.parse::<Wish>().map_err(|reason| PyValueError::new_err(format!("warnings: `{wish}`: {reason}")))
+    });
+    let options = Options {
+        machine: self::machine(machine)?,
+        schedule: choice(
+            "schedule",
+            schedule,
+            &[("source", Schedule::AsWritten), ("on", Schedule::All), ("off", Schedule::None)],
+        )?,
+        contract: choice(
+            "contract",
+            contract,
+            &[("source", Contract::AsWritten), ("on", Contract::All), ("off", Contract::None)],
+        )?,
+        effort: effort.unwrap_or(Options::default().effort),
+        levels: wishes.collect::<PyResult<Vec<_>>>()?.into_iter().collect(),
+    };
+    if let Some(none) = include.iter().find(|folder| !folder.is_dir()) {
+        return Err(PyValueError::new_err(format!("include: there is no folder {}", none.display())));
+    }
+    let recipe = Recipe { text, name: name.to_owned(), folder, include, options };
+    match py.detach(|| recipe.assemble()) {
+        Ok(assembled) => Program::assembled(assembled, recipe),
+        Err(diagnostics) => Err(AssemblyError::new_err((diagnostics.render(false), diagnostics.to_json()))),
+    }
+}
+
+/// The program in a file: an image, or `None` if that is a source, with its bytes.
+#[pyfunction]
+pub(crate) fn load(path: PathBuf) -> PyResult<(Option<Program>, Py<PyBytes>)> {
+    let about = std::fs::metadata(&path).map_err(|error| named(&path, error))?;
+    if about.len() > IMAGE_BYTES as u64 {
+        let text = format!("{} is larger than {} MiB", path.display(), IMAGE_BYTES >> 20);
+        return Err(PyValueError::new_err(text));
+    }
+    let bytes = std::fs::read(&path).map_err(|error| named(&path, error))?;
+    let program = image::is_image(&bytes).then(|| Program::from_image(&bytes, &path)).transpose()?;
+    Ok((program, Python::attach(|py| PyBytes::new(py, &bytes).unbind())))
+}
+
+fn named(path: &Path, error: std::io::Error) -> PyErr {
+    std::io::Error::new(error.kind(), format!("cannot read {}: {error}", path.display())).into()
+}
+
+/// Cycles, from the fewest to the most.
+type Pair = (u64, u64);
+
+/// A port: name, and `float`, `int` or `bits`.
+fn ports(ports: &[Port]) -> Vec<(String, &'static str)> {
+    ports.iter().map(|port| (port.name.clone(), kind(port.ty))).collect()
+}
+
+pub(crate) fn kind(ty: Type) -> &'static str {
+    match ty {
+        Type::F => "float",
+        Type::I => "int",
+        Type::B => "bits",
+    }
+}
+
+impl Program {
+    fn assembled(assembled: Assembled, recipe: Recipe) -> PyResult<Program> {
+        if assembled.program.bundles() == 0 {
+            return Err(PyValueError::new_err("the program has no instruction"));
+        }
+        let sources = Arc::new(assembled.debug_info().sources);
+        let program = Arc::new(assembled.program.clone());
+        Ok(Program { program, sources, assembled: Some(assembled), recipe: Some(recipe), debug: None })
+    }
+
+    /// The same source assembled for another machine; `None` of an image, and if it does not fit.
+    pub(crate) fn again(&self, machine: &'static Machine) -> Option<Assembled> {
+        let recipe = self.recipe.as_ref()?;
+        Recipe { options: Options { machine, ..recipe.options }, ..recipe.clone() }.assemble().ok()
+    }
+
+    fn from_image(bytes: &[u8], path: &Path) -> PyResult<Program> {
+        let wrong = |why: String| PyValueError::new_err(format!("{}: {why}", path.display()));
+        let (program, debug) = image::read_with(bytes)
+            .map_err(|error| wrong(format!("this is not an image that can run: {error}")))?;
+        if program.bundles() == 0 {
+            return Err(wrong("it has no instruction".to_owned()));
+        }
+        let sources = Arc::new(debug.as_ref().map_or(Vec::new(), |debug| debug.sources.clone()));
+        Ok(Program { program: Arc::new(program), sources, assembled: None, recipe: None, debug })
+    }
+}
+
+#[pymethods]
+impl Program {
+    /// The machine's name.
+    #[getter]
+    fn machine(&self) -> &'static str {
+        self.program.machine.name
+    }
+
+    /// Bundles in the program.
+    #[getter]
+    fn bundles(&self) -> u32 {
+        self.program.bundles()
+    }
+
+    /// Whether its ports are latched.
+    #[getter]
+    fn latched(&self) -> bool {
+        self.program.latched
+    }
+
+    /// Input ports: name and type.
+    #[getter]
+    fn inputs(&self) -> Vec<(String, &'static str)> {
+        ports(&self.program.inputs)
+    }
+
+    /// Output ports: name and type.
+    #[getter]
+    fn outputs(&self) -> Vec<(String, &'static str)> {
+        ports(&self.program.outputs)
+    }
+
+    /// Texts, by file.
+    #[getter]
+    fn sources(&self) -> Vec<(String, String)> {
+        self.sources.to_vec()
+    }
+
+    /// The assembler's warnings: rendered, and as JSON.
+    #[getter]
+    fn warnings(&self) -> Option<(String, String)> {
+        let warnings = &self.assembled.as_ref()?.warnings;
+        (!warnings.is_empty()).then(|| (warnings.render(false), warnings.to_json()))
+    }
+
+    /// Words beside the source lines that they come from; of an image, source that assembles to it.
+    fn listing(&self) -> String {
+        match &self.assembled {
+            Some(assembled) => listing::listing(assembled),
+            None => disasm::disassemble(&self.program),
+        }
+    }
+
+    /// The image, as `takt asm` writes it.
+    fn image(&self) -> PyResult<Vec<u8>> {
+        let debug = self.assembled.as_ref().map(Assembled::debug_info).or_else(|| self.debug.clone());
+        let image = image::write_with(&self.program, debug.as_ref());
+        image.map_err(|error| PyValueError::new_err(format!("no image: {error}")))
+    }
+
+    /// Of each block that the scheduler packed: label, cycles, and what no schedule can beat.
+    fn blocks(&self) -> Vec<(Option<String>, u32, u32)> {
+        let blocks = self.assembled.iter().flat_map(|assembled| &assembled.blocks);
+        blocks.map(|block| (block.label.clone(), block.cycles, block.bound.cycles())).collect()
+    }
+
+    /// The best and the worst of each section: name, place, whether it runs once, and cycles as a pair three times: after a
+    /// long wait, with the tick in time, after a missed deadline. Then the worst period.
+    #[allow(clippy::type_complexity)]
+    fn bound(
+        &self,
+        py: Python<'_>,
+    ) -> PyResult<(Vec<(String, Option<String>, bool, Pair, Pair, Pair)>, Option<u64>)> {
+        let program = &self.program;
+        let bounds = py
+            .detach(|| takt_analysis::bound(program))
+            .map_err(|error| NoBoundError::new_err(format!("no bound: {error}")))?;
+        let worst = bounds.worst_period();
+        let pair = |span: takt_analysis::Span| (span.best, span.worst);
+        let sections = bounds.sections.into_iter().map(|section| {
+            let place = section.location.map(|location| program.place_text(location));
+            let (plain, in_time, missed) = (section.cycles, section.in_time, section.missed);
+            (section.name, place, section.once, pair(plain), pair(in_time), pair(missed))
+        });
+        Ok((sections.collect(), worst))
+    }
+
+    /// A machine with the program in it.
+    #[pyo3(signature = (tick, max_cycles))]
+    fn sim(&self, tick: Option<NonZeroU64>, max_cycles: NonZeroU64) -> PyResult<Sim> {
+        Sim::new(self, tick, max_cycles)
+    }
+}

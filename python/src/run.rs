@@ -1,0 +1,305 @@
+//! Runs over arrays: one on an emulator, many in a batch.
+
+use crate::failure::{self, Failure};
+use crate::interrupt::Interrupt;
+use crate::program::Program;
+use numpy::{Element, PyReadonlyArray, PyReadwriteArray, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use std::num::NonZeroU64;
+use takt_emu::{Batch, Emulator, PeriodError, PeriodReport, Status, Stop};
+use takt_isa::Type;
+use takt_isa::program::Port;
+
+/// Lanes of a batch that run together; of more runs, so many at a time. (A lane takes 9 kB.)
+const LANES: usize = 4096;
+/// What stands in an output of binary32 that no operation has written yet.
+const UNWRITTEN: u32 = 0x7fc0_0000;
+
+/// What came of a run beside outputs and cycles.
+#[derive(IntoPyObject)]
+pub(crate) struct Ran {
+    /// Of each run the periods that came to their end.
+    completed: Vec<usize>,
+    /// Of each run its sticky exception flags, as bits.
+    flags: Vec<u8>,
+    /// What ended runs early.
+    failures: Vec<Failure>,
+    /// Of each output port the periods at whose end it had never been written.
+    unwritten: Vec<u64>,
+    /// NaNs written to output ports, in all runs.
+    nan_writes: u64,
+}
+
+/// The arrays of a call.
+struct Arrays<'a> {
+    ports: usize,
+    periods: usize,
+    runs: usize,
+    /// By input port, period and run.
+    inputs: &'a [u32],
+    /// By output port, period and run.
+    outputs: &'a mut [u32],
+    /// By period and run.
+    cycles: &'a mut [u64],
+    missed: &'a mut [u64],
+}
+
+struct Settings<'a> {
+    program: &'a takt_isa::Program,
+    sources: &'a [(String, String)],
+    tick: Option<NonZeroU64>,
+    max_cycles: u64,
+}
+
+fn shaped<'a, T: Element, D: numpy::ndarray::Dimension>(
+    array: &'a PyReadonlyArray<'_, T, D>,
+    what: &str,
+    shape: &[usize],
+) -> PyResult<&'a [T]> {
+    if array.shape() != shape {
+        return Err(PyValueError::new_err(format!("{what} has shape {:?}, not {shape:?}", array.shape())));
+    }
+    array.as_slice().map_err(|_| PyValueError::new_err(format!("{what} is not contiguous")))
+}
+
+fn writable<'a, T: Element, D: numpy::ndarray::Dimension>(
+    array: &'a mut PyReadwriteArray<'_, T, D>,
+    what: &str,
+    shape: &[usize],
+) -> PyResult<&'a mut [T]> {
+    if array.shape() != shape {
+        return Err(PyValueError::new_err(format!("{what} has shape {:?}, not {shape:?}", array.shape())));
+    }
+    array.as_slice_mut().map_err(|_| PyValueError::new_err(format!("{what} is not contiguous")))
+}
+
+/// Runs the program over arrays of words: `inputs` and `outputs` by port, period and run, `cycles` and `missed` by period
+/// and run. One run alone is an emulator's, several are a batch's.
+#[pyfunction]
+#[pyo3(signature = (program, inputs, outputs, cycles, missed, tick, max_cycles))]
+#[allow(clippy::too_many_arguments)]
+pub(crate) fn run(
+    py: Python<'_>,
+    program: &Program,
+    inputs: PyReadonlyArray<'_, u32, numpy::Ix3>,
+    mut outputs: PyReadwriteArray<'_, u32, numpy::Ix3>,
+    mut cycles: PyReadwriteArray<'_, u64, numpy::Ix2>,
+    mut missed: PyReadwriteArray<'_, u64, numpy::Ix2>,
+    tick: Option<NonZeroU64>,
+    max_cycles: NonZeroU64,
+) -> PyResult<Ran> {
+    let &[ports, periods, runs] = inputs.shape() else {
+        return Err(PyValueError::new_err("inputs: by port, period and run"));
+    };
+    if ports != program.program.inputs.len() {
+        let text = format!("inputs of {ports} ports; the program has {}", program.program.inputs.len());
+        return Err(PyValueError::new_err(text));
+    }
+    let arrays = Arrays {
+        ports,
+        periods,
+        runs,
+        inputs: shaped(&inputs, "inputs", &[ports, periods, runs])?,
+        outputs: writable(&mut outputs, "outputs", &[program.program.outputs.len(), periods, runs])?,
+        cycles: writable(&mut cycles, "cycles", &[periods, runs])?,
+        missed: writable(&mut missed, "missed", &[periods, runs])?,
+    };
+    let settings =
+        Settings { program: &program.program, sources: &program.sources, tick, max_cycles: max_cycles.get() };
+    py.detach(|| if runs == 1 { alone(&settings, arrays) } else { together(&settings, arrays) })
+}
+
+/// Runs the program to its `halt`, with these words on the input ports: cycles, outputs (`None` where nothing was
+/// written), exception flags, and what ended it otherwise.
+#[pyfunction]
+#[allow(clippy::type_complexity)]
+pub(crate) fn run_to_halt(
+    py: Python<'_>,
+    program: &Program,
+    inputs: Vec<u32>,
+    max_cycles: NonZeroU64,
+) -> PyResult<(u64, Vec<Option<u32>>, u8, Option<Failure>)> {
+    if inputs.len() != program.program.inputs.len() {
+        return Err(PyValueError::new_err(format!(
+            "{} inputs; the program has {}",
+            inputs.len(),
+            program.program.inputs.len()
+        )));
+    }
+    let mut emulator = loaded(Emulator::new(&program.program))?;
+    for (port, bits) in program.program.inputs.iter().zip(inputs) {
+        emulator.set_input_bits(port.register, bits).map_err(port_error)?;
+    }
+    emulator.set_cycle_limit(max_cycles.get());
+    let stop = py.detach(|| {
+        let mut interrupt = Interrupt::new();
+        loop {
+            interrupt.check_now()?;
+            if matches!(emulator.status(), Status::Waiting { .. }) && emulator.next_tick().is_none() {
+                return Ok(Ok(Stop::Idle));
+            }
+            let until = emulator.now().saturating_add(SLICE);
+            match emulator.run_until(until) {
+                Ok(Stop::Reached | Stop::Paused) => {}
+                Ok(stop) => return Ok::<_, PyErr>(Ok(stop)),
+                Err(fault) => return Ok(Err(fault)),
+            }
+        }
+    })?;
+    let failure = match stop {
+        Ok(Stop::Idle) => {
+            let text = "the program waits for the tick: give it periods";
+            return Err(PyValueError::new_err(text));
+        }
+        Ok(_) => None,
+        Err(fault) => Some(failure::of_fault(&fault, (0, 0), &program.program, &program.sources)),
+    };
+    let outputs = program.program.outputs.iter().map(|port| emulator.output_bits(port.register)).collect();
+    Ok((emulator.now(), outputs, emulator.flags().bits(), failure))
+}
+
+/// Cycles between two looks for Ctrl-C within one period.
+pub(crate) const SLICE: u64 = 10_000_000;
+
+/// Runs a period, looking for Ctrl-C.
+pub(crate) fn period(
+    emulator: &mut Emulator,
+    max_cycles: u64,
+    interrupt: &mut Interrupt,
+) -> PyResult<Result<PeriodReport, PeriodError>> {
+    emulator.set_cycle_limit(emulator.now().saturating_add(max_cycles));
+    interrupt.check()?;
+    loop {
+        match emulator.run_period_until(emulator.now().saturating_add(SLICE)) {
+            Ok(Some(report)) => return Ok(Ok(report)),
+            Ok(None) => interrupt.check_now()?,
+            Err(error) => return Ok(Err(error)),
+        }
+    }
+}
+
+/// Deadlines that were missed in a period.
+pub(crate) fn misses(report: &PeriodReport) -> u64 {
+    u64::from(report.missed) + report.lost
+}
+
+/// What is there of an output, and whether it was ever written.
+fn shown(port: &Port, bits: Option<u32>) -> u32 {
+    bits.unwrap_or(if port.ty == Type::F { UNWRITTEN } else { 0 })
+}
+
+pub(crate) fn loaded<T>(result: Result<T, takt_emu::LoadError>) -> PyResult<T> {
+    result.map_err(|error| PyValueError::new_err(format!("the program cannot be loaded: {error}")))
+}
+
+pub(crate) fn port_error(error: takt_emu::PortError) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+fn alone(settings: &Settings<'_>, arrays: Arrays<'_>) -> PyResult<Ran> {
+    let Settings { program, sources, tick, max_cycles } = *settings;
+    let Arrays { periods, inputs, outputs, cycles, missed, .. } = arrays;
+    let mut emulator = loaded(Emulator::new(program))?;
+    emulator.set_tick_period(tick);
+    let mut interrupt = Interrupt::new();
+    let mut ran = Ran::new(1, program);
+    fill(program, outputs, periods);
+    for number in 0..periods {
+        for (port, series) in program.inputs.iter().zip(inputs.chunks_exact(periods)) {
+            emulator.set_input_bits(port.register, series[number]).map_err(port_error)?;
+        }
+        match period(&mut emulator, max_cycles, &mut interrupt)? {
+            Ok(report) => {
+                cycles[number] = report.cycles;
+                missed[number] = misses(&report);
+            }
+            Err(error) => {
+                ran.failures.push(failure::of_period(&error, (0, number), program, sources));
+                break;
+            }
+        }
+        ran.completed[0] += 1;
+        let ports = program.outputs.iter().zip(outputs.chunks_exact_mut(periods)).zip(&mut ran.unwritten);
+        for ((port, series), unwritten) in ports {
+            let bits = emulator.output_bits(port.register);
+            *unwritten += u64::from(bits.is_none());
+            series[number] = shown(port, bits);
+        }
+    }
+    ran.flags[0] = emulator.flags().bits();
+    ran.nan_writes = emulator.statistics().nan_writes;
+    Ok(ran)
+}
+
+/// As if no output was ever written.
+fn fill(program: &takt_isa::Program, outputs: &mut [u32], each: usize) {
+    if each > 0 {
+        let ports = program.outputs.iter().zip(outputs.chunks_exact_mut(each));
+        ports.for_each(|(port, series)| series.fill(shown(port, None)));
+    }
+}
+
+fn together(settings: &Settings<'_>, arrays: Arrays<'_>) -> PyResult<Ran> {
+    let Settings { program, sources, tick, max_cycles } = *settings;
+    let Arrays { ports, periods, runs, inputs, outputs, cycles, missed } = arrays;
+    let mut interrupt = Interrupt::new();
+    let mut ran = Ran::new(runs, program);
+    fill(program, outputs, periods * runs);
+    for first in (0..runs).step_by(LANES) {
+        let lanes = (runs - first).min(LANES);
+        let mut batch = loaded(Batch::new(program, lanes))?;
+        batch.set_tick_period(tick);
+        batch.set_period_limit(max_cycles);
+        let mut failed = vec![false; lanes];
+        for number in 0..periods {
+            interrupt.check_now()?;
+            for port in 0..ports {
+                let at = (port * periods + number) * runs + first;
+                let register = program.inputs[port].register;
+                batch.set_input_bits(register, &inputs[at..at + lanes]).map_err(port_error)?;
+            }
+            batch.run_period();
+            for (lane, failed) in failed.iter_mut().enumerate().filter(|(_, failed)| !**failed) {
+                let (run, at) = (first + lane, number * runs + first + lane);
+                match batch.outcome(lane) {
+                    Some(Ok(report)) => {
+                        cycles[at] = report.cycles;
+                        missed[at] = misses(&report);
+                        ran.nan_writes += report.nan_writes.len() as u64;
+                        ran.completed[run] += 1;
+                    }
+                    Some(Err(error)) => {
+                        *failed = true;
+                        ran.failures.push(failure::of_period(&error, (run, number), program, sources));
+                        continue;
+                    }
+                    None => continue,
+                }
+                for (index, port) in program.outputs.iter().enumerate() {
+                    let bits = batch.output_bits(lane, port.register);
+                    ran.unwritten[index] += u64::from(bits.is_none());
+                    outputs[(index * periods + number) * runs + run] = shown(port, bits);
+                }
+            }
+            if failed.iter().all(|failed| *failed) {
+                break;
+            }
+        }
+        (0..lanes).for_each(|lane| ran.flags[first + lane] = batch.flags(lane).bits());
+    }
+    ran.failures.sort_by_key(|failure| failure.run);
+    Ok(ran)
+}
+
+impl Ran {
+    fn new(runs: usize, program: &takt_isa::Program) -> Ran {
+        Ran {
+            completed: vec![0; runs],
+            flags: vec![0; runs],
+            failures: Vec::new(),
+            unwritten: vec![0; program.outputs.len()],
+            nan_writes: 0,
+        }
+    }
+}

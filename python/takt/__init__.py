@@ -1,0 +1,72 @@
+"""Programs for the Takt processor, from Python: assemble, run over NumPy arrays, close a loop, bound, analyse.
+
+    import numpy as np, takt
+
+    program = takt.assemble(".input x\\n.output y\\n.period\\nloop: fmul y, x, 0.5\\n wait loop\\n")
+    run = program.run({"x": np.linspace(0, 1, 1000)})    # a period for each element
+    run.outputs["y"], run.cycles                         # float32 and int64, each of shape (1000,)
+
+    sim = program.sim()                                  # the same, period by period
+    y = sim.step({"x": 0.25})["y"]
+
+The arithmetic is the machine's, bit for bit, and so are the cycles. `takt.urdf`, `takt.casadi` and `takt.sympy` make programs
+from robots' descriptions and from expressions.
+"""
+
+from takt._errors import (
+    AssemblyError,
+    AssemblyWarning,
+    Diagnostic,
+    FaultError,
+    ModelError,
+    NoBoundError,
+    Place,
+    TaktError,
+)
+from takt._program import (
+    DEFAULT_MACHINE,
+    Accuracy,
+    Analysis,
+    Array,
+    Bound,
+    Largest,
+    Model,
+    Port,
+    Program,
+    Run,
+    Section,
+    Sim,
+    Span,
+    assemble,
+    load,
+    machines,
+)
+from takt._takt import Fault
+
+__all__ = [
+    "DEFAULT_MACHINE",
+    "Accuracy",
+    "Analysis",
+    "Array",
+    "AssemblyError",
+    "AssemblyWarning",
+    "Bound",
+    "Diagnostic",
+    "Fault",
+    "FaultError",
+    "Largest",
+    "Model",
+    "ModelError",
+    "NoBoundError",
+    "Place",
+    "Port",
+    "Program",
+    "Run",
+    "Section",
+    "Sim",
+    "Span",
+    "TaktError",
+    "assemble",
+    "load",
+    "machines",
+]

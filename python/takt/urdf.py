@@ -1,0 +1,78 @@
+"""Programs from robots' descriptions: URDF, and tables of Denavit-Hartenberg parameters.
+
+    import takt.urdf
+
+    arm = takt.urdf.program("ur5.urdf", "inverse-dynamics")
+    arm.run({"q": q, "qd": qd, "qdd": qdd}).outputs["tau"]    # all of shape (periods, 6)
+
+docs/model.md says how descriptions are read and what the functions compute.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from takt import _takt
+from takt._program import DEFAULT_MACHINE, Program, modelled
+
+#: Angles this close to a multiple of a quarter turn are taken for it, rad.
+SNAP = 1e-6
+
+
+def functions() -> dict[str, str]:
+    """What can be computed of a robot: name and description."""
+    return dict(_takt.robot_functions())
+
+
+def program(
+    robot: str | os.PathLike[str],
+    function: str,
+    machine: str = DEFAULT_MACHINE,
+    *,
+    base: str | None = None,
+    tip: str | None = None,
+    kp: float = 100.0,
+    kd: float = 20.0,
+    snap: float = SNAP,
+    exact: bool = False,
+    without: Sequence[str] = (),
+    effort: int | None = None,
+) -> Program:
+    """A function of a robot as a program.
+
+    Arrays by joint, in the order of `Program.model.joints`: `q`, rad or m; `qd`, rad/s or m/s; `qdd`, rad/s² or m/s²; `tau`,
+    N m or N; of computed torque also the reference `qr`, `qdr`, `qddr`. Of the tip: rotation `R` of shape (3, 3), position `p` of
+    shape (3,) in m, Jacobian `J` of shape (6, joints), linear velocity first. The mass matrix `M` has shape (joints, joints).
+
+    Args:
+        robot: A URDF's path or text (which begins with `<`), or the path of a table of Denavit-Hartenberg parameters (`.csv`).
+        function: `inverse-dynamics`, `gravity`, …: see `functions()`.
+        machine: The machine's name.
+        base: The link that stays where it is; without, the root.
+        tip: Only the joints from the base to this link, whose pose and Jacobian are computed.
+        kp: Of computed torque: acceleration for an error of position, 1/s².
+        kd: And for an error of velocity, 1/s.
+        snap: Angles this close to a multiple of a quarter turn are taken for it, rad.
+        exact: Only rewrites that keep every operation's rounding.
+        without: Rewrites to switch off, as `factor`; docs/model.md lists them.
+        effort: How long the scheduler searches; 0 is one pass.
+
+    Raises:
+        ModelError: the description cannot be read, has what the equations cannot express, or does not fit the machine.
+        AssemblyError: the program does not fit the machine.
+    """
+    if isinstance(robot, str) and robot.lstrip("\ufeff \t\r\n").startswith("<"):
+        text, name, table = robot, "robot", False
+    else:
+        path = Path(robot)
+        try:
+            text = path.read_text("utf-8")
+        except UnicodeDecodeError:
+            raise ValueError(f"{path} is no text in UTF-8") from None
+        name, table = path.name, path.suffix.lower() == ".csv"
+    model = _takt.robot(
+        text, name, table, function, base, tip, (float(kp), float(kd)), float(snap), exact, list(without), machine
+    )
+    return modelled(model, f"{function}.s", machine, effort)

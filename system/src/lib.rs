@@ -1,0 +1,23 @@
+//! Several cores in one clock, and links between their ports.
+//!
+//! [`read`] makes a [`Description`] of a TOML file, or says what is wrong with it and at which line. [`System`] emulates
+//! one exactly, every core's cycle and every link's latency in one global time. [`latency`] bounds the way from a
+//! host's command to an output. `docs/system.md` defines in which cycle the other side sees what. Nothing here prints.
+
+mod check;
+mod description;
+mod fifo;
+mod file;
+mod gate;
+pub mod latency;
+mod system;
+#[cfg(feature = "testing")]
+pub mod testing;
+
+pub use check::{ProgramError, ReadError, Request, read};
+pub use description::{
+    Core, Description, End, Field, Lane, Link, LinkKind, MAX_CORES, MAX_DEPTH, MAX_LATENCY, MAX_TICK,
+    MIN_LATENCY, Side, Source, Status, SystemPort, TEXT_BYTES,
+};
+pub use fifo::FifoCounts;
+pub use system::{CorePeriods, HostError, LinkEvent, LinkEventKind, System, SystemFault};

@@ -1,0 +1,131 @@
+//! What the host does between runs.
+
+use super::{HostError, LinkState, System};
+use crate::description::{End, LinkKind};
+use std::sync::Arc;
+use takt_emu::Number;
+
+impl System {
+    /// Writes an input of the system: it is on its way from now on. A field of a snapshot or of a FIFO waits for
+    /// [`System::publish`], [`System::push`].
+    ///
+    /// # Errors
+    /// If there is no such input.
+    pub fn set_input(&mut self, name: &str, bits: u32) -> Result<(), HostError> {
+        let description = Arc::clone(&self.description);
+        let mut found = false;
+        for (number, link) in description.links.iter().enumerate().filter(|(_, link)| link.from == End::Host)
+        {
+            match &mut self.links[number] {
+                LinkState::Wire { .. } => {
+                    if link.fields.first().is_some_and(|field| field.from == name) {
+                        self.deliver(number, self.now + link.transit(), 0, bits);
+                        found = true;
+                    }
+                }
+                LinkState::Snapshot { working, .. } | LinkState::Fifo { working, .. } => {
+                    let Some(name) = name.strip_prefix(&link.name).and_then(|rest| rest.strip_prefix('.'))
+                    else {
+                        continue;
+                    };
+                    if let Some(field) = link.fields.iter().position(|field| field.from == name) {
+                        working[field] = bits;
+                        found = true;
+                    }
+                }
+            }
+        }
+        if found { Ok(()) } else { Err(HostError::Unknown { what: "input", name: name.to_owned() }) }
+    }
+
+    /// Publishes the host's values of a snapshot.
+    ///
+    /// # Errors
+    /// If it is no snapshot from the host.
+    pub fn publish(&mut self, link: usize) -> Result<(), HostError> {
+        let description = Arc::clone(&self.description);
+        let now = self.now;
+        match (description.links.get(link), self.links.get_mut(link)) {
+            (Some(known), Some(LinkState::Snapshot { working, published, .. }))
+                if known.from == End::Host =>
+            {
+                published.push_back((now + known.transit() + 1, working.clone()));
+                Ok(())
+            }
+            (known, _) => {
+                let name = known.map_or_else(|| link.to_string(), |link| link.name.clone());
+                Err(HostError::Unknown { what: "snapshot from the host", name })
+            }
+        }
+    }
+
+    /// Puts the host's values of a FIFO into it. False if that makes it overflow, as far as the host can know: entries on
+    /// their way count, room that is made meanwhile does not.
+    ///
+    /// # Errors
+    /// If it is no FIFO from the host.
+    pub fn push(&mut self, link: usize) -> Result<bool, HostError> {
+        let description = Arc::clone(&self.description);
+        let now = self.now;
+        match (description.links.get(link), self.links.get_mut(link)) {
+            (Some(known), Some(LinkState::Fifo { working, fifo })) if known.from == End::Host => {
+                let LinkKind::Fifo { depth, .. } = known.kind else { return Ok(false) };
+                let room = fifo.store.entries.len() + fifo.pushing() < depth as usize;
+                let cycle = (now + known.transit()).max(fifo.free().0);
+                fifo.push(cycle, working.clone());
+                Ok(room)
+            }
+            (known, _) => {
+                let name = known.map_or_else(|| link.to_string(), |link| link.name.clone());
+                Err(HostError::Unknown { what: "FIFO from the host", name })
+            }
+        }
+    }
+
+    /// Takes the head of a FIFO to the host; `None` if it is empty.
+    ///
+    /// # Errors
+    /// If it is no FIFO to the host.
+    pub fn pop(&mut self, link: usize) -> Result<Option<Vec<u32>>, HostError> {
+        let description = Arc::clone(&self.description);
+        let now = self.now;
+        match (description.links.get(link), self.links.get_mut(link)) {
+            (Some(known), Some(LinkState::Fifo { fifo, .. })) if known.to == End::Host => {
+                let entry = fifo.store.entries.get(fifo.popping()).cloned();
+                if entry.is_some() {
+                    fifo.pop(now.max(fifo.free().1));
+                }
+                Ok(entry)
+            }
+            (known, _) => {
+                let name = known.map_or_else(|| link.to_string(), |link| link.name.clone());
+                Err(HostError::Unknown { what: "FIFO to the host", name })
+            }
+        }
+    }
+
+    /// What the host sees on an output of the system: of a FIFO its head, 0 while it is empty.
+    ///
+    /// # Errors
+    /// If there is no such output.
+    pub fn output(&self, name: &str) -> Result<u32, HostError> {
+        let ports = self.description.outputs();
+        let port = ports.iter().find(|port| port.name == name);
+        let port = port.ok_or_else(|| HostError::Unknown { what: "output", name: name.to_owned() })?;
+        Ok(match &self.links[port.link] {
+            LinkState::Wire { shown, .. } => *shown,
+            LinkState::Snapshot { shown, .. } => shown[port.field],
+            LinkState::Fifo { fifo, .. } => fifo.store.entries.front().map_or(0, |entry| entry[port.field]),
+        })
+    }
+
+    /// As [`System::output`], as a number of the port's type.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn output_number(&self, name: &str) -> Result<Number, HostError> {
+        let bits = self.output(name)?;
+        let ty = self.description.outputs().iter().find(|port| port.name == name).map(|port| port.ty);
+        Ok(ty.map_or(Number::Bits(bits), |ty| Number::of(ty, bits)))
+    }
+}

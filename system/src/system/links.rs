@@ -1,0 +1,251 @@
+//! What is on the links: from what a core has written to what arrives at another.
+
+use super::{LinkEvent, LinkEventKind, LinkState, System, latched};
+use crate::description::{End, Field, Link, LinkKind, Side, Source, Status as FifoStatus};
+use crate::fifo::Change;
+use std::sync::Arc;
+use takt_emu::{PortWrite, Status};
+use takt_isa::Register;
+use takt_isa::timing::{Cycle, ENDED_DELAY};
+
+impl System {
+    /// Lets a FIFO do what is known of both sides; the cycles that are done.
+    pub(super) fn carry_out(&mut self, number: usize) -> Cycle {
+        let description = Arc::clone(&self.description);
+        let link = &description.links[number];
+        let LinkKind::Fifo { sender, receiver, .. } = &link.kind else { return 0 };
+        let end = (self.known(link.from) + link.transit()).min(self.known(link.to)).min(self.until);
+        loop {
+            let LinkState::Fifo { fifo, .. } = &mut self.links[number] else { return 0 };
+            let Some((cycle, change)) = fifo.next(end) else { return fifo.done };
+            let head = fifo.store.entries.front().filter(|_| change.head).cloned();
+            let status = |list: &[(FifoStatus, Register)]| -> Vec<u32> {
+                list.iter().map(|(status, _)| fifo.store.status(*status)).collect()
+            };
+            let (to_sender, to_receiver) = (status(sender), status(receiver));
+            self.fifo_events(cycle, number, change);
+            let core = |end| if let End::Core(core) = end { Some(core) } else { None };
+            if let Some(core) = core(link.to) {
+                for (field, value) in head.into_iter().flatten().enumerate() {
+                    self.arrive(core, cycle + 1, Source::Field { link: number, field }, value);
+                }
+            }
+            let sides = [
+                (link.from, Side::Sender, sender, to_sender, cycle + 1 + link.transit()),
+                (link.to, Side::Receiver, receiver, to_receiver, cycle + 1),
+            ];
+            for (end, side, list, values, cycle) in sides {
+                for (&(status, _), value) in list.iter().zip(values) {
+                    if let Some(core) = core(end) {
+                        self.arrive(core, cycle, Source::Status { link: number, side, status }, value);
+                    }
+                }
+            }
+        }
+    }
+
+    pub(super) fn fifo_events(&mut self, cycle: Cycle, link: usize, change: Change) {
+        for (happened, kind) in [
+            (change.popped, LinkEventKind::Popped),
+            (change.pushed, LinkEventKind::Pushed),
+            (change.overflow, LinkEventKind::Overflow),
+            (change.underflow, LinkEventKind::Underflow),
+        ] {
+            if happened {
+                self.event(cycle, link, kind);
+            }
+        }
+    }
+
+    pub(super) fn event(&mut self, cycle: Cycle, link: usize, kind: LinkEventKind) {
+        if let Some(events) = &mut self.events {
+            events.push(LinkEvent { cycle, link, kind });
+        }
+    }
+
+    /// A value arrives at a core's gate.
+    pub(super) fn arrive(&mut self, core: usize, cycle: Cycle, source: Source, value: u32) {
+        let state = &mut self.cores[core];
+        if let Some(lane) = state.lanes.iter().position(|lane| lane.source == source) {
+            state.gate.arrive(cycle, lane, value);
+        }
+    }
+
+    /// A field of a wire arrives.
+    pub(super) fn deliver(&mut self, number: usize, cycle: Cycle, field: usize, value: u32) {
+        self.event(cycle, number, LinkEventKind::Value(value));
+        match self.description.links[number].to {
+            End::Core(core) => self.arrive(core, cycle, Source::Field { link: number, field }, value),
+            End::Host => {
+                if let LinkState::Wire { host, .. } = &mut self.links[number] {
+                    host.push_back((cycle, value));
+                }
+            }
+        }
+    }
+
+    /// Takes the snapshots for a core's next tick, and lets the tick come; false if a sender is not far enough.
+    pub(super) fn take(&mut self, core: usize, cycle: Cycle) -> bool {
+        let description = Arc::clone(&self.description);
+        let here = |link: &&Link| link.is_snapshot() && link.to == End::Core(core);
+        let far = |link: &Link| self.known(link.from) + ENDED_DELAY + link.transit() >= cycle;
+        if !description.links.iter().filter(here).all(far) {
+            return false;
+        }
+        let waits = match self.cores[core].emulator.status() {
+            Status::Waiting { since, .. } => since + ENDED_DELAY <= cycle,
+            _ => false,
+        };
+        let numbered = description.links.iter().enumerate().filter(|(_, link)| here(link));
+        let mut any = false;
+        for (number, _) in numbered {
+            any = true;
+            self.see(number, cycle);
+            if waits {
+                let LinkState::Snapshot { shown, taken, .. } = &mut self.links[number] else { continue };
+                *taken += 1;
+                for (field, value) in shown.clone().into_iter().enumerate() {
+                    self.arrive(core, cycle, Source::Field { link: number, field }, value);
+                }
+            }
+            self.event(cycle, number, if waits { LinkEventKind::Taken } else { LinkEventKind::Skipped });
+        }
+        let state = &mut self.cores[core];
+        state.periods.skipped += u64::from(any && !waits);
+        state.emulator.tick_at(state.tick);
+        state.taken = true;
+        true
+    }
+
+    /// Shows what was published of a snapshot and can be seen in a cycle.
+    pub(super) fn see(&mut self, number: usize, cycle: Cycle) {
+        if let LinkState::Snapshot { published, shown, .. } = &mut self.links[number] {
+            while let Some((_, values)) = published.pop_front_if(|(first, _)| *first <= cycle) {
+                *shown = values;
+            }
+        }
+    }
+
+    /// What arrives at the host.
+    pub(super) fn show(&mut self) {
+        for number in 0..self.links.len() {
+            if matches!(self.links[number], LinkState::Fifo { .. }) {
+                self.carry_out(number);
+            }
+            if self.description.links[number].to == End::Host {
+                self.see(number, self.now);
+            }
+            if let LinkState::Wire { host, shown, .. } = &mut self.links[number] {
+                while let Some((_, value)) = host.pop_front_if(|(cycle, _)| *cycle < self.now) {
+                    *shown = value;
+                }
+            }
+        }
+    }
+
+    /// Puts on the links what a core has written, and what its `wait` in cycle `waited` publishes.
+    pub(super) fn send(&mut self, core: usize, writes: &[PortWrite], waited: Option<Cycle>) {
+        let description = Arc::clone(&self.description);
+        let here = End::Core(core);
+        for (number, link) in description.links.iter().enumerate() {
+            if link.from == here {
+                match &link.kind {
+                    LinkKind::Wire => self.send_wire(number, link, writes, waited),
+                    LinkKind::Snapshot { strobe } => {
+                        self.send_snapshot(number, link, *strobe, writes, waited)
+                    }
+                    LinkKind::Fifo { push: Some(push), .. } => {
+                        let LinkState::Fifo { working, fifo } = &mut self.links[number] else { continue };
+                        follow(link, *push, writes, working, |cycle, entry| {
+                            fifo.push(cycle + link.transit(), entry);
+                        });
+                    }
+                    LinkKind::Fifo { .. } => {}
+                }
+            }
+            if let (LinkKind::Fifo { pop: Some(pop), .. }, true) = (&link.kind, link.to == here)
+                && let LinkState::Fifo { fifo, .. } = &mut self.links[number]
+            {
+                let pops = writes.iter().filter(|write| write.register == *pop);
+                pops.for_each(|write| fifo.pop(write.cycle));
+            }
+        }
+    }
+
+    pub(super) fn send_wire(
+        &mut self,
+        number: usize,
+        link: &Link,
+        writes: &[PortWrite],
+        waited: Option<Cycle>,
+    ) {
+        let output = link.fields.first().and_then(|field| field.output);
+        let written = writes.iter().filter(|write| Some(write.register) == output);
+        if !latched(&self.description, link.from) {
+            for write in written {
+                self.deliver(number, write.cycle + link.transit(), 0, write.value);
+            }
+            return;
+        }
+        let LinkState::Wire { changed, .. } = &mut self.links[number] else { return };
+        *changed = written.last().map(|write| write.value).or(*changed);
+        if let Some(cycle) = waited
+            && let Some(value) = changed.take()
+        {
+            self.deliver(number, cycle + ENDED_DELAY + link.transit(), 0, value);
+        }
+    }
+
+    pub(super) fn send_snapshot(
+        &mut self,
+        number: usize,
+        link: &Link,
+        strobe: Option<Register>,
+        writes: &[PortWrite],
+        waited: Option<Cycle>,
+    ) {
+        let mut sent = Vec::new();
+        let LinkState::Snapshot { working, published, .. } = &mut self.links[number] else { return };
+        let first = |cycle| cycle + ENDED_DELAY + link.transit() + 1;
+        match (strobe, waited, link.from) {
+            (Some(strobe), ..) => follow(link, strobe, writes, working, |cycle, values| {
+                published.push_back((first(cycle), values));
+                sent.push(first(cycle));
+            }),
+            (None, Some(cycle), End::Core(core)) => {
+                let emulator = &self.cores[core].emulator;
+                let value = |field: &Field| field.output.and_then(|port| emulator.register(port));
+                let values = link.fields.iter().map(|field| value(field).unwrap_or(0)).collect();
+                published.push_back((first(cycle), values));
+                sent.push(first(cycle));
+            }
+            _ => {}
+        }
+        for cycle in sent {
+            self.event(cycle, number, LinkEventKind::Published);
+        }
+    }
+}
+
+/// Follows a core's writes to the fields of a link, and tells what they are whenever `action` is written. What is written in
+/// the same cycle counts.
+fn follow(
+    link: &Link,
+    action: Register,
+    writes: &[PortWrite],
+    working: &mut [u32],
+    mut tell: impl FnMut(Cycle, Vec<u32>),
+) {
+    for writes in writes.chunk_by(|a, b| a.cycle == b.cycle) {
+        for write in writes {
+            for (field, value) in link.fields.iter().zip(&mut *working) {
+                if field.output == Some(write.register) {
+                    *value = write.value;
+                }
+            }
+        }
+        if let Some(write) = writes.iter().find(|write| write.register == action) {
+            tell(write.cycle, working.to_vec());
+        }
+    }
+}

@@ -1,0 +1,371 @@
+//! The emulator of a system. Each core runs ahead on its own until it needs to know what another one did.
+//!
+//! A core's reads of linked inputs are where it can see others, and nothing arrives earlier than [`MIN_LATENCY`](crate::MIN_LATENCY) cycles
+//! after it was sent. So a core runs to the next bundle that reads such an input (or tick that takes one), and goes on once
+//! every sender has come within the link's latency of that cycle. The core that is behind all others can always go on.
+
+mod host;
+mod links;
+mod run;
+
+use crate::description::{Description, End, Lane, Link, LinkKind, Source};
+use crate::fifo::{Fifo, FifoCounts};
+use crate::gate::Gate;
+use std::collections::{BTreeSet, VecDeque};
+use std::sync::Arc;
+use takt_emu::{Emulator, Fault, LoadError, PeriodReport};
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Program, Register};
+
+/// A core that stopped with a fault: the system stands.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("core {name}: {fault}")]
+pub struct SystemFault {
+    /// The core.
+    pub core: usize,
+    /// Its name.
+    pub name: String,
+    /// What happened.
+    #[source]
+    pub fault: Fault,
+}
+
+/// What the host cannot do.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum HostError {
+    /// The system has no such port or link at the host.
+    #[error("the system has no {what} `{name}`")]
+    Unknown {
+        /// `input`, `output`, `snapshot from the host`, ….
+        what: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// An entry has so many fields.
+    #[error("`{name}` has {wanted} fields, not {given}")]
+    Fields {
+        /// The link.
+        name: String,
+        /// Fields that it has.
+        wanted: usize,
+        /// Values given.
+        given: usize,
+    },
+}
+
+/// Something that happens on a link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct LinkEvent {
+    /// The cycle.
+    pub cycle: Cycle,
+    /// The link.
+    pub link: usize,
+    /// What.
+    pub kind: LinkEventKind,
+}
+
+/// What happens on a link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LinkEventKind {
+    /// A value of a wire arrives at the receiver.
+    Value(u32),
+    /// A snapshot's values arrive together.
+    Published,
+    /// The receiver takes them, for the tick to come.
+    Taken,
+    /// The receiver does not wait for its tick in time: it keeps those that it has.
+    Skipped,
+    /// An entry is put into a FIFO.
+    Pushed,
+    /// An entry is taken out of a FIFO.
+    Popped,
+    /// A FIFO is full: the entry is refused.
+    Overflow,
+    /// A FIFO is empty: there is no entry to be taken out.
+    Underflow,
+}
+
+/// What a core's periods came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CorePeriods {
+    /// Periods that ended.
+    pub count: u64,
+    /// The cycles of the shortest; 0 if there was none.
+    pub shortest: Cycle,
+    /// The cycles of the longest.
+    pub longest: Cycle,
+    /// Ticks for which it took no snapshots, because it did not wait in time.
+    pub skipped: u64,
+}
+
+#[derive(Clone)]
+struct CoreState {
+    emulator: Emulator,
+    lanes: Arc<[Lane]>,
+    gate: Gate,
+    /// Of links that drive its input ports at any time, one lane each.
+    moving: Arc<[Source]>,
+    /// Whether it has no tick to come, for good.
+    halted: bool,
+    /// The cycle of its first `wait`.
+    waited: Option<Cycle>,
+    /// Its next tick; there only once ticks have started.
+    tick: Cycle,
+    /// Whether its snapshots for that tick are dealt with.
+    taken: bool,
+    periods: CorePeriods,
+    last: Option<PeriodReport>,
+}
+
+#[derive(Clone)]
+enum LinkState {
+    Wire {
+        /// What is to be published at the sender's `wait`, if its ports are latched.
+        changed: Option<u32>,
+        /// Values on the way to the host, with the cycle in which they arrive.
+        host: VecDeque<(Cycle, u32)>,
+        /// What the host sees.
+        shown: u32,
+    },
+    Snapshot {
+        /// As written, of a link with a strobe, or of the host's.
+        working: Vec<u32>,
+        /// Published, with the first cycle in which it can be taken.
+        published: VecDeque<(Cycle, Vec<u32>)>,
+        /// What was published last of what could be seen.
+        shown: Vec<u32>,
+        taken: u64,
+    },
+    Fifo {
+        working: Vec<u32>,
+        fifo: Box<Fifo>,
+    },
+}
+
+/// A system that runs.
+#[derive(Clone)]
+pub struct System {
+    description: Arc<Description>,
+    cores: Vec<CoreState>,
+    links: Vec<LinkState>,
+    now: Cycle,
+    /// How far the present run goes.
+    until: Cycle,
+    /// The first base tick.
+    start: Option<Cycle>,
+    /// Whether the present run goes to where that is known.
+    starting: bool,
+    fault: Option<SystemFault>,
+    events: Option<Vec<LinkEvent>>,
+}
+
+/// The input ports that a bundle of the program reads.
+fn readers(program: &Program, ports: &BTreeSet<Register>) -> Vec<BundleAddress> {
+    let reads = |address: &BundleAddress| match program.bundle(*address) {
+        Some(Ok(bundle)) => {
+            bundle.iter().any(|instruction| instruction.reads().iter().any(|read| ports.contains(read)))
+        }
+        _ => false,
+    };
+    program.addresses().filter(reads).collect()
+}
+
+impl System {
+    /// The system after reset, at the beginning of cycle 0.
+    ///
+    /// # Errors
+    /// If a core's memories cannot hold its program.
+    pub fn new(description: &Description) -> Result<System, LoadError> {
+        let description = Arc::new(description.clone());
+        let mut cores = Vec::new();
+        for (number, core) in description.cores.iter().enumerate() {
+            let mut emulator = Emulator::new(&core.program)?;
+            let lanes: Arc<[Lane]> = description.lanes(number).into();
+            for port in &core.program.inputs {
+                let lane = lanes.iter().find(|lane| lane.register == port.register);
+                let initial = lane.map_or(0, |lane| initial(&description, lane.source));
+                // The port is the program's own.
+                let _ = emulator.set_input_bits(port.register, initial);
+            }
+            emulator.set_watched(watched(&description, number));
+            let moving: Vec<&Lane> =
+                lanes.iter().filter(|lane| !description.links[lane.source.link()].is_snapshot()).collect();
+            if !core.program.latched {
+                let ports = moving.iter().map(|lane| lane.register).collect();
+                emulator.set_pauses(readers(&core.program, &ports));
+            }
+            let mut sources: Vec<Source> = Vec::new();
+            for lane in moving {
+                let same = |known: &Source| match (known, &lane.source) {
+                    (Source::Status { link, side, .. }, Source::Status { link: l, side: s, .. }) => {
+                        (link, side) == (l, s)
+                    }
+                    (known, source) => {
+                        known.link() == source.link() && matches!(source, Source::Field { .. })
+                    }
+                };
+                if !sources.iter().any(same) {
+                    sources.push(lane.source);
+                }
+            }
+            cores.push(CoreState {
+                emulator,
+                lanes: Arc::clone(&lanes),
+                gate: Gate::default(),
+                moving: sources.into(),
+                halted: false,
+                waited: None,
+                tick: 0,
+                taken: false,
+                periods: CorePeriods { count: 0, shortest: 0, longest: 0, skipped: 0 },
+                last: None,
+            });
+        }
+        let links = description.links.iter().map(state).collect();
+        Ok(System {
+            description,
+            cores,
+            links,
+            now: 0,
+            until: 0,
+            start: None,
+            starting: false,
+            fault: None,
+            events: None,
+        })
+    }
+
+    // ---- What there is to see.
+
+    /// Cores and links.
+    pub fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// Cycles that have passed since reset.
+    pub fn now(&self) -> Cycle {
+        self.now
+    }
+
+    /// The cycle of the first base tick; `None` until every core has waited for the first time.
+    pub fn start(&self) -> Option<Cycle> {
+        self.start
+    }
+
+    /// A core. Between runs it stands at [`System::now`], if it has not halted and there is no fault.
+    pub fn core(&self, core: usize) -> &Emulator {
+        &self.cores[core].emulator
+    }
+
+    /// The same, for a debugger.
+    pub fn core_mut(&mut self, core: usize) -> &mut Emulator {
+        &mut self.cores[core].emulator
+    }
+
+    /// What a core's periods came to.
+    pub fn periods(&self, core: usize) -> CorePeriods {
+        self.cores[core].periods
+    }
+
+    /// A core's last period that ended.
+    pub fn last_period(&self, core: usize) -> Option<&PeriodReport> {
+        self.cores[core].last.as_ref()
+    }
+
+    /// Whether every core has halted.
+    pub fn halted(&self) -> bool {
+        self.cores.iter().all(|core| core.halted)
+    }
+
+    /// The fault that it stands with.
+    pub fn fault(&self) -> Option<&SystemFault> {
+        self.fault.as_ref()
+    }
+
+    /// What has happened to a FIFO; `None` for other links.
+    pub fn fifo_counts(&self, link: usize) -> Option<FifoCounts> {
+        match self.links.get(link)? {
+            LinkState::Fifo { fifo, .. } => Some(fifo.store.counts),
+            _ => None,
+        }
+    }
+
+    /// Entries of a FIFO now, the head first; none of other links.
+    pub fn fifo_entries(&self, link: usize) -> Vec<Vec<u32>> {
+        match self.links.get(link) {
+            Some(LinkState::Fifo { fifo, .. }) => fifo.store.entries.iter().cloned().collect(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Keeps the events on links from now on, until they are taken.
+    pub fn keep_events(&mut self) {
+        self.events.get_or_insert_default();
+    }
+
+    /// The events on links since this was last asked, by cycle. (Those of the last few cycles may still be missing: they
+    /// come with the next run.)
+    pub fn take_events(&mut self) -> Vec<LinkEvent> {
+        let mut events = self.events.as_mut().map(std::mem::take).unwrap_or_default();
+        events.sort();
+        events
+    }
+}
+
+pub(super) fn latched(description: &Description, end: End) -> bool {
+    description.core(end).is_some_and(|core| core.program.latched)
+}
+
+/// What a port shows before anything has arrived.
+pub(crate) fn initial(description: &Description, source: Source) -> u32 {
+    match source {
+        Source::Field { link, field } => {
+            let link = &description.links[link];
+            let fifo = matches!(link.kind, LinkKind::Fifo { .. });
+            if fifo { 0 } else { link.fields[field].initial }
+        }
+        Source::Status { status, .. } => status.initial(),
+    }
+}
+
+/// The output ports of a core whose every write counts.
+fn watched(description: &Description, core: usize) -> BTreeSet<Register> {
+    let here = End::Core(core);
+    let mut ports = BTreeSet::new();
+    for link in &description.links {
+        let fields = link.fields.iter().filter_map(|field| field.output);
+        match &link.kind {
+            LinkKind::Wire if link.from == here => ports.extend(fields),
+            LinkKind::Snapshot { strobe: Some(strobe) } if link.from == here => {
+                ports.extend(fields.chain([*strobe]));
+            }
+            LinkKind::Fifo { push, pop, .. } => {
+                if link.from == here {
+                    ports.extend(fields.chain(*push));
+                }
+                if link.to == here {
+                    ports.extend(*pop);
+                }
+            }
+            _ => {}
+        }
+    }
+    ports
+}
+
+fn state(link: &Link) -> LinkState {
+    let initial = || link.fields.iter().map(|field| field.initial).collect::<Vec<_>>();
+    match link.kind {
+        LinkKind::Wire => LinkState::Wire {
+            changed: None,
+            host: VecDeque::new(),
+            shown: link.fields.first().map_or(0, |field| field.initial),
+        },
+        LinkKind::Snapshot { .. } => {
+            LinkState::Snapshot { working: initial(), published: VecDeque::new(), shown: initial(), taken: 0 }
+        }
+        LinkKind::Fifo { depth, .. } => {
+            LinkState::Fifo { working: initial(), fifo: Box::new(Fifo::new(depth)) }
+        }
+    }
+}

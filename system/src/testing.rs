@@ -1,0 +1,522 @@
+//! Random systems from a seed, and a stepper that goes cycle by cycle, with every register of a link in its place: for
+//! tests, of the emulator here and of the circuit against it.
+
+use crate::description::{Description, End, Link, LinkKind, Side, Source, Status};
+use crate::fifo::{Change, Store};
+use crate::system::initial;
+use crate::{ProgramError, ReadError, read};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::convert::Infallible;
+use std::fmt::Write as _;
+use std::sync::Arc;
+use takt_emu::testing::{Options, Random, random_program};
+use takt_emu::{Emulator, Event, Fault, LoadError};
+use takt_isa::timing::{Cycle, ENDED_DELAY};
+use takt_isa::{MACHINES, Machine, Program, Register};
+
+/// The random system of a seed, as a file, and its programs by path.
+pub fn random_system(seed: u64, machines: &[&'static Machine]) -> (String, BTreeMap<String, Program>) {
+    let mut random = Random::new(seed.wrapping_mul(0x9e37_79b9) ^ 0x5157);
+    let count = 2 + random.below(3) as usize;
+    let mut text = format!("tick = {}\n", 40 + random.below(500));
+    let mut programs = BTreeMap::new();
+    // Of each core the names of its ports; inputs are used up.
+    let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
+    for core in 0..count {
+        let machine = machines[random.below(machines.len() as u32) as usize];
+        let options = Options { bundles: 20 + random.below(30), ..Options::TAME };
+        let program = random_program(random.bits(), machine, options);
+        let program = Program { latched: random.once_in(3), ..program };
+        inputs.push(program.inputs.iter().map(|port| port.name.clone()).collect::<Vec<_>>());
+        outputs.push(program.outputs.iter().map(|port| port.name.clone()).collect::<Vec<_>>());
+        let path = format!("core{core}.s");
+        let _ = writeln!(
+            text,
+            "\n[[core]]\nname = \"c{core}\"\nprogram = \"{path}\"\nmachine = \"{}\"",
+            machine.name
+        );
+        if random.once_in(2) {
+            let _ = writeln!(text, "tick = {}\noffset = {}", 1 + random.below(3), random.below(40));
+        }
+        programs.insert(path, program);
+    }
+    let latency = |random: &mut Random| match random.below(3) {
+        0 => String::new(),
+        1 => format!("latency = {}\n", 4 + random.below(4)),
+        _ => format!("latency = {}\n", 4 + random.below(80)),
+    };
+    let mut number = 0;
+    for core in 0..count {
+        while let Some(last) = inputs[core].pop() {
+            number += 1;
+            let sender = random.below(count as u32 + 1) as usize;
+            let host = sender == count;
+            let from = if host { "host".to_owned() } else { format!("c{sender}") };
+            let output = |random: &mut Random| match host {
+                true => format!("h{}", random.bits() % 1_000_000),
+                false => outputs[sender][random.below(outputs[sender].len() as u32) as usize].clone(),
+            };
+            let own = |random: &mut Random| {
+                outputs[core][random.below(outputs[core].len() as u32) as usize].clone()
+            };
+            let kind = random.below(3);
+            if kind == 0 {
+                let _ = write!(
+                    text,
+                    "\n[[wire]]\nfrom = \"{from}.{}\"\nto = \"c{core}.{last}\"\n",
+                    output(&mut random)
+                );
+                text.push_str(&latency(&mut random));
+                continue;
+            }
+            let mut ports = vec![format!("{} -> {last}", output(&mut random))];
+            if random.once_in(2)
+                && let Some(more) = inputs[core].pop()
+            {
+                ports.push(format!("{} -> {more}", output(&mut random)));
+            }
+            let ports: Vec<String> = ports.iter().map(|port| format!("\"{port}\"")).collect();
+            let table = if kind == 1 { "snapshot" } else { "fifo" };
+            let _ = write!(
+                text,
+                "\n[[{table}]]\nname = \"l{number}\"\nfrom = \"{from}\"\nto = \"c{core}\"\nports = [{}]\n",
+                ports.join(", ")
+            );
+            text.push_str(&latency(&mut random));
+            if kind == 1 {
+                if !host && random.once_in(2) {
+                    let _ = writeln!(text, "strobe = \"{}\"", output(&mut random));
+                }
+                continue;
+            }
+            let _ = writeln!(text, "depth = {}\npop = \"{}\"", 1 + random.below(6), own(&mut random));
+            if !host {
+                let _ = writeln!(text, "push = \"{}\"", output(&mut random));
+            }
+            for (key, core) in [("receiver", core), ("sender", sender)] {
+                if core < count
+                    && random.once_in(2)
+                    && let Some(port) = inputs[core].pop()
+                {
+                    let status = Status::ALL[random.below(5) as usize].name();
+                    let _ = writeln!(text, "{key} = {{ {status} = \"{port}\" }}");
+                }
+            }
+        }
+    }
+    // What the host sees.
+    let all: Vec<(usize, &String)> = outputs
+        .iter()
+        .enumerate()
+        .flat_map(|(core, ports)| ports.iter().map(move |port| (core, port)))
+        .collect();
+    for _ in 0..2 {
+        number += 1;
+        let (core, port) = all[random.below(all.len() as u32) as usize];
+        let _ = match random.below(3) {
+            0 => write!(text, "\n[[wire]]\nfrom = \"c{core}.{port}\"\nto = \"host.o{number}\"\n"),
+            1 => write!(
+                text,
+                "\n[[snapshot]]\nname = \"l{number}\"\nfrom = \"c{core}\"\nto = \"host\"\nports = [\"{port}\"]\n"
+            ),
+            _ => write!(
+                text,
+                "\n[[fifo]]\nname = \"l{number}\"\nfrom = \"c{core}\"\nto = \"host\"\nports = [\"{port}\"]\ndepth = 3\npush = \"{port}\"\n"
+            ),
+        };
+        text.push_str(&latency(&mut random));
+    }
+    (text, programs)
+}
+
+/// The description that a file with its programs makes.
+///
+/// # Errors
+/// What is wrong with the file.
+pub fn describe(
+    text: &str,
+    programs: &BTreeMap<String, Program>,
+) -> Result<Description, ReadError<Infallible>> {
+    read("system.toml", text, |request| {
+        programs.get(request.path).cloned().ok_or_else(|| ProgramError::Missing {
+            message: format!("there is no program {}", request.path),
+            help: None,
+        })
+    })
+}
+
+/// The random system of a seed. Those that a file cannot say (a tick that is too short) are left out for the next one.
+pub fn random_description(seed: u64, machines: &[&'static Machine]) -> Description {
+    let seeds = (0..).map(|i: u64| seed.wrapping_add(i << 32));
+    let tries = seeds.map(|seed| random_system(seed, machines));
+    tries.filter_map(|(text, programs)| describe(&text, &programs).ok()).next().unwrap_or(Description {
+        tick: 1,
+        cores: Vec::new(),
+        links: Vec::new(),
+    })
+}
+
+/// Every machine.
+pub fn all_machines() -> Vec<&'static Machine> {
+    MACHINES.to_vec()
+}
+
+/// A register line of a length: what goes in comes out so many cycles later.
+#[derive(Clone)]
+struct Line<T> {
+    stages: VecDeque<Option<T>>,
+}
+
+impl<T> Line<T> {
+    fn new(length: Cycle) -> Line<T> {
+        Line { stages: (0..length).map(|_| None).collect() }
+    }
+
+    fn step(&mut self, input: Option<T>) -> Option<T> {
+        self.stages.push_back(input);
+        self.stages.pop_front().flatten()
+    }
+}
+
+struct ReferenceCore {
+    emulator: Emulator,
+    lanes: Vec<crate::Lane>,
+    /// Lanes with a value that waits before the pins.
+    gate: BTreeMap<usize, u32>,
+    /// From the pins to where it counts.
+    pins: Line<(Register, u32)>,
+    /// Writes to output ports whose cycle has not come.
+    writes: Vec<(Cycle, Register, u32)>,
+    waits: BTreeSet<Cycle>,
+    waited: Option<Cycle>,
+    /// Arrived in this cycle.
+    arrived: Vec<(usize, u32)>,
+    halted: bool,
+}
+
+struct ReferenceLink {
+    /// Of a wire.
+    wire: Line<u32>,
+    /// Of a snapshot: writes of a cycle, and whether they are published.
+    writes: Line<(Vec<(usize, u32)>, bool)>,
+    working: Vec<u32>,
+    published: Vec<u32>,
+    /// Of a FIFO: entries on their way there, and its status on the way back.
+    pushes: Line<Vec<u32>>,
+    store: Store,
+    back: Line<Vec<(Status, u32)>>,
+    /// What changed in the last cycle.
+    change: Option<(Option<Vec<u32>>, Vec<(Status, u32)>)>,
+    /// Latched: what is to be sent at the `wait`.
+    changed: Option<u32>,
+    /// The host's, for this cycle.
+    host_value: Option<u32>,
+    host_publish: Option<Vec<u32>>,
+    host_push: Option<Vec<u32>>,
+    host_pop: bool,
+    /// What the host sees.
+    shown: u32,
+}
+
+/// All cores of a system in cycle lockstep.
+pub struct Reference {
+    description: Arc<Description>,
+    cores: Vec<ReferenceCore>,
+    links: Vec<ReferenceLink>,
+    now: Cycle,
+    start: Option<Cycle>,
+}
+
+impl Reference {
+    /// As [`crate::System::new`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn new(description: &Description) -> Result<Reference, LoadError> {
+        let mut cores = Vec::new();
+        for (number, core) in description.cores.iter().enumerate() {
+            let mut emulator = Emulator::new(&core.program)?;
+            emulator.set_blocks(false);
+            let lanes = description.lanes(number);
+            for lane in &lanes {
+                let _ = emulator.set_input_bits(lane.register, initial(description, lane.source));
+            }
+            cores.push(ReferenceCore {
+                emulator,
+                lanes,
+                gate: BTreeMap::new(),
+                pins: Line::new(core.input_delay()),
+                writes: Vec::new(),
+                waits: BTreeSet::new(),
+                waited: None,
+                arrived: Vec::new(),
+                halted: false,
+            });
+        }
+        let links = description.links.iter().map(|link| {
+            let late = description.core(link.from).is_some_and(|core| core.program.latched);
+            let extra = if late { ENDED_DELAY } else { 0 };
+            let initial: Vec<u32> = link.fields.iter().map(|field| field.initial).collect();
+            let depth = if let LinkKind::Fifo { depth, .. } = link.kind { depth } else { 0 };
+            // The host's values are not two cycles late.
+            let told = if link.from == End::Host { 0 } else { ENDED_DELAY };
+            ReferenceLink {
+                wire: Line::new(link.transit() + extra),
+                writes: Line::new(link.transit() + told),
+                working: initial.clone(),
+                published: initial.clone(),
+                pushes: Line::new(link.transit()),
+                store: Store::new(depth),
+                back: Line::new(link.transit()),
+                change: None,
+                changed: None,
+                host_value: None,
+                host_publish: None,
+                host_push: None,
+                host_pop: false,
+                shown: initial.first().copied().unwrap_or(0),
+            }
+        });
+        let links = links.collect();
+        Ok(Reference { description: Arc::new(description.clone()), cores, links, now: 0, start: None })
+    }
+
+    /// Cycles that have passed.
+    pub fn now(&self) -> Cycle {
+        self.now
+    }
+
+    /// The first base tick.
+    pub fn start(&self) -> Option<Cycle> {
+        self.start
+    }
+
+    /// A core.
+    pub fn core(&self, core: usize) -> &Emulator {
+        &self.cores[core].emulator
+    }
+
+    /// What the host sees of a wire or of a snapshot, or of a FIFO's head.
+    pub fn output(&self, link: usize, field: usize) -> u32 {
+        let state = &self.links[link];
+        match self.description.links[link].kind {
+            LinkKind::Wire => state.shown,
+            LinkKind::Snapshot { .. } => state.published[field],
+            LinkKind::Fifo { .. } => state.store.entries.front().map_or(0, |entry| entry[field]),
+        }
+    }
+
+    /// Entries of a FIFO.
+    pub fn fifo_entries(&self, link: usize) -> Vec<Vec<u32>> {
+        self.links[link].store.entries.iter().cloned().collect()
+    }
+
+    /// The host writes all fields of a link in the cycle to come: of a snapshot it publishes them, of a FIFO it pushes them.
+    pub fn write(&mut self, link: usize, values: &[u32]) {
+        let state = &mut self.links[link];
+        match self.description.links[link].kind {
+            LinkKind::Wire => state.host_value = Some(values[0]),
+            LinkKind::Snapshot { .. } => state.host_publish = Some(values.to_vec()),
+            LinkKind::Fifo { .. } => state.host_push = Some(values.to_vec()),
+        }
+    }
+
+    /// The host takes the head of a FIFO in the cycle to come.
+    pub fn pop(&mut self, link: usize) {
+        self.links[link].host_pop = true;
+    }
+
+    /// One cycle of every core and every link.
+    ///
+    /// # Errors
+    /// The core that faults, and how.
+    pub fn step(&mut self) -> Result<(), (usize, Fault)> {
+        let now = self.now;
+        let description = Arc::clone(&self.description);
+        self.begin();
+        let mut fault = None;
+        for (number, core) in self.cores.iter_mut().enumerate() {
+            if let Some(start) = self.start {
+                let known = &description.cores[number];
+                let (first, period) = (start + known.offset, known.period(description.tick));
+                if now >= first && (now - first).is_multiple_of(period) {
+                    core.emulator.tick_at(now);
+                }
+            }
+            let (writes, waits) = (&mut core.writes, &mut core.waits);
+            let mut sink = |event: &Event| match event {
+                Event::PortWrite(write) => writes.push((write.cycle, write.register, write.value)),
+                Event::Wait { cycle, .. } => {
+                    waits.insert(*cycle);
+                }
+                Event::Halt { .. } => core.halted = true,
+                _ => {}
+            };
+            if let Err(found) = core.emulator.observed(&mut sink).step_cycle() {
+                fault.get_or_insert((number, found));
+            }
+            if core.waits.contains(&now) {
+                core.waited.get_or_insert(now);
+            }
+        }
+        for (number, link) in description.links.iter().enumerate() {
+            self.link(&description, number, link, now);
+        }
+        self.end(&description, now);
+        self.now += 1;
+        match fault {
+            Some(fault) => Err(fault),
+            None => Ok(()),
+        }
+    }
+
+    /// What goes in before the cores' cycle, and what stands on the pins in it.
+    fn begin(&mut self) {
+        for core in &mut self.cores {
+            let pin = core.gate.pop_first().map(|(lane, value)| (core.lanes[lane].register, value));
+            if let Some((register, value)) = core.pins.step(pin) {
+                let _ = core.emulator.set_input_bits(register, value);
+            }
+        }
+    }
+
+    fn arrive(&mut self, core: usize, source: Source, value: u32) {
+        let core = &mut self.cores[core];
+        if let Some(lane) = core.lanes.iter().position(|lane| lane.source == source) {
+            core.arrived.push((lane, value));
+        }
+    }
+
+    fn written(&self, end: End, register: Option<Register>, now: Cycle) -> Option<u32> {
+        let End::Core(core) = end else { return None };
+        let writes = &self.cores[core].writes;
+        let found = writes.iter().find(|(cycle, written, _)| *cycle == now && Some(*written) == register);
+        found.map(|(_, _, value)| *value)
+    }
+
+    fn link(&mut self, description: &Description, number: usize, link: &Link, now: Cycle) {
+        let waits = |reference: &Reference, end| match end {
+            End::Core(core) => reference.cores[core].waits.contains(&now),
+            End::Host => false,
+        };
+        match &link.kind {
+            LinkKind::Wire => {
+                let written = self.written(link.from, link.fields[0].output, now);
+                let latched = description.core(link.from).is_some_and(|core| core.program.latched);
+                let wait = waits(self, link.from);
+                let state = &mut self.links[number];
+                let sent = if latched {
+                    state.changed = written.or(state.changed);
+                    if wait { state.changed.take() } else { None }
+                } else {
+                    written.or(state.host_value.take())
+                };
+                if let Some(value) = state.wire.step(sent) {
+                    match link.to {
+                        End::Core(core) => self.arrive(core, Source::Field { link: number, field: 0 }, value),
+                        End::Host => state.shown = value,
+                    }
+                }
+            }
+            LinkKind::Snapshot { strobe } => {
+                // Taken is what was published before this cycle.
+                if let (End::Core(core), Some(start)) = (link.to, self.start) {
+                    let known = &description.cores[core];
+                    let (first, period) =
+                        (start + known.offset - description.taking(core), known.period(description.tick));
+                    let waits = self.cores[core].waits.last().is_some_and(|since| since + ENDED_DELAY <= now)
+                        && matches!(self.cores[core].emulator.status(), takt_emu::Status::Waiting { .. });
+                    if now >= first && (now - first).is_multiple_of(period) && waits {
+                        for (field, value) in self.links[number].published.clone().into_iter().enumerate() {
+                            self.arrive(core, Source::Field { link: number, field }, value);
+                        }
+                    }
+                }
+                let fields = link.fields.iter().enumerate();
+                let mut writes: Vec<(usize, u32)> = fields
+                    .filter_map(|(i, field)| Some((i, self.written(link.from, field.output, now)?)))
+                    .collect();
+                let publish = match strobe {
+                    Some(strobe) => self.written(link.from, Some(*strobe), now).is_some(),
+                    None => waits(self, link.from),
+                };
+                let state = &mut self.links[number];
+                let host = state.host_publish.take();
+                let published = publish || host.is_some();
+                writes.extend(host.into_iter().flatten().enumerate());
+                let input = if writes.is_empty() && !published { None } else { Some((writes, published)) };
+                if let Some((writes, published)) = state.writes.step(input) {
+                    writes.into_iter().for_each(|(field, value)| state.working[field] = value);
+                    if published {
+                        state.published.clone_from(&state.working);
+                    }
+                }
+            }
+            LinkKind::Fifo { push, pop, sender, receiver, .. } => {
+                // What changed in the last cycle arrives in this one.
+                let change = self.links[number].change.take();
+                let (head, status) = change.unzip();
+                if let End::Core(core) = link.to {
+                    for (field, value) in head.flatten().into_iter().flatten().enumerate() {
+                        self.arrive(core, Source::Field { link: number, field }, value);
+                    }
+                    for &(status, value) in status.iter().flatten() {
+                        if receiver.iter().any(|(wanted, _)| *wanted == status) {
+                            self.arrive(
+                                core,
+                                Source::Status { link: number, side: Side::Receiver, status },
+                                value,
+                            );
+                        }
+                    }
+                }
+                let back = self.links[number].back.step(status);
+                if let End::Core(core) = link.from {
+                    for (status, value) in back.into_iter().flatten() {
+                        if sender.iter().any(|(wanted, _)| *wanted == status) {
+                            self.arrive(
+                                core,
+                                Source::Status { link: number, side: Side::Sender, status },
+                                value,
+                            );
+                        }
+                    }
+                }
+                for (i, field) in link.fields.iter().enumerate() {
+                    if let Some(value) = self.written(link.from, field.output, now) {
+                        self.links[number].working[i] = value;
+                    }
+                }
+                let pushed = push.is_some_and(|push| self.written(link.from, Some(push), now).is_some());
+                let popped = pop.is_some_and(|pop| self.written(link.to, Some(pop), now).is_some());
+                let state = &mut self.links[number];
+                let entry = match state.host_push.take() {
+                    Some(entry) => Some(entry),
+                    None => pushed.then(|| state.working.clone()),
+                };
+                let entry = state.pushes.step(entry);
+                let popped = popped || std::mem::take(&mut state.host_pop);
+                if popped || entry.is_some() {
+                    let Change { head, .. } = state.store.cycle(popped, entry);
+                    let first = state.store.entries.front().filter(|_| head).cloned();
+                    let status = Status::ALL.map(|status| (status, state.store.status(status))).to_vec();
+                    state.change = Some((first, status));
+                }
+            }
+        }
+    }
+
+    /// What has arrived waits before the pins; ticks may start.
+    fn end(&mut self, description: &Description, now: Cycle) {
+        for core in &mut self.cores {
+            core.gate.extend(core.arrived.drain(..));
+            core.writes.retain(|(cycle, ..)| *cycle > now);
+        }
+        if self.start.is_none() && self.cores.iter().all(|core| core.waited.is_some() || core.halted) {
+            let last = self.cores.iter().filter_map(|core| core.waited).max();
+            let tick = description.tick;
+            self.start =
+                last.map(|last| (last + crate::MIN_LATENCY + description.lead()).div_ceil(tick) * tick);
+        }
+    }
+}

@@ -1,0 +1,334 @@
+// The editor: CodeMirror as a client of Takt's language server. Everything that it knows of the language, the colours too,
+// are the server's answers.
+import { basicSetup } from "codemirror";
+import { Decoration, EditorView, GutterMarker, ViewPlugin, WidgetType, gutter, keymap } from "@codemirror/view";
+import { Compartment, EditorState, RangeSet, StateEffect, StateField } from "@codemirror/state";
+import { lintGutter, setDiagnostics } from "@codemirror/lint";
+import {
+  LSPClient, LSPPlugin, findReferencesKeymap, formatKeymap, hoverTooltips, jumpToDefinitionKeymap, renameKeymap, serverCompletion,
+} from "@codemirror/lsp-client";
+
+/** The client is silent for so long before the program is read, and before it is scheduled; ms. */
+const PAUSE = 60, LONG_PAUSE = 350;
+/** An answer that takes longer ends the server; ms. */
+export const LANGUAGE_LIMIT = 20_000;
+
+// ---- Colours, from semantic tokens.
+
+const setColours = StateEffect.define();
+const colours = StateField.define({
+  create: () => Decoration.none,
+  update(value, tr) {
+    value = value.map(tr.changes);
+    for (const effect of tr.effects) if (effect.is(setColours)) value = effect.value;
+    return value;
+  },
+  provide: (field) => EditorView.decorations.from(field),
+});
+
+function decorations(doc, data, legend) {
+  const marks = [];
+  let line = 0, character = 0;
+  for (let i = 0; i + 4 < data.length; i += 5) {
+    const [lines, start, length, type] = data.slice(i, i + 5);
+    line += lines;
+    character = lines ? start : character + start;
+    if (line >= doc.lines) break;
+    const from = doc.line(line + 1).from + character, to = Math.min(from + length, doc.length);
+    if (from < to) marks.push(Decoration.mark({ class: `tok-${legend[type]}` }).range(from, to));
+  }
+  return Decoration.set(marks, true);
+}
+
+// ---- Cycles: inlay hints behind lines, lenses above them.
+
+class Hint extends WidgetType {
+  constructor(text, more, lens) {
+    super();
+    Object.assign(this, { text, more, lens });
+  }
+  eq(other) {
+    return other.text === this.text && other.lens === this.lens && other.more === this.more;
+  }
+  toDOM() {
+    const element = document.createElement(this.lens ? "div" : "span");
+    element.className = this.lens ? "lens" : "hint";
+    element.textContent = this.text;
+    if (this.more) element.title = this.more;
+    return element;
+  }
+  ignoreEvent() {
+    return true;
+  }
+}
+
+const setHints = StateEffect.define();
+const hints = StateField.define({
+  create: () => Decoration.none,
+  update(value, tr) {
+    value = value.map(tr.changes);
+    for (const effect of tr.effects) if (effect.is(setHints)) value = effect.value;
+    return value;
+  },
+  provide: (field) => EditorView.decorations.from(field),
+});
+
+// ---- Where the debugger stands.
+
+class Arrow extends GutterMarker {
+  toDOM() {
+    const element = document.createElement("span");
+    element.textContent = "▶";
+    element.title = "issues next";
+    return element;
+  }
+}
+const arrow = new Arrow();
+const setPlace = StateEffect.define();
+const place = StateField.define({
+  create: () => ({ lines: Decoration.none, markers: RangeSet.empty }),
+  update(value, tr) {
+    if (tr.docChanged) value = { lines: value.lines.map(tr.changes), markers: value.markers.map(tr.changes) };
+    for (const effect of tr.effects) if (effect.is(setPlace)) value = effect.value;
+    return value;
+  },
+  provide: (field) => EditorView.decorations.from(field, (value) => value.lines),
+});
+
+const theme = EditorView.theme({
+  "&": { height: "100%", fontSize: "13px", backgroundColor: "var(--bg)", color: "var(--fg)" },
+  ".cm-scroller": { fontFamily: "ui-monospace, 'DejaVu Sans Mono', Menlo, Consolas, monospace", lineHeight: "1.5" },
+  ".cm-content": { caretColor: "var(--fg)" },
+  ".cm-cursor": { borderLeftColor: "var(--fg)" },
+  ".cm-gutters": { backgroundColor: "var(--panel)", color: "var(--dim)", border: "none" },
+  ".cm-activeLine, .cm-activeLineGutter": { backgroundColor: "var(--line)" },
+  "&.cm-focused > .cm-scroller > .cm-selectionLayer .cm-selectionBackground, .cm-selectionBackground": { backgroundColor: "var(--select)" },
+  ".cm-tooltip": { backgroundColor: "var(--panel)", color: "var(--fg)", border: "1px solid var(--edge)", maxWidth: "min(44em, 92vw)" },
+  ".cm-tooltip-autocomplete ul li[aria-selected]": { backgroundColor: "var(--accent)", color: "var(--on-accent)" },
+  ".cm-panels": { backgroundColor: "var(--panel)", color: "var(--fg)" },
+  ".cm-lsp-documentation": { padding: "2px 8px" },
+});
+
+export class Editor {
+  /**
+   * @param parent where it goes
+   * @param thread the language server's worker
+   * @param told called with what goes wrong
+   * @param changed called when the text has changed
+   */
+  constructor(parent, { thread, told, changed, keys }) {
+    Object.assign(this, { thread, told });
+    this.server = new Compartment();
+    this.version = 0;
+    this.scheduled = 0;
+    const follow = EditorView.updateListener.of((update) => {
+      if (!update.docChanged) return;
+      this.version++;
+      changed();
+      this.later();
+    });
+    this.view = new EditorView({
+      parent,
+      state: EditorState.create({
+        extensions: [
+          keymap.of(keys), basicSetup, lintGutter(), theme, colours, hints, place, follow,
+          gutter({ class: "cm-arrow", markers: (view) => view.state.field(place).markers, initialSpacer: () => arrow }),
+          EditorView.contentAttributes.of({ "aria-label": "Takt source", spellcheck: "false", autocorrect: "off", autocapitalize: "off" }),
+          this.server.of([]),
+        ],
+      }),
+    });
+  }
+
+  get text() {
+    return this.view.state.doc.toString();
+  }
+
+  /** Opens a text under a name, for a machine. */
+  async open(name, text, machine) {
+    Object.assign(this, { name, machine });
+    this.close();
+    this.view.dispatch({ changes: { from: 0, to: this.view.state.doc.length, insert: text }, selection: { anchor: 0 } });
+    await this.connect();
+  }
+
+  async use(machine) {
+    this.machine = machine;
+    this.close();
+    await this.connect();
+  }
+
+  close() {
+    clearTimeout(this.pause);
+    clearTimeout(this.longPause);
+    if (!this.client) return;
+    this.view.dispatch({ effects: [this.server.reconfigure([]), setColours.of(Decoration.none), setHints.of(Decoration.none)] });
+    this.client.disconnect();
+    this.client = null;
+  }
+
+  async connect() {
+    const client = new LSPClient({
+      timeout: LANGUAGE_LIMIT,
+      notificationHandlers: {
+        "textDocument/publishDiagnostics": (_, params) => this.diagnosed(params),
+        "window/logMessage": (_, params) => (this.told(params.message), true),
+      },
+      extensions: [
+        { clientCapabilities: { textDocument: { publishDiagnostics: {}, inlayHint: {}, semanticTokens: { requests: { full: true }, tokenTypes: [], tokenModifiers: [], formats: ["relative"] } } } },
+        serverCompletion(), hoverTooltips(),
+        keymap.of([...formatKeymap, ...renameKeymap, ...jumpToDefinitionKeymap, ...findReferencesKeymap]),
+      ],
+    });
+    this.client = client;
+    await this.ask("lsp.start", { machine: this.machine });
+    if (this.client !== client) return;
+    this.handlers = new Set();
+    client.connect({
+      send: (message) => {
+        this.ask("lsp", JSON.parse(message)).then((said) => this.said(client, said), () => {});
+      },
+      subscribe: (handler) => this.handlers.add(handler),
+      unsubscribe: (handler) => this.handlers.delete(handler),
+    });
+    await client.initializing;
+    if (this.client !== client) return;
+    this.view.dispatch({ effects: this.server.reconfigure(client.plugin(this.name, "takt")) });
+    await this.read();
+    clearTimeout(this.longPause);
+    this.longPause = setTimeout(() => this.count(), 0);
+  }
+
+  /** Hands on what the server says to a client, if that is still there. */
+  said(client, messages) {
+    if (this.client !== client) return;
+    for (const message of messages ?? []) for (const handler of this.handlers) handler(JSON.stringify(message));
+  }
+
+  /** Asks the worker; one that does not answer in time is begun again. */
+  async ask(method, params) {
+    const limit = setTimeout(() => {
+      this.told(`The language server took more than ${LANGUAGE_LIMIT / 1000} s over this text and was begun again; it goes on when the text changes.`);
+      this.thread.stop();
+      this.lost = true;
+    }, LANGUAGE_LIMIT);
+    try {
+      return await this.thread.call(method, params);
+    } finally {
+      clearTimeout(limit);
+    }
+  }
+
+  later() {
+    clearTimeout(this.pause);
+    clearTimeout(this.longPause);
+    if (this.lost) {
+      this.lost = false;
+      this.close();
+      this.connect();
+      return;
+    }
+    if (!this.client) return;
+    this.pause = setTimeout(() => this.read(), PAUSE);
+    this.longPause = setTimeout(() => this.count(), LONG_PAUSE);
+  }
+
+  /** What is known at once: diagnostics and colours. */
+  async read() {
+    const { client, version } = this;
+    if (!client?.serverCapabilities) return;
+    try {
+      client.sync();
+      this.said(client, await this.ask("lsp.check"));
+      const document = { textDocument: { uri: this.name } };
+      const tokens = await client.request("textDocument/semanticTokens/full", document);
+      if (this.client !== client || this.version !== version) return;
+      const legend = client.serverCapabilities.semanticTokensProvider.legend.tokenTypes;
+      this.view.dispatch({ effects: setColours.of(decorations(this.view.state.doc, tokens.data, legend)) });
+    } catch {
+      // The server was begun again, or the text is another by now.
+    }
+  }
+
+  /** What scheduling tells: cycles. */
+  async count() {
+    const { client, version } = this;
+    if (!client?.serverCapabilities) return;
+    try {
+      for (let more = true; more && this.client === client; ) {
+        const answer = await this.ask("lsp.schedule");
+        this.said(client, answer.messages);
+        more = answer.more;
+      }
+      const doc = this.view.state.doc, document = { textDocument: { uri: this.name } };
+      const range = { start: { line: 0, character: 0 }, end: { line: doc.lines, character: 0 } };
+      const [found, lenses] = await Promise.all([
+        client.request("textDocument/inlayHint", { ...document, range }),
+        client.request("textDocument/codeLens", document),
+      ]);
+      if (this.client !== client || this.version !== version) return;
+      const at = (position) => Math.min(doc.line(Math.min(position.line + 1, doc.lines)).from + position.character, doc.length);
+      const widgets = [
+        ...found.map((hint) => Decoration.widget({ widget: new Hint(hint.label, hint.tooltip?.value), side: 1 }).range(at(hint.position))),
+        ...lenses.map((lens) => Decoration.widget({ widget: new Hint(lens.command.title, "", true), block: true, side: -1 }).range(doc.lineAt(at(lens.range.start)).from)),
+      ];
+      this.scheduled = version;
+      this.view.dispatch({ effects: setHints.of(Decoration.set(widgets, true)) });
+    } catch {
+      // As above.
+    }
+  }
+
+  diagnosed(params) {
+    if (params.uri !== this.name) return true;
+    const plugin = LSPPlugin.get(this.view);
+    if (!plugin) return true;
+    const place = (position) => Math.min(plugin.unsyncedChanges.mapPos(plugin.fromPosition(position, plugin.syncedDoc)), this.view.state.doc.length);
+    const severities = ["error", "error", "warning", "info", "hint"];
+    const show = (fixes) => {
+      const diagnostics = params.diagnostics.map((item) => ({
+        from: place(item.range.start), to: place(item.range.end), severity: severities[item.severity ?? 1], message: item.message,
+        actions: fixes(item).map((fix) => ({ name: fix.title, apply: (view) => this.apply(view, fix) })),
+      }));
+      this.view.dispatch(setDiagnostics(this.view.state, diagnostics));
+    };
+    show(() => []);
+    if (params.diagnostics.length) this.fixes(params, show);
+    return true;
+  }
+
+  async fixes(params, show) {
+    const { client, version } = this;
+    const range = { start: { line: 0, character: 0 }, end: { line: this.view.state.doc.lines, character: 0 } };
+    try {
+      const found = await client.request("textDocument/codeAction", { textDocument: { uri: this.name }, range, context: { diagnostics: params.diagnostics } });
+      if (this.client !== client || this.version !== version) return;
+      const same = (a, b) => a.message === b.message && JSON.stringify(a.range) === JSON.stringify(b.range);
+      show((item) => found.filter((fix) => fix.diagnostics?.some((one) => same(one, item))));
+    } catch {
+      // Without fixes, then.
+    }
+  }
+
+  apply(view, fix) {
+    const plugin = LSPPlugin.get(view);
+    const edits = Object.entries(fix.edit?.changes ?? {}).filter(([uri]) => uri === this.name).flatMap(([, edits]) => edits);
+    view.dispatch({ changes: edits.map((edit) => ({ from: plugin.fromPosition(edit.range.start), to: plugin.fromPosition(edit.range.end), insert: edit.newText })), userEvent: "input.fix" });
+  }
+
+  /** Shows where the debugger stands: the line that issues next, and those of which operations are in its bundle. */
+  stand(line, part = []) {
+    const doc = this.view.state.doc;
+    const exists = (number) => number >= 1 && number <= doc.lines;
+    const lines = [...new Set(part)].filter(exists).filter((number) => number !== line).map((number) => Decoration.line({ class: "cm-part" }).range(doc.line(number).from));
+    if (exists(line)) lines.push(Decoration.line({ class: "cm-next" }).range(doc.line(line).from));
+    const markers = exists(line) ? RangeSet.of(arrow.range(doc.line(line).from)) : RangeSet.empty;
+    const effects = [setPlace.of({ lines: Decoration.set(lines, true), markers })];
+    if (exists(line)) effects.push(EditorView.scrollIntoView(doc.line(line).from, { y: "nearest", yMargin: 60 }));
+    this.view.dispatch({ effects });
+  }
+
+  focus() {
+    this.view.focus();
+  }
+}

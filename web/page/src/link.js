@@ -1,0 +1,59 @@
+// A program in the part of an address behind `#`: compressed, base 64 for addresses. No server sees it.
+
+/** Characters of a link that is made: what browsers and mail programs carry. */
+export const LINK_CHARACTERS = 100_000;
+/** Bytes of what a link is unpacked to. */
+const UNPACKED_BYTES = 8 << 20;
+
+const through = (bytes, stream) => new Response(new Blob([bytes]).stream().pipeThrough(stream)).arrayBuffer();
+
+export async function pack(program) {
+  const bytes = new TextEncoder().encode(JSON.stringify(program));
+  const packed = new Uint8Array(await through(bytes, new CompressionStream("deflate")));
+  let text = "";
+  for (const byte of packed) text += String.fromCharCode(byte);
+  const fragment = "p1=" + btoa(text).replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "");
+  if (fragment.length > LINK_CHARACTERS) {
+    throw new Error(`the link would have ${fragment.length} characters, more than the ${LINK_CHARACTERS} that browsers carry: export the source instead`);
+  }
+  return fragment;
+}
+
+/** The program of a fragment; null if it has none. */
+export async function unpack(fragment) {
+  const text = fragment.replace(/^#/, "");
+  if (text === "") return null;
+  if (/^example=/.test(text)) return { example: decodeURIComponent(text.slice(8)) };
+  if (!text.startsWith("p1=")) throw new Error("it does not begin with `p1=`, as Takt's links do");
+  let packed;
+  try {
+    packed = Uint8Array.from(atob(text.slice(3).replaceAll("-", "+").replaceAll("_", "/")), (c) => c.charCodeAt(0));
+  } catch {
+    throw new Error("it has characters that no link has");
+  }
+  let bytes;
+  try {
+    // Deflate ends with a sum of what was packed, so that one lost or changed character is found.
+    bytes = await unpackBounded(packed);
+  } catch (error) {
+    throw new Error(error instanceof RangeError ? error.message : "a part of it is missing or was changed on the way");
+  }
+  const program = JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(bytes));
+  if (typeof program?.source !== "string") throw new Error("it holds no source");
+  const word = (value) => (typeof value === "string" ? value : "");
+  return { name: word(program.name), machine: word(program.machine), inputs: word(program.inputs), source: program.source };
+}
+
+async function unpackBounded(packed) {
+  const reader = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate")).getReader();
+  const parts = [];
+  let length = 0;
+  for (;;) {
+    const { done, value } = await reader.read();
+    if (done) break;
+    length += value.length;
+    if (length > UNPACKED_BYTES) throw new RangeError(`it unpacks to more than ${UNPACKED_BYTES >> 20} MiB`);
+    parts.push(value);
+  }
+  return new Uint8Array(await new Blob(parts).arrayBuffer());
+}

@@ -1,0 +1,52 @@
+//! Programs to start from.
+
+use crate::{CYCLES, PERIODS, SOURCE_BYTES};
+use serde_json::{Value, json};
+use std::sync::OnceLock;
+use takt_isa::MACHINES;
+use takt_programs::{EXAMPLES, SOURCES};
+
+/// Those of `programs/examples` that come first, in this order; the others follow as they are.
+const FIRST: [&str; 3] = ["pi.s", "foc.s", "blink.s"];
+/// The controller that drives the robot.
+pub(crate) const TRACKING: &str = "hybrid/tracking.s";
+
+/// Sources that a program can include by name: the parts of those that come with Takt.
+pub(crate) fn beside() -> &'static [(&'static str, &'static str)] {
+    static BESIDE: OnceLock<Vec<(&str, &str)>> = OnceLock::new();
+    BESIDE.get_or_init(|| SOURCES.iter().map(|(path, text)| (file_name(path), *text)).collect())
+}
+
+fn file_name(path: &'static str) -> &'static str {
+    path.rsplit_once('/').map_or(path, |(_, name)| name)
+}
+
+/// What an example is: the words of its first comment.
+fn title(source: &str) -> &str {
+    source.lines().find_map(|line| line.strip_prefix(';')).map_or("", str::trim)
+}
+
+/// What the page is told first.
+pub(crate) fn about() -> Value {
+    let text = |name: &str| EXAMPLES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
+    let rest =
+        EXAMPLES.iter().map(|(name, _)| *name).filter(|name| name.ends_with(".s") && !FIRST.contains(name));
+    let example = |name: &str| {
+        let source = text(name)?;
+        let inputs = text(&name.replace(".s", ".csv"));
+        Some(
+            json!({ "name": name, "title": title(source), "source": source, "inputs": inputs, "track": false }),
+        )
+    };
+    let mut examples: Vec<Value> = FIRST.into_iter().chain(rest).filter_map(example).collect();
+    if let Some((path, source)) = SOURCES.iter().find(|(path, _)| *path == TRACKING) {
+        let tracking = json!({ "name": file_name(path), "title": title(source), "source": source, "inputs": null, "track": true });
+        examples.insert(2.min(examples.len()), tracking);
+    }
+    json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "machines": MACHINES.iter().map(|machine| json!({ "name": machine.name, "text": machine.text })).collect::<Vec<_>>(),
+        "examples": examples,
+        "limits": { "cycles": CYCLES, "periods": PERIODS, "source_bytes": SOURCE_BYTES },
+    })
+}

@@ -1,0 +1,60 @@
+//! What can be taken away: image, circuit, header.
+
+use crate::program::Loaded;
+use serde::Deserialize;
+use serde_json::{Value, json};
+use takt_rtl::header::{Cycles, Header, Language, Span};
+use takt_rtl::{Library, bench, export};
+
+/// Rows of recorded inputs that the test bench gets.
+const BENCH_PERIODS: usize = 100;
+
+pub(crate) fn image(loaded: &Loaded) -> Result<Vec<u8>, String> {
+    let assembled = &loaded.assembled;
+    takt_asm::image::write_with(&assembled.program, Some(&assembled.debug_info()))
+        .map_err(|error| error.to_string())
+}
+
+/// The circuit with its test bench, which runs the program: names and texts of files.
+pub(crate) fn verilog(loaded: &Loaded) -> Result<Value, String> {
+    let program = &loaded.assembled.program;
+    let design = export(program.machine, &Library::builtin()).map_err(|error| error.to_string())?;
+    let design = design.latching(program.latched_inputs()).map_err(|error| error.to_string())?;
+    let rows = loaded.rows.as_ref().map_or(&[][..], |rows| rows.as_slice());
+    let rows = &rows[..rows.len().min(BENCH_PERIODS)];
+    let files = bench::folder(&design, Some(program), rows);
+    let files = files.into_iter().map(|file| json!({ "name": file.name, "text": file.text }));
+    Ok(json!({ "top": design.top, "files": files.collect::<Vec<_>>() }))
+}
+
+#[derive(Deserialize)]
+struct Wanted {
+    language: String,
+}
+
+/// What a host must know of the program.
+pub(crate) fn header(loaded: &Loaded, params: Value) -> Result<Value, String> {
+    let Wanted { language } = crate::parameters("header", params)?;
+    let language = match language.as_str() {
+        "c" => Language::C,
+        "rust" => Language::Rust,
+        "json" => Language::Json,
+        "svd" => Language::Svd,
+        other => return Err(format!("there is no header in `{other}` (languages: c, rust, json, svd)")),
+    };
+    let program = &loaded.assembled.program;
+    let span = |span: takt_analysis::Span| Span { best: span.best, worst: span.worst };
+    let cycles = takt_analysis::bound(program).map(|bounds| {
+        let section = |section: &takt_analysis::SectionBounds| Cycles {
+            name: section.name.clone(),
+            address: section.address,
+            once: section.once,
+            cycles: span(if section.once { section.cycles } else { section.in_time }),
+            missed: (!section.once).then_some(span(section.missed)),
+        };
+        bounds.sections.iter().map(section).collect()
+    });
+    let stem = loaded.name.strip_suffix(".s").unwrap_or(&loaded.name);
+    let header = Header::new(program, stem, cycles.map_err(|error| error.to_string()));
+    Ok(Value::from(header.text(language)))
+}

@@ -1,0 +1,149 @@
+//! Assembling what the page holds.
+
+use crate::{CYCLES, PERIODS, Playground, SOURCE_BYTES, examples, machine, view};
+use serde::Deserialize;
+use serde_json::{Value, json};
+use std::num::NonZeroU64;
+use std::sync::Arc;
+use takt_analysis::{SectionBounds, Span};
+use takt_asm::schedule::BlockReport;
+use takt_asm::{Assembled, MemoryLoader, Options, Search};
+use takt_debug::console::Console;
+use takt_debug::session::{self, Session};
+use takt_emu::Rows;
+use takt_isa::program::Port;
+
+/// A program, and what it is run on.
+pub(crate) struct Loaded {
+    pub(crate) name: String,
+    pub(crate) assembled: Assembled,
+    /// Recorded inputs; `None`: the ports are 0.
+    pub(crate) rows: Option<Arc<Rows>>,
+    pub(crate) tick: Option<NonZeroU64>,
+}
+
+/// What is to be assembled.
+#[derive(Deserialize)]
+pub(crate) struct Assemble {
+    name: String,
+    source: String,
+    machine: String,
+    /// A table (CSV) with a column for each input port; blank: the ports are 0.
+    #[serde(default)]
+    inputs: String,
+    /// Cycles between ticks; 0: the tick comes when the program is ready.
+    #[serde(default)]
+    tick: u64,
+}
+
+/// What errors of the inputs call them.
+const INPUTS: &str = "inputs";
+
+impl Playground {
+    /// Assembles, bounds the cycles, opens a session at the beginning.
+    pub(crate) fn assemble(&mut self, wanted: Assemble) -> Result<Value, String> {
+        let machine = machine(&wanted.machine)?;
+        (self.loaded, self.console, self.run, self.track) = (None, None, None, None);
+        if wanted.source.len() > SOURCE_BYTES {
+            return Err(format!("the source has more than {} MiB", SOURCE_BYTES >> 20));
+        }
+        let name = if wanted.name.is_empty() { "main.s".to_owned() } else { wanted.name };
+        let loader = Search::new(MemoryLoader::new(examples::beside())).library(takt_programs::LIBRARY);
+        let options = Options { machine, ..Options::default() };
+        let assembled = match takt_asm::assemble_bytes(&name, wanted.source.into_bytes(), &loader, &options) {
+            Ok(assembled) => assembled,
+            Err(mistakes) => {
+                return Ok(json!({
+                    "assembled": false, "messages": mistakes.messages(), "text": mistakes.render(false),
+                }));
+            }
+        };
+        let program = &assembled.program;
+        let empty = program.bundles() == 0;
+        let rows = if wanted.inputs.trim().is_empty() {
+            Ok(None)
+        } else {
+            let rows = takt_debug::inputs::rows(INPUTS, wanted.inputs.as_bytes(), &program.inputs, PERIODS);
+            rows.map(|rows| Some(Arc::new(rows)))
+        };
+        let (rows, inputs_error) = match rows {
+            Ok(rows) => (rows, None),
+            Err(error) => (None, Some(error)),
+        };
+        let loaded = Loaded { name, assembled, rows, tick: NonZeroU64::new(wanted.tick) };
+        let mut told = told(&loaded);
+        told["inputs_error"] = json!(inputs_error);
+        if !empty && inputs_error.is_none() {
+            self.console = Some(Console::new(loaded.session()?));
+        }
+        if let Some(console) = &mut self.console {
+            told["view"] = view::view(console);
+        }
+        self.loaded = Some(loaded);
+        Ok(told)
+    }
+}
+
+impl Loaded {
+    /// A debug session at the beginning.
+    fn session(&self) -> Result<Session, String> {
+        let info = self.assembled.debug_info();
+        let options = session::Options {
+            inputs: self.rows.clone(),
+            tick: self.tick,
+            constants: info.constants,
+            sources: info.sources,
+            names: info.names,
+            ..session::Options::default()
+        };
+        let mut session =
+            Session::new(&self.assembled.program, options).map_err(|error| error.to_string())?;
+        session.run_limit = CYCLES;
+        Ok(session)
+    }
+}
+
+/// What there is to say of a program that assembles.
+fn told(loaded: &Loaded) -> Value {
+    let Loaded { assembled, name, .. } = loaded;
+    let program = &assembled.program;
+    let port = |port: &Port| json!({ "name": port.name, "type": takt_asm::type_name(port.ty) });
+    let ports = |ports: &[Port]| ports.iter().map(port).collect::<Vec<_>>();
+    let span = |span: Span| json!({ "best": span.best, "worst": span.worst });
+    let section = |section: &SectionBounds| {
+        let cycles = if section.once { section.cycles } else { section.in_time };
+        json!({ "name": section.name, "once": section.once, "cycles": span(cycles) })
+    };
+    let (bounds, no_bound) = match takt_analysis::bound(program) {
+        Ok(bounds) => (Some(bounds.sections.iter().map(section).collect::<Vec<_>>()), None),
+        Err(error) => (None, Some(error.to_string())),
+    };
+    let block = |block: &BlockReport| {
+        json!({
+            "label": block.label,
+            "place": block.location.map(|at| program.place_text(at)),
+            "operations": block.operations,
+            "bundles": block.bundles,
+            "cycles": block.cycles,
+            "bound": block.bound.cycles(),
+        })
+    };
+    json!({
+        "assembled": true,
+        "messages": assembled.warnings.messages(),
+        "text": assembled.warnings.render(false),
+        "name": name,
+        "machine": program.machine.name,
+        "bundles": program.bundles(),
+        "words": program.code.len(),
+        "constants": program.constants.len(),
+        "data_words": program.data.len(),
+        "inputs": ports(&program.inputs),
+        "outputs": ports(&program.outputs),
+        "rows": loaded.rows.as_ref().map(|rows| rows.len()),
+        "bounds": bounds,
+        "no_bound": no_bound,
+        "blocks": assembled.blocks.iter().map(block).collect::<Vec<_>>(),
+        "tracks": crate::track::Binding::new(program).is_ok(),
+    })
+}

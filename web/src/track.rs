@@ -1,0 +1,205 @@
+//! The robot: a tracking program in the closed loop along the AGH path.
+
+use crate::program::Loaded;
+use crate::{CYCLES, Playground};
+use serde::Deserialize;
+use serde_json::{Value, json};
+use std::sync::OnceLock;
+use takt_emu::{Emulator, PeriodError};
+use takt_isa::program::Port;
+use takt_isa::{Program, Register, Type};
+use takt_programs::hybrid::closed_loop::{ClosedLoop, Inputs, TrackingController, TrackingError};
+use takt_programs::hybrid::params;
+use takt_programs::hybrid::ports::{INPUTS, OUTPUTS, Port as RobotPort, PortType};
+use takt_programs::hybrid::{LoopError, Outputs};
+use takt_programs::trajectory::Trajectory;
+
+/// Periods that a call drives at most.
+const SLICE: u64 = 20_000;
+/// Every so many periods the pose is kept for drawing.
+const EVERY: u64 = 100;
+
+/// The AGH path, planned once.
+fn trajectory() -> Result<&'static Trajectory, String> {
+    static TRAJECTORY: OnceLock<Result<Trajectory, String>> = OnceLock::new();
+    let plan = || {
+        let moves = takt_programs::gcode::read_bytes(takt_programs::AGH.as_bytes());
+        let moves = moves.map_err(|error| format!("agh.ngc:{}: {}", error.line, error.kind))?;
+        Trajectory::plan(&moves).map_err(|error| error.to_string())
+    };
+    TRAJECTORY.get_or_init(plan).as_ref().map_err(Clone::clone)
+}
+
+/// Registers of a program for the ports of the tracking algorithm.
+pub(crate) struct Binding {
+    inputs: Vec<Register>,
+    outputs: Vec<Register>,
+}
+
+impl Binding {
+    pub(crate) fn new(program: &Program) -> Result<Binding, String> {
+        let find = |kind: &str, wanted: &[RobotPort], have: &[Port]| {
+            let register = |wanted: &RobotPort| {
+                let ty = match wanted.kind {
+                    PortType::I32 => Type::I,
+                    PortType::F32 => Type::F,
+                };
+                let port = have.iter().find(|port| port.name == wanted.name && port.ty == ty);
+                let ty = takt_asm::type_name(ty);
+                port.map(|port| port.register).ok_or_else(|| {
+                    format!(
+                        "this is no tracking program: it has no {kind} port `{}:{ty}` (the example `tracking.s` has all)",
+                        wanted.name
+                    )
+                })
+            };
+            wanted.iter().map(register).collect::<Result<Vec<_>, String>>()
+        };
+        if let Some(port) =
+            program.inputs.iter().find(|port| INPUTS.iter().all(|known| known.name != port.name))
+        {
+            return Err(format!(
+                "this is no tracking program: nothing gives its input `{}` a value",
+                port.name
+            ));
+        }
+        Ok(Binding {
+            inputs: find("input", &INPUTS, &program.inputs)?,
+            outputs: find("output", &OUTPUTS, &program.outputs)?,
+        })
+    }
+}
+
+/// Why the loop ends early.
+pub(crate) enum Lost {
+    Period(PeriodError),
+    /// An output port, by its name, was not written.
+    Unwritten(&'static str),
+}
+
+/// The program as the controller.
+struct OnEmulator {
+    emulator: Emulator,
+    binding: Binding,
+    cycles: u64,
+}
+
+impl TrackingController for OnEmulator {
+    type Error = Lost;
+
+    fn step(&mut self, inputs: &Inputs) -> Result<Outputs<f64>, Lost> {
+        let Self { emulator, binding, cycles } = self;
+        for (register, bits) in binding.inputs.iter().zip(inputs.to_words()) {
+            emulator.set_input_bits(*register, bits).map_err(|error| Lost::Period(error.into()))?;
+        }
+        emulator.set_cycle_limit(emulator.now() + CYCLES);
+        *cycles = emulator.run_period(&[]).map_err(Lost::Period)?.cycles;
+        let mut values = [0.0; OUTPUTS.len()];
+        for ((value, register), port) in values.iter_mut().zip(&binding.outputs).zip(&OUTPUTS) {
+            let bits = emulator.output_bits(*register).ok_or(Lost::Unwritten(port.name))?;
+            *value = f64::from(f32::from_bits(bits));
+        }
+        Ok(Outputs::from_array(values))
+    }
+}
+
+/// A drive along the path.
+pub(crate) struct Track {
+    closed_loop: ClosedLoop<'static, OnEmulator>,
+    errors: TrackingError,
+    /// Periods that are over.
+    done: u64,
+    longest: u64,
+}
+
+/// How far to drive.
+#[derive(Deserialize)]
+pub(crate) struct Wanted {
+    /// From the beginning; else further.
+    #[serde(default)]
+    begin: bool,
+    periods: u64,
+}
+
+impl Loaded {
+    fn lost(&self, error: &LoopError<Lost>) -> String {
+        match error {
+            LoopError::Controller { period, source: Lost::Period(error) } => {
+                format!("period {}: {}", period + 1, self.fault(error))
+            }
+            LoopError::Controller { period, source: Lost::Unwritten(port) } => {
+                format!("period {}: the program has not written output port `{port}`", period + 1)
+            }
+            LoopError::NotFinite { period, port } => format!("period {}: {port} is not finite", period + 1),
+            LoopError::Lost { period } => {
+                format!("period {}: an axis left the range of its encoder", period + 1)
+            }
+        }
+    }
+}
+
+impl Playground {
+    /// Drives on; the poses on the way.
+    pub(crate) fn track(&mut self, wanted: Wanted) -> Result<Value, String> {
+        let trajectory = trajectory()?;
+        if wanted.begin {
+            let loaded = self.loaded()?;
+            let program = &loaded.assembled.program;
+            let binding = Binding::new(program)?;
+            let emulator = Emulator::new(program).map_err(|error| error.to_string())?;
+            let closed_loop = ClosedLoop::new(trajectory, OnEmulator { emulator, binding, cycles: 0 });
+            self.track = Some(Track { closed_loop, errors: TrackingError::default(), done: 0, longest: 0 });
+        }
+        let mut track = self.track.take().ok_or("no drive has begun")?;
+        let loaded = self.loaded()?;
+        let all = trajectory.periods();
+        let until = (track.done + wanted.periods.min(SLICE)).min(all);
+        let (mut poses, mut fault) = (Vec::new(), None);
+        while track.done < until && fault.is_none() {
+            match track.closed_loop.next() {
+                Some(Ok(record)) => {
+                    track.errors.add(&record);
+                    track.longest = track.longest.max(track.closed_loop.controller().cycles);
+                    if record.period.is_multiple_of(EVERY) || track.done + 1 == all {
+                        let angle =
+                            |axis: usize| f64::from(record.inputs.counts[axis]) * params::RESOLUTION[axis];
+                        let [x, y, z] = record.position;
+                        let cutting = f64::from(u8::from(record.sample.cutting));
+                        poses.push([
+                            record.period as f64,
+                            x,
+                            y,
+                            z,
+                            angle(3),
+                            angle(4),
+                            record.tool_error,
+                            cutting,
+                        ]);
+                    }
+                    track.done += 1;
+                }
+                Some(Err(error)) => fault = Some(loaded.lost(&error)),
+                None => break,
+            }
+        }
+        let controller = track.closed_loop.controller();
+        let statistics = controller.emulator.statistics();
+        let told = json!({
+            "done": track.done,
+            "all": all,
+            "over": track.done >= all || fault.is_some(),
+            "sample_time": params::SAMPLE_TIME,
+            "base": params::BASE_POINTS,
+            "poses": poses,
+            "cycles": controller.cycles,
+            "longest": track.longest,
+            "cutting": track.errors.cutting,
+            "overall": track.errors.overall,
+            "operations": statistics.total_operations(),
+            "missed": statistics.missed,
+            "fault": fault,
+        });
+        self.track = Some(track);
+        Ok(told)
+    }
+}

@@ -1,0 +1,64 @@
+//! The debug session as the page shows it.
+
+use crate::Playground;
+use serde::Deserialize;
+use serde_json::{Value, json};
+use takt_debug::console::Console;
+use takt_debug::panes::Named;
+
+/// A line for the debugger's console.
+#[derive(Deserialize)]
+pub(crate) struct Execute {
+    line: String,
+}
+
+impl Playground {
+    pub(crate) fn execute(&mut self, wanted: Execute) -> Result<Value, String> {
+        let console = self.console.as_mut().ok_or("there is no program to step through")?;
+        let text = console.execute(&wanted.line)?;
+        Ok(json!({ "text": text, "view": view(console) }))
+    }
+}
+
+fn named(row: &Named) -> Value {
+    json!({
+        "name": row.name, "place": row.place, "type": takt_asm::type_name(row.ty), "value": row.value(),
+        "every_way": row.every_way(), "changed": row.changed, "used": row.used,
+    })
+}
+
+/// Everything that there is to see at this position.
+pub(crate) fn view(console: &mut Console) -> Value {
+    let panes = console.panes();
+    let session = &console.session;
+    let next = panes.lines.iter().find(|line| line.next).map(|line| line.number);
+    let part: Vec<u32> = panes.lines.iter().filter(|line| line.part).map(|line| line.number).collect();
+    let stops: Vec<u32> = panes.lines.iter().filter(|line| line.stop).map(|line| line.number).collect();
+    let rows = |rows: &[Named]| rows.iter().map(named).collect::<Vec<_>>();
+    let flight = panes.flight.iter().map(|one| {
+        json!({ "left": one.left, "register": one.register, "mnemonic": one.mnemonic, "from": one.from })
+    });
+    let bundle = panes.bundle.iter().map(|(slot, text)| json!({ "slot": slot, "text": text }));
+    let stalls = panes.stalls.iter().map(|(cycles, text)| json!({ "cycles": cycles, "text": text }));
+    let displays = panes.displays.iter().map(|(text, value)| json!({ "text": text, "value": value }));
+    json!({
+        "head": panes.head,
+        "cycle": session.cycle(),
+        "period": session.period(),
+        "last": session.report().map(|report| report.cycles),
+        "missed": session.emulator().statistics().missed,
+        "flags": session.emulator().flags().to_string(),
+        "file": panes.file,
+        "line": next,
+        "part": part,
+        "stops": stops,
+        "bundle": bundle.collect::<Vec<_>>(),
+        "registers": rows(&panes.registers),
+        "inputs": rows(&panes.inputs),
+        "outputs": rows(&panes.outputs),
+        "flight": flight.collect::<Vec<_>>(),
+        "cause": panes.cause,
+        "stalls": stalls.collect::<Vec<_>>(),
+        "displays": displays.collect::<Vec<_>>(),
+    })
+}

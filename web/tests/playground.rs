@@ -1,0 +1,185 @@
+//! The playground as the page calls it, without a browser.
+
+use serde_json::{Value, json};
+use takt_web::{CYCLES, Playground};
+
+fn call(playground: &mut Playground, method: &str, params: Value) -> Value {
+    playground.call(method, params).unwrap_or_else(|error| panic!("{method}: {error}"))
+}
+
+fn assemble(playground: &mut Playground, source: &str, inputs: &str) -> Value {
+    let params = json!({ "name": "a.s", "source": source, "machine": "t3", "inputs": inputs });
+    call(playground, "assemble", params)
+}
+
+const DOUBLE: &str = ".input x\n.output y\n.period\nstart:\n    fadd y, x, x\n    wait start\n";
+
+#[test]
+fn every_example_assembles_and_runs() {
+    let mut playground = Playground::default();
+    let about = call(&mut playground, "about", Value::Null);
+    let examples = about["examples"].as_array().expect("there are some");
+    assert_eq!(examples[0]["name"], "pi.s", "the integrator comes first");
+    assert_eq!(examples.iter().filter(|example| example["track"] == true).count(), 1);
+    for example in examples {
+        assert_ne!(example["title"], "", "{}", example["name"]);
+        let params = json!({
+            "name": example["name"], "source": example["source"], "machine": "t3",
+            "inputs": example["inputs"].as_str().unwrap_or_default(),
+        });
+        let told = call(&mut playground, "assemble", params);
+        assert_eq!(told["assembled"], true, "{}: {}", example["name"], told["text"]);
+        assert_eq!(told["inputs_error"], Value::Null, "{}", example["name"]);
+        assert!(told["bounds"].is_array(), "{}", example["name"]);
+        assert_eq!(told["tracks"], example["track"], "{}", example["name"]);
+        if example["track"] == false {
+            let ran = call(&mut playground, "run", json!({ "begin": true, "periods": 3 }));
+            assert_eq!(ran["fault"], Value::Null, "{}", example["name"]);
+            let worst = &told["bounds"][1]["cycles"]["worst"];
+            assert!(
+                ran["cycles"]
+                    .as_array()
+                    .expect("a list")
+                    .iter()
+                    .all(|cycles| cycles.as_u64() <= worst.as_u64())
+            );
+        }
+    }
+}
+
+#[test]
+fn a_run_gives_what_the_ports_carried() {
+    let mut playground = Playground::default();
+    assemble(&mut playground, DOUBLE, "x,other\n1,5\n-2.5,6\n");
+    let ran = call(&mut playground, "run", json!({ "begin": true }));
+    assert_eq!(ran["outputs"]["y"], json!([2.0, -5.0]));
+    assert_eq!(ran["inputs"]["x"], json!([1.0, -2.5]));
+    assert_eq!(ran["over"], true);
+    assemble(&mut playground, DOUBLE, "");
+    let ran = call(&mut playground, "run", json!({ "begin": true, "periods": 4 }));
+    assert_eq!(ran["outputs"]["y"], json!([0.0, 0.0, 0.0, 0.0]));
+}
+
+#[test]
+fn long_runs_come_in_slices() {
+    let mut playground = Playground::default();
+    assemble(&mut playground, DOUBLE, "");
+    let (mut periods, mut calls, mut begin) = (0, 0, true);
+    loop {
+        let ran = call(&mut playground, "run", json!({ "begin": begin, "periods": 5000 }));
+        periods += ran["cycles"].as_array().map_or(0, Vec::len);
+        (calls, begin) = (calls + 1, false);
+        if ran["over"] == true {
+            break;
+        }
+    }
+    assert_eq!((periods, calls), (5000, 3));
+}
+
+#[test]
+fn mistakes_are_told() {
+    let mut playground = Playground::default();
+    let told = assemble(&mut playground, "    fmull y, x, x\n", "");
+    assert_eq!(told["assembled"], false);
+    assert!(told["text"].as_str().is_some_and(|text| text.contains("a.s:1")), "{told}");
+    let error = playground.call("run", json!({ "begin": true })).expect_err("there is no program");
+    assert_eq!(error, "no program is assembled yet");
+    let told = assemble(&mut playground, DOUBLE, "x\n1\ntwo\n");
+    assert_eq!(told["inputs_error"], "inputs:3: column x: `two` is no number");
+    let params = json!({ "name": "a.s", "source": "", "machine": "t9" });
+    assert!(playground.call("assemble", params).is_err_and(|error| error.contains("machines: ")));
+    assert!(
+        playground
+            .call("assemble", Value::Null)
+            .is_err_and(|error| error.contains("parameters of `assemble`"))
+    );
+    assert!(playground.call("nothing", Value::Null).is_err());
+    let params = json!({ "name": "", "source": "x".repeat(takt_web::SOURCE_BYTES + 1), "machine": "t3" });
+    assert_eq!(playground.call("assemble", params), Err("the source has more than 4 MiB".to_owned()));
+    // An empty source is no program, and nothing that is asked of it fails otherwise than in words.
+    assemble(&mut playground, "", "");
+    for method in ["run", "track", "picture", "execute", "listing", "header", "verilog"] {
+        let params = json!({ "begin": true, "periods": 1, "period": 1, "line": "step", "language": "c" });
+        let _ = playground.call(method, params);
+    }
+}
+
+#[test]
+fn a_loop_without_end_stops_at_the_limit() {
+    let mut playground = Playground::default();
+    assemble(&mut playground, "start:\n    jmp start\n", "");
+    let ran = call(&mut playground, "run", json!({ "begin": true, "periods": 3 }));
+    let fault = ran["fault"].as_str().expect("it does not end").to_owned();
+    assert!(fault.contains(&CYCLES.to_string()) && fault.contains("a.s:"), "{fault}");
+    let stopped = call(&mut playground, "execute", json!({ "line": "continue" }));
+    assert!(stopped["text"].as_str().is_some_and(|text| text.contains("cycles")), "{}", stopped["text"]);
+}
+
+#[test]
+fn steps_forward_and_back() {
+    let mut playground = Playground::default();
+    let told = assemble(&mut playground, DOUBLE, "x\n1\n3\n");
+    let step = |playground: &mut Playground, line: &str| {
+        call(playground, "execute", json!({ "line": line }))["view"].take()
+    };
+    let mut views = vec![told["view"].clone()];
+    for _ in 0..4 {
+        views.push(step(&mut playground, "step"));
+    }
+    assert!(views.windows(2).all(|pair| pair[0]["cycle"].as_u64() < pair[1]["cycle"].as_u64()));
+    for view in views.iter().rev().skip(1) {
+        let back = step(&mut playground, "back");
+        assert_eq!(
+            (&back["cycle"], &back["line"], &back["outputs"][0]["value"]),
+            (&view["cycle"], &view["line"], &view["outputs"][0]["value"])
+        );
+    }
+    let end = step(&mut playground, "goto period 2");
+    assert_eq!(end["outputs"][0]["value"], "6.0");
+}
+
+#[test]
+fn the_robot_follows_the_path() {
+    let mut playground = Playground::default();
+    let about = call(&mut playground, "about", Value::Null);
+    let tracking =
+        about["examples"].as_array().and_then(|list| list.iter().find(|one| one["track"] == true)).cloned();
+    let source = tracking.expect("one of them is")["source"].clone();
+    let params = json!({ "name": "tracking.s", "source": source, "machine": "t3" });
+    call(&mut playground, "assemble", params);
+    let first = call(&mut playground, "track", json!({ "begin": true, "periods": 150 }));
+    assert_eq!((&first["done"], &first["longest"]), (&json!(150), &json!(124)));
+    assert_eq!(first["poses"].as_array().map(Vec::len), Some(2));
+    let more = call(&mut playground, "track", json!({ "periods": 150 }));
+    assert_eq!(more["done"], 300);
+    assert!(
+        more["overall"].as_f64().is_some_and(|error| (0.0..1e-5).contains(&error)),
+        "{}",
+        more["overall"]
+    );
+    assemble(&mut playground, DOUBLE, "");
+    let error =
+        playground.call("track", json!({ "begin": true, "periods": 1 })).expect_err("it has other ports");
+    assert!(error.contains("no tracking program"), "{error}");
+}
+
+#[test]
+fn what_is_taken_away_is_what_the_command_line_writes() {
+    let mut playground = Playground::default();
+    assemble(&mut playground, DOUBLE, "x\n1\n");
+    let image = playground.image().expect("it fits");
+    assert_eq!(takt_asm::image::read(&image).expect("it was just written").inputs[0].name, "x");
+    let verilog = call(&mut playground, "verilog", Value::Null);
+    assert_eq!(verilog["top"], "takt_t3");
+    let program =
+        verilog["files"].as_array().and_then(|files| files.iter().find(|file| file["name"] == "program.hex"));
+    assert!(program.is_some_and(|file| file["text"].as_str().is_some_and(|text| text.lines().count() > 2)));
+    for (language, word) in
+        [("c", "#ifndef"), ("rust", "pub const"), ("json", "\"schema\""), ("svd", "<device")]
+    {
+        let header = call(&mut playground, "header", json!({ "language": language }));
+        assert!(header.as_str().is_some_and(|text| text.contains(word)), "{language}: {header}");
+    }
+    let picture = call(&mut playground, "picture", json!({ "period": 1 }));
+    assert!(picture["html"].as_str().is_some_and(|html| html.contains("\"program\":\"a.s\"")));
+}
