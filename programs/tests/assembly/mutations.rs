@@ -119,6 +119,8 @@ fn factor(name: &str) -> &'static str {
         "ec{i}" => "2.2",
         "fall" | "Tc" => "1.001",
         "xc*gain - fall/2" => "1.01",
+        // Matters only within a few v0 of standstill, where few points are.
+        "1/(v0)" => "1.1",
         _ => "1.0001",
     }
 }
