@@ -3,13 +3,14 @@
 mod common;
 
 use std::path::Path;
-use takt_asm::FileLoader;
+use takt_asm::{FileLoader, Search};
 use takt_isa::{Machine, T1, T3};
 
 /// Cycles of the block at the label `period`, or else of the longest.
 fn cycles(folder: &str, name: &str, machine: &'static Machine) -> u32 {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../programs").join(folder);
-    let assembled = takt_asm::assemble(name, &FileLoader::new(root), &common::options(machine));
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../programs");
+    let loader = Search::new(FileLoader::new(root.join(folder))).folder(root.join("library"));
+    let assembled = takt_asm::assemble(name, &loader, &common::options(machine));
     let assembled = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false)));
     let period = assembled.blocks.iter().find(|block| block.label.as_deref() == Some("period"));
     let longest = assembled.blocks.iter().map(|block| block.cycles).max();
@@ -22,6 +23,8 @@ fn programs_take_no_longer() {
         ("hybrid", "tracking.s", &T3, 124),
         ("hybrid", "tracking_literal.s", &T3, 341),
         ("hybrid", "tracking.s", &T1, 304),
+        ("hybrid", "tracking_friction.s", &T3, 270),
+        ("hybrid", "tracking_friction.s", &T1, 651),
         ("arm", "forward.s", &T3, 100),
         ("arm", "inverse.s", &T3, 209),
     ];

@@ -426,6 +426,16 @@ fn a_name_asks_what_the_machine_has() {
 }
 
 #[test]
+fn a_name_asks_whether_there_is_a_macro() {
+    let asked = ".if macro.extra\n.data\n.word 1\n.else\n.data\n.word 0\n.endif\n";
+    let macro_ = ".macro extra\n nop\n.endm\n";
+    assert_eq!(good(asked).program.data, [0]);
+    assert_eq!(good(&format!("{macro_}{asked}")).program.data, [1]);
+    assert_eq!(good(&format!("{asked}{macro_}")).program.data, [0], "only what stands above counts");
+    assert_eq!(good(&format!(".const extra = 2\n{asked}")).program.data, [0], "a constant is no macro");
+}
+
+#[test]
 fn advice_on_a_cast_operand_assembles() {
     let text = ".input x\n.output y\n.period\np: flt y:int, x, 1.0\n wait p\n";
     let report = good(text).warnings.render(false);

@@ -2,6 +2,7 @@
 
 use crate::debug::{self, Debug};
 use crate::output::{describe, message};
+use crate::track;
 use anyhow::{Context, Result};
 use clap::{Args, Parser};
 use crossbeam_channel::unbounded;
@@ -151,7 +152,7 @@ fn arguments(configuration: &Value, folder: Option<&Path>) -> Result<Vec<String>
     let wrong = |name: &str, what: &str| format!("`{name}` in the launch configuration is {what}");
     // Paths are relative to `cwd`, if that is given.
     let path = |text: &str| match folder {
-        Some(folder) if text != "tracking" && text != "tracking_literal" => {
+        Some(folder) if track::builtin_names().all(|name| name != text) => {
             folder.join(text).display().to_string()
         }
         _ => text.to_owned(),

@@ -20,6 +20,7 @@ mod eval;
 mod fault;
 mod files;
 mod fmt;
+mod friction;
 mod isa;
 mod live;
 mod load;

@@ -4,7 +4,7 @@ use crate::controller::{Binding, ControllerError};
 use crate::files::{self, Out};
 use crate::plot;
 use crate::run::PERIOD_LIMIT;
-use crate::track::progress;
+use crate::track::{progress, variant};
 use crate::{number, output};
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
@@ -291,7 +291,8 @@ impl Drives<'_> {
         )?;
         let (cutting, overall) = (self.sorted(|drive| drive.cutting), self.sorted(|drive| drive.overall));
         if !cutting.is_empty() {
-            writeln!(out, "{:<34}{:>12}{:>12}", "largest tracking error, µm", "cutting", "overall")?;
+            writeln!(out, "largest tracking error: {} on {machine}", variant(name))?;
+            writeln!(out, "{:<34}{:>12}{:>12}", "  µm", "cutting", "overall")?;
             let mut row = |name: &str, cutting: Option<f64>, overall: Option<f64>| {
                 let show =
                     |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{:.2}", value * 1e6));

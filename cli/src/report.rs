@@ -1,8 +1,9 @@
 //! `takt track`'s tables: ours beside the founding paper's.
 
 use crate::account::{Account, fused_operations, rounding};
+use crate::friction::Friction;
 use crate::select::PAPER_CLOCK;
-use crate::track::Tracking;
+use crate::track::{Tracking, variant};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -85,11 +86,13 @@ pub(crate) fn text(tracking: &Tracking) -> String {
         "{name} on {}, closed loop along {path}: {periods} period{s} of 100 µs\n",
         program.machine.name
     );
-    time_table(tracking, &mut out);
-    operation_table(&tracking.account, &mut out);
-    error_table(&totals.accuracy.errors, &bounds(program), fused_operations(program), &mut out);
+    let of = format!("{} on {}", variant(name), program.machine.name);
+    time_table(tracking, &of, &mut out);
+    operation_table(&tracking.account, &of, &mut out);
+    let fused = fused_operations(program);
+    error_table(&totals.accuracy.errors, &bounds(program), fused, &of, &mut out);
 
-    let _ = writeln!(out, "\nLargest tracking error of the tool{:>11}", "µm");
+    let _ = writeln!(out, "\nLargest tracking error of the tool: {of}\n  {:<32}{:>11}", "", "µm");
     for (name, error) in [("while cutting", totals.error.cutting), ("over everything", totals.error.overall)]
     {
         // Exactly none: no period was of that kind.
@@ -98,15 +101,18 @@ pub(crate) fn text(tracking: &Tracking) -> String {
     }
     let _ = writeln!(out, "  {:<32}{:>11.3}", "required while cutting", REQUIREMENT * 1e6);
 
-    let _ = writeln!(out, "\nCycles of one period (the last), by what they went to");
+    let _ = writeln!(out, "\nCycles of one period (the last), by what they went to: {of}");
     out.push_str(&tracking.account.stall_table(program, 5));
+    if let Some(friction) = &tracking.friction {
+        friction.text(&of, &mut out);
+    }
     out
 }
 
 /// Table 2.
-fn time_table(tracking: &Tracking, out: &mut String) {
+fn time_table(tracking: &Tracking, of: &str, out: &mut String) {
     let (machine, clock, totals) = (tracking.program.machine.name, tracking.clock, &tracking.totals);
-    let _ = writeln!(out, "Time of one period{:>31}{:>10}{:>12}", "clock MHz", "cycles", "time µs");
+    let _ = writeln!(out, "Time of one period: {of}\n{:>49}{:>10}{:>12}", "clock MHz", "cycles", "time µs");
     for (platform, clock, time) in PLATFORMS {
         let _ = writeln!(out, "  {platform:<40}{clock:>7}{:>10}{time:>12}", digits((clock * time) as u64));
     }
@@ -145,8 +151,8 @@ fn time_table(tracking: &Tracking, out: &mut String) {
 }
 
 /// Table 1.
-fn operation_table(account: &Account, out: &mut String) {
-    let _ = writeln!(out, "\nOperations of one period{:>10}{:>10}", "paper", "Takt");
+fn operation_table(account: &Account, of: &str, out: &mut String) {
+    let _ = writeln!(out, "\nOperations of one period: {of}\n{:>34}{:>10}", "paper", "Takt");
     let operations = &account.operations;
     let mut listed = 0;
     for (name, paper, mnemonics) in OPERATIONS {
@@ -180,10 +186,12 @@ fn bounds(program: &Program) -> Vec<Option<f64>> {
 }
 
 /// Table 3.
-fn error_table(errors: &[MaxError], bounds: &[Option<f64>], fused: usize, out: &mut String) {
+fn error_table(errors: &[MaxError], bounds: &[Option<f64>], fused: usize, of: &str, out: &mut String) {
     let _ = writeln!(
         out,
-        "\nLargest |binary32 - binary64|{:>12}{:>8}{:>12}{:>12}{:>12}{:>12}",
+        "
+Largest |binary32 - binary64|: {of}
+{:>41}{:>8}{:>12}{:>12}{:>12}{:>12}",
         "Takt", "ulp", "at most", "paper PC", "DSP", "FPGA"
     );
     let mut row = |name: &str, ours: f64, ulps: Option<f64>, most: Option<f64>, paper: [f64; 3]| {
@@ -245,5 +253,6 @@ pub(crate) fn json(tracking: &Tracking) -> Value {
         "tracking_error_m": {"cutting": totals.error.cutting, "overall": totals.error.overall},
         "stalls": tracking.account.stalls_json(),
         "nan_writes": tracking.nan_writes,
+        "friction": tracking.friction.as_ref().map(Friction::json),
     })
 }

@@ -5,6 +5,7 @@ use crate::controller::{Latency, OnEmulator, port_type};
 use crate::deny::{Denials, DenyArguments, Watch};
 use crate::fault;
 use crate::files::{self, Given, Out};
+use crate::friction::Friction;
 use crate::load::{Load, Loaded};
 use crate::monte_carlo::{MonteCarlo, SpreadArguments, leaves_stdout};
 use crate::nan::NanWrites;
@@ -22,9 +23,9 @@ use takt_emu::{Emulator, PeriodReport, Rows};
 use takt_isa::Program;
 use takt_programs::accuracy::Accuracy;
 use takt_programs::hybrid::closed_loop::{ClosedLoop, Record, TrackingError};
-use takt_programs::hybrid::kinematics;
 use takt_programs::hybrid::params::SAMPLE_TIME;
 use takt_programs::hybrid::ports::{INPUTS, OUTPUTS, REFERENCE_LEN};
+use takt_programs::hybrid::{Identification, kinematics};
 use takt_programs::trajectory::Trajectory;
 use takt_programs::{SOURCES, gcode};
 
@@ -35,7 +36,8 @@ use takt_programs::{SOURCES, gcode};
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Track {
-    /// `tracking`, `tracking_literal` (the equations as printed), or a source or image of your own.
+    /// `tracking`, `tracking_friction` (friction and coupled inertia fed forward), `tracking_literal` (the equations as
+    /// printed), `tracking_equations`, or a source or image of your own.
     #[arg(long, value_name = "NAME|FILE", default_value = "tracking")]
     program: PathBuf,
     #[command(flatten)]
@@ -69,6 +71,10 @@ pub(crate) struct Track {
         conflicts_with_all = ["csv", "deny"]
     )]
     monte_carlo: Option<u64>,
+    /// Identify the friction of every axis from the run, for the source of tracking_friction (docs/friction.md); drives a path made
+    /// for it unless --gcode gives one.
+    #[arg(long, conflicts_with = "monte_carlo")]
+    fit_friction: bool,
     #[command(flatten)]
     deny: DenyArguments,
     /// Print the result as JSON.
@@ -85,6 +91,8 @@ Examples:
   takt track --machine t1 --plot agh.svg         on the small machine; draw path and error
   takt track --program mine.s --gcode part.ngc   your own controller, your own path
   takt track --periods 1000 --csv path.csv       record inputs and outputs for `takt run`
+  takt track --program tracking_friction         with a model of friction, fed forward
+  takt track --fit-friction                      identify that model's parameters
   takt track -q --deny all                       for CI: status 3 if a deadline is missed, …
   takt track --monte-carlo 100 --plot errors.svg  a hundred robots that differ";
 
@@ -111,6 +119,8 @@ pub(crate) struct Tracking {
     pub(crate) account: Account,
     /// Of the last period; `None` if it read no encoder or wrote no force.
     pub(crate) latency: Option<Latency>,
+    /// What --fit-friction asks for.
+    pub(crate) friction: Option<Friction>,
     pub(crate) denials: Denials,
 }
 
@@ -160,7 +170,8 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
         return Err(output::Failure::Usage(text.to_owned()).into());
     }
 
-    let (path, trajectory) = trajectory(arguments.gcode.as_deref())?;
+    let builtin = if arguments.fit_friction { FRICTION_PATH } else { AGH_PATH };
+    let (path, trajectory) = trajectory_or(arguments.gcode.as_deref(), builtin)?;
     let (name, loaded) =
         program(&arguments.program, Load::new(arguments.machine.machine, color).with(&arguments.source))?;
     let program = &loaded.program;
@@ -195,6 +206,7 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
     let progress = progress(periods, "periods", arguments.quiet);
     let mut totals = Totals::new();
     let mut nans = NanWrites::default();
+    let mut identification = arguments.fit_friction.then(Identification::new);
     let mut closed = false;
     while !closed && totals.periods < periods {
         let record = closed_loop.next().context("the path ended early")?.with_context(|| path.clone());
@@ -208,6 +220,9 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
         if let Some((_, plot)) = &mut drawing {
             plot.add(&record);
         }
+        if let Some(identification) = &mut identification {
+            identification.add(&record);
+        }
         if record.period.is_multiple_of(4096) {
             progress.set_position(record.period);
         }
@@ -220,7 +235,7 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
         return denials.verdict();
     }
     if let Some((mut file, plot)) = drawing {
-        file.write_all(plot.draw(&path)?.as_bytes())?;
+        file.write_all(plot.draw(&format!("{path} with {}", variant(&name)))?.as_bytes())?;
         file.finish()?;
     }
 
@@ -230,7 +245,12 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
     let account = Account::between(&detail.before, &detail.after);
     let (clock, latency) = (arguments.clock, detail.latency);
     let program = loaded.program;
-    let tracking = Tracking { name, program, path, clock, totals, nan_writes, account, latency, denials };
+    let friction = identification
+        .map(|identification| (identification.pairs().len(), identification.fit()))
+        .map(|(windows, fits)| Friction::new(windows, fits, &path))
+        .transpose()?;
+    let tracking =
+        Tracking { name, program, path, clock, totals, nan_writes, account, latency, friction, denials };
     if arguments.json {
         output::json(&report::json(&tracking), out)?;
     } else if !writes.iter().any(|(_, path)| files::is_dash(path)) {
@@ -337,11 +357,21 @@ impl Table {
     }
 }
 
+/// A tool path that comes with Takt: its name and its text.
+type BuiltinPath = (&'static str, &'static str);
+const AGH_PATH: BuiltinPath = ("agh.ngc", takt_programs::AGH);
+const FRICTION_PATH: BuiltinPath = ("friction.ngc", takt_programs::FRICTION);
+
 /// The name and the plan of a tool path; without a file, the letters AGH.
 pub(crate) fn trajectory(file: Option<&Path>) -> Result<(String, Trajectory)> {
+    trajectory_or(file, AGH_PATH)
+}
+
+/// The name and the plan of a tool path; without a file, of one that comes with Takt.
+fn trajectory_or(file: Option<&Path>, builtin: BuiltinPath) -> Result<(String, Trajectory)> {
     let (name, source) = match file {
         Some(file) => (files::input_name(file), files::read(file, GCODE_LIMIT)?),
-        None => ("agh.ngc".to_owned(), takt_programs::AGH.as_bytes().to_vec()),
+        None => (builtin.0.to_owned(), builtin.1.as_bytes().to_vec()),
     };
     let moves = gcode::read_bytes(&source)
         .map_err(|error| anyhow!("{name}:{}:{}: {}", error.line, error.column, error.kind))?;
@@ -352,16 +382,28 @@ pub(crate) fn trajectory(file: Option<&Path>) -> Result<(String, Trajectory)> {
     Ok((name, trajectory))
 }
 
+/// The tracking programs that come with Takt, by name.
+pub(crate) fn builtin_names() -> impl Iterator<Item = &'static str> {
+    let names = SOURCES.iter().filter_map(|(path, _)| path.strip_prefix("hybrid/")?.strip_suffix(".s"));
+    names.filter(|name| name.starts_with("tracking"))
+}
+
+/// What a table calls a program: the end of its path, without what every source ends in.
+pub(crate) fn variant(name: &str) -> &str {
+    let file = name.rsplit(['/', '\\']).next().unwrap_or(name);
+    file.strip_suffix(".s").unwrap_or(file)
+}
+
 /// A program that comes with Takt, by name, or one in a file.
 pub(crate) fn program(path: &Path, load: Load) -> Result<(String, Loaded)> {
     let name = files::input_name(path);
     let builtin = format!("hybrid/{name}.s");
-    if SOURCES.iter().any(|(path, _)| *path == builtin) {
+    if builtin_names().any(|known| known == name) {
         return Ok((format!("programs/{builtin}"), load.builtin(&builtin)?));
     }
     if !path.exists() && !files::is_dash(path) {
-        let names = ["tracking", "tracking_literal"];
-        let near = suggest(&name, names);
+        let names: Vec<&str> = builtin_names().collect();
+        let near = suggest(&name, names.iter().copied());
         bail!("there is no program and no file `{name}`{near} (programs: {})", names.join(", "));
     }
     Ok((name, load.with_source(path)?))

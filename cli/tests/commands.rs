@@ -153,6 +153,32 @@ fn track_as_json() {
     }
 }
 
+/// The lines that --fit-friction prints are those that the source has, every table says whose it is, and a run that shows no
+/// friction is refused.
+#[test]
+fn friction_is_identified_from_a_run() {
+    let folder = Folder::new();
+    let text = folder.line("track --fit-friction -q").ok();
+    let (_, lines) = text.split_once("\nFor tracking_friction.s:\n").expect("the lines of the source");
+    let words =
+        |line: &str| line.split([' ', ',']).filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ");
+    let source = std::fs::read_to_string(source("tracking_friction.s")).unwrap();
+    let written: Vec<String> = source.lines().map(words).collect();
+    assert_eq!(lines.lines().count(), 5);
+    for line in lines.lines() {
+        assert!(written.contains(&words(line)), "{line}");
+    }
+    let headings = text.lines().filter(|line| line.contains("tracking on t3")).count();
+    assert_eq!(headings, 6, "{text}");
+    let refused = folder.line("track --fit-friction --periods 3000 -q");
+    assert_eq!(refused.status, Some(1));
+    assert!(
+        refused.stderr.starts_with("error: friction.ngc: no friction of arm 1 in this run"),
+        "{}",
+        refused.stderr
+    );
+}
+
 #[test]
 fn run_reproduces_track_from_recorded_inputs() {
     let folder = Folder::new();

@@ -229,6 +229,23 @@ period:
         fadd    acc{i}, ff, e
 .endm
 .reg    acc1 acc2 acc3 acc4 acc5
+        .if macro.feedforward           ; the variant tracking_friction.s: for the arms ff_i in place of M·a_d, for the table beyond it
+.reg    ff1 ff2 ff3 ff4 ff5
+        feedforward
+        .rep i, 1, 3
+        control i, l{i}d, v{i}d, zero
+        fmul    acc{i}, acc{i}, M{i}
+        fadd    ff{i}, ff{i}, G{i}
+        fadd    F{i}, acc{i}, ff{i}
+        .endr
+        control 4, alpha, omega_alpha, eps_alpha
+        fmul    acc4, acc4, J44
+        fadd    ff4, ff4, G4
+        fadd    tau4, acc4, ff4
+        control 5, gamma, omega_gamma, eps_gamma
+        fmul    acc5, acc5, J55
+        fadd    tau5, acc5, ff5
+        .else
         .rep i, 1, 3
         control i, l{i}d, v{i}d, a{i}d
         fmul    acc{i}, acc{i}, M{i}
@@ -239,6 +256,7 @@ period:
         fadd    tau4, acc4, G4
         control 5, gamma, omega_gamma, eps_gamma
         fmul    tau5, acc5, J55
+        .endif
 
         wait    period
 

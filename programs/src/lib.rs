@@ -22,14 +22,19 @@ pub mod trajectory;
 /// The test path of the paper, the letters "AGH", each in a plane of its own.
 pub const AGH: &str = include_str!("../data/agh.ngc");
 
+/// The path that friction is identified on: every axis there and back at constant speeds.
+pub const FRICTION: &str = include_str!("../data/friction.ngc");
+
 /// The assembly sources: path within this crate's folder, and text.
 pub const SOURCES: &[(&str, &str)] = &[
     ("arm/arm.s", include_str!("../arm/arm.s")),
     ("arm/forward.s", include_str!("../arm/forward.s")),
     ("arm/inverse.s", include_str!("../arm/inverse.s")),
+    ("hybrid/generation.s", include_str!("../hybrid/generation.s")),
     ("hybrid/robot.s", include_str!("../hybrid/robot.s")),
     ("hybrid/tracking.s", include_str!("../hybrid/tracking.s")),
     ("hybrid/tracking_equations.s", include_str!("../hybrid/tracking_equations.s")),
+    ("hybrid/tracking_friction.s", include_str!("../hybrid/tracking_friction.s")),
     ("hybrid/tracking_literal.s", include_str!("../hybrid/tracking_literal.s")),
 ];
 

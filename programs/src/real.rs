@@ -36,6 +36,9 @@ pub trait Real:
     /// Sine of an angle in radians, as the host's library computes it.
     #[must_use]
     fn sin(self) -> Self;
+    /// Hyperbolic tangent, as the host's library computes it.
+    #[must_use]
+    fn tanh(self) -> Self;
     /// Absolute value.
     #[must_use]
     fn abs(self) -> Self;
@@ -70,6 +73,11 @@ macro_rules! real {
             #[inline]
             fn sin(self) -> Self {
                 self.sin()
+            }
+
+            #[inline]
+            fn tanh(self) -> Self {
+                self.tanh()
             }
 
             #[inline]

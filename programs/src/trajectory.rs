@@ -165,6 +165,11 @@ impl Trajectory {
         self.start
     }
 
+    /// The moves that take time, each with its number of periods.
+    pub fn moves(&self) -> impl Iterator<Item = (&Move, u64)> {
+        self.segments.iter().map(|segment| (&segment.piece, segment.profile.periods))
+    }
+
     /// Number of sampling periods.
     #[must_use]
     pub fn periods(&self) -> u64 {

@@ -24,6 +24,8 @@ use takt_isa::{Machine, Op, Type};
 
 /// What stands before a mnemonic in the name of the constant that says whether the machine has the instruction.
 pub(crate) const HAS: &str = "has.";
+/// What stands before a name in the name of the constant that says whether there is a macro of that name.
+const MACRO: &str = "macro.";
 
 /// The mistake is in the report.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -89,9 +91,15 @@ impl Context {
         }
     }
 
-    /// Whether the machine has an instruction, where the name asks for that: `has.` and a mnemonic, which may name a slot.
+    /// Whether there is what the name asks for: `has.` and a mnemonic, which may name a slot, for an instruction of the machine;
+    /// `macro.` and a name for a macro.
     fn has(&self, name: NameId) -> Option<bool> {
-        let asked = self.scopes.text(name).strip_prefix(HAS)?;
+        let text = self.scopes.text(name);
+        if let Some(asked) = text.strip_prefix(MACRO) {
+            let asked = self.scopes.names().find(asked);
+            return Some(asked.is_some_and(|asked| self.scopes.macros.contains_key(&asked)));
+        }
+        let asked = text.strip_prefix(HAS)?;
         let (mnemonic, slot) = asked.split_once('.').map_or((asked, None), |(op, slot)| (op, Some(slot)));
         let row = Op::from_mnemonic(mnemonic)?.row();
         let is_idle = row.function == takt_isa::Function::Idle;

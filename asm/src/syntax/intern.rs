@@ -44,20 +44,33 @@ impl Interner {
         interner
     }
 
-    /// The name's number, new if the name is.
-    pub(crate) fn intern(&mut self, name: &str) -> NameId {
+    /// The name's number, or the free entry of the table where it belongs.
+    fn find_or_slot(&self, name: &str) -> Result<NameId, usize> {
         let mask = self.table.len() - 1;
         let mut slot = hash(name.as_bytes()) as usize & mask;
         loop {
             let id = self.table[slot];
             if id == EMPTY {
-                break;
+                return Err(slot);
             }
             if self.text(NameId(id)) == name {
-                return NameId(id);
+                return Ok(NameId(id));
             }
             slot = (slot + 1) & mask;
         }
+    }
+
+    /// The name's number, if it has one.
+    pub(crate) fn find(&self, name: &str) -> Option<NameId> {
+        self.find_or_slot(name).ok()
+    }
+
+    /// The name's number, new if the name is.
+    pub(crate) fn intern(&mut self, name: &str) -> NameId {
+        let slot = match self.find_or_slot(name) {
+            Ok(id) => return id,
+            Err(slot) => slot,
+        };
         let id = self.ends.len() as u32;
         self.table[slot] = id;
         self.text.push_str(name);

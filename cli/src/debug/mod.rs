@@ -32,7 +32,7 @@ use takt_emu::Rows;
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Debug {
-    /// Source or image. With --track, `tracking` (as if nothing is said), `tracking_literal`, or a file.
+    /// Source or image. With --track, `tracking` (as if nothing is said) or another that `takt track` knows, or a file.
     #[arg(required_unless_present = "track")]
     pub(crate) file: Option<PathBuf>,
     #[command(flatten)]

@@ -1,6 +1,7 @@
 //! The tracking controller: one sampling period, from encoder counts and reference to forces.
 
 use super::dynamics::{gravity, reduced_masses, table_gravity};
+use super::friction::{coupled_inertia, friction};
 use super::integrator::Integrator;
 use super::kinematics::{JointReference, Reference, forward, inverse};
 use super::params;
@@ -33,11 +34,13 @@ pub struct Controller<T> {
     /// Encoder counts of the previous period; `None` before the first, whose velocity is 0.
     previous: Option<[i32; 5]>,
     integrators: [Integrator<T>; 5],
+    /// Whether friction and coupled inertia are fed forward.
+    friction: bool,
 }
 
 impl<T: Real> Default for Controller<T> {
     fn default() -> Self {
-        Self { previous: None, integrators: [Integrator::default(); 5] }
+        Self { previous: None, integrators: [Integrator::default(); 5], friction: false }
     }
 }
 
@@ -46,6 +49,12 @@ impl<T: Real> Controller<T> {
     #[must_use]
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// The variant at power-on that feeds forward friction and coupled inertia (docs/friction.md).
+    #[must_use]
+    pub fn with_friction() -> Self {
+        Self { friction: true, ..Self::default() }
     }
 
     /// One period of the tracking algorithm, steps 1-8 of the specification.
@@ -72,13 +81,23 @@ impl<T: Real> Controller<T> {
         let [g1, g2, g3] = gravity(length, forward(length));
         let [g4, g5] = table_gravity(position[3]);
         let mass = [m1, m2, m3, T::from_f64(params::TILT_INERTIA), T::from_f64(params::ROTATION_INERTIA)];
-        let load = [g1, g2, g3, g4, g5];
+        let mut load = [g1, g2, g3, g4, g5];
 
         let JointReference { length: l, velocity: v, acceleration: a, angle, .. } = joint;
         let (omega, epsilon) = (joint.angular_velocity, joint.angular_acceleration);
         let wanted = [l[0], l[1], l[2], angle[0], angle[1]];
         let wanted_velocity = [v[0], v[1], v[2], omega[0], omega[1]];
-        let wanted_acceleration = [a[0], a[1], a[2], epsilon[0], epsilon[1]];
+        let mut wanted_acceleration = [a[0], a[1], a[2], epsilon[0], epsilon[1]];
+        if self.friction {
+            // In place of the arms' M·a_d, and beyond the table's.
+            for (load, friction) in load.iter_mut().zip(friction(&joint)) {
+                *load += friction;
+            }
+            for (arm, force) in coupled_inertia(reference, &joint, length).into_iter().enumerate() {
+                load[arm] += force;
+                wanted_acceleration[arm] = T::ZERO;
+            }
+        }
 
         let (kp, kv, ki) = (T::from_f64(params::KP), T::from_f64(params::KV), T::from_f64(params::KI));
         let mut effort = [T::ZERO; 5];

@@ -7,6 +7,9 @@
 pub mod closed_loop;
 pub mod controller;
 pub mod dynamics;
+pub mod friction;
+pub mod generation;
+pub mod identify;
 pub mod integrator;
 pub mod kinematics;
 pub mod params;
@@ -17,6 +20,8 @@ pub mod workspace;
 
 pub use closed_loop::{ClosedLoop, Inputs, LoopError, Record, TrackingController, TrackingError};
 pub use controller::{Controller, Outputs};
+pub use friction::Friction;
+pub use identify::Identification;
 pub use kinematics::{JointReference, Reference};
 pub use plant::Plant;
 pub use spread::{Robot, Spread};

@@ -2,7 +2,7 @@
 
 use crate::inputs::{CIRCLE, LETTER_G, moves};
 use crate::measure::ulp;
-use crate::processor::{LITERAL, PROGRAMS, Processor, full};
+use crate::processor::{FRICTION, LITERAL, PROGRAMS, Processor, full};
 use takt_isa::{MACHINES, T3};
 use takt_programs::accuracy::{Accuracy, MaxError};
 use takt_programs::hybrid::kinematics::inverse;
@@ -20,6 +20,9 @@ const ACCELERATION_ULPS: f64 = 2.0;
 /// Without the integrator's boost it is 9.3 µm over everything.
 const CUTTING: f64 = 8.5e-6;
 const OVERALL: f64 = 9e-6;
+/// With friction and coupled inertia fed forward a binary64 controller has 0.61 µm and 0.82 µm.
+const CUTTING_FRICTION: f64 = 0.7e-6;
+const OVERALL_FRICTION: f64 = 0.9e-6;
 
 /// `Δl` in ulps of the largest length (below 1 m). Nearly half of one is the input's own: `z`, most of `l`, is rounded to
 /// binary32 before the program sees it.
@@ -68,7 +71,10 @@ impl Run {
         below(accelerations, PAPER.1.min(ACCELERATION_ULPS * ulp(7.0)), "a");
         assert!(angles.iter().all(|error| error.ulps <= 0.5), "{name}: {angles:?}");
         let TrackingError { cutting, overall } = self.tracking;
-        assert!(cutting > 0.0 && cutting <= CUTTING && overall <= OVERALL, "{name}: {:?}", self.tracking);
+        let (most_cutting, most) =
+            if path == FRICTION { (CUTTING_FRICTION, OVERALL_FRICTION) } else { (CUTTING, OVERALL) };
+        let stays = cutting > 0.0 && cutting <= most_cutting && overall <= most;
+        assert!(stays, "{name}: {:?}", self.tracking);
     }
 }
 

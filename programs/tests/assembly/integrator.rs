@@ -145,7 +145,7 @@ fn scenarios_reach_every_branch() {
         for Inputs { counts, reference } in &inputs {
             let measured = Measured::rounded(*counts, *counts, Velocity::Counts);
             let joint = inverse(&reference.convert());
-            law.step(&measured, &joint);
+            law.step(&measured, &joint, &reference.convert());
             let [l1, l2, l3] = joint.length;
             for (i, wanted) in [l1, l2, l3, joint.angle[0], joint.angle[1]].into_iter().enumerate() {
                 let error = (wanted - measured.position[i]).abs();

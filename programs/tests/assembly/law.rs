@@ -2,10 +2,12 @@
 //! positions, which the gains magnify, is taken as given.
 
 use crate::measure::ulp;
+use crate::processor::FRICTION;
 use takt_programs::hybrid::dynamics::{gravity, reduced_masses, table_gravity};
+use takt_programs::hybrid::friction::{coupled_inertia, friction};
 use takt_programs::hybrid::integrator::Integrator;
 use takt_programs::hybrid::kinematics::{JointReference, forward};
-use takt_programs::hybrid::params;
+use takt_programs::hybrid::{Reference, params};
 
 /// Where a program has its measured velocity from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,7 +62,7 @@ impl Measured {
 pub(crate) struct Effort {
     /// Its value, N or N·m.
     pub(crate) value: f64,
-    /// The largest of the terms that it is the sum of: `M·a_d`, `M·KP·e`, `M·KV·v_d`, `M·KV·v`, `M·KI·s`, and of gravity the
+    /// The largest of the terms that it is the sum of, of which the coupled inertia has that of a mass of all that moves: `M·a_d`, `M·KP·e`, `M·KV·v_d`, `M·KV·v`, `M·KI·s`, and of gravity the
     /// largest over the arms, since an arm that carries little has its share from a difference of thirds. The terms of the
     /// velocities count each, for one of them can be computed before the other is measured.
     pub(crate) largest: f64,
@@ -71,6 +73,8 @@ pub(crate) struct Effort {
 /// Steps 3 to 8 of the specification, with the state that they keep.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Law {
+    /// Whether friction and coupled inertia are fed forward.
+    friction: bool,
     integrators: [Integrator<f64>; 5],
     /// The integrators' values `s`.
     pub(crate) sums: [f64; 5],
@@ -79,8 +83,18 @@ pub(crate) struct Law {
 }
 
 impl Law {
+    /// Of a program, before the first period.
+    pub(crate) fn new(path: &str) -> Law {
+        Law { friction: path == FRICTION, ..Law::default() }
+    }
+
     /// One period.
-    pub(crate) fn step(&mut self, measured: &Measured, joint: &JointReference<f64>) -> [Effort; 5] {
+    pub(crate) fn step(
+        &mut self,
+        measured: &Measured,
+        joint: &JointReference<f64>,
+        reference: &Reference<f64>,
+    ) -> [Effort; 5] {
         let [l1, l2, l3, tilt, _] = measured.position;
         let [m1, m2, m3] = reduced_masses([l1, l2, l3]);
         let [g1, g2, g3] = gravity([l1, l2, l3], forward([l1, l2, l3]));
@@ -89,6 +103,18 @@ impl Law {
         let load = [g1, g2, g3, g4, g5];
         let heaviest = g1.abs().max(g2.abs()).max(g3.abs());
 
+        let (mut ahead, mut scale) = ([0.0; 5], 0.0f64);
+        if self.friction {
+            ahead = friction(joint);
+            for (ahead, force) in ahead.iter_mut().zip(coupled_inertia(reference, joint, [l1, l2, l3])) {
+                *ahead += force;
+            }
+            let norm = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
+            let all = params::PLATFORM_MASS + 3.0 * params::SLIDER_MASS;
+            let centripetal = norm(reference.velocity).powi(2) / l1.min(l2).min(l3);
+            scale = all * norm(reference.acceleration).max(centripetal);
+        }
+        let coupled = self.friction;
         let wanted = joint.to_array();
         let axis =
             |row: usize, i: usize| if i < 3 { wanted[3 * row + i] } else { wanted[9 + 2 * row + i - 3] };
@@ -99,13 +125,14 @@ impl Law {
             self.sums[i] = self.integrators[i].step(i, e, v);
             self.ulps[i] += ulp(before.abs().max(self.sums[i].abs()));
             let terms = [
-                mass[i] * a,
+                if coupled && i < 3 { 0.0 } else { mass[i] * a },
+                ahead[i],
                 mass[i] * params::KP * e,
                 mass[i] * params::KV * (v - measured.velocity[i]),
                 mass[i] * params::KI * self.sums[i],
                 load[i],
             ];
-            let share = if i < 3 { heaviest } else { 0.0 };
+            let share = if i < 3 { heaviest.max(scale) } else { 0.0 };
             let fastest = mass[i] * params::KV * v.abs().max(measured.velocity[i].abs());
             Effort {
                 value: terms.iter().sum(),

@@ -1,4 +1,4 @@
-//! The shipped assembly programs, `hybrid/tracking.s` and `hybrid/tracking_literal.s`, judged by what was not written
+//! The shipped assembly programs, `hybrid/tracking.s` and its variants, judged by what was not written
 //! into them: the binary64 model, the closed loop with the plant, the other machine, the scheduler's own prediction.
 //!
 //! | module | question |
@@ -9,6 +9,8 @@
 //! | [`agreement`] | Do both machines, scheduled or not, compute the same bits? |
 //! | [`cycles`] | Does a period take the cycles that were predicted, whatever the data? |
 //! | [`operations`] | How many operations is a period, beside the paper's count? |
+//! | [`friction`] | Are the friction's parameters those that a run shows, and does Stribeck's term do what it says? |
+//! | [`generation`] | Does `generation.s` give the trajectory's points, and lose no period between moves? |
 //! | [`mutations`] | Would any of this notice a mistake? |
 //!
 //! `TAKT_FULL=1` runs the whole path, and more points, in a debug build too.
@@ -16,6 +18,8 @@
 mod agh;
 mod agreement;
 mod cycles;
+mod friction;
+mod generation;
 mod inputs;
 mod integrator;
 mod law;

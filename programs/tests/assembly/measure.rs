@@ -1,7 +1,7 @@
 //! Errors of the outputs, in the units in which a bound means something, and the bounds.
 
 use crate::law::{Effort, Law, Measured, Velocity};
-use crate::processor::{LITERAL, floats};
+use crate::processor::{FRICTION, LITERAL, TRACKING, floats};
 use std::fmt::Write as _;
 use takt_programs::accuracy;
 use takt_programs::hybrid::kinematics::inverse;
@@ -102,10 +102,16 @@ impl Figures {
     }
 }
 
+/// The golden controller of a program, at power-on.
+fn golden(path: &str) -> Controller<f64> {
+    if path == FRICTION { Controller::with_friction() } else { Controller::new() }
+}
+
 /// The models that a program is compared with, period by period, and the errors so far.
 #[derive(Clone)]
 pub(crate) struct Comparison {
     pub(crate) figures: Figures,
+    path: String,
     from: Velocity,
     controller: Controller<f64>,
     law: Law,
@@ -119,9 +125,10 @@ impl Comparison {
     pub(crate) fn new(path: &str) -> Comparison {
         Comparison {
             figures: Figures::default(),
+            path: path.to_owned(),
             from: if path == LITERAL { Velocity::Positions } else { Velocity::Counts },
-            controller: Controller::new(),
-            law: Law::default(),
+            controller: golden(path),
+            law: Law::new(path),
             previous: None,
             drift: [0.0; 5],
         }
@@ -129,8 +136,8 @@ impl Comparison {
 
     /// The models as at power-on; the errors stay.
     pub(crate) fn restart(&mut self) {
-        self.controller = Controller::new();
-        self.law = Law::default();
+        self.controller = golden(&self.path);
+        self.law = Law::new(&self.path);
         self.previous = None;
         self.drift = [0.0; 5];
     }
@@ -165,7 +172,7 @@ impl Comparison {
 
         let previous = self.previous.replace(inputs.counts).unwrap_or(inputs.counts);
         let measured = Measured::rounded(previous, inputs.counts, self.from);
-        let efforts: [Effort; 5] = self.law.step(&measured, &joint);
+        let efforts: [Effort; 5] = self.law.step(&measured, &joint, &reference);
         let golden = golden.to_array();
         let JointReference { length: l, velocity: v, angle, angular_velocity: omega, .. } = joint;
         let wanted = [(l[0], v[0]), (l[1], v[1]), (l[2], v[2]), (angle[0], omega[0]), (angle[1], omega[1])];
@@ -201,13 +208,15 @@ impl Comparison {
 #[test]
 fn the_law_is_that_of_the_golden_controller() {
     let mut random = crate::inputs::Random(1);
-    for _ in 0..1000 {
-        let (mut controller, mut law) = (Controller::<f64>::new(), Law::default());
+    for turn in 0..1000 {
+        let path = [TRACKING, FRICTION][turn % 2];
+        let (mut controller, mut law) = (golden(path), Law::new(path));
         let pair = crate::inputs::pair(&mut random);
         let mut previous = pair[0].counts;
         for inputs in pair {
-            let golden = controller.step(inputs.counts, &inputs.reference.convert());
-            let efforts = law.step(&Measured::exact(previous, inputs.counts), &golden.joint);
+            let reference = inputs.reference.convert();
+            let golden = controller.step(inputs.counts, &reference);
+            let efforts = law.step(&Measured::exact(previous, inputs.counts), &golden.joint, &reference);
             for (effort, golden) in efforts.iter().zip(golden.to_array()) {
                 assert!(
                     (effort.value - golden).abs() <= 1e-13 * effort.largest,

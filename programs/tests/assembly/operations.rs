@@ -43,10 +43,11 @@ fn operations_beside_the_papers() {
         assert_eq!(one, other, "{path}: the machines do the same work");
         columns.push(one);
     }
-    let mut table = format!("{:<12}{:>8}{:>10}{:>10}\n", "", "paper", "tracking", "literal");
+    let [a, b, c] = ["tracking", "literal", "friction"];
+    let mut table = format!("{:<12}{:>8}{a:>10}{b:>10}{c:>10}\n", "", "paper");
     let mut line = |name: &str, paper: &str, count: &dyn Fn(&BTreeMap<&str, u64>) -> u64| {
-        let (tracking, literal) = (count(&columns[0]), count(&columns[1]));
-        let _ = writeln!(table, "{name:<12}{paper:>8}{tracking:>10}{literal:>10}");
+        let [a, b, c] = [0, 1, 2].map(|i| count(&columns[i]));
+        let _ = writeln!(table, "{name:<12}{paper:>8}{a:>10}{b:>10}{c:>10}");
     };
     for (name, paper, mnemonics) in PAPER {
         line(name, &paper.to_string(), &|counts| mnemonics.iter().filter_map(|m| counts.get(m)).sum());

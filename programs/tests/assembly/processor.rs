@@ -1,12 +1,12 @@
 //! The programs under test, and a program on the emulator as the controller of the hybrid robot.
 
 use std::sync::{Arc, Mutex};
-use takt_asm::{Assembled, MemoryLoader, Options, Schedule};
+use takt_asm::{Assembled, MemoryLoader, Options, Schedule, Search};
 use takt_emu::{Emulator, PeriodError, PeriodReport};
 use takt_isa::{Machine, Program, Register, Type};
-use takt_programs::SOURCES;
 use takt_programs::hybrid::ports::{INPUTS, OUTPUTS, PortType};
 use takt_programs::hybrid::{Inputs, Outputs, TrackingController};
+use takt_programs::{LIBRARY, SOURCES};
 
 /// `tracking.s`, shared work done once.
 pub(crate) const TRACKING: &str = "hybrid/tracking.s";
@@ -14,8 +14,10 @@ pub(crate) const TRACKING: &str = "hybrid/tracking.s";
 pub(crate) const EQUATIONS: &str = "hybrid/tracking_equations.s";
 /// `tracking_literal.s`, every equation as printed.
 pub(crate) const LITERAL: &str = "hybrid/tracking_literal.s";
-/// `tracking.s` and `tracking_literal.s`.
-pub(crate) const PROGRAMS: [&str; 2] = [TRACKING, LITERAL];
+/// `tracking_friction.s`, with friction and coupled inertia fed forward.
+pub(crate) const FRICTION: &str = "hybrid/tracking_friction.s";
+/// What each computes differs from what the others do.
+pub(crate) const PROGRAMS: [&str; 3] = [TRACKING, LITERAL, FRICTION];
 
 /// Whether to take the time for everything: in release builds, and where `TAKT_FULL=1` asks for it.
 pub(crate) fn full() -> bool {
@@ -37,7 +39,8 @@ pub(crate) fn assemble(path: &'static str, machine: &'static Machine, schedule: 
         return Arc::clone(assembled);
     }
     let options = Options { machine, schedule, ..Options::default() };
-    let assembled = takt_asm::assemble(path, &MemoryLoader::new(SOURCES), &options);
+    let assembled =
+        takt_asm::assemble(path, &Search::new(MemoryLoader::new(SOURCES)).library(LIBRARY), &options);
     let assembled =
         assembled.unwrap_or_else(|errors| panic!("{path} on {}: {}", machine.name, errors.render(false)));
     assert!(assembled.warnings.is_empty(), "{path}: {}", assembled.warnings.render(false));

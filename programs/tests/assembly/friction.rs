@@ -1,0 +1,76 @@
+//! What `tracking_friction.s` adds beside its share in every other test.
+
+use crate::inputs::{moves, recorded};
+use crate::processor::{FRICTION, Processor, source};
+use takt_asm::{MemoryLoader, Options, Search};
+use takt_isa::{Program, T1};
+use takt_programs::hybrid::friction::{Friction, IDENTIFIED};
+use takt_programs::hybrid::{ClosedLoop, Controller, Identification};
+use takt_programs::trajectory::Trajectory;
+use takt_programs::{LIBRARY, SOURCES, gcode};
+
+/// The parameters are those that the fit finds on the robot with its own controller, to the digits that are written.
+#[test]
+fn parameters_are_those_that_a_run_shows() {
+    let path = gcode::read(takt_programs::FRICTION).expect("the embedded path is sound");
+    let trajectory = Trajectory::plan(&path).expect("the embedded path is short");
+    let mut identification = Identification::new();
+    for record in ClosedLoop::new(&trajectory, Controller::<f64>::new()) {
+        identification.add(&record.expect("the loop is stable"));
+    }
+    for (axis, (fit, written)) in identification.fit().iter().zip(IDENTIFIED).enumerate() {
+        let found = fit.expect("every axis moves").friction;
+        // The table's encoders are coarse, and a controller in binary32 moves a little differently.
+        let tolerance = if axis < 3 { 2e-3 } else { 2e-2 };
+        let near = |found: f64, written: f64| (found - written).abs() <= tolerance * written.abs();
+        assert!(near(found.coulomb, written.coulomb), "axis {}: {found:?}", axis + 1);
+        assert!(near(found.sign_speed, written.sign_speed), "axis {}: {found:?}", axis + 1);
+        assert!(near(found.viscous, written.viscous), "axis {}: {found:?}", axis + 1);
+        assert_eq!(found.stribeck, written.stribeck, "axis {}", axis + 1);
+    }
+}
+
+/// The program with lines of `tracking_friction.s` changed.
+fn assembled(change: impl Fn(&str) -> String) -> Program {
+    let mut loader = MemoryLoader::new(SOURCES);
+    let lines: Vec<String> = source(FRICTION).lines().map(change).collect();
+    loader.add(FRICTION, lines.join("\n"));
+    let options = Options { machine: &T1, ..Options::default() };
+    let assembled = takt_asm::assemble(FRICTION, &Search::new(loader).library(LIBRARY), &options);
+    assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false))).program
+}
+
+/// An axis that sticks: the shipped source with Stribeck's term given.
+#[test]
+fn sticking_is_fed_forward() {
+    let plain = IDENTIFIED[4];
+    let sticking = Friction { stribeck: 0.05, stribeck_speed: 0.04, ..plain };
+    let row = |friction: &Friction| {
+        let Friction { coulomb, stribeck, stribeck_speed, sign_speed, viscous } = friction;
+        format!(
+            "friction ff5, omega_gamma, {coulomb}, {stribeck}, {stribeck_speed:?}, {sign_speed:?}, {viscous}"
+        )
+    };
+    let program = |friction: &Friction| {
+        assembled(
+            |line| {
+                if line.trim().starts_with("friction ff5") { row(friction) } else { line.to_owned() }
+            },
+        )
+    };
+    let [mut before, mut after] = [&plain, &sticking].map(|friction| Processor::new(&program(friction)));
+    let mut largest = 0.0f64;
+    // The table turns in the moves that the G begins with.
+    for inputs in recorded(&moves(crate::inputs::LETTER_G..), 3000) {
+        let words = inputs.to_words();
+        let torque = |processor: &mut Processor| {
+            f64::from(f32::from_bits(processor.period(&words).expect("no input makes the program fault")[4]))
+        };
+        let found = torque(&mut after) - torque(&mut before);
+        let speed = f64::from(inputs.reference.angular_velocity[1]);
+        let expected = sticking.at(speed) - plain.at(speed);
+        assert!((found - expected).abs() < 1e-5, "{speed}: {found} instead of {expected}");
+        largest = largest.max(expected);
+    }
+    assert!(largest > 0.03, "{largest}");
+}
