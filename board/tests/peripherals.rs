@@ -24,7 +24,7 @@ impl Random {
     }
 
     fn one_in(&mut self, n: u32) -> bool {
-        self.bits() % n == 0
+        self.bits().is_multiple_of(n)
     }
 
     /// Numbers near the edges of `span`, within it, and any.
@@ -37,7 +37,7 @@ impl Random {
             4 => [0, 1 << 31, u32::MAX, i32::MAX as u32][self.bits() as usize % 4],
             _ => self.bits(),
         };
-        if self.bits() % 2 == 0 { value.wrapping_neg() } else { value }
+        if self.bits().is_multiple_of(2) { value.wrapping_neg() } else { value }
     }
 }
 

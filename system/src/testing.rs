@@ -194,6 +194,9 @@ struct ReferenceCore {
     halted: bool,
 }
 
+/// What changed in a FIFO in a cycle: its head, if it has another, and its status.
+type Changed = (Option<Vec<u32>>, Vec<(Status, u32)>);
+
 struct ReferenceLink {
     /// Of a wire.
     wire: Line<u32>,
@@ -206,7 +209,7 @@ struct ReferenceLink {
     store: Store,
     back: Line<Vec<(Status, u32)>>,
     /// What changed in the last cycle.
-    change: Option<(Option<Vec<u32>>, Vec<(Status, u32)>)>,
+    change: Option<Changed>,
     /// Latched: what is to be sent at the `wait`.
     changed: Option<u32>,
     /// The host's, for this cycle.

@@ -131,12 +131,15 @@ struct State {
 /// Where a way has come to. Ways that come first in this order can still lead to those behind.
 type Position = Vec<u32>;
 
+/// Registers that an operation reads, and what they may hold; `None` if that is not known.
+type Operands = Vec<(Register, Option<Interval>)>;
+
 struct Explorer<'p> {
     program: &'p Program,
     graph: Graph<'p>,
     /// The word whose rounding a symbol stands for; `None` for an input's or state's value.
     symbols: Vec<Option<u32>>,
-    hazards: BTreeMap<(u32, Problem), Vec<(Register, Option<Interval>)>>,
+    hazards: BTreeMap<(u32, Problem), Operands>,
     outputs: BTreeMap<Register, Value>,
     /// What states hold at the end of a period.
     left: BTreeMap<Register, Value>,
@@ -516,8 +519,9 @@ impl Explorer<'_> {
             };
         }
         let local = bound * ulp(magnitude);
-        // `!` so that a NaN counts.
-        if !(magnitude + local <= largest) || !number.error.range().is_finite() {
+        // A NaN does not fit.
+        let fits = magnitude + local <= largest && number.error.range().is_finite();
+        if !fits {
             return Err(Problem::Overflow);
         }
         // All operands known to the bit: so is the result.

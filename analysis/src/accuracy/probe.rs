@@ -170,7 +170,7 @@ mod tests {
                 if row.result_type() == Type::I {
                     let operands = [a, b, c].map(f32::from_bits);
                     let float = row.source_type(0) == Type::F;
-                    let wraps = !float && (exact < -2147483648.0 || exact > 2147483647.0);
+                    let wraps = !float && !(-2147483648.0..=2147483647.0).contains(&exact);
                     if wraps || float && operands.iter().any(|operand| operand.is_nan()) {
                         continue;
                     }

@@ -180,7 +180,7 @@ impl System {
         waited: Option<Cycle>,
     ) {
         let output = link.fields.first().and_then(|field| field.output);
-        let written = writes.iter().filter(|write| Some(write.register) == output);
+        let mut written = writes.iter().filter(|write| Some(write.register) == output);
         if !latched(&self.description, link.from) {
             for write in written {
                 self.deliver(number, write.cycle + link.transit(), 0, write.value);
@@ -188,7 +188,7 @@ impl System {
             return;
         }
         let LinkState::Wire { changed, .. } = &mut self.links[number] else { return };
-        *changed = written.last().map(|write| write.value).or(*changed);
+        *changed = written.next_back().map(|write| write.value).or(*changed);
         if let Some(cycle) = waited
             && let Some(value) = changed.take()
         {
