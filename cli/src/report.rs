@@ -189,9 +189,7 @@ fn bounds(program: &Program) -> Vec<Option<f64>> {
 fn error_table(errors: &[MaxError], bounds: &[Option<f64>], fused: usize, of: &str, out: &mut String) {
     let _ = writeln!(
         out,
-        "
-Largest |binary32 - binary64|: {of}
-{:>41}{:>8}{:>12}{:>12}{:>12}{:>12}",
+        "\nLargest |binary32 - binary64|: {of}\n{:>41}{:>8}{:>12}{:>12}{:>12}{:>12}",
         "Takt", "ulp", "at most", "paper PC", "DSP", "FPGA"
     );
     let mut row = |name: &str, ours: f64, ulps: Option<f64>, most: Option<f64>, paper: [f64; 3]| {

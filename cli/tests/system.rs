@@ -55,7 +55,7 @@ fn what_a_system_is_not() {
     folder.write("a.s", ".input x\n.output y\n.once\n wait p\n.period\np: mov y, x\n wait p\n");
     folder.write(
         "loads.s",
-        ".input x\n.output y\n.once\n wait p\n.period\np: ld y, 4000[zero]\n fadd y, x, x\n wait p\n",
+        ".input x\n.output y\n.state far: int\n.preset far = 4000\n.once\n wait p\n.period\np: ld y, [far]\n wait p\n",
     );
     let system = |program: &str| {
         format!(
