@@ -128,7 +128,8 @@ fn moves_of_every_kind() {
             0..3 => 8e-8,
             3..6 => speed,
             6..9 => acceleration,
-            9..11 => 5e-7,
+            // Two ulps of 300°.
+            9..11 => 1e-6,
             11..13 => turning,
             _ => spinning,
         };
