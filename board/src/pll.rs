@@ -73,7 +73,9 @@ mod tests {
         assert_eq!(Pll::new(25.0, 62.5).map(|pll| (pll.reference, pll.feedback)), Ok((2, 5)));
         let error = Pll::new(25.0, 61.803).expect_err("none");
         assert!(
-            error.to_string().starts_with("the PLL cannot make 61.803 MHz of 25; near it are 60.7143 and 62.5"),
+            error
+                .to_string()
+                .starts_with("the PLL cannot make 61.803 MHz of 25; near it are 60.7143 and 62.5"),
             "{error}"
         );
     }
