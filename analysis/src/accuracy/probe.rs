@@ -78,20 +78,20 @@ impl Real for Probe {
     }
 
     fn sin(self) -> Probe {
-        Probe::of(core_math::sin(self.value))
+        Probe::of(libm::sin(self.value))
     }
 
     fn cos(self) -> Probe {
-        Probe::of(core_math::cos(self.value))
+        Probe::of(libm::cos(self.value))
     }
 
     fn atan2(self, x: Probe) -> Probe {
-        Probe::of(core_math::atan2(self.value, x.value))
+        Probe::of(libm::atan2(self.value, x.value))
     }
 
     fn acos(self) -> Probe {
         // What rounding has carried past the edge stays there: the arccosine of the edge is meant.
-        Probe::of(core_math::acos(self.value.clamp(-1.0, 1.0)))
+        Probe::of(libm::acos(self.value.clamp(-1.0, 1.0)))
     }
 
     fn abs(self) -> Probe {
