@@ -4,6 +4,7 @@
 use crate::block::Block;
 use crate::emulator::{Emulator, Recent, Status};
 use crate::execute::stack_fault;
+use crate::jit;
 use crate::machine::{Pending, RegisterSet, State, Word};
 use crate::micro::{self, Context, Outside};
 use takt_isa::fp::{Flags, Value};
@@ -35,6 +36,7 @@ pub(crate) struct Journal {
     writes: Vec<(u32, u32)>,
     logged: usize,
     late: Vec<(Flags, Option<u32>)>,
+    words: jit::Words,
 }
 
 impl Journal {
@@ -94,12 +96,16 @@ impl Emulator {
                 return Fast::Step { until: bound.max(self.now + 1) };
             }
             self.begin_cycle();
-            let block = &self.cache.blocks[id as usize];
+            let block = &mut self.cache.blocks[id as usize];
             let (state, flow) = (&mut self.state, block.flow);
+            let code = match self.compile_after {
+                Some(after) => block.code(after, self.code.machine.data_depth),
+                None => None,
+            };
             if stack_fault(flow, state, self.code.machine).is_some()
                 || beyond_bound
                 || !(block.verified || has_required(state, block, last))
-                || !run(block, state, journal, entered)
+                || !run(block, code, state, journal, entered)
             {
                 return Fast::Step { until: last + 1 };
             }
@@ -163,10 +169,23 @@ pub(crate) fn has_required(state: &State, block: &Block, last: Cycle) -> bool {
 }
 
 /// Runs a block entered in cycle `entered`. If it faults, nothing has happened, and the answer is false.
-fn run(block: &Block, state: &mut State, journal: &mut Journal, entered: Cycle) -> bool {
+fn run(
+    block: &mut Block,
+    code: Option<jit::Code>,
+    state: &mut State,
+    journal: &mut Journal,
+    entered: Cycle,
+) -> bool {
     let last = entered + Cycle::from(block.last);
     journal.begin(state, block, last);
     state.write_back_until(last);
+    if let Some(code) = code {
+        if code.run(block, state, &mut journal.words, &mut journal.late, &mut journal.writes) {
+            finish(block, state, journal, entered);
+            return true;
+        }
+        block.left();
+    }
     let mut context = Context {
         registers: &mut state.registers,
         memory: &mut state.memory,
@@ -184,6 +203,12 @@ fn run(block: &Block, state: &mut State, journal: &mut Journal, entered: Cycle) 
         return false;
     }
     state.flags = flags;
+    finish(block, state, journal, entered);
+    true
+}
+
+/// After a block's operations: its late results are in flight, its writes to ports recorded.
+fn finish(block: &Block, state: &mut State, journal: &Journal, entered: Cycle) {
     for (i, (late, &(flags, memory))) in block.late.iter().zip(&journal.late).enumerate() {
         let value = Value { bits: state.get(Word::late(i)), flags };
         state.pending.push(late.pending(entered, value, memory));
@@ -193,5 +218,4 @@ fn run(block: &Block, state: &mut State, journal: &mut Journal, entered: Cycle) 
     }
     let writes = journal.writes.iter();
     state.port_writes.extend(writes.map(|&(check, bits)| block.checks[check as usize].write(entered, bits)));
-    true
 }

@@ -34,6 +34,12 @@ mod event;
 mod execute;
 mod fast;
 mod fault;
+#[cfg(all(feature = "jit", target_arch = "x86_64"))]
+mod jit;
+/// Where there is no compiler, blocks are interpreted.
+#[cfg(not(all(feature = "jit", target_arch = "x86_64")))]
+#[path = "jit/absent.rs"]
+mod jit;
 mod machine;
 mod micro;
 mod statistics;
