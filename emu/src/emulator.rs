@@ -67,6 +67,15 @@ pub enum Step {
     Halted,
 }
 
+/// Runs of compiled blocks ([`Emulator::set_compile_after`]).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CompiledRuns {
+    /// Those that their code did.
+    pub done: u64,
+    /// Those that it left to the interpreter, because of an infinity, a NaN, a flag or a fault.
+    pub left: u64,
+}
+
 /// Why a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
@@ -177,6 +186,7 @@ pub struct Emulator {
     pub(crate) blocks_enabled: bool,
     /// After how many runs blocks are compiled; `None`: never.
     pub(crate) compile_after: Option<u64>,
+    pub(crate) compiled_runs: CompiledRuns,
     /// Bundles before whose issue runs pause, ascending.
     pub(crate) pauses: Arc<[BundleAddress]>,
 }
@@ -235,6 +245,7 @@ impl Emulator {
             cycle_limit: MAX_CYCLE,
             blocks_enabled: true,
             compile_after: Some(COMPILE_AFTER),
+            compiled_runs: CompiledRuns::default(),
             pauses: Arc::default(),
             program: Arc::new(program.clone()),
             code: Arc::new(code),
@@ -290,6 +301,11 @@ impl Emulator {
     /// Whether this build, on this host, can compile blocks: feature `jit`, on x86-64.
     pub fn compiles() -> bool {
         jit::is_available()
+    }
+
+    /// How often compiled blocks ran since loading.
+    pub fn compiled_runs(&self) -> CompiledRuns {
+        self.compiled_runs
     }
 
     /// Lets runs pause at these bundles: once a cycle has passed, wherever the cycle to come is the one in which one of them

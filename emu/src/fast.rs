@@ -2,7 +2,7 @@
 //! is undone.
 
 use crate::block::Block;
-use crate::emulator::{Emulator, Recent, Status};
+use crate::emulator::{CompiledRuns, Emulator, Recent, Status};
 use crate::execute::stack_fault;
 use crate::jit;
 use crate::machine::{Pending, RegisterSet, State, Word};
@@ -105,7 +105,7 @@ impl Emulator {
             if stack_fault(flow, state, self.code.machine).is_some()
                 || beyond_bound
                 || !(block.verified || has_required(state, block, last))
-                || !run(block, code, state, journal, entered)
+                || !run(block, code, &mut self.compiled_runs, state, journal, entered)
             {
                 return Fast::Step { until: last + 1 };
             }
@@ -172,6 +172,7 @@ pub(crate) fn has_required(state: &State, block: &Block, last: Cycle) -> bool {
 fn run(
     block: &mut Block,
     code: Option<jit::Code>,
+    runs: &mut CompiledRuns,
     state: &mut State,
     journal: &mut Journal,
     entered: Cycle,
@@ -182,8 +183,10 @@ fn run(
     if let Some(code) = code {
         if code.run(block, state, &mut journal.words, &mut journal.late, &mut journal.writes) {
             finish(block, state, journal, entered);
+            runs.done += 1;
             return true;
         }
+        runs.left += 1;
         block.left();
     }
     let mut context = Context {

@@ -48,7 +48,7 @@ mod system;
 pub mod testing;
 
 pub use batch::Batch;
-pub use emulator::{Emulator, MAX_CYCLE, Observed, Status, Step, Stop, Upcoming};
+pub use emulator::{CompiledRuns, Emulator, MAX_CYCLE, Observed, Status, Step, Stop, Upcoming};
 pub use event::{Event, PortWrite, Retire};
 pub use fault::{Fault, FaultKind, LoadError, ShownFault};
 pub use machine::MAX_NAN_WRITES;
