@@ -107,18 +107,14 @@ impl Block {
         self.entry.offset(self.bundles)
     }
 
-    /// The block's code, if it has any. It is made once the block has run `after` times.
+    /// Compiles it, once it has run `after` times.
     #[inline]
-    pub(crate) fn code(&mut self, after: u64, depth: u32) -> Option<jit::Code> {
+    pub(crate) fn compile_after(&mut self, after: u64, depth: u32) {
         if matches!(self.compiled, Compiled::NotYet) && self.runs >= after {
             self.compiled = match jit::compile(self, depth) {
                 Some(code) => Compiled::Code(code, 0),
                 None => Compiled::Never,
             };
-        }
-        match &self.compiled {
-            Compiled::Code(code, _) => Some(code.clone()),
-            _ => None,
         }
     }
 

@@ -295,12 +295,20 @@ impl Emulator {
     /// After how many runs a block is compiled to the host's instructions, or `None`: never. Only time tells. Where there is no
     /// compiler ([`Emulator::compiles`]) this changes nothing.
     pub fn set_compile_after(&mut self, runs: Option<u64>) {
-        self.compile_after = runs;
+        if self.compile_after != runs {
+            self.compile_after = runs;
+            self.drop_blocks();
+        }
     }
 
     /// Whether this build, on this host, can compile blocks: feature `jit`, on x86-64.
     pub fn compiles() -> bool {
         jit::is_available()
+    }
+
+    /// From now on this process compiles no block, whatever its emulators are set to.
+    pub fn switch_compiler_off() {
+        jit::switch_off();
     }
 
     /// How often compiled blocks ran since loading.

@@ -1,7 +1,7 @@
 //! Running blocks. What is out of the ordinary is left to the stepper: before a block, if that can be seen; else the block
 //! is undone.
 
-use crate::block::Block;
+use crate::block::{Block, Compiled};
 use crate::emulator::{CompiledRuns, Emulator, Recent, Status};
 use crate::execute::stack_fault;
 use crate::jit;
@@ -78,15 +78,6 @@ impl Emulator {
     /// Runs blocks as long as they end before cycle `bound`; until a `wait` issues, if `stop_at_wait`. The machine must
     /// be running and the next bundle not have been charged a stall but the front end's.
     pub(crate) fn run_blocks(&mut self, bound: Cycle, stop_at_wait: bool) -> Fast {
-        let mut journal = std::mem::take(&mut self.journal);
-        let why = self.chain(bound, stop_at_wait, &mut journal);
-        self.journal = journal;
-        why
-    }
-}
-
-impl Emulator {
-    fn chain(&mut self, bound: Cycle, stop_at_wait: bool, journal: &mut Journal) -> Fast {
         loop {
             let entered = self.front.delivered;
             let Some(id) = self.next_block() else { return Fast::Step { until: entered + 1 } };
@@ -98,14 +89,13 @@ impl Emulator {
             self.begin_cycle();
             let block = &mut self.cache.blocks[id as usize];
             let (state, flow) = (&mut self.state, block.flow);
-            let code = match self.compile_after {
-                Some(after) => block.code(after, self.code.machine.data_depth),
-                None => None,
-            };
+            if let Some(after) = self.compile_after {
+                block.compile_after(after, self.code.machine.data_depth);
+            }
             if stack_fault(flow, state, self.code.machine).is_some()
                 || beyond_bound
                 || !(block.verified || has_required(state, block, last))
-                || !run(block, code, &mut self.compiled_runs, state, journal, entered)
+                || !run(block, &mut self.compiled_runs, state, &mut self.journal, entered)
             {
                 return Fast::Step { until: last + 1 };
             }
@@ -171,7 +161,6 @@ pub(crate) fn has_required(state: &State, block: &Block, last: Cycle) -> bool {
 /// Runs a block entered in cycle `entered`. If it faults, nothing has happened, and the answer is false.
 fn run(
     block: &mut Block,
-    code: Option<jit::Code>,
     runs: &mut CompiledRuns,
     state: &mut State,
     journal: &mut Journal,
@@ -180,7 +169,7 @@ fn run(
     let last = entered + Cycle::from(block.last);
     journal.begin(state, block, last);
     state.write_back_until(last);
-    if let Some(code) = code {
+    if let Compiled::Code(code, _) = &block.compiled {
         if code.run(block, state, &mut journal.words, &mut journal.late, &mut journal.writes) {
             finish(block, state, journal, entered);
             runs.done += 1;

@@ -115,7 +115,9 @@ fn programs_of_numbers_agree() {
             program.latched = seed % 3 == 2;
             let mut random = Random::new(!seed);
             // The addresses of loads and stores stay.
-            for (_, bits) in program.constants.iter_mut().filter(|(_, bits)| bits.cast_signed().unsigned_abs() > 600) {
+            for (_, bits) in
+                program.constants.iter_mut().filter(|(_, bits)| bits.cast_signed().unsigned_abs() > 600)
+            {
                 *bits = tame(&mut random);
             }
             program.data.iter_mut().for_each(|bits| *bits = tame(&mut random));

@@ -184,14 +184,27 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
         tests.env("TAKT_FULL", "1");
     }
     run(&mut tests)?;
-    if rest.is_empty() { python::test() } else { Ok(()) }
+    if !rest.is_empty() {
+        return Ok(());
+    }
+    // The compiler of blocks is a feature that nothing else turns on: `takt` is to be built quickly.
+    run(cargo().args(["test", "--release", "-p", "takt-emu", "-p", "unify"]).args([
+        "--features",
+        "takt-emu/jit",
+        "--lib",
+        "--test",
+        "agreement",
+        "--test",
+        "compiled",
+    ]))?;
+    python::test()
 }
 
 /// Measures, prints, writes docs/speed.md.
 fn speed() -> Result<()> {
     install()?;
     let mut measure = cargo();
-    measure.args(["run", "--release", "--package", "takt-benches", "--bin", "speed"]);
+    measure.args(["run", "--release", "--package", "takt-benches", "--features", "jit", "--bin", "speed"]);
     let output = measure.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
     if !output.status.success() {
         bail!("measuring failed ({})", output.status);
@@ -205,6 +218,10 @@ fn speed() -> Result<()> {
 fn lint() -> Result<()> {
     run(cargo().args(["fmt", "--all", "--check"]))?;
     run(cargo().args(["clippy", "--workspace", "--all-targets", "--release", "--", "-D", "warnings"]))?;
+    let compiled = ["--features", "takt/jit", "--", "-D", "warnings"];
+    run(cargo()
+        .args(["clippy", "--release", "-p", "takt-emu", "-p", "takt", "--all-targets"])
+        .args(compiled))?;
     // isa, asm and emu stand without C: SoftFloat is a feature.
     run(cargo().args([
         "check",

@@ -25,9 +25,17 @@ pub(super) enum Node {
     /// What [`takt_isa::compute`] gives.
     Call(Op, [Id; 3]),
     /// `memory[offset + base]`, and the number of the late result that it is.
-    Load { base: Id, offset: u32, late: Option<usize> },
+    Load {
+        base: Id,
+        offset: u32,
+        late: Option<usize>,
+    },
     /// `memory[offset + base] = value`
-    Store { base: Id, offset: u32, value: Id },
+    Store {
+        base: Id,
+        offset: u32,
+        value: Id,
+    },
     /// Goes to a watched port.
     Watched(Id),
 }

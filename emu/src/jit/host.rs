@@ -204,22 +204,22 @@ impl Host {
         let sources = self.sources();
         let probes = |source: usize| if source < sources { &PROBES[..] } else { &PROBES[..1] };
         let alike = op.row().effect == Effect::Compute && op.row().shape.sources() == sources;
-        alike && probes(0).iter().all(|&a| {
-            probes(1).iter().all(|&b| {
-                probes(2).iter().all(|&c| {
-                    let value = compute::<fp::Host>(op, a, b, c);
-                    self.value([a, b, c]).is_none_or(|bits| bits == value.bits && value.flags.is_empty())
+        alike
+            && probes(0).iter().all(|&a| {
+                probes(1).iter().all(|&b| {
+                    probes(2).iter().all(|&c| {
+                        let value = compute::<fp::Host>(op, a, b, c);
+                        self.value([a, b, c]).is_none_or(|bits| bits == value.bits && value.flags.is_empty())
+                    })
                 })
             })
-        })
     }
 
     /// The host's instruction for an operation; `None` if there is none, and the operation is a call.
     pub(super) fn of(op: Op) -> Option<Host> {
         static FOUND: OnceLock<Vec<Option<Host>>> = OnceLock::new();
-        let found = FOUND.get_or_init(|| {
-            ROWS.iter().map(|row| ALL.into_iter().find(|host| host.is(row.op))).collect()
-        });
+        let found = FOUND
+            .get_or_init(|| ROWS.iter().map(|row| ALL.into_iter().find(|host| host.is(row.op))).collect());
         found.get(op as usize).copied().flatten()
     }
 }

@@ -11,7 +11,8 @@ use crate::machine::Word;
 use cranelift::codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift::codegen::ir::{Function, SigRef, UserFuncName};
 use cranelift::prelude::{
-    AbiParam, FunctionBuilder, FunctionBuilderContext, Ieee32, InstBuilder, MemFlagsData, Signature, Value, types,
+    AbiParam, FunctionBuilder, FunctionBuilderContext, Ieee32, InstBuilder, MemFlagsData, Signature, Value,
+    types,
 };
 use takt_isa::{Op, ROWS, compute, fp};
 
@@ -150,9 +151,7 @@ impl Lowering<'_, '_> {
         }
         let value = match self.nodes[id] {
             Node::Constant(bits) => self.builder.ins().iconst(types::I32, i64::from(bits)),
-            Node::Entry(word) => {
-                self.builder.ins().load(types::I32, TRUSTED, self.registers, offset(word))
-            }
+            Node::Entry(word) => self.builder.ins().load(types::I32, TRUSTED, self.registers, offset(word)),
             _ => match (forms.float, forms.truth) {
                 (Some(float), _) => self.builder.ins().bitcast(types::I32, MemFlagsData::new(), float),
                 // A comparison's, 0 or 1.

@@ -15,8 +15,9 @@ use graph::Graph;
 use lower::Scratch;
 use native::Native;
 use std::sync::Arc;
-use takt_isa::fp::Flags;
+use std::sync::atomic::{AtomicBool, Ordering};
 use takt_isa::Effect;
+use takt_isa::fp::Flags;
 
 /// A block's code.
 #[derive(Clone)]
@@ -39,13 +40,23 @@ impl std::fmt::Debug for Code {
     }
 }
 
+/// Whether this process is to do without the compiler.
+static SWITCHED_OFF: AtomicBool = AtomicBool::new(false);
+
 /// Whether blocks can be compiled for this host.
 pub(crate) fn is_available() -> bool {
-    native::target().is_some()
+    !SWITCHED_OFF.load(Ordering::Relaxed) && native::target().is_some()
+}
+
+pub(crate) fn switch_off() {
+    SWITCHED_OFF.store(true, Ordering::Relaxed);
 }
 
 /// Compiles a block; `None` if there is no code for it.
 pub(crate) fn compile(block: &Block, depth: u32) -> Option<Code> {
+    if !is_available() {
+        return None;
+    }
     let graph = Graph::new(&block.micros);
     let scratch = Scratch::new(&graph, block.late.len());
     let native = lower::lower(&graph, depth, scratch)?;
