@@ -142,6 +142,24 @@ impl Graph {
         self.nodes.len() - 1
     }
 
+    /// Which words get each value as soon as it is there, and which only at the end: those that the block also reads. (If it
+    /// has to be run again it reads them again, and writes all others before it reads them.)
+    pub(super) fn places(&self) -> (Vec<Vec<Word>>, Vec<(Word, Id)>) {
+        let mut early = vec![Vec::new(); self.nodes.len()];
+        let mut last = Vec::new();
+        for &(word, id) in &self.results {
+            let is_read = self.nodes.contains(&Node::Entry(word));
+            if self.nodes[id] == Node::Entry(word) {
+                // It is there.
+            } else if is_read {
+                last.push((word, id));
+            } else {
+                early[id].push(word);
+            }
+        }
+        (early, last)
+    }
+
     /// For each value whether it is to be looked at; `None` if one of them is never in order.
     pub(super) fn looked_at(&self) -> Option<Vec<bool>> {
         let mut looked_at = vec![false; self.nodes.len()];

@@ -1,8 +1,8 @@
 //! Code for a [`Graph`].
 //!
-//! It has one way through and no branch before its end: an address outside the memory becomes 0 and a mark. At the end either
-//! nothing was out of the ordinary, and the registers are written, or the code says so and has written nothing but memory,
-//! whose old words are among the scratch words.
+//! It has one way through and decides nothing before its end: an address outside the memory becomes 0 and a mark. At the end
+//! either nothing was out of the ordinary, and the registers that the block also reads are written, or the code says so: then
+//! these are as they were, and the words of memory that it has overwritten are among the scratch words.
 
 use super::graph::{Graph, Id, Node};
 use super::host::Host;
@@ -111,13 +111,17 @@ pub(super) fn lower(graph: &Graph, depth: u32, scratch: Scratch) -> Option<Nativ
         stores: 0,
         watches: 0,
     };
+    let (early, last) = graph.places();
     for (id, looked_at) in looked_at.into_iter().enumerate() {
         lowering.node(id)?;
+        for &word in &early[id] {
+            lowering.write(word, id);
+        }
         if looked_at {
             lowering.look_at(id);
         }
     }
-    lowering.finish(graph);
+    lowering.finish(graph, &last);
     Native::new(function, depth as usize, scratch.end)
 }
 
@@ -228,6 +232,11 @@ impl Lowering<'_, '_> {
             Some(float) => float,
             None => self.integer(id),
         }
+    }
+
+    fn write(&mut self, word: Word, id: Id) {
+        let value = self.any(id);
+        self.builder.ins().store(TRUSTED, value, self.registers, offset(word));
     }
 
     fn put(&mut self, value: Value, place: usize) {
@@ -419,8 +428,8 @@ impl Lowering<'_, '_> {
         }
     }
 
-    /// Writes the registers, unless something was out of the ordinary.
-    fn finish(mut self, graph: &Graph) {
+    /// Writes the other registers, unless something was out of the ordinary.
+    fn finish(mut self, graph: &Graph, last: &[(Word, Id)]) {
         let sums: Vec<Value> = self.sums.into_iter().flatten().collect();
         if let Some(sum) = sums.into_iter().reduce(|a, b| self.builder.ins().fadd(a, b)) {
             let wrong = self.builder.ins().fcmp(FloatCC::Unordered, sum, sum);
@@ -445,8 +454,7 @@ impl Lowering<'_, '_> {
             self.builder.switch_to_block(right);
         }
         // All are read before one is written: some may be what another register held.
-        let changed = graph.results.iter().filter(|&&(word, id)| graph.nodes[id] != Node::Entry(word));
-        let values: Vec<(i32, Value)> = changed.map(|&(word, id)| (offset(word), self.any(id))).collect();
+        let values: Vec<(i32, Value)> = last.iter().map(|&(word, id)| (offset(word), self.any(id))).collect();
         for (offset, value) in values {
             self.builder.ins().store(TRUSTED, value, self.registers, offset);
         }

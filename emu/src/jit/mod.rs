@@ -64,7 +64,7 @@ pub(crate) fn compile(block: &Block, depth: u32) -> Option<Code> {
 }
 
 impl Code {
-    /// Runs the block. If the answer is false, nothing has happened, and the interpreter is to run it.
+    /// Runs the block. If the answer is false, the interpreter is to run it: all that it reads is as it was.
     pub(crate) fn run(
         &self,
         block: &Block,

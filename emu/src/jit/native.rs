@@ -25,7 +25,8 @@ pub(super) fn target() -> Option<&'static dyn TargetIsa> {
     static TARGET: OnceLock<Option<OwnedTargetIsa>> = OnceLock::new();
     let target = TARGET.get_or_init(|| {
         let mut flags = settings::builder();
-        flags.set("opt_level", "speed").ok()?;
+        // Its optimiser would take operations from where they are, and leave everything waiting in memory for them.
+        flags.set("opt_level", "none").ok()?;
         // In release it costs time only: what it checks is Cranelift's own.
         flags.set("enable_verifier", if cfg!(debug_assertions) { "true" } else { "false" }).ok()?;
         cranelift::native::builder().ok()?.finish(settings::Flags::new(flags)).ok()
@@ -58,7 +59,8 @@ impl Native {
         Some(Native { code: pages.make_exec().ok()?, memory, scratch })
     }
 
-    /// Runs the block. If it did not do all of its work, the answer is false: then the registers are as they were.
+    /// Runs the block. If something was out of the ordinary, the answer is false: then every register that the block reads
+    /// before it writes it is as it was.
     pub(super) fn call(&self, registers: &mut [u32; WORDS], memory: &mut [u32], scratch: &mut [u32]) -> bool {
         assert!(memory.len() >= self.memory && scratch.len() >= self.scratch, "the block needs more words");
         // SAFETY: the pages hold a whole function of this signature and calling convention, made by Cranelift; they are
