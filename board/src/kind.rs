@@ -1,5 +1,5 @@
 //! The table of peripherals: what each has of pins, registers and parameters. The generator, the twins' tests, the reader of
-//! system files and `takt board` take names and limits from here.
+//! wiring files and `takt board` take names and limits from here.
 
 /// Which way a signal goes, seen from the peripheral.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,7 +35,7 @@ pub struct Register {
 /// A parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Parameter {
-    /// Its name in system files; in the module the same in capitals.
+    /// Its name in wiring files; in the module the same in capitals.
     pub name: &'static str,
     /// The least value.
     pub least: u32,
@@ -62,7 +62,7 @@ pub type Port = (String, u32);
 /// A kind of peripheral.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kind {
-    /// Its name in system files.
+    /// Its name in wiring files.
     pub name: &'static str,
     /// Its module.
     pub module: &'static str,
