@@ -106,7 +106,7 @@ const fn parameter(name: &'static str, least: u32, most: u32, default: u32, text
 
 const FILTER: Parameter =
     parameter("filter", 1, 256, 3, "cycles for which a level must stand before it counts");
-const SIGNED: Parameter = parameter("signed", 0, 1, 1, "1: the value is signed, and 0 is one half");
+const SIGNED: Parameter = parameter("signed", 0, 1, 1, "1: the value is signed, and 0 is 50 % duty");
 
 const ENABLED: Strobes = Strobes { enable: true, start: false };
 const PLAIN: Strobes = Strobes { enable: false, start: false };
@@ -147,7 +147,7 @@ pub const KINDS: &[Kind] = &[
         reads: &[],
         writes: &[scaled(
             "duty",
-            "cycles of the pulse, 0 to 2·half; signed: -half to half, 0 is one half of the period",
+            "cycles of the pulse, 0 to 2·half; signed: -half to half, 0 is 50 % duty",
         )],
         parameters: &[
             parameter("half", 1, 65535, 1250, "half a period in cycles"),

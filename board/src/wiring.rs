@@ -95,7 +95,7 @@ pub struct Peripheral {
 pub struct Write {
     /// The program's output port.
     pub port: String,
-    /// For a port that is a number with point: the power of two by which it is multiplied before it is rounded.
+    /// For a float port: the power of two by which it is multiplied before it is rounded.
     pub scale: Option<i32>,
 }
 
@@ -180,7 +180,7 @@ impl Wiring {
         if direction == Direction::Input {
             if port.ty == Type::F {
                 let text = format!(
-                    "input port `{}` is a number with point; a register is an integer: declare it `{}:int`",
+                    "input port `{}` is a float; a register is an integer: declare it `{}:int`",
                     port.name, port.name
                 );
                 document.mistake(place, text);
@@ -193,7 +193,7 @@ impl Wiring {
             (Type::F, None) => document.mistake(
                 place,
                 format!(
-                    "output port `{}` is a number with point: `scale` says how many steps of the register 1.0 is, as in \
+                    "output port `{}` is a float: `scale` says how many steps of the register 1.0 is, as in \
                      `scale = {{ {} = 16 }}`",
                     port.name, peripheral.kind.writes[0].name
                 ),

@@ -162,7 +162,7 @@ fn ports_must_be_the_programs() {
         "robot.toml:19:33: the program has no input port `bad`; there are n, worse"
     );
     let float = PROGRAM.replace("n:int", "n").replace("itof    force, n", "fadd force, n, n");
-    assert!(said(&float).contains("19:19: input port `n` is a number with point"), "{}", said(&float));
+    assert!(said(&float).contains("19:19: input port `n` is a float"), "{}", said(&float));
     let integer = PROGRAM.replace("force\n", "force:int\n").replace("itof    force, n", "mov force, n");
     assert!(
         said(&integer).contains("26:18: output port `force` is an integer, which is not scaled"),

@@ -92,7 +92,7 @@ struct Sim {
     /// A motor that turns an encoder: the peripherals' names, and counts per second at full duty; may be repeated.
     #[arg(long, value_name = "PWM,QUADRATURE,SPEED")]
     axis: Vec<String>,
-    /// One in so many bits of the UART is turned, in either direction.
+    /// One in so many bits of the UART is flipped, in either direction.
     #[arg(long, default_value_t = 0, value_name = "N")]
     noise: u32,
     /// End after so many cycles; without it, when it is interrupted.

@@ -98,7 +98,7 @@ enum Command {
     Start,
     /// Stop the program; outputs are safe.
     Stop,
-    /// Halt at the end of a period: no more ticks.
+    /// Hold at the end of a period: no more ticks.
     Hold,
     /// One period, while it is held.
     Step,
