@@ -90,7 +90,7 @@ impl Interner {
     }
 
     /// How many names there are; numbers are below it.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.ends.len()
     }
 
@@ -181,7 +181,7 @@ mod tests {
     fn known_names_are_distinct() {
         // One name in two lists would shift the numbers of all that follow.
         let count = NameId::BUILTINS as usize + BUILTINS.len();
-        assert_eq!(Interner::new().len(), count);
+        assert_eq!(Interner::new().count(), count);
     }
 
     #[test]
