@@ -102,6 +102,9 @@ fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
+/// The features with which takt has all its commands.
+const EVERYTHING: &str = "takt/full";
+
 fn cargo() -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(root());
@@ -179,25 +182,12 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
         formal::formal(&formal::Arguments::SHARE)?;
     }
     let mut tests = cargo();
-    tests.args(["test", "--workspace", "--no-fail-fast", "--release"]).args(rest);
+    tests.args(["test", "--workspace", "--features", EVERYTHING, "--no-fail-fast", "--release"]).args(rest);
     if full {
         tests.env("TAKT_FULL", "1");
     }
     run(&mut tests)?;
-    if !rest.is_empty() {
-        return Ok(());
-    }
-    // The compiler of blocks is a feature that nothing else turns on: `takt` is to be built quickly.
-    run(cargo().args(["test", "--release", "-p", "takt-emu", "-p", "unify"]).args([
-        "--features",
-        "takt-emu/jit",
-        "--lib",
-        "--test",
-        "agreement",
-        "--test",
-        "compiled",
-    ]))?;
-    python::test()
+    if rest.is_empty() { python::test() } else { Ok(()) }
 }
 
 /// Measures, prints, writes docs/speed.md.
@@ -217,11 +207,10 @@ fn speed() -> Result<()> {
 
 fn lint() -> Result<()> {
     run(cargo().args(["fmt", "--all", "--check"]))?;
-    run(cargo().args(["clippy", "--workspace", "--all-targets", "--release", "--", "-D", "warnings"]))?;
-    let compiled = ["--features", "takt/jit", "--", "-D", "warnings"];
-    run(cargo()
-        .args(["clippy", "--release", "-p", "takt-emu", "-p", "takt", "--all-targets"])
-        .args(compiled))?;
+    let workspace = ["--workspace", "--all-targets", "--features", EVERYTHING, "--release"];
+    run(cargo().arg("clippy").args(workspace).args(["--", "-D", "warnings"]))?;
+    // What `cargo run` compiles: takt with fewer commands.
+    run(cargo().args(["clippy", "--release", "-p", "takt", "--", "-D", "warnings"]))?;
     // isa, asm and emu stand without C: SoftFloat is a feature.
     run(cargo().args([
         "check",

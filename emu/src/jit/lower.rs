@@ -364,7 +364,7 @@ impl Lowering<'_, '_> {
                 let a = self.integer(sources[0]);
                 self.forms[id].float = Some(self.builder.ins().fcvt_from_sint(types::F32, a));
             }
-            Host::ToInteger => self.to_integer(id, sources[0]),
+            Host::ToInteger => self.nearest_integer(id, sources[0]),
             _ => {
                 let value = self.number(host, sources);
                 self.forms[id].float = Some(value);
@@ -373,7 +373,7 @@ impl Lowering<'_, '_> {
     }
 
     /// As `takt_isa::fp::Host` has it: a sum that rounds at the units' place, in its low word the integer.
-    fn to_integer(&mut self, id: Id, source: Id) {
+    fn nearest_integer(&mut self, id: Id, source: Id) {
         let a = self.float(source);
         let magnitude = self.builder.ins().fabs(a);
         let limit = self.builder.ins().f32const(2_147_483_648.0);
