@@ -1,0 +1,5 @@
+//! The host of the three-processor robot controller.
+
+pub mod dynamics;
+pub mod packet;
+pub mod plant;
