@@ -211,8 +211,7 @@ impl Arm {
     pub fn potential(&self, q: &Joints) -> f64 {
         let [upper, across, along] = self.moments();
         let (s23, c23) = (q[1] + q[2]).sin_cos();
-        let springs =
-            self.balance * self.gravity[2] * (upper * q[1].sin() + across * s23 - along * c23);
+        let springs = self.balance * self.gravity[2] * (upper * q[1].sin() + across * s23 - along * c23);
         let turns = self.turns(q);
         let weights = self.links.iter().enumerate().map(|(i, link)| {
             let mut point = link.centre;

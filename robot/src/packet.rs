@@ -197,7 +197,11 @@ impl Cause {
     pub const fn has_joint(self) -> bool {
         matches!(
             self,
-            Cause::JointLimit | Cause::VelocityLimit | Cause::TorqueLimit | Cause::Tracking | Cause::NotFinite
+            Cause::JointLimit
+                | Cause::VelocityLimit
+                | Cause::TorqueLimit
+                | Cause::Tracking
+                | Cause::NotFinite
         )
     }
 }

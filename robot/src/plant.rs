@@ -21,8 +21,7 @@ pub const COUNTS: f64 = (1u32 << 18) as f64;
 /// Steps of the integration in a tick.
 pub const SUBSTEPS: u32 = 2;
 /// Where the arm stands at power-up, rad: upper arm up, forearm level, hand half down.
-pub const HOME: Joints =
-    [0.0, std::f64::consts::FRAC_PI_2, 0.0, 0.0, -std::f64::consts::FRAC_PI_4, 0.0];
+pub const HOME: Joints = [0.0, std::f64::consts::FRAC_PI_2, 0.0, 0.0, -std::f64::consts::FRAC_PI_4, 0.0];
 
 /// The robot.
 #[derive(Clone, Debug)]

@@ -101,8 +101,7 @@ fn lagrange(arm: &Arm, q: &Joints, qd: &Joints, qdd: &Joints) -> Joints {
                 velocity += (slopes[k][i][j] - 0.5 * slopes[i][j][k]) * qd[j] * qd[k];
             }
         }
-        let weight =
-            (potential(arm, &along(i, STEP)) - potential(arm, &along(i, -STEP))) / (2.0 * STEP);
+        let weight = (potential(arm, &along(i, STEP)) - potential(arm, &along(i, -STEP))) / (2.0 * STEP);
         inertia + velocity + weight
     })
 }
