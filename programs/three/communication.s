@@ -4,6 +4,8 @@
 ; kinematic core's queue, or an order that does not wait for its turn. What that core answers goes on to the host.
 
 .include "packets.s"
+.include "ums7.s"
+.include <math.s>
 .schedule on
 
 .const  WORDS   = 64                    ; words read in a period at most
@@ -18,24 +20,29 @@
 .output word_pop:int
 .output report:int, sequence:int, cause:int, value, report_push:int
 .output item:int, item_sequence:int, item_epoch:int, c1:bits, c2:bits, c3:bits, c4:bits, c5:bits, c6:bits
-.output profile:int, how:int, amount:bits, flags:int, item_push:int
+.output profile:int, periods:int, ramp_periods:int, flags:int, item_push:int
 .input  item_full:int
 .output epoch:int                       ; counts stops: items of an earlier one are dropped
 .output stop_cause:int, stop_sequence:int, reset:int
 .input  reply:int, reply_sequence:int, reply_cause:int, reply_value:bits, reply_epoch:int, reply_empty:int
 .output reply_pop:int
 .input  mode:int, beat:int              ; of the kinematic core: what the robot does; counts its periods
+.input  stand1, stand2, stand3, stand4, stand5, stand6 ; rad, its reference
 .input  inputs:int, analogue1, analogue2
 .output outputs:int, level1, level2
 .output tracked:int, smooth1, smooth2   ; inputs as they are tracked: bits that stood for two periods, analogue values smoothed
 
 ; ---- State --------------------------------------------------------------------------------------------------------------------
 .state  got:int need:int kind:int crc:bits idle:int ; of the packet that is read: words, and how many they will be
+.state  planning:int                    ; it is a motion, to be planned
+.state  jog_kind:int                    ; rates of the jog that goes on
 .state  number:bits last:int            ; its sequence number; the last good one's
-.state  silence:int pending:int locked:int started:int
+.state  silence:int pending:int locked:int started:int jogging:int halting:int ; motions and outputs in the queue; …; until the kinematic core says
 .state  now:int resets:int              ; stops and resets so far
 .state  beats:int                       ; where the beat stood
 .state  raw:int                         ; inputs a period ago
+.state  tool[3]                         ; m
+.state  via_before:int                  ; the motion before is to be passed
 .state  pops:int pushes:int reports:int taken:int ; written to ports that want only a write
 
 .data
@@ -50,12 +57,38 @@ crc_table:                              ; of four bits at a time, reflected poly
         .endr
 payload:                                ; of the packet that is read
         .space  PAYLOAD_WORDS + 1
+        .macro  floats count
+        .rep    i, 1, count
+        .float  0
+        .endr
+        .endm
+; Six words each, of the joints: as in kinematic.s.
+way:        floats 6
+way1:       floats 6
+joints:     floats 6
+joints1:    floats 6
+forces1:    floats 6
+weights:    floats 6
+plan_S:     floats 6                    ; of what is planned: where it begins, its way, where it ends
+plan_D:     floats 6
+plan_T:     floats 6
+forces0:    floats 6                    ; forces1 of the sample before
+planned:    floats 6                    ; where what has been planned ends: joints, pose
+planned_pose: floats 6
+fastest:    .float fast1, fast2, fast3, fast4, fast5, fast6 ; limits as they are, and as they are built in
+strongest:  .float torque1, torque2, torque3, torque4, torque5, torque6
+fastest0:   .float fast1, fast2, fast3, fast4, fast5, fast6
+strongest0: .float torque1, torque2, torque3, torque4, torque5, torque6
+lowest:     .float low1, low2, low3, low4, low5, low6
+highest:    .float high1, high2, high3, high4, high5, high6
 
 .once
-        got, need, kind, idle = 0, 0, 0, 0
+        got, need, kind, idle, planning = 0, 0, 0, 0, 0
         li      crc, 0xffffffff
-        number, last = 0, 0
-        silence, pending, locked, started = 0, 0, 0, 0
+        number, last, jog_kind = 0, 0, 0
+        silence, pending, locked, started, jogging, halting = 0, 0, 0, 0, 0, 0
+        via_before, space, back, elbow_up, wrist_up = 0, 0, 0, 0, 0
+        tool[1], tool[2], tool[3] = 0, 0, 0
         now, resets, beats, raw = 0, 0, 0, 0
         pops, pushes, reports, taken = 0, 0, 0, 0
         epoch, stop_cause, stop_sequence, reset = 0, 0, 0, 0
@@ -65,7 +98,7 @@ payload:                                ; of the packet that is read
 
 .period
 period:
-.reg    rk:int rs:int rc:int rv:bits    ; a report
+.reg    rk:int rs:int rc:int rw:bits    ; a report
 .reg    error:int
         silence = silence + 1
 
@@ -84,7 +117,7 @@ period:
         wake = started | (here < BEATS)
         bnz     wake, awake
         started = 1
-        rk, rs, rc, rv = REPORT_READY, 0, 0, 0
+        rk, rs, rc, rw = REPORT_READY, 0, 0, 0
         beats = here - BEATS
         call    say
 awake:
@@ -191,7 +224,7 @@ in_order:
         mov     last, number
         bz      kind, next_word         ; NOP
         mov     rs, number
-        mov     rv, zero
+        mov     rw, zero
         li      rk, REPORT_REFUSED
         li      rc, CAUSE_STOPPEDSTATE
         bnz     locked, refused
@@ -210,12 +243,41 @@ in_order:
         bnz     jogs, jog
         bnz     sets, set
         is = kind == KIND_TOOL
-        bnz     is, tool
+        bnz     is, tool_packet
 
-; LIMITS: two items.
+; LIMITS: velocities and torques, lower than those built in and more than nothing. Two items.
+.reg    j:int jn:int ju:int limit:float built:float less:int wrong_one:int
+.macro  each_joint label                ; ends a loop over the joints, j from 0
+        j = j + 1
+        jn = j < 6
+        bnz     jn, label
+.endm
+        mov     wrong_one, zero
+        j = 0
+        .loop_bound 12
+limits: ld      limit, payload[j]
+        ld      built, fastest0[j]
+        less = (limit > 0) & (limit <= built)
+        j = j + 1
+        wrong_one = less | wrong_one ? wrong_one : j
+        jn = j < 12
+        bnz     jn, limits
+        jn = wrong_one > 6
+        rc = jn ? CAUSE_TORQUELIMIT : CAUSE_VELOCITYLIMIT
+        wrong_one = jn ? wrong_one - 6 : wrong_one
         li      refuse, PAYLOAD_WORDS
-        call    finite
-        bnz     refuse, refused
+.reg    wrong_value
+        wrong_value = itof(wrong_one)
+        mov     rw, wrong_value
+        bnz     wrong_one, refused
+        j = 0
+        .loop_bound 12
+limit_it:
+        ld      limit, payload[j]
+        st      fastest[j], limit
+        j = j + 1
+        jn = j < 12
+        bnz     jn, limit_it
         li      rk, KIND_LIMITS
         call    put
         .rep    i, 1, 6
@@ -223,43 +285,61 @@ in_order:
         .endr
         li      rk, KIND_TORQUES
         call    put
-        jmp     next_word
+        jmp     accepted
 
-tool:   li      refuse, 3
+tool_packet:
+        li      refuse, 3
         call    finite
         bnz     refuse, refused
         li      rc, CAUSE_NOTWHILEMOVING
-        bnz     pending, refused
+        is = pending | jogging | halting | (mode != MODE_STANDING)
+        bnz     is, refused
+.reg    tx:float ty:float tz:float
+        ld      tx, payload
+        ld      ty, payload + 1
+        ld      tz, payload + 2
+        tool[1], tool[2], tool[3] = tx, ty, tz
         mov     rk, kind
         call    put
+accepted:
+        li      rk, REPORT_ACCEPTED
+        mov     rc, zero
+        mov     rw, zero
+        call    say
         jmp     next_word
 
 jog:    li      refuse, 7
         call    finite
         bnz     refuse, refused
-.reg    which:int which_ok:int
+.reg    which:int which_ok:int idle_or_jog:int
         ld      which, payload
         iltu    which_ok, which, JOGS
         li      rc, CAUSE_HEADER
         bz      which_ok, refused
         li      rc, CAUSE_NOTWHILEMOVING
-        bnz     pending, refused
+        idle_or_jog = (mode == MODE_STANDING) | (mode == MODE_JOGGING)
+        is = pending | halting | !idle_or_jog
+        bnz     is, refused
+        is = jogging & (which != jog_kind) ; one kind of rates ends before another begins
+        bnz     is, refused
         .rep    i, 1, 6
         ld      c{i}, payload + i
         .endr
         mov     profile, which
+        mov     jog_kind, which
+        jogging = last
         mov     rk, kind
         call    put
-        jmp     next_word
+        jmp     accepted
 
 set:    pending = pending + 1
         mov     rk, kind
         call    put
         jmp     next_word
 
-; MOVE, MOVEL: targets finite or NaN, which the kinematic core completes; profile, kind of demand, amount, flags.
+; MOVE, MOVEL: targets finite or NaN, which stands for "as it is"; profile, what is demanded, how much, flags.
 motion:
-.reg    infinite:int pr:int ho:int am am_bits:bits fl:int good:int asked:int
+.reg    infinite:int pr:int ho:int am:float fl:int good:int positive:int
         mov     infinite, zero
         .rep    i, 0, 5
 .reg    tb{i}:bits ti{i}:int
@@ -270,30 +350,25 @@ motion:
         .endr
         ld      pr, payload + 6
         ld      ho, payload + 7
-        ld      am_bits, payload + 8
-        mov     am, am_bits
+        ld      am, payload + 8
         ld      fl, payload + 9
-        mov     profile, pr
-        mov     how, ho
-        mov     amount, am_bits
-        mov     flags, fl
 .reg    pr_ok:int ho_ok:int fl_ok:int
         iltu    pr_ok, pr, PROFILES
         iltu    ho_ok, ho, HOWS
         iltu    fl_ok, fl, FLAGS + 1
         good = pr_ok & ho_ok & fl_ok
-        asked = ho == HOW_FAST ? 1 : (am > 0) & (am <= LONGEST)
+        positive = ho == HOW_FAST ? 1 : (am > 0) & (am <= LONGEST)
         li      rc, CAUSE_HEADER
         bz      good, refused
         li      rc, CAUSE_NOTFINITE
         bnz     infinite, refused
-        bz      asked, refused
-        is = mode == MODE_JOGGING
+        bz      positive, refused
+; It goes on where the motion before ends; without one, the robot must stand.
         li      rc, CAUSE_NOTWHILEMOVING
+        is = jogging | halting | (!pending & (mode != MODE_STANDING))
         bnz     is, refused
-        pending = pending + 1
-        mov     rk, kind
-        call    put
+        planning = 1                    ; the words that follow are for the next period
+        mov     left, zero
         jmp     next_word
 
 refused:
@@ -302,9 +377,7 @@ refused:
         jmp     next_word
 
 stopping:
-        now = now + 1
-        mov     pending, zero
-        mov     epoch, now
+        call    drop
         mov     stop_cause, zero
         mov     stop_sequence, rs
         jmp     next_word
@@ -312,18 +385,33 @@ stopping:
 resetting:
         mov     last, number
         mov     locked, zero
-        mov     pending, zero
-        now = now + 1
-        mov     epoch, now
+        call    drop
         mov     stop_cause, zero
         mov     stop_sequence, zero
         resets = resets + 1
         mov     reset, resets
         mov     rs, number
-        rk, rc, rv = REPORT_READY, 0, 0
+        rk, rc, rw = REPORT_READY, 0, 0
         call    say
         jmp     next_word
 words_end:
+        bz      planning, no_plan
+        planning = 0
+        bnz     pending, plan_motion
+; Nothing is going on: the way begins where the robot stands.
+        mov     via_before, zero
+        .rep    i, 1, 6
+        st      planned + i - 1, stand{i}
+        st      way + i - 1, stand{i}
+        .endr
+        call    fetch
+        call    frame
+        call    forward
+        .rep    i, 1, 6
+        st      planned_pose + i - 1, fk[i]
+        .endr
+.include "planning.s"
+no_plan:
 
 ; ---- A packet that was begun and does not go on; a host that is silent while the robot moves ------------------------------------------
 .reg    begun:int overdue:int
@@ -351,12 +439,12 @@ heard:
 next_reply:
         none = reply_empty | (answers == 0)
         bnz     none, replies_end
-.reg    re:int done:int locks:int current:int sets_now:int
+.reg    re:int halts:int done:int locks:int current:int sets_now:int
         answers = answers - 1
         r = reply
         rs = reply_sequence
         rc = reply_cause
-        mov     rv, reply_value
+        mov     rw, reply_value
         re = reply_epoch
 taken_reply:
         taken = taken + 1
@@ -364,7 +452,11 @@ taken_reply:
         current = re == now
         done = r & REPLY_DONE
         done = current & (done != 0)
-        pending = pending - done
+        is = jogging & (rs == jogging) & done ; a jog, then
+        pending = is ? pending : pending - done
+        jogging = is ? 0 : jogging
+        halts = r & REPLY_HALTED
+        halting = (halts != 0) & current ? 0 : halting
         locks = r & REPLY_LOCK
         sets_now = r & REPLY_SET
         iand    rk, r, 0xff
@@ -372,9 +464,7 @@ taken_reply:
         bz      locks, unlocked
         bnz     locked, unlocked
         locked = 1
-        now = now + 1
-        mov     pending, zero
-        mov     epoch, now
+        call    drop
         mov     stop_cause, rc
         mov     stop_sequence, zero
 unlocked:
@@ -384,19 +474,19 @@ unlocked:
 
 ; An output or a level whose turn it is.
 setting:
-        mov     rvi, rv
-.reg    rvi:int level:int a:int to1:int to2:int lv:bits
+        mov     rwi, rw
+.reg    rwi:int level:int a:int to1:int to2:int lv:bits
         bz      current, next_reply_soon
         level = rk == KIND_LEVEL
         a = outputs
-        a = (a & xor(rc, 0xffffffff)) | (rc & rvi)
+        a = (a & xor(rc, 0xffffffff)) | (rc & rwi)
         outputs = level ? outputs : a
         to1 = level & (rc == 1)
         to2 = level & (rc == 2)
-        mov     lv, rv
+        mov     lv, rw
         sel     level1, to1, lv:float, level1
         sel     level2, to2, lv:float, level2
-        rk, rc, rv = REPORT_FINISHED, 0, 0
+        rk, rc, rw = REPORT_FINISHED, 0, 0
         call    say
 next_reply_soon:                        ; jumps enough since the pop: the next head is on the ports
         jmp     next_reply
@@ -408,7 +498,7 @@ replies_end:
 say:    report = rk
         sequence = rs
         cause = rc
-        mov     value, rv:float
+        mov     value, rw:float
         reports = reports + 1
         report_push = reports
         .order  report, sequence, cause, value, report_push
@@ -418,14 +508,19 @@ say:    report = rk
 stop_for:
         bnz     locked, known_error
         locked = 1
-        now = now + 1
-        mov     pending, zero
-        mov     epoch, now
+        call    drop
         mov     stop_cause, error
         mov     stop_sequence, zero
-        rk, rc, rv = REPORT_STOPPED, error, 0
+        rk, rc, rw = REPORT_STOPPED, error, 0
         call    say
 known_error:
+        ret
+
+; Nothing in the queue counts any more.
+drop:   now = now + 1
+        mov     pending, zero
+        li      halting, 1
+        mov     epoch, now
         ret
 
 ; The next word begins a packet.
@@ -458,3 +553,5 @@ scan:   ld      fb, payload[at]
         mov     refuse, bad
         li      rc, CAUSE_NOTFINITE
         ret
+
+.include "geometry.s"

@@ -58,3 +58,7 @@
 .rep    i, 1, 6
 .const  control{i} = 2*(Da*torque{i} + Db*fast{i}) ; limit of the control: twice what the limits ask for
 .endr
+
+; ---- A trapezoidal pulse of acceleration --------------------------------------------------------------------------------------------
+.const  RISE = 0.25                     ; of its time; then it falls as long
+.const  TOP  = 1/(1 - RISE)             ; its largest value, where its mean is 1
