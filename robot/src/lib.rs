@@ -5,10 +5,11 @@
 //! ```
 //!
 //! [`language`] reads commands and programs, [`level`] executes them, [`host`] is their end of the link, with packets as
-//! [`packet`] defines them. `controller` is the other end: the system of three cores on the emulator, its loop closed by
+//! [`packet`] defines them. [`controller`] is the other end: the system of three cores on the emulator, its loop closed by
 //! [`plant`], a six-joint arm in binary64 whose [`dynamics`] are not the nominal ones. docs/robot-commands.md is the
 //! language's contract. Nothing here prints, and nothing opens files.
 
+pub mod controller;
 pub mod dynamics;
 pub mod geometry;
 pub mod host;
