@@ -18,6 +18,7 @@
 .output u1, u2, u3, u4, u5, u6
 .output enable:int                      ; 1: drives on
 .output m1, m2, m3, m4, m5, m6          ; rad, as measured
+.output r1, r2, r3, r4, r5, r6          ; rad, the reference of this period
 .output ready:int                       ; 1: they are
 .output lost:int                        ; number of a joint that does not follow; 0: none
 
@@ -50,7 +51,7 @@ weights:
         qa[i], va[i], aa[i], ua[i] = 0, 0, 0, 0
         qb[i], vb[i], ab[i], ub[i], inertia[i] = 0, 0, 0, 0, 0
         E[i] = 0
-        u{i}, m{i} = 0, 0
+        u{i}, m{i}, r{i} = 0, 0, 0
         .endr
         phase, head, pops, on = 1, 0, 0, 0
         enable, ready, lost = 0, 0, 0
@@ -122,7 +123,7 @@ interpolate:
         free{i} = (us{i} == u{i}f) | out{i}
         E[i] = free{i} & on ? E[i] + e{i}*Td : E[i]
         u{i} = on ? us{i} : 0
-        m{i} = q{i}
+        m{i}, r{i} = q{i}, q0{i}
         behind[i] = (abs(e{i}) > LAG) & on
         .endr
         lost = behind[1] ? 1 : behind[2] ? 2 : behind[3] ? 3 : behind[4] ? 4 : behind[5] ? 5 : behind[6] ? 6 : 0

@@ -30,7 +30,7 @@
 .const  Dc = 0.02                       ; control per rad/s²
 
 ; ---- Limits, joint by joint: range, rad; velocity, rad/s; torque, N·m --------------------------------------------------------------
-; Torques: 1.3 times the largest of the move that programs/src/three/limits.rs describes, rounded.
+; Torques: 1.3 times the largest of the move that programs/src/three/dynamics.rs describes, rounded.
 .const  low1 = -170*pi/180
 .const  low2 = -60*pi/180
 .const  low3 = -100*pi/180
@@ -49,11 +49,11 @@
 .rep    i, 4, 6
 .const  fast{i} = 6
 .endr
-.const  torque1 = 250
-.const  torque2 = 300
-.const  torque3 = 150
-.const  torque4 = 13
-.const  torque5 = 13
+.const  torque1 = 230
+.const  torque2 = 340
+.const  torque3 = 140
+.const  torque4 = 6.5
+.const  torque5 = 12
 .const  torque6 = 2.6
 .rep    i, 1, 6
 .const  control{i} = 2*(Da*torque{i} + Db*fast{i}) ; limit of the control: twice what the limits ask for
