@@ -51,7 +51,7 @@ impl Status {
 
     /// What stopped the drive.
     pub fn causes(self) -> impl Iterator<Item = &'static str> {
-        let names = ["fault", "halt", "missed deadline", "host silent", "stop", "output that is no number"];
+        let names = ["fault", "halt", "missed deadline", "host silent", "stop", "NaN output"];
         names.into_iter().enumerate().filter(move |(i, _)| self.0 >> (12 + i) & 1 != 0).map(|(_, name)| name)
     }
 }

@@ -52,8 +52,8 @@ pub const REGISTERS: [Register; 15] = [
         2,
         "status",
         "r",
-        "bit 0 waiting, 1 halted, 2 fault, 6:4 slot of the fault, 9:7 sticky flags (overflow, divide by zero, invalid), 10 in reset, \
-         11 drive, 17:12 what stopped the drive: fault, halt, deadline, host, stop, an output that is no number",
+        "bit 0 waiting, 1 halted, 2 fault, 6:4 slot of the fault, sticky flags: 7 overflow, 8 divide by zero, 9 invalid;, 10 in reset, \
+         11 drive, 17:12 what stopped the drive: fault, halt, deadline, host, stop, a NaN output",
     ),
     register(3, "fault", "r", "15:0 bundle, 18:16 kind, as of the Wishbone slave (docs/hardware.md)"),
     register(4, "period", "rw", "cycles from tick to tick"),

@@ -36,11 +36,11 @@ const STEP: u64 = 1024;
 /// Which robot, or robots, to drive instead of the one that the controller's model knows.
 #[derive(Args)]
 pub(crate) struct SpreadArguments {
-    /// Drive the robot of this seed: its masses, friction, encoders and clock are drawn at random (docs/robot.md). With
+    /// Drive the robot of this seed: its masses, friction, encoders and clock are drawn at random (docs/batch.md). With
     /// --monte-carlo, the first of the seeds [default: 1].
     #[arg(long, value_name = "S", value_parser = number::natural, allow_hyphen_values = true)]
     pub(crate) seed: Option<u64>,
-    /// Standard deviations of what is drawn, as TOML; what it leaves out is as stated in docs/robot.md.
+    /// Standard deviations of what is drawn, as TOML; what it leaves out is as stated in docs/batch.md.
     #[arg(long, value_name = "FILE")]
     pub(crate) spread: Option<PathBuf>,
 }

@@ -1,4 +1,4 @@
-//! A system: which peripherals at which pins of a board, and which ports of the program are their registers.
+//! A wiring: which peripherals at which pins of a board, and which ports of the program are their registers.
 //!
 //! The form of the file: docs/board.md.
 
@@ -10,14 +10,18 @@ use std::ops::Range;
 use takt_isa::program::Port;
 use takt_isa::{Program, Type};
 
-/// Peripherals of a system.
+/// Peripherals of a wiring.
 pub const PERIPHERALS: usize = 64;
+/// A period where no file says how long it is, in µs: the founding paper's.
+const PERIOD: f64 = 100.0;
+/// Bits per second of the UART where no file says them.
+const BAUD: u32 = 115_200;
 /// Cycles of a period, at most.
 pub const MOST_PERIOD: u32 = 1 << 30;
 
-/// A system.
+/// A wiring.
 #[derive(Clone, Debug, PartialEq)]
-pub struct System {
+pub struct Wiring {
     /// The core's clock in MHz.
     pub clock: f64,
     /// Cycles from tick to tick.
@@ -41,7 +45,7 @@ pub struct System {
 /// A pin with a meaning of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Signal {
-    /// Its name in system files.
+    /// Its name in wiring files.
     pub name: &'static str,
     /// Its direction, seen from the circuit.
     pub direction: Direction,
@@ -66,7 +70,7 @@ pub const SIGNALS: [Signal; 5] = [
     Signal { name: "tick", direction: Direction::Output, text: "high for a cycle at each tick" },
 ];
 
-/// A peripheral of a system.
+/// A peripheral of a wiring.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Peripheral {
     /// Its name.
@@ -91,11 +95,26 @@ pub struct Peripheral {
 pub struct Write {
     /// The program's output port.
     pub port: String,
-    /// For a port that is a number with point: the power of two by which it is multiplied before it is rounded.
+    /// For a float port: the power of two by which it is multiplied before it is rounded.
     pub scale: Option<i32>,
 }
 
-impl System {
+impl Wiring {
+    /// No peripherals: the host has all ports. The program waits for it.
+    pub fn none(board: &Board) -> Wiring {
+        Wiring {
+            clock: board.clock.1,
+            period: (PERIOD * board.clock.1) as u32,
+            lead: 0,
+            baud: BAUD,
+            autostart: false,
+            deadlines: 1,
+            host: 0,
+            signals: [const { None }; SIGNALS.len()],
+            peripherals: Vec::new(),
+        }
+    }
+
     /// What is at a pin of the board: `motor.high`, `drive`.
     pub fn at(&self, pin: &str) -> Option<String> {
         let signals = SIGNALS.iter().zip(&self.signals);
@@ -108,17 +127,17 @@ impl System {
         signal.chain(pins.filter(|(at, _)| *at == Some(pin)).map(|(_, name)| name())).next()
     }
 
-    /// Reads a system for a board, from the text of a file.
+    /// Reads a wiring for a board, from the text of a file.
     ///
     /// # Errors
     /// Everything that is wrong with it, in the order of the file.
-    pub fn read(file: &str, text: &str, board: &Board) -> Result<System, Vec<Mistake>> {
+    pub fn read(file: &str, text: &str, board: &Board) -> Result<Wiring, Vec<Mistake>> {
         let document = Document::new(file, text);
-        let system = document.top().and_then(|top| Reader::new(&document, board).system(&top));
-        document.finish(system)
+        let wiring = document.top().and_then(|top| Reader::new(&document, board).wiring(&top));
+        document.finish(wiring)
     }
 
-    /// Whether the program has the ports that the system names, with types that fit. `text` is what the system was read from.
+    /// Whether the program has the ports that the wiring names, with types that fit. `text` is what the wiring was read from.
     ///
     /// # Errors
     /// Every port that the program does not have, or that does not fit.
@@ -161,7 +180,7 @@ impl System {
         if direction == Direction::Input {
             if port.ty == Type::F {
                 let text = format!(
-                    "input port `{}` is a number with point; a register is an integer: declare it `{}:int`",
+                    "input port `{}` is a float; a register is an integer: declare it `{}:int`",
                     port.name, port.name
                 );
                 document.mistake(place, text);
@@ -174,7 +193,7 @@ impl System {
             (Type::F, None) => document.mistake(
                 place,
                 format!(
-                    "output port `{}` is a number with point: `scale` says how many steps of the register 1.0 is, as in \
+                    "output port `{}` is a float: `scale` says how many steps of the register 1.0 is, as in \
                      `scale = {{ {} = 16 }}`",
                     port.name, peripheral.kind.writes[0].name
                 ),
@@ -188,7 +207,7 @@ impl System {
     }
 }
 
-/// What reads a system.
+/// What reads a wiring.
 struct Reader<'a> {
     document: &'a Document<'a>,
     board: &'a Board,
@@ -201,11 +220,11 @@ impl<'a> Reader<'a> {
         Reader { document, board, used: BTreeMap::new() }
     }
 
-    fn system(mut self, top: &Table<'a>) -> Option<System> {
+    fn wiring(mut self, top: &Table<'a>) -> Option<Wiring> {
         let mistake = |place: &Range<usize>, text: String| self.document.mistake(place, text);
         if let Some(wanted) = top.string("board").filter(|wanted| wanted.value != self.board.name) {
             let text =
-                format!("this system is for the board `{}`, not for `{}`", wanted.value, self.board.name);
+                format!("this wiring is for the board `{}`, not for `{}`", wanted.value, self.board.name);
             mistake(&wanted.place, text);
         }
         let clock = top.number("clock", 4.0, 400.0).map_or(self.board.clock.1, |at| at.value);
@@ -272,11 +291,11 @@ impl<'a> Reader<'a> {
             peripherals.extend(self.peripheral(name, &table));
         }
         top.no_others(&[]);
-        Some(System {
+        Some(Wiring {
             clock,
             period: period?,
             lead: lead?,
-            baud: baud.map_or(115_200, |at| at.value),
+            baud: baud.map_or(BAUD, |at| at.value),
             autostart,
             deadlines,
             host,

@@ -4,10 +4,10 @@ use std::path::Path;
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::protocol::{INPUTS, LinkError, OUTPUTS};
 use takt_board::simulation::{Simulation, Turn};
-use takt_board::{Board, Host, System, top};
+use takt_board::{Board, Host, Wiring, top};
 use takt_isa::{Program, T1};
 
-const SYSTEM: &str = r#"
+const WIRING: &str = r#"
 clock = 50
 period = 40
 baud = 5_000_000
@@ -108,11 +108,11 @@ fn pulse(board: &mut Simulation) -> u32 {
 #[test]
 fn board_runs_talks_and_fails_safe() {
     let board = Board::from_name("ulx3s-85f").expect("a board").expect("a right one");
-    let system = System::read("system.toml", SYSTEM, &board).expect("a right system");
+    let wiring = Wiring::read("wiring.toml", WIRING, &board).expect("a right wiring");
     let first = program(PROGRAM);
-    system.check("system.toml", SYSTEM, &first).expect("ports fit");
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("board-system");
-    let mut sim = Simulation::new(&board, &system, &first, &folder).unwrap_or_else(|error| panic!("{error}"));
+    wiring.check("wiring.toml", WIRING, &first).expect("ports fit");
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("board-wiring");
+    let mut sim = Simulation::new(&board, &wiring, &first, &folder).unwrap_or_else(|error| panic!("{error}"));
     let encoder = [sim.input("encoder_a").expect("a pin"), sim.input("encoder_b").expect("a pin")];
 
     // From power-up, without a host: safe, then it drives. The encoder stands at 0, so half of the time each way.
