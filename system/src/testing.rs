@@ -3,7 +3,6 @@
 
 use crate::description::{Description, End, Link, LinkKind, Side, Source, Status};
 use crate::fifo::{Change, Store};
-use crate::system::initial;
 use crate::{ProgramError, ReadError, read};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::convert::Infallible;
@@ -242,7 +241,7 @@ impl Reference {
             emulator.set_blocks(false);
             let lanes = description.lanes(number);
             for lane in &lanes {
-                let _ = emulator.set_input_bits(lane.register, initial(description, lane.source));
+                let _ = emulator.set_input_bits(lane.register, description.initial(lane.source));
             }
             cores.push(ReferenceCore {
                 emulator,
@@ -352,7 +351,10 @@ impl Reference {
                 Event::Wait { cycle, .. } => {
                     waits.insert(*cycle);
                 }
-                Event::Halt { .. } => core.halted = true,
+                Event::Halt { .. } => {
+                    core.waited.get_or_insert(now);
+                    core.halted = true;
+                }
                 _ => {}
             };
             if let Err(found) = core.emulator.observed(&mut sink).step_cycle() {
@@ -515,7 +517,8 @@ impl Reference {
             core.gate.extend(core.arrived.drain(..));
             core.writes.retain(|(cycle, ..)| *cycle > now);
         }
-        if self.start.is_none() && self.cores.iter().all(|core| core.waited.is_some() || core.halted) {
+        let all = self.cores.iter().all(|core| core.waited.is_some());
+        if self.start.is_none() && all && self.cores.iter().any(|core| !core.halted) {
             let last = self.cores.iter().filter_map(|core| core.waited).max();
             let tick = description.tick;
             self.start =

@@ -9,7 +9,7 @@ mod print;
 
 pub use expression::{
     Expr, Net, Place, Select, any, binary, choose, concat, decimal, gated, hexadecimal, no, number, repeat,
-    yes,
+    string, yes,
 };
 
 use std::collections::BTreeSet;
@@ -84,7 +84,7 @@ impl Port {
 pub(crate) struct Parameter {
     pub(crate) net: Net,
     /// Unless an instance says otherwise.
-    pub(crate) value: u32,
+    pub(crate) value: Expr,
     /// Said on a line of its own before it.
     pub(crate) heading: String,
 }
@@ -178,6 +178,12 @@ impl Instance {
     /// A parameter that is a parameter of this module.
     pub(crate) fn parameter_as(mut self, name: &'static str, value: &Net) -> Instance {
         self.parameters.push((name, value.into()));
+        self
+    }
+
+    /// A parameter that is more than a number.
+    pub(crate) fn parameter_is(mut self, name: &'static str, value: Expr) -> Instance {
+        self.parameters.push((name, value));
         self
     }
 

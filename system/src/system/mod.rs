@@ -107,7 +107,7 @@ struct CoreState {
     moving: Arc<[Source]>,
     /// Whether it has no tick to come, for good.
     halted: bool,
-    /// The cycle of its first `wait`.
+    /// The cycle of its first `wait`, or of its halt before that.
     waited: Option<Cycle>,
     /// Its next tick; there only once ticks have started.
     tick: Cycle,
@@ -183,7 +183,7 @@ impl System {
             let lanes: Arc<[Lane]> = description.lanes(number).into();
             for port in &core.program.inputs {
                 let lane = lanes.iter().find(|lane| lane.register == port.register);
-                let initial = lane.map_or(0, |lane| initial(&description, lane.source));
+                let initial = lane.map_or(0, |lane| description.initial(lane.source));
                 // The port is the program's own.
                 let _ = emulator.set_input_bits(port.register, initial);
             }
@@ -314,18 +314,6 @@ impl System {
 
 pub(super) fn latched(description: &Description, end: End) -> bool {
     description.core(end).is_some_and(|core| core.program.latched)
-}
-
-/// What a port shows before anything has arrived.
-pub(crate) fn initial(description: &Description, source: Source) -> u32 {
-    match source {
-        Source::Field { link, field } => {
-            let link = &description.links[link];
-            let fifo = matches!(link.kind, LinkKind::Fifo { .. });
-            if fifo { 0 } else { link.fields[field].initial }
-        }
-        Source::Status { status, .. } => status.initial(),
-    }
 }
 
 /// The output ports of a core whose every write counts.

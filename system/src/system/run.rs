@@ -81,7 +81,7 @@ impl System {
     /// Ticks start once every core has waited, in the first cycle that is a multiple of their distance and that leaves the
     /// host and the snapshots their time.
     fn try_start(&mut self) {
-        if self.start.is_some() || self.cores.iter().any(|core| core.waited.is_none() && !core.halted) {
+        if self.start.is_some() || self.halted() || self.cores.iter().any(|core| core.waited.is_none()) {
             return;
         }
         let Some(last) = self.cores.iter().filter_map(|core| core.waited).max() else { return };
@@ -188,8 +188,12 @@ impl System {
             state.last = Some(report);
         }
         let waited = if let Ok(Stop::Wait { cycle, .. }) = stop { Some(cycle) } else { None };
-        state.waited = state.waited.or(waited);
         state.halted = stop == Ok(Stop::Halted);
+        let halted = match *state.emulator.status() {
+            Status::Halted { cycle, .. } => Some(cycle),
+            _ => None,
+        };
+        state.waited = state.waited.or(waited).or(halted);
         // Its inputs for the tick are in: on to the next one.
         if self.start.is_some() && state.taken && state.emulator.now() >= state.tick - ENDED_DELAY + delay {
             state.taken = false;
