@@ -10,7 +10,6 @@ module takt_delay #(
     parameter WIDTH  = 32
 ) (
     input  wire             clk,
-    input  wire             rst,
     input  wire             in_valid,
     input  wire [WIDTH-1:0] in,
     output wire             out_valid,
@@ -20,25 +19,24 @@ module takt_delay #(
     generate
         if (LENGTH == 0) begin : g_none
             assign {out_valid, out} = {in_valid, in};
-            wire unused = &{1'b0, clk, rst};
+            wire unused = &{1'b0, clk};
         end else if (LENGTH < 4) begin : g_line
             reg  [LENGTH*(WIDTH+1)-1:0]     line;
             wire [(LENGTH+1)*(WIDTH+1)-1:0] all = {line, in_valid, in};
             always @(posedge clk) line <= all[LENGTH*(WIDTH+1)-1:0];
             assign {out_valid, out} = all[(LENGTH+1)*(WIDTH+1)-1 -: WIDTH+1];
-            wire unused = &{1'b0, rst};
         end else begin : g_ring
             localparam BITS = $clog2(LENGTH);
-            localparam [BITS-1:0] LAST = LENGTH - 1;
+            localparam LAST = LENGTH - 1;
             (* no_rw_check *)
             reg  [WIDTH:0]  ring [0:LENGTH-1];
             reg  [WIDTH:0]  read;
             reg  [BITS-1:0] at;
-            wire [BITS-1:0] next = at == LAST ? {BITS{1'b0}} : at + 1'b1;
+            wire [BITS-1:0] next = at >= LAST[BITS-1:0] ? {BITS{1'b0}} : at + 1'b1;
             always @(posedge clk) begin
                 ring[at] <= {in_valid, in};
                 read     <= ring[next];
-                at       <= rst ? next & {BITS{at <= LAST}} : next;
+                at       <= next;
             end
             assign {out_valid, out} = read;
         end

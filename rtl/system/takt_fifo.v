@@ -45,8 +45,8 @@ module takt_fifo #(
 
     localparam WIDTH   = 32 * FIELDS;
     localparam ADDRESS = DEPTH > 1 ? $clog2(DEPTH) : 1;
-    localparam [ADDRESS-1:0] LAST = DEPTH - 1;
-    localparam [COUNT-1:0]   MOST = DEPTH, ONE = 1, NONE = 0;
+    localparam LAST    = DEPTH - 1;
+    localparam [COUNT-1:0] MOST = DEPTH, ONE = 1, NONE = 0;
 
     // ---- the sender's side
 
@@ -66,7 +66,7 @@ module takt_fifo #(
         end
     endgenerate
     takt_delay #(.LENGTH(LENGTH), .WIDTH(WIDTH)) way (
-        .clk(clk), .rst(rst), .in_valid(push), .in(sent), .out_valid(put), .out(entry)
+        .clk(clk), .in_valid(push), .in(sent), .out_valid(put), .out(entry)
     );
 
     // ---- the queue
@@ -82,7 +82,7 @@ module takt_fifo #(
     assign missed  = pop & empty;
     assign pushed  = put & (~full | popped);
     assign refused = put & full & ~popped;
-    wire [ADDRESS-1:0] second = first == LAST ? {ADDRESS{1'b0}} : first + 1'b1;
+    wire [ADDRESS-1:0] second = first == LAST[ADDRESS-1:0] ? {ADDRESS{1'b0}} : first + 1'b1;
     wire [ADDRESS-1:0] next   = popped ? second : first;
     // An entry that is the head at once has not been in the memory yet.
     assign head = is_latest ? latest : read;
@@ -93,7 +93,7 @@ module takt_fifo #(
         latest    <= entry;
         is_latest <= pushed & free == next;
         first     <= next;
-        if (pushed) free <= free == LAST ? {ADDRESS{1'b0}} : free + 1'b1;
+        if (pushed) free <= free == LAST[ADDRESS-1:0] ? {ADDRESS{1'b0}} : free + 1'b1;
         count     <= count + {{COUNT-1{1'b0}}, pushed} - {{COUNT-1{1'b0}}, popped};
         overflow  <= overflow | refused;
         underflow <= underflow | missed;
@@ -110,7 +110,7 @@ module takt_fifo #(
     // ---- back to the sender
 
     takt_delay #(.LENGTH(LENGTH), .WIDTH(COUNT + 4)) back (
-        .clk(clk), .rst(rst), .in_valid(changed), .in({empty, full, count, overflow, underflow}),
+        .clk(clk), .in_valid(changed), .in({empty, full, count, overflow, underflow}),
         .out_valid(told), .out({told_empty, told_full, told_count, told_overflow, told_underflow})
     );
 

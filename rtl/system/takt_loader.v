@@ -27,9 +27,9 @@ module takt_loader #(
 );
 
     localparam BITS = RECORDS > 1 ? $clog2(RECORDS) : 1;
-    localparam [BITS-1:0] LAST_RECORD = RECORDS - 1;
-    localparam [15:0]     LAST_CODE = (1 << CODE) - 1, LAST_DATA = (1 << DATA) - 1, LAST_SETTLE = SETTLE - 1;
-    localparam [2:0]      DATA_SLOT = SLOTS;   // beyond the slots of program memory
+    localparam LAST_RECORD = RECORDS - 1;
+    localparam [15:0] LAST_CODE = (1 << CODE) - 1, LAST_DATA = (1 << DATA) - 1, LAST_SETTLE = SETTLE - 1;
+    localparam [2:0]  DATA_SLOT = SLOTS;   // beyond the slots of program memory
 
     reg [72:0]     records [0:RECORDS-1];
     initial $readmemh(IMAGE, records);
@@ -74,7 +74,7 @@ module takt_loader #(
             end
             2'd1: begin
                 next <= next + 1'b1;
-                if (next == LAST_RECORD) begin
+                if (next == LAST_RECORD[BITS-1:0]) begin
                     address <= 16'd0;
                     state   <= 2'd2;
                 end

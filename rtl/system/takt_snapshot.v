@@ -37,7 +37,7 @@ module takt_snapshot #(
     generate
         for (f = 0; f < FIELDS; f = f + 1) begin : g_field
             takt_delay #(.LENGTH(VALUES), .WIDTH(32)) way (
-                .clk(clk), .rst(rst), .in_valid(HOST ? publish : write[f]), .in(value[32*f +: 32]),
+                .clk(clk), .in_valid(HOST ? publish : write[f]), .in(value[32*f +: 32]),
                 .out_valid(arrives[f]), .out(arrived[32*f +: 32])
             );
             always @(posedge clk) begin
@@ -52,7 +52,7 @@ module takt_snapshot #(
 
     wire nothing;
     takt_delay #(.LENGTH(PUBLISHES), .WIDTH(1)) way (
-        .clk(clk), .rst(rst), .in_valid(publish), .in(1'b0), .out_valid(publishes), .out(nothing)
+        .clk(clk), .in_valid(publish), .in(1'b0), .out_valid(publishes), .out(nothing)
     );
     wire unused = &{1'b0, nothing};
 

@@ -24,7 +24,7 @@ module takt_wire #(
     generate
         if (LATCHED == 0) begin : g_direct
             assign {sends, sent} = {write, value};
-            wire unused = &{1'b0, ended};
+            wire unused = &{1'b0, rst, ended};
         end else begin : g_latched
             reg        changed;
             reg [31:0] held;
@@ -37,7 +37,7 @@ module takt_wire #(
     endgenerate
 
     takt_delay #(.LENGTH(LENGTH), .WIDTH(32)) way (
-        .clk(clk), .rst(rst), .in_valid(sends), .in(sent), .out_valid(arrives), .out(arrived)
+        .clk(clk), .in_valid(sends), .in(sent), .out_valid(arrives), .out(arrived)
     );
 
 endmodule

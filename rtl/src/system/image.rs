@@ -28,11 +28,12 @@ pub(super) fn records(plan: &SystemPlan) -> Vec<Record> {
     records
 }
 
-/// The records for `$readmemh`.
-pub(super) fn file(plan: &SystemPlan, records: &[Record]) -> DesignFile {
+/// The records for `$readmemh`, so many of them: the last one again where there are fewer.
+pub(super) fn file(plan: &SystemPlan, records: &[Record], count: usize) -> DesignFile {
     let mut text =
         String::from("// {core, space, slot, address, value}: what takt_loader writes into the cores\n");
-    for &(core, LoadRecord { space, slot, address, value }) in records {
+    let more = records.last().into_iter().cycle().take(count.saturating_sub(records.len()));
+    for &(core, LoadRecord { space, slot, address, value }) in records.iter().chain(more) {
         let place = (core as u128) << 5 | (space as u128) << 3 | u128::from(slot);
         let word = place << 64 | u128::from(address) << 48 | u128::from(value);
         let _ = writeln!(text, "{word:019x}");

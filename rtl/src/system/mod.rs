@@ -65,6 +65,8 @@ pub struct SystemDesign {
     pub ecp5: Vec<DesignFile>,
     /// Every core's program and first values, which the top's loader reads: not Verilog.
     pub image: DesignFile,
+    /// The image's records, which the top's loader counts.
+    pub records: usize,
 }
 
 /// The circuit of a system; its top is named after `name`, of which what cannot stand in a name becomes `_`.
@@ -93,7 +95,7 @@ pub fn export_system(
     }
     let plan = SystemPlan::new(description.clone(), cores, name);
     let records = image::records(&plan);
-    let image = image::file(&plan, &records);
+    let image = image::file(&plan, &records, records.len());
     let mut files = vec![DesignFile { name: format!("{}.v", plan.top), text: top::module(&plan, &records)? }];
     for core in 0..plan.cores.len() {
         files.push(DesignFile {
@@ -114,10 +116,18 @@ pub fn export_system(
             }
         }
     }
-    Ok(SystemDesign { top: plan.top.clone(), plan, files, ecp5, image })
+    Ok(SystemDesign { top: plan.top.clone(), plan, files, ecp5, image, records: records.len() })
 }
 
 impl SystemDesign {
+    /// The image of a description that differs in its programs alone, for this circuit; `None` if it has more records than this
+    /// one's.
+    pub fn image_of(&self, description: &Description) -> Option<String> {
+        let plan = SystemPlan { description: description.clone(), ..self.plan.clone() };
+        let records = image::records(&plan);
+        (records.len() <= self.records).then(|| image::file(&plan, &records, self.records).text)
+    }
+
     /// Every file of an exported folder.
     pub fn folder(&self) -> Vec<DesignFile> {
         let base = |name: &str| name.rsplit('/').next().map(str::to_owned);

@@ -84,7 +84,7 @@ impl SystemPlan {
     }
 
     /// A net of a core in the top.
-    pub(super) fn of_core(&self, core: usize, what: &str) -> Net {
+    pub fn of_core(&self, core: usize, what: &str) -> Net {
         Net::named(format!("{}_{what}", self.description.cores[core].name))
     }
 

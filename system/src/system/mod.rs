@@ -13,7 +13,7 @@ use crate::fifo::{Fifo, FifoCounts};
 use crate::gate::Gate;
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
-use takt_emu::{Emulator, Fault, LoadError, PeriodReport};
+use takt_emu::{Emulator, Event, Fault, LoadError, PeriodReport};
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Program, Register};
 
@@ -83,6 +83,30 @@ pub enum LinkEventKind {
     Overflow,
     /// A FIFO is empty: there is no entry to be taken out.
     Underflow,
+}
+
+impl LinkEventKind {
+    /// In words.
+    pub fn text(self) -> String {
+        match self {
+            LinkEventKind::Value(value) => format!("the value 0x{value:08x} arrives"),
+            other => other.name().to_owned(),
+        }
+    }
+
+    /// In a word or two, without the value.
+    pub fn name(self) -> &'static str {
+        match self {
+            LinkEventKind::Value(_) => "value",
+            LinkEventKind::Published => "published",
+            LinkEventKind::Taken => "taken",
+            LinkEventKind::Skipped => "skipped",
+            LinkEventKind::Pushed => "pushed",
+            LinkEventKind::Popped => "popped",
+            LinkEventKind::Overflow => "overflow",
+            LinkEventKind::Underflow => "underflow",
+        }
+    }
 }
 
 /// What a core's periods came to.
@@ -157,6 +181,8 @@ pub struct System {
     starting: bool,
     fault: Option<SystemFault>,
     events: Option<Vec<LinkEvent>>,
+    /// What the cores did, each with its core.
+    recorded: Option<Vec<(usize, Event)>>,
 }
 
 /// The input ports that a bundle of the program reads.
@@ -232,6 +258,7 @@ impl System {
             starting: false,
             fault: None,
             events: None,
+            recorded: None,
         })
     }
 
@@ -296,6 +323,17 @@ impl System {
             Some(LinkState::Fifo { fifo, .. }) => fifo.store.entries.iter().cloned().collect(),
             _ => Vec::new(),
         }
+    }
+
+    /// Keeps what the cores do from now on, until it is taken. Cores then run slower: no block of bundles runs as a whole.
+    pub fn keep_core_events(&mut self) {
+        self.recorded.get_or_insert_default();
+    }
+
+    /// What the cores did since this was last asked: of each core in the order of its run. After a fault, cores that had run
+    /// ahead of it are in it with what came later.
+    pub fn take_core_events(&mut self) -> Vec<(usize, Event)> {
+        self.recorded.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
     /// Keeps the events on links from now on, until they are taken.

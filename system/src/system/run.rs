@@ -4,7 +4,7 @@ use super::{System, SystemFault, latched};
 use crate::description::{End, LinkKind, MIN_LATENCY, Side, Source};
 use crate::system::CoreState;
 use std::sync::Arc;
-use takt_emu::{Fault, Status, Stop};
+use takt_emu::{Event, Fault, Status, Stop};
 use takt_isa::timing::{Cycle, ENDED_DELAY};
 
 /// Cycles that a core runs ahead of the one that is behind all others at most, so that what is under way stays small.
@@ -177,7 +177,13 @@ impl System {
         }
         self.enter(core, now);
         let state = &mut self.cores[core];
-        let stop = state.emulator.run_to_wait_until(end);
+        let stop = match &mut self.recorded {
+            None => state.emulator.run_to_wait_until(end),
+            Some(events) => {
+                let mut sink = |event: &Event| events.push((core, event.clone()));
+                state.emulator.observed(&mut sink).run_to_wait_until(end)
+            }
+        };
         let writes = state.emulator.take_port_writes();
         if let Some(report) = state.emulator.take_period() {
             let periods = &mut state.periods;
