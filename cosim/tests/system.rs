@@ -33,7 +33,7 @@ fn machines() -> [&'static Machine; 2] {
         name: "two",
         slots: Vec::leak(vec![
             slot("sum", "a", 0, &[ADD]),
-            slot("all", "r", 64, &[ALU, MEMORY, SEQUENCER]),
+            slot("all", "r", 128, &[ALU, MEMORY, SEQUENCER]),
         ]),
         inputs,
         outputs_per_bank: 16,

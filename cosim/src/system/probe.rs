@@ -89,6 +89,7 @@ pub(super) fn module(design: &SystemDesign) -> String {
         ports.push(format!("{direction} wire {}{}", range(pin.net.width()), pin.net));
         inner.push(format!(".{0}({0})", pin.net));
     }
+    inner.extend(design.plan.status_pins().iter().map(|net| format!(".{net}()")));
     for core in 0..design.plan.cores.len() {
         for net in core_nets(design, core) {
             ports.push(format!("output wire {}c{core}_{net}", range(net.width())));

@@ -1,10 +1,12 @@
 //! Every name in the generated part of a system, and the top's pins.
 
+use super::core::STATUS;
+use super::top::DUE;
 use crate::plan::Plan;
 use crate::verilog::{Direction, Expr, Net, no};
 use takt_isa::Register;
 use takt_isa::timing::Cycle;
-use takt_system::{Description, End, Lane, LinkKind, Source, Status};
+use takt_system::{Description, End, Lane, LinkKind, Status};
 
 /// The plan of a system's circuit.
 #[derive(Clone, Debug)]
@@ -197,6 +199,13 @@ impl SystemPlan {
         pins
     }
 
+    /// The top's pins that say what it does, and are no link's: `due`, then what each core tells, core 0 lowest.
+    pub fn status_pins(&self) -> Vec<Net> {
+        let cores = self.cores.len() as u32;
+        let told = STATUS.into_iter().skip(1).map(|net| Net::named(net.name().to_owned()).wide(net.width() * cores));
+        [DUE].into_iter().chain(told).collect()
+    }
+
     /// The pin of a host's end.
     pub(super) fn pin(&self, link: usize, kind: PinKind) -> Option<Net> {
         let pins = self.pins();
@@ -215,11 +224,5 @@ impl SystemPlan {
         };
         own.or_else(first).map(|pin| pin.net.clone())
     }
-
-    /// What arrives on a lane: whether it does, and the value.
-    pub(super) fn arrival(&self, core: usize, source: Source) -> (Expr, Expr) {
-        links_arrival(self, core, source)
-    }
 }
 
-use super::links::arrival as links_arrival;

@@ -11,7 +11,7 @@ use crate::verilog::{
 use takt_system::{End, LinkKind};
 
 const RUNNING: Net = Net::bit("running");
-const DUE: Net = Net::bit("due");
+pub(super) const DUE: Net = Net::bit("due");
 const STARTS: Net = Net::bit("starts");
 const STARTED: Net = Net::bit("started");
 /// Reset of cores and links: the loader's.
@@ -48,7 +48,7 @@ pub(super) fn module(plan: &SystemPlan, records: &[Record]) -> Result<String, Mo
     }
     m.banner("pins");
     m.assign(RUNNING, !RESET);
-    for (status, pin) in STATUS.into_iter().zip(status_pins(plan)).skip(1) {
+    for (status, pin) in STATUS.into_iter().skip(1).zip(plan.status_pins().into_iter().skip(1)) {
         let each = (0..plan.cores.len()).map(|core| of(plan, core, &status).into());
         m.assign(pin, concat(each.collect::<Vec<Expr>>()));
     }
@@ -59,12 +59,6 @@ pub(super) fn module(plan: &SystemPlan, records: &[Record]) -> Result<String, Mo
 fn of(plan: &SystemPlan, core: usize, net: &Net) -> Net {
     let named = plan.of_core(core, net.name());
     if net.width() > 1 { named.wide(net.width()) } else { named }
-}
-
-/// The top's pins for what the cores tell about themselves; the first is none.
-fn status_pins(plan: &SystemPlan) -> Vec<Net> {
-    let cores = plan.cores.len() as u32;
-    STATUS.iter().map(|net| Net::named(net.name().to_owned()).wide(net.width() * cores)).collect()
 }
 
 fn heading(plan: &SystemPlan) -> Vec<String> {
@@ -118,7 +112,7 @@ fn ports(plan: &SystemPlan) -> Vec<Port> {
         ports.push(if last == Some(pin.link) { port } else { port.heading(format!("{}: {text}.", link.name)) });
         last = Some(pin.link);
     }
-    for (i, pin) in status_pins(plan).into_iter().enumerate().skip(1) {
+    for (i, pin) in plan.status_pins().into_iter().enumerate().skip(1) {
         let port = Port::new(Direction::Output, pin);
         ports.push(if i == 1 {
             port.heading(
@@ -245,7 +239,7 @@ fn instance(plan: &SystemPlan, m: &mut Module, core: usize) {
         m.unused(plan.of_core(core, "takes_unused"), plan.of_core(core, "takes"), None);
     } else {
         let (valid, value): (Vec<Expr>, Vec<Expr>) =
-            lanes.iter().map(|lane| plan.arrival(core, lane.source)).unzip();
+            lanes.iter().map(|lane| links::arrival(plan, core, lane.source)).unzip();
         let (arrives, values) = (own(&arrives(lanes.len())), own(&values(lanes.len())));
         m.define(arrives.clone(), concat(valid));
         m.define(values.clone(), concat(value));
