@@ -117,7 +117,8 @@ fn of_system(arguments: &Rtl, file: &Path, color: bool, out: &mut Out) -> Result
     }
     if arguments.json {
         let cores = design.plan.description.cores.iter();
-        let cores: Vec<_> = cores.map(|core| json!({ "name": core.name, "machine": core.program.machine.name })).collect();
+        let cores: Vec<_> =
+            cores.map(|core| json!({ "name": core.name, "machine": core.program.machine.name })).collect();
         return output::json(&json!({ "cores": cores, "top": design.top, "files": written }), out);
     }
     let folder = arguments.output.display();

@@ -352,6 +352,7 @@ pub(crate) fn show(program: &Program, event: &CircuitEvent) -> String {
         ),
         EventKind::Port => format!("output port {} takes 0x{:08x}", name(), event.value),
         EventKind::Publish => format!("output {} is published as 0x{:08x}", event.register, event.value),
+        EventKind::Input => format!("input port {} is given 0x{:08x}", name(), event.value),
         EventKind::Missed => "the deadline is missed".to_owned(),
         EventKind::Lost => "the tick is lost".to_owned(),
         EventKind::Halt => "halts".to_owned(),
@@ -387,7 +388,7 @@ pub(crate) fn fault_code(kind: &FaultKind) -> Option<u16> {
 }
 
 /// An event of which only kind and cycle are known.
-fn bare(kind: EventKind, cycle: Cycle) -> CircuitEvent {
+pub(crate) fn bare(kind: EventKind, cycle: Cycle) -> CircuitEvent {
     CircuitEvent { cycle, kind, slot: 0, address: 0, register: 0, value: 0, flags: 0 }
 }
 

@@ -244,9 +244,11 @@ pub enum EventKind {
     Fault,
     /// A `wait` issues, and what was written to an output port since the last one is what the outside sees there.
     Publish,
+    /// A value stands on the input pins: of a system, where the driver shows it.
+    Input,
 }
 
-const KINDS: [EventKind; 9] = [
+const KINDS: [EventKind; 10] = [
     EventKind::Issue,
     EventKind::Store,
     EventKind::Retire,
@@ -256,6 +258,7 @@ const KINDS: [EventKind; 9] = [
     EventKind::Halt,
     EventKind::Fault,
     EventKind::Publish,
+    EventKind::Input,
 ];
 
 /// What stands on a pin in a cycle.

@@ -20,7 +20,7 @@
 #include <cstdlib>
 #include <vector>
 
-enum Kind { ISSUE, STORE, RETIRE, PORT, MISSED, LOST, HALT, FAULT, PUBLISH, LINK };
+enum Kind { ISSUE, STORE, RETIRE, PORT, MISSED, LOST, HALT, FAULT, PUBLISH, INPUT, LINK };
 enum LinkKind { VALUE = LINK, PUBLISHED, TAKEN, SKIPPED, PUSHED, POPPED, OVERFLOWS, UNDERFLOWS };
 
 struct Event {
@@ -73,6 +73,9 @@ template <std::size_t N> static uint64_t bits(const VlWide<N> &value, unsigned l
 
 #define OBSERVE_PORT(core, slot, write, reg, value)                                                                        \
     if (write) event(PORT, cycle, 0, slot, reg, value, 0, core)
+
+#define OBSERVE_INPUT(core, write, reg, value)                                                                             \
+    if (write) event(INPUT, cycle, 0, 0, reg, value, 0, core)
 
 #define OBSERVE_LINK(link, kind, happens, value)                                                                           \
     if (happens) event(kind, cycle, 0, 0, 0, value, 0, link)

@@ -1,11 +1,11 @@
 //! A system on both sides.
 
 use super::model::{PinAction, SystemEvent, SystemSimulation};
-use crate::lockstep::{REPORT_DELAY, circuit_stops, describe, expect, show};
-use crate::model::{EventKind, ModelError};
+use crate::lockstep::{REPORT_DELAY, bare, circuit_stops, describe, expect, show};
+use crate::model::{CircuitEvent, EventKind, ModelError};
 use takt_emu::{LoadError, Status};
 use takt_isa::BundleAddress;
-use takt_isa::timing::Cycle;
+use takt_isa::timing::{Cycle, INPUT_DELAY};
 use takt_rtl::system::{Pin, PinKind, SystemPlan};
 use takt_rtl::verilog::Direction;
 use takt_system::{Description, HostError, LinkEventKind, LinkKind, System, SystemFault};
@@ -183,6 +183,12 @@ impl SystemLockstep {
         self.expected.extend(
             cores.filter_map(|(core, event)| Some(SystemEvent::Core { core, event: expect(&event)? })),
         );
+        let inputs = self.system.take_input_events().into_iter().map(|input| {
+            let register = input.register.get();
+            let event = CircuitEvent { register, value: input.value, ..bare(EventKind::Input, input.cycle) };
+            SystemEvent::Core { core: input.core, event }
+        });
+        self.expected.extend(inputs);
         self.expected.extend(self.system.take_events().into_iter().map(SystemEvent::Link));
         if now > self.simulated {
             self.actions.sort_by_key(|&(cycle, ..)| cycle);
@@ -218,23 +224,35 @@ impl SystemLockstep {
         self.check(end)
     }
 
-    /// What the host sees.
+    /// What the host sees, on each of its pins.
     fn check_pins(&mut self, now: Cycle, values: &[u32]) -> Result<(), SystemLockstepError> {
-        for output in self.system.description().outputs() {
-            let link = &self.system.description().links[output.link];
-            if matches!(link.kind, LinkKind::Fifo { .. }) && self.system.fifo_entries(output.link).is_empty() {
+        for (pin, &found) in self.pins.iter().zip(values) {
+            if pin.direction != Direction::Output {
                 continue;
             }
-            let own =
-                |pin: &Pin| pin.link == output.link && pin.kind == PinKind::Field(output.field) && pin.direction == Direction::Output;
-            let Some(pin) = self.pins.iter().position(own) else { continue };
-            let (expected, found) = (self.system.output(&output.name)?, values[pin]);
+            let link = &self.system.description().links[pin.link];
+            let expected = match (pin.kind, &link.kind) {
+                (PinKind::Status(status), _) => self.system.fifo_status(pin.link, status),
+                // Without an entry there is no head.
+                (_, LinkKind::Fifo { .. }) if self.system.fifo_entries(pin.link).is_empty() => None,
+                (PinKind::Field(field), kind) => {
+                    let name = &link.fields[field].to;
+                    let name = match kind {
+                        LinkKind::Wire => name.clone(),
+                        _ => format!("{}.{name}", link.name),
+                    };
+                    Some(self.system.output(&name)?)
+                }
+                _ => None,
+            };
+            let Some(expected) = expected else { continue };
             if expected != found {
                 let text = format!(
-                    "cycle {now}, what the host sees of {}\n  emulator: 0x{expected:08x}\n  circuit:  0x{found:08x}",
-                    output.name
+                    "cycle {now}, pin {}\n  emulator: 0x{expected:08x}\n  circuit:  0x{found:08x}",
+                    pin.net
                 );
-                return Err(Box::new(SystemDifference { cycle: now, place: output.name, text }).into());
+                let place = format!("pin {}", pin.net);
+                return Err(Box::new(SystemDifference { cycle: now, place, text }).into());
             }
             self.compared += 1;
         }
@@ -252,7 +270,9 @@ impl SystemLockstep {
             })
             .collect();
         let after_halt = |event: &SystemEvent| match event {
-            SystemEvent::Core { core, event } if matches!(event.kind, EventKind::Missed | EventKind::Lost) => {
+            SystemEvent::Core { core, event }
+                if matches!(event.kind, EventKind::Missed | EventKind::Lost) =>
+            {
                 halts[*core].is_some_and(|halt| event.cycle > halt)
             }
             SystemEvent::Link(event) if event.kind == LinkEventKind::Skipped => {
@@ -262,9 +282,16 @@ impl SystemLockstep {
             }
             _ => false,
         };
+        // The emulator puts a value on the pins when it counts.
+        let known = |event: &SystemEvent| match event {
+            SystemEvent::Core { event, .. } if event.kind == EventKind::Input => {
+                event.cycle + INPUT_DELAY < end
+            }
+            event => event.cycle() < end,
+        };
         let take = |events: &mut Vec<SystemEvent>| {
             let (mut taken, left): (Vec<_>, Vec<_>) =
-                events.drain(..).filter(|event| !after_halt(event)).partition(|event| event.cycle() < end);
+                events.drain(..).filter(|event| !after_halt(event)).partition(|event| known(event));
             *events = left;
             taken.sort_by_key(key);
             taken
@@ -310,14 +337,17 @@ impl SystemLockstep {
             Some(SystemEvent::Link(event)) => event.kind.text(),
         };
         let at = if instruction.is_empty() { String::new() } else { format!(" at {instruction}") };
-        let text =
-            format!("cycle {cycle}, {name}{at}\n  emulator: {}\n  circuit:  {}", side(emulator), side(circuit));
+        let text = format!(
+            "cycle {cycle}, {name}{at}\n  emulator: {}\n  circuit:  {}",
+            side(emulator),
+            side(circuit)
+        );
         SystemDifference { cycle, place: name, text }
     }
 }
 
 /// By what events are in order: cycle, cores before links, which of them, and the event itself.
-fn key(event: &SystemEvent) -> (Cycle, u8, usize, Option<crate::CircuitEvent>, Option<LinkEventKind>) {
+fn key(event: &SystemEvent) -> (Cycle, u8, usize, Option<CircuitEvent>, Option<LinkEventKind>) {
     match *event {
         SystemEvent::Core { core, event } => (event.cycle, 0, core, Some(event), None),
         SystemEvent::Link(event) => (event.cycle, 1, event.link, None, Some(event.kind)),

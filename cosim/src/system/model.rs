@@ -150,7 +150,7 @@ impl SystemSimulation {
 }
 
 /// The driver's first kind that is a link's.
-const LINK: u32 = 9;
+const LINK: u32 = 10;
 
 fn event(words: &[u32]) -> Option<SystemEvent> {
     let (cycle, place) = (Cycle::from(words[1]), words[7] as usize);

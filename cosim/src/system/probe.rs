@@ -14,6 +14,9 @@ fn core_nets(design: &SystemDesign, core: usize) -> Vec<Net> {
     let plan = &design.plan.cores[core];
     let mut nets = vec![
         net::RST,
+        net::INPUT_WRITE,
+        plan.input_index(),
+        net::INPUT_VALUE,
         net::ISSUED,
         net::ISSUED_ADDRESS,
         net::STORED,
@@ -56,7 +59,8 @@ fn link_nets(design: &SystemDesign) -> Vec<LinkNet> {
             LinkKind::Snapshot { .. } => {
                 nets.push((number, "PUBLISHED", of("published"), None));
                 if let End::Core(core) = link.to {
-                    let [take, takes] = ["take", "takes"].map(|what| format!("system.{}", plan.of_core(core, what)));
+                    let [take, takes] =
+                        ["take", "takes"].map(|what| format!("system.{}", plan.of_core(core, what)));
                     nets.push((number, "TAKEN", takes.clone(), None));
                     nets.push((number, "SKIPPED", format!("{take} & ~{takes}"), None));
                 }
@@ -81,7 +85,8 @@ fn range(width: u32) -> String {
 
 /// The module's text: the host's pins go through, everything else comes out.
 pub(super) fn module(design: &SystemDesign) -> String {
-    let mut ports = vec!["input wire clk".to_owned(), "input wire rst".to_owned(), "output wire running".to_owned()];
+    let mut ports =
+        vec!["input wire clk".to_owned(), "input wire rst".to_owned(), "output wire running".to_owned()];
     let mut inner = vec![".clk(clk)".to_owned(), ".rst(rst)".to_owned(), ".running(running)".to_owned()];
     let mut body = String::new();
     for pin in design.plan.pins() {
@@ -138,6 +143,12 @@ pub(super) fn header(design: &SystemDesign) -> String {
     for (core, plan) in design.plan.cores.iter().enumerate() {
         let machine = plan.machine;
         let _ = writeln!(text, "    OBSERVE_CORE({core}, {}, c{core}_);", machine.slots.len());
+        let _ = writeln!(
+            text,
+            "    OBSERVE_INPUT({core}, top->c{core}_input_write && !top->c{core}_rst, {} + top->c{core}_input_index, \
+             top->c{core}_input_value);",
+            machine.inputs.base
+        );
         for (s, slot) in machine.slots.iter().enumerate() {
             let b = slot.bank.name;
             let first = slot.bank.base + slot.bank.depth - machine.outputs_per_bank;

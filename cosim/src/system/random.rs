@@ -31,11 +31,14 @@ pub struct Coverage {
     pub missed: u64,
 }
 
-/// A random system, and others that differ from it in their programs alone: one circuit, with other contents of its memories.
-///
-/// Ports, and what the loader writes to output ports, are the first one's: they are part of the circuit.
+/// A random system, and others that differ from it in their programs alone: as [`variants`] of it.
 pub fn systems(seed: u64, machines: &[&'static Machine], count: u64) -> Vec<Description> {
-    let first = random_description(seed, machines);
+    variants(random_description(seed, machines), seed, count)
+}
+
+/// A system of random programs, and others that differ from it in their programs alone: one circuit, with other contents of its
+/// memories. Ports, and what the loader writes to output ports, are the first one's: they are part of the circuit.
+pub fn variants(first: Description, seed: u64, count: u64) -> Vec<Description> {
     let others = (1..count).map(|number| {
         let mut other = first.clone();
         for (i, core) in other.cores.iter_mut().enumerate() {
@@ -50,13 +53,15 @@ pub fn systems(seed: u64, machines: &[&'static Machine], count: u64) -> Vec<Desc
 
 fn another(first: &Program, seed: u64) -> Program {
     let machine = first.machine;
-    let bundles = 20 + Random::new(seed).below(30);
+    // Few, so that a port is not written in every period; many, so that periods are longer than ticks are apart.
+    let bundles = 2 + Random::new(seed).below(45);
     let program = random_program(seed, machine, Options { bundles, ..Options::TAME });
     let presets: BTreeMap<_, _> =
         first.constants.iter().copied().filter(|(register, _)| machine.is_output(*register)).collect();
-    let constants = program.constants.iter().map(|&(register, bits)| {
-        (register, presets.get(&register).copied().unwrap_or(bits))
-    });
+    let constants = program
+        .constants
+        .iter()
+        .map(|&(register, bits)| (register, presets.get(&register).copied().unwrap_or(bits)));
     let constants = constants.collect();
     Program { latched: first.latched, constants, ..program }
 }

@@ -118,17 +118,33 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
         nets.iter().for_each(|net| m.wires([net.clone()]));
         bus.extend(nets);
     }
-    let unused = [own.retire(), own.retire_address(), own.retire_register(), own.retire_value(), own.retire_flags()];
+    let unused =
+        [own.retire(), own.retire_address(), own.retire_register(), own.retire_value(), own.retire_flags()];
     let open = [
-        net::READ_VALUE, net::TICK_MISSED, net::TICK_LOST, net::ISSUED, net::ISSUED_ADDRESS, net::STORED,
-        net::STORED_ADDRESS, net::STORED_VALUE, net::STATUS,
+        net::READ_VALUE,
+        net::TICK_MISSED,
+        net::TICK_LOST,
+        net::ISSUED,
+        net::ISSUED_ADDRESS,
+        net::STORED,
+        net::STORED_ADDRESS,
+        net::STORED_VALUE,
+        net::STATUS,
     ];
     let open: Vec<Net> = open.into_iter().chain(unused).collect();
     open.iter().for_each(|net| m.wires([net.clone()]));
     m.instance(
         Instance::new(own.top(), "core")
             .parameter("LATCHED", known.program.latched_inputs().into())
-            .same([net::CLK, net::RST, net::LOAD, net::LOAD_SPACE, net::LOAD_SLOT, net::LOAD_ADDRESS, net::LOAD_VALUE])
+            .same([
+                net::CLK,
+                net::RST,
+                net::LOAD,
+                net::LOAD_SPACE,
+                net::LOAD_SLOT,
+                net::LOAD_ADDRESS,
+                net::LOAD_VALUE,
+            ])
             .port("input_write", LOAD_INPUT | gate_write)
             .port(
                 "input_index",
@@ -141,7 +157,11 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
             .same(STATUS)
             .same(open.clone()),
     );
-    m.unused(Net::bit("unused"), concat(open.iter().map(Into::into).collect::<Vec<crate::verilog::Expr>>()), None);
+    m.unused(
+        Net::bit("unused"),
+        concat(open.iter().map(Into::into).collect::<Vec<crate::verilog::Expr>>()),
+        None,
+    );
 
     if !outputs.is_empty() {
         m.banner("output ports");

@@ -12,17 +12,15 @@ pub(super) type Record = (usize, LoadRecord);
 pub(super) fn records(plan: &SystemPlan) -> Vec<Record> {
     let mut records = Vec::new();
     for (number, core) in plan.description.cores.iter().enumerate() {
-        let cleared = |record: &LoadRecord| {
-            matches!(record.space, Space::Program | Space::Data) && record.value == 0
-        };
+        let cleared =
+            |record: &LoadRecord| matches!(record.space, Space::Program | Space::Data) && record.value == 0;
         let loaded = load_records(&core.program).into_iter().filter(|record| !cleared(record));
         records.extend(loaded.map(|record| (number, record)));
         let machine = core.program.machine;
         for lane in &plan.lanes[number] {
             let Some(index) = machine.inputs.index(lane.register) else { continue };
             let value = plan.description.initial(lane.source).into();
-            records
-                .push((number, LoadRecord { space: Space::Input, slot: 0, address: index.get(), value }));
+            records.push((number, LoadRecord { space: Space::Input, slot: 0, address: index.get(), value }));
         }
     }
     records

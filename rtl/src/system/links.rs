@@ -102,7 +102,10 @@ fn wire(plan: &SystemPlan, m: &mut Module, number: usize, link: &Link, reset: &N
         m.regs([seen.clone()]);
         m.clocked(vec![
             crate::verilog::when(arrives, vec![crate::verilog::set(&seen, arrived)]),
-            crate::verilog::when(reset, vec![crate::verilog::set(&seen, decimal(32, link.fields[0].initial))]),
+            crate::verilog::when(
+                reset,
+                vec![crate::verilog::set(&seen, decimal(32, link.fields[0].initial))],
+            ),
         ]);
         m.assign(shown, seen);
     }

@@ -202,7 +202,8 @@ impl SystemPlan {
     /// The top's pins that say what it does, and are no link's: `due`, then what each core tells, core 0 lowest.
     pub fn status_pins(&self) -> Vec<Net> {
         let cores = self.cores.len() as u32;
-        let told = STATUS.into_iter().skip(1).map(|net| Net::named(net.name().to_owned()).wide(net.width() * cores));
+        let told =
+            STATUS.into_iter().skip(1).map(|net| Net::named(net.name().to_owned()).wide(net.width() * cores));
         [DUE].into_iter().chain(told).collect()
     }
 
@@ -225,4 +226,3 @@ impl SystemPlan {
         own.or_else(first).map(|pin| pin.net.clone())
     }
 }
-

@@ -5,9 +5,7 @@ use super::image::Record;
 use super::{SystemPlan, links};
 use crate::export::RESET_CYCLES;
 use crate::plan::names::net;
-use crate::verilog::{
-    Direction, Expr, Instance, Module, ModuleError, Net, Parameter, Port, concat, string,
-};
+use crate::verilog::{Direction, Expr, Instance, Module, ModuleError, Net, Parameter, Port, concat, string};
 use takt_system::{End, LinkKind};
 
 const RUNNING: Net = Net::bit("running");
@@ -109,7 +107,11 @@ fn ports(plan: &SystemPlan) -> Vec<Port> {
             (_, LinkKind::Snapshot { .. }) => "the set that was published last",
             (_, LinkKind::Wire) => "the value that arrived last",
         };
-        ports.push(if last == Some(pin.link) { port } else { port.heading(format!("{}: {text}.", link.name)) });
+        ports.push(if last == Some(pin.link) {
+            port
+        } else {
+            port.heading(format!("{}: {text}.", link.name))
+        });
         last = Some(pin.link);
     }
     for (i, pin) in plan.status_pins().into_iter().enumerate().skip(1) {

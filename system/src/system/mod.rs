@@ -8,7 +8,7 @@ mod host;
 mod links;
 mod run;
 
-use crate::description::{Description, End, Lane, Link, LinkKind, Source};
+use crate::description::{Description, End, Lane, Link, LinkKind, Source, Status};
 use crate::fifo::{Fifo, FifoCounts};
 use crate::gate::Gate;
 use std::collections::{BTreeSet, VecDeque};
@@ -83,6 +83,19 @@ pub enum LinkEventKind {
     Overflow,
     /// A FIFO is empty: there is no entry to be taken out.
     Underflow,
+}
+
+/// A value on a core's input pins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct InputEvent {
+    /// The cycle.
+    pub cycle: Cycle,
+    /// The core.
+    pub core: usize,
+    /// The input port.
+    pub register: Register,
+    /// Its new value.
+    pub value: u32,
 }
 
 impl LinkEventKind {
@@ -183,6 +196,8 @@ pub struct System {
     events: Option<Vec<LinkEvent>>,
     /// What the cores did, each with its core.
     recorded: Option<Vec<(usize, Event)>>,
+    /// What stood on the cores' input pins.
+    inputs: Option<Vec<InputEvent>>,
 }
 
 /// The input ports that a bundle of the program reads.
@@ -259,6 +274,7 @@ impl System {
             fault: None,
             events: None,
             recorded: None,
+            inputs: None,
         })
     }
 
@@ -317,6 +333,14 @@ impl System {
         }
     }
 
+    /// What a FIFO tells about itself now; `None` for other links.
+    pub fn fifo_status(&self, link: usize, status: Status) -> Option<u32> {
+        match self.links.get(link)? {
+            LinkState::Fifo { fifo, .. } => Some(fifo.store.status(status)),
+            _ => None,
+        }
+    }
+
     /// Entries of a FIFO now, the head first; none of other links.
     pub fn fifo_entries(&self, link: usize) -> Vec<Vec<u32>> {
         match self.links.get(link) {
@@ -328,6 +352,15 @@ impl System {
     /// Keeps what the cores do from now on, until it is taken. Cores then run slower: no block of bundles runs as a whole.
     pub fn keep_core_events(&mut self) {
         self.recorded.get_or_insert_default();
+        self.inputs.get_or_insert_default();
+    }
+
+    /// What stood on the cores' input pins since this was last asked, by cycle; that of the last
+    /// [`INPUT_DELAY`](takt_isa::timing::INPUT_DELAY) cycles comes with the next run.
+    pub fn take_input_events(&mut self) -> Vec<InputEvent> {
+        let mut inputs = self.inputs.as_mut().map(std::mem::take).unwrap_or_default();
+        inputs.sort();
+        inputs
     }
 
     /// What the cores did since this was last asked: of each core in the order of its run. After a fault, cores that had run

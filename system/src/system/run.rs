@@ -1,6 +1,6 @@
 //! Running ahead: each core to where it needs to know of others.
 
-use super::{System, SystemFault, latched};
+use super::{InputEvent, System, SystemFault, latched};
 use crate::description::{End, LinkKind, MIN_LATENCY, Side, Source};
 use crate::system::CoreState;
 use std::sync::Arc;
@@ -133,9 +133,14 @@ impl System {
     fn enter(&mut self, core: usize, now: Cycle) {
         let delay = self.description.cores[core].input_delay();
         let CoreState { emulator, gate, lanes, .. } = &mut self.cores[core];
-        gate.run((now + 1).saturating_sub(delay), |lane, value| {
+        let inputs = &mut self.inputs;
+        gate.run((now + 1).saturating_sub(delay), |cycle, lane, value| {
+            let register = lanes[lane].register;
             // A lane's port is an input.
-            let _ = emulator.set_input_bits(lanes[lane].register, value);
+            let _ = emulator.set_input_bits(register, value);
+            if let Some(inputs) = inputs {
+                inputs.push(InputEvent { cycle, core, register, value });
+            }
         });
     }
 
