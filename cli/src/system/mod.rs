@@ -1,6 +1,8 @@
 //! Systems of several cores: their files, and the commands that take them.
 
 pub(crate) mod bound;
+pub(crate) mod cosim;
+mod host;
 pub(crate) mod run;
 
 use crate::fault;

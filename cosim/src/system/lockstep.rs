@@ -101,51 +101,89 @@ impl SystemLockstep {
         self.simulation
     }
 
+    /// As [`System::set_input`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn set_input(&mut self, name: &str, bits: u32) -> Result<(), SystemLockstepError> {
+        self.system.set_input(name, bits)?;
+        let description = self.system.description();
+        let own = |pin: &&Pin| {
+            let link = &description.links[pin.link];
+            let PinKind::Field(field) = pin.kind else { return false };
+            pin.direction == Direction::Input
+                && match link.kind {
+                    LinkKind::Wire => link.fields[field].from == name,
+                    _ => name
+                        .strip_prefix(&link.name)
+                        .and_then(|rest| rest.strip_prefix('.'))
+                        .is_some_and(|name| name == link.fields[field].from),
+                }
+        };
+        let Some(link) = self.pins.iter().find(own).map(|pin| pin.link) else { return Ok(()) };
+        let wire = matches!(description.links[link].kind, LinkKind::Wire);
+        let pin = self.pins.iter().position(|pin| own(&pin));
+        self.actions.extend(pin.map(|pin| (self.system.now(), pin, bits)));
+        if wire {
+            self.strobe(link, PinKind::Send);
+        }
+        Ok(())
+    }
+
+    /// As [`System::publish`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn publish(&mut self, link: usize) -> Result<(), SystemLockstepError> {
+        self.system.publish(link)?;
+        self.strobe(link, PinKind::Send);
+        Ok(())
+    }
+
+    /// As [`System::push`]; no more than one a cycle.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn push(&mut self, link: usize) -> Result<bool, SystemLockstepError> {
+        let room = self.system.push(link)?;
+        self.strobe(link, PinKind::Send);
+        Ok(room)
+    }
+
+    fn strobe(&mut self, link: usize, kind: PinKind) {
+        let pin = self.pins.iter().position(|pin| pin.link == link && pin.kind == kind);
+        self.actions.extend(pin.map(|pin| (self.system.now(), pin, 1)));
+    }
+
     /// The host writes all fields of a link that it drives: of a wire its value, of a snapshot what it publishes, of a FIFO an
     /// entry. False if a FIFO is full, as far as the host can know.
     ///
     /// # Errors
     /// If it drives no such link.
     pub fn write(&mut self, link: usize, values: &[u32]) -> Result<bool, SystemLockstepError> {
-        let now = self.system.now();
-        let known = self.system.description().links.get(link).cloned();
         let unknown = || HostError::Unknown { what: "link from the host", name: link.to_string() };
-        let known = known.ok_or_else(unknown)?;
+        let known = self.system.description().links.get(link).cloned().ok_or_else(unknown)?;
         for (field, &value) in known.fields.iter().zip(values) {
-            let name = match known.kind {
-                LinkKind::Wire => field.from.clone(),
-                _ => format!("{}.{}", known.name, field.from),
-            };
-            self.system.set_input(&name, value)?;
-        }
-        let room = match known.kind {
-            LinkKind::Wire => true,
-            LinkKind::Snapshot { .. } => self.system.publish(link).map(|()| true)?,
-            LinkKind::Fifo { .. } => self.system.push(link)?,
-        };
-        for (number, pin) in self.pins.iter().enumerate() {
-            if pin.link == link && pin.direction == Direction::Input {
-                let value = match pin.kind {
-                    PinKind::Field(field) => values.get(field).copied(),
-                    PinKind::Send => Some(1),
-                    PinKind::Pop | PinKind::Status(_) => None,
-                };
-                self.actions.extend(value.map(|value| (now, number, value)));
+            match known.kind {
+                LinkKind::Wire => self.set_input(&field.from, value)?,
+                _ => self.set_input(&format!("{}.{}", known.name, field.from), value)?,
             }
         }
-        Ok(room)
+        match known.kind {
+            LinkKind::Wire => Ok(true),
+            LinkKind::Snapshot { .. } => self.publish(link).map(|()| true),
+            LinkKind::Fifo { .. } => self.push(link),
+        }
     }
 
-    /// The host takes the head of a FIFO; `None` if it is empty.
+    /// The host takes the head of a FIFO; `None` if it is empty. No more than one a cycle.
     ///
     /// # Errors
     /// If there is no such FIFO.
     pub fn pop(&mut self, link: usize) -> Result<Option<Vec<u32>>, SystemLockstepError> {
         let head = self.system.pop(link)?;
         if head.is_some() {
-            let own = |pin: &Pin| pin.link == link && pin.kind == PinKind::Pop;
-            let pin = self.pins.iter().position(own);
-            self.actions.extend(pin.map(|pin| (self.system.now(), pin, 1)));
+            self.strobe(link, PinKind::Pop);
         }
         Ok(head)
     }

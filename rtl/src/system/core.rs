@@ -1,8 +1,9 @@
 //! A core of a system with its gate, and the writes to its output ports told apart.
 
 use super::SystemPlan;
+use super::plan::OutputPort;
 use crate::plan::names::net;
-use crate::verilog::{Direction, Instance, Module, ModuleError, Net, Port, concat, decimal};
+use crate::verilog::{Direction, Expr, Instance, Module, ModuleError, Net, Port, choose, concat, decimal};
 use takt_isa::{Bank, BankIndex, Register};
 
 /// Whether the loader writes an input port of this core.
@@ -60,7 +61,9 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
             ),
             _ => write,
         });
-        ports.push(output(Net::named(format!("{}_value", port_name(&port.name))).wide(32)));
+        if port.sent {
+            ports.push(output(Net::named(format!("{}_value", port_name(&port.name))).wide(32)));
+        }
     }
     for (i, status) in STATUS.into_iter().enumerate() {
         let port = output(status);
@@ -112,15 +115,27 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
 
     m.banner("the core");
     m.comment("In reset the loader writes input ports, with what they show before anything has arrived.");
-    let mut bus = Vec::new();
+    let used: Vec<(&Bank, u16, &OutputPort)> =
+        outputs.iter().filter_map(|port| place(plan, core, port)).collect();
+    let (mut bus, mut open) = (Vec::new(), Vec::new());
     for slot in own.machine.slots {
-        let nets = [own.output_write(&slot.bank), own.output_index(&slot.bank), own.output_value(&slot.bank)];
-        nets.iter().for_each(|net| m.wires([net.clone()]));
-        bus.extend(nets);
+        let bank = slot.bank;
+        let sent: Vec<bool> =
+            used.iter().filter(|(own, ..)| **own == bank).map(|(.., port)| port.sent).collect();
+        for (net, used) in [
+            (own.output_write(&bank), !sent.is_empty()),
+            (own.output_index(&bank), !sent.is_empty()),
+            (own.output_value(&bank), sent.contains(&true)),
+        ] {
+            if used {
+                m.wires([net.clone()]);
+                bus.push(net);
+            } else {
+                open.push(net);
+            }
+        }
     }
-    let unused =
-        [own.retire(), own.retire_address(), own.retire_register(), own.retire_value(), own.retire_flags()];
-    let open = [
+    open.extend([
         net::READ_VALUE,
         net::TICK_MISSED,
         net::TICK_LOST,
@@ -129,10 +144,13 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
         net::STORED,
         net::STORED_ADDRESS,
         net::STORED_VALUE,
+        own.retire(),
+        own.retire_address(),
+        own.retire_register(),
+        own.retire_value(),
+        own.retire_flags(),
         net::STATUS,
-    ];
-    let open: Vec<Net> = open.into_iter().chain(unused).collect();
-    open.iter().for_each(|net| m.wires([net.clone()]));
+    ]);
     m.instance(
         Instance::new(own.top(), "core")
             .parameter("LATCHED", known.program.latched_inputs().into())
@@ -146,33 +164,26 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
                 net::LOAD_VALUE,
             ])
             .port("input_write", LOAD_INPUT | gate_write)
-            .port(
-                "input_index",
-                crate::verilog::choose(net::RST, net::LOAD_ADDRESS.low(own.input_bits), gate_index),
-            )
-            .port("input_value", crate::verilog::choose(net::RST, net::LOAD_VALUE.low(32), gate_value))
+            .port("input_index", choose(net::RST, net::LOAD_ADDRESS.low(own.input_bits), gate_index))
+            .port("input_value", choose(net::RST, net::LOAD_VALUE.low(32), gate_value))
             .same(bus)
             .port("read_output", decimal(own.port_bits, 0_u32))
             .same([net::TICK])
             .same(STATUS)
-            .same(open.clone()),
-    );
-    m.unused(
-        Net::bit("unused"),
-        concat(open.iter().map(Into::into).collect::<Vec<crate::verilog::Expr>>()),
-        None,
+            .open(open.iter().map(Net::name)),
     );
 
     if !outputs.is_empty() {
         m.banner("output ports");
         m.comment("What the loader writes there in reset is not sent: links begin with it.");
-        for port in &outputs {
-            let Some((bank, index)) = place(plan, core, port.register) else { continue };
+        for (bank, index, port) in used {
             let write = Net::named(format!("{}_write", port_name(&port.name)));
-            let at = crate::verilog::Expr::from(own.output_index(bank)).is(decimal(own.port_bits, index));
+            let at = Expr::from(own.output_index(bank)).is(decimal(own.port_bits, index));
             m.assign(write, own.output_write(bank) & at & !net::RST);
-            let value = Net::named(format!("{}_value", port_name(&port.name))).wide(32);
-            m.assign(value, own.output_value(bank));
+            if port.sent {
+                let value = Net::named(format!("{}_value", port_name(&port.name))).wide(32);
+                m.assign(value, own.output_value(bank));
+            }
         }
     }
     m.finish()
@@ -184,8 +195,12 @@ pub(super) fn port_name(name: &str) -> String {
 }
 
 /// The bank that has an output port, and the port's number in it.
-fn place(plan: &SystemPlan, core: usize, register: Register) -> Option<(&'static Bank, u16)> {
+fn place<'a>(
+    plan: &SystemPlan,
+    core: usize,
+    port: &'a OutputPort,
+) -> Option<(&'static Bank, u16, &'a OutputPort)> {
     let machine = plan.cores[core].machine;
-    let slot = machine.slots.iter().find(|slot| slot.bank.index(register).is_some())?;
-    Some((&slot.bank, machine.output_number(register)?))
+    let slot = machine.slots.iter().find(|slot| slot.bank.index(port.register).is_some())?;
+    Some((&slot.bank, machine.output_number(port.register)?, port))
 }

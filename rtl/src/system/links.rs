@@ -127,8 +127,9 @@ fn snapshot(plan: &SystemPlan, m: &mut Module, number: usize, link: &Link, reset
         .parameter_is("INITIAL", initial(link))
         .port("write", write)
         .port("value", value)
-        .port("publish", publish);
-    outputs(plan, m, number, instance, &[("published", 1), ("shown", 32 * count)]);
+        .port("publish", publish)
+        .open(["published"]);
+    outputs(plan, m, number, instance, &[("shown", 32 * count)]);
     host_fields(plan, m, number, link, "shown");
 }
 
@@ -165,7 +166,8 @@ fn fifo(plan: &SystemPlan, m: &mut Module, number: usize, link: &Link, reset: &N
         .port("write", write)
         .port("value", value)
         .port("push", push)
-        .port("pop", pop);
+        .port("pop", pop)
+        .open(["pushed", "popped", "refused", "missed"]);
     let ports = [
         ("head", 32 * fields),
         ("another", 1),
@@ -181,10 +183,6 @@ fn fifo(plan: &SystemPlan, m: &mut Module, number: usize, link: &Link, reset: &N
         ("told_count", count),
         ("told_overflow", 1),
         ("told_underflow", 1),
-        ("pushed", 1),
-        ("popped", 1),
-        ("refused", 1),
-        ("missed", 1),
     ];
     outputs(plan, m, number, instance, &ports);
     host_fields(plan, m, number, link, "head");

@@ -51,6 +51,8 @@ pub enum PinKind {
 pub(super) struct OutputPort {
     pub(super) register: Register,
     pub(super) name: String,
+    /// Whether its value is sent; else only that it is written.
+    pub(super) sent: bool,
 }
 
 impl SystemPlan {
@@ -98,24 +100,23 @@ impl SystemPlan {
     /// The output ports of a core that links use, each once.
     pub(super) fn outputs(&self, core: usize) -> Vec<OutputPort> {
         let here = End::Core(core);
-        let mut registers: Vec<Register> = Vec::new();
+        let mut used: Vec<(Register, bool)> = Vec::new();
         for link in &self.description.links {
-            let mut used: Vec<Register> = Vec::new();
+            let mut add =
+                |register: Register, sent: bool| match used.iter_mut().find(|(own, _)| *own == register) {
+                    Some((_, known)) => *known |= sent,
+                    None => used.push((register, sent)),
+                };
             if link.from == here {
-                used.extend(link.fields.iter().filter_map(|field| field.output));
+                link.fields.iter().filter_map(|field| field.output).for_each(|register| add(register, true));
                 match link.kind {
-                    LinkKind::Snapshot { strobe } => used.extend(strobe),
-                    LinkKind::Fifo { push, .. } => used.extend(push),
-                    LinkKind::Wire => {}
+                    LinkKind::Snapshot { strobe: Some(strobe) } => add(strobe, false),
+                    LinkKind::Fifo { push: Some(push), .. } => add(push, false),
+                    _ => {}
                 }
             }
             if let (LinkKind::Fifo { pop: Some(pop), .. }, true) = (&link.kind, link.to == here) {
-                used.push(*pop);
-            }
-            for register in used {
-                if !registers.contains(&register) {
-                    registers.push(register);
-                }
+                add(*pop, false);
             }
         }
         let program = &self.description.cores[core].program;
@@ -123,7 +124,18 @@ impl SystemPlan {
             let port = program.outputs.iter().find(|port| port.register == register);
             port.map_or_else(|| program.register_text(register), |port| port.name.clone())
         };
-        registers.into_iter().map(|register| OutputPort { register, name: name(register) }).collect()
+        used.into_iter().map(|(register, sent)| OutputPort { register, name: name(register), sent }).collect()
+    }
+
+    /// Whether a link goes by the `wait`s of a core.
+    pub(super) fn is_waited_for(&self, core: usize) -> bool {
+        let latched = self.description.cores[core].program.latched;
+        let own = self.description.links.iter().filter(|link| link.from == End::Core(core));
+        own.into_iter().any(|link| match link.kind {
+            LinkKind::Wire => latched,
+            LinkKind::Snapshot { strobe } => strobe.is_none(),
+            LinkKind::Fifo { .. } => false,
+        })
     }
 
     fn port_net(&self, end: End, register: Option<Register>, what: &str) -> Option<Net> {

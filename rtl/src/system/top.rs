@@ -11,7 +11,6 @@ use takt_system::{End, LinkKind};
 const RUNNING: Net = Net::bit("running");
 pub(super) const DUE: Net = Net::bit("due");
 const STARTS: Net = Net::bit("starts");
-const STARTED: Net = Net::bit("started");
 /// Reset of cores and links: the loader's.
 const RESET: Net = Net::bit("reset");
 const STOP: Net = Net::bit("stop");
@@ -28,12 +27,14 @@ pub(super) fn module(plan: &SystemPlan, records: &[Record]) -> Result<String, Mo
     start(plan, &mut m);
     m.banner("what the cores tell");
     for core in 0..plan.cores.len() {
-        for status in STATUS {
+        for status in STATUS.into_iter().filter(|status| shown(plan, core, status)) {
             m.wires([of(plan, core, &status)]);
         }
         for port in plan.outputs(core) {
             m.wires([plan.of_core(core, &format!("{}_write", port.name))]);
-            m.wires([plan.of_core(core, &format!("{}_value", port.name)).wide(32)]);
+            if port.sent {
+                m.wires([plan.of_core(core, &format!("{}_value", port.name)).wide(32)]);
+            }
         }
     }
     let cores = 0..plan.cores.len();
@@ -51,6 +52,11 @@ pub(super) fn module(plan: &SystemPlan, records: &[Record]) -> Result<String, Mo
         m.assign(pin, concat(each.collect::<Vec<Expr>>()));
     }
     m.finish()
+}
+
+/// Whether the top uses what a core tells: everything but its `ended`, which is for some links.
+fn shown(plan: &SystemPlan, core: usize, status: &Net) -> bool {
+    *status != net::ENDED || plan.is_waited_for(core)
 }
 
 /// A net of a core's status.
@@ -171,7 +177,7 @@ fn start(plan: &SystemPlan, m: &mut Module) {
         "docs/system.md, Base ticks: they start by themselves, once every core has waited for the first time, or halted.",
     );
     m.blank();
-    m.wires([STARTS, STARTED]);
+    m.wires([STARTS]);
     let cores = plan.cores.len() as u32;
     let tick = plan.description.tick;
     m.instance(
@@ -186,9 +192,8 @@ fn start(plan: &SystemPlan, m: &mut Module) {
             .port("halted", Net::named(net::HALTED.name().to_owned()).wide(cores))
             .port("starts", STARTS)
             .port("due", DUE)
-            .port("started", STARTED),
+            .open(["started"]),
     );
-    m.unused(Net::bit("started_unused"), STARTED, None);
 }
 
 fn ticks(plan: &SystemPlan, m: &mut Module) {
@@ -201,27 +206,29 @@ fn ticks(plan: &SystemPlan, m: &mut Module) {
             core.period(plan.description.tick),
             plan.description.taking(number)
         ));
-        let names = ["tick", "take", "takes"].map(|what| plan.of_core(number, what));
-        let [tick, take, takes] = names;
-        m.wires([tick.clone(), take.clone()]);
+        let [tick, take, takes] = ["tick", "take", "takes"].map(|what| plan.of_core(number, what));
+        m.wires([tick.clone()]);
         let snapshots = plan.description.snapshot_lanes(number);
         let period = core.period(plan.description.tick);
         let most = (period - 1).max(plan.lead() + core.offset).max(snapshots + 1);
-        m.instance(
-            Instance::new("takt_pace", format!("pace_{}", core.name))
-                .parameter("PERIOD", period as u32)
-                .parameter("OFFSET", core.offset as u32)
-                .parameter("LEAD", plan.lead() as u32)
-                .parameter("SNAPSHOTS", snapshots as u32)
-                .parameter("BITS", bits(most))
-                .port("clk", net::CLK)
-                .port("rst", RESET)
-                .port("starts", STARTS)
-                .port("stop", STOP)
-                .port("tick", tick)
-                .port("take", take.clone()),
-        );
-        m.define(takes, take & of(plan, number, &net::WAITING));
+        let pace = Instance::new("takt_pace", format!("pace_{}", core.name))
+            .parameter("PERIOD", period as u32)
+            .parameter("OFFSET", core.offset as u32)
+            .parameter("LEAD", plan.lead() as u32)
+            .parameter("SNAPSHOTS", snapshots as u32)
+            .parameter("BITS", bits(most))
+            .port("clk", net::CLK)
+            .port("rst", RESET)
+            .port("starts", STARTS)
+            .port("stop", STOP)
+            .port("tick", tick);
+        if snapshots == 0 {
+            m.instance(pace.open(["take"]));
+        } else {
+            m.wires([take.clone()]);
+            m.instance(pace.port("take", take.clone()));
+            m.define(takes, take & of(plan, number, &net::WAITING));
+        }
     }
 }
 
@@ -237,9 +244,7 @@ fn instance(plan: &SystemPlan, m: &mut Module, core: usize) {
         .port(LOAD_INPUT.name(), Net::bus("loads_input", plan.cores.len() as u32).at(core as u32))
         .same([net::LOAD_SPACE, net::LOAD_SLOT, net::LOAD_ADDRESS, net::LOAD_VALUE])
         .port("tick", plan.of_core(core, "tick"));
-    if lanes.is_empty() {
-        m.unused(plan.of_core(core, "takes_unused"), plan.of_core(core, "takes"), None);
-    } else {
+    if !lanes.is_empty() {
         let (valid, value): (Vec<Expr>, Vec<Expr>) =
             lanes.iter().map(|lane| links::arrival(plan, core, lane.source)).unzip();
         let (arrives, values) = (own(&arrives(lanes.len())), own(&values(lanes.len())));
@@ -249,12 +254,18 @@ fn instance(plan: &SystemPlan, m: &mut Module, core: usize) {
     }
     for port in plan.outputs(core) {
         let name = port_name(&port.name);
-        instance = instance
-            .port(format!("{name}_write"), plan.of_core(core, &format!("{}_write", port.name)))
-            .port(format!("{name}_value"), plan.of_core(core, &format!("{}_value", port.name)).wide(32));
+        instance =
+            instance.port(format!("{name}_write"), plan.of_core(core, &format!("{}_write", port.name)));
+        if port.sent {
+            let value = plan.of_core(core, &format!("{}_value", port.name)).wide(32);
+            instance = instance.port(format!("{name}_value"), value);
+        }
     }
     for status in STATUS {
-        instance = instance.port(status.name(), of(plan, core, &status));
+        instance = match shown(plan, core, &status) {
+            true => instance.port(status.name(), of(plan, core, &status)),
+            false => instance.open([status.name()]),
+        };
     }
     m.instance(instance);
 }

@@ -192,6 +192,12 @@ impl Instance {
         self
     }
 
+    /// Outputs that are left open.
+    pub(crate) fn open(mut self, names: impl IntoIterator<Item = impl Into<String>>) -> Instance {
+        self.ports.extend(names.into_iter().map(|name| (name.into(), Expr::Literal(String::new()))));
+        self
+    }
+
     /// Ports that are connected to the nets of their names.
     pub(crate) fn same(mut self, nets: impl IntoIterator<Item = Net>) -> Instance {
         self.ports.extend(nets.into_iter().map(|net| (net.name().to_owned(), net.into())));
