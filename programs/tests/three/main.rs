@@ -1,0 +1,5 @@
+//! The three-processor controller: the three programs run as a system, with packets from a host and a plant behind encoders and drives, and
+//! each module is compared with its binary64 model. docs/controller.md.
+
+mod bench;
+mod motion;
