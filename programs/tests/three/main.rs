@@ -2,4 +2,9 @@
 //! each module is compared with its binary64 model. docs/controller.md.
 
 mod bench;
+mod errors;
+mod jog;
 mod motion;
+mod packets;
+mod servo;
+mod world;
