@@ -307,10 +307,12 @@ take:   pops = pops + 1
 begun:
         jogs = motion == JOG
         bnz     jogs, jogging
-        motion = in_on | out_on ? motion : STAND
-        bnz     motion, moving
+        bz      motion, resting
+        motion = in_on | out_on ? MOVE : STAND ; of a motion that has ended, this is the last point
+        jmp     moving
+resting:
         call    stay
-        space, pace, pacedot, world = 0, 0, 0, 0
+        space, pace, pacedot = 0, 0, 0
         jmp     solved
 
 ; ---- Where it is on its way --------------------------------------------------------------------------------------------------------------

@@ -22,14 +22,16 @@ fn planned(from: &Six, to: &Six, demand: Demand, profile: Profile, via: bool) ->
     course(demand, profile, (speed * 0.999, acceleration * 0.95 * share)).expect("it is possible")
 }
 
-/// The errors of angles, velocities and accelerations against a motion that began in the first period seen.
-fn errors(seen: &[Seen], motion: &Motion) -> [f64; 3] {
+/// The errors of angles, velocities and accelerations against a motion that began in the first period seen; accelerations not in `steps`,
+/// where they have two values.
+fn errors(seen: &[Seen], motion: &Motion, steps: &[u32]) -> [f64; 3] {
     let mut worst = [0f64; 3];
     for (k, seen) in seen.iter().enumerate() {
         let at = motion.at(k as f64 * PERIOD);
-        if std::env::var_os("SHOW").is_some() { println!("{k} {:?} {:?}", (0..6).map(|i| seen.q()[i]-at[0][i]).collect::<Vec<_>>(), (0..6).map(|i| seen.a()[i]-at[2][i]).collect::<Vec<_>>()); }
-        for (worst, (is, should)) in worst.iter_mut().zip([seen.q(), seen.v(), seen.a()].iter().zip(&at)) {
-            *worst = worst.max(apart(is, should));
+        worst[0] = worst[0].max(apart(&seen.q(), &at[0]));
+        worst[1] = worst[1].max(apart(&seen.v(), &at[1]));
+        if !steps.contains(&(k as u32)) {
+            worst[2] = worst[2].max(apart(&seen.a(), &at[2]));
         }
     }
     worst
@@ -42,8 +44,13 @@ fn matches(seen: &[Seen], from: Six, to: Six, course: Course, allowed: [f64; 3])
         periods: course.periods + periods,
         ..course
     });
-    let all = neighbours.map(|course| errors(seen, &Motion::new(from, &[Segment { to, course, via: false }])));
-    let best = all.iter().min_by(|a, b| a[1].total_cmp(&b[1])).expect("there are four");
+    let all = neighbours.map(|course| {
+        let steps = [0, course.ramp, course.periods - course.ramp, course.periods];
+        let steps = if course.profile == Profile::Rectangular { &steps[..] } else { &[] };
+        errors(seen, &Motion::new(from, &[Segment { to, course, via: false }]), steps)
+    });
+    let best = all.iter().min_by(|a, b| (a[0] + a[1]).total_cmp(&(b[0] + b[1]))).expect("there are four");
+    println!("{course:?}: {best:?}");
     assert!((0..3).all(|i| best[i] <= allowed[i]), "{course:?}: {best:?}");
 }
 

@@ -90,8 +90,8 @@ fn a_square_is_gone_round_without_a_pause() {
     let first = speeds.iter().position(at_speed).expect("it gets there");
     let last = speeds.iter().rposition(at_speed).expect("it gets there");
     let inner = &speeds[first..last];
-    // At a right corner both speeds are half: 0.707 of one.
-    assert!(inner.iter().all(|speed| *speed > 0.15 && *speed < 0.31), "{:?}", inner.iter().copied().fold(f64::MAX, f64::min));
+    // At a right corner both speeds are half: 0.707 of one, less where one ramp is longer.
+    assert!(inner.iter().all(|speed| *speed > 0.12 && *speed < 0.31), "{:?}", inner.iter().copied().fold(f64::MAX, f64::min));
     for pose in &poses {
         assert!((pose[0] - from[0]).abs() < 3e-6 && apart(&[pose[3], pose[4], pose[5], 0.0, 0.0, 0.0], &[from[3], from[4], from[5], 0.0, 0.0, 0.0]) < 5e-6);
     }
