@@ -369,4 +369,3 @@ impl Bench {
 pub(crate) fn apart(a: &Six, b: &Six) -> f64 {
     (0..6).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max)
 }
-

@@ -1,6 +1,9 @@
 //! Checks while it runs, the queue, signals.
 
-use crate::bench::{ACCEPTED, Bench, FINISHED, HOME, How, JOG, MOVE, READY, REFUSED, RESET, STARTED, STOP, STOPPED, apart, bits, fast};
+use crate::bench::{
+    ACCEPTED, Bench, FINISHED, HOME, How, JOG, MOVE, READY, REFUSED, RESET, STARTED, STOP, STOPPED, apart,
+    bits, fast,
+};
 use takt_programs::three::profile::Profile;
 
 const SLOW: How = How { profile: Profile::Parabolic, how: 0, amount: 0.2, flags: 0 };
@@ -37,7 +40,12 @@ fn a_joint_that_does_not_follow_stops_the_robot() {
     // The reference is now where the joints are.
     bench.run(40);
     assert!(apart(&bench.last().q(), &HOME) < 3e-5, "{:?}", bench.last().q());
-    assert_eq!(bench.reports.iter().filter(|report| report.kind == STOPPED).count(), 1, "{:?}", bench.reports);
+    assert_eq!(
+        bench.reports.iter().filter(|report| report.kind == STOPPED).count(),
+        1,
+        "{:?}",
+        bench.reports
+    );
 }
 
 #[test]
@@ -65,7 +73,8 @@ fn a_full_queue_refuses_and_a_stop_empties_it() {
     let mut bench = Bench::new();
     let mut first = None;
     for number in 0..40 {
-        let sequence = bench.motion(MOVE, near(if number % 2 == 0 { 0.1 } else { 0.0 }), How { amount: 5.0, ..SLOW });
+        let sequence =
+            bench.motion(MOVE, near(if number % 2 == 0 { 0.1 } else { 0.0 }), How { amount: 5.0, ..SLOW });
         first = first.or(Some(sequence));
         bench.run(20);
     }

@@ -56,7 +56,10 @@ fn the_tool_moves_along_the_axes_of_the_world() {
         let here = pose(&seen.q(), &TOOL).0;
         assert!((here[1] - from[1]).abs() < 2e-5, "along x and z only");
         assert!((0..3).all(|i| (here[3 + i] - from[3 + i]).abs() < 5e-5), "it does not turn");
-        assert!((here[2] - from[2] + (here[0] - from[0]) / 2.0).abs() < 0.002, "at the rates' ratio but for ramps");
+        assert!(
+            (here[2] - from[2] + (here[0] - from[0]) / 2.0).abs() < 0.002,
+            "at the rates' ratio but for ramps"
+        );
     }
     consistent(&seen, 3e-3);
     // About the world's vertical axis: the point stays, yaw turns.

@@ -1,6 +1,9 @@
 //! Motion in joint space against the binary64 synthesis; limits; stops.
 
-use crate::bench::{ACCEPTED, Bench, CHECKED, FINISHED, HOME, How, MOVE, REFUSED, STARTED, STOP, STOPPED, Seen, apart, bits, fast};
+use crate::bench::{
+    ACCEPTED, Bench, CHECKED, FINISHED, HOME, How, MOVE, REFUSED, STARTED, STOP, STOPPED, Seen, apart, bits,
+    fast,
+};
 use takt_programs::three::dynamics::nominal;
 use takt_programs::three::plan::{Demand, Limits, admissible, course};
 use takt_programs::three::profile::{Course, Profile};
@@ -70,7 +73,11 @@ fn each_profile_is_its_binary64_model() {
         assert!((f64::from(accepted.value) - expected).abs() < 1.5 * PERIOD, "{accepted:?}, not {expected}");
         matches(seen, from, to, course, [3e-7, 1e-5, 2e-3]);
         continuous(seen, course, &from, &to);
-        assert_eq!(seen.last().expect("some").q(), to.map(|to| f64::from(to as f32)), "it ends exactly there");
+        assert_eq!(
+            seen.last().expect("some").q(),
+            to.map(|to| f64::from(to as f32)),
+            "it ends exactly there"
+        );
         from = to;
     }
 }
@@ -134,7 +141,11 @@ fn times_are_met_and_speeds_are_reached() {
 fn via_points_are_passed_without_a_pause() {
     let mut bench = Bench::new();
     let from = bench.last().q();
-    let corners = [[0.15, 0.0, 0.0, 0.1, 0.0, 0.0], [0.2, -0.12, 0.05, 0.2, 0.0, 0.1], [0.05, -0.2, 0.1, 0.1, -0.1, 0.2]];
+    let corners = [
+        [0.15, 0.0, 0.0, 0.1, 0.0, 0.0],
+        [0.2, -0.12, 0.05, 0.2, 0.0, 0.1],
+        [0.05, -0.2, 0.1, 0.1, -0.1, 0.2],
+    ];
     let targets = corners.map(|by| away(&from, by));
     let mut last = from;
     let (mut segments, mut sequences) = (Vec::new(), Vec::new());
@@ -156,7 +167,8 @@ fn via_points_are_passed_without_a_pause() {
     let speed = |seen: &Seen| seen.v().iter().map(|v| v * v).sum::<f64>().sqrt();
     let top = seen.iter().map(speed).fold(0.0, f64::max);
     let ramp = segments[0].course.ramp as usize;
-    let slowest = seen[ramp..moving - segments[2].course.ramp as usize].iter().map(speed).fold(f64::MAX, f64::min);
+    let slowest =
+        seen[ramp..moving - segments[2].course.ramp as usize].iter().map(speed).fold(f64::MAX, f64::min);
     assert!(slowest > 0.25 * top, "slows down to {slowest} of {top}");
     for pair in seen.windows(2) {
         assert!(apart(&pair[0].v(), &pair[1].v()) < 0.02 && apart(&pair[0].a(), &pair[1].a()) < 3.0);

@@ -1,6 +1,8 @@
 //! What comes from the host: good packets, and all kinds of bad ones.
 
-use crate::bench::{Bench, FINISHED, HOME, How, MOVE, READY, REFUSED, RESET, STARTED, STOPPED, bits, checksum, fast, packet};
+use crate::bench::{
+    Bench, FINISHED, HOME, How, MOVE, READY, REFUSED, RESET, STARTED, STOPPED, bits, checksum, fast, packet,
+};
 use takt_programs::three::profile::Profile;
 
 #[test]
@@ -91,12 +93,13 @@ fn a_silent_host_stops_the_robot() {
 fn demands_that_make_no_sense_are_refused() {
     let mut bench = Bench::new();
     let good = fast(Profile::Cosine);
-    let refused = |bench: &mut Bench, target: [f64; 6], how: u32, amount: f64, profile: u32, flags: u32, cause: u32| {
-        let mut payload = bits(&target);
-        payload.extend([profile, how, (amount as f32).to_bits(), flags]);
-        let sequence = bench.send(MOVE, &payload);
-        assert_eq!(bench.until(REFUSED, sequence).cause, cause);
-    };
+    let refused =
+        |bench: &mut Bench, target: [f64; 6], how: u32, amount: f64, profile: u32, flags: u32, cause: u32| {
+            let mut payload = bits(&target);
+            payload.extend([profile, how, (amount as f32).to_bits(), flags]);
+            let sequence = bench.send(MOVE, &payload);
+            assert_eq!(bench.until(REFUSED, sequence).cause, cause);
+        };
     let mut infinite = HOME;
     infinite[4] = f64::INFINITY;
     refused(&mut bench, infinite, good.how, 0.0, 0, 0, 6);

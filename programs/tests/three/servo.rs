@@ -33,7 +33,9 @@ fn the_servo_is_its_binary64_model() {
             largest = largest.max(u[i].abs());
         }
     }
-    println!("control {control:.2e}, reference {reference:.2e} rad, behind {behind:.2e} rad, largest control {largest}");
+    println!(
+        "control {control:.2e}, reference {reference:.2e} rad, behind {behind:.2e} rad, largest control {largest}"
+    );
     assert!(control < CONTROL, "{control}");
     assert!(reference < 3e-7, "{reference}");
     assert!(behind < 2e-3, "{behind}");

@@ -78,22 +78,38 @@ fn a_square_is_gone_round_without_a_pause() {
     let mut sequences = Vec::new();
     for (number, corner) in corners.iter().enumerate() {
         let flags = u32::from(number < 3);
-        sequences.push(bench.motion(MOVEL, *corner, How { profile: Profile::Parabolic, how: 1, amount: 0.3, flags }));
+        sequences.push(bench.motion(
+            MOVEL,
+            *corner,
+            How { profile: Profile::Parabolic, how: 1, amount: 0.3, flags },
+        ));
     }
     bench.until(FINISHED, sequences[3]);
     let seen: Vec<Seen> = bench.from_segment(sequences[0]).to_vec();
     let end = seen.iter().position(|seen| seen.mode == 0).expect("it has ended");
     let poses: Vec<Six> = seen[..end].iter().map(|seen| pose(&seen.q(), &TOOL).0).collect();
-    let speeds: Vec<f64> =
-        poses.windows(2).map(|p| (0..3).map(|i| (p[1][i] - p[0][i]).powi(2)).sum::<f64>().sqrt() / PERIOD).collect();
+    let speeds: Vec<f64> = poses
+        .windows(2)
+        .map(|p| (0..3).map(|i| (p[1][i] - p[0][i]).powi(2)).sum::<f64>().sqrt() / PERIOD)
+        .collect();
     let at_speed = |speed: &f64| *speed > 0.29;
     let first = speeds.iter().position(at_speed).expect("it gets there");
     let last = speeds.iter().rposition(at_speed).expect("it gets there");
     let inner = &speeds[first..last];
     // At a right corner both speeds are half: 0.707 of one, less where one ramp is longer.
-    assert!(inner.iter().all(|speed| *speed > 0.12 && *speed < 0.31), "{:?}", inner.iter().copied().fold(f64::MAX, f64::min));
+    assert!(
+        inner.iter().all(|speed| *speed > 0.12 && *speed < 0.31),
+        "{:?}",
+        inner.iter().copied().fold(f64::MAX, f64::min)
+    );
     for pose in &poses {
-        assert!((pose[0] - from[0]).abs() < 3e-6 && apart(&[pose[3], pose[4], pose[5], 0.0, 0.0, 0.0], &[from[3], from[4], from[5], 0.0, 0.0, 0.0]) < 5e-6);
+        assert!(
+            (pose[0] - from[0]).abs() < 3e-6
+                && apart(
+                    &[pose[3], pose[4], pose[5], 0.0, 0.0, 0.0],
+                    &[from[3], from[4], from[5], 0.0, 0.0, 0.0]
+                ) < 5e-6
+        );
     }
     assert!(apart(&bench.last().pose, &from) < 3e-6);
 }
@@ -139,10 +155,14 @@ fn a_tool_moves_the_point_that_is_led() {
     assert!(apart(&bench.last().pose, &from) < 2e-6);
     let mut to = from;
     to[5] += 0.2;
-    let sequence = bench.motion(MOVEL, to, How { profile: Profile::Trapezoidal, how: 0, amount: 0.3, flags: 0 });
+    let sequence =
+        bench.motion(MOVEL, to, How { profile: Profile::Trapezoidal, how: 0, amount: 0.3, flags: 0 });
     bench.until(FINISHED, sequence);
     for seen in bench.from_segment(sequence) {
         let here = pose(&seen.q(), &tool).0;
-        assert!((0..5).all(|i| (here[i] - from[i]).abs() < 5e-6), "the point stays while the tool turns: {here:?}");
+        assert!(
+            (0..5).all(|i| (here[i] - from[i]).abs() < 5e-6),
+            "the point stays while the tool turns: {here:?}"
+        );
     }
 }
