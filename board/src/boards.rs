@@ -63,7 +63,7 @@ pub struct Board {
     pub leds: Vec<String>,
     /// Whether a lamp is lit by a 1.
     pub leds_high: bool,
-    /// What systems may use: sites by the pins' names, in the order of the file.
+    /// What wirings may use: sites by the pins' names, in the order of the file.
     pub pins: Vec<(String, String)>,
 }
 

@@ -1,9 +1,9 @@
 //! From a circuit to a bitstream: yosys, nextpnr, ecppack.
 
 use crate::boards::Board;
-use crate::system::System;
 use crate::tools::{MAPPING, NEXTPNR, OPTIONS, ToolError, Venv, YOSYS};
 use crate::top::{self, TOP, TopError};
+use crate::wiring::Wiring;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs;
@@ -29,7 +29,7 @@ pub enum BuildError {
     Report(String),
     /// The clock is not met.
     #[error(
-        "timing is not met: {clock} reaches {reached:.1} MHz and needs {wanted:.1}. Another --seed may reach more; or lower `clock` in the system"
+        "timing is not met: {clock} reaches {reached:.1} MHz and needs {wanted:.1}. Another --seed may reach more; or lower `clock` in the wiring"
     )]
     Timing {
         /// The clock's net.
@@ -60,11 +60,11 @@ pub struct Report {
 /// If there is none, or a file cannot be written.
 pub fn write(
     board: &Board,
-    system: &System,
+    wiring: &Wiring,
     program: &Program,
     folder: &Path,
 ) -> Result<top::Circuit, BuildError> {
-    let mut circuit = top::circuit(board, system, program)?;
+    let mut circuit = top::circuit(board, wiring, program)?;
     let base = |name: &str| name.rsplit('/').next().unwrap_or(name).to_owned();
     let replaced: Vec<String> = circuit.ecp5.iter().map(|file| base(&file.name)).collect();
     circuit.files.retain(|file| !replaced.contains(&base(&file.name)));
@@ -88,13 +88,13 @@ pub fn write(
 pub fn build(
     venv: &Venv,
     board: &Board,
-    system: &System,
+    wiring: &Wiring,
     program: &Program,
     seed: u32,
     folder: &Path,
     step: &dyn Fn(&str),
 ) -> Result<Report, BuildError> {
-    let circuit = write(board, system, program, folder)?;
+    let circuit = write(board, wiring, program, folder)?;
     let path = |name: &str| folder.join(name).display().to_string();
     // What an earlier run left must not be taken for this one's.
     for old in ["takt.bit", "takt.config", "report.json", "manifest.json"] {
@@ -146,7 +146,7 @@ pub fn build(
     placed?;
     let report = report.ok_or_else(|| BuildError::Report(path("report.json")))?;
     // A report without the core's clock says nothing of it.
-    if !clocks.iter().any(|(_, _, wanted)| (wanted / system.clock - 1.0).abs() < 0.01) {
+    if !clocks.iter().any(|(_, _, wanted)| (wanted / wiring.clock - 1.0).abs() < 0.01) {
         return Err(BuildError::Report(path("report.json")));
     }
     step("bitstream");
@@ -157,10 +157,10 @@ pub fn build(
     let used = used(&report);
     let manifest = json!({
         "board": board.name, "device": board.device.part, "grade": board.grade, "package": board.package,
-        "machine": program.machine.name, "clock_mhz": system.clock, "period_cycles": system.period, "baud": system.baud,
+        "machine": program.machine.name, "clock_mhz": wiring.clock, "period_cycles": wiring.period, "baud": wiring.baud,
         "seed": seed, "records": circuit.records, "bytes": bytes,
         "clocks": clocks.iter().map(|(net, reached, wanted)| json!({ "net": net, "reached_mhz": reached, "needed_mhz": wanted })).collect::<Vec<_>>(),
-        "pins": top::own_pins(system).into_iter().map(|(name, _, pin)| json!({ "signal": name, "site": board.site(&pin), "pin": pin })).collect::<Vec<_>>(),
+        "pins": top::own_pins(wiring).into_iter().map(|(name, _, pin)| json!({ "signal": name, "site": board.site(&pin), "pin": pin })).collect::<Vec<_>>(),
         "tools": [YOSYS, NEXTPNR],
     });
     fs::write(folder.join("manifest.json"), format!("{manifest:#}\n"))

@@ -1,5 +1,5 @@
 //! The table of peripherals: what each has of pins, registers and parameters. The generator, the twins' tests, the reader of
-//! system files and `takt board` take names and limits from here.
+//! wiring files and `takt board` take names and limits from here.
 
 /// Which way a signal goes, seen from the peripheral.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,7 +35,7 @@ pub struct Register {
 /// A parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Parameter {
-    /// Its name in system files; in the module the same in capitals.
+    /// Its name in wiring files; in the module the same in capitals.
     pub name: &'static str,
     /// The least value.
     pub least: u32,
@@ -62,7 +62,7 @@ pub type Port = (String, u32);
 /// A kind of peripheral.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kind {
-    /// Its name in system files.
+    /// Its name in wiring files.
     pub name: &'static str,
     /// Its module.
     pub module: &'static str,
@@ -106,7 +106,7 @@ const fn parameter(name: &'static str, least: u32, most: u32, default: u32, text
 
 const FILTER: Parameter =
     parameter("filter", 1, 256, 3, "cycles for which a level must stand before it counts");
-const SIGNED: Parameter = parameter("signed", 0, 1, 1, "1: the value is signed, and 0 is one half");
+const SIGNED: Parameter = parameter("signed", 0, 1, 1, "1: the value is signed, and 0 is 50 % duty");
 
 const ENABLED: Strobes = Strobes { enable: true, start: false };
 const PLAIN: Strobes = Strobes { enable: false, start: false };
@@ -145,10 +145,7 @@ pub const KINDS: &[Kind] = &[
         text: "half bridge: centred pulses, complementary pin, dead time",
         pins: &[output("high"), optional(output("low"))],
         reads: &[],
-        writes: &[scaled(
-            "duty",
-            "cycles of the pulse, 0 to 2·half; signed: -half to half, 0 is one half of the period",
-        )],
+        writes: &[scaled("duty", "cycles of the pulse, 0 to 2·half; signed: -half to half, 0 is 50 % duty")],
         parameters: &[
             parameter("half", 1, 65535, 1250, "half a period in cycles"),
             parameter("dead", 0, 255, 0, "dead time in cycles"),

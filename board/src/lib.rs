@@ -1,7 +1,7 @@
 //! From a program to a robot: the core of Takt on a board that one can buy, with signals on its pins.
 //!
 //! [`kind`] is the table of peripherals, of which each is a Verilog file in `board/verilog/` and, in [`twin`], the same in Rust, cycle
-//! by cycle. [`boards`] are the boards, as data. [`System`] is what a user writes: which peripherals at which pins, and which ports
+//! by cycle. [`boards`] are the boards, as data. [`Wiring`] is what a user writes: which peripherals at which pins, and which ports
 //! of the program are their registers.
 
 pub mod boards;
@@ -13,18 +13,18 @@ pub mod pll;
 pub mod protocol;
 pub mod serial;
 pub mod simulation;
-pub mod system;
 #[cfg(unix)]
 pub mod terminal;
 pub mod tools;
 pub mod top;
 pub mod twin;
+pub mod wiring;
 
 pub use boards::Board;
 pub use document::Mistake;
 pub use host::Host;
 pub use kind::Kind;
-pub use system::System;
+pub use wiring::Wiring;
 
 /// The Verilog of the peripherals and of what is around the core, by file name.
 pub const VERILOG: &[(&str, &str)] = &[

@@ -52,8 +52,8 @@ pub const REGISTERS: [Register; 15] = [
         2,
         "status",
         "r",
-        "bit 0 waiting, 1 halted, 2 fault, 6:4 slot of the fault, 9:7 sticky flags (overflow, divide by zero, invalid), 10 in reset, \
-         11 drive, 17:12 what stopped the drive: fault, halt, deadline, host, stop, an output that is no number",
+        "bit 0 waiting, 1 halted, 2 fault, 6:4 slot of the fault, sticky flags: 7 overflow, 8 divide by zero, 9 invalid;, 10 in reset, \
+         11 drive, 17:12 what stopped the drive: fault, halt, deadline, host, stop, a NaN output",
     ),
     register(3, "fault", "r", "15:0 bundle, 18:16 kind, as of the Wishbone slave (docs/hardware.md)"),
     register(4, "period", "rw", "cycles from tick to tick"),
@@ -124,6 +124,16 @@ pub fn write(number: u8, address: u16, words: &[u32]) -> Vec<u8> {
 fn request(number: u8, command: u8, count: u8, address: u16, words: &[u32]) -> Vec<u8> {
     let [low, high] = address.to_le_bytes();
     let mut bytes = vec![REQUEST, number, command, count, low, high];
+    bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
+    let sum = checksum(&bytes[1..]);
+    bytes.extend(sum.to_le_bytes());
+    bytes
+}
+
+/// What a board answers to a request that reads `words`.
+#[cfg(test)]
+pub(crate) fn answer(number: u8, words: &[u32]) -> Vec<u8> {
+    let mut bytes = vec![ANSWER, number, 0, words.len() as u8];
     bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
     let sum = checksum(&bytes[1..]);
     bytes.extend(sum.to_le_bytes());
@@ -203,7 +213,7 @@ pub trait Line {
     /// If the line is gone.
     fn receive(&mut self) -> std::io::Result<Vec<u8>>;
 
-    /// How often to wait for an answer until a request is made again.
+    /// How often in a row nothing may come until a request is made again.
     fn patience(&self) -> u32;
 }
 
@@ -244,14 +254,6 @@ mod tests {
     fn checksum_is_the_standards() {
         // The check value of CRC-16/CCITT-FALSE in the catalogue of CRCs (reveng.sourceforge.io).
         assert_eq!(checksum(b"123456789"), 0x29b1);
-    }
-
-    fn answer(number: u8, words: &[u32]) -> Vec<u8> {
-        let mut bytes = vec![ANSWER, number, 0, words.len() as u8];
-        bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
-        let sum = checksum(&bytes[1..]);
-        bytes.extend(sum.to_le_bytes());
-        bytes
     }
 
     #[test]

@@ -3,8 +3,8 @@
 use crate::boards::Board;
 use crate::kind::Direction;
 use crate::protocol::{self, Line};
-use crate::system::System;
 use crate::top::{self, Circuit, TOP, TopError};
+use crate::wiring::Wiring;
 use std::fmt::Write as _;
 use std::fs;
 use std::io::{self, Read, Write};
@@ -72,12 +72,12 @@ impl Simulation {
     /// If there is no circuit for it, or Verilator is missing or fails.
     pub fn new(
         board: &Board,
-        system: &System,
+        wiring: &Wiring,
         program: &Program,
         folder: &Path,
     ) -> Result<Simulation, SimulationError> {
-        let circuit = top::circuit(board, system, program)?;
-        let (built, inputs, outputs) = build(&circuit, board, system, folder)?;
+        let circuit = top::circuit(board, wiring, program)?;
+        let (built, inputs, outputs) = build(&circuit, board, wiring, folder)?;
         let start = |error| SimulationError::Start(built.display().to_string(), error);
         let mut process = Command::new(&built)
             .current_dir(folder)
@@ -190,7 +190,7 @@ impl Drop for Simulation {
 
 type Pins = (PathBuf, Vec<(String, u32)>, Vec<String>);
 
-fn build(circuit: &Circuit, board: &Board, system: &System, folder: &Path) -> Result<Pins, SimulationError> {
+fn build(circuit: &Circuit, board: &Board, wiring: &Wiring, folder: &Path) -> Result<Pins, SimulationError> {
     let write = |name: &str, text: &str| {
         let path = folder.join(name);
         let parent = path.parent().unwrap_or(folder);
@@ -202,14 +202,14 @@ fn build(circuit: &Circuit, board: &Board, system: &System, folder: &Path) -> Re
     if let Some(reset) = &board.reset {
         inputs.push(("button".to_owned(), u32::from(!reset.level)));
     }
-    for (name, direction, _) in top::own_pins(system) {
+    for (name, direction, _) in top::own_pins(wiring) {
         match direction {
             // `stop` is 1 when open, but here it is wired.
             Direction::Input => inputs.push((name, 0)),
             Direction::Output => outputs.push(name),
         }
     }
-    let divide = (system.clock * 1e6 / f64::from(system.baud)).round();
+    let divide = (wiring.clock * 1e6 / f64::from(wiring.baud)).round();
     let mut header = format!(
         "#define DIVIDE {divide}\n#define INPUTS {}\n#define OUTPUTS {}\n",
         inputs.len(),

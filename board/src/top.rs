@@ -1,9 +1,9 @@
-//! What is generated for a system: the module around core and peripherals, the board's top level, the image in block RAM, pins.
+//! What is generated for a wiring: the module around core and peripherals, the board's top level, the image in block RAM, pins.
 
 use crate::boards::Board;
 use crate::kind::Direction;
 use crate::protocol::{self, record_words};
-use crate::system::{SIGNALS, System};
+use crate::wiring::{SIGNALS, Wiring};
 use crate::{VERILOG, pll};
 use std::fmt::Write as _;
 use takt_isa::Program;
@@ -19,7 +19,7 @@ pub const RECORDS: usize = 1 << IMAGE_BITS;
 /// Name of the board's top module.
 pub const TOP: &str = "takt_board";
 /// Name of the module around core and peripherals.
-pub const SYSTEM: &str = "takt_system";
+pub const AROUND: &str = "takt_peripherals";
 /// Cycles that a reset of the board lasts, after which pins are valid.
 const RESET_BITS: u32 = 8;
 
@@ -70,7 +70,7 @@ pub fn image(program: &Program) -> Result<Vec<LoadRecord>, TopError> {
 ///
 /// # Errors
 /// If the program is too big, the clock cannot be made, or the machine has no circuit.
-pub fn circuit(board: &Board, system: &System, program: &Program) -> Result<Circuit, TopError> {
+pub fn circuit(board: &Board, wiring: &Wiring, program: &Program) -> Result<Circuit, TopError> {
     let records = image(program)?;
     let library = Library::builtin();
     let design = export(program.machine, &library)?.latching(program.latched_inputs())?;
@@ -91,8 +91,8 @@ pub fn circuit(board: &Board, system: &System, program: &Program) -> Result<Circ
     // The converter's code for a number with point to an integer, as its header has it.
     let convert = library.text("convert.v").unwrap_or_default();
     let to_integer = convert.lines().any(|line| line == "//@ op 1'b1 ftoi").into();
-    put(&format!("{SYSTEM}.v"), around(system, program, &design.top, records.len(), to_integer));
-    put(&format!("{TOP}.v"), top(board, system)?);
+    put(&format!("{AROUND}.v"), around(wiring, program, &design.top, records.len(), to_integer));
+    put(&format!("{TOP}.v"), top(board, wiring)?);
     let mut hex = String::from("// slot, space, address, value: what takt_boot writes at a start\n");
     for record in &records {
         let [low, high, place] = record_words(record);
@@ -102,19 +102,19 @@ pub fn circuit(board: &Board, system: &System, program: &Program) -> Result<Circ
     Ok(Circuit {
         files,
         ecp5: design.ecp5,
-        pins: pins(board, system),
-        clock: system.clock,
+        pins: pins(board, wiring),
+        clock: wiring.clock,
         records: records.len(),
     })
 }
 
-/// Pins of the system's module that belong to peripherals and signals: name, direction, the board's pin.
-pub(crate) fn own_pins(system: &System) -> Vec<(String, Direction, String)> {
+/// Pins of that module that belong to peripherals and signals: name, direction, the board's pin.
+pub(crate) fn own_pins(wiring: &Wiring) -> Vec<(String, Direction, String)> {
     let mut pins = Vec::new();
-    for (signal, pin) in SIGNALS.iter().zip(&system.signals) {
+    for (signal, pin) in SIGNALS.iter().zip(&wiring.signals) {
         pins.extend(pin.clone().map(|pin| (format!("signal_{}", signal.name), signal.direction, pin)));
     }
-    for peripheral in &system.peripherals {
+    for peripheral in &wiring.peripherals {
         for (pin, at) in peripheral.kind.pins.iter().zip(&peripheral.pins) {
             let name = format!("{}_{}", peripheral.name, pin.name);
             pins.extend(at.clone().map(|at| (name, pin.direction, at)));
@@ -131,7 +131,7 @@ fn direction(direction: Direction) -> &'static str {
 }
 
 /// Core, peripherals and what is between them.
-fn around(system: &System, program: &Program, core: &str, records: usize, to_integer: u8) -> String {
+fn around(wiring: &Wiring, program: &Program, core: &str, records: usize, to_integer: u8) -> String {
     let machine = program.machine;
     let input_bits = machine.inputs.depth.trailing_zeros();
     let port_bits = machine.outputs_per_bank.trailing_zeros();
@@ -147,10 +147,10 @@ fn around(system: &System, program: &Program, core: &str, records: usize, to_int
     let (mut inputs, mut outputs, mut taken, mut settings) =
         (String::new(), String::new(), String::new(), String::new());
     let (mut in_count, mut out_count) = (0, 0);
-    for (name, way, _) in own_pins(system) {
+    for (name, way, _) in own_pins(wiring) {
         let _ = write!(pins, ",\n    {} {name}", direction(way));
     }
-    for peripheral in &system.peripherals {
+    for peripheral in &wiring.peripherals {
         let (name, kind) = (&peripheral.name, peripheral.kind);
         let parameters: Vec<String> = kind
             .parameters
@@ -227,31 +227,31 @@ fn around(system: &System, program: &Program, core: &str, records: usize, to_int
         })
         .collect();
     let signal = |name: &str, value: &str| {
-        let there = SIGNALS.iter().zip(&system.signals).any(|(s, pin)| s.name == name && pin.is_some());
+        let there = SIGNALS.iter().zip(&wiring.signals).any(|(s, pin)| s.name == name && pin.is_some());
         if there { format!("    assign signal_{name} = {value};\n") } else { String::new() }
     };
     let signals = signal("drive", "drive")
         + &signal("fault", "fault")
         + &signal("deadline", "|misses")
         + &signal("tick", "ticks");
-    let stop = if system.signals[3].is_some() {
+    let stop = if wiring.signals[3].is_some() {
         "    takt_filter #(.HOLD(16), .BITS(8)) filter_stop (.clk(clk), .rst(rst), .pin(signal_stop), .level(stop));\n"
     } else {
         "    assign stop = 1'b0;\n"
     };
-    let divide = (system.clock * 1e6 / f64::from(system.baud)).round();
+    let divide = (wiring.clock * 1e6 / f64::from(wiring.baud)).round();
     let mut values: Vec<(String, String)> = protocol::REGISTERS
         .iter()
         .map(|register| (format!("A_{}", register.name.to_uppercase()), register.address.to_string()))
         .collect();
     let more: [(&str, String); 38] = [
-        ("NAME", SYSTEM.to_owned()),
+        ("NAME", AROUND.to_owned()),
         ("DIVIDE", divide.to_string()),
         ("PINS", pins),
         ("ID", format!("{:08x}", protocol::ID)),
-        ("START", u8::from(system.autostart).to_string()),
-        ("PERIOD", system.period.to_string()),
-        ("LEAD", system.lead.to_string()),
+        ("START", u8::from(wiring.autostart).to_string()),
+        ("PERIOD", wiring.period.to_string()),
+        ("LEAD", wiring.lead.to_string()),
         ("RECORDS", format!("{}'d{records}", IMAGE_BITS + 1)),
         ("RECORD_PAD", (31 - IMAGE_BITS).to_string()),
         ("IMAGE_BITS", IMAGE_BITS.to_string()),
@@ -264,8 +264,8 @@ fn around(system: &System, program: &Program, core: &str, records: usize, to_int
         ("IN_LAST", ((1_u32 << input_bits) - 1).to_string()),
         ("PORT_BITS", port_bits.to_string()),
         ("PORT_HIGH", (port_bits - 1).to_string()),
-        ("DEADLINES", system.deadlines.to_string()),
-        ("HOST", system.host.to_string()),
+        ("DEADLINES", wiring.deadlines.to_string()),
+        ("HOST", wiring.host.to_string()),
         ("IN_COUNT", in_count.to_string()),
         ("OUT_COUNT", out_count.to_string()),
         ("INPUTS_AT", (protocol::INPUTS >> 12).to_string()),
@@ -285,7 +285,7 @@ fn around(system: &System, program: &Program, core: &str, records: usize, to_int
         ("LATCHED", program.latched_inputs().to_string()),
     ];
     values.extend(more.map(|(name, value)| (name.to_owned(), value)));
-    fill(include_str!("system.v.in"), &values)
+    fill(include_str!("peripherals.v.in"), &values)
 }
 
 /// The text with every `@NAME@` replaced by its value.
@@ -294,9 +294,9 @@ fn fill(text: &str, values: &[(String, String)]) -> String {
 }
 
 /// The board's top level: clock, reset, pins.
-fn top(board: &Board, system: &System) -> Result<String, TopError> {
+fn top(board: &Board, wiring: &Wiring) -> Result<String, TopError> {
     let (mut ports, mut connections, mut constants) = (String::new(), String::new(), String::new());
-    for (name, way, _) in own_pins(system) {
+    for (name, way, _) in own_pins(wiring) {
         let _ = write!(ports, ",\n    {} {name}", direction(way));
         let _ = write!(connections, ", .{name}({name})");
     }
@@ -316,10 +316,10 @@ fn top(board: &Board, system: &System) -> Result<String, TopError> {
             format!("{}button", if reset.level { "" } else { "~" })
         }
     };
-    let pll = if (system.clock / board.clock.1 - 1.0).abs() < 1e-9 {
+    let pll = if (wiring.clock / board.clock.1 - 1.0).abs() < 1e-9 {
         "    assign clk    = clk_in;\n    assign locked = 1'b1;\n".to_owned()
     } else {
-        let pll::Pll { reference, feedback, outputs } = pll::Pll::new(board.clock.1, system.clock)?;
+        let pll::Pll { reference, feedback, outputs } = pll::Pll::new(board.clock.1, wiring.clock)?;
         format!(
             "    EHXPLLL #(
         .PLLRST_ENA(\"DISABLED\"), .INTFB_WAKE(\"DISABLED\"), .STDBY_ENABLE(\"DISABLED\"), .DPHASE_SOURCE(\"DISABLED\"),
@@ -359,7 +359,7 @@ module {TOP} (
 
     wire [3:0] lamps;
 {constants}
-    {SYSTEM} system (
+    {AROUND} around (
         .clk(clk), .rst(rst), .uart_receive(uart_receive), .uart_send(uart_send), .lamps(lamps){connections}
     );
 
@@ -367,7 +367,7 @@ endmodule
 ",
         board.text,
         board.clock.1,
-        system.clock,
+        wiring.clock,
         1 << RESET_BITS,
         RESET_BITS + 5,
         RESET_BITS + 1,
@@ -379,7 +379,7 @@ endmodule
 const LAMPS: usize = 4;
 
 /// Constraints for nextpnr.
-fn pins(board: &Board, system: &System) -> String {
+fn pins(board: &Board, wiring: &Wiring) -> String {
     let mut text = String::new();
     let mut put = |name: &str, site: &str, pull: &str| {
         let _ = writeln!(text, "LOCATE COMP \"{name}\" SITE \"{site}\";");
@@ -397,7 +397,7 @@ fn pins(board: &Board, system: &System) -> String {
     for (i, site) in board.leds.iter().take(LAMPS).enumerate() {
         put(&format!("led{i}"), site, "NONE");
     }
-    for (name, way, pin) in own_pins(system) {
+    for (name, way, pin) in own_pins(wiring) {
         // An open input is at rest: 1, which for `stop` means stop.
         let pull = if way == Direction::Input { "UP" } else { "NONE" };
         put(&name, board.site(&pin).unwrap_or_default(), pull);

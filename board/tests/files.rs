@@ -1,16 +1,16 @@
-//! Boards and systems as files: what is read from right ones, and what is said of wrong ones.
+//! Boards and wirings as files: what is read from right ones, and what is said of wrong ones.
 
 use takt_asm::{MemoryLoader, Options, assemble};
-use takt_board::{Board, Mistake, System};
+use takt_board::{Board, Mistake, Wiring};
 use takt_isa::Program;
 
 fn ulx3s() -> Board {
     Board::from_name("ulx3s-85f").expect("it is there").expect("its file is right")
 }
 
-/// What is said of a system, a line each.
+/// What is said of a wiring, a line each.
 fn said(text: &str) -> Vec<String> {
-    let result = System::read("robot.toml", text, &ulx3s());
+    let result = Wiring::read("robot.toml", text, &ulx3s());
     result.expect_err("a mistake").iter().map(Mistake::to_string).collect()
 }
 
@@ -77,18 +77,18 @@ fn builtin_boards_are_right() {
 
 #[test]
 fn system_is_read() {
-    let system = System::read("robot.toml", RIGHT, &ulx3s()).expect("it is right");
-    assert_eq!((system.clock, system.period, system.lead, system.baud), (50.0, 20_000, 250, 1_000_000));
-    assert_eq!((system.autostart, system.deadlines, system.host), (true, 3, 100));
-    assert_eq!(system.peripherals[0].parameters, [4]);
-    assert_eq!(system.peripherals[1].parameters, [1000, 25, 1]);
+    let wiring = Wiring::read("robot.toml", RIGHT, &ulx3s()).expect("it is right");
+    assert_eq!((wiring.clock, wiring.period, wiring.lead, wiring.baud), (50.0, 20_000, 250, 1_000_000));
+    assert_eq!((wiring.autostart, wiring.deadlines, wiring.host), (true, 3, 100));
+    assert_eq!(wiring.peripherals[0].parameters, [4]);
+    assert_eq!(wiring.peripherals[1].parameters, [1000, 25, 1]);
     assert_eq!(
-        system.peripherals[1].writes[0].as_ref().map(|w| (w.port.as_str(), w.scale)),
+        wiring.peripherals[1].writes[0].as_ref().map(|w| (w.port.as_str(), w.scale)),
         Some(("force", Some(3)))
     );
-    assert_eq!(system.at("gn2").as_deref(), Some("motor.low"));
-    assert_eq!((system.at("gp10").as_deref(), system.at("gp9")), (Some("drive"), None));
-    system.check("robot.toml", RIGHT, &program(PROGRAM)).expect("the program has its ports");
+    assert_eq!(wiring.at("gn2").as_deref(), Some("motor.low"));
+    assert_eq!((wiring.at("gp10").as_deref(), wiring.at("gp9")), (Some("drive"), None));
+    wiring.check("robot.toml", RIGHT, &program(PROGRAM)).expect("the program has its ports");
 }
 
 /// What takes the place of what, and what is then said.
@@ -96,7 +96,7 @@ const WRONG: &[(&str, &str, &str)] = &[
     (
         "board = \"ulx3s-85f\"",
         "board = \"icepi-zero\"",
-        "2:9: this system is for the board `icepi-zero`, not for `ulx3s-85f`",
+        "2:9: this wiring is for the board `icepi-zero`, not for `ulx3s-85f`",
     ),
     ("gn0", "gp0", "17:25: pin `gp0` is used twice: line 17 has it for `encoder`"),
     ("high = \"gp2\"", "high = \"gp10\"", "23:17: pin `gp10` is used twice: line 12 has it for `drive`"),
@@ -152,9 +152,9 @@ fn mistakes_name_their_place() {
 
 #[test]
 fn ports_must_be_the_programs() {
-    let system = System::read("robot.toml", RIGHT, &ulx3s()).expect("it is right");
+    let wiring = Wiring::read("robot.toml", RIGHT, &ulx3s()).expect("it is right");
     let said = |source: &str| {
-        let mistakes = system.check("robot.toml", RIGHT, &program(source)).expect_err("a mistake");
+        let mistakes = wiring.check("robot.toml", RIGHT, &program(source)).expect_err("a mistake");
         mistakes.iter().map(Mistake::to_string).collect::<Vec<_>>().join("\n")
     };
     assert_eq!(
@@ -162,7 +162,7 @@ fn ports_must_be_the_programs() {
         "robot.toml:19:33: the program has no input port `bad`; there are n, worse"
     );
     let float = PROGRAM.replace("n:int", "n").replace("itof    force, n", "fadd force, n, n");
-    assert!(said(&float).contains("19:19: input port `n` is a number with point"), "{}", said(&float));
+    assert!(said(&float).contains("19:19: input port `n` is a float"), "{}", said(&float));
     let integer = PROGRAM.replace("force\n", "force:int\n").replace("itof    force, n", "mov force, n");
     assert!(
         said(&integer).contains("26:18: output port `force` is an integer, which is not scaled"),
@@ -170,8 +170,8 @@ fn ports_must_be_the_programs() {
         said(&integer)
     );
     let unscaled = RIGHT.replace("scale = { duty = 8 }", "");
-    let system = System::read("robot.toml", &unscaled, &ulx3s()).expect("it is right");
-    let mistakes = system.check("robot.toml", &unscaled, &program(PROGRAM)).expect_err("a mistake");
+    let wiring = Wiring::read("robot.toml", &unscaled, &ulx3s()).expect("it is right");
+    let mistakes = wiring.check("robot.toml", &unscaled, &program(PROGRAM)).expect_err("a mistake");
     assert!(mistakes[0].text.contains("`scale` says how many"), "{mistakes:?}");
 }
 

@@ -1,4 +1,4 @@
-//! `takt board`: boards, their pins, and systems that are to run on them.
+//! `takt board`: boards, their pins, and wirings that are to run on them.
 
 use crate::files::{self, Out};
 use crate::load::Load;
@@ -11,7 +11,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_board::simulation::{Simulation, Turn};
 use takt_board::tools::{NEXTPNR, Venv, YOSYS};
-use takt_board::{Board, Mistake, System};
+use takt_board::{Board, Mistake, Wiring};
 use takt_isa::Program;
 
 /// Boards: which there are, their pins, and a program on one.
@@ -38,20 +38,20 @@ struct List {
     json: bool,
 }
 
-/// List a board's pins by name, with the sites of the device; with --system, what is at each.
+/// List a board's pins by name, with the sites of the device; with --wiring, what is at each.
 #[derive(Args)]
 struct Pins {
     /// A name from `takt board list`, or a file of the same form (docs/board.md).
     board: String,
-    /// System whose peripherals are at the pins.
+    /// Wiring whose peripherals are at the pins.
     #[arg(long, value_name = "TOML")]
-    system: Option<PathBuf>,
+    wiring: Option<PathBuf>,
     /// Print them as JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// Check that a system fits a board and a program.
+/// Check that a wiring fits a board and a program.
 #[derive(Args)]
 struct Check {
     #[command(flatten)]
@@ -79,7 +79,7 @@ struct Build {
 
 const BUILD: &str = "\
 Example:
-  takt board build --board ulx3s-85f --system robot.toml --program robot.s -o out
+  takt board build --board ulx3s-85f --wiring robot.toml --program robot.s -o out
   openFPGALoader --board ulx3s out/takt.bit";
 
 /// Run the complete top level in Verilator, with its UART at a pseudo-terminal, as a board at a serial port.
@@ -92,7 +92,7 @@ struct Sim {
     /// A motor that turns an encoder: the peripherals' names, and counts per second at full duty; may be repeated.
     #[arg(long, value_name = "PWM,QUADRATURE,SPEED")]
     axis: Vec<String>,
-    /// One in so many bits of the UART is turned, in either direction.
+    /// One in so many bits of the UART is flipped, in either direction.
     #[arg(long, default_value_t = 0, value_name = "N")]
     noise: u32,
     /// End after so many cycles; without it, when it is interrupted.
@@ -100,15 +100,16 @@ struct Sim {
     cycles: Option<u64>,
 }
 
-/// A program, a system and a board.
+/// A program, a wiring and a board.
 #[derive(Args)]
 pub(crate) struct Target {
     /// A name from `takt board list`, or a file of the same form (docs/board.md).
     #[arg(long)]
     pub(crate) board: String,
-    /// Which peripherals are at which pins, and which ports are their registers (docs/board.md).
+    /// Which peripherals are at which pins, and which ports are their registers (docs/board.md). Without it there are none: the
+    /// host reads and writes ports, the clock is the board's own, and a period takes 100 µs.
     #[arg(long, value_name = "TOML")]
-    pub(crate) system: PathBuf,
+    pub(crate) wiring: Option<PathBuf>,
     /// Source or image of the program.
     #[arg(long, value_name = "FILE")]
     pub(crate) program: PathBuf,
@@ -118,7 +119,7 @@ pub(crate) struct Target {
     pub(crate) source: SourceArguments,
 }
 
-/// Bytes of a board's or a system's file.
+/// Bytes of a board's or a wiring's file.
 const LIMIT: usize = 1 << 20;
 
 /// A file's name and text.
@@ -152,14 +153,21 @@ pub(crate) fn find(name: &str, color: bool) -> Result<Board> {
 
 impl Target {
     /// All three, which fit each other.
-    pub(crate) fn read(&self, color: bool) -> Result<(Board, System, Program)> {
-        files::check(&[("--system", &self.system), ("--program", &self.program)], &[])?;
+    pub(crate) fn read(&self, color: bool) -> Result<(Board, Wiring, Program)> {
+        let mut reads: Vec<(&str, &Path)> = vec![("--program", &self.program)];
+        reads.extend(self.wiring.as_deref().map(|path| ("--wiring", path)));
+        files::check(&reads, &[])?;
         let board = find(&self.board, color)?;
-        let (name, text) = text(&self.system)?;
-        let system = right(System::read(&name, &text, &board), color)?;
-        let program = Load::new(self.machine.machine, color).with(&self.source).program(&self.program)?;
-        right(system.check(&name, &text, &program), color)?;
-        Ok((board, system, program))
+        let load = || Load::new(self.machine.machine, color).with(&self.source).program(&self.program);
+        let Some(path) = &self.wiring else {
+            let wiring = Wiring::none(&board);
+            return Ok((board, wiring, load()?));
+        };
+        let (name, text) = text(path)?;
+        let wiring = right(Wiring::read(&name, &text, &board), color)?;
+        let program = load()?;
+        right(wiring.check(&name, &text, &program), color)?;
+        Ok((board, wiring, program))
     }
 }
 
@@ -170,8 +178,8 @@ pub(crate) fn run(arguments: &Boards, color: bool, out: &mut Out) -> Result<()> 
         Command::Sim(sim) => self::sim(sim, color, out),
         Command::Pins(pins) => self::pins(pins, color, out),
         Command::Check(check) => {
-            let (board, system, program) = check.target.read(color)?;
-            let ports = system
+            let (board, wiring, program) = check.target.read(color)?;
+            let ports = wiring
                 .peripherals
                 .iter()
                 .map(|p| p.reads.iter().flatten().count() + p.writes.iter().flatten().count());
@@ -180,10 +188,10 @@ pub(crate) fn run(arguments: &Boards, color: bool, out: &mut Out) -> Result<()> 
                 "{}, {}: {} peripherals, {} of the program's ports on pins, a period of {} cycles at {} MHz",
                 board.name,
                 program.machine.name,
-                system.peripherals.len(),
+                wiring.peripherals.len(),
                 ports.sum::<usize>(),
-                system.period,
-                system.clock
+                wiring.period,
+                wiring.clock
             )?;
             Ok(())
         }
@@ -224,14 +232,14 @@ fn list(arguments: &List, color: bool, out: &mut Out) -> Result<()> {
 
 fn pins(arguments: &Pins, color: bool, out: &mut Out) -> Result<()> {
     let board = find(&arguments.board, color)?;
-    let system = match &arguments.system {
+    let wiring = match &arguments.wiring {
         None => None,
         Some(path) => {
             let (name, text) = text(path)?;
-            Some(right(System::read(&name, &text, &board), color)?)
+            Some(right(Wiring::read(&name, &text, &board), color)?)
         }
     };
-    let used = |pin: &str| system.as_ref().and_then(|system| system.at(pin));
+    let used = |pin: &str| wiring.as_ref().and_then(|wiring| wiring.at(pin));
     if arguments.json {
         let pins =
             board.pins.iter().map(|(pin, site)| json!({ "pin": pin, "site": site, "used": used(pin) }));
@@ -245,10 +253,10 @@ fn pins(arguments: &Pins, color: bool, out: &mut Out) -> Result<()> {
 }
 
 fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
-    let (board, system, program) = arguments.target.read(color)?;
+    let (board, wiring, program) = arguments.target.read(color)?;
     let folder = &arguments.output;
     if arguments.sources {
-        let circuit = takt_board::build::write(&board, &system, &program, folder)?;
+        let circuit = takt_board::build::write(&board, &wiring, &program, folder)?;
         writeln!(
             out,
             "{} files in {}; the top level is {}.v",
@@ -263,7 +271,7 @@ fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
     let step = |what: &str| output::message(&format!("{what} …"));
     step("tools");
     let venv = Venv::with(&venv, &[YOSYS, NEXTPNR])?;
-    let report = takt_board::build::build(&venv, &board, &system, &program, arguments.seed, folder, &step)?;
+    let report = takt_board::build::build(&venv, &board, &wiring, &program, arguments.seed, folder, &step)?;
     writeln!(out, "{}: {} bytes, for {}", folder.join("takt.bit").display(), report.bytes, board.text)?;
     for (net, reached, needed) in &report.clocks {
         writeln!(
@@ -291,21 +299,21 @@ struct Axis {
 }
 
 impl Axis {
-    fn new(text: &str, system: &System, sim: &Simulation) -> Result<Axis> {
+    fn new(text: &str, wiring: &Wiring, sim: &Simulation) -> Result<Axis> {
         let wrong =
             || anyhow!("--axis {text}: it is a PWM, a quadrature and a speed, as in motor,encoder,20000");
         let [motor, encoder, speed] = text.split(',').collect::<Vec<_>>()[..] else { return Err(wrong()) };
         let find = |name: &str, kind: &str| {
-            let mut all = system.peripherals.iter();
+            let mut all = wiring.peripherals.iter();
             all.find(|p| p.name == name && p.kind.name == kind)
-                .ok_or_else(|| anyhow!("--axis {text}: the system has no {kind} `{name}`"))
+                .ok_or_else(|| anyhow!("--axis {text}: the wiring has no {kind} `{name}`"))
         };
         let half = find(motor, "pwm")?.parameters[0];
         find(encoder, "quadrature")?;
         let speed: f64 = speed.parse().map_err(|_| wrong())?;
         let pins = ["a", "b"].map(|pin| sim.input(&format!("{encoder}_{pin}")));
         let [Some(a), Some(b)] = pins else { return Err(wrong()) };
-        let speed = speed / (system.clock * 1e6);
+        let speed = speed / (wiring.clock * 1e6);
         Ok(Axis { motor: motor.to_owned(), pins: [a, b], half: half.into(), speed, position: 0.0, counts: 0 })
     }
 
@@ -323,23 +331,23 @@ impl Axis {
 
 #[cfg(unix)]
 fn sim(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
-    let (board, system, program) = arguments.target.read(color)?;
+    let (board, wiring, program) = arguments.target.read(color)?;
     let folder = takt_cosim::cache_folder().join(format!("board-{}", std::process::id()));
     output::message("compiling the circuit …");
-    let sim = Simulation::new(&board, &system, &program, &folder);
-    let ended = sim.map_err(anyhow::Error::from).and_then(|sim| serve(arguments, &system, sim, out));
+    let sim = Simulation::new(&board, &wiring, &program, &folder);
+    let ended = sim.map_err(anyhow::Error::from).and_then(|sim| serve(arguments, &wiring, sim, out));
     let _ = std::fs::remove_dir_all(&folder);
     ended
 }
 
 #[cfg(unix)]
-fn serve(arguments: &Sim, system: &System, mut sim: Simulation, out: &mut Out) -> Result<()> {
-    let axes = arguments.axis.iter().map(|text| Axis::new(text, system, &sim));
+fn serve(arguments: &Sim, wiring: &Wiring, mut sim: Simulation, out: &mut Out) -> Result<()> {
+    let axes = arguments.axis.iter().map(|text| Axis::new(text, wiring, &sim));
     let mut axes = axes.collect::<Result<Vec<Axis>>>()?;
     // Pulses are measured over whole periods of the PWM.
     let slice = axes.iter().map(|axis| 2 * axis.half as u32).max().unwrap_or(2000);
     let mut terminal = takt_board::terminal::Terminal::new()?;
-    writeln!(out, "{} {}", terminal.path().display(), system.baud)?;
+    writeln!(out, "{} {}", terminal.path().display(), wiring.baud)?;
     out.flush()?;
     sim.noise = arguments.noise;
     while arguments.cycles.is_none_or(|most| sim.cycles < most) {

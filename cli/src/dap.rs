@@ -1,6 +1,7 @@
 //! `takt dap`: the debug adapter, on standard input and output or for one client after the other on a socket.
 
 use crate::debug::{self, Debug};
+use crate::files::Out;
 use crate::output::{describe, message};
 use crate::track;
 use anyhow::{Context, Result};
@@ -26,7 +27,7 @@ pub(crate) struct Dap {
     listen: Option<String>,
 }
 
-pub(crate) fn run(arguments: &Dap) -> Result<()> {
+pub(crate) fn run(arguments: &Dap, _color: bool, _out: &mut Out) -> Result<()> {
     let Some(address) = &arguments.listen else {
         client(io::stdin(), io::stdout());
         return Ok(());

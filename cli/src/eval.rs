@@ -1,5 +1,6 @@
 //! `takt eval`: one operation on operands from standard input, in TestFloat's line format.
 
+use crate::absent;
 use crate::files::Out;
 use crate::output::Failure;
 use crate::select::{self, MachineArgument};
@@ -45,6 +46,9 @@ pub(crate) fn run(arguments: &Eval, out: &mut Out) -> Result<()> {
     }
     if machine.host(row.function).is_none() {
         bail!("machine {} has no unit for `{}`", machine.name, row.mnemonic);
+    }
+    if arguments.reference && !cfg!(feature = "reference") {
+        return absent::left_out("reference");
     }
     if arguments.reference && !HAS_SOFTFLOAT {
         let text = "--reference needs Berkeley SoftFloat, which is built on x86-64 Linux with glibc only; \

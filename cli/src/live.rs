@@ -19,7 +19,7 @@ use takt_isa::{Program, Type};
 struct Port {
     /// The serial port: /dev/ttyUSB0, or what `takt board sim` says.
     port: PathBuf,
-    /// Its baud rate: the system's.
+    /// Its baud rate: the wiring's.
     #[arg(long, default_value_t = 115_200)]
     baud: u32,
 }
@@ -98,7 +98,7 @@ enum Command {
     Start,
     /// Stop the program; outputs are safe.
     Stop,
-    /// Halt at the end of a period: no more ticks.
+    /// Hold at the end of a period: no more ticks.
     Hold,
     /// One period, while it is held.
     Step,

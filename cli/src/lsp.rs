@@ -1,5 +1,6 @@
 //! `takt lsp`: the language server on standard input and output.
 
+use crate::files::Out;
 use crate::number::{self, Time};
 use crate::output::{Failure, message};
 use crate::select::{self, MachineArgument, SourceArguments};
@@ -41,7 +42,7 @@ fn library_folder() -> Option<PathBuf> {
     Some(cache.join("takt").join("library"))
 }
 
-pub(crate) fn run(arguments: &Lsp) -> Result<()> {
+pub(crate) fn run(arguments: &Lsp, _color: bool, _out: &mut Out) -> Result<()> {
     let settings = Settings {
         machine: arguments.machine.machine,
         levels: arguments.source.warnings.iter().copied().collect(),

@@ -1,17 +1,20 @@
 //! Takt: assemble, emulate and time controllers for robots. One command per module; this is the only crate that knows the
 //! terminal.
 
+mod absent;
 mod account;
 mod accuracy;
 mod analyse;
 mod arm;
 mod asm;
 mod batch;
+#[cfg(feature = "board")]
 mod board;
 mod bound;
 mod completions;
 mod controller;
 mod cosim;
+#[cfg(feature = "editor")]
 mod dap;
 mod debug;
 mod deny;
@@ -22,11 +25,14 @@ mod files;
 mod fmt;
 mod friction;
 mod isa;
+#[cfg(feature = "board")]
 mod live;
 mod load;
+#[cfg(feature = "editor")]
 mod lsp;
 mod machines;
 mod man;
+#[cfg(feature = "model")]
 mod model;
 mod monte_carlo;
 mod nan;
@@ -43,6 +49,12 @@ mod system;
 mod trace;
 mod track;
 
+#[cfg(not(feature = "model"))]
+use absent::model;
+#[cfg(not(feature = "board"))]
+use absent::{board, live};
+#[cfg(not(feature = "editor"))]
+use absent::{dap, lsp};
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 use files::Out;
@@ -114,8 +126,8 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Accuracy(accuracy) => accuracy::run(accuracy, color, out),
         Command::Eval(eval) => eval::run(eval, out),
         Command::Fmt(fmt) => fmt::run(fmt, out),
-        Command::Lsp(lsp) => lsp::run(lsp),
-        Command::Dap(dap) => dap::run(dap),
+        Command::Lsp(lsp) => lsp::run(lsp, color, out),
+        Command::Dap(dap) => dap::run(dap, color, out),
         Command::Rtl(rtl) => rtl::run(rtl, color, out),
         Command::Board(board) => board::run(board, color, out),
         Command::Load(load) => live::load(load, color, out),

@@ -37,8 +37,8 @@ pub(crate) fn info(session: &Session, name: &str) -> Result<String, String> {
             writeln!(text, "{name} is {}, {}: {}", kind(program, only.register), place, type_name(only.ty));
     } else {
         let at_hand = lives.iter().any(|life| life.at_hand);
-        let at_hand = if at_hand { "; > is at hand" } else { "; none is at hand" };
-        let _ = writeln!(text, "{name} stands for {} registers here and there{at_hand}", lives.len());
+        let at_hand = if at_hand { "; > is this line's" } else { "; none is this line's" };
+        let _ = writeln!(text, "{name} stands for {} registers{at_hand}", lives.len());
     }
     for life in &lives {
         let mark = if life.at_hand { '>' } else { ' ' };

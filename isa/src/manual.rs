@@ -170,7 +170,7 @@ pub fn text() -> String {
     let machines: Vec<&str> = manual.machines.iter().map(|machine| machine.name).collect();
     let _ = writeln!(
         out,
-        "\nColumns {}: issue slot, latency/interval in cycles. `takt isa MNEMONIC` tells more.",
+        "\nColumns {}: slot, latency/interval in cycles. `takt isa MNEMONIC` tells more.",
         machines.join(", ")
     );
     out
@@ -204,7 +204,7 @@ pub fn machines_text() -> String {
         );
         let _ = writeln!(
             out,
-            "  {} cycles without issue after a redirection, {} after a conditional branch not taken",
+            "  {} cycles without issue after a branch taken (refill), {} after one not taken (resolve)",
             machine.refill, machine.resolve
         );
     }
@@ -249,8 +249,8 @@ pub fn markdown() -> String {
         out.push('\n');
     }
     out.push_str(
-        "\nTypes: of the result, if any, then of the sources. Columns of machines: issue slot, latency/interval in cycles; an operation that issues in\n\
-         cycle `c` delivers to operations that issue in cycle `c + latency` or later (docs/timing.md).\n\n",
+        "\nTypes: of the result, if any, then of the sources. Columns of machines: slot, latency/interval in cycles; an\n\
+         operation that issues in cycle `c` delivers to operations that issue in cycle `c + latency` or later (docs/timing.md).\n\n",
     );
 
     out.push_str("## Words\n\n| operands | bits |\n|---|---|\n");

@@ -23,24 +23,10 @@ from takt._errors import (
     Place,
     TaktError,
 )
-from takt._program import (
-    DEFAULT_MACHINE,
-    Accuracy,
-    Analysis,
-    Array,
-    Bound,
-    Largest,
-    Model,
-    Port,
-    Program,
-    Run,
-    Section,
-    Sim,
-    Span,
-    assemble,
-    load,
-    machines,
-)
+from takt._ports import Array, Port
+from takt._program import DEFAULT_MACHINE, Program, assemble, load, machines
+from takt._results import Accuracy, Analysis, Bound, Largest, Model, Run, Section, Span
+from takt._sim import Sim
 from takt._takt import Fault
 
 __all__ = [

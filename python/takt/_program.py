@@ -1,13 +1,10 @@
-"""Programs and runs, with the names, shapes and types of NumPy around the extension module."""
+"""Programs, with the names, shapes and types of NumPy around the extension module."""
 
 from __future__ import annotations
 
-import html
-import json
 import os
 import warnings as python_warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,283 +13,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from takt import _takt
 from takt._errors import AssemblyWarning, Diagnostic, FaultError, diagnostics
+from takt._ports import Array, Port, count_of, near, numbers, words_of
+from takt._results import Accuracy, Analysis, Bound, Largest, Model, Run, Section, Span
+from takt._sim import Sim
 
 #: Cycles in which a period ends, or nobody expects it to any more.
 MAX_CYCLES = 1_000_000_000
 #: The machine that sources are assembled for, unless told otherwise.
 DEFAULT_MACHINE = _takt.machines()[0][0]
 
-_DTYPES: dict[str, np.dtype[Any]] = {
-    "float": np.dtype(np.float32),
-    "int": np.dtype(np.int32),
-    "bits": np.dtype(np.uint32),
-}
-_FLAGS = _takt.flag_names()
-
 
 def machines() -> dict[str, str]:
     """The machines that programs can be assembled for: name and description."""
     return dict(_takt.machines())
-
-
-@dataclass(frozen=True)
-class Port:
-    """An input or output port: a register with a name."""
-
-    name: str
-    #: `float` (binary32), `int` (32 bits, signed) or `bits` (32 bits, unsigned).
-    type: str
-
-    @property
-    def dtype(self) -> np.dtype[Any]:
-        """The type of its values in arrays: float32, int32 or uint32."""
-        return _DTYPES[self.type]
-
-
-@dataclass(frozen=True)
-class Array:
-    """Several ports as one array, as models have them: `q` of shape (6,) for `q_shoulder`, ….
-
-    `elements` are in row-major order. Each is a port's name, or a number (an output that is constant has no port), or
-    None (an input without effect has none).
-    """
-
-    name: str
-    shape: tuple[int, ...]
-    elements: tuple[str | float | None, ...]
-
-
-@dataclass(frozen=True)
-class Largest:
-    """The largest error of a kind that an output has had, and when."""
-
-    #: In the output's unit, in ulps, or as a part of the exact value.
-    error: float
-    #: The period, from 0.
-    period: int
-    #: What the output was.
-    value: float
-    #: What it is in binary64.
-    exact: float
-
-
-@dataclass(frozen=True)
-class Accuracy:
-    """The errors of an output at the ends of the periods, against the same operations in binary64."""
-
-    name: str
-    #: Periods at whose end it was compared.
-    periods: int
-    #: The largest in the output's own unit, in ulps, and in relation to the exact value; None if it never was a finite number.
-    absolute: Largest | None
-    ulp: Largest | None
-    relative: Largest | None
-    #: Where the largest absolute error comes from, the largest share first: place (`law.s:12`) and share, which add up to it.
-    operations: tuple[tuple[str, float], ...]
-
-
-@dataclass(frozen=True)
-class Model:
-    """What a program was made of."""
-
-    #: What is computed, in a line.
-    title: str
-    #: What was decided on the way.
-    notes: tuple[str, ...]
-    #: Scalar operations after rewriting.
-    operations: int
-    #: Of a robot: its joints, in the order of the arrays.
-    joints: tuple[str, ...]
-    #: What each port is, and its unit.
-    ports: dict[str, str]
-
-
-@dataclass(frozen=True)
-class Span:
-    """Cycles, from the fewest to the most."""
-
-    best: int
-    worst: int
-
-
-@dataclass(frozen=True)
-class Section:
-    """What a section of a program can take, in cycles, whatever the inputs."""
-
-    #: The label that it begins at; of what runs once, `once`.
-    name: str
-    #: Where it begins, as `pd.s:12`.
-    place: str | None
-    #: Whether it begins with reset, not with a tick.
-    once: bool
-    #: With the tick long after the `wait`.
-    cycles: Span
-    #: With the tick at any time after the `wait`.
-    in_time: Span
-    #: After a missed deadline.
-    missed: Span
-
-
-@dataclass(frozen=True)
-class Bound:
-    """The best and the worst that each section can take."""
-
-    sections: tuple[Section, ...]
-    #: The longest period, in cycles, with every tick in time; None if there is no period.
-    worst_period: int | None
-
-
-def _flags(bits: int) -> frozenset[str]:
-    return frozenset(name for bit, name in _FLAGS if bits & bit)
-
-
-def _near(name: str, names: Sequence[str]) -> str:
-    near = _takt.nearest(name, list(names))
-    if near is not None:
-        return f"; did you mean `{near}`?"
-    return f" (there are: {', '.join(names)})" if 0 < len(names) <= 40 else ""
-
-
-def _first(wrong: NDArray[np.bool_]) -> str:
-    """Where the first of some elements is, as an index."""
-    place = np.unravel_index(int(np.argmax(wrong)), wrong.shape) if wrong.ndim else ()
-    return "" if not place else "[" + ", ".join(str(int(i)) for i in place) + "]"
-
-
-def _numbers(what: str, value: ArrayLike) -> NDArray[Any]:
-    try:
-        array = np.asarray(value)
-    except ValueError as error:
-        raise ValueError(f"{what}: no array of numbers: {error}") from None
-    if array.dtype.kind not in "fiub":
-        raise ValueError(f"{what}: an array of {array.dtype} is none of numbers")
-    return array
-
-
-def _words(what: str, port: Port, array: NDArray[Any]) -> NDArray[np.uint32]:
-    """The bits of values for a port; numbers are rounded to binary32 once."""
-    if port.type == "float":
-        nan = np.isnan(array)
-        if nan.any():
-            raise ValueError(f"{what}{_first(nan)}: NaN is no input for a controller")
-        with np.errstate(over="ignore"):
-            rounded = array.astype(np.float32)
-        infinite = np.isinf(rounded)
-        if infinite.any():
-            number = array[infinite].flat[0]
-            raise ValueError(f"{what}{_first(infinite)}: {number} does not fit binary32, whose largest is 3.4028235e38")
-        return rounded.view(np.uint32)
-    if array.dtype.kind == "f":
-        raise ValueError(f"{what}: the port carries integers, the array {array.dtype}; round it and use .astype(np.{port.dtype})")
-    limits = np.iinfo(port.dtype)
-    outside = (array < limits.min) | (array > limits.max) if array.dtype.itemsize >= 4 or limits.min == 0 else np.zeros(array.shape, bool)
-    if outside.any():
-        number = array[outside].flat[0]
-        raise ValueError(f"{what}{_first(outside)}: {number} is not between {limits.min} and {limits.max}")
-    return array.astype(port.dtype).view(np.uint32)
-
-
-class Analysis:
-    """Where the cycles of a period went. In a notebook it shows the pipeline as a picture; as text it is the report that
-    `takt analyse` prints."""
-
-    #: Everything, as `takt analyse --json` prints it.
-    data: dict[str, Any]
-    #: The picture, as a page for a browser that needs nothing else.
-    html: str
-
-    def __init__(self, text: str, data: str, html: str) -> None:
-        self._text = text
-        self.data = json.loads(data)
-        self.html = html
-
-    @property
-    def cycles(self) -> int:
-        """Cycles of the period."""
-        cycles: int = self.data["cycles"]
-        return cycles
-
-    def __str__(self) -> str:
-        return self._text
-
-    def __repr__(self) -> str:
-        data = self.data
-        return f"<takt.Analysis of {data['program']}, period {data['period']}: {data['cycles']} cycles on {data['machine']}>"
-
-    def _repr_html_(self) -> str:
-        # A frame of its own: the page's styles and script are not the notebook's.
-        page = html.escape(self.html, quote=True)
-        return f'<iframe srcdoc="{page}" style="width:100%;height:720px;border:0" sandbox="allow-scripts"></iframe>'
-
-
-class Run:
-    """What came of a run.
-
-    Arrays have shape (periods,), those of a batch (runs, periods). A run that a fault has ended has, from then on, outputs
-    as if never written and 0 cycles.
-    """
-
-    #: Output by name; an array of ports has its own dimensions behind those of the run. float32, int32 or uint32. What
-    #: was never written is NaN or 0, and counted in `unwritten`.
-    outputs: dict[str, NDArray[Any]]
-    #: The same by port.
-    ports: dict[str, NDArray[Any]]
-    #: Cycles of each period, from the tick to the `wait`; int64.
-    cycles: NDArray[np.int64]
-    #: Deadlines missed in each period: ticks that came before the `wait`; int64.
-    missed: NDArray[np.int64]
-    #: Periods that came to their end: of a batch, int64 of shape (runs,).
-    completed: int | NDArray[np.int64]
-    #: The exception flags raised since reset, among `invalid`, `divide-by-zero`, `overflow`: of a batch a list.
-    flags: frozenset[str] | list[frozenset[str]]
-    #: What ended runs early, by run.
-    faults: list[_takt.Fault]
-    #: Output ports that a period ended with before anything was written there, and how many periods.
-    unwritten: dict[str, int]
-    #: NaNs written to output ports.
-    nan_writes: int
-
-    def __init__(
-        self,
-        program: Program,
-        ports: dict[str, NDArray[Any]],
-        cycles: NDArray[np.int64],
-        missed: NDArray[np.int64],
-        ran: _takt.Ran,
-    ) -> None:
-        self.ports = ports
-        self.outputs = {array.name: program._stacked(array, ports, cycles.shape) for array in program.output_arrays}
-        if not program.output_arrays:
-            self.outputs = ports
-        self.cycles = cycles
-        self.missed = missed
-        single = cycles.ndim < 2
-        self.completed = ran["completed"][0] if single else np.array(ran["completed"], np.int64)
-        self.flags = _flags(ran["flags"][0]) if single else [_flags(bits) for bits in ran["flags"]]
-        self.faults = ran["failures"]
-        names = list(program.outputs)
-        self.unwritten = {name: count for name, count in zip(names, ran["unwritten"]) if count}
-        self.nan_writes = ran["nan_writes"]
-
-    def check(self) -> Run:
-        """The run itself if it came to its end.
-
-        Raises:
-            FaultError: the first fault.
-        """
-        if self.faults:
-            raise FaultError(self.faults[0])
-        return self
-
-    def __repr__(self) -> str:
-        shape, cycles = self.cycles.shape, self.cycles
-        what = "to its halt" if not shape else " × ".join(
-            f"{count} {name}{'' if count == 1 else 's'}" for count, name in zip(shape, ("run", "period")[-len(shape):])
-        )
-        done = cycles[cycles > 0]
-        span = "" if done.size == 0 else f", {done.min()} to {done.max()} cycles" if done.min() != done.max() else f", {done.min()} cycles"
-        faults = f", {len(self.faults)} ended by a fault: {self.faults[0].message}" if self.faults else ""
-        return f"<takt.Run: {what}{span}, outputs {', '.join(self.outputs)}{faults}>"
 
 
 class Program:
@@ -386,7 +119,7 @@ class Program:
         lead = self._lead({what: shape for what, shape, _ in given.values()})
         if len(lead) > 1:
             raise ValueError(f"an analysis is of one run, and the inputs have {lead[0]}")
-        wanted = _count("period", period, least=0)
+        wanted = count_of("period", period, least=0)
         if lead and wanted is not None and wanted > lead[0]:
             raise ValueError(f"the inputs have {lead[0]} periods, so there is no period {wanted}")
         count = lead[0] if lead else max(wanted, 1) if wanted is not None else 2
@@ -422,7 +155,7 @@ class Program:
         words = np.empty((lead[0] if lead else 1, len(given)), np.uint32)
         for column, port in enumerate(self.inputs):
             words[:, column] = given[port][2]
-        limit = _count("max_cycles", max_cycles) or MAX_CYCLES
+        limit = count_of("max_cycles", max_cycles) or MAX_CYCLES
         outputs, fault = _takt.accuracy(self._core, words, each_period, limit)
         if fault is not None:
             raise FaultError(fault)
@@ -470,12 +203,12 @@ class Program:
         Raises:
             ValueError: a name, shape or value that does not fit, with the name nearest to it.
         """
-        tick, max_cycles = _count("tick", tick), _count("max_cycles", max_cycles) or MAX_CYCLES
+        tick, max_cycles = count_of("tick", tick), count_of("max_cycles", max_cycles) or MAX_CYCLES
         given = self._by_port(inputs or {})
         self._all_given(given)
         lead = self._lead({what: shape for what, shape, _ in given.values()})
         if periods is not None:
-            wanted = _count("periods", periods, least=0) or 0
+            wanted = count_of("periods", periods, least=0) or 0
             if lead and lead[-1] not in (1, wanted):
                 raise ValueError(f"periods is {wanted}, and the inputs have {lead[-1]}")
             lead = (*lead[:-1], wanted)
@@ -493,7 +226,7 @@ class Program:
             return array.T if len(lead) == 2 else array[:, 0]
 
         ports = {name: shaped(bits.view(port.dtype)) for (name, port), bits in zip(self.outputs.items(), outputs)}
-        return Run(self, ports, shaped(cycles.view(np.int64)), shaped(missed.view(np.int64)), ran)
+        return Run(self.output_arrays, ports, shaped(cycles.view(np.int64)), shaped(missed.view(np.int64)), ran)
 
     def _run_to_halt(self, words: Mapping[str, NDArray[np.uint32]], max_cycles: int) -> Run:
         bits = [int(words[name]) for name in self.inputs]
@@ -510,7 +243,7 @@ class Program:
             "unwritten": [int(value is None) for value in values],
             "nan_writes": 0,
         }
-        return Run(self, ports, np.array(cycles, np.int64), np.array(0, np.int64), ran)
+        return Run(self.output_arrays, ports, np.array(cycles, np.int64), np.array(0, np.int64), ran)
 
     def sim(self, *, tick: int | None = None, max_cycles: int = MAX_CYCLES) -> Sim:
         """A machine with the program in it, to be stepped period by period.
@@ -519,7 +252,7 @@ class Program:
             tick: The tick comes every so many cycles; without, when the program is ready for it.
             max_cycles: A period that takes more is ended by a fault.
         """
-        return Sim(self, self._core.sim(_count("tick", tick), _count("max_cycles", max_cycles) or MAX_CYCLES))
+        return Sim(self, self._core.sim(count_of("tick", tick), count_of("max_cycles", max_cycles) or MAX_CYCLES))
 
     # ---- Names and shapes.
 
@@ -531,14 +264,14 @@ class Program:
         def give(port: str, what: str, values: NDArray[Any]) -> None:
             if port in ports:
                 raise ValueError(f"`{port}` is given twice: by {ports[port][0]} and by {what}")
-            ports[port] = (what, values.shape, _words(what, self.inputs[port], values))
+            ports[port] = (what, values.shape, words_of(what, self.inputs[port], values))
 
         for name, value in inputs.items():
             what = f"`{name}`"
             array = arrays.get(name)
             if array is None and name not in self.inputs:
-                raise ValueError(f"the program has no input {what}{_near(name, [*arrays, *self.inputs])}")
-            values = _numbers(what, value)
+                raise ValueError(f"the program has no input {what}{near(name, [*arrays, *self.inputs])}")
+            values = numbers(what, value)
             if array is None:
                 give(name, what, values)
                 continue
@@ -570,14 +303,6 @@ class Program:
             text = ", ".join(f"{what} {shape}" for what, shape in shapes.items() if shape)
             raise ValueError(f"inputs of different lengths: {text}") from None
 
-    @staticmethod
-    def _stacked(array: Array, ports: Mapping[str, Any], lead: tuple[int, ...]) -> NDArray[Any]:
-        whole = np.zeros((*lead, len(array.elements)), np.float32)
-        for index, element in enumerate(array.elements):
-            if element is not None:
-                whole[..., index] = ports[element] if isinstance(element, str) else element
-        return whole.reshape((*lead, *array.shape))
-
     def __repr__(self) -> str:
         def names(ports: Mapping[str, Port], arrays: Sequence[Array]) -> str:
             listed = [f"{array.name}{list(array.shape) if array.shape else ''}" for array in arrays] or list(ports)
@@ -585,126 +310,6 @@ class Program:
 
         ins, outs = names(self.inputs, self.input_arrays), names(self.outputs, self.output_arrays)
         return f"<takt.Program for {self.machine}: {self.bundles} bundles, ({ins}) -> ({outs})>"
-
-
-def _count(what: str, value: int | None, least: int = 1) -> int | None:
-    if value is None:
-        return None
-    try:
-        number = value.__index__()
-    except AttributeError:
-        raise TypeError(f"{what} is a whole number, not {value!r}") from None
-    if not least <= number < 1 << 62:
-        raise ValueError(f"{what} is {number}: it is {least} at least, and less than 2**62")
-    return number
-
-
-class Sim:
-    """A closed loop, period by period:
-
-        sim = program.sim()
-        for k in range(1000):
-            out = sim.step({"q": q, "qd": qd})
-            q, qd = plant(q, qd, out["tau"])
-    """
-
-    def __init__(self, program: Program, core: _takt.Sim) -> None:
-        self.program = program
-        self._core = core
-
-    def step(self, inputs: Mapping[str, ArrayLike] | None = None) -> dict[str, Any]:
-        """Sets inputs, lets the tick come and runs the program to its `wait`.
-
-        Args:
-            inputs: Values by port or array of ports. The first step needs all; later an input that is not given keeps
-                its value.
-
-        Returns:
-            The outputs: a float or int for each port, None if nothing was ever written there; an array of ports as
-            float32 of its shape.
-
-        Raises:
-            FaultError: the machine has stopped; it stays where it is until `reset`.
-            ValueError: a name, shape or value that does not fit.
-        """
-        program = self.program
-        given: dict[str, Any] = dict(inputs or {})
-        if program.input_arrays:
-            given = self._elements(given)
-        values = self._core.step(given)
-        if values is None:
-            fault = self._core.failure
-            raise RuntimeError("the machine has stopped") if fault is None else FaultError(fault)
-        return self._shaped(values)
-
-    def _elements(self, inputs: dict[str, Any]) -> dict[str, Any]:
-        """Arrays of ports as their elements."""
-        elements: dict[str, Any] = {}
-        arrays = {array.name: array for array in self.program.input_arrays}
-        for name, value in inputs.items():
-            array = arrays.get(name)
-            if array is None and name not in self.program.inputs:
-                raise ValueError(f"the program has no input `{name}`{_near(name, [*arrays, *self.program.inputs])}")
-            if array is None or array.shape == ():
-                pairs = [(name if array is None else array.elements[0], value)]
-            else:
-                values = _numbers(f"`{name}`", value)
-                if values.shape != array.shape:
-                    raise ValueError(f"`{name}` has shape {values.shape}, not {array.shape}")
-                pairs = list(zip(array.elements, values.ravel().tolist()))
-            for port, number in pairs:
-                if isinstance(port, str) and port in elements:
-                    raise ValueError(f"`{port}` is given twice")
-                if isinstance(port, str):
-                    elements[port] = number
-        return elements
-
-    def _shaped(self, values: dict[str, Any]) -> dict[str, Any]:
-        if not self.program.output_arrays:
-            return values
-        known = {name: np.nan if value is None else value for name, value in values.items()}
-        shaped: dict[str, Any] = {}
-        for array in self.program.output_arrays:
-            whole = Program._stacked(array, known, ())
-            shaped[array.name] = whole if array.shape else float(whole)
-        return shaped
-
-    def reset(self) -> None:
-        """Back to the state after loading."""
-        self._core.reset()
-
-    @property
-    def outputs(self) -> dict[str, Any]:
-        """What is on the outputs now, as `step` gives it."""
-        return self._shaped(self._core.read())
-
-    @property
-    def cycles(self) -> int:
-        """Cycles of the last period, from the tick to the `wait`."""
-        return self._core.cycles
-
-    @property
-    def missed(self) -> int:
-        """Deadlines missed in the last period."""
-        return self._core.missed
-
-    @property
-    def periods(self) -> int:
-        """Periods since reset."""
-        return self._core.periods
-
-    @property
-    def now(self) -> int:
-        """Cycles since reset, waiting included."""
-        return self._core.now
-
-    @property
-    def flags(self) -> frozenset[str]:
-        """The exception flags raised since reset, among `invalid`, `divide-by-zero`, `overflow`."""
-        return _flags(self._core.flags)
-
-    def __repr__(self) -> str:
-        return f"<takt.Sim on {self.program.machine}: {self.periods} periods, the last {self.cycles} cycles>"
 
 
 def assemble(
@@ -740,7 +345,7 @@ def assemble(
     if "\n" not in text and text.endswith((".s", ".takt")) and Path(text).is_file():
         raise ValueError(f"{text!r} is a file's name, not a source: takt.load({text!r}) reads it")
     core = _takt.assemble(
-        text.encode(), name, folder, list(include), machine, schedule, contract, _count("effort", effort, 0), list(warnings)
+        text.encode(), name, folder, list(include), machine, schedule, contract, count_of("effort", effort, 0), list(warnings)
     )
     return _warned(Program(core))
 
@@ -770,7 +375,7 @@ def load(
     core, text = _takt.load(path)
     if core is None:
         core = _takt.assemble(
-            text, path.name, path.parent, list(include), machine or DEFAULT_MACHINE, schedule, contract, _count("effort", effort, 0), list(warnings)
+            text, path.name, path.parent, list(include), machine or DEFAULT_MACHINE, schedule, contract, count_of("effort", effort, 0), list(warnings)
         )
     elif machine is not None and machine != core.machine:
         raise ValueError(f"{path} is an image for {core.machine}, not for {machine}")
@@ -791,7 +396,7 @@ def modelled(model: _takt.Model, name: str, machine: str, effort: int | None) ->
         return [Array(name, tuple(shape), tuple(elements)) for name, shape, elements in shaped]
 
     core = _takt.assemble(
-        model["source"].encode(), name, ".", [], machine, "source", "source", _count("effort", effort, 0), []
+        model["source"].encode(), name, ".", [], machine, "source", "source", count_of("effort", effort, 0), []
     )
     about = Model(
         model["title"], tuple(model["notes"]), model["operations"], tuple(model["joints"]), dict(model["texts"])

@@ -102,6 +102,9 @@ fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
+/// The features with which takt has all its commands.
+const EVERYTHING: &str = "takt/full";
+
 fn cargo() -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(root());
@@ -179,7 +182,7 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
         formal::formal(&formal::Arguments::SHARE)?;
     }
     let mut tests = cargo();
-    tests.args(["test", "--workspace", "--no-fail-fast", "--release"]).args(rest);
+    tests.args(["test", "--workspace", "--features", EVERYTHING, "--no-fail-fast", "--release"]).args(rest);
     if full {
         tests.env("TAKT_FULL", "1");
     }
@@ -204,7 +207,10 @@ fn speed() -> Result<()> {
 
 fn lint() -> Result<()> {
     run(cargo().args(["fmt", "--all", "--check"]))?;
-    run(cargo().args(["clippy", "--workspace", "--all-targets", "--release", "--", "-D", "warnings"]))?;
+    let workspace = ["--workspace", "--all-targets", "--features", EVERYTHING, "--release"];
+    run(cargo().arg("clippy").args(workspace).args(["--", "-D", "warnings"]))?;
+    // What `cargo run` compiles: takt with fewer commands.
+    run(cargo().args(["clippy", "--release", "-p", "takt", "--", "-D", "warnings"]))?;
     // isa, asm and emu stand without C: SoftFloat is a feature.
     run(cargo().args([
         "check",
@@ -229,7 +235,7 @@ fn fuzz(minutes: u32) -> Result<()> {
     seed()?;
     for target in ["assemble", "image"] {
         // cargo-fuzz needs unstable compiler flags; the variable admits them on the stable compiler.
-        run(cargo().env("RUSTC_BOOTSTRAP", "1").args(["fuzz", "run", target, "--"]).args([
+        run(cargo().env("RUSTC_BOOTSTRAP", "1").args(["fuzz", "run", "--fuzz-dir", "asm/fuzz", target, "--"]).args([
             format!("-max_total_time={}", 60 * minutes),
             "-max_len=65536".to_owned(),
             "-rss_limit_mb=4096".to_owned(),
@@ -241,7 +247,7 @@ fn fuzz(minutes: u32) -> Result<()> {
 
 /// What fuzzing starts from: the sources there are, and images of the programs.
 fn seed() -> Result<()> {
-    let (sources, images) = (root().join("fuzz/corpus/assemble"), root().join("fuzz/corpus/image"));
+    let (sources, images) = (root().join("asm/fuzz/corpus/assemble"), root().join("asm/fuzz/corpus/image"));
     std::fs::create_dir_all(&sources)?;
     std::fs::create_dir_all(&images)?;
     for folder in ["programs/hybrid", "asm/tests/accepted", "asm/tests/mistakes", "asm/tests/kernels"] {

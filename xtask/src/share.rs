@@ -1,4 +1,4 @@
-//! Whether `cargo xtask test` finds every crate that `cargo run --release` compiled: `third_party/unify`'s purpose.
+//! Whether the tests find every crate that `cargo xtask` itself and takt with all features compiled: `third_party/unify`'s purpose.
 
 use crate::cargo;
 use anyhow::{Context, Result, bail};
@@ -26,8 +26,10 @@ fn units(arguments: &[&str]) -> Result<BTreeSet<String>> {
 /// # Errors
 /// If the tests would compile a crate again, with other features.
 pub(crate) fn check() -> Result<()> {
-    let tests = units(&["test", "--workspace"])?;
-    let again: Vec<String> = units(&["build"])?.difference(&tests).cloned().collect();
+    let tests = units(&["test", "--workspace", "--features", crate::EVERYTHING])?;
+    let mut before = units(&["build", "--package", "xtask"])?;
+    before.extend(units(&["build", "--package", "takt", "--features", "full"])?);
+    let again: Vec<String> = before.difference(&tests).cloned().collect();
     if !again.is_empty() {
         bail!(
             "the tests compile these again, with other features; name those in third_party/unify/Cargo.toml:\n{}",

@@ -5,6 +5,7 @@ mod prompt;
 #[cfg(feature = "tui")]
 mod screen;
 
+use crate::absent;
 use crate::files::{self, Given, Out};
 use crate::load::{Load, Loaded};
 use crate::number;
@@ -87,8 +88,7 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
     let script = arguments.script.as_deref().map(script).transpose()?;
 
     if arguments.tui && !cfg!(feature = "tui") {
-        let text = "--tui is not in this build of takt; `cargo build --release --features tui` has it";
-        return Err(Failure::Usage(text.to_owned()).into());
+        return absent::left_out("tui");
     }
     if arguments.tui && !(std::io::stdin().is_terminal() && std::io::stdout().is_terminal()) {
         let text = "--tui needs a terminal as standard input and output; without one, commands come from --script or standard input";

@@ -154,6 +154,9 @@ impl Seen {
     }
 }
 
+/// What is seen in a tick: what went to the drives, the encoders' counts, the point that came, the reference.
+pub(crate) type Served = (Six, [i32; 6], Option<[Point; 6]>, Six);
+
 /// Output ports that are looked at often.
 struct Ports {
     u: [Register; 6],
@@ -175,8 +178,8 @@ pub(crate) struct Bench {
     pub(crate) alive: bool,
     pub(crate) reports: Vec<Report>,
     pub(crate) seen: Vec<Seen>,
-    /// Each tick: what went to the drives, the encoders' counts, the point that came, the reference.
-    pub(crate) servo: Vec<([f64; 6], [i32; 6], Option<[Point; 6]>, [f64; 6])>,
+    /// Each tick.
+    pub(crate) servo: Vec<Served>,
     links: [usize; 3],
     ports: Ports,
 }
@@ -344,7 +347,7 @@ impl Bench {
     }
 
     /// What was seen from when a segment first ran to the end.
-    pub(crate) fn from_segment(&self, sequence: u32) -> &[Seen] {
+    pub(crate) fn since(&self, sequence: u32) -> &[Seen] {
         let first = self.seen.iter().position(|seen| seen.segment == sequence).expect("it ran");
         &self.seen[first..]
     }

@@ -67,7 +67,7 @@ fn each_profile_is_its_binary64_model() {
         let sequence = bench.motion(MOVE, to, fast(profile));
         let accepted = bench.until(ACCEPTED, sequence);
         bench.until(FINISHED, sequence);
-        let seen = bench.from_segment(sequence);
+        let seen = bench.since(sequence);
         let course = planned(&from, &to, Demand::Fast, profile, false);
         let expected = f64::from(course.periods) * PERIOD;
         assert!((f64::from(accepted.value) - expected).abs() < 1.5 * PERIOD, "{accepted:?}, not {expected}");
@@ -115,11 +115,11 @@ fn times_are_met_and_speeds_are_reached() {
     let moving = bench.seen.iter().filter(|seen| seen.mode == 1).count();
     assert_eq!(moving, 625, "0.25 s");
     let course = planned(&from, &to, Demand::Time(0.25), Profile::Parabolic, false);
-    matches(bench.from_segment(sequence), from, to, course, [3e-7, 1e-5, 2e-3]);
+    matches(bench.since(sequence), from, to, course, [3e-7, 1e-5, 2e-3]);
     // Given speed: the fastest joint's.
     let back = bench.motion(MOVE, from, How { how: 1, amount: 0.7, ..how });
     bench.until(FINISHED, back);
-    let fastest = bench.from_segment(back).iter().flat_map(Seen::v).fold(0.0, |a: f64, v| a.max(v.abs()));
+    let fastest = bench.since(back).iter().flat_map(Seen::v).fold(0.0, |a: f64, v| a.max(v.abs()));
     assert!((0.695..=0.7).contains(&fastest), "{fastest}");
     // Only checked: no motion.
     let checked = bench.motion(MOVE, to, How { flags: 2, ..how });
@@ -160,7 +160,7 @@ fn via_points_are_passed_without_a_pause() {
     bench.until(FINISHED, sequences[2]);
     assert!(bench.reports.iter().all(|report| report.kind != STOPPED), "{:?}", bench.reports);
     let motion = Motion::new(from, &segments);
-    let seen: Vec<Seen> = bench.from_segment(sequences[0]).to_vec();
+    let seen: Vec<Seen> = bench.since(sequences[0]).to_vec();
     let moving = seen.iter().position(|seen| seen.mode == 0).expect("it has ended");
     // A course that is longer by a period shifts those after it: durations within 3 periods, and the shape by its continuity.
     assert!((moving as i64 - i64::from(motion.periods())).abs() <= 3, "{moving}, {}", motion.periods());
@@ -204,7 +204,7 @@ fn torque_limits_are_met_and_hit() {
     let free = bench.until(ACCEPTED, sequence).value;
     bench.until(FINISHED, sequence);
     // As fast as may be: close to the limit, and not beyond.
-    assert!(within_limits(bench.from_segment(sequence), &TORQUES, 1.0) > 0.9);
+    assert!(within_limits(bench.since(sequence), &TORQUES, 1.0) > 0.9);
     // In half the time it is not possible, and joint 1 is why.
     let how = How { profile: Profile::Rectangular, how: 0, amount: f64::from(free) / 2.0, flags: 0 };
     let refused = bench.motion(MOVE, from, how);
@@ -219,7 +219,7 @@ fn torque_limits_are_met_and_hit() {
     bench.until(ACCEPTED, limits);
     bench.until(FINISHED, back);
     let mut held = 0;
-    for seen in &bench.from_segment(back)[40..] {
+    for seen in &bench.since(back)[40..] {
         let torque = nominal(&seen.q()).torques(&seen.a())[0].clamp(-60.0, 60.0);
         let point = seen.points[0];
         assert!((point.u - (DA * torque + DB * point.v + DC * point.a)).abs() < 1e-4, "{point:?} {torque}");

@@ -42,7 +42,7 @@ fn a_line_is_straight_and_its_joints_are_binary64s() {
     let how = How { profile: Profile::Cosine, how: 0, amount: 0.5, flags: 0 };
     let sequence = bench.motion(MOVEL, to, how);
     bench.until(FINISHED, sequence);
-    let seen = bench.from_segment(sequence);
+    let seen = bench.since(sequence);
     // Its ramps are a quarter of the time, unless limits say otherwise: here they do not.
     let course = Course { ramp: 313, periods: 1250, profile: Profile::Cosine };
     let (mut off, mut worst, mut tool) = (0f64, [0f64; 3], 0f64);
@@ -85,7 +85,7 @@ fn a_square_is_gone_round_without_a_pause() {
         ));
     }
     bench.until(FINISHED, sequences[3]);
-    let seen: Vec<Seen> = bench.from_segment(sequences[0]).to_vec();
+    let seen: Vec<Seen> = bench.since(sequences[0]).to_vec();
     let end = seen.iter().position(|seen| seen.mode == 0).expect("it has ended");
     let poses: Vec<Six> = seen[..end].iter().map(|seen| pose(&seen.q(), &TOOL).0).collect();
     let speeds: Vec<f64> = poses
@@ -158,7 +158,7 @@ fn a_tool_moves_the_point_that_is_led() {
     let sequence =
         bench.motion(MOVEL, to, How { profile: Profile::Trapezoidal, how: 0, amount: 0.3, flags: 0 });
     bench.until(FINISHED, sequence);
-    for seen in bench.from_segment(sequence) {
+    for seen in bench.since(sequence) {
         let here = pose(&seen.q(), &tool).0;
         assert!(
             (0..5).all(|i| (here[i] - from[i]).abs() < 5e-6),

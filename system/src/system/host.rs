@@ -128,4 +128,17 @@ impl System {
         let ty = self.description.outputs().iter().find(|port| port.name == name).map(|port| port.ty);
         Ok(ty.map_or(Number::Bits(bits), |ty| Number::of(ty, bits)))
     }
+
+    /// As [`System::output`], by link and field as [`Description::outputs`](crate::Description::outputs) has them: for who
+    /// looks in every tick. `None` if there is no such field.
+    pub fn field_bits(&self, link: usize, field: usize) -> Option<u32> {
+        match self.links.get(link)? {
+            LinkState::Wire { shown, .. } => (field == 0).then_some(*shown),
+            LinkState::Snapshot { shown, .. } => shown.get(field).copied(),
+            LinkState::Fifo { fifo, .. } => match fifo.store.entries.front() {
+                Some(entry) => entry.get(field).copied(),
+                None => Some(0),
+            },
+        }
+    }
 }

@@ -1,0 +1,196 @@
+//! Names as numbers. Equal text has equal numbers, so that later stages compare and index instead of hashing text.
+//!
+//! The interner starts with the names the language knows, in a fixed order: mnemonics, directives, functions, constants.
+//! Whether a name is a mnemonic, and which, is then a comparison of its number: the table of instructions is hashed once,
+//! here, and no list of mnemonics exists anywhere else.
+
+use crate::ast::Directive;
+use crate::expr::{BUILTINS, Function};
+use crate::name::NameId;
+use takt_isa::{Op, ROWS};
+
+const EMPTY: u32 = u32::MAX;
+
+/// The set of all names.
+#[derive(Clone, Debug)]
+pub struct Interner {
+    /// All names, one after another.
+    text: String,
+    /// Where each name ends in `text`; it begins where the one before ends.
+    ends: Vec<u32>,
+    /// Open addressing: hash to number. A power of two of entries, at most half of them used.
+    table: Vec<u32>,
+}
+
+impl Default for Interner {
+    fn default() -> Interner {
+        Interner::new()
+    }
+}
+
+impl Interner {
+    /// An interner that knows the language's own names.
+    pub fn new() -> Interner {
+        let mut interner = Interner { text: String::new(), ends: Vec::new(), table: vec![EMPTY; 1 << 12] };
+        let known = ROWS
+            .iter()
+            .map(|row| row.mnemonic)
+            .chain(Directive::ALL.iter().map(|directive| directive.name()))
+            .chain(Function::ALL.iter().map(|function| function.name()))
+            .chain(BUILTINS.iter().map(|builtin| builtin.0));
+        for name in known {
+            interner.intern(name);
+        }
+        interner
+    }
+
+    /// The name's number, or the free entry of the table where it belongs.
+    fn find_or_slot(&self, name: &str) -> Result<NameId, usize> {
+        let mask = self.table.len() - 1;
+        let mut slot = hash(name.as_bytes()) as usize & mask;
+        loop {
+            let id = self.table[slot];
+            if id == EMPTY {
+                return Err(slot);
+            }
+            if self.text(NameId(id)) == name {
+                return Ok(NameId(id));
+            }
+            slot = (slot + 1) & mask;
+        }
+    }
+
+    /// The name's number, if it has one.
+    pub fn find(&self, name: &str) -> Option<NameId> {
+        self.find_or_slot(name).ok()
+    }
+
+    /// The name's number, new if the name is.
+    pub fn intern(&mut self, name: &str) -> NameId {
+        let slot = match self.find_or_slot(name) {
+            Ok(id) => return id,
+            Err(slot) => slot,
+        };
+        let id = self.ends.len() as u32;
+        self.table[slot] = id;
+        self.text.push_str(name);
+        self.ends.push(self.text.len() as u32);
+        if self.ends.len() * 2 > self.table.len() {
+            self.grow();
+        }
+        NameId(id)
+    }
+
+    /// The name's text.
+    #[inline]
+    pub fn text(&self, name: NameId) -> &str {
+        let index = name.0 as usize;
+        let start = if index == 0 { 0 } else { self.ends[index - 1] as usize };
+        &self.text[start..self.ends[index] as usize]
+    }
+
+    /// How many names there are; numbers are below it.
+    pub fn count(&self) -> usize {
+        self.ends.len()
+    }
+
+    fn grow(&mut self) {
+        let size = self.table.len() * 4;
+        let mut table = vec![EMPTY; size];
+        for id in 0..self.ends.len() as u32 {
+            let mut slot = hash(self.text(NameId(id)).as_bytes()) as usize & (size - 1);
+            while table[slot] != EMPTY {
+                slot = (slot + 1) & (size - 1);
+            }
+            table[slot] = id;
+        }
+        self.table = table;
+    }
+}
+
+impl NameId {
+    const DIRECTIVES: u32 = ROWS.len() as u32;
+    const FUNCTIONS: u32 = NameId::DIRECTIVES + Directive::ALL.len() as u32;
+    const BUILTINS: u32 = NameId::FUNCTIONS + Function::ALL.len() as u32;
+
+    /// The instruction of this mnemonic.
+    #[inline]
+    pub fn op(self) -> Option<Op> {
+        ROWS.get(self.0 as usize).map(|row| row.op)
+    }
+
+    /// The directive of this name, its point included.
+    #[inline]
+    pub fn directive(self) -> Option<Directive> {
+        self.0.checked_sub(NameId::DIRECTIVES).and_then(|i| Directive::ALL.get(i as usize)).copied()
+    }
+
+    /// The number of a directive's name.
+    pub fn of_directive(directive: Directive) -> NameId {
+        let index = Directive::ALL.iter().position(|known| *known == directive).unwrap_or(0);
+        NameId(NameId::DIRECTIVES + index as u32)
+    }
+
+    /// The function of this name.
+    pub fn function(self) -> Option<Function> {
+        self.0.checked_sub(NameId::FUNCTIONS).and_then(|i| Function::ALL.get(i as usize)).copied()
+    }
+
+    /// The index in [`BUILTINS`] of the constant of this name. `e`, `pi` and the like may be declared as something else.
+    pub fn builtin(self) -> Option<usize> {
+        let index = self.0.checked_sub(NameId::BUILTINS)? as usize;
+        (index < BUILTINS.len()).then_some(index)
+    }
+}
+
+/// Multiply and fold, eight bytes at a time.
+fn hash(bytes: &[u8]) -> u64 {
+    const K: u64 = 0x9e37_79b9_7f4a_7c15;
+    let fold = |h: u64, word: u64| {
+        let product = u128::from(h ^ word) * u128::from(K);
+        (product as u64) ^ ((product >> 64) as u64)
+    };
+    let mut h = K ^ bytes.len() as u64;
+    let mut chunks = bytes.chunks_exact(8);
+    for chunk in &mut chunks {
+        h = fold(h, chunk.iter().rev().fold(0, |word, &byte| word << 8 | u64::from(byte)));
+    }
+    let rest = chunks.remainder();
+    if !rest.is_empty() {
+        h = fold(h, rest.iter().rev().fold(0, |word, &byte| word << 8 | u64::from(byte)));
+    }
+    h ^ h >> 29
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn known_names_are_found_by_number() {
+        let mut interner = Interner::new();
+        assert_eq!(interner.intern("fadd").op(), Some(Op::fadd));
+        assert_eq!(interner.intern(".rep").directive(), Some(Directive::Rep));
+        assert_eq!(interner.intern("sqrt").function(), Some(Function::Sqrt));
+        assert_eq!(interner.intern("pi").builtin().map(|b| BUILTINS[b].0), Some("pi"));
+        let new = interner.intern("q1");
+        assert_eq!((new.op(), new.directive(), new.function(), new.builtin()), (None, None, None, None));
+    }
+
+    #[test]
+    fn known_names_are_distinct() {
+        // One name in two lists would shift the numbers of all that follow.
+        let count = NameId::BUILTINS as usize + BUILTINS.len();
+        assert_eq!(Interner::new().count(), count);
+    }
+
+    #[test]
+    fn growth_keeps_numbers() {
+        let mut interner = Interner::new();
+        let first: Vec<NameId> = (0..20_000).map(|i| interner.intern(&format!("n{i}"))).collect();
+        for (i, id) in first.iter().enumerate() {
+            assert_eq!(interner.text(*id), format!("n{i}"));
+            assert_eq!(interner.intern(&format!("n{i}")), *id);
+        }
+    }
+}

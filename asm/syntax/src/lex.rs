@@ -1,0 +1,522 @@
+//! Text to tokens. One regular expression for each kind of token, none for mnemonics: those are names like any other.
+
+use crate::ast::Directive;
+use crate::ast::Operator;
+use crate::intern::Interner;
+use crate::limits;
+use crate::name::NameId;
+use crate::report::diag::{Diagnostic, Severity, Sink};
+use crate::report::source::Span;
+use logos::Logos;
+
+/// A kind of token, as the regular expressions tell them apart.
+#[derive(Logos, Clone, Copy, PartialEq, Eq, Debug)]
+#[logos(skip r"[ \t\r\x0C]+")]
+#[logos(skip(r";[^\n]*", allow_greedy = true))]
+pub(crate) enum Raw {
+    #[token("\n")]
+    Newline,
+    #[regex(r"[A-Za-z_][A-Za-z0-9_.]*")]
+    Name,
+    // The pieces of a name template: `l{`, `}m{`, `}`.
+    #[regex(r"([A-Za-z_][A-Za-z0-9_.]*)?\{")]
+    Begin,
+    #[regex(r"\}[A-Za-z0-9_.]*\{")]
+    Middle,
+    #[regex(r"\}[A-Za-z0-9_.]*")]
+    End,
+    #[regex(r"\.[A-Za-z_][A-Za-z0-9_]*")]
+    Directive,
+    #[regex(r"[0-9][0-9_]*")]
+    Decimal,
+    #[regex(r"0[xX][0-9A-Fa-f_]+")]
+    Hexadecimal,
+    #[regex(r"0[bB][01_]+")]
+    Binary,
+    #[regex(r"[0-9][0-9_]*\.[0-9_]*([eE][+-]?[0-9]+)?")]
+    #[regex(r"[0-9][0-9_]*[eE][+-]?[0-9]+")]
+    #[regex(r"\.[0-9][0-9_]*([eE][+-]?[0-9]+)?")]
+    Real,
+    #[regex(r"0[xX][0-9A-Fa-f_]*(\.[0-9A-Fa-f_]*)?[pP][+-]?[0-9]+")]
+    HexReal,
+    // Anything else that begins like a number; the longest match wins, and of equals the one of higher priority.
+    #[regex(r"[0-9][0-9A-Za-z_.]*", priority = 1)]
+    NotNumber,
+    #[regex(r#""([^"\\\n]|\\[^\n])*""#)]
+    Text,
+    #[regex(r#""([^"\\\n]|\\[^\n])*"#, priority = 1)]
+    OpenText,
+    #[token(",")]
+    Comma,
+    #[token(":")]
+    Colon,
+    #[token("(")]
+    Open,
+    #[token(")")]
+    Close,
+    #[token("[")]
+    BracketOpen,
+    #[token("]")]
+    BracketClose,
+    #[token("@")]
+    At,
+    #[token("=")]
+    Assign,
+    #[token("?")]
+    Question,
+    #[token("||")]
+    Bars,
+    #[token("==")]
+    Eq,
+    #[token("!=")]
+    Ne,
+    #[token("<")]
+    Lt,
+    #[token("<=")]
+    Le,
+    #[token(">")]
+    Gt,
+    #[token(">=")]
+    Ge,
+    #[token("|")]
+    Or,
+    #[token("&")]
+    And,
+    #[token("<<")]
+    Shl,
+    #[token(">>")]
+    Shr,
+    #[token("+")]
+    Add,
+    #[token("-")]
+    Sub,
+    #[token("*")]
+    Mul,
+    #[token("/")]
+    Div,
+    // A comment elsewhere: with the rest of the line, which is then no further mistake.
+    #[regex(r"//[^\n]*", allow_greedy = true)]
+    Slashes,
+    #[token("%")]
+    Rem,
+    #[token("~")]
+    Complement,
+    #[token("!")]
+    Not,
+    #[token("^")]
+    Power,
+}
+
+/// A token with what it carries.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) enum Token {
+    /// The end of a line, at the end of every line's tokens.
+    Newline,
+    Name(NameId),
+    /// The text before a template's first brace.
+    Begin(NameId),
+    /// The text between two braced parts.
+    Middle(NameId),
+    /// The text after the last brace.
+    End(NameId),
+    Directive(Directive),
+    /// A name that begins with a point and is no directive.
+    NotDirective,
+    Int(i64),
+    Real(f64),
+    Text,
+    Comma,
+    Colon,
+    Open,
+    Close,
+    BracketOpen,
+    BracketClose,
+    At,
+    Assign,
+    Question,
+    Bars,
+    Operator(Operator),
+    /// Reported already; no line that holds one is parsed.
+    Bad,
+}
+
+/// The tokens of some whole lines.
+#[derive(Default)]
+pub(crate) struct Chunk {
+    pub(crate) tokens: Vec<(Token, Span)>,
+    /// For each line that has tokens: where they end in `tokens`, the line's number, and what stands against parsing it.
+    pub(crate) lines: Vec<LineTokens>,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LineTokens {
+    /// Index of the token after the line's last.
+    pub(crate) end: u32,
+    /// Line number, from 1.
+    pub(crate) number: u32,
+    /// A token was reported.
+    pub(crate) bad: bool,
+    /// The line continues over line breaks.
+    pub(crate) continued: bool,
+    /// It may nest deeply: many brackets, prefix operators and powers.
+    pub(crate) nested: bool,
+}
+
+/// Reads a file's tokens, some thousand lines at a time.
+pub(crate) struct Lexer<'s> {
+    lexer: logos::Lexer<'s, Raw>,
+    base: u32,
+    line: u32,
+    done: bool,
+}
+
+impl<'s> Lexer<'s> {
+    pub(crate) fn new(text: &'s str, base: u32) -> Lexer<'s> {
+        let mut lexer = Raw::lexer(text);
+        if text.starts_with('\u{feff}') {
+            lexer.bump('\u{feff}'.len_utf8());
+        }
+        Lexer { lexer, base, line: 1, done: false }
+    }
+
+    /// Reads the tokens of the next lines, about as many tokens as asked for; false at the end.
+    pub(crate) fn chunk(
+        &mut self,
+        size: usize,
+        chunk: &mut Chunk,
+        names: &mut Interner,
+        sink: &mut Sink,
+    ) -> bool {
+        let Chunk { tokens, lines } = chunk;
+        tokens.clear();
+        lines.clear();
+        if self.done {
+            return false;
+        }
+        let mut line = Line::new(0, self.line);
+        loop {
+            let raw = self.lexer.next();
+            let range = self.lexer.span();
+            let span = Span::new(self.base + range.start as u32, self.base + range.end as u32);
+            let token = match raw {
+                Some(Ok(Raw::Newline)) | None => {
+                    let more = raw.is_some();
+                    self.line += u32::from(more);
+                    let is_empty = tokens.len() == line.start;
+                    // A line that ends in `||` continues on the next.
+                    if more && !is_empty && !line.long && matches!(tokens.last(), Some((Token::Bars, _))) {
+                        line.continued = true;
+                        continue;
+                    }
+                    if !is_empty {
+                        tokens.push((Token::Newline, span));
+                        lines.push(line.end(tokens.len()));
+                    }
+                    self.done = !more;
+                    if self.done || tokens.len() >= size {
+                        return true;
+                    }
+                    line = Line::new(tokens.len(), self.line);
+                    continue;
+                }
+                // Of a line that is too long nothing more is kept.
+                _ if line.long => continue,
+                Some(Ok(raw)) => {
+                    let text = self.lexer.slice();
+                    token(raw, text, &mut line.nesting, names).unwrap_or_else(|message| {
+                        line.bad = true;
+                        sink.add(Severity::Error, "token", span, || message.diagnostic(span, text));
+                        Token::Bad
+                    })
+                }
+                Some(Err(())) => {
+                    // What makes no sense to the lexer is one mistake of its line, however many characters there are.
+                    if !std::mem::replace(&mut line.unknown, true) {
+                        let text = self.lexer.slice();
+                        sink.add(Severity::Error, "token", span, || {
+                            TokenError::Unknown.diagnostic(span, text)
+                        });
+                    }
+                    line.bad = true;
+                    Token::Bad
+                }
+            };
+            tokens.push((token, span));
+            let first = tokens[line.start].1;
+            if (span.end - first.start) as usize > limits::LINE_BYTES {
+                (line.long, line.bad) = (true, true);
+                let message = format!(
+                    "this line is longer than the {} bytes that the assembler reads",
+                    limits::LINE_BYTES
+                );
+                sink.push(
+                    Diagnostic::error("limit", first, message)
+                        .here("it begins here")
+                        .help("break it into several lines"),
+                );
+            }
+        }
+    }
+}
+
+/// The line being read.
+struct Line {
+    /// Its first token.
+    start: usize,
+    number: u32,
+    bad: bool,
+    continued: bool,
+    /// Something in it was no token, and is reported.
+    unknown: bool,
+    long: bool,
+    /// Tokens that may nest expressions.
+    nesting: usize,
+}
+
+impl Line {
+    fn new(start: usize, number: u32) -> Line {
+        Line { start, number, bad: false, continued: false, unknown: false, long: false, nesting: 0 }
+    }
+
+    fn end(&self, end: usize) -> LineTokens {
+        let nested = self.nesting > limits::EXPRESSION_DEPTH || end - self.start > limits::EXPRESSION_NODES;
+        LineTokens { end: end as u32, number: self.number, bad: self.bad, continued: self.continued, nested }
+    }
+}
+
+/// What is wrong with a token.
+enum TokenError {
+    Unknown,
+    TooLarge,
+    NotNumber,
+    Slashes,
+    OpenText,
+    LongName,
+}
+
+impl TokenError {
+    fn diagnostic(self, span: Span, text: &str) -> Diagnostic {
+        let shown: String = text.chars().take(40).collect();
+        let error = |message: String| Diagnostic::error("token", span, message);
+        match self {
+            TokenError::Unknown => match text.chars().next() {
+                Some('\'') => error("`'` is not part of the language".into()).help("text stands in `\"`"),
+                Some('#') => error("`#` is not part of the language".into())
+                    .help("a comment begins with `;`, and a constant needs no sign"),
+                Some('$') => error("`$` is not part of the language".into())
+                    .help("a hexadecimal number begins with `0x`, and a parameter needs no sign"),
+                Some(c) if c.is_ascii() => error(format!("`{}` is not part of the language", c.escape_default())),
+                Some(c) => error(format!("`{c}` (U+{:04X}) is not part of the language", u32::from(c)))
+                    .help("names are made of ASCII letters, digits, `_` and `.`; other characters may stand in comments"),
+                None => error("this is not part of the language".into()),
+            },
+            TokenError::TooLarge => error(format!("`{shown}` does not fit a 64-bit integer"))
+                .help("write a real number: with a decimal point or an exponent"),
+            TokenError::NotNumber => error(format!("`{shown}` is not a number"))
+                .help("a name begins with a letter or `_`; a number is like 12, 1_000, 0x1f, 0b101, 0.25e-6 or 0x1.8p-3"),
+            TokenError::Slashes => {
+                let span = Span::new(span.start, span.start + 2);
+                Diagnostic::error("token", span, "`//` is not part of the language")
+                    .help("a comment begins with `;`; of integers, `floor(a/b)` is the quotient rounded down")
+            }
+            TokenError::OpenText => error("this text has no closing `\"`".into()).help("close it on the same line"),
+            TokenError::LongName => error(format!("a name of {} characters", text.len()))
+                .help(format!("a name has at most {}", limits::NAME_BYTES)),
+        }
+    }
+}
+
+fn token(raw: Raw, text: &str, nesting: &mut usize, names: &mut Interner) -> Result<Token, TokenError> {
+    let mut name = |text: &str| {
+        if text.len() > limits::NAME_BYTES { Err(TokenError::LongName) } else { Ok(names.intern(text)) }
+    };
+    let mut nest = || *nesting += 1;
+    Ok(match raw {
+        Raw::Newline => Token::Newline,
+        Raw::Name => Token::Name(name(text)?),
+        Raw::Begin => {
+            nest();
+            Token::Begin(name(&text[..text.len() - 1])?)
+        }
+        Raw::Middle => Token::Middle(name(&text[1..text.len() - 1])?),
+        Raw::End => Token::End(name(&text[1..])?),
+        Raw::Directive => name(text)?.directive().map_or(Token::NotDirective, Token::Directive),
+        Raw::Decimal => Token::Int(decimal(text).ok_or(TokenError::TooLarge)?),
+        Raw::Hexadecimal => Token::Int(radix(&text[2..], 16)?),
+        Raw::Binary => Token::Int(radix(&text[2..], 2)?),
+        Raw::Real => Token::Real(real(text)),
+        Raw::HexReal => Token::Real(hex_real(text).ok_or(TokenError::NotNumber)?),
+        Raw::NotNumber => return Err(TokenError::NotNumber),
+        Raw::Slashes => return Err(TokenError::Slashes),
+        Raw::Text => Token::Text,
+        Raw::OpenText => return Err(TokenError::OpenText),
+        Raw::Comma => Token::Comma,
+        Raw::Colon => Token::Colon,
+        Raw::Open => {
+            nest();
+            Token::Open
+        }
+        Raw::Close => Token::Close,
+        Raw::BracketOpen => {
+            nest();
+            Token::BracketOpen
+        }
+        Raw::BracketClose => Token::BracketClose,
+        Raw::At => Token::At,
+        Raw::Assign => Token::Assign,
+        Raw::Question => {
+            nest();
+            Token::Question
+        }
+        Raw::Bars => Token::Bars,
+        Raw::Eq => Token::Operator(Operator::Eq),
+        Raw::Ne => Token::Operator(Operator::Ne),
+        Raw::Lt => Token::Operator(Operator::Lt),
+        Raw::Le => Token::Operator(Operator::Le),
+        Raw::Gt => Token::Operator(Operator::Gt),
+        Raw::Ge => Token::Operator(Operator::Ge),
+        Raw::Or => Token::Operator(Operator::Or),
+        Raw::And => Token::Operator(Operator::And),
+        Raw::Shl => Token::Operator(Operator::Shl),
+        Raw::Shr => Token::Operator(Operator::Shr),
+        Raw::Add | Raw::Sub | Raw::Complement | Raw::Not | Raw::Power => {
+            nest();
+            Token::Operator(match raw {
+                Raw::Add => Operator::Add,
+                Raw::Sub => Operator::Sub,
+                Raw::Complement => Operator::Complement,
+                Raw::Not => Operator::Not,
+                _ => Operator::Power,
+            })
+        }
+        Raw::Mul => Token::Operator(Operator::Mul),
+        Raw::Div => Token::Operator(Operator::Div),
+        Raw::Rem => Token::Operator(Operator::Rem),
+    })
+}
+
+fn decimal(text: &str) -> Option<i64> {
+    text.bytes()
+        .filter(|byte| *byte != b'_')
+        .try_fold(0i64, |value, digit| value.checked_mul(10)?.checked_add(i64::from(digit - b'0')))
+}
+
+fn radix(digits: &str, radix: u32) -> Result<i64, TokenError> {
+    let digits = digits.replace('_', "");
+    if digits.is_empty() {
+        return Err(TokenError::NotNumber);
+    }
+    i64::from_str_radix(&digits, radix).map_err(|_| TokenError::TooLarge)
+}
+
+fn real(text: &str) -> f64 {
+    // The regular expression admits only what the parser takes, once separators are gone.
+    let parsed = if text.contains('_') { text.replace('_', "").parse() } else { text.parse() };
+    parsed.unwrap_or(f64::NAN)
+}
+
+/// `0x1.8p-3`, exact where binary64 holds it, else rounded to it once: digits beyond 62 bits leave a sticky bit. (Subnormal
+/// numbers of more digits than they can hold round twice.)
+fn hex_real(text: &str) -> Option<f64> {
+    let text = text[2..].replace('_', "");
+    let (digits, exponent) = text.split_once(['p', 'P'])?;
+    let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
+    if whole.is_empty() && fraction.is_empty() {
+        return None;
+    }
+    let mut exponent: i64 = match exponent.parse::<i64>() {
+        Ok(exponent) => exponent.clamp(-1_000_000_000, 1_000_000_000),
+        Err(_) if exponent.starts_with('-') => -1_000_000_000,
+        Err(_) => 1_000_000_000,
+    };
+    let mut mantissa: u64 = 0;
+    for (i, digit) in whole.chars().chain(fraction.chars()).enumerate() {
+        let digit = u64::from(digit.to_digit(16)?);
+        if mantissa >> 58 == 0 {
+            mantissa = mantissa << 4 | digit;
+            exponent -= if i >= whole.len() { 4 } else { 0 };
+        } else {
+            mantissa |= u64::from(digit != 0);
+            exponent += if i < whole.len() { 4 } else { 0 };
+        }
+    }
+    let mut value = mantissa as f64;
+    if mantissa != 0 {
+        value = libm::scalbn(value, exponent.clamp(-2_000, 2_000) as i32);
+    }
+    Some(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tokens(text: &str) -> Vec<Token> {
+        let mut names = Interner::new();
+        let mut lexer = Lexer::new(text, 0);
+        let mut chunk = Chunk::default();
+        lexer.chunk(1 << 10, &mut chunk, &mut names, &mut Sink::default());
+        chunk.tokens.into_iter().map(|(token, _)| token).collect()
+    }
+
+    fn number(text: &str) -> Token {
+        tokens(text)[0]
+    }
+
+    #[test]
+    fn numbers() {
+        assert_eq!(number("12"), Token::Int(12));
+        assert_eq!(number("1_000"), Token::Int(1000));
+        assert_eq!(number("0x1f"), Token::Int(31));
+        assert_eq!(number("0xFFFF_FFFF"), Token::Int(0xffff_ffff));
+        assert_eq!(number("0b101"), Token::Int(5));
+        assert_eq!(number("0.25e-6"), Token::Real(0.25e-6));
+        assert_eq!(number("1e3"), Token::Real(1000.0));
+        assert_eq!(number("2."), Token::Real(2.0));
+        assert_eq!(number(".5"), Token::Real(0.5));
+        assert_eq!(number("0x1.8p-3"), Token::Real(0.1875));
+        assert_eq!(number("0x1p-1074"), Token::Real(f64::from_bits(1)));
+        assert_eq!(number("0x1.fffffffffffffp1023"), Token::Real(f64::MAX));
+        // Halfway between two neighbours, decided by a digit far away.
+        assert_eq!(number("0x1.00000000000008p0"), Token::Real(1.0));
+        assert_eq!(number("0x1.000000000000080000000001p0"), Token::Real(1.0 + f64::EPSILON));
+        assert_eq!(number("0x.8p1"), Token::Real(1.0));
+        assert_eq!(number("0x1p999999999999999999999"), Token::Real(f64::INFINITY));
+    }
+
+    #[test]
+    fn no_numbers() {
+        for text in ["5c", "0x", "0b2", "1.2.3", "9223372036854775808", "0xp3", "0x_", "1e"] {
+            assert_eq!(number(text), Token::Bad, "{text}");
+        }
+    }
+
+    #[test]
+    fn lines_continue_after_bars() {
+        let mut names = Interner::new();
+        let mut lexer = Lexer::new("a ||\n\n ; comment\n b\nc\n||", 0);
+        let mut chunk = Chunk::default();
+        assert!(lexer.chunk(100, &mut chunk, &mut names, &mut Sink::default()));
+        assert_eq!(chunk.lines.iter().map(|line| line.number).collect::<Vec<_>>(), [1, 5, 6]);
+        assert!(chunk.lines[0].continued && !chunk.lines[1].continued);
+        assert_eq!(chunk.lines[0].end, 4);
+    }
+
+    #[test]
+    fn templates() {
+        let found = tokens("c{i}{i%3}x");
+        assert!(matches!(
+            found[..],
+            [
+                Token::Begin(_),
+                Token::Name(_),
+                Token::Middle(_),
+                Token::Name(_),
+                Token::Operator(Operator::Rem),
+                Token::Int(3),
+                Token::End(_),
+                Token::Newline
+            ]
+        ));
+    }
+}

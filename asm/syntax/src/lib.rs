@@ -1,0 +1,38 @@
+//! The syntax of the assembler's language: text to tree, before any name has a meaning; the expression language; and how
+//! mistakes are told.
+//!
+//! A crate of its own because its parsers take long to compile. It is a part of `takt-asm`, which offers what others may use
+//! of it.
+
+pub mod ast;
+mod blocks;
+mod explain;
+pub mod expr;
+mod expression;
+mod grammar;
+pub mod intern;
+mod lex;
+pub mod limits;
+pub mod name;
+pub mod parse;
+pub mod report;
+pub mod tokens;
+
+pub use expression::Expression;
+
+use crate::report::diag::{Diagnostics, Sink};
+use crate::report::source::Sources;
+use std::sync::Arc;
+
+/// What is wrong with a text before any name in it has a meaning: its tokens, its lines, its blocks. Nothing is included and
+/// nothing expanded.
+pub fn read(name: &str, text: &str) -> Diagnostics {
+    let (mut sources, mut sink) = (Sources::default(), Sink::default());
+    match sources.add(name, text.into()) {
+        Some(index) => {
+            parse::parse(&sources.files()[index], &mut intern::Interner::new(), &mut sink);
+        }
+        None => sink.push(crate::report::diag::Diagnostic::placeless("limit", "the source is too long")),
+    }
+    sink.finish(Arc::new(sources))
+}

@@ -1,0 +1,249 @@
+//! The complete top level of a board in Verilator, with a plant behind its pins and the real host at its UART.
+
+use std::path::Path;
+use takt_asm::{MemoryLoader, Options, assemble};
+use takt_board::protocol::{INPUTS, LinkError, OUTPUTS};
+use takt_board::simulation::{Simulation, Turn};
+use takt_board::{Board, Host, Wiring, top};
+use takt_isa::{Program, T1};
+
+const WIRING: &str = r#"
+clock = 50
+period = 40
+baud = 5_000_000
+autostart = true
+deadlines = 2
+host = 400
+
+[signals]
+drive = "gp10"
+fault = "gp11"
+deadline = "gp12"
+stop = "gn10"
+
+[peripheral.encoder]
+kind = "quadrature"
+pins = { a = "gp0", b = "gn0" }
+filter = 3
+ports = { count = "n" }
+
+[peripheral.motor]
+kind = "pwm"
+pins = { high = "gp2", low = "gn2" }
+half = 250
+dead = 5
+ports = { duty = "force" }
+scale = { duty = 16 }
+
+[peripheral.lamp]
+kind = "digital-out"
+pins = { out = "gp3" }
+ports = { level = "lit" }
+"#;
+
+/// Cycles of a period, as the system has them.
+const PERIOD: u32 = 2000;
+
+/// A proportional controller with a set point that the host sets; `force` is a quarter of the difference.
+const PROGRAM: &str = "
+.schedule on
+.input n:int wanted:int
+.output force lit:int
+.once
+        mov     force, zero
+        mov     lit, zero
+        wait    period
+.period
+period:
+.reg    e:int f
+        isub    e, wanted, n
+        itof    f, e
+        fmul    force, f, 0.25
+        mov     lit, 1
+        wait    period
+";
+
+/// More work than a period has cycles for.
+const SLOW: &str = ".reg k:int
+        mov     k, 2000
+again:  isub    k, k, 1
+        bnz     k, again
+";
+
+fn program(source: &str) -> Program {
+    let loader = MemoryLoader::new(&[("p.s", source)]);
+    let options = Options { machine: &T1, ..Options::default() };
+    assemble("p.s", &loader, &options).unwrap_or_else(|e| panic!("{e:?}")).program
+}
+
+fn port(program: &Program, name: &str) -> u16 {
+    let input = program.inputs.iter().find(|port| port.name == name);
+    match input {
+        Some(port) => INPUTS + program.machine.inputs.index(port.register).expect("an input").get(),
+        None => {
+            let port = program.outputs.iter().find(|port| port.name == name).expect("a port");
+            OUTPUTS + port.register.get() % program.machine.outputs_per_bank
+        }
+    }
+}
+
+/// Runs whole periods.
+fn periods(board: &mut Simulation, count: u32) {
+    board.run(count * PERIOD, &[]).expect("it runs");
+}
+
+/// Whether the outputs are safe: nothing drives.
+fn safe(board: &mut Simulation) -> bool {
+    periods(board, 1);
+    let level = |name: &str| board.output(name).expect("a pin");
+    ["signal_drive", "motor_high", "motor_low", "lamp_out"].iter().all(|name| level(name) == (false, 0))
+}
+
+/// Cycles in which the upper switch conducts, in one period of the PWM.
+fn pulse(board: &mut Simulation) -> u32 {
+    board.run(500, &[]).expect("it runs");
+    board.output("motor_high").expect("a pin").1
+}
+
+#[test]
+fn board_runs_talks_and_fails_safe() {
+    let board = Board::from_name("ulx3s-85f").expect("a board").expect("a right one");
+    let wiring = Wiring::read("wiring.toml", WIRING, &board).expect("a right wiring");
+    let first = program(PROGRAM);
+    wiring.check("wiring.toml", WIRING, &first).expect("ports fit");
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("board-wiring");
+    let mut sim = Simulation::new(&board, &wiring, &first, &folder).unwrap_or_else(|error| panic!("{error}"));
+    let encoder = [sim.input("encoder_a").expect("a pin"), sim.input("encoder_b").expect("a pin")];
+
+    // From power-up, without a host: safe, then it drives. The encoder stands at 0, so half of the time each way.
+    sim.run(1000, &[]).expect("it runs");
+    assert_eq!(sim.output("signal_drive"), Some((false, 0)), "before the first period");
+    periods(&mut sim, 10);
+    assert_eq!(sim.output("signal_drive").map(|(level, _)| level), Some(true), "it drives");
+    assert_eq!(pulse(&mut sim), 250 - 5, "half of the time, less the dead time");
+
+    // The loop through the pins: 40 counts forward are a force of -10, which is 160 cycles less.
+    sim.turns.push(Turn { pins: encoder, from: 0, by: 40 });
+    periods(&mut sim, 3);
+    periods(&mut sim, 3);
+    assert_eq!(pulse(&mut sim), 250 - 160 - 5);
+
+    // Glitches shorter than the filter are not counted.
+    for _ in 0..5 {
+        sim.set("encoder_a", true);
+        sim.run(2, &[]).expect("it runs");
+        sim.set("encoder_a", false);
+        sim.run(7, &[]).expect("it runs");
+    }
+
+    // The host: reads ports and sets them.
+    let mut host = Host::connect(sim, 77).unwrap_or_else(|error| panic!("{error}"));
+    assert!(host.status().expect("status").drives());
+    assert_eq!(host.read(port(&first, "n"), 1).expect("a port")[0], 40);
+    assert_eq!(host.read(port(&first, "force"), 1).expect("a port")[0], (-10.0_f32).to_bits());
+    host.write(port(&first, "wanted"), &[52]).expect("a port");
+    periods(&mut host.line, 4);
+    assert_eq!(host.read(port(&first, "force"), 1).expect("a port")[0], 3.0_f32.to_bits());
+    assert_eq!(pulse(&mut host.line), 250 + 48 - 5);
+    let cycles = host.register("cycles").expect("a register");
+    assert!((20..200).contains(&cycles), "{cycles} cycles from tick to outputs");
+    assert_eq!(host.register("misses").expect("a register"), 0);
+
+    // Hold, then one period at a time.
+    host.set("control", 0b111).expect("control");
+    let before = host.register("periods").expect("a register");
+    periods(&mut host.line, 5);
+    assert_eq!(host.register("periods").expect("a register"), before);
+    host.set("step", 1).expect("step");
+    assert_eq!(host.register("periods").expect("a register"), before + 1);
+    host.set("control", 0b101).expect("control");
+
+    // A stream: every second period, with its number.
+    host.set("stream", 2 << 20 | 1 << 16 | u32::from(port(&first, "force"))).expect("stream");
+    let mut seen = Vec::new();
+    while seen.len() < 6 {
+        if let Some(frame) = host.streamed().expect("a line") {
+            assert_eq!(frame.words[1], 3.0_f32.to_bits());
+            seen.push(frame.words[0]);
+        }
+    }
+    assert!(seen.windows(2).all(|pair| pair[1] == pair[0] + 2), "{seen:?}");
+    host.set("stream", 0).expect("stream");
+
+    // Noise on the line: requests are made again, none is lost or made twice.
+    host.line.noise = 400;
+    host.set("control", 0b111).expect("control");
+    let before = host.register("periods").expect("a register");
+    for _ in 0..40 {
+        host.set("step", 1).expect("in spite of noise");
+    }
+    assert_eq!(host.register("periods").expect("a register"), before + 40);
+    host.set("control", 0b101).expect("control");
+    host.line.noise = 0;
+    assert!(host.retries > 0, "there was no noise");
+    assert!(host.register("errors").expect("a register") > 0);
+
+    // The host is gone.
+    host.line.unplugged = true;
+    periods(&mut host.line, 420);
+    assert!(safe(&mut host.line), "without a host");
+    assert!(matches!(host.register("id"), Err(LinkError::Silence(_))));
+    host.line.unplugged = false;
+    let status = host.status().expect("it is back");
+    assert_eq!(status.causes().collect::<Vec<_>>(), ["host silent"]);
+    // A start makes it drive again.
+    host.set("control", 0x105).expect("control");
+    periods(&mut host.line, 5);
+    assert!(host.status().expect("status").drives());
+
+    // The stop input.
+    host.line.set("signal_stop", true);
+    periods(&mut host.line, 1);
+    assert!(safe(&mut host.line), "stopped");
+    host.line.set("signal_stop", false);
+    assert!(safe(&mut host.line), "and it stays so");
+    assert_eq!(host.status().expect("status").causes().collect::<Vec<_>>(), ["stop"]);
+
+    // Reset in mid-period: pins are safe at once, and the machine starts from the beginning.
+    host.set("control", 0x105).expect("control");
+    periods(&mut host.line, 5);
+    host.line.run(37, &[]).expect("it runs");
+    host.line.set("button", true);
+    host.line.run(10, &[]).expect("it runs");
+    assert!(safe(&mut host.line), "in reset");
+    host.line.set("button", false);
+    periods(&mut host.line, 6);
+    assert!(host.status().expect("status").drives(), "after a reset");
+
+    // A program that misses its deadlines, one that halts, one that makes no number.
+    let instead = |what: &str| PROGRAM.replace("        mov     lit, 1\n", what);
+    let nan = PROGRAM.replace("fmul    force, f, 0.25", "fdiv    force, zero, zero");
+    for (source, cause) in [
+        (instead(SLOW), "missed deadline"),
+        (instead("        halt\n"), "halt"),
+        (nan, "output that is no number"),
+    ] {
+        let records = top::image(&program(&source)).expect("it fits");
+        host.load(&records, top::RECORDS).expect("it is loaded");
+        assert!(safe(&mut host.line), "while it is loaded");
+        host.set("control", 5).expect("control");
+        periods(&mut host.line, 8);
+        assert!(safe(&mut host.line), "{cause}");
+        let status = host.status().expect("status");
+        assert!(
+            status.causes().any(|name| name == cause),
+            "{cause}: {:?}",
+            status.causes().collect::<Vec<_>>()
+        );
+    }
+    assert!(host.register("misses").expect("a register") == 0, "of this program, none");
+    // And back to the first one.
+    host.load(&top::image(&first).expect("it fits"), top::RECORDS).expect("it is loaded");
+    host.set("control", 5).expect("control");
+    periods(&mut host.line, 6);
+    assert!(host.status().expect("status").drives());
+    // A broken image: one that does not fit is refused before anything happens.
+    let record = top::image(&first).expect("it fits")[0];
+    let error = host.load(&vec![record; top::RECORDS + 1], top::RECORDS).expect_err("too big");
+    assert_eq!(error.to_string(), "the program takes 2049 records; the board has room for 2048");
+}

@@ -1,0 +1,137 @@
+//! `takt board`, `load` and `live` as commands: what they print, what they refuse, and the loop through a simulated board's pins.
+#![cfg(unix)]
+
+mod common;
+
+use common::Folder;
+use std::io::{BufRead, BufReader};
+use std::process::Child;
+
+fn example(name: &str) -> String {
+    format!("{}/../programs/examples/board/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The example's wiring and program, as arguments.
+fn position() -> String {
+    format!("--wiring {} --program {} --machine t1", example("position.toml"), example("position.s"))
+}
+
+#[test]
+fn boards_and_their_pins_are_listed() {
+    let folder = Folder::new();
+    let list = folder.line("board list").ok();
+    assert!(list.contains("ulx3s-85f") && list.contains("colorlight-i5"), "{list}");
+    let wiring = format!("--wiring {}", example("position.toml"));
+    let pins = folder.line(&format!("board pins ulx3s-85f {wiring}")).ok();
+    assert!(pins.contains("gp0      B11   encoder.a\n") && pins.contains("gp10"), "{pins}");
+    let pins = folder.line(&format!("board pins ulx3s-85f --json {wiring}")).ok();
+    assert!(serde_json::from_str::<serde_json::Value>(&pins).is_ok_and(|pins| pins.is_array()), "{pins}");
+}
+
+#[test]
+fn the_example_fits_its_board_and_a_circuit_is_written() {
+    let folder = Folder::new();
+    let text = folder.line(&format!("board check --board ulx3s-85f {}", position())).ok();
+    assert_eq!(
+        text,
+        "ulx3s-85f, t1: 2 peripherals, 2 of the program's ports on pins, a period of 5000 cycles at 50 MHz\n"
+    );
+    folder.line(&format!("board build --board ulx3s-85f {} --sources -o out", position())).ok();
+    let pins = folder.read_text("out/pins.lpf");
+    assert!(pins.contains("LOCATE COMP \"encoder_a\" SITE \"B11\";"), "{pins}");
+}
+
+#[test]
+fn a_program_alone_is_a_circuit_too() {
+    let folder = Folder::new();
+    let program = format!("--program {} --machine t1", example("position.s"));
+    folder.line(&format!("board build --board colorlight-i5 {program} --sources -o out")).ok();
+    // Another tool reads all of it; the device's own cells it does not know.
+    let lint = "find . -name '*.v' -exec verilator --lint-only -Wno-fatal -Wno-lint -Wno-style --top-module takt_board {} +";
+    let out = folder.path().join("out");
+    let done = std::process::Command::new("/bin/sh").args(["-c", lint]).current_dir(out).output().unwrap();
+    let text = String::from_utf8_lossy(&done.stderr);
+    let known = |line: &str| {
+        ["EHXPLLL", "MULT18X18D", "DP16KD"].iter().any(|cell| line.contains(&format!("module: '{cell}'")))
+            || line.contains("there's no search path specified")
+            || line.contains("Exiting due to")
+    };
+    let errors: Vec<&str> = text.lines().filter(|line| line.starts_with("%Error") && !known(line)).collect();
+    assert!(errors.is_empty(), "{text}");
+}
+
+#[test]
+fn wrong_boards_wirings_and_ports_are_refused() {
+    let folder = Folder::new();
+    let refused = |line: &str, says: &str| {
+        let done = folder.line(line);
+        assert_eq!(done.status, Some(1), "{line}: {done:?}");
+        assert!(done.stderr.contains(says) && done.stdout.is_empty(), "{line}: {}", done.stderr);
+    };
+    refused("board pins ulx3s", "there is no board `ulx3s`, and no file of that name");
+    refused(
+        &format!("board check --board colorlight-i5 {}", position()),
+        "position.toml:3:9: this wiring is for the board `ulx3s-85f`, not for `colorlight-i5`",
+    );
+    let twice = std::fs::read_to_string(example("position.toml")).unwrap().replace("\"gn2\"", "\"gp0\"");
+    folder.write("twice.toml", twice);
+    refused(
+        &format!("board check --board ulx3s-85f --wiring twice.toml --program {}", example("position.s")),
+        "pin `gp0` is used twice: line 16 has it for `encoder`",
+    );
+    folder.write("other.s", ".output y\n.once\n mov y, zero\n wait period\n.period\nperiod: wait period\n");
+    refused(
+        &format!("board check --board ulx3s-85f --wiring {} --program other.s", example("position.toml")),
+        "the program has no input port `n`",
+    );
+    refused("live /dev/nothing status", "cannot open /dev/nothing: is the board plugged in");
+    refused(&format!("load /dev/nothing {}", example("position.s")), "cannot open /dev/nothing");
+}
+
+/// Ended with the test.
+struct Board(Child);
+
+impl Drop for Board {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn the_loop_closes_through_the_pins_of_a_simulated_board() {
+    let folder = Folder::new();
+    let line = format!("board sim --board ulx3s-85f {} --axis motor,encoder,20000", position());
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_takt"));
+    command.args(line.split_whitespace()).current_dir(folder.path());
+    command.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::null());
+    let mut board = Board(command.spawn().unwrap());
+    let mut said = String::new();
+    BufReader::new(board.0.stdout.take().unwrap()).read_line(&mut said).unwrap();
+    let (port, baud) = said.trim().split_once(' ').unwrap_or_else(|| panic!("`{said}`"));
+    let program = example("position.s");
+    let live = |what: &str| {
+        folder.line(&format!("live {port} --baud {baud} --program {program} --machine t1 {what}")).ok()
+    };
+    live("set wanted=30");
+    // It comes nearer by a third of the error in a millisecond of the board's time, until dead time swallows the pulses.
+    let error = || -> i32 { live("read error").trim().trim_start_matches("error = ").parse().unwrap() };
+    assert!((0..200).any(|_| error().abs() <= 2), "{}", live("read"));
+    // Frames may be lost where requests take the line: then it says so.
+    let stream = folder.line(&format!(
+        "live {port} --baud {baud} --program {program} --machine t1 stream n --every 20 --count 3"
+    ));
+    assert_eq!((stream.status, stream.stdout.lines().count()), (Some(0), 3), "{stream:?}");
+    assert!(live("status").contains("the program runs; outputs drive"), "{}", live("status"));
+    // Held, it stays where it is; a period at a time it goes on.
+    live("hold");
+    live("set wanted=-30");
+    assert!(error().abs() <= 2);
+    live("step");
+    assert!((-62..=-58).contains(&error()), "{}", live("read"));
+    let loaded = folder.line(&format!("load {port} --baud {baud} {program} --machine t1 --stopped")).ok();
+    assert!(loaded.contains("records loaded and compared; stopped"), "{loaded}");
+    let broken = folder.line(&format!("live {port} --baud {baud} --program {program} set nothing=1"));
+    assert_eq!(broken.status, Some(1));
+    assert!(broken.stderr.contains("the program has no port `nothing`"), "{}", broken.stderr);
+}

@@ -1,0 +1,111 @@
+"""Ports and their values: what NumPy has on one side, words of 32 bits on the other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from takt import _takt
+
+_DTYPES: dict[str, np.dtype[Any]] = {
+    "float": np.dtype(np.float32),
+    "int": np.dtype(np.int32),
+    "bits": np.dtype(np.uint32),
+}
+
+
+@dataclass(frozen=True)
+class Port:
+    """An input or output port: a register with a name."""
+
+    name: str
+    #: `float` (binary32), `int` (32 bits, signed) or `bits` (32 bits, unsigned).
+    type: str
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """The type of its values in arrays: float32, int32 or uint32."""
+        return _DTYPES[self.type]
+
+
+@dataclass(frozen=True)
+class Array:
+    """Several ports as one array, as models have them: `q` of shape (6,) for `q_shoulder`, ….
+
+    `elements` are in row-major order. Each is a port's name, or a number (an output that is constant has no port), or
+    None (an input without effect has none).
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    elements: tuple[str | float | None, ...]
+
+    def stacked(self, ports: Mapping[str, Any], lead: tuple[int, ...]) -> NDArray[Any]:
+        """Its elements, taken from values by port, in one array of shape (*lead, *shape)."""
+        whole = np.zeros((*lead, len(self.elements)), np.float32)
+        for index, element in enumerate(self.elements):
+            if element is not None:
+                whole[..., index] = ports[element] if isinstance(element, str) else element
+        return whole.reshape((*lead, *self.shape))
+
+
+def near(name: str, names: Sequence[str]) -> str:
+    found = _takt.nearest(name, list(names))
+    if found is not None:
+        return f"; did you mean `{found}`?"
+    return f" (there are: {', '.join(names)})" if 0 < len(names) <= 40 else ""
+
+
+def first(wrong: NDArray[np.bool_]) -> str:
+    """Where the first of some elements is, as an index."""
+    place = np.unravel_index(int(np.argmax(wrong)), wrong.shape) if wrong.ndim else ()
+    return "" if not place else "[" + ", ".join(str(int(i)) for i in place) + "]"
+
+
+def numbers(what: str, value: ArrayLike) -> NDArray[Any]:
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise ValueError(f"{what}: no array of numbers: {error}") from None
+    if array.dtype.kind not in "fiub":
+        raise ValueError(f"{what}: an array of {array.dtype} is none of numbers")
+    return array
+
+
+def words_of(what: str, port: Port, array: NDArray[Any]) -> NDArray[np.uint32]:
+    """The bits of values for a port; numbers are rounded to binary32 once."""
+    if port.type == "float":
+        nan = np.isnan(array)
+        if nan.any():
+            raise ValueError(f"{what}{first(nan)}: NaN is no input for a controller")
+        with np.errstate(over="ignore"):
+            rounded = array.astype(np.float32)
+        infinite = np.isinf(rounded)
+        if infinite.any():
+            number = array[infinite].flat[0]
+            raise ValueError(f"{what}{first(infinite)}: {number} does not fit binary32, whose largest is 3.4028235e38")
+        return rounded.view(np.uint32)
+    if array.dtype.kind == "f":
+        raise ValueError(f"{what}: the port carries integers, the array {array.dtype}; round it and use .astype(np.{port.dtype})")
+    limits = np.iinfo(port.dtype)
+    outside = (array < limits.min) | (array > limits.max) if array.dtype.itemsize >= 4 or limits.min == 0 else np.zeros(array.shape, bool)
+    if outside.any():
+        number = array[outside].flat[0]
+        raise ValueError(f"{what}{first(outside)}: {number} is not between {limits.min} and {limits.max}")
+    return array.astype(port.dtype).view(np.uint32)
+
+
+def count_of(what: str, value: int | None, least: int = 1) -> int | None:
+    if value is None:
+        return None
+    try:
+        number = value.__index__()
+    except AttributeError:
+        raise TypeError(f"{what} is a whole number, not {value!r}") from None
+    if not least <= number < 1 << 62:
+        raise ValueError(f"{what} is {number}: it is {least} at least, and less than 2**62")
+    return number

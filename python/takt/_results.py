@@ -1,0 +1,202 @@
+"""What is known of a program, and what came of a run."""
+
+from __future__ import annotations
+
+import html
+import json
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from takt import _takt
+from takt._errors import FaultError
+from takt._ports import Array
+
+_FLAGS = _takt.flag_names()
+
+
+def flags_of(bits: int) -> frozenset[str]:
+    return frozenset(name for bit, name in _FLAGS if bits & bit)
+
+
+@dataclass(frozen=True)
+class Largest:
+    """The largest error of a kind that an output has had, and when."""
+
+    #: In the output's unit, in ulps, or as a part of the exact value.
+    error: float
+    #: The period, from 0.
+    period: int
+    #: What the output was.
+    value: float
+    #: What it is in binary64.
+    exact: float
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """The errors of an output at the ends of the periods, against the same operations in binary64."""
+
+    name: str
+    #: Periods at whose end it was compared.
+    periods: int
+    #: The largest in the output's own unit, in ulps, and in relation to the exact value; None if it never was a finite number.
+    absolute: Largest | None
+    ulp: Largest | None
+    relative: Largest | None
+    #: Where the largest absolute error comes from, the largest share first: place (`law.s:12`) and share, which add up to it.
+    operations: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
+class Model:
+    """What a program was made of."""
+
+    #: What is computed, in a line.
+    title: str
+    #: What was decided on the way.
+    notes: tuple[str, ...]
+    #: Scalar operations after rewriting.
+    operations: int
+    #: Of a robot: its joints, in the order of the arrays.
+    joints: tuple[str, ...]
+    #: What each port is, and its unit.
+    ports: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Span:
+    """Cycles, from the fewest to the most."""
+
+    best: int
+    worst: int
+
+
+@dataclass(frozen=True)
+class Section:
+    """What a section of a program can take, in cycles, whatever the inputs."""
+
+    #: The label that it begins at; of what runs once, `once`.
+    name: str
+    #: Where it begins, as `pd.s:12`.
+    place: str | None
+    #: Whether it begins with reset, not with a tick.
+    once: bool
+    #: With the tick long after the `wait`.
+    cycles: Span
+    #: With the tick at any time after the `wait`.
+    in_time: Span
+    #: After a missed deadline.
+    missed: Span
+
+
+@dataclass(frozen=True)
+class Bound:
+    """The best and the worst that each section can take."""
+
+    sections: tuple[Section, ...]
+    #: The longest period, in cycles, with every tick in time; None if there is no period.
+    worst_period: int | None
+
+
+class Analysis:
+    """Where the cycles of a period went. In a notebook it shows the pipeline as a picture; as text it is the report that
+    `takt analyse` prints."""
+
+    #: Everything, as `takt analyse --json` prints it.
+    data: dict[str, Any]
+    #: The picture, as a page for a browser that needs nothing else.
+    html: str
+
+    def __init__(self, text: str, data: str, html: str) -> None:
+        self._text = text
+        self.data = json.loads(data)
+        self.html = html
+
+    @property
+    def cycles(self) -> int:
+        """Cycles of the period."""
+        cycles: int = self.data["cycles"]
+        return cycles
+
+    def __str__(self) -> str:
+        return self._text
+
+    def __repr__(self) -> str:
+        data = self.data
+        return f"<takt.Analysis of {data['program']}, period {data['period']}: {data['cycles']} cycles on {data['machine']}>"
+
+    def _repr_html_(self) -> str:
+        # A frame of its own: the page's styles and script are not the notebook's.
+        page = html.escape(self.html, quote=True)
+        return f'<iframe srcdoc="{page}" style="width:100%;height:720px;border:0" sandbox="allow-scripts"></iframe>'
+
+
+class Run:
+    """What came of a run.
+
+    Arrays have shape (periods,), those of a batch (runs, periods). A run that a fault has ended has, from then on, outputs
+    as if never written and 0 cycles.
+    """
+
+    #: Output by name; an array of ports has its own dimensions behind those of the run. float32, int32 or uint32. What
+    #: was never written is NaN or 0, and counted in `unwritten`.
+    outputs: dict[str, NDArray[Any]]
+    #: The same by port.
+    ports: dict[str, NDArray[Any]]
+    #: Cycles of each period, from the tick to the `wait`; int64.
+    cycles: NDArray[np.int64]
+    #: Deadlines missed in each period: ticks that came before the `wait`; int64.
+    missed: NDArray[np.int64]
+    #: Periods that came to their end: of a batch, int64 of shape (runs,).
+    completed: int | NDArray[np.int64]
+    #: The exception flags raised since reset, among `invalid`, `divide-by-zero`, `overflow`: of a batch a list.
+    flags: frozenset[str] | list[frozenset[str]]
+    #: What ended runs early, by run.
+    faults: list[_takt.Fault]
+    #: Output ports that a period ended with before anything was written there, and how many periods.
+    unwritten: dict[str, int]
+    #: NaNs written to output ports.
+    nan_writes: int
+
+    def __init__(
+        self,
+        arrays: tuple[Array, ...],
+        ports: dict[str, NDArray[Any]],
+        cycles: NDArray[np.int64],
+        missed: NDArray[np.int64],
+        ran: _takt.Ran,
+    ) -> None:
+        self.ports = ports
+        self.outputs = {array.name: array.stacked(ports, cycles.shape) for array in arrays} or ports
+        self.cycles = cycles
+        self.missed = missed
+        single = cycles.ndim < 2
+        self.completed = ran["completed"][0] if single else np.array(ran["completed"], np.int64)
+        self.flags = flags_of(ran["flags"][0]) if single else [flags_of(bits) for bits in ran["flags"]]
+        self.faults = ran["failures"]
+        names = list(ports)
+        self.unwritten = {name: count for name, count in zip(names, ran["unwritten"]) if count}
+        self.nan_writes = ran["nan_writes"]
+
+    def check(self) -> Run:
+        """The run itself if it came to its end.
+
+        Raises:
+            FaultError: the first fault.
+        """
+        if self.faults:
+            raise FaultError(self.faults[0])
+        return self
+
+    def __repr__(self) -> str:
+        shape, cycles = self.cycles.shape, self.cycles
+        what = "to its halt" if not shape else " × ".join(
+            f"{count} {name}{'' if count == 1 else 's'}" for count, name in zip(shape, ("run", "period")[-len(shape):])
+        )
+        done = cycles[cycles > 0]
+        span = "" if done.size == 0 else f", {done.min()} to {done.max()} cycles" if done.min() != done.max() else f", {done.min()} cycles"
+        faults = f", {len(self.faults)} ended by a fault: {self.faults[0].message}" if self.faults else ""
+        return f"<takt.Run: {what}{span}, outputs {', '.join(self.outputs)}{faults}>"

@@ -1,0 +1,125 @@
+"""A machine with a program in it, period by period."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from takt import _takt
+from takt._errors import FaultError
+from takt._ports import near, numbers
+from takt._results import flags_of
+
+if TYPE_CHECKING:
+    from takt._program import Program
+
+
+class Sim:
+    """A closed loop, period by period:
+
+        sim = program.sim()
+        for k in range(1000):
+            out = sim.step({"q": q, "qd": qd})
+            q, qd = plant(q, qd, out["tau"])
+    """
+
+    def __init__(self, program: Program, core: _takt.Sim) -> None:
+        self.program = program
+        self._core = core
+
+    def step(self, inputs: Mapping[str, ArrayLike] | None = None) -> dict[str, Any]:
+        """Sets inputs, lets the tick come and runs the program to its `wait`.
+
+        Args:
+            inputs: Values by port or array of ports. The first step needs all; later an input that is not given keeps
+                its value.
+
+        Returns:
+            The outputs: a float or int for each port, None if nothing was ever written there; an array of ports as
+            float32 of its shape.
+
+        Raises:
+            FaultError: the machine has stopped; it stays where it is until `reset`.
+            ValueError: a name, shape or value that does not fit.
+        """
+        program = self.program
+        given: dict[str, Any] = dict(inputs or {})
+        if program.input_arrays:
+            given = self._elements(given)
+        values = self._core.step(given)
+        if values is None:
+            fault = self._core.failure
+            raise RuntimeError("the machine has stopped") if fault is None else FaultError(fault)
+        return self._shaped(values)
+
+    def _elements(self, inputs: dict[str, Any]) -> dict[str, Any]:
+        """Arrays of ports as their elements."""
+        elements: dict[str, Any] = {}
+        arrays = {array.name: array for array in self.program.input_arrays}
+        for name, value in inputs.items():
+            array = arrays.get(name)
+            if array is None and name not in self.program.inputs:
+                raise ValueError(f"the program has no input `{name}`{near(name, [*arrays, *self.program.inputs])}")
+            if array is None or array.shape == ():
+                pairs = [(name if array is None else array.elements[0], value)]
+            else:
+                values = numbers(f"`{name}`", value)
+                if values.shape != array.shape:
+                    raise ValueError(f"`{name}` has shape {values.shape}, not {array.shape}")
+                pairs = list(zip(array.elements, values.ravel().tolist()))
+            for port, number in pairs:
+                if isinstance(port, str) and port in elements:
+                    raise ValueError(f"`{port}` is given twice")
+                if isinstance(port, str):
+                    elements[port] = number
+        return elements
+
+    def _shaped(self, values: dict[str, Any]) -> dict[str, Any]:
+        if not self.program.output_arrays:
+            return values
+        known = {name: np.nan if value is None else value for name, value in values.items()}
+        shaped: dict[str, Any] = {}
+        for array in self.program.output_arrays:
+            whole = array.stacked(known, ())
+            shaped[array.name] = whole if array.shape else float(whole)
+        return shaped
+
+    def reset(self) -> None:
+        """Back to the state after loading."""
+        self._core.reset()
+
+    @property
+    def outputs(self) -> dict[str, Any]:
+        """What is on the outputs now, as `step` gives it."""
+        return self._shaped(self._core.read())
+
+    @property
+    def cycles(self) -> int:
+        """Cycles of the last period, from the tick to the `wait`."""
+        return self._core.cycles
+
+    @property
+    def missed(self) -> int:
+        """Deadlines missed in the last period."""
+        return self._core.missed
+
+    @property
+    def periods(self) -> int:
+        """Periods since reset."""
+        return self._core.periods
+
+    @property
+    def now(self) -> int:
+        """Cycles since reset, waiting included."""
+        return self._core.now
+
+    @property
+    def flags(self) -> frozenset[str]:
+        """The exception flags raised since reset, among `invalid`, `divide-by-zero`, `overflow`."""
+        return flags_of(self._core.flags)
+
+    def __repr__(self) -> str:
+        return f"<takt.Sim on {self.program.machine}: {self.periods} periods, the last {self.cycles} cycles>"
