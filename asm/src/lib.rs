@@ -14,7 +14,7 @@
 //! }
 //! ```
 //!
-//! The stages, each a folder:
+//! The stages, each a folder, the first a crate of its own:
 //!
 //! ```text
 //! text ─ syntax ─ tree ─ expand ─ flat list ─ resolve ─ ir ─ check ─ contract ─ homes ─ schedule ─ emit ─ Program ─ output
@@ -24,7 +24,7 @@
 //! meaning; `check` looks at the whole program (types, who writes what); `contract` fuses products into sums; `homes` finds
 //! each operation a slot and each value its place; `schedule` packs bundles, and chooses again among the slots that can take an operation;
 //! `emit` places registers and makes words; `output` is what can be made of the result. `context` is what the stages before
-//! `schedule` share, `report` how mistakes are told. A stage uses those before it, never one after it.
+//! `schedule` share; how mistakes are told is in the first crate. A stage uses those before it, never one after it.
 //!
 //! `docs/language.md` is the contract of the language, `docs/image.md` that of the image. Nothing here prints, and nothing here
 //! touches the file system but [`FileLoader`]. No input makes the assembler panic; [`limits`] bounds what it takes.
@@ -37,18 +37,17 @@ mod expand;
 mod homes;
 pub mod index;
 mod ir;
-pub mod limits;
 mod output;
-mod report;
 mod resolve;
 pub mod schedule;
-mod syntax;
 
 use emit::place;
 use homes::{copies, values};
 use report::source::Sources;
 use std::sync::Arc;
 use takt_isa::{Machine, Program, T3};
+use takt_syntax as syntax;
+use takt_syntax::report;
 
 pub use context::type_name;
 pub use contract::Contraction;
@@ -59,6 +58,7 @@ pub use report::diag::{Diagnostic, Diagnostics};
 pub use report::levels::Levels;
 pub use report::{diag, levels, nearest, source};
 pub use syntax::ast::{Directive, Operator};
+pub use syntax::limits;
 pub use syntax::{Expression, expr, read, tokens};
 
 /// What the assembler is to do.

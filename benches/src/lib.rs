@@ -55,11 +55,13 @@ pub fn source(lines: usize) -> String {
     let mut line = text.lines().count();
     let mut label = 0;
     while line + 12 < lines {
+        // Each value takes a register: as many as there is room for.
+        let constant = label % 64;
         let _ = write!(
             text,
             "; block {label}: a proportional controller\n\n\
              step{label}:\n        fmul    a, x, k\n        fmul    b, y, 0.25e-6         ; m\n\
-             \x20       fadd    c, a, b || mov d, x\n        scale   a, 2*k + {label}\n        fsub    c, c, a\n\
+             \x20       fadd    c, a, b || mov d, x\n        scale   a, 2*k + {constant}\n        fsub    c, c, a\n\
              \x20       sel     d, d, x, y\n        itof    t, n\n        fsqrt   a, x\n        fadd    F, c, t\n"
         );
         label += 1;

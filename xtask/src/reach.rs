@@ -49,7 +49,7 @@ const TARGETS: [Target; 4] = [
 pub(crate) const WASM: &str = "wasm32-unknown-unknown";
 const AARCH64: &str = "aarch64-unknown-linux-gnu";
 /// The crates whose results must be the same bits on every host.
-const TESTED: [&str; 3] = ["takt-isa", "takt-asm", "takt-emu"];
+const TESTED: [&str; 4] = ["takt-isa", "takt-syntax", "takt-asm", "takt-emu"];
 /// Of the random operands of a release test run; qemu takes about fifty times as long for each.
 const SCALE: &str = "0.002";
 

@@ -71,7 +71,7 @@ impl Context {
             };
             return Err(self.report(at.scope, Diagnostic::error("name", span, message).help(help)));
         }
-        if self.scopes.names().len() >= limits::NAMES {
+        if self.scopes.names().count() >= limits::NAMES {
             let message = format!("more than {} names", limits::NAMES);
             return Err(self.error(at.scope, "limit", span, message));
         }

@@ -170,7 +170,7 @@ impl Scopes {
         if scope == ScopeId::ROOT {
             let index = name.0 as usize;
             if index >= self.globals.len() {
-                self.globals.resize((index + 1).max(self.names.len()), Binding::None);
+                self.globals.resize((index + 1).max(self.names.count()), Binding::None);
             }
             self.globals[index] = binding;
         } else {

@@ -140,7 +140,7 @@ impl Context {
                 !matches!(binding, Binding::Register(_) | Binding::Code(_))
             }
         };
-        let names = (0..self.scopes.names().len() as u32).map(NameId);
+        let names = (0..self.scopes.names().count() as u32).map(NameId);
         let candidates = names.filter(|name| {
             self.scopes.text(*name).len().abs_diff(text.len()) <= 3 && fits(self.lookup(scope, *name))
         });

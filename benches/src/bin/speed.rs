@@ -164,10 +164,11 @@ fn native_source(lines: usize) -> String {
     let mut line = text.lines().count();
     let mut label = 0;
     while line + 12 < lines {
+        let constant = label % 64;
         let _ = write!(
             text,
             "# block {label}: a proportional controller\n\nstep{label}:\n        mulss   k(%rsi), %xmm1\n        \
-             mulss   8(%rsi), %xmm2         # m\n        addss   %xmm1, %xmm2\n        scale   %xmm1, 2*k+{label}(%rdi)\n\
+             mulss   8(%rsi), %xmm2         # m\n        addss   %xmm1, %xmm2\n        scale   %xmm1, 2*k+{constant}(%rdi)\n\
              \x20       subss   %xmm1, %xmm3\n        movss   %xmm3, %xmm4\n        cvtsi2ss %eax, %xmm5\n        \
              sqrtss  %xmm6, %xmm1\n        addss   %xmm5, %xmm3\n"
         );
@@ -224,9 +225,14 @@ fn assembler_in(folder: &Path, text: &mut String) -> Outcome<()> {
             if let Some(error) = failed {
                 return Err(error);
             }
+            let mut mistakes = None;
             let ours = fastest(samples, |_| {
-                black_box(takt_asm::assemble("source.s", &loader, &options).is_ok());
+                let assembled = black_box(takt_asm::assemble("source.s", &loader, &options));
+                mistakes = assembled.err().or(mistakes.take());
             });
+            if let Some(mistakes) = mistakes {
+                return Err(mistakes.render(false).into());
+            }
             ratios.0.push(theirs / ours);
             best = best.min(ours / lines as f64);
         }

@@ -1,12 +1,12 @@
 //! The expression language on its own, for a debugger's prompt or a configuration: text to value, with the caller's names.
 
+use crate::ast::{Ast, ExprId, Node, NodeKind};
+use crate::expr::{self, BUILTINS, EvalError, Fault, Function, Names, Value};
+use crate::intern::Interner;
+use crate::name::{NameId, NameRef};
+use crate::parse::parse_expression;
 use crate::report::diag::{Diagnostic, Diagnostics, Sink};
 use crate::report::source::{Sources, Span};
-use crate::syntax::ast::{Ast, ExprId, Node, NodeKind};
-use crate::syntax::expr::{self, BUILTINS, EvalError, Fault, Function, Names, Value};
-use crate::syntax::intern::Interner;
-use crate::syntax::name::{NameId, NameRef};
-use crate::syntax::parse::parse_expression;
 use std::sync::Arc;
 
 /// A parsed expression.

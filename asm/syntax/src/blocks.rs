@@ -1,8 +1,8 @@
 //! Blocks of a file: `.macro`, `.rep` and `.if` to the directives that close them.
 
+use crate::ast::*;
 use crate::limits;
 use crate::report::diag::{Diagnostic, Sink};
-use crate::syntax::ast::*;
 
 /// Finds for every block of the file where it ends, so that expansion can jump.
 pub(crate) fn close(ast: &mut Ast, sink: &mut Sink) {

@@ -4,16 +4,16 @@
 //! Whether a name is a mnemonic, and which, is then a comparison of its number: the table of instructions is hashed once,
 //! here, and no list of mnemonics exists anywhere else.
 
-use crate::syntax::ast::Directive;
-use crate::syntax::expr::{BUILTINS, Function};
-use crate::syntax::name::NameId;
+use crate::ast::Directive;
+use crate::expr::{BUILTINS, Function};
+use crate::name::NameId;
 use takt_isa::{Op, ROWS};
 
 const EMPTY: u32 = u32::MAX;
 
 /// The set of all names.
 #[derive(Clone, Debug)]
-pub(crate) struct Interner {
+pub struct Interner {
     /// All names, one after another.
     text: String,
     /// Where each name ends in `text`; it begins where the one before ends.
@@ -30,7 +30,7 @@ impl Default for Interner {
 
 impl Interner {
     /// An interner that knows the language's own names.
-    pub(crate) fn new() -> Interner {
+    pub fn new() -> Interner {
         let mut interner = Interner { text: String::new(), ends: Vec::new(), table: vec![EMPTY; 1 << 12] };
         let known = ROWS
             .iter()
@@ -61,12 +61,12 @@ impl Interner {
     }
 
     /// The name's number, if it has one.
-    pub(crate) fn find(&self, name: &str) -> Option<NameId> {
+    pub fn find(&self, name: &str) -> Option<NameId> {
         self.find_or_slot(name).ok()
     }
 
     /// The name's number, new if the name is.
-    pub(crate) fn intern(&mut self, name: &str) -> NameId {
+    pub fn intern(&mut self, name: &str) -> NameId {
         let slot = match self.find_or_slot(name) {
             Ok(id) => return id,
             Err(slot) => slot,
@@ -83,14 +83,14 @@ impl Interner {
 
     /// The name's text.
     #[inline]
-    pub(crate) fn text(&self, name: NameId) -> &str {
+    pub fn text(&self, name: NameId) -> &str {
         let index = name.0 as usize;
         let start = if index == 0 { 0 } else { self.ends[index - 1] as usize };
         &self.text[start..self.ends[index] as usize]
     }
 
     /// How many names there are; numbers are below it.
-    pub(crate) fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.ends.len()
     }
 
@@ -181,7 +181,7 @@ mod tests {
     fn known_names_are_distinct() {
         // One name in two lists would shift the numbers of all that follow.
         let count = NameId::BUILTINS as usize + BUILTINS.len();
-        assert_eq!(Interner::new().len(), count);
+        assert_eq!(Interner::new().count(), count);
     }
 
     #[test]

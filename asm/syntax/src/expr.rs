@@ -6,9 +6,9 @@
 //! Values are 64-bit integers while all operands are integers and the operation is an integer one, else binary64. The
 //! elementary functions are those of the `libm` crate, not the host's: an image is the same wherever it is assembled.
 
+use crate::ast::{ExprId, Node, NodeKind, Operator};
+use crate::name::NameRef;
 use crate::report::source::Span;
-use crate::syntax::ast::{ExprId, Node, NodeKind, Operator};
-use crate::syntax::name::NameRef;
 use smallvec::SmallVec;
 use takt_isa::Type;
 
@@ -175,7 +175,7 @@ pub trait Names {
     ///
     /// # Errors
     /// If there is none.
-    fn function(&mut self, name: crate::syntax::name::NameId, span: Span) -> Result<Function, EvalError>;
+    fn function(&mut self, name: crate::name::NameId, span: Span) -> Result<Function, EvalError>;
 }
 
 /// The value of an expression, given as the nodes of its tree.
@@ -226,7 +226,7 @@ pub fn evaluate(nodes: &[Node], id: ExprId, names: &mut dyn Names) -> Result<Val
 }
 
 /// Where the part of an expression that each node heads begins: the node itself, or its first operand's part.
-pub(crate) fn parts(nodes: &[Node]) -> Vec<u32> {
+pub fn parts(nodes: &[Node]) -> Vec<u32> {
     let mut parts: Vec<u32> = Vec::with_capacity(nodes.len());
     // The beginnings of the parts that no operator has taken yet.
     let mut open: Vec<u32> = Vec::new();
@@ -248,7 +248,7 @@ pub(crate) fn parts(nodes: &[Node]) -> Vec<u32> {
 }
 
 /// The parts that are the operands of a node, in order: first and last node of each. `parts` is what [`parts`] gave.
-pub(crate) fn operands(parts: &[u32], node: u32) -> SmallVec<[(u32, u32); 3]> {
+pub fn operands(parts: &[u32], node: u32) -> SmallVec<[(u32, u32); 3]> {
     let (start, mut end) = (parts[node as usize], node);
     let mut operands = SmallVec::new();
     while end > start {
@@ -347,7 +347,7 @@ fn only_integer(operator: &'static str, value: Value) -> Result<i64, Fault> {
 }
 
 /// The value of an operator before one operand.
-pub(crate) fn prefix(operator: Operator, a: Value) -> Result<Value, Fault> {
+pub fn prefix(operator: Operator, a: Value) -> Result<Value, Fault> {
     Ok(match (operator, a) {
         (Operator::Sub, Value::Int(a)) => Value::Int(a.checked_neg().ok_or(Fault::IntegerOverflow("-"))?),
         (Operator::Sub, Value::Real(a)) => Value::Real(-a),
@@ -358,7 +358,7 @@ pub(crate) fn prefix(operator: Operator, a: Value) -> Result<Value, Fault> {
 }
 
 /// The value of an operator between two operands.
-pub(crate) fn infix(operator: Operator, a: Value, b: Value) -> Result<Value, Fault> {
+pub fn infix(operator: Operator, a: Value, b: Value) -> Result<Value, Fault> {
     use Operator::*;
     let name = operator.text();
     let integers = || Ok((only_integer(name, a)?, only_integer(name, b)?));
@@ -421,7 +421,7 @@ pub(crate) fn infix(operator: Operator, a: Value, b: Value) -> Result<Value, Fau
 }
 
 /// The value of a function.
-pub(crate) fn call(function: Function, arguments: &[Value]) -> Result<Value, Fault> {
+pub fn call(function: Function, arguments: &[Value]) -> Result<Value, Fault> {
     let name = function.name();
     let takes = function.arguments();
     let (Some(&a), true) = (arguments.first(), takes == 0 || takes == arguments.len()) else {

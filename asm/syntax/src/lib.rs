@@ -1,14 +1,21 @@
-//! Text to syntax tree, before any name has a meaning; and the expression language.
+//! The syntax of the assembler's language: text to tree, before any name has a meaning; the expression language; and how
+//! mistakes are told.
+//!
+//! A crate of its own because its parsers take long to compile. It is a part of `takt-asm`, which offers what others may use
+//! of it.
 
-pub(crate) mod ast;
+pub mod ast;
 mod blocks;
+mod explain;
 pub mod expr;
 mod expression;
 mod grammar;
-pub(crate) mod intern;
+pub mod intern;
 mod lex;
-pub(crate) mod name;
-pub(crate) mod parse;
+pub mod limits;
+pub mod name;
+pub mod parse;
+pub mod report;
 pub mod tokens;
 
 pub use expression::Expression;

@@ -3,27 +3,25 @@
 //! The parser never fails: a line that it cannot read is reported and leaves an empty statement, so that one run finds the
 //! mistakes of every line.
 
+use crate::ast::*;
+use crate::blocks;
+use crate::explain::describe;
+use crate::grammar::{self, Body, Builder, Line};
+use crate::intern::Interner;
+use crate::lex::{Chunk, Lexer, LineTokens, Token};
 use crate::limits;
+use crate::name::NameRef;
 use crate::report::diag::{Diagnostic, Severity, Sink};
-use crate::report::nearest;
 use crate::report::source::{Source, Span};
-use crate::syntax::ast::Operator;
-use crate::syntax::ast::*;
-use crate::syntax::blocks;
-use crate::syntax::grammar::{self, Body, Builder, Line};
-use crate::syntax::intern::Interner;
-use crate::syntax::lex::{Chunk, Lexer, LineTokens, Token};
-use crate::syntax::name::{NameId, NameRef};
-use chumsky::error::{EmptyErr, Rich, RichPattern, RichReason};
+use chumsky::Parser as _;
 use chumsky::input::Input as _;
-use chumsky::prelude::Parser;
-use takt_isa::ROWS;
+use std::cell::OnceCell;
 
 /// Tokens read at a time: enough that building the parser does not count, few enough to stay in the cache.
 const CHUNK: usize = 1 << 14;
 
 /// Reads a source file.
-pub(crate) fn parse(source: &Source, names: &mut Interner, sink: &mut Sink) -> Ast {
+pub fn parse(source: &Source, names: &mut Interner, sink: &mut Sink) -> Ast {
     parse_with(source, names, sink, true)
 }
 
@@ -45,11 +43,7 @@ fn parse_with(source: &Source, names: &mut Interner, sink: &mut Sink, shortcut: 
 }
 
 /// An expression alone, for whoever evaluates text: its nodes, or what is wrong with it.
-pub(crate) fn parse_expression(
-    source: &Source,
-    names: &mut Interner,
-    sink: &mut Sink,
-) -> Option<(Ast, ExprId)> {
+pub fn parse_expression(source: &Source, names: &mut Interner, sink: &mut Sink) -> Option<(Ast, ExprId)> {
     // As the value of a constant, an expression reads like any other. The directive before it takes no room in the text:
     // messages know by that that nobody wrote it.
     let mut ast = Ast::default();
@@ -81,8 +75,8 @@ pub(crate) fn parse_expression(
 
 fn parse_chunk(chunk: &Chunk, source: &Source, ast: &mut Ast, sink: &mut Sink, shortcut: bool) {
     let mut builder = Builder { ast: std::mem::take(ast), text: &source.text, base: source.base, line: 0 };
-    let quick = grammar::line::<EmptyErr>(shortcut);
-    let equation = grammar::equation::<EmptyErr>();
+    // Built when a line first needs them.
+    let (bundle, equation) = (OnceCell::new(), OnceCell::new());
     let mut start = 0;
     for line in &chunk.lines {
         let tokens = &chunk.tokens[start..line.end as usize];
@@ -93,34 +87,36 @@ fn parse_chunk(chunk: &Chunk, source: &Source, ast: &mut Ast, sink: &mut Sink, s
         }
         builder.line = line.number;
         let mark = builder.mark();
-        let end = tokens[tokens.len() - 1].1;
-        let input = tokens.split_token_span(end);
-        let parsed = if is_equation(tokens) {
-            equation.parse_with_state(input, &mut builder).into_output()
-        } else {
-            quick.parse_with_state(input, &mut builder).into_output()
+        if shortcut && let Some(parsed) = grammar::common_line(tokens, &mut builder) {
+            add(parsed, line, tokens, source, &mut builder.ast, sink);
+            continue;
+        }
+        builder.rewind(mark);
+        let input = tokens.split_token_span(tokens[tokens.len() - 1].1);
+        let grammar = match is_equation(tokens) {
+            true => equation.get_or_init(grammar::equation),
+            false => bundle.get_or_init(grammar::line),
         };
-        match parsed {
-            Some(parsed) => add(parsed, line, tokens, source, &mut builder.ast, sink),
-            None => {
+        match grammar.parse_with_state(input, &mut builder).into_result() {
+            Ok(parsed) => add(parsed, line, tokens, source, &mut builder.ast, sink),
+            Err(errors) => {
                 builder.rewind(mark);
-                if sink.keeps(Severity::Error) {
-                    explain(tokens, source, &mut builder, sink);
-                    builder.rewind(mark);
-                } else {
+                if !sink.keeps(Severity::Error) {
                     sink.errors += 1;
+                } else if let Some(error) = errors.first() {
+                    sink.push(describe(error, tokens, &|span| source.slice(span)));
                 }
                 broken(tokens, line, &mut builder.ast);
             }
         }
     }
-    // The parser may hold on to the builder's lifetime until it is dropped.
-    drop((quick, equation));
+    // The parsers may hold on to the builder's lifetime until they are dropped.
+    drop((bundle, equation));
     *ast = builder.ast;
 }
 
 /// Whether a line is meant as an equation: of the others only directives have a `=`.
-fn is_equation(tokens: &[(Token, Span)]) -> bool {
+pub(crate) fn is_equation(tokens: &[(Token, Span)]) -> bool {
     let mut assigns = false;
     for (token, _) in tokens {
         match token {
@@ -286,209 +282,6 @@ fn nests_too_deeply(tokens: &[(Token, Span)], sink: &mut Sink) -> bool {
         }
     }
     false
-}
-
-/// Parses a line that failed once more, for its error.
-fn explain<'t, 'a: 't>(
-    tokens: &'t [(Token, Span)],
-    source: &Source,
-    builder: &mut Builder<'a>,
-    sink: &mut Sink,
-) {
-    let end = tokens.last().map_or(Span::default(), |last| last.1);
-    let input = tokens.split_token_span(end);
-    let errors = if is_equation(tokens) {
-        grammar::equation::<Rich<'t, Token, Span>>().parse_with_state(input, builder).into_errors()
-    } else {
-        grammar::line::<Rich<'t, Token, Span>>(false).parse_with_state(input, builder).into_errors()
-    };
-    let slice = |span: Span| {
-        let range = (span.start - source.base) as usize..(span.end - source.base) as usize;
-        source.text.get(range).unwrap_or("")
-    };
-    if let Some(error) = errors.first() {
-        sink.push(describe(error, tokens, &slice));
-    }
-}
-
-/// An error of the grammar as a user reads it.
-fn describe<'s>(
-    error: &Rich<'_, Token, Span>,
-    tokens: &[(Token, Span)],
-    text: &dyn Fn(Span) -> &'s str,
-) -> Diagnostic {
-    let mut span = *error.span();
-    let at = tokens.iter().position(|token| token.1.start >= span.start).unwrap_or(tokens.len() - 1);
-    let found = tokens[at].0;
-    if found == Token::Newline {
-        // Behind the last token, where something is missing, rather than under the line break or its comment.
-        let last = tokens[..at].last().map_or(span, |token| token.1);
-        span = Span::new(last.end, last.end);
-    } else {
-        span = tokens[at].1;
-    }
-    let shown = match found {
-        Token::Newline => "the end of the line".to_owned(),
-        _ => format!("`{}`", text(span)),
-    };
-    let mut expected: Vec<String> = match error.reason() {
-        RichReason::ExpectedFound { expected, .. } => expected.iter().map(pattern).collect(),
-        RichReason::Custom(_) => Vec::new(),
-    };
-    expected.sort();
-    expected.dedup();
-    // After a name a call, an index or a type might always follow: no news where something else is missing.
-    if expected.len() > 1 {
-        expected.retain(|expected| !["`(`", "`[`", "`:`"].contains(&expected.as_str()));
-    }
-    let previous = at.checked_sub(1).map(|before| tokens[before].0);
-    let is_alone = matches!(tokens[0], (Token::Directive(_), span) if span.start == span.end);
-    let directive = tokens.iter().find_map(|(token, _)| match token {
-        Token::Directive(directive) if !is_alone => Some(*directive),
-        _ => None,
-    });
-    let diagnostic = Diagnostic::error("syntax", span, "");
-    let mut diagnostic = diagnostic.here(match expected.len() {
-        0 => "not expected here".to_owned(),
-        _ => format!("expected {}", list(&expected)),
-    });
-    // What was probably meant, from what stands around the mistake.
-    let operand = |token: Option<Token>| {
-        matches!(
-            token,
-            Some(
-                Token::Name(_)
-                    | Token::Int(_)
-                    | Token::Real(_)
-                    | Token::Close
-                    | Token::End(_)
-                    | Token::BracketClose
-            )
-        )
-    };
-    let (message, help) = match (previous, found) {
-        (_, Token::NotDirective) => {
-            let known = Directive::ALL.iter().map(|directive| directive.name());
-            let meant = nearest(text(span), known);
-            let message = format!("there is no directive {shown}");
-            let diagnostic = Diagnostic::error("unknown-directive", span, message).here("unknown");
-            return if meant.is_some() {
-                diagnostic.did_you_mean(meant)
-            } else {
-                let known: Vec<&str> = Directive::ALL.iter().map(|directive| directive.name()).collect();
-                diagnostic.note(format!("directives: {}", known.join(" ")))
-            };
-        }
-        (Some(Token::Bars), Token::Newline) => (
-            "the bundle ends in `||`".to_owned(),
-            Some("remove it, or write the next operation on the next line".to_owned()),
-        ),
-        (Some(Token::Bars), Token::Directive(_)) => (
-            format!("{shown} cannot stand in a bundle"),
-            Some("a directive has a line of its own: does the line above end in `||`?".to_owned()),
-        ),
-        (_, Token::Directive(inner)) if at > 0 && !is_alone && inner != Directive::Raw => (
-            format!("{shown} in the middle of a line"),
-            Some("a directive begins its line; only a label may stand before it".to_owned()),
-        ),
-        _ if is_equation(tokens) && tokens.iter().any(|(token, _)| *token == Token::Bars) => (
-            "an equation within a bundle".to_owned(),
-            Some("an equation has a line of its own: the scheduler packs its operations".to_owned()),
-        ),
-        (Some(_), Token::Assign) if tokens[..at].iter().any(|(token, _)| *token == Token::Assign) => {
-            ("a second `=`".to_owned(), Some("`==` compares; `a, b = x, y` writes two registers".to_owned()))
-        }
-        (Some(Token::Name(_)), Token::Name(_) | Token::Int(_) | Token::Real(_)) if is_equation(tokens) => (
-            format!("{shown} follows an operand"),
-            Some("is an operator missing, or a function's parentheses?".to_owned()),
-        ),
-        (_, Token::Newline)
-            if tokens.iter().filter(|(token, _)| *token == Token::Question).count()
-                > tokens.iter().skip(2).filter(|(token, _)| *token == Token::Colon).count() =>
-        {
-            ("the choice is incomplete".to_owned(), Some("a choice is written `c ? a : b`".to_owned()))
-        }
-        (_, Token::Name(name))
-            if operand(previous) && name.op().is_some() && directive.is_none() && !is_alone =>
-        {
-            (
-                format!("{shown} begins another operation"),
-                Some(
-                    "operations of one bundle are separated by `||`, others stand on lines of their own"
-                        .to_owned(),
-                ),
-            )
-        }
-        (_, Token::Name(_) | Token::Int(_) | Token::Real(_)) if operand(previous) && at > 1 => (
-            format!("{shown} follows an operand"),
-            match directive {
-                Some(directive) => Some(format!("write `{} {}`", directive.name(), directive.operands())),
-                None if is_alone => None,
-                None => Some("operands are separated by `,`: is one missing?".to_owned()),
-            },
-        ),
-        (Some(Token::Comma), Token::Newline | Token::Comma) => {
-            ("an operand is missing after `,`".to_owned(), None)
-        }
-        (_, Token::Newline) => ("the line is incomplete".to_owned(), None),
-        (_, Token::Comma) if at > 0 && matches!(previous, Some(Token::Name(_))) && at == 1 => {
-            ("the first operand is missing".to_owned(), None)
-        }
-        _ if at == 0 => (format!("a line cannot begin with {shown}"), None),
-        _ => (format!("{shown} is not expected here"), None),
-    };
-    diagnostic.message = message;
-    diagnostic.help = help.or_else(|| match (directive, tokens.first()) {
-        (Some(directive), _) if directive.operands().is_empty() => {
-            Some(format!("`{}` stands alone", directive.name()))
-        }
-        (Some(directive), _) => Some(format!("write `{} {}`", directive.name(), directive.operands())),
-        (None, _) => {
-            mnemonic(tokens, at).map(|row| format!("write `{} {}`", row.mnemonic, row.shape.syntax()))
-        }
-    });
-    diagnostic
-}
-
-/// The instruction that the token at `at` belongs to.
-fn mnemonic(tokens: &[(Token, Span)], at: usize) -> Option<&'static takt_isa::Row> {
-    let start = tokens[..at].iter().rposition(|(token, _)| matches!(token, Token::Bars | Token::Colon));
-    match tokens.get(start.map_or(0, |start| start + 1))?.0 {
-        Token::Name(NameId(name)) => ROWS.get(name as usize),
-        _ => None,
-    }
-}
-
-fn pattern(pattern: &RichPattern<'_, Token>) -> String {
-    match pattern {
-        RichPattern::Label(label) => label.to_string(),
-        RichPattern::EndOfInput => "the end of the line".to_owned(),
-        RichPattern::Token(token) => match **token {
-            Token::Comma => "`,`".to_owned(),
-            Token::Colon => "`:`".to_owned(),
-            Token::At => "`@`".to_owned(),
-            Token::Assign => "`=`".to_owned(),
-            Token::Question => "`?`".to_owned(),
-            Token::Bars => "`||`".to_owned(),
-            Token::Open => "`(`".to_owned(),
-            Token::Close => "`)`".to_owned(),
-            Token::BracketOpen => "`[`".to_owned(),
-            Token::BracketClose => "`]`".to_owned(),
-            Token::Newline => "the end of the line".to_owned(),
-            Token::Directive(directive) => format!("`{}`", directive.name()),
-            _ => "something else".to_owned(),
-        },
-        _ => "something else".to_owned(),
-    }
-}
-
-/// `a, b or c`.
-fn list(items: &[String]) -> String {
-    match items {
-        [] => String::new(),
-        [one] => one.clone(),
-        [init @ .., last] => format!("{} or {last}", init.join(", ")),
-    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The tokens of a source, as an editor colours them and [`format`](crate::format) lays them out. Comments are among them.
 
-use crate::syntax::ast::Directive;
-use crate::syntax::lex::Raw;
+use crate::ast::Directive;
+use crate::lex::Raw;
 use logos::Logos;
 use std::ops::Range;
 

@@ -3,13 +3,13 @@
 //! Everything is kept in a few flat lists that refer to each other by index: a file of a million lines is a handful of
 //! allocations, and a statement within a repetition is read again and again without being copied.
 
+use crate::name::{NameId, NameRef};
 use crate::report::source::Span;
-use crate::syntax::name::{NameId, NameRef};
 use std::collections::BTreeSet;
 
 /// A name and its place.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Name {
+pub struct Name {
     /// The name.
     pub name: NameRef,
     /// Its place.
@@ -18,7 +18,7 @@ pub(crate) struct Name {
 
 /// `head{e}middle{e}tail`: what precedes each braced expression, the expression, and the tail.
 #[derive(Clone, PartialEq, Debug)]
-pub(crate) struct Template {
+pub struct Template {
     /// Text and expression, in turn.
     pub parts: Vec<(NameId, Vec<Node>)>,
     /// The text after the last expression.
@@ -74,7 +74,7 @@ impl ExprId {
 
 /// An expression and its place.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Expr {
+pub struct Expr {
     /// The expression.
     pub id: ExprId,
     /// Its place.
@@ -83,7 +83,7 @@ pub(crate) struct Expr {
 
 /// An operand as written.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Operand {
+pub struct Operand {
     /// What it is.
     pub kind: OperandKind,
     /// Its place.
@@ -98,7 +98,7 @@ impl From<Expr> for Operand {
 
 /// What an operand looks like.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum OperandKind {
+pub enum OperandKind {
     /// A name alone: a register, port, label, constant or parameter.
     Name(NameRef),
     /// Any other expression.
@@ -115,7 +115,7 @@ pub(crate) enum OperandKind {
 
 /// `name[i, j]`: an element of an array of registers.
 #[derive(Clone, PartialEq, Debug)]
-pub(crate) struct Element {
+pub struct Element {
     /// The array.
     pub name: Name,
     /// The nodes of each index.
@@ -124,7 +124,7 @@ pub(crate) struct Element {
 
 /// `target, … = value, …`: computed when the program runs.
 #[derive(Clone, PartialEq, Debug)]
-pub(crate) struct Equation {
+pub struct Equation {
     /// What is written.
     pub targets: Vec<Operand>,
     /// What is written there.
@@ -135,7 +135,7 @@ pub(crate) struct Equation {
 
 /// `register:type`: its bits are taken as another type.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Cast {
+pub struct Cast {
     /// What stands before the colon.
     pub operand: Operand,
     /// The type's name.
@@ -144,7 +144,7 @@ pub(crate) struct Cast {
 
 /// `offset[register]`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Memory {
+pub struct Memory {
     /// The offset; none is 0.
     pub offset: Option<Expr>,
     /// What stands in the brackets.
@@ -153,7 +153,7 @@ pub(crate) struct Memory {
 
 /// An operation of a bundle, or the use of a macro.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Operation {
+pub struct Operation {
     /// The mnemonic, the macro's name, or `.raw`.
     pub mnemonic: Name,
     /// Its first operand in [`Ast::operands`].
@@ -168,7 +168,7 @@ pub(crate) struct Operation {
 
 /// A line: an optional label, and what follows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Statement {
+pub struct Statement {
     /// The label.
     pub label: Option<Name>,
     /// What follows.
@@ -179,7 +179,7 @@ pub(crate) struct Statement {
 
 /// What a line does.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum StatementKind {
+pub enum StatementKind {
     /// Nothing: a label alone, or a line that could not be read.
     Empty,
     /// Operations: their first in [`Ast::operations`] and their number.
@@ -192,7 +192,7 @@ pub(crate) enum StatementKind {
 
 /// What a declaration declares.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Declares {
+pub enum Declares {
     /// Registers.
     Register,
     /// Registers whose value outlives the period.
@@ -205,7 +205,7 @@ pub(crate) enum Declares {
 
 /// One name of a declaration.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Declaration {
+pub struct Declaration {
     /// The name.
     pub name: Name,
     /// Of an array, how many elements it has in each direction: where they begin in [`Ast::sizes`], and how many there are.
@@ -218,7 +218,7 @@ pub(crate) struct Declaration {
 
 /// A section of the program.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash, PartialOrd, Ord)]
-pub(crate) enum Section {
+pub enum Section {
     /// What runs once, after reset.
     Once,
     /// What runs every period.
@@ -229,7 +229,7 @@ pub(crate) enum Section {
 
 impl Section {
     /// Its name, without the point.
-    pub(crate) const fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Section::Once => "once",
             Section::Period => "period",
@@ -240,7 +240,7 @@ impl Section {
 
 /// A directive and its operands.
 #[derive(Clone, PartialEq, Debug)]
-pub(crate) struct DirectiveLine {
+pub struct DirectiveLine {
     /// The directive.
     pub kind: DirectiveKind,
     /// The directive's place and, where it has operands, theirs.
@@ -249,7 +249,7 @@ pub(crate) struct DirectiveLine {
 
 /// A directive and its operands. `end` and `next` are indices into [`Ast::statements`], known once the file is read.
 #[derive(Clone, PartialEq, Debug)]
-pub(crate) enum DirectiveKind {
+pub enum DirectiveKind {
     /// `.reg`, `.state`, `.input`, `.output`.
     Declare(Declares, Vec<Declaration>),
     /// `.const`.
@@ -318,7 +318,16 @@ pub(crate) enum DirectiveKind {
     /// `.loop_bound`.
     LoopBound(Expr),
     /// `.range`, the registers, whether `@` stands before them, the least and the largest value.
-    Range { registers: Vec<Name>, placed: bool, low: Expr, high: Expr },
+    Range {
+        /// The registers, by their names or their places.
+        registers: Vec<Name>,
+        /// Whether `@` stands before them: then they are places.
+        placed: bool,
+        /// The least value.
+        low: Expr,
+        /// The largest value.
+        high: Expr,
+    },
     /// `.deadline`, the ports, and the cycle.
     Deadline(Vec<Name>, Expr),
     /// `.order` and the ports.
@@ -329,7 +338,7 @@ pub(crate) enum DirectiveKind {
 
 /// One place of a `.loc`.
 #[derive(Clone, PartialEq, Debug)]
-pub(crate) enum Loc {
+pub enum Loc {
     /// `none`, or another name by mistake.
     None(Name),
     /// A file, a line, and perhaps the first and the last column of a part of it.
@@ -405,7 +414,7 @@ directives! {
 
 /// A source file, read.
 #[derive(Clone, Default, Debug)]
-pub(crate) struct Ast {
+pub struct Ast {
     /// Lines that say something, in order.
     pub statements: Vec<Statement>,
     /// Operations of the bundles.

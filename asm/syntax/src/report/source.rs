@@ -59,6 +59,14 @@ pub struct Source {
     pub base: u32,
 }
 
+impl Source {
+    /// The text of a span, which lies in this file.
+    pub fn slice(&self, span: Span) -> &str {
+        let range = (span.start - self.base) as usize..(span.end - self.base) as usize;
+        self.text.get(range).unwrap_or("")
+    }
+}
+
 /// The source files of a program, in the order in which they were met.
 #[derive(Clone, Debug, Default)]
 pub struct Sources {
@@ -88,8 +96,7 @@ impl Sources {
     /// The text of a span.
     pub fn text(&self, span: Span) -> &str {
         let Some(file) = self.files.get(self.file_of(span.start)) else { return "" };
-        let (start, end) = ((span.start - file.base) as usize, (span.end - file.base) as usize);
-        file.text.get(start..end).unwrap_or("")
+        file.slice(span)
     }
 }
 

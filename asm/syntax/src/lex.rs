@@ -1,19 +1,19 @@
 //! Text to tokens. One regular expression for each kind of token, none for mnemonics: those are names like any other.
 
+use crate::ast::Directive;
+use crate::ast::Operator;
+use crate::intern::Interner;
 use crate::limits;
+use crate::name::NameId;
 use crate::report::diag::{Diagnostic, Severity, Sink};
 use crate::report::source::Span;
-use crate::syntax::ast::Directive;
-use crate::syntax::ast::Operator;
-use crate::syntax::intern::Interner;
-use crate::syntax::name::NameId;
 use logos::Logos;
 
 /// A kind of token, as the regular expressions tell them apart.
 #[derive(Logos, Clone, Copy, PartialEq, Eq, Debug)]
 #[logos(skip r"[ \t\r\x0C]+")]
 #[logos(skip(r";[^\n]*", allow_greedy = true))]
-pub(super) enum Raw {
+pub(crate) enum Raw {
     #[token("\n")]
     Newline,
     #[regex(r"[A-Za-z_][A-Za-z0-9_.]*")]

@@ -1,0 +1,163 @@
+//! What a line that the grammar does not take probably means.
+
+use crate::ast::Directive;
+use crate::grammar::Expected;
+use crate::lex::Token;
+use crate::name::NameId;
+use crate::parse::is_equation;
+use crate::report::diag::Diagnostic;
+use crate::report::nearest;
+use crate::report::source::Span;
+use takt_isa::ROWS;
+
+/// An error of the grammar as a user reads it.
+pub(crate) fn describe<'s>(
+    error: &Expected,
+    tokens: &[(Token, Span)],
+    text: &dyn Fn(Span) -> &'s str,
+) -> Diagnostic {
+    let mut span = error.span();
+    let at = tokens.iter().position(|token| token.1.start >= span.start).unwrap_or(tokens.len() - 1);
+    let found = tokens[at].0;
+    if found == Token::Newline {
+        // Behind the last token, where something is missing, rather than under the line break or its comment.
+        let last = tokens[..at].last().map_or(span, |token| token.1);
+        span = Span::new(last.end, last.end);
+    } else {
+        span = tokens[at].1;
+    }
+    let shown = match found {
+        Token::Newline => "the end of the line".to_owned(),
+        _ => format!("`{}`", text(span)),
+    };
+    let mut expected = error.texts();
+    // After a name a call, an index or a type might always follow: no news where something else is missing.
+    if expected.len() > 1 {
+        expected.retain(|expected| !["`(`", "`[`", "`:`"].contains(&expected.as_str()));
+    }
+    let previous = at.checked_sub(1).map(|before| tokens[before].0);
+    let is_alone = matches!(tokens[0], (Token::Directive(_), span) if span.start == span.end);
+    let directive = tokens.iter().find_map(|(token, _)| match token {
+        Token::Directive(directive) if !is_alone => Some(*directive),
+        _ => None,
+    });
+    let diagnostic = Diagnostic::error("syntax", span, "");
+    let mut diagnostic = diagnostic.here(match expected.len() {
+        0 => "not expected here".to_owned(),
+        _ => format!("expected {}", list(&expected)),
+    });
+    // What was probably meant, from what stands around the mistake.
+    let operand = |token: Option<Token>| {
+        matches!(
+            token,
+            Some(
+                Token::Name(_)
+                    | Token::Int(_)
+                    | Token::Real(_)
+                    | Token::Close
+                    | Token::End(_)
+                    | Token::BracketClose
+            )
+        )
+    };
+    let (message, help) = match (previous, found) {
+        (_, Token::NotDirective) => {
+            let known = Directive::ALL.iter().map(|directive| directive.name());
+            let meant = nearest(text(span), known);
+            let message = format!("there is no directive {shown}");
+            let diagnostic = Diagnostic::error("unknown-directive", span, message).here("unknown");
+            return if meant.is_some() {
+                diagnostic.did_you_mean(meant)
+            } else {
+                let known: Vec<&str> = Directive::ALL.iter().map(|directive| directive.name()).collect();
+                diagnostic.note(format!("directives: {}", known.join(" ")))
+            };
+        }
+        (Some(Token::Bars), Token::Newline) => (
+            "the bundle ends in `||`".to_owned(),
+            Some("remove it, or write the next operation on the next line".to_owned()),
+        ),
+        (Some(Token::Bars), Token::Directive(_)) => (
+            format!("{shown} cannot stand in a bundle"),
+            Some("a directive has a line of its own: does the line above end in `||`?".to_owned()),
+        ),
+        (_, Token::Directive(inner)) if at > 0 && !is_alone && inner != Directive::Raw => (
+            format!("{shown} in the middle of a line"),
+            Some("a directive begins its line; only a label may stand before it".to_owned()),
+        ),
+        _ if is_equation(tokens) && tokens.iter().any(|(token, _)| *token == Token::Bars) => (
+            "an equation within a bundle".to_owned(),
+            Some("an equation has a line of its own: the scheduler packs its operations".to_owned()),
+        ),
+        (Some(_), Token::Assign) if tokens[..at].iter().any(|(token, _)| *token == Token::Assign) => {
+            ("a second `=`".to_owned(), Some("`==` compares; `a, b = x, y` writes two registers".to_owned()))
+        }
+        (Some(Token::Name(_)), Token::Name(_) | Token::Int(_) | Token::Real(_)) if is_equation(tokens) => (
+            format!("{shown} follows an operand"),
+            Some("is an operator missing, or a function's parentheses?".to_owned()),
+        ),
+        (_, Token::Newline)
+            if tokens.iter().filter(|(token, _)| *token == Token::Question).count()
+                > tokens.iter().skip(2).filter(|(token, _)| *token == Token::Colon).count() =>
+        {
+            ("the choice is incomplete".to_owned(), Some("a choice is written `c ? a : b`".to_owned()))
+        }
+        (_, Token::Name(name))
+            if operand(previous) && name.op().is_some() && directive.is_none() && !is_alone =>
+        {
+            (
+                format!("{shown} begins another operation"),
+                Some(
+                    "operations of one bundle are separated by `||`, others stand on lines of their own"
+                        .to_owned(),
+                ),
+            )
+        }
+        (_, Token::Name(_) | Token::Int(_) | Token::Real(_)) if operand(previous) && at > 1 => (
+            format!("{shown} follows an operand"),
+            match directive {
+                Some(directive) => Some(format!("write `{} {}`", directive.name(), directive.operands())),
+                None if is_alone => None,
+                None => Some("operands are separated by `,`: is one missing?".to_owned()),
+            },
+        ),
+        (Some(Token::Comma), Token::Newline | Token::Comma) => {
+            ("an operand is missing after `,`".to_owned(), None)
+        }
+        (_, Token::Newline) => ("the line is incomplete".to_owned(), None),
+        (_, Token::Comma) if at > 0 && matches!(previous, Some(Token::Name(_))) && at == 1 => {
+            ("the first operand is missing".to_owned(), None)
+        }
+        _ if at == 0 => (format!("a line cannot begin with {shown}"), None),
+        _ => (format!("{shown} is not expected here"), None),
+    };
+    diagnostic.message = message;
+    diagnostic.help = help.or_else(|| match (directive, tokens.first()) {
+        (Some(directive), _) if directive.operands().is_empty() => {
+            Some(format!("`{}` stands alone", directive.name()))
+        }
+        (Some(directive), _) => Some(format!("write `{} {}`", directive.name(), directive.operands())),
+        (None, _) => {
+            mnemonic(tokens, at).map(|row| format!("write `{} {}`", row.mnemonic, row.shape.syntax()))
+        }
+    });
+    diagnostic
+}
+
+/// The instruction that the token at `at` belongs to.
+fn mnemonic(tokens: &[(Token, Span)], at: usize) -> Option<&'static takt_isa::Row> {
+    let start = tokens[..at].iter().rposition(|(token, _)| matches!(token, Token::Bars | Token::Colon));
+    match tokens.get(start.map_or(0, |start| start + 1))?.0 {
+        Token::Name(NameId(name)) => ROWS.get(name as usize),
+        _ => None,
+    }
+}
+
+/// `a, b or c`.
+fn list(items: &[String]) -> String {
+    match items {
+        [] => String::new(),
+        [one] => one.clone(),
+        [init @ .., last] => format!("{} or {last}", init.join(", ")),
+    }
+}

@@ -1,0 +1,208 @@
+//! The grammar of directives.
+
+use super::expected::What;
+use super::{Body, Builder, Rule, rule};
+use crate::ast::*;
+use crate::lex::Token;
+use chumsky::prelude::*;
+
+/// The parser of a directive with its operands.
+pub(super) fn directive<'t, 'a: 't>(
+    name: Rule<'t, 'a, Name>,
+    expr: Rule<'t, 'a, Expr>,
+) -> Rule<'t, 'a, Body> {
+    let comma = || just(Token::Comma).labelled(What::Comma);
+    let is = |directive| just(Token::Directive(directive));
+    let text = rule(select! { Token::Text => () }.labelled(What::Text).map_with(|(), e| {
+        let span = e.span();
+        (e.state() as &mut Builder<'a>).quoted(span)
+    }));
+    let bare = select! {
+        Token::Directive(Directive::Once) => DirectiveKind::Section(Section::Once),
+        Token::Directive(Directive::Period) => DirectiveKind::Section(Section::Period),
+        Token::Directive(Directive::Data) => DirectiveKind::Section(Section::Data),
+        Token::Directive(Directive::EndMacro) => DirectiveKind::End(Directive::EndMacro),
+        Token::Directive(Directive::EndRep) => DirectiveKind::End(Directive::EndRep),
+        Token::Directive(Directive::EndIf) => DirectiveKind::End(Directive::EndIf),
+        Token::Directive(Directive::Else) => DirectiveKind::Else(0),
+    };
+    let declares = select! {
+        Token::Directive(Directive::Reg) => Declares::Register,
+        Token::Directive(Directive::State) => Declares::State,
+        Token::Directive(Directive::Input) => Declares::Input,
+        Token::Directive(Directive::Output) => Declares::Output,
+    };
+    let sizes = expr
+        .clone()
+        .separated_by(comma())
+        .at_least(1)
+        .collect::<Vec<_>>()
+        .delimited_by(
+            just(Token::BracketOpen).labelled(What::BracketOpen),
+            just(Token::BracketClose).labelled(What::BracketClose),
+        )
+        .or_not()
+        .map_with(|sizes, e| {
+            let all = &mut (e.state() as &mut Builder<'a>).ast.sizes;
+            let sizes = sizes.unwrap_or_default();
+            all.extend(&sizes);
+            ((all.len() - sizes.len()) as u32, sizes.len() as u32)
+        });
+    let declaration = name
+        .clone()
+        .then(rule(sizes))
+        .then(
+            just(Token::Colon).labelled(What::Colon).ignore_then(name.clone().labelled(What::Type)).or_not(),
+        )
+        .then(just(Token::At).labelled(What::At).ignore_then(expr.clone().labelled(What::Place)).or_not())
+        .map(|(((name, sizes), ty), place)| Declaration { name, sizes, ty, place });
+    let declaration = rule(declaration);
+    // Separated by blanks or commas.
+    let declarations = declaration
+        .clone()
+        .then(comma().or_not().ignore_then(declaration).repeated().collect::<Vec<_>>())
+        .map(|(first, mut more)| {
+            more.insert(0, first);
+            more
+        });
+    let declare = declares.then(declarations).map(|(what, names)| DirectiveKind::Declare(what, names));
+    let values = rule(expr.clone().separated_by(comma()).at_least(1).collect::<Vec<_>>());
+    let float = is(Directive::Float).ignore_then(values.clone()).map(DirectiveKind::Float);
+    let word = is(Directive::Word).ignore_then(values.clone()).map(DirectiveKind::Word);
+    let assigned = name.clone().then_ignore(just(Token::Assign).labelled(What::Assign)).then(expr.clone());
+    let assigned = rule(assigned);
+    let constant = is(Directive::Const)
+        .ignore_then(assigned.clone())
+        .map(|(name, value)| DirectiveKind::Const(name, value));
+    let preset = is(Directive::Preset)
+        .ignore_then(just(Token::At).or_not())
+        .then(assigned.clone())
+        .map(|(at, (register, value))| DirectiveKind::Preset { register, placed: at.is_some(), value });
+    let space = is(Directive::Space).ignore_then(expr.clone()).map(DirectiveKind::Space);
+    let branch = is(Directive::If).ignore_then(expr.clone()).map(|condition| DirectiveKind::If(condition, 0));
+    let elif =
+        is(Directive::Elif).ignore_then(expr.clone()).map(|condition| DirectiveKind::Elif(condition, 0, 0));
+    let rep = is(Directive::Rep)
+        .ignore_then(name.clone())
+        .then_ignore(comma())
+        .then(expr.clone())
+        .then_ignore(comma())
+        .then(expr.clone())
+        .map(|((variable, first), last)| DirectiveKind::Rep { variable, first, last, end: 0 });
+    let more = rule(comma().or_not().ignore_then(name.clone()).repeated().collect::<Vec<_>>());
+    let macro_ = is(Directive::Macro)
+        .ignore_then(name.clone())
+        .then(more.clone())
+        .map(|(name, parameters)| DirectiveKind::Macro { name, parameters, end: 0 });
+    // Whatever tokens a library file's name is made of: its text counts.
+    let library = select! {
+        token if !matches!(token, Token::Newline | Token::Operator(Operator::Gt)) => (),
+    }
+    .repeated()
+    .at_least(1)
+    .collect::<Vec<()>>()
+    .map_with(|_, e| {
+        let span = e.span();
+        (e.state() as &mut Builder<'a>).text_of(span).to_owned()
+    })
+    .delimited_by(
+        just(Token::Operator(Operator::Lt)).labelled(What::LibraryFile),
+        just(Token::Operator(Operator::Gt)).labelled(What::Greater),
+    );
+    let include = is(Directive::Include)
+        .ignore_then(text.clone().map(|name| (name, false)).or(library.map(|name| (name, true))))
+        .map(|(name, library)| DirectiveKind::Include(name, library));
+    let schedule = is(Directive::Schedule)
+        .ignore_then(name.clone().labelled(What::OnOrOff))
+        .map(DirectiveKind::Schedule);
+    let fast = is(Directive::Fast).ignore_then(name.clone().labelled(What::Allowed).then(more.clone())).map(
+        |(first, mut more)| {
+            more.insert(0, first);
+            DirectiveKind::Fast(more)
+        },
+    );
+    let contract = is(Directive::Contract)
+        .ignore_then(name.clone().labelled(What::OnOrOff))
+        .map(DirectiveKind::Contract);
+    let latched = is(Directive::Ports)
+        .ignore_then(name.clone().labelled(What::LatchedOrDirect))
+        .map(DirectiveKind::Ports);
+    let loop_bound = is(Directive::LoopBound).ignore_then(expr.clone()).map(DirectiveKind::LoopBound);
+    let ports = rule(name.clone().labelled(What::Port).then(more).map(|(first, mut more)| {
+        more.insert(0, first);
+        more
+    }));
+    let range = is(Directive::Range)
+        .ignore_then(just(Token::At).or_not())
+        .then(ports.clone())
+        .then_ignore(just(Token::Assign).labelled(What::Assign))
+        .then(expr.clone().labelled(What::Least))
+        .then_ignore(comma())
+        .then(expr.clone().labelled(What::Largest))
+        .map(|(((at, registers), low), high)| DirectiveKind::Range {
+            registers,
+            placed: at.is_some(),
+            low,
+            high,
+        });
+    let deadline = is(Directive::Deadline)
+        .ignore_then(ports.clone())
+        .then_ignore(just(Token::Assign).labelled(What::Assign))
+        .then(expr.clone().labelled(What::Cycle))
+        .map(|(ports, cycle)| DirectiveKind::Deadline(ports, cycle));
+    let order = is(Directive::Order).ignore_then(ports.clone()).map(DirectiveKind::Order);
+    let late = is(Directive::Late)
+        .ignore_then(ports.clone())
+        .then(
+            just(Token::Assign)
+                .labelled(What::Assign)
+                .ignore_then(expr.clone().labelled(What::Cycles))
+                .or_not(),
+        )
+        .map(|(ports, cost)| DirectiveKind::Late(ports, cost));
+    let error = is(Directive::Error).ignore_then(text.clone()).map(DirectiveKind::Error);
+    let columns = expr
+        .clone()
+        .then_ignore(comma())
+        .then(expr.clone())
+        .delimited_by(
+            just(Token::BracketOpen).labelled(What::BracketOpen),
+            just(Token::BracketClose).labelled(What::BracketClose),
+        )
+        .or_not();
+    let at = text
+        .clone()
+        .then(expr.clone().labelled(What::LineNumber))
+        .then(columns)
+        .map(|((file, line), columns)| Loc::At(file, line, columns))
+        .or(name.map(Loc::None));
+    let loc = is(Directive::Loc)
+        .ignore_then(at.separated_by(just(Token::Bars).labelled(What::Bars)).at_least(1).collect::<Vec<_>>())
+        .map(DirectiveKind::Loc);
+    let kind = choice([
+        rule(bare),
+        rule(declare),
+        rule(float),
+        rule(word),
+        rule(constant),
+        rule(preset),
+        rule(space),
+        rule(branch),
+        rule(elif),
+        rule(rep),
+        rule(macro_),
+        rule(include),
+        rule(error),
+        rule(loc),
+        rule(schedule),
+        rule(contract),
+        rule(fast),
+        rule(latched),
+        rule(loop_bound),
+        rule(range),
+        rule(deadline),
+        rule(order),
+        rule(late),
+    ]);
+    rule(kind.map_with(|kind, e| Body::Directive(kind, e.span())))
+}

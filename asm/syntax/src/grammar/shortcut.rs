@@ -1,0 +1,92 @@
+//! The lines that most are, without the grammar.
+
+use super::{Body, Builder, Line};
+use crate::ast::*;
+use crate::lex::Token;
+use crate::name::NameRef;
+use crate::report::source::Span;
+
+/// The line that most are: perhaps a label, then operations whose operands are names, numbers and `offset[name]` with one
+/// of each. It says nothing that the grammar does not, only sooner; anything else it leaves to that, and what it has
+/// written until then to be taken out again.
+pub(crate) fn common_line(tokens: &[(Token, Span)], builder: &mut Builder<'_>) -> Option<Line> {
+    let mut rest = tokens;
+    let mut label = None;
+    if let [(Token::Name(name), span), (Token::Colon, _), behind @ ..] = rest {
+        label = Some(Name { name: NameRef::plain(*name), span: *span });
+        if let [(Token::Newline, _)] = behind {
+            return Some(Line { label, body: Body::Empty });
+        }
+        rest = behind;
+    }
+    let mut count = 0;
+    loop {
+        let [(Token::Name(mnemonic), span), behind @ ..] = rest else { return None };
+        let mnemonic = Name { name: NameRef::plain(*mnemonic), span: *span };
+        let end;
+        (end, rest) = common_operands(behind, mnemonic, builder)?;
+        count += 1;
+        if end == Token::Newline {
+            return Some(Line { label, body: Body::Bundle(count) });
+        }
+    }
+}
+
+/// The operands of [`common_line`]: the token that ends them, `||` or the end of the line, and what follows it.
+#[inline(always)]
+fn common_operands<'t>(
+    mut rest: &'t [(Token, Span)],
+    mnemonic: Name,
+    builder: &mut Builder<'_>,
+) -> Option<(Token, &'t [(Token, Span)])> {
+    let mut count = 0;
+    let mut last = mnemonic.span;
+    if let [(end @ (Token::Newline | Token::Bars), _), behind @ ..] = rest {
+        builder.push_operation(mnemonic, 0, last);
+        return Some((*end, behind));
+    }
+    loop {
+        let [(value, mut span), ref behind @ ..] = *rest else { return None };
+        let first = builder.ast.nodes.len() as u32;
+        let mut kind = match value {
+            Token::Name(name) => OperandKind::Name(NameRef::plain(name)),
+            Token::Int(value) => {
+                builder.node(NodeKind::Int(value), span);
+                OperandKind::Expr(ExprId { first, count: 1 })
+            }
+            Token::Real(value) => {
+                builder.node(NodeKind::Real(value), span);
+                OperandKind::Expr(ExprId { first, count: 1 })
+            }
+            _ => return None,
+        };
+        rest = behind;
+        if let [(Token::BracketOpen, _), behind @ ..] = rest {
+            let [(Token::Name(base), inside), (Token::BracketClose, close), behind @ ..] = behind else {
+                return None;
+            };
+            let base = Operand { kind: OperandKind::Name(NameRef::plain(*base)), span: *inside };
+            if let OperandKind::Name(name) = kind {
+                builder.node(NodeKind::Name(name), span);
+            }
+            let offset = Some(Expr { id: ExprId { first, count: 1 }, span });
+            builder.ast.memories.push(Memory { offset, base });
+            kind = OperandKind::Memory(builder.ast.memories.len() as u32 - 1);
+            span = span.to(*close);
+            rest = behind;
+        }
+        builder.ast.operands.push(Operand { kind, span });
+        last = span;
+        count += 1;
+        let [(token, _), behind @ ..] = rest else { return None };
+        rest = behind;
+        match token {
+            Token::Comma => {}
+            Token::Newline | Token::Bars => {
+                builder.push_operation(mnemonic, count, mnemonic.span.to(last));
+                return Some((*token, rest));
+            }
+            _ => return None,
+        }
+    }
+}
