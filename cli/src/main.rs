@@ -41,6 +41,7 @@ mod output;
 mod plot;
 mod ports;
 mod report;
+#[cfg(feature = "robot")]
 mod robot;
 mod rtl;
 mod run;
@@ -52,6 +53,8 @@ mod track;
 
 #[cfg(not(feature = "model"))]
 use absent::model;
+#[cfg(not(feature = "robot"))]
+use absent::robot;
 #[cfg(not(feature = "board"))]
 use absent::{board, live};
 #[cfg(not(feature = "editor"))]
