@@ -657,6 +657,14 @@ impl Observed<'_> {
         self.drive(Goal { wait: true, ..self.emulator.goal() })
     }
 
+    /// As [`Emulator::run_to_wait_until`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn run_to_wait_until(&mut self, cycle: Cycle) -> Result<Stop, Fault> {
+        self.drive(Goal { until: cycle, wait: true, ..self.emulator.goal() })
+    }
+
     /// As [`Emulator::run`].
     ///
     /// # Errors
