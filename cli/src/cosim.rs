@@ -13,6 +13,7 @@ use clap::Args;
 use serde_json::{Value, json};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 use takt_cosim::{Difference, Lockstep, LockstepError, Model, Simulation, cache_folder, random};
 use takt_emu::{Fault, Row};
 use takt_isa::{MACHINES, Machine, Program};
@@ -108,7 +109,9 @@ fn one(arguments: &Cosim, file: &Path, color: bool, out: &mut Out) -> Result<()>
     let program = &loaded.program;
     let rows = ports::rows(arguments.inputs.as_deref(), arguments.periods, PERIODS, &program.inputs)?;
     let (design, model) = model(program.machine, program.latched_inputs())?;
+    let start = Instant::now();
     let ran = run_rows(program, &rows, model.start(&[])?);
+    let elapsed = start.elapsed();
     let result = match ran {
         Ok(result) => result,
         Err(error) => {
@@ -122,6 +125,7 @@ fn one(arguments: &Cosim, file: &Path, color: bool, out: &mut Out) -> Result<()>
                 "machine": program.machine.name,
                 "periods": result.periods,
                 "cycles": result.cycles,
+                "cycles_per_second": rate(result.cycles, elapsed),
                 "events": result.events,
                 "stopped": match &result.stopped {
                     Stopped::No => None,
@@ -138,6 +142,7 @@ fn one(arguments: &Cosim, file: &Path, color: bool, out: &mut Out) -> Result<()>
         "{} periods on {}, {} cycles: {} events, no difference",
         result.periods, program.machine.name, result.cycles, result.events
     )?;
+    writeln!(out, "  {} cycles a second, both sides together", rate(result.cycles, elapsed))?;
     match &result.stopped {
         Stopped::No => {}
         Stopped::Halt => writeln!(out, "  both sides stopped: halt")?,
@@ -149,6 +154,11 @@ fn one(arguments: &Cosim, file: &Path, color: bool, out: &mut Out) -> Result<()>
         }
     }
     Ok(())
+}
+
+/// Cycles a second.
+fn rate(cycles: u64, elapsed: Duration) -> u64 {
+    (cycles as f64 / elapsed.as_secs_f64().max(1e-9)) as u64
 }
 
 struct Ran {
@@ -198,6 +208,7 @@ fn many(arguments: &Cosim, out: &mut Out) -> Result<()> {
     let (design, model) = model(machine, if arguments.latched { machine.inputs.depth } else { 0 })?;
     let mut simulation = model.start(&[])?;
     let mut coverage = random::Coverage::default();
+    let start = Instant::now();
     for seed in first..end {
         simulation = match random::run(seed, machine, simulation, &mut coverage) {
             Ok(simulation) => simulation,
@@ -210,6 +221,7 @@ fn many(arguments: &Cosim, out: &mut Out) -> Result<()> {
             }
         };
     }
+    let rate = rate(coverage.cycles, start.elapsed());
     if arguments.json {
         return output::json(
             &json!({
@@ -217,6 +229,7 @@ fn many(arguments: &Cosim, out: &mut Out) -> Result<()> {
                 "seeds": [first, end - 1],
                 "programs": coverage.programs,
                 "cycles": coverage.cycles,
+                "cycles_per_second": rate,
                 "events": coverage.events,
                 "instructions": coverage.operations,
                 "hazards": coverage.hazards.len(),
@@ -244,6 +257,7 @@ fn many(arguments: &Cosim, out: &mut Out) -> Result<()> {
         coverage.hazards.len(),
         if faults.is_empty() { "none".to_owned() } else { faults.join(", ") }
     )?;
+    writeln!(out, "  {rate} cycles a second, both sides together")?;
     Ok(())
 }
 

@@ -96,6 +96,8 @@ impl Random {
 /// Registers that random operations read and write, of each bank; and how many of its output ports.
 const POOL: u32 = 8;
 const OUTPUTS: usize = 2;
+/// Data words that differ from the other seeds', at most.
+const OWN_DATA: u32 = 64;
 /// How many input ports random programs read.
 pub const INPUTS: usize = 4;
 /// Registers at the start of the first slot's bank that hold word addresses and are never written.
@@ -203,12 +205,18 @@ impl Generator {
             let (start, end) = (BundleAddress::new(start), BundleAddress::new(end));
             Section { name: name.to_owned(), start, end }
         };
+        // Nearly the same for every seed: a circuit that has run another program need not be given most of it again.
+        let mut common = Random::new(0);
+        let mut data: Vec<u32> = (0..machine.data_depth).map(|_| common.word()).collect();
+        for _ in 0..OWN_DATA.min(machine.data_depth) {
+            data[self.random.below(machine.data_depth) as usize] = self.random.word();
+        }
         self.constants.sort_unstable();
         self.loop_bounds.sort_unstable_by_key(|bound| bound.address);
         Program {
             machine,
             lines: vec![None; self.bundles.len() * machine.slots.len()],
-            data: (0..machine.data_depth).map(|_| self.random.word()).collect(),
+            data,
             inputs,
             outputs: outputs.collect(),
             constants: self.constants,
