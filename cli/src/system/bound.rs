@@ -17,13 +17,7 @@ pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
         return Err(Failure::Usage(why.to_owned()).into());
     }
     let LoadedSystem { description, .. } = load(&arguments.file, &arguments.source, color)?;
-    let mut bounds = Vec::new();
-    for core in &description.cores {
-        bounds.push(
-            takt_analysis::bound(&core.program)
-                .map_err(|error| anyhow!("core {}: no bound: {error}", core.name))?,
-        );
-    }
+    let bounds = bounds(&description)?;
     let deadline = arguments.deadline.map(|deadline| deadline.cycles(arguments.clock));
     let ways = latencies(&description, &bounds).map_err(|error| anyhow!("no end-to-end bound: {error}"));
     let late =
@@ -41,6 +35,14 @@ pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
         Some(late) if late > 0 => Err(Failure::Reported.into()),
         _ => Ok(()),
     }
+}
+
+/// The bounds of each core's sections.
+pub(super) fn bounds(description: &Description) -> Result<Vec<Bounds>> {
+    let bound = |core: &Core| {
+        takt_analysis::bound(&core.program).map_err(|error| anyhow!("core {}: no bound: {error}", core.name))
+    };
+    description.cores.iter().map(bound).collect()
 }
 
 fn result_json(
@@ -98,7 +100,7 @@ fn write_text(arguments: &Bound, description: &Description, bounds: &[Bounds], o
 /// Names that are shown of a link with many.
 const SHOWN: usize = 3;
 
-fn write_ways(
+pub(super) fn write_ways(
     description: &Description,
     ways: &[Latency],
     clock: f64,

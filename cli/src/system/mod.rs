@@ -4,6 +4,7 @@ pub(crate) mod bound;
 pub(crate) mod cosim;
 mod host;
 pub(crate) mod run;
+pub(crate) mod track;
 
 use crate::fault;
 use crate::files;
