@@ -261,7 +261,7 @@ impl Checked {
         let placement = place::place(&ir, &mut sink);
         let mut emitted = emit::emit(&ir, &placement, &mut sink);
         emitted.program.parts = names::parts(&sources, &emitted);
-        let names = names::names(&context, &ir, &placement, &emitted);
+        let names = names::names(&mut context, &ir, &placement, &mut emitted);
         let report = sink.finish(Arc::clone(&sources));
         if report.has_errors() {
             return Err(report);

@@ -14,8 +14,8 @@ use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::resolve::forms::passed;
 use crate::syntax::expr::Value;
+use foldhash::HashMap;
 use smallvec::SmallVec;
-use std::collections::HashMap;
 use takt_isa::program::Space;
 use takt_isa::{Effect, ROWS, Row, Type};
 

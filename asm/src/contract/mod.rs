@@ -8,8 +8,8 @@ mod choose;
 use crate::homes;
 use crate::ir::matching;
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, runs};
+use foldhash::{HashMap, HashSet};
 use smallvec::SmallVec;
-use std::collections::{HashMap, HashSet};
 use takt_isa::program::Location;
 use takt_isa::{Fusion, Slots, fusions};
 
@@ -88,7 +88,7 @@ pub(crate) fn contract(ir: &mut Ir, is_on: impl Fn(usize) -> bool) -> Contracted
             let free = !(product.stale || product.last && exposed[product.dest.index()]);
             (wanted && free && has_place(ir, reader, fusion)).then_some((reader, **fusion))
         };
-        let mut wishes = Wishes::new();
+        let mut wishes = Wishes::default();
         for product in &products {
             if let Some((sum, fusion)) = fits(product) {
                 wishes.entry(sum).or_default().push((product.at, fusion));

@@ -21,8 +21,9 @@ use crate::report::source::Span;
 use crate::resolve::forms::Forms;
 use crate::resolve::sharing::Sharing;
 use crate::syntax::ast::*;
+use foldhash::HashMap;
 use smallvec::SmallVec;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::rc::Rc;
 use takt_isa::program::{Location, Range};
 use takt_isa::spec::instructions::Function;
@@ -65,7 +66,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         Data::Value(..) => 1,
     };
     let data_words = flat.data.iter().map(words).sum();
-    let (pool, own_files) = (HashMap::new(), Vec::new());
+    let (pool, own_files) = (HashMap::default(), Vec::new());
     let mut resolver = Resolver {
         context,
         loader,
@@ -468,7 +469,7 @@ impl Resolver<'_> {
     }
 
     fn ranges(&mut self) {
-        let mut seen: HashMap<RegisterId, Span> = HashMap::new();
+        let mut seen: HashMap<RegisterId, Span> = HashMap::default();
         for (at, directive) in std::mem::take(&mut self.flat.ranges) {
             let ast = Rc::clone(&self.context.asts[at.ast as usize]);
             let DirectiveKind::Range { registers, placed, low, high } =

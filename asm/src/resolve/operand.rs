@@ -120,8 +120,11 @@ impl Resolver<'_> {
                     Argument { operand, at, .. } = self.context.declared.arguments[argument as usize];
                 }
                 binding => {
-                    if let (Some(parameter), Binding::Register(register)) = (parameter, binding) {
-                        self.context.declared.parameters.insert(parameter, register);
+                    if let (Some((scope, name)), Binding::Register(register)) = (parameter, binding) {
+                        let known = &mut self.context.declared.parameters;
+                        if known.last() != Some(&(scope, name, register)) {
+                            known.push((scope, name, register));
+                        }
                     }
                     return Ok((at, operand, Some((name, binding))));
                 }

@@ -67,6 +67,9 @@ pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
     if fixed && ir.demands.is_empty() {
         return Report::default();
     }
+    if ir.demands.is_empty() && !ir.bundles.iter().any(|bundle| bundle.scheduled) {
+        return Report::default();
+    }
     let fixed_registers = memory::fixed(ir);
     let runs = runs::runs(ir);
     let demands = demand::assign(ir, &runs, sink);
