@@ -68,9 +68,11 @@ pub(crate) fn contract(ir: &mut Ir, is_on: impl Fn(usize) -> bool) -> Contracted
     let mut contracted = Contracted::default();
     let hosted = |fusion: &&Fusion| ir.machine.host(fusion.fused.row().function).is_some();
     let known: Vec<&Fusion> = fusions().iter().filter(hosted).collect();
+    if known.is_empty() || !(0..ir.bundles.len()).any(&is_on) {
+        return contracted;
+    }
     // Where every bundle must keep its address, and where words may read anything, nothing can be taken out.
-    let fixed = runs::jumps_to_numbers(ir) || ir.bundles.iter().any(|bundle| bundle.is_opaque());
-    if known.is_empty() || fixed || !(0..ir.bundles.len()).any(&is_on) {
+    if runs::jumps_to_numbers(ir) || ir.is_opaque() {
         return contracted;
     }
     let exposed = exposed(ir);

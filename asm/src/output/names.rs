@@ -161,6 +161,9 @@ fn values(ir: &Ir, placement: &Placement, emitted: &Emitted) -> Vec<NamedValue> 
     for id in shared.filter(|id| !made.contains(id)) {
         split.entry(id).or_default();
     }
+    if split.is_empty() {
+        return Vec::new();
+    }
     let ranges = ranges(ir);
     let own_names: HashMap<Register, &str> =
         emitted.program.registers.iter().map(|port| (port.register, port.name.as_str())).collect();

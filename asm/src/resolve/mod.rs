@@ -1,6 +1,7 @@
 //! Names to registers, labels and numbers: the expanded source as [`Ir`].
 
 mod address;
+mod advice;
 pub(crate) mod equation;
 mod expression;
 mod fast;
@@ -55,6 +56,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         demands: Vec::new(),
         latched: flat.ports.is_some_and(|(latched, _)| latched),
         numbers: BTreeMap::new(),
+        scheduled: false,
         data: Vec::new(),
         raw: Vec::new(),
         contracted: Vec::new(),
@@ -104,9 +106,6 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
     ir.numbers = std::mem::take(&mut context.declared.numbered);
     ir.labels = std::mem::take(&mut context.declared.labels);
     ir.files = flat.files;
-    for (order, bundle) in (0..).zip(&mut ir.bundles) {
-        bundle.operations.iter_mut().for_each(|operation| operation.order = order);
-    }
     ir
 }
 
@@ -259,9 +258,12 @@ impl Resolver<'_> {
     }
 
     /// Adds a bundle to the program.
-    fn push(&mut self, bundle: Bundle) {
+    fn push(&mut self, mut bundle: Bundle) {
         let is_opaque = bundle.is_opaque();
-        for operation in &bundle.operations {
+        let order = self.ir.bundles.len() as u32;
+        self.ir.scheduled |= bundle.scheduled;
+        for operation in &mut bundle.operations {
+            operation.order = order;
             if let Some(dest) = operation.dest {
                 let kind = self.result_kind(operation);
                 self.set_kind(dest, kind);

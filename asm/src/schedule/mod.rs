@@ -63,11 +63,11 @@ pub struct Report {
 
 /// Schedules every block of bundles that ask for it ([`Bundle::scheduled`]), and checks what is demanded of ports.
 pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
-    let fixed = runs::jumps_to_numbers(ir);
-    if fixed && ir.demands.is_empty() {
+    if ir.demands.is_empty() && !ir.scheduled {
         return Report::default();
     }
-    if ir.demands.is_empty() && !ir.bundles.iter().any(|bundle| bundle.scheduled) {
+    let fixed = runs::jumps_to_numbers(ir);
+    if fixed && ir.demands.is_empty() {
         return Report::default();
     }
     let fixed_registers = memory::fixed(ir);
