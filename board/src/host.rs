@@ -7,6 +7,9 @@ use takt_rtl::bench::LoadRecord;
 /// Times that a request is made.
 const ATTEMPTS: u32 = 8;
 
+/// Bytes among which an answer is looked for until the request is made again: many times the longest answer.
+const BYTES: usize = 4096;
+
 /// A board that answers.
 #[derive(Debug)]
 pub struct Host<L> {
@@ -74,8 +77,13 @@ impl<L: Line> Host<L> {
         for attempt in 0..ATTEMPTS {
             self.retries += u64::from(attempt > 0);
             self.line.send(bytes)?;
-            for _ in 0..self.line.patience() {
+            // A line brings an answer in as many pieces as it likes; what counts is how long it is silent. Noise and a stream
+            // can come without end.
+            let (mut silent, mut bytes) = (0, 0);
+            while silent < self.line.patience() && bytes < BYTES {
                 let received = self.line.receive()?;
+                silent = if received.is_empty() { silent + 1 } else { 0 };
+                bytes += received.len();
                 self.receiver.put(&received);
                 while let Some(frame) = self.receiver.frame() {
                     match frame {
@@ -189,4 +197,48 @@ impl<L: Line> Host<L> {
 /// The address of a register.
 fn address(name: &str) -> u16 {
     protocol::REGISTERS.iter().find(|register| register.name == name).map_or(0, |register| register.address)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::ID;
+
+    /// A board that brings a byte at a time, or noise for ever.
+    #[derive(Debug)]
+    struct Slow {
+        bytes: VecDeque<u8>,
+        noise: bool,
+        sent: u32,
+    }
+
+    impl Line for Slow {
+        fn send(&mut self, request: &[u8]) -> std::io::Result<()> {
+            self.sent += 1;
+            if !self.noise {
+                self.bytes = protocol::answer(request[1], &[ID]).into();
+            }
+            Ok(())
+        }
+
+        fn receive(&mut self) -> std::io::Result<Vec<u8>> {
+            Ok(if self.noise { vec![0x11; 16] } else { self.bytes.pop_front().into_iter().collect() })
+        }
+
+        fn patience(&self) -> u32 {
+            2
+        }
+    }
+
+    #[test]
+    fn an_answer_may_come_in_any_number_of_pieces() {
+        let host = Host::connect(Slow { bytes: VecDeque::new(), noise: false, sent: 0 }, 1).unwrap();
+        assert_eq!((host.retries, host.line.sent), (0, 1));
+    }
+
+    #[test]
+    fn noise_without_end_is_no_answer() {
+        let error = Host::connect(Slow { bytes: VecDeque::new(), noise: true, sent: 0 }, 1).unwrap_err();
+        assert!(matches!(error, LinkError::Silence(ATTEMPTS)), "{error}");
+    }
 }

@@ -145,10 +145,7 @@ pub const KINDS: &[Kind] = &[
         text: "half bridge: centred pulses, complementary pin, dead time",
         pins: &[output("high"), optional(output("low"))],
         reads: &[],
-        writes: &[scaled(
-            "duty",
-            "cycles of the pulse, 0 to 2·half; signed: -half to half, 0 is 50 % duty",
-        )],
+        writes: &[scaled("duty", "cycles of the pulse, 0 to 2·half; signed: -half to half, 0 is 50 % duty")],
         parameters: &[
             parameter("half", 1, 65535, 1250, "half a period in cycles"),
             parameter("dead", 0, 255, 0, "dead time in cycles"),

@@ -130,6 +130,16 @@ fn request(number: u8, command: u8, count: u8, address: u16, words: &[u32]) -> V
     bytes
 }
 
+/// What a board answers to a request that reads `words`.
+#[cfg(test)]
+pub(crate) fn answer(number: u8, words: &[u32]) -> Vec<u8> {
+    let mut bytes = vec![ANSWER, number, 0, words.len() as u8];
+    bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
+    let sum = checksum(&bytes[1..]);
+    bytes.extend(sum.to_le_bytes());
+    bytes
+}
+
 /// What finds frames in the bytes of a line, between noise.
 #[derive(Clone, Debug, Default)]
 pub struct Receiver {
@@ -203,7 +213,7 @@ pub trait Line {
     /// If the line is gone.
     fn receive(&mut self) -> std::io::Result<Vec<u8>>;
 
-    /// How often to wait for an answer until a request is made again.
+    /// How often in a row nothing may come until a request is made again.
     fn patience(&self) -> u32;
 }
 
@@ -244,14 +254,6 @@ mod tests {
     fn checksum_is_the_standards() {
         // The check value of CRC-16/CCITT-FALSE in the catalogue of CRCs (reveng.sourceforge.io).
         assert_eq!(checksum(b"123456789"), 0x29b1);
-    }
-
-    fn answer(number: u8, words: &[u32]) -> Vec<u8> {
-        let mut bytes = vec![ANSWER, number, 0, words.len() as u8];
-        bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
-        let sum = checksum(&bytes[1..]);
-        bytes.extend(sum.to_le_bytes());
-        bytes
     }
 
     #[test]

@@ -3,79 +3,24 @@
 use crate::deny::{Denials, Watch};
 use crate::run::PERIOD_LIMIT;
 use crate::select::suggest;
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Result, anyhow};
 use takt_emu::{Emulator, Event, PeriodError, PeriodReport, Statistics};
-use takt_isa::program::Port;
-use takt_isa::{Program, Register, Type};
-use takt_programs::hybrid::Outputs;
+use takt_isa::{Program, Register};
 use takt_programs::hybrid::closed_loop::{Inputs, TrackingController};
-use takt_programs::hybrid::ports::{INPUTS, OUTPUTS, Port as RobotPort, PortType};
+use takt_programs::hybrid::ports::INPUTS;
+use takt_programs::hybrid::{Binding, BindingError, Outputs, Unwritten};
 
 /// Number of encoders, the first inputs, and of forces and torques, the first outputs.
 const AXES: usize = 5;
 
-/// Registers of a program for the ports of the tracking algorithm.
-#[derive(Clone)]
-pub(crate) struct Binding {
-    pub(crate) inputs: [Register; INPUTS.len()],
-    outputs: [Register; OUTPUTS.len()],
-}
-
-impl Binding {
-    pub(crate) fn new(program: &Program) -> Result<Binding> {
-        if let Some(port) = program.inputs.iter().find(|port| !is_among(&INPUTS, &port.name)) {
-            bail!("this is no tracking program: nothing gives its input port `{}` a value", port.name);
+/// The binding of a tracking program; of a port that is missing, the name that may be meant.
+pub(crate) fn bind(program: &Program) -> Result<Binding> {
+    Binding::new(program).map_err(|error| match &error {
+        BindingError::Missing { name, others, .. } => {
+            anyhow!("{error}{}", suggest(name, others.iter().map(String::as_str)))
         }
-        let mut binding =
-            Binding { inputs: [Register::ZERO; INPUTS.len()], outputs: [Register::ZERO; OUTPUTS.len()] };
-        for (port, register) in INPUTS.iter().zip(&mut binding.inputs) {
-            *register = find("input", port, &program.inputs, &INPUTS)?;
-        }
-        for (port, register) in OUTPUTS.iter().zip(&mut binding.outputs) {
-            *register = find("output", port, &program.outputs, &OUTPUTS)?;
-        }
-        Ok(binding)
-    }
-
-    /// What the program has computed, read by register.
-    pub(crate) fn outputs(
-        &self,
-        read: impl Fn(Register) -> Option<u32>,
-    ) -> Result<Outputs<f64>, ControllerError> {
-        let mut values = [0.0; OUTPUTS.len()];
-        for ((value, register), port) in values.iter_mut().zip(&self.outputs).zip(&OUTPUTS) {
-            let bits = read(*register).ok_or(ControllerError::Unwritten(port.name))?;
-            *value = f64::from(f32::from_bits(bits));
-        }
-        Ok(Outputs::from_array(values))
-    }
-}
-
-fn is_among(ports: &[RobotPort], name: &str) -> bool {
-    ports.iter().any(|port| port.name == name)
-}
-
-/// The register of one of the algorithm's ports in a program.
-fn find(kind: &str, wanted: &RobotPort, have: &[Port], all: &[RobotPort]) -> Result<Register> {
-    let name = wanted.name;
-    let port = have.iter().find(|port| port.name == name).ok_or_else(|| {
-        let others = have.iter().map(|port| port.name.as_str()).filter(|name| !is_among(all, name));
-        let near = suggest(name, others);
-        anyhow!("this is no tracking program: it has no {kind} port `{name}`{near}")
-    })?;
-    match port_type(wanted.kind) {
-        ty if ty == port.ty => Ok(port.register),
-        Type::I => bail!("{kind} port `{name}` must carry integers: declare it `{name}:int`"),
-        _ => bail!("{kind} port `{name}` must carry binary32: declare it `{name}:float`"),
-    }
-}
-
-/// The machine's type for a port's.
-pub(crate) fn port_type(kind: PortType) -> Type {
-    match kind {
-        PortType::I32 => Type::I,
-        PortType::F32 => Type::F,
-    }
+        _ => error.into(),
+    })
 }
 
 /// Cycles from reading encoders to writing forces.
@@ -112,7 +57,7 @@ pub(crate) struct OnEmulator {
 impl OnEmulator {
     /// A program that has the tracking algorithm's ports; period `detail`, from 0, is looked at in detail.
     pub(crate) fn new(emulator: Emulator, watch: Watch, detail: u64) -> Result<OnEmulator> {
-        let binding = Binding::new(emulator.program())?;
+        let binding = bind(emulator.program())?;
         Ok(OnEmulator { emulator, binding, watch, until_detail: detail, report: None, detail: None })
     }
 
@@ -164,9 +109,9 @@ pub(crate) enum ControllerError {
     /// It has stopped, or a port cannot be set.
     #[error("{0}")]
     Period(#[from] PeriodError),
-    /// An output port, by its name, was not written.
-    #[error("the program has not written output port `{0}`")]
-    Unwritten(&'static str),
+    /// An output port was not written.
+    #[error(transparent)]
+    Unwritten(#[from] Unwritten),
 }
 
 impl TrackingController for OnEmulator {
@@ -185,6 +130,6 @@ impl TrackingController for OnEmulator {
         };
         self.until_detail = self.until_detail.wrapping_sub(1);
         self.report = Some(report?);
-        self.binding.outputs(|register| self.emulator.output_bits(register))
+        Ok(self.binding.outputs(|register| self.emulator.output_bits(register))?)
     }
 }

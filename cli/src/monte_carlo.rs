@@ -1,6 +1,6 @@
 //! `takt track --monte-carlo`: many robots that differ, each with the tracking program as its controller.
 
-use crate::controller::{Binding, ControllerError};
+use crate::controller::{ControllerError, bind};
 use crate::files::{self, Out};
 use crate::plot;
 use crate::run::PERIOD_LIMIT;
@@ -19,7 +19,7 @@ use takt_emu::{Batch, PeriodError};
 use takt_isa::Program;
 use takt_programs::hybrid::closed_loop::{Inputs, LoopError, distance, not_finite};
 use takt_programs::hybrid::ports::INPUTS;
-use takt_programs::hybrid::{Outputs, Robot, Spread};
+use takt_programs::hybrid::{Binding, Outputs, Robot, Spread};
 use takt_programs::trajectory::Trajectory;
 
 /// Bytes of a spread file.
@@ -114,7 +114,7 @@ pub(crate) struct Drives<'a> {
 impl<'a> MonteCarlo<'a> {
     /// Drives every robot, on all cores.
     pub(crate) fn run(&'a self, quiet: bool) -> Result<Drives<'a>> {
-        let binding = Binding::new(self.program).with_context(|| self.name.to_owned())?;
+        let binding = bind(self.program).with_context(|| self.name.to_owned())?;
         let bar = progress(self.robots.saturating_mul(self.periods), "periods", quiet);
         let width = Batch::WIDTH as u64;
         let groups: Vec<Range<u64>> = (0..self.robots.div_ceil(width))

@@ -1,7 +1,7 @@
 //! `takt track`: the main job. The tracking program, in closed loop with the robot, along a tool path.
 
 use crate::account::Account;
-use crate::controller::{Latency, OnEmulator, port_type};
+use crate::controller::{Latency, OnEmulator};
 use crate::deny::{Denials, DenyArguments, Watch};
 use crate::fault;
 use crate::files::{self, Given, Out};
@@ -351,7 +351,7 @@ impl Table {
         let inputs = record.inputs.to_words();
         let outputs = record.outputs.to_array().map(|value| (value as f32).to_bits());
         let ports = INPUTS.iter().zip(inputs).chain(OUTPUTS.iter().zip(outputs));
-        let ports = ports.map(|(port, bits)| ports::format(port_type(port.kind), bits));
+        let ports = ports.map(|(port, bits)| ports::format(port.ty, bits));
         let last = [cycles.to_string(), format!("{:e}", record.tool_error)];
         Ok(ports::write_row(&mut self.0, first.into_iter().chain(ports).chain(last))?)
     }

@@ -117,8 +117,11 @@ fn the_loop_closes_through_the_pins_of_a_simulated_board() {
     // It comes nearer by a third of the error in a millisecond of the board's time, until dead time swallows the pulses.
     let error = || -> i32 { live("read error").trim().trim_start_matches("error = ").parse().unwrap() };
     assert!((0..200).any(|_| error().abs() <= 2), "{}", live("read"));
-    let stream = live("stream n --every 2 --count 3");
-    assert_eq!(stream.lines().count(), 3, "{stream}");
+    // Frames may be lost where requests take the line: then it says so.
+    let stream = folder.line(&format!(
+        "live {port} --baud {baud} --program {program} --machine t1 stream n --every 20 --count 3"
+    ));
+    assert_eq!((stream.status, stream.stdout.lines().count()), (Some(0), 3), "{stream:?}");
     assert!(live("status").contains("the program runs; outputs drive"), "{}", live("status"));
     // Held, it stays where it is; a period at a time it goes on.
     live("hold");

@@ -84,6 +84,22 @@ fn expressions_become_programs() {
     folder.write("f.json", list.replace("OP", "atan2"));
     assert!(folder.line("model f.json -o f.s").ok().contains("1 operations:"));
     assert!(folder.read_text("f.s").contains("        y = atan2(x_1, x_2)\n"));
+    // What is no instruction comes from the library.
+    folder.write("e.json", list.replace("OP", "exp").replace("\"of\": [0, 1]", "\"of\": [0]"));
+    assert!(folder.line("model e.json -o e.s").ok().contains("1 operations:"));
+    assert!(folder.read_text("e.s").contains(".include <math.s>\n"));
+    folder.write("e.csv", "x_1\n1\n-2.5\n");
+    folder.line("run e.s --inputs e.csv --outputs y.csv").ok();
+    let values: Vec<f64> = folder
+        .read_text("y.csv")
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').next().unwrap().parse().unwrap())
+        .collect();
+    assert_eq!(values.len(), 2);
+    for (y, x) in values.into_iter().zip([1_f64, -2.5]) {
+        assert!((y / x.exp() - 1.0).abs() < 1e-7, "{y}");
+    }
     folder.write("f.json", list.replace("OP", "erf"));
     let done = folder.line("model f.json");
     assert_eq!(done.status, Some(1));

@@ -96,6 +96,8 @@ struct Writer<'a> {
     /// The comment that the statements before have.
     said: String,
     temporaries: usize,
+    /// Whether an operation is a macro of the library.
+    library: bool,
 }
 
 /// The source of a function: a program that computes the outputs in every period.
@@ -111,10 +113,17 @@ pub fn source(function: &Function) -> String {
         registers: Vec::new(),
         said: String::new(),
         temporaries: 0,
+        library: false,
     };
+    let live = writer.uses.iter().enumerate().filter(|(_, uses)| **uses > 0);
+    let mut live = live.map(|(index, _)| function.graph.node_at(index));
+    writer.library = live.any(|node| matches!(node, Node::Unary(op, _) if of_library(op)));
     writer.equations();
     let mut text = String::new();
     header(function, &mut text);
+    if writer.library {
+        text.push_str(".include <math.s>\n");
+    }
     for line in wrapped(&writer.registers) {
         let _ = writeln!(text, ".reg    {line}");
     }
@@ -369,6 +378,11 @@ impl Terms<'_> {
         };
         Text { text, binding }
     }
+}
+
+/// Whether an operation is no instruction, but a macro of `<math.s>`.
+fn of_library(op: Unary) -> bool {
+    matches!(op, Unary::Tan | Unary::Asin | Unary::Exp | Unary::Log)
 }
 
 fn unary_name(op: Unary) -> &'static str {

@@ -5,6 +5,7 @@
 //! - [`hybrid`] is the five-axis hybrid robot of the founding paper: kinematics, dynamics, the tracking
 //!   controller in binary64 and in native binary32, the plant, and the loop that joins them;
 //! - [`arm`] is the six-axis arm of the second founding paper: kinematics in binary64, and the measurement of its programs;
+//! - [`three`] is the six-joint arm of the third founding paper: what its three processors compute, in binary64;
 //! - [`listings`] finds the assembler listings of documents;
 //! - [`accuracy`] measures binary32 results against binary64.
 //!
@@ -17,6 +18,7 @@ pub mod hybrid;
 pub mod listings;
 pub mod path;
 pub mod real;
+pub mod three;
 pub mod trajectory;
 
 /// The test path of the paper, the letters "AGH", each in a plane of its own.
@@ -36,6 +38,19 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("hybrid/tracking_equations.s", include_str!("../hybrid/tracking_equations.s")),
     ("hybrid/tracking_friction.s", include_str!("../hybrid/tracking_friction.s")),
     ("hybrid/tracking_literal.s", include_str!("../hybrid/tracking_literal.s")),
+];
+
+/// The three-processor controller: name and text of every file in `three/`. The system's is `controller.toml`.
+pub const THREE: &[(&str, &str)] = &[
+    ("communication.s", include_str!("../three/communication.s")),
+    ("controller.toml", include_str!("../three/controller.toml")),
+    ("dynamic.s", include_str!("../three/dynamic.s")),
+    ("geometry.s", include_str!("../three/geometry.s")),
+    ("kinematic.s", include_str!("../three/kinematic.s")),
+    ("packets.s", include_str!("../three/packets.s")),
+    ("planning.s", include_str!("../three/planning.s")),
+    ("profile.s", include_str!("../three/profile.s")),
+    ("ums7.s", include_str!("../three/ums7.s")),
 ];
 
 /// The examples and their inputs: name and text of every file in `examples/`.
@@ -63,7 +78,7 @@ pub const LIBRARY: &[(&str, &str)] =
 mod tests {
     #[test]
     fn every_file_of_the_library_and_the_examples_is_carried() {
-        let carried = [("library", super::LIBRARY), ("examples", super::EXAMPLES)];
+        let carried = [("library", super::LIBRARY), ("examples", super::EXAMPLES), ("three", super::THREE)];
         for (folder, list) in carried {
             let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
             let entries = std::fs::read_dir(path).expect("it is part of the crate");

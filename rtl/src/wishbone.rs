@@ -231,7 +231,8 @@ module {name} #(
         loads        <= writes & adr_i == 16'd{low};
         writes_input <= writes & to_input & ~&adr_i[{input_high}:0];  // the last is `zero`
         input_index  <= adr_i[{input_high}:0];
-        output_index <= adr_i[{port_high}:0];
+        // Under this condition it is no copy of input_index, with which synthesis would merge it.
+        if (outputs) output_index <= adr_i[{port_high}:0];
         output_value <= read_value;
         reading      <= request & outputs & ~access ? {{reading[0], 1'b1}} : 2'd0;
         value        <= dat_i;

@@ -144,6 +144,6 @@ fn told(loaded: &Loaded) -> Value {
         "bounds": bounds,
         "no_bound": no_bound,
         "blocks": assembled.blocks.iter().map(block).collect::<Vec<_>>(),
-        "tracks": crate::track::Binding::new(program).is_ok(),
+        "tracks": takt_programs::hybrid::Binding::new(program).is_ok(),
     })
 }

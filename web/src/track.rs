@@ -6,12 +6,9 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use std::sync::OnceLock;
 use takt_emu::{Emulator, PeriodError};
-use takt_isa::program::Port;
-use takt_isa::{Program, Register, Type};
 use takt_programs::hybrid::closed_loop::{ClosedLoop, Inputs, TrackingController, TrackingError};
 use takt_programs::hybrid::params;
-use takt_programs::hybrid::ports::{INPUTS, OUTPUTS, Port as RobotPort, PortType};
-use takt_programs::hybrid::{LoopError, Outputs};
+use takt_programs::hybrid::{Binding, LoopError, Outputs, Unwritten};
 use takt_programs::trajectory::Trajectory;
 
 /// Periods that a call drives at most.
@@ -30,51 +27,10 @@ fn trajectory() -> Result<&'static Trajectory, String> {
     TRAJECTORY.get_or_init(plan).as_ref().map_err(Clone::clone)
 }
 
-/// Registers of a program for the ports of the tracking algorithm.
-pub(crate) struct Binding {
-    inputs: Vec<Register>,
-    outputs: Vec<Register>,
-}
-
-impl Binding {
-    pub(crate) fn new(program: &Program) -> Result<Binding, String> {
-        let find = |kind: &str, wanted: &[RobotPort], have: &[Port]| {
-            let register = |wanted: &RobotPort| {
-                let ty = match wanted.kind {
-                    PortType::I32 => Type::I,
-                    PortType::F32 => Type::F,
-                };
-                let port = have.iter().find(|port| port.name == wanted.name && port.ty == ty);
-                let ty = takt_asm::type_name(ty);
-                port.map(|port| port.register).ok_or_else(|| {
-                    format!(
-                        "this is no tracking program: it has no {kind} port `{}:{ty}` (the example `tracking.s` has all)",
-                        wanted.name
-                    )
-                })
-            };
-            wanted.iter().map(register).collect::<Result<Vec<_>, String>>()
-        };
-        if let Some(port) =
-            program.inputs.iter().find(|port| INPUTS.iter().all(|known| known.name != port.name))
-        {
-            return Err(format!(
-                "this is no tracking program: nothing gives its input `{}` a value",
-                port.name
-            ));
-        }
-        Ok(Binding {
-            inputs: find("input", &INPUTS, &program.inputs)?,
-            outputs: find("output", &OUTPUTS, &program.outputs)?,
-        })
-    }
-}
-
 /// Why the loop ends early.
 pub(crate) enum Lost {
     Period(PeriodError),
-    /// An output port, by its name, was not written.
-    Unwritten(&'static str),
+    Unwritten(Unwritten),
 }
 
 /// The program as the controller.
@@ -94,12 +50,7 @@ impl TrackingController for OnEmulator {
         }
         emulator.set_cycle_limit(emulator.now() + CYCLES);
         *cycles = emulator.run_period(&[]).map_err(Lost::Period)?.cycles;
-        let mut values = [0.0; OUTPUTS.len()];
-        for ((value, register), port) in values.iter_mut().zip(&binding.outputs).zip(&OUTPUTS) {
-            let bits = emulator.output_bits(*register).ok_or(Lost::Unwritten(port.name))?;
-            *value = f64::from(f32::from_bits(bits));
-        }
-        Ok(Outputs::from_array(values))
+        binding.outputs(|register| emulator.output_bits(register)).map_err(Lost::Unwritten)
     }
 }
 
@@ -127,8 +78,8 @@ impl Loaded {
             LoopError::Controller { period, source: Lost::Period(error) } => {
                 format!("period {}: {}", period + 1, self.fault(error))
             }
-            LoopError::Controller { period, source: Lost::Unwritten(port) } => {
-                format!("period {}: the program has not written output port `{port}`", period + 1)
+            LoopError::Controller { period, source: Lost::Unwritten(error) } => {
+                format!("period {}: {error}", period + 1)
             }
             LoopError::NotFinite { period, port } => format!("period {}: {port} is not finite", period + 1),
             LoopError::Lost { period } => {
@@ -145,7 +96,7 @@ impl Playground {
         if wanted.begin {
             let loaded = self.loaded()?;
             let program = &loaded.assembled.program;
-            let binding = Binding::new(program)?;
+            let binding = Binding::new(program).map_err(|error| error.to_string())?;
             let emulator = Emulator::new(program).map_err(|error| error.to_string())?;
             let closed_loop = ClosedLoop::new(trajectory, OnEmulator { emulator, binding, cycles: 0 });
             self.track = Some(Track { closed_loop, errors: TrackingError::default(), done: 0, longest: 0 });

@@ -194,7 +194,7 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
 fn speed() -> Result<()> {
     install()?;
     let mut measure = cargo();
-    measure.args(["run", "--release", "--package", "takt-benches", "--bin", "speed"]);
+    measure.args(["run", "--release", "--package", "takt-benches", "--features", "jit", "--bin", "speed"]);
     let output = measure.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
     if !output.status.success() {
         bail!("measuring failed ({})", output.status);
@@ -235,7 +235,7 @@ fn fuzz(minutes: u32) -> Result<()> {
     seed()?;
     for target in ["assemble", "image"] {
         // cargo-fuzz needs unstable compiler flags; the variable admits them on the stable compiler.
-        run(cargo().env("RUSTC_BOOTSTRAP", "1").args(["fuzz", "run", target, "--"]).args([
+        run(cargo().env("RUSTC_BOOTSTRAP", "1").args(["fuzz", "run", "--fuzz-dir", "asm/fuzz", target, "--"]).args([
             format!("-max_total_time={}", 60 * minutes),
             "-max_len=65536".to_owned(),
             "-rss_limit_mb=4096".to_owned(),
@@ -247,7 +247,7 @@ fn fuzz(minutes: u32) -> Result<()> {
 
 /// What fuzzing starts from: the sources there are, and images of the programs.
 fn seed() -> Result<()> {
-    let (sources, images) = (root().join("fuzz/corpus/assemble"), root().join("fuzz/corpus/image"));
+    let (sources, images) = (root().join("asm/fuzz/corpus/assemble"), root().join("asm/fuzz/corpus/image"));
     std::fs::create_dir_all(&sources)?;
     std::fs::create_dir_all(&images)?;
     for folder in ["programs/hybrid", "asm/tests/accepted", "asm/tests/mistakes", "asm/tests/kernels"] {

@@ -4,6 +4,7 @@
 //! algorithm is generic over [`Real`](crate::real::Real): in `f64` it is the golden model that judges the assembly
 //! program, in `f32` the same algorithm native.
 
+pub mod binding;
 pub mod closed_loop;
 pub mod controller;
 pub mod dynamics;
@@ -18,6 +19,7 @@ pub mod ports;
 pub mod spread;
 pub mod workspace;
 
+pub use binding::{Binding, BindingError, Unwritten};
 pub use closed_loop::{ClosedLoop, Inputs, LoopError, Record, TrackingController, TrackingError};
 pub use controller::{Controller, Outputs};
 pub use friction::Friction;

@@ -2,33 +2,25 @@
 
 use super::controller::Outputs;
 use super::kinematics::{JointReference, Reference};
-
-/// Whether a port carries an integer or a floating-point number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PortType {
-    /// Signed 32-bit integer.
-    I32,
-    /// IEEE 754 binary32.
-    F32,
-}
+use takt_isa::Type;
 
 /// One named value that a program reads or writes each period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Port {
     /// Name in programs and as a CSV column.
     pub name: &'static str,
-    /// Representation.
-    pub kind: PortType,
+    /// Signed 32-bit integer or binary32.
+    pub ty: Type,
     /// SI unit; `count` for encoders.
     pub unit: &'static str,
 }
 
 const fn count(name: &'static str) -> Port {
-    Port { name, kind: PortType::I32, unit: "count" }
+    Port { name, ty: Type::I, unit: "count" }
 }
 
 const fn real(name: &'static str, unit: &'static str) -> Port {
-    Port { name, kind: PortType::F32, unit }
+    Port { name, ty: Type::F, unit }
 }
 
 /// The twenty inputs of one period: five encoder counts, then the fifteen values of the reference.

@@ -3,8 +3,9 @@
 use std::sync::{Arc, Mutex};
 use takt_asm::{Assembled, MemoryLoader, Options, Schedule, Search};
 use takt_emu::{Emulator, PeriodError, PeriodReport};
-use takt_isa::{Machine, Program, Register, Type};
-use takt_programs::hybrid::ports::{INPUTS, OUTPUTS, PortType};
+use takt_isa::{Machine, Program, Register};
+use takt_programs::hybrid::Binding;
+use takt_programs::hybrid::ports::{INPUTS, OUTPUTS};
 use takt_programs::hybrid::{Inputs, Outputs, TrackingController};
 use takt_programs::{LIBRARY, SOURCES};
 
@@ -69,17 +70,11 @@ pub(crate) struct Processor {
 impl Processor {
     /// The program loaded and reset. Panics if a port is missing or of another type.
     pub(crate) fn new(program: &Program) -> Processor {
-        let find = |have: &[takt_isa::program::Port], name: &str, kind: PortType| {
-            let port = have.iter().find(|port| port.name == name);
-            let port = port.unwrap_or_else(|| panic!("there is no port {name}"));
-            let ty = if kind == PortType::I32 { Type::I } else { Type::F };
-            assert_eq!(port.ty, ty, "type of port {name}");
-            port.register
-        };
+        let Binding { inputs, outputs } = Binding::new(program).unwrap_or_else(|error| panic!("{error}"));
         Processor {
             emulator: Emulator::new(program).expect("the program fits its machine"),
-            inputs: INPUTS.map(|port| find(&program.inputs, port.name, port.kind)),
-            outputs: OUTPUTS.map(|port| find(&program.outputs, port.name, port.kind)),
+            inputs,
+            outputs,
             report: None,
             nan_writes: 0,
         }

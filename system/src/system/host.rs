@@ -1,6 +1,6 @@
 //! What the host does between runs.
 
-use super::{HostError, LinkState, System};
+use super::{HostError, LinkEventKind, LinkState, System};
 use crate::description::{End, LinkKind};
 use std::sync::Arc;
 use takt_emu::Number;
@@ -49,7 +49,9 @@ impl System {
             (Some(known), Some(LinkState::Snapshot { working, published, .. }))
                 if known.from == End::Host =>
             {
-                published.push_back((now + known.transit() + 1, working.clone()));
+                let first = now + known.transit() + 1;
+                published.push_back((first, working.clone()));
+                self.event(first, link, LinkEventKind::Published);
                 Ok(())
             }
             (known, _) => {
@@ -127,5 +129,18 @@ impl System {
         let bits = self.output(name)?;
         let ty = self.description.outputs().iter().find(|port| port.name == name).map(|port| port.ty);
         Ok(ty.map_or(Number::Bits(bits), |ty| Number::of(ty, bits)))
+    }
+
+    /// As [`System::output`], by link and field as [`Description::outputs`](crate::Description::outputs) has them: for who
+    /// looks in every tick. `None` if there is no such field.
+    pub fn field_bits(&self, link: usize, field: usize) -> Option<u32> {
+        match self.links.get(link)? {
+            LinkState::Wire { shown, .. } => (field == 0).then_some(*shown),
+            LinkState::Snapshot { shown, .. } => shown.get(field).copied(),
+            LinkState::Fifo { fifo, .. } => match fifo.store.entries.front() {
+                Some(entry) => entry.get(field).copied(),
+                None => Some(0),
+            },
+        }
     }
 }

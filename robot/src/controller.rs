@@ -1,0 +1,354 @@
+//! The three cores on the emulator, their loop closed by the plant: the far end of the host's link.
+
+use crate::dynamics::{JOINTS, Joints};
+use crate::host::{Inputs, Mode, Robot, TICK, View};
+use crate::plant::Plant;
+use std::collections::BTreeMap;
+use takt_asm::{MemoryLoader, Options, Search, assemble};
+use takt_emu::LoadError;
+use takt_isa::T3;
+use takt_system::{CorePeriods, Description, HostError, ProgramError, ReadError, Request, System};
+
+/// The files of the controller: its system and the programs of its cores.
+pub const FILES: &[(&str, &str)] = &[
+    ("controller.toml", include_str!("../../programs/three/controller.toml")),
+    ("communication.s", include_str!("../../programs/three/communication.s")),
+    ("dynamic.s", include_str!("../../programs/three/dynamic.s")),
+    ("geometry.s", include_str!("../../programs/three/geometry.s")),
+    ("kinematic.s", include_str!("../../programs/three/kinematic.s")),
+    ("packets.s", include_str!("../../programs/three/packets.s")),
+    ("planning.s", include_str!("../../programs/three/planning.s")),
+    ("profile.s", include_str!("../../programs/three/profile.s")),
+    ("ums7.s", include_str!("../../programs/three/ums7.s")),
+];
+/// Cycles in which the cores must have come to their first ticks.
+const START: u64 = 10_000_000;
+/// Ticks between two records.
+pub const RECORD_TICKS: u64 = 10;
+/// Records at most; later ones are left out.
+const RECORDS: usize = 1 << 20;
+
+/// The controller as it comes with the crate.
+///
+/// # Errors
+/// If its own programs are wrong, in words.
+pub fn standard() -> Result<Description, String> {
+    let text = |name: &str| FILES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
+    let read = takt_system::read(
+        "controller.toml",
+        text("controller.toml").unwrap_or(""),
+        |request: &Request<'_>| {
+            let loader = Search::new(MemoryLoader::new(FILES)).library(takt_programs::LIBRARY);
+            let options = Options { machine: request.machine.unwrap_or(&T3), ..Options::default() };
+            match assemble(request.path, &loader, &options) {
+                Ok(assembled) => Ok(assembled.program),
+                Err(mistakes) => Err(ProgramError::Invalid(mistakes.render(false))),
+            }
+        },
+    );
+    read.map_err(|error| match error {
+        ReadError::Mistakes(mistakes) => mistakes.render(false),
+        ReadError::Program(text) => text,
+    })
+}
+
+/// Why there is no controller.
+#[derive(Debug, thiserror::Error)]
+pub enum ControllerError {
+    /// A link that the host needs.
+    #[error("the system is no robot controller: {0}")]
+    Host(#[from] HostError),
+    /// A core's memory.
+    #[error("{0}")]
+    Load(#[from] LoadError),
+    /// The cores' first periods.
+    #[error("the cores did not get to their first ticks: {0}")]
+    Start(String),
+}
+
+/// The robot at a time.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Record {
+    /// s.
+    pub time: f64,
+    /// The plant's joint angles, rad.
+    pub joints: Joints,
+    /// The reference that the servo had for this time, rad.
+    pub reference: Joints,
+    /// Controls.
+    pub controls: Joints,
+    /// Sequence number of the packet of the running segment.
+    pub segment: u32,
+    /// Number of the mode.
+    pub mode: u32,
+}
+
+/// What the tracking came to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Tracking {
+    /// Ticks in which the robot moved.
+    pub ticks: u64,
+    /// Largest differences between reference and plant, rad.
+    pub largest: Joints,
+    /// Sums of their squares.
+    pub squares: Joints,
+    /// The largest while it stood.
+    pub standing: Joints,
+}
+
+impl Tracking {
+    /// Root of the mean square while it moved, rad.
+    pub fn rms(&self) -> Joints {
+        self.squares.map(|sum| (sum / self.ticks.max(1) as f64).sqrt())
+    }
+}
+
+/// Where a value of the system is: link and field.
+type Place = (usize, usize);
+
+#[derive(Clone)]
+struct Ports {
+    controls: [Place; JOINTS],
+    reference: [Place; JOINTS],
+    enable: Place,
+    state: [Place; 15],
+    outputs: [Place; 3],
+    commands: usize,
+    depth: usize,
+    reports: usize,
+}
+
+/// Encoders, as the system names them.
+const ENCODERS: [&str; JOINTS] = ["n1", "n2", "n3", "n4", "n5", "n6"];
+/// Fields of the snapshot `state`.
+const STATE: [&str; 15] =
+    ["q1", "q2", "q3", "q4", "q5", "q6", "x", "y", "z", "roll", "pitch", "yaw", "mode", "segment", "queued"];
+
+impl Ports {
+    fn of(description: &Description) -> Result<Ports, HostError> {
+        let outputs: BTreeMap<String, Place> =
+            description.outputs().into_iter().map(|port| (port.name, (port.link, port.field))).collect();
+        let unknown = |what, name: &str| HostError::Unknown { what, name: name.to_owned() };
+        let place = |name: &str| outputs.get(name).copied().ok_or_else(|| unknown("output", name));
+        let link = |name: &str| description.link_named(name).ok_or_else(|| unknown("link", name));
+        let six = |letter: char| -> Result<[Place; JOINTS], HostError> {
+            let mut places = [(0, 0); JOINTS];
+            for (joint, known) in places.iter_mut().enumerate() {
+                *known = place(&format!("{letter}{}", joint + 1))?;
+            }
+            Ok(places)
+        };
+        let mut state = [(0, 0); STATE.len()];
+        for (known, name) in state.iter_mut().zip(STATE) {
+            *known = place(&format!("state.{name}"))?;
+        }
+        let commands = link("commands")?;
+        let depth = match description.links[commands].kind {
+            takt_system::LinkKind::Fifo { depth, .. } => depth as usize,
+            _ => return Err(unknown("FIFO", "commands")),
+        };
+        let given: Vec<String> = description.inputs().into_iter().map(|port| port.name).collect();
+        for name in ENCODERS.into_iter().chain(["inputs", "analogue1", "analogue2", "commands.word"]) {
+            if !given.iter().any(|known| known == name) {
+                return Err(unknown("input", name));
+            }
+        }
+        Ok(Ports {
+            controls: six('u')?,
+            reference: six('r')?,
+            enable: place("enable")?,
+            state,
+            outputs: [place("outputs")?, place("level1")?, place("level2")?],
+            commands,
+            depth,
+            reports: link("reports")?,
+        })
+    }
+}
+
+/// Cores and plant.
+#[derive(Clone)]
+pub struct Controller {
+    system: System,
+    plant: Plant,
+    ports: Ports,
+    /// Where the host writes for the tick to come, in cycles.
+    next: u64,
+    tick: u64,
+    ticks: u64,
+    words: Vec<u32>,
+    view: View,
+    inputs: Inputs,
+    /// What the encoders stood for in the last tick, and the controls that were held since.
+    sampled: Option<(Joints, Joints)>,
+    records: Vec<Record>,
+    tracking: Tracking,
+}
+
+impl Controller {
+    /// After reset, with a plant.
+    ///
+    /// # Errors
+    /// If the system has not the host's ends that the controller has, or its cores do not start.
+    pub fn new(description: &Description, plant: Plant) -> Result<Controller, ControllerError> {
+        let ports = Ports::of(description)?;
+        let mut system = System::new(description)?;
+        let start = system.run_to_start(START).map_err(|fault| ControllerError::Start(fault.to_string()))?;
+        let start = start.ok_or_else(|| {
+            ControllerError::Start(format!("{START} cycles have passed, or all have halted"))
+        })?;
+        let view = View {
+            joints: plant.joints(),
+            pose: [0.0; 6],
+            mode: Mode::Standing,
+            segment: 0,
+            queued: 0,
+            outputs: 0,
+            levels: [0.0; 2],
+        };
+        Ok(Controller {
+            system,
+            plant,
+            ports,
+            next: start - description.lead(),
+            tick: description.tick,
+            ticks: 0,
+            words: Vec::new(),
+            view,
+            inputs: Inputs::default(),
+            sampled: None,
+            records: Vec::new(),
+            tracking: Tracking::default(),
+        })
+    }
+
+    /// The plant.
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
+    /// The system.
+    pub fn system(&self) -> &System {
+        &self.system
+    }
+
+    /// The robot every [`RECORD_TICKS`] ticks.
+    pub fn records(&self) -> &[Record] {
+        &self.records
+    }
+
+    /// What the tracking came to.
+    pub fn tracking(&self) -> &Tracking {
+        &self.tracking
+    }
+
+    /// Each core with its periods.
+    pub fn periods(&self) -> Vec<(String, CorePeriods)> {
+        let cores = self.system.description().cores.iter().enumerate();
+        cores.map(|(number, core)| (core.name.clone(), self.system.periods(number))).collect()
+    }
+
+    fn bits(&self, (link, field): Place) -> u32 {
+        self.system.field_bits(link, field).unwrap_or(0)
+    }
+
+    fn float(&self, place: Place) -> f64 {
+        f64::from(f32::from_bits(self.bits(place)))
+    }
+
+    /// What the cores show before the tick to come.
+    fn look(&mut self) {
+        let state: [u32; STATE.len()] = self.ports.state.map(|place| self.bits(place));
+        let float = |i: usize| f64::from(f32::from_bits(state[i]));
+        let outputs = self.ports.outputs.map(|place| self.bits(place));
+        // Before the first period of the kinematic core it shows nothing yet.
+        if self.ticks > 0 {
+            self.view = View {
+                joints: std::array::from_fn(float),
+                pose: std::array::from_fn(|i| float(i + 6)),
+                mode: Mode::of(state[12]).unwrap_or(Mode::Error),
+                segment: state[13],
+                queued: state[14],
+                outputs: outputs[0],
+                levels: [f32::from_bits(outputs[1]), f32::from_bits(outputs[2])],
+            };
+        }
+    }
+
+    /// Compares the reference of the last period with where the plant was in it.
+    fn compare(&mut self, controls: Joints) {
+        let Some((sampled, _)) = self.sampled else { return };
+        let reference = self.ports.reference.map(|place| self.float(place));
+        let moves = self.view.mode != Mode::Standing && self.view.mode != Mode::Error;
+        self.tracking.ticks += u64::from(moves);
+        for i in 0..JOINTS {
+            let error = (reference[i] - sampled[i]).abs();
+            let largest = if moves { &mut self.tracking.largest[i] } else { &mut self.tracking.standing[i] };
+            *largest = largest.max(error);
+            if moves {
+                self.tracking.squares[i] += error * error;
+            }
+        }
+        if self.ticks.is_multiple_of(RECORD_TICKS) && self.records.len() < RECORDS {
+            let mode = self.bits(self.ports.state[12]);
+            let (time, segment) = ((self.ticks - 1) as f64 * TICK, self.view.segment);
+            self.records.push(Record { time, joints: sampled, reference, controls, segment, mode });
+        }
+    }
+}
+
+impl Robot for Controller {
+    fn tick(&mut self, inputs: &Inputs) -> Result<(), String> {
+        self.system.run_until(self.next).map_err(|fault| fault.to_string())?;
+        self.next += self.tick;
+        self.look();
+        let controls = self.ports.controls.map(|place| self.float(place));
+        let enabled = self.bits(self.ports.enable) != 0;
+        if enabled {
+            self.compare(controls);
+        }
+        let counts = self.plant.counts();
+        let host = |error: HostError| error.to_string();
+        for (name, count) in ENCODERS.into_iter().zip(counts) {
+            self.system.set_input(name, count as u32).map_err(host)?;
+        }
+        if self.ticks == 0 || *inputs != self.inputs {
+            self.inputs = *inputs;
+            self.system.set_input("inputs", inputs.digital).map_err(host)?;
+            for (name, value) in ["analogue1", "analogue2"].into_iter().zip(inputs.analogue) {
+                self.system.set_input(name, value.to_bits()).map_err(host)?;
+            }
+        }
+        for word in std::mem::take(&mut self.words) {
+            self.system.set_input("commands.word", word).map_err(host)?;
+            self.system.push(self.ports.commands).map_err(host)?;
+        }
+        self.sampled = Some((self.plant.joints(), controls));
+        // The controls that are seen now are held until the next tick: those of the period before.
+        self.plant.advance(TICK, enabled.then_some(&controls));
+        self.ticks += 1;
+        Ok(())
+    }
+
+    fn room(&self) -> usize {
+        let taken = self.system.fifo_entries(self.ports.commands).len() + self.words.len();
+        // Entries of the last tick may still be on their way.
+        (self.ports.depth / 2).saturating_sub(taken)
+    }
+
+    fn send(&mut self, word: u32) {
+        self.words.push(word);
+    }
+
+    fn reports(&mut self) -> Vec<[u32; 4]> {
+        let mut reports = Vec::new();
+        while let Ok(Some(entry)) = self.system.pop(self.ports.reports) {
+            reports.push(std::array::from_fn(|i| entry.get(i).copied().unwrap_or(0)));
+        }
+        reports
+    }
+
+    fn view(&self) -> View {
+        self.view
+    }
+}

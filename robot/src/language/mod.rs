@@ -1,0 +1,14 @@
+//! The language of the command level: text to code. docs/robot-commands.md is its contract.
+//!
+//! ```text
+//! text ─ tokens ─ parse ─ tree ─ compile ─ Code, which `level` executes
+//! ```
+
+pub mod code;
+mod expression;
+mod parse;
+pub mod table;
+mod tokens;
+pub mod tree;
+
+pub use parse::{Parsed, parse};

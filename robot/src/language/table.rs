@@ -1,0 +1,245 @@
+//! The commands and functions: one table each, for the parser's suggestions, `help`, completion and the documentation.
+
+/// A command.
+#[derive(Clone, Copy, Debug)]
+pub struct Command {
+    /// Its first word.
+    pub name: &'static str,
+    /// How it is written.
+    pub syntax: &'static str,
+    /// One that can be typed.
+    pub example: &'static str,
+    /// What it does.
+    pub text: &'static str,
+    /// Whether only the prompt knows it.
+    pub console: bool,
+}
+
+const fn row(name: &'static str, syntax: &'static str, example: &'static str, text: &'static str) -> Command {
+    Command { name, syntax, example, text, console: false }
+}
+
+const fn console(
+    name: &'static str,
+    syntax: &'static str,
+    example: &'static str,
+    text: &'static str,
+) -> Command {
+    Command { name, syntax, example, text, console: true }
+}
+
+/// All commands.
+pub const COMMANDS: &[Command] = &[
+    row(
+        "move",
+        "move TARGET [at DEG/S | in S | fast] [profile NAME]",
+        "move joints(0, 90, 0, 0, -45, 0) at 30",
+        "Moves the joints to joint angles or to a pose; the program waits for the end.",
+    ),
+    row(
+        "movel",
+        "movel TARGET [at MM/S | in S | fast] [profile NAME]",
+        "movel pose(420, _, _, _, _, _) at 100",
+        "Moves the tool to a pose along a straight line, its angles linear in time.",
+    ),
+    row(
+        "via",
+        "via move ... | via movel ...",
+        "via movel pose(420, _, _, _, _, _) at 100",
+        "Moves on into the motion that follows without stopping; the program goes on at once.",
+    ),
+    row(
+        "start",
+        "start move ... | start movel ...",
+        "start move joints(10, _, _, _, _, _)",
+        "Starts a motion; the program goes on while it runs (`wait done` waits for its end).",
+    ),
+    row(
+        "check",
+        "check move ... | check movel ... | check [\"FILE\"]",
+        "check move joints(10, _, _, _, _, _)",
+        "Asks the controller whether a motion is possible and how long it takes, without moving; or, at the prompt, runs a file or the session's program in a copy of the robot.",
+    ),
+    row(
+        "jog",
+        "jog joints|world|gripper R1, R2, R3, R4, R5, R6 [for S] | jog off",
+        "jog world 50, 0, 0, 0, 0, 0 for 1",
+        "Moves at rates: of the joints, deg/s; of the tool along and about the world's axes or its own, mm/s and deg/s. Without `for`, until the next `jog`.",
+    ),
+    row("stop", "stop", "stop", "Stops on the path, as fast as the limits allow, and empties the queue."),
+    row(
+        "speed",
+        "speed JOINTS [, LINE] | speed fast",
+        "speed 60, 200",
+        "How fast motions are that do not say: deg/s of the fastest joint and mm/s along lines, or as the limits allow.",
+    ),
+    row(
+        "profile",
+        "profile rectangular|trapezoidal|parabolic|cosine",
+        "profile cosine",
+        "The acceleration's profile of motions that do not say.",
+    ),
+    row(
+        "signal",
+        "signal NUMBER on|off",
+        "signal 1 on",
+        "Sets a digital output, when the motions before it have come to their end.",
+    ),
+    row("level", "level CHANNEL, VALUE", "level 1, 2.5", "Sets an analogue output, 1 or 2, likewise."),
+    row(
+        "wait",
+        "wait S | wait done | wait input NUMBER on|off [for S] | wait until CONDITION [for S]",
+        "wait input 3 on for 5",
+        "Waits for a time, for the end of all motions, or for a signal; not longer than `for` says.",
+    ),
+    row("tool", "tool X, Y, Z", "tool 0, 0, 100", "The tool's point in the flange's frame, mm."),
+    row(
+        "limits",
+        "limits speed V1, ..., V6 | limits torque T1, ..., T6",
+        "limits speed 90, 90, 90, 180, 180, 180",
+        "Limits of the joints' speeds, deg/s, or of the drives' torques, N*m; only below the built-in ones.",
+    ),
+    row("reset", "reset", "reset", "Ends the state after an error."),
+    row("where", "where", "where", "Shows joint angles, pose and signals."),
+    row("say", "say ITEM, ...", "say \"at \", pose()", "Shows texts and values."),
+    row(
+        "teach",
+        "teach NAME [joints]",
+        "teach corner",
+        "Gives the present pose (or the joint angles) a name, and writes it into the program that is recorded.",
+    ),
+    row("let", "let NAME = VALUE", "let above = frame(0, 0, 50, 0, 0, 0)", "Gives a value a name."),
+    row(
+        "if",
+        "if CONDITION ... [else if CONDITION ...] [else ...] end",
+        "if input(1)\nend",
+        "Does one or the other.",
+    ),
+    row("repeat", "repeat NUMBER ... end", "repeat 3\nend", "Does it so many times."),
+    row(
+        "while",
+        "while CONDITION ... end",
+        "while input(1)\nwait 0.1\nend",
+        "Does it as long as the condition holds.",
+    ),
+    row(
+        "sub",
+        "sub NAME(PARAMETER, ...) ... end",
+        "sub pick(place)\nmovel place\nend",
+        "Makes a subprogram; what it gives names is its own.",
+    ),
+    row("call", "call NAME(VALUE, ...)", "call pick(pose())", "Calls a subprogram."),
+    row("return", "return", "sub nothing()\nreturn\nend", "Ends a subprogram."),
+    row(
+        "try",
+        "try ... else ... end",
+        "try\nmovel pose(2000, _, _, _, _, _)\nelse\nreset\nend",
+        "Does what stands after `else` if the robot refuses, stops or a wait ends in vain; `cause()` says why.",
+    ),
+    row(
+        "simulate",
+        "simulate input NUMBER on|off [after S] | simulate analogue CHANNEL, VALUE [after S] | simulate FAULT [after S]",
+        "simulate input 3 on after 2",
+        "Something around the robot: inputs, and faults of the link (corrupt, order, late, silent).",
+    ),
+    console("help", "help [COMMAND]", "help jog", "Lists the commands, or explains one."),
+    console("run", "run [\"FILE\"]", "run \"square.robot\"", "Runs a file, or the session's program."),
+    console("load", "load \"FILE\"", "load \"square.robot\"", "Makes a file the session's program."),
+    console("save", "save \"FILE\"", "save \"mine.robot\"", "Writes the session's program to a file."),
+    console("list", "list", "list", "Shows the session's program."),
+    console("new", "new", "new", "Empties the session's program."),
+    console(
+        "record",
+        "record on|off",
+        "record on",
+        "Whether the commands that are typed are added to the session's program.",
+    ),
+    console("step", "step", "step", "Executes the next statement of the session's program."),
+    console("continue", "continue", "continue", "Executes the rest of it."),
+    console("quit", "quit", "quit", "Ends the session."),
+];
+
+/// A function.
+#[derive(Clone, Copy, Debug)]
+pub struct Function {
+    /// Its name.
+    pub name: &'static str,
+    /// How it is written.
+    pub syntax: &'static str,
+    /// Numbers of arguments that it takes.
+    pub arguments: &'static [usize],
+    /// What it gives.
+    pub text: &'static str,
+}
+
+const fn function(
+    name: &'static str,
+    syntax: &'static str,
+    arguments: &'static [usize],
+    text: &'static str,
+) -> Function {
+    Function { name, syntax, arguments, text }
+}
+
+/// All functions.
+pub const FUNCTIONS: &[Function] = &[
+    function(
+        "joints",
+        "joints(a1, ..., a6)",
+        &[0, 6],
+        "Joint angles, deg; without arguments the present ones.",
+    ),
+    function(
+        "pose",
+        "pose(x, y, z, roll, pitch, yaw)",
+        &[0, 6],
+        "A pose of the tool, mm and deg (docs/arm.md); without arguments the present one.",
+    ),
+    function(
+        "frame",
+        "frame(x, y, z, rx, ry, rz) or frame(pose)",
+        &[1, 6],
+        "A transformation: turned about x, then y, then z, and shifted, mm and deg; or the tool's axes at a pose.",
+    ),
+    function("inverse", "inverse(frame)", &[1], "The transformation back."),
+    function("input", "input(number)", &[1], "A digital input, 0 or 1."),
+    function("analogue", "analogue(channel)", &[1], "An analogue input."),
+    function("time", "time()", &[0], "s since power-up."),
+    function("cause", "cause()", &[0], "Number of the last error's cause; 0 if there was none."),
+    function("abs", "abs(x)", &[1], "Without its sign."),
+    function("sqrt", "sqrt(x)", &[1], "The square root."),
+    function("sin", "sin(angle)", &[1], "Of an angle in deg."),
+    function("cos", "cos(angle)", &[1], "Of an angle in deg."),
+    function("atan2", "atan2(y, x)", &[2], "deg."),
+    function("min", "min(a, b)", &[2], "The smaller."),
+    function("max", "max(a, b)", &[2], "The larger."),
+    function("floor", "floor(x)", &[1], "The next whole number below."),
+];
+
+/// Words that are no names of variables.
+pub const RESERVED: &[&str] = &[
+    "and", "or", "not", "else", "end", "at", "in", "for", "fast", "after", "on", "off", "done", "until", "_",
+];
+
+/// Whether a word means something already.
+pub fn is_reserved(word: &str) -> bool {
+    RESERVED.contains(&word)
+        || COMMANDS.iter().any(|command| command.name == word)
+        || FUNCTIONS.iter().any(|function| function.name == word)
+}
+
+/// The function of this name.
+pub fn function_named(name: &str) -> Option<&'static Function> {
+    FUNCTIONS.iter().find(|function| function.name == name)
+}
+
+/// The command of this name.
+pub fn command_named(name: &str) -> Option<&'static Command> {
+    COMMANDS.iter().find(|command| command.name == name)
+}
+
+/// Names of commands that begin so, for completion.
+pub fn complete(begin: &str) -> Vec<String> {
+    let names = COMMANDS.iter().map(|command| command.name);
+    names.filter(|name| name.starts_with(begin)).map(str::to_owned).collect()
+}

@@ -1,0 +1,529 @@
+//! The command level: a session that executes commands and programs, on a [`Robot`] behind the [`Host`]'s end of the link.
+//! Nothing here prints or opens files: what there is to say is in [`Session::take_messages`], files are [`Files`].
+
+mod act;
+mod execute;
+pub mod value;
+
+use crate::dynamics::Joints;
+use crate::geometry::pose_of;
+use crate::host::{Event, Host, News, Problem, Robot, degrees};
+use crate::language::code::{Code, Known, compile};
+use crate::language::tree::{Console, StatementKind};
+use crate::language::{parse, table};
+use crate::limits;
+use crate::packet::{Profile, ReportKind};
+use execute::Machine;
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use takt_asm::diag::{Diagnostic, Diagnostics};
+use takt_asm::nearest;
+use takt_asm::source::{Lines, Sources, Span};
+use value::Value;
+
+/// Files, as the session's surroundings have them. Errors are in words.
+pub trait Files {
+    /// The text of a file.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    fn read(&self, name: &str) -> Result<String, String>;
+    /// Writes a file whole.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    fn write(&self, name: &str, text: &str) -> Result<(), String>;
+}
+
+/// What there is to say.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Message {
+    /// s since power-up.
+    pub time: f64,
+    /// `say`, `note`, `signal`, `stopped`, `caught` or `check`.
+    pub kind: &'static str,
+    /// In words.
+    pub text: String,
+}
+
+/// What an entered text came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Answer {
+    /// It is executed.
+    Done,
+    /// A block is open: the same text with further lines is to be entered.
+    More,
+}
+
+/// What motions are like that do not say.
+#[derive(Clone, Debug)]
+struct Settings {
+    /// deg/s, mm/s.
+    speed: Option<(f64, f64)>,
+    profile: Profile,
+    /// mm.
+    tool: [f64; 3],
+    /// rad/s, N·m.
+    limits: [[f32; 6]; 2],
+}
+
+/// The speeds that a session begins with: deg/s of the fastest joint, mm/s along lines.
+pub const SPEEDS: (f64, f64) = (45.0, 150.0);
+/// What stands for a built-in limit.
+const BUILT_IN: f32 = 1e9;
+
+/// A subprogram, wherever it came from.
+#[derive(Clone, Debug)]
+struct Subprogram {
+    code: Arc<Code>,
+    parameters: Vec<String>,
+    entry: usize,
+}
+
+/// A program on its way.
+#[derive(Clone, Debug)]
+pub struct Running(Machine);
+
+/// A session of the command level.
+#[derive(Clone)]
+pub struct Session<R> {
+    host: Host<R>,
+    files: Arc<dyn Files + Send + Sync>,
+    interrupt: Arc<AtomicBool>,
+    sources: Sources,
+    values: BTreeMap<String, Value>,
+    subprograms: BTreeMap<String, Subprogram>,
+    settings: Settings,
+    /// Where the last accepted motion ends, deg.
+    planned: Joints,
+    /// Motions whose end has not been reported.
+    open: Vec<u32>,
+    /// Where the latest motions stand in the sources.
+    motions: VecDeque<(u32, Span)>,
+    cause: u32,
+    messages: Vec<Message>,
+    /// The session's program, its lines.
+    program: Vec<String>,
+    recording: bool,
+    stepping: Option<Machine>,
+    /// Whether it only looks whether a program can run.
+    checking: bool,
+    /// Whether it is over.
+    pub quit: bool,
+}
+
+impl<R: Robot + Clone> Session<R> {
+    /// A session with a robot that has just been powered up.
+    ///
+    /// # Errors
+    /// If the controller does not get ready.
+    pub fn new(
+        robot: R,
+        files: Arc<dyn Files + Send + Sync>,
+        interrupt: Arc<AtomicBool>,
+    ) -> Result<Session<R>, Problem> {
+        let mut host = Host::new(robot);
+        host.power_up()?;
+        let planned = degrees(&host.view().joints);
+        Ok(Session {
+            host,
+            files,
+            interrupt,
+            sources: Sources::default(),
+            values: BTreeMap::new(),
+            subprograms: BTreeMap::new(),
+            settings: Settings {
+                speed: Some(SPEEDS),
+                profile: Profile::Trapezoidal,
+                tool: [0.0; 3],
+                limits: [[BUILT_IN; 6]; 2],
+            },
+            planned,
+            open: Vec::new(),
+            motions: VecDeque::new(),
+            cause: 0,
+            messages: Vec::new(),
+            program: Vec::new(),
+            recording: false,
+            stepping: None,
+            checking: false,
+            quit: false,
+        })
+    }
+
+    /// The host's end of the link.
+    pub fn host(&self) -> &Host<R> {
+        &self.host
+    }
+
+    /// Something is to happen around the robot, so many s from now.
+    pub fn schedule(&mut self, after: f64, event: Event) {
+        self.host.schedule(after, event);
+    }
+
+    /// What there is to say, in its order.
+    pub fn take_messages(&mut self) -> Vec<Message> {
+        self.hear();
+        std::mem::take(&mut self.messages)
+    }
+
+    fn say(&mut self, kind: &'static str, text: impl Into<String>) {
+        self.hear();
+        let message = Message { time: self.host.time(), kind, text: text.into() };
+        if self.messages.len() < limits::MESSAGES {
+            self.messages.push(message);
+        }
+    }
+
+    /// Turns the news of the link into messages.
+    fn hear(&mut self) {
+        for (time, news) in self.host.take_news() {
+            let (kind, text) = match news {
+                News::Output(number, on) => {
+                    ("signal", format!("output {number} {}", if on { "on" } else { "off" }))
+                }
+                News::Level(channel, value) => {
+                    ("signal", format!("level {channel} is {}", value::short(f64::from(value))))
+                }
+                News::Report(report) if report.kind == ReportKind::Stopped && report.cause.is_some() => {
+                    ("stopped", Problem::Stopped(report).to_string())
+                }
+                News::Report(_) => continue,
+            };
+            if self.messages.len() < limits::MESSAGES {
+                self.messages.push(Message { time, kind, text });
+            }
+        }
+    }
+
+    fn diagnostics(&self, list: Vec<Diagnostic>) -> Diagnostics {
+        Diagnostics { sources: Arc::new(self.sources.clone()), list, ..Diagnostics::default() }
+    }
+
+    fn known(&self) -> Known {
+        Known {
+            values: self.values.keys().cloned().collect(),
+            subprograms: self
+                .subprograms
+                .iter()
+                .map(|(name, sub)| (name.clone(), sub.parameters.len()))
+                .collect(),
+        }
+    }
+
+    /// Where the robot is planned to be, as a pose: mm, deg.
+    fn planned_pose(&self) -> [f64; 6] {
+        pose_of(&self.planned, self.settings.tool).0
+    }
+
+    /// Reads a text into code. `Ok(None)`: a block is open at its end, and `more` lines may come.
+    fn read(
+        &mut self,
+        name: &str,
+        text: &str,
+        console: bool,
+        more: bool,
+    ) -> Result<Option<Code>, Diagnostics> {
+        if text.len() > limits::PROGRAM_BYTES {
+            let message = format!("{name} has more than {} bytes", limits::PROGRAM_BYTES);
+            return Err(self.diagnostics(vec![Diagnostic::placeless("limit", message)]));
+        }
+        let before = self.sources.clone();
+        let Some(file) = self.sources.add(name, text.into()) else {
+            let message = "this session has read too much text";
+            return Err(self.diagnostics(vec![Diagnostic::placeless("limit", message)]));
+        };
+        let base = self.sources.files()[file].base;
+        let parsed = parse(text, base);
+        if parsed.open && more && parsed.mistakes.len() == 1 {
+            self.sources = before;
+            return Ok(None);
+        }
+        if !parsed.mistakes.is_empty() {
+            return Err(self.diagnostics(parsed.mistakes));
+        }
+        let has_console =
+            parsed.block.iter().any(|statement| matches!(statement.kind, StatementKind::Console(_)));
+        if has_console && console && parsed.block.len() > 1 {
+            let place = parsed.block.iter().find(|one| matches!(one.kind, StatementKind::Console(_)));
+            let span = place.map_or(Span::default(), |one| one.span);
+            let mistake = Diagnostic::error("command", span, "this command stands by itself");
+            return Err(self.diagnostics(vec![mistake]));
+        }
+        compile(&parsed.block, &self.known(), console).map(Some).map_err(|list| self.diagnostics(list))
+    }
+
+    /// Executes what was typed at the prompt, or a line of a script.
+    ///
+    /// # Errors
+    /// What is wrong with it, or what went wrong.
+    pub fn enter(&mut self, name: &str, text: &str, more: bool) -> Result<Answer, Diagnostics> {
+        let Some(code) = self.read(name, text, true, more)? else { return Ok(Answer::More) };
+        if let Some((_, span, console)) = code.console.first().cloned() {
+            self.console(span, &console)?;
+            return Ok(Answer::Done);
+        }
+        let result = self.execute(code);
+        if self.recording && result.is_ok() {
+            self.record(text);
+        }
+        result.map(|()| Answer::Done)
+    }
+
+    /// Runs a program.
+    ///
+    /// # Errors
+    /// What is wrong with it, or what went wrong.
+    pub fn run(&mut self, name: &str, text: &str) -> Result<(), Diagnostics> {
+        match self.read(name, text, false, false)? {
+            Some(code) => self.execute(code),
+            None => Ok(()),
+        }
+    }
+
+    /// Begins a program, which [`Session::advance`] executes statement by statement.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn begin(&mut self, name: &str, text: &str) -> Result<Running, Diagnostics> {
+        let code = self.read(name, text, false, false)?.unwrap_or_default();
+        Ok(Running(Machine::new(self.adopt(code))))
+    }
+
+    /// Executes a program's next operation; whether there are more.
+    ///
+    /// # Errors
+    /// What went wrong: the program is over.
+    pub fn advance(&mut self, running: &mut Running) -> Result<bool, Diagnostics> {
+        self.step(&mut running.0).map_err(|mistake| self.broken_off(*mistake))
+    }
+
+    /// Runs a program in a copy of the robot, which stays where it is. Signals are taken to come.
+    ///
+    /// # Errors
+    /// What is wrong with it, or what would go wrong.
+    pub fn check(&mut self, name: &str, text: &str) -> Result<(), Diagnostics> {
+        let Some(code) = self.read(name, text, false, false)? else { return Ok(()) };
+        let mut copy = self.clone();
+        copy.checking = true;
+        copy.recording = false;
+        copy.take_messages();
+        let result = copy.execute(code);
+        let takes = copy.host.time() - self.host.time();
+        for message in copy.take_messages() {
+            let text = format!("at {} s: {}", value::short(message.time - self.host.time()), message.text);
+            self.say("check", text);
+        }
+        if result.is_ok() {
+            self.say("check", format!("{name} can run: it takes {} s", value::short(takes)));
+        }
+        result
+    }
+
+    fn adopt(&mut self, code: Code) -> Arc<Code> {
+        let code = Arc::new(code);
+        for (name, sub) in &code.subprograms {
+            let (parameters, entry) = (sub.parameters.clone(), sub.entry);
+            self.subprograms.insert(name.clone(), Subprogram { code: Arc::clone(&code), parameters, entry });
+        }
+        code
+    }
+
+    fn execute(&mut self, code: Code) -> Result<(), Diagnostics> {
+        let machine = Machine::new(self.adopt(code));
+        self.drive(machine)
+    }
+
+    fn drive(&mut self, mut machine: Machine) -> Result<(), Diagnostics> {
+        loop {
+            match self.step(&mut machine) {
+                Ok(true) => {}
+                Ok(false) => return Ok(()),
+                Err(mistake) => return Err(self.broken_off(*mistake)),
+            }
+        }
+    }
+
+    /// A program has ended with an error: the robot does not go on without it.
+    fn broken_off(&mut self, mistake: Diagnostic) -> Diagnostics {
+        self.interrupt.store(false, Ordering::Relaxed);
+        let list = match (self.host.stopped(), self.host.stands()) {
+            (None, false) => match self.halt() {
+                Ok(()) => vec![mistake.note("the robot was stopped")],
+                Err(_) => vec![mistake],
+            },
+            _ => vec![mistake],
+        };
+        self.diagnostics(list)
+    }
+
+    /// Waits until nothing moves: at the end of a script.
+    ///
+    /// # Errors
+    /// If the robot is stopped on its way.
+    pub fn finish(&mut self) -> Result<(), Diagnostics> {
+        if self.host.stopped().is_some() {
+            return Ok(());
+        }
+        self.enter("end", "wait done", false).map(|_| ())
+    }
+
+    /// Whether somebody wants it to end: asked once.
+    fn interrupted(&self) -> bool {
+        self.interrupt.load(Ordering::Relaxed)
+    }
+
+    fn record(&mut self, text: &str) {
+        for line in text.lines() {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            match words[..] {
+                ["teach", name, ..] => {
+                    if let Some(value) = self.values.get(name) {
+                        self.program.push(format!("let {name} = {value}"));
+                    }
+                }
+                _ => self.program.push(line.to_owned()),
+            }
+        }
+    }
+
+    fn program_text(&self) -> String {
+        self.program.iter().map(|line| format!("{line}\n")).collect()
+    }
+
+    /// A file's name and text, or the session's program.
+    fn text_of(&self, file: Option<&crate::language::tree::Name>) -> Result<(String, String), Diagnostics> {
+        match file {
+            Some(file) => {
+                let text = self
+                    .files
+                    .read(&file.text)
+                    .map_err(|error| self.diagnostics(vec![Diagnostic::error("file", file.span, error)]))?;
+                Ok((file.text.clone(), text))
+            }
+            None => Ok(("program".to_owned(), self.program_text())),
+        }
+    }
+
+    // ---- The prompt's own commands.
+
+    fn console(&mut self, span: Span, console: &Console) -> Result<(), Diagnostics> {
+        match console {
+            Console::Help(None) => {
+                let width = table::COMMANDS.iter().map(|command| command.name.len()).max().unwrap_or(0);
+                let rows = table::COMMANDS.iter().map(|command| {
+                    let text = command.text.split(['.', ';', ':']).next().unwrap_or("");
+                    format!("{:width$}  {text}", command.name)
+                });
+                let text: Vec<String> = rows.collect();
+                self.say("note", format!("{}\n`help COMMAND` explains one", text.join("\n")));
+            }
+            Console::Help(Some(name)) => {
+                let text = if let Some(command) = table::command_named(&name.text) {
+                    format!(
+                        "{}\n{}\nas in: {}",
+                        command.syntax,
+                        command.text,
+                        command.example.replace('\n', "; ")
+                    )
+                } else if let Some(function) = table::function_named(&name.text) {
+                    format!("{}\n{}", function.syntax, function.text)
+                } else {
+                    let names = table::COMMANDS.iter().map(|command| command.name);
+                    let names = names.chain(table::FUNCTIONS.iter().map(|function| function.name));
+                    let message = format!("there is no command `{}`", name.text);
+                    let mistake = Diagnostic::error("command", name.span, message);
+                    return Err(self.diagnostics(vec![mistake.did_you_mean(nearest(&name.text, names))]));
+                };
+                self.say("note", text);
+            }
+            Console::Quit => self.quit = true,
+            Console::Run(file) => {
+                let (name, text) = self.text_of(file.as_ref())?;
+                self.run(&name, &text)?;
+            }
+            Console::Check(file) => {
+                let (name, text) = self.text_of(file.as_ref())?;
+                self.check(&name, &text)?;
+            }
+            Console::Load(file) => {
+                let (_, text) = self.text_of(Some(file))?;
+                self.program = text.lines().map(str::to_owned).collect();
+                self.stepping = None;
+                let lines = self.program.len();
+                self.say("note", format!("{}: {lines} lines", file.text));
+            }
+            Console::Save(file) => {
+                if let Err(error) = self.files.write(&file.text, &self.program_text()) {
+                    return Err(self.diagnostics(vec![Diagnostic::error("file", file.span, error)]));
+                }
+                let lines = self.program.len();
+                self.say("note", format!("{}: {lines} lines written", file.text));
+            }
+            Console::List => {
+                let numbered =
+                    self.program.iter().zip(1..).map(|(line, number)| format!("{number:>4}  {line}"));
+                let text: Vec<String> = numbered.collect();
+                let text = if text.is_empty() { "the program is empty".to_owned() } else { text.join("\n") };
+                self.say("note", text);
+            }
+            Console::New => {
+                self.program.clear();
+                self.stepping = None;
+            }
+            Console::Record(on) => {
+                self.recording = *on;
+                self.stepping = None;
+            }
+            Console::Step => return self.single_step(span),
+            Console::Continue => {
+                let Some(machine) = self.stepping.take() else {
+                    let mistake = Diagnostic::error("command", span, "no program stands at a step");
+                    return Err(self.diagnostics(vec![mistake.help("`step` begins the session's program")]));
+                };
+                self.drive(machine)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Executes one statement of the session's program, and says which one is next.
+    fn single_step(&mut self, span: Span) -> Result<(), Diagnostics> {
+        let mut machine = match self.stepping.take() {
+            Some(machine) => machine,
+            None if self.program.is_empty() => {
+                let mistake = Diagnostic::error("command", span, "the session has no program");
+                return Err(
+                    self.diagnostics(vec![mistake.help("`load \"FILE\"` or `record on` gives it one")])
+                );
+            }
+            None => {
+                let text = self.program_text();
+                let Some(code) = self.read("program", &text, false, false)? else { return Ok(()) };
+                Machine::new(self.adopt(code))
+            }
+        };
+        let more = loop {
+            let shown = machine.is_shown();
+            match self.step(&mut machine) {
+                Ok(false) => break false,
+                Ok(true) if shown => break true,
+                Ok(true) => {}
+                Err(mistake) => return Err(self.broken_off(*mistake)),
+            }
+        };
+        let next = if more { machine.next_span() } else { None };
+        match next {
+            Some(span) => {
+                let file = &self.sources.files()[self.sources.file_of(span.start)];
+                let line = Lines::of(&file.text).index(span.start - file.base) + 1;
+                let text = format!("next: line {line}: {}", self.sources.text(span));
+                self.say("note", text);
+                self.stepping = Some(machine);
+            }
+            None => self.say("note", "the program has ended"),
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,26 @@
+//! Limits of programs and sessions.
+
+/// Bytes of a program at most.
+pub const PROGRAM_BYTES: usize = 1 << 20;
+/// How deep blocks may lie in one another.
+pub const BLOCK_DEPTH: usize = 32;
+/// How deep expressions may lie in one another.
+pub const EXPRESSION_DEPTH: usize = 64;
+/// Values and operators of an expression at most, which bounds its depth too.
+pub const EXPRESSION_SIZE: usize = 256;
+/// Calls of subprograms in one another at most.
+pub const CALL_DEPTH: usize = 64;
+/// Parameters of a subprogram at most.
+pub const PARAMETERS: usize = 16;
+/// Steps of a program between two that take time: more is a loop that never ends.
+pub const IDLE_STEPS: u64 = 1_000_000;
+/// Mistakes of a program that are shown.
+pub const SHOWN: usize = 20;
+/// What a wait for a signal lasts at most if the program does not say, s.
+pub const SIGNAL_TIME: f64 = 60.0;
+/// What anything may last at most, s.
+pub const LONGEST: f64 = 3600.0;
+/// Messages that a session keeps until they are taken.
+pub const MESSAGES: usize = 100_000;
+/// Segments that the host lets stand in the robot's queue before it sends another one.
+pub const QUEUE_AHEAD: u32 = 4;
