@@ -100,6 +100,27 @@ fn write_text(arguments: &Bound, description: &Description, bounds: &[Bounds], o
 /// Names that are shown of a link with many.
 const SHOWN: usize = 3;
 
+/// Ways through the same cores in the same time as one, of all their inputs to all their outputs.
+fn grouped(ways: &[Latency]) -> Vec<Latency> {
+    let mut groups: Vec<Latency> = Vec::new();
+    let alike = |a: &Latency, b: &Latency| (&a.cores, a.best, a.worst) == (&b.cores, b.best, b.worst);
+    // First the outputs of the same inputs, then the inputs of the same outputs: so each of one group leads to each of the other.
+    for way in ways {
+        match groups.iter_mut().find(|group| alike(group, way) && group.inputs == way.inputs) {
+            Some(group) => group.outputs.extend(way.outputs.iter().cloned()),
+            None => groups.push(way.clone()),
+        }
+    }
+    let mut merged: Vec<Latency> = Vec::new();
+    for group in groups {
+        match merged.iter_mut().find(|other| alike(other, &group) && other.outputs == group.outputs) {
+            Some(other) => other.inputs.extend(group.inputs),
+            None => merged.push(group),
+        }
+    }
+    merged
+}
+
 pub(super) fn write_ways(
     description: &Description,
     ways: &[Latency],
@@ -116,7 +137,7 @@ pub(super) fn write_ways(
         many if many.len() > SHOWN => format!("{}, … ({})", many[..SHOWN].join(", "), many.len()),
         few => few.join(", "),
     };
-    for way in ways {
+    for way in grouped(ways) {
         let cores: Vec<&str> = way.cores.iter().map(|core| description.cores[*core].name.as_str()).collect();
         writeln!(out, "  {} -> {}, through {}", names(&way.inputs), names(&way.outputs), cores.join(", "))?;
         let late = deadline.map_or("", |deadline| if way.worst > deadline { ": too late" } else { ": kept" });

@@ -263,7 +263,7 @@ impl Ran<'_> {
         json!({
             "system": files::input_name(self.file), "path": self.path, "periods": self.periods, "clock_mhz": self.arguments.clock,
             "tick": self.loaded.description.tick, "cores": cores.collect::<Vec<_>>(), "missed": self.missed(),
-            "error_cutting_m": self.errors.cutting, "error_m": self.errors.overall,
+            "tracking_error_m": { "cutting": self.errors.cutting, "overall": self.errors.overall },
             "points": points.collect::<Vec<_>>(), "latencies": ways.collect::<Vec<_>>(),
         })
     }
