@@ -12,7 +12,8 @@ fn a_session_from_a_pipe() {
                   save \"mine.robot\"\nhelp jog\nmoev p\nmovel pose(3000, _, _, _, _, _)\nsay joints().q1\n";
     let done = folder.fed("robot --plot out.svg", script.as_bytes());
     assert_eq!(done.status, Some(1), "{done:?}");
-    for text in ["joints(0, 90, 0, 0, -45, 0)", "p = pose(", "off\n", "jog joints|world|gripper", " s  20\n"] {
+    for text in ["joints(0, 90, 0, 0, -45, 0)", "p = pose(", "off\n", "jog joints|world|gripper", " s  20\n"]
+    {
         assert!(done.stdout.contains(text), "{text}\n{}", done.stdout);
     }
     assert!(done.stdout.contains("Tracking error") && done.stdout.contains("kinematic"), "{}", done.stdout);

@@ -21,7 +21,8 @@ const RECORDS: usize = 1 << 20;
 /// # Errors
 /// If its own programs are wrong, in words.
 pub fn standard() -> Result<Description, String> {
-    let text = |name: &str| takt_programs::THREE.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
+    let text =
+        |name: &str| takt_programs::THREE.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
     let read = takt_system::read(
         "controller.toml",
         text("controller.toml").unwrap_or(""),

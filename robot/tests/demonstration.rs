@@ -61,7 +61,8 @@ fn the_demonstration_runs() {
     }
     // The square goes round its corners without stopping: at the corners, too, the tool moves.
     let square = |from: &str, to: &str| {
-        let time = |text: &str| messages.iter().find(|message| message.text == text).map(|message| message.time);
+        let time =
+            |text: &str| messages.iter().find(|message| message.text == text).map(|message| message.time);
         (time(from).expect("a time"), time(to).expect("a time"))
     };
     let (begin, end) = square("output 1 on", "output 1 off");
