@@ -34,14 +34,18 @@ const RECORDS: usize = 1 << 20;
 /// If its own programs are wrong, in words.
 pub fn standard() -> Result<Description, String> {
     let text = |name: &str| FILES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
-    let read = takt_system::read("controller.toml", text("controller.toml").unwrap_or(""), |request: &Request<'_>| {
-        let loader = Search::new(MemoryLoader::new(FILES)).library(takt_programs::LIBRARY);
-        let options = Options { machine: request.machine.unwrap_or(&T3), ..Options::default() };
-        match assemble(request.path, &loader, &options) {
-            Ok(assembled) => Ok(assembled.program),
-            Err(mistakes) => Err(ProgramError::Invalid(mistakes.render(false))),
-        }
-    });
+    let read = takt_system::read(
+        "controller.toml",
+        text("controller.toml").unwrap_or(""),
+        |request: &Request<'_>| {
+            let loader = Search::new(MemoryLoader::new(FILES)).library(takt_programs::LIBRARY);
+            let options = Options { machine: request.machine.unwrap_or(&T3), ..Options::default() };
+            match assemble(request.path, &loader, &options) {
+                Ok(assembled) => Ok(assembled.program),
+                Err(mistakes) => Err(ProgramError::Invalid(mistakes.render(false))),
+            }
+        },
+    );
     read.map_err(|error| match error {
         ReadError::Mistakes(mistakes) => mistakes.render(false),
         ReadError::Program(text) => text,
@@ -117,9 +121,8 @@ struct Ports {
 /// Encoders, as the system names them.
 const ENCODERS: [&str; JOINTS] = ["n1", "n2", "n3", "n4", "n5", "n6"];
 /// Fields of the snapshot `state`.
-const STATE: [&str; 15] = [
-    "q1", "q2", "q3", "q4", "q5", "q6", "x", "y", "z", "roll", "pitch", "yaw", "mode", "segment", "queued",
-];
+const STATE: [&str; 15] =
+    ["q1", "q2", "q3", "q4", "q5", "q6", "x", "y", "z", "roll", "pitch", "yaw", "mode", "segment", "queued"];
 
 impl Ports {
     fn of(description: &Description) -> Result<Ports, HostError> {
@@ -280,8 +283,7 @@ impl Controller {
         self.tracking.ticks += u64::from(moves);
         for i in 0..JOINTS {
             let error = (reference[i] - sampled[i]).abs();
-            let largest =
-                if moves { &mut self.tracking.largest[i] } else { &mut self.tracking.standing[i] };
+            let largest = if moves { &mut self.tracking.largest[i] } else { &mut self.tracking.standing[i] };
             *largest = largest.max(error);
             if moves {
                 self.tracking.squares[i] += error * error;

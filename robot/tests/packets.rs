@@ -23,7 +23,9 @@ fn constants() -> Vec<(String, u32)> {
 fn assembly_has_the_same_numbers() {
     macro_rules! rows {
         ($prefix:literal, $table:ty) => {
-            <$table>::ALL.iter().map(|row| (format!("{}_{}", $prefix, row.name().to_uppercase()), row.number()))
+            <$table>::ALL
+                .iter()
+                .map(|row| (format!("{}_{}", $prefix, row.name().to_uppercase()), row.number()))
         };
     }
     let mut expected: Vec<(String, u32)> = vec![

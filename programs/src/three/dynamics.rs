@@ -72,7 +72,12 @@ mod tests {
     fn torque_limits_are_the_reference_moves() {
         for (limit, torque) in super::super::TORQUES.iter().zip(reference_move()) {
             let digits = 10f64.powf((1.3 * torque).log10().floor() - 1.0);
-            assert_eq!(*limit, ((1.3 * torque / digits).round() * digits * 10.0).round() / 10.0, "{:?}", reference_move());
+            assert_eq!(
+                *limit,
+                ((1.3 * torque / digits).round() * digits * 10.0).round() / 10.0,
+                "{:?}",
+                reference_move()
+            );
         }
     }
 }

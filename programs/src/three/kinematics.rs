@@ -17,9 +17,7 @@ pub fn pose(joints: &Six, tool: &[f64; 3]) -> (Six, Configuration) {
 /// If there are none.
 pub fn joints(pose: &Six, tool: &[f64; 3], configuration: Configuration) -> Result<Six, Failure> {
     let [x, y, z, roll, pitch, yaw] = *pose;
-    let pose = Pose {
-        position: [x, y, z].map(|p| p * 1e3),
-        orientation: [roll, pitch, yaw].map(f64::to_degrees),
-    };
+    let pose =
+        Pose { position: [x, y, z].map(|p| p * 1e3), orientation: [roll, pitch, yaw].map(f64::to_degrees) };
     Ok(arm::inverse(&pose, tool.map(|t| t * 1e3), configuration)?.joints.map(f64::to_radians))
 }

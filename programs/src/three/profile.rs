@@ -39,9 +39,7 @@ impl Profile {
                 let integral = top * (y - RISE / 2.0);
                 [top, integral, top * (y * y / 2.0 - RISE * y / 2.0 + RISE * RISE / 6.0)]
             }
-            Profile::Parabolic => {
-                [6.0 * y * (1.0 - y), y * y * (3.0 - 2.0 * y), y.powi(3) * (1.0 - y / 2.0)]
-            }
+            Profile::Parabolic => [6.0 * y * (1.0 - y), y * y * (3.0 - 2.0 * y), y.powi(3) * (1.0 - y / 2.0)],
             Profile::Cosine => {
                 let (sin, cos) = (TAU * y).sin_cos();
                 [1.0 - cos, y - sin / TAU, y * y / 2.0 - (1.0 - cos) / (4.0 * PI * PI)]

@@ -290,7 +290,8 @@ impl Bench {
             })
         });
         if let Some(points) = points {
-            let pose = ["x", "y", "z", "roll", "pitch", "yaw"].map(|name| self.number(&format!("state.{name}")));
+            let pose =
+                ["x", "y", "z", "roll", "pitch", "yaw"].map(|name| self.number(&format!("state.{name}")));
             let (mode, segment) = (self.output("state.mode"), self.output("state.segment"));
             self.seen.push(Seen { points, pose, mode, segment });
         }
@@ -328,4 +329,3 @@ impl Bench {
 pub fn apart(a: &Six, b: &Six) -> f64 {
     (0..6).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max)
 }
-

@@ -16,7 +16,15 @@ fn probe() {
     for seen in bench.from_segment(sequence).iter().step_by(60).take(20) {
         println!("{} {:?} {:?} {:?} {:?}", seen.mode, seen.q(), seen.v(), seen.a(), seen.pose);
     }
-    let worst = bench.servo.iter().map(|(_, n, _, r)| (0..6).map(|i| (r[i] - f64::from(n[i])*takt_programs::three::servo::COUNT).abs()).fold(0.0, f64::max)).fold(0.0, f64::max);
+    let worst = bench
+        .servo
+        .iter()
+        .map(|(_, n, _, r)| {
+            (0..6)
+                .map(|i| (r[i] - f64::from(n[i]) * takt_programs::three::servo::COUNT).abs())
+                .fold(0.0, f64::max)
+        })
+        .fold(0.0, f64::max);
     println!("{worst} {:?}", bench.servo.last());
     let mut bench = Bench::new();
     let pose = takt_programs::three::kinematics::pose(&HOME, &[0.0; 3]).0;
