@@ -41,6 +41,8 @@ mod output;
 mod plot;
 mod ports;
 mod report;
+#[cfg(feature = "robot")]
+mod robot;
 mod rtl;
 mod run;
 mod select;
@@ -51,6 +53,8 @@ mod track;
 
 #[cfg(not(feature = "model"))]
 use absent::model;
+#[cfg(not(feature = "robot"))]
+use absent::robot;
 #[cfg(not(feature = "board"))]
 use absent::{board, live};
 #[cfg(not(feature = "editor"))]
@@ -71,6 +75,10 @@ struct Arguments {
     /// Colour of messages: auto (on a terminal, unless NO_COLOR is set), always or never.
     #[arg(long, global = true, value_enum, default_value_t = Color::Auto, value_name = "WHEN", hide_possible_values = true)]
     color: Color,
+    /// Do not compile what the emulator runs often: slower, and otherwise the same.
+    #[cfg(feature = "jit")]
+    #[arg(long, global = true)]
+    no_jit: bool,
 }
 
 const AFTER_HELP: &str = "\
@@ -81,6 +89,7 @@ Exit status: 0 success; 1 an error in a file or while running, or what was to be
 Examples:
   takt track                         the main job: cycles, accuracy, tracking error
   takt arm                           a six-axis arm's kinematics: cycles and errors
+  takt robot                         a robot on three cores: a prompt, scripts, programs
   takt asm prog.s                    assemble prog.s into prog.takt
   takt run prog.s --inputs in.csv    run it, one period for each row
   takt isa fdiv                      look an instruction up";
@@ -89,6 +98,7 @@ Examples:
 enum Command {
     Track(track::Track),
     Arm(arm::Arm),
+    Robot(robot::Robot),
     Asm(asm::Asm),
     Model(model::Model),
     Disasm(disasm::Disasm),
@@ -116,6 +126,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
     match &arguments.command {
         Command::Track(track) => track::run(track, color, out),
         Command::Arm(arm) => arm::run(arm, color, out),
+        Command::Robot(robot) => robot::run(robot, color, out),
         Command::Asm(asm) => asm::run(asm, color, out),
         Command::Model(model) => model::run(model, color, out),
         Command::Disasm(disasm) => disasm::run(disasm, color),
@@ -181,6 +192,10 @@ fn main() -> ExitCode {
         Err(status) => return status,
     };
     let color = arguments.color.on_stderr();
+    #[cfg(feature = "jit")]
+    if arguments.no_jit {
+        takt_emu::Emulator::switch_compiler_off();
+    }
     let result = run(&arguments, color, &mut out);
     // What was written before an error still goes out; the first error is the one that counts.
     let flushed = out.flush().map_err(anyhow::Error::from);

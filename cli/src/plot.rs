@@ -8,16 +8,16 @@ use takt_programs::hybrid::closed_loop::Record;
 use takt_programs::hybrid::params::SAMPLE_TIME;
 
 /// Points of a curve at most: an SVG of all periods would have hundreds of thousands.
-const POINTS: u64 = 1000;
+pub(crate) const POINTS: u64 = 1000;
 /// The picture in pixels.
-const SIZE: u32 = 1000;
+pub(crate) const SIZE: u32 = 1000;
 /// Units of drawing in a pixel. plotters draws in whole units, and a slanted line in whole pixels is a zig-zag.
-const FINE: u32 = 8;
+pub(crate) const FINE: u32 = 8;
 const CUT: RGBColor = RGBColor(0x1f, 0x4e, 0x9c);
 const RAPID: RGBColor = RGBColor(0xa8, 0xa8, 0xa8);
 const LIMIT: RGBColor = RGBColor(0xc0, 0x30, 0x20);
 /// Of θ1 to θ6.
-const JOINT_COLORS: [RGBColor; 6] = [
+pub(crate) const JOINT_COLORS: [RGBColor; 6] = [
     CUT,
     LIMIT,
     RGBColor(0x2a, 0x8a, 0x3c),
@@ -33,8 +33,8 @@ const SHADOW: RGBColor = RGBColor(0xe2, 0xe4, 0xe8);
 /// The paper's requirement on the tool, µm.
 const REQUIRED: f64 = 10.0;
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
+pub(crate) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+pub(crate) type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
 /// What is drawn, gathered as the loop runs.
 pub(crate) struct Plot {
@@ -336,22 +336,22 @@ impl ArmPlot<'_> {
 }
 
 /// The picture, drawn in fine units, with its size in pixels.
-fn in_pixels(svg: &str, width: u32, height: u32) -> String {
+pub(crate) fn in_pixels(svg: &str, width: u32, height: u32) -> String {
     let size = |unit: u32| format!("width=\"{}\" height=\"{}\"", width * unit, height * unit);
     svg.replacen(&size(FINE), &size(1), 1)
 }
 
 /// Pixels in units of drawing.
-fn px(pixels: u32) -> u32 {
+pub(crate) fn px(pixels: u32) -> u32 {
     pixels * FINE
 }
 
-fn font(size: u32) -> (&'static str, u32) {
+pub(crate) fn font(size: u32) -> (&'static str, u32) {
     ("sans-serif", px(size))
 }
 
 /// Writes a title and, in a line under it, what is drawn in which style; gives the area below, which they cannot cover.
-fn headed<'a>(area: &Area<'a>, title: &str, styles: &[(&str, ShapeStyle)]) -> Outcome<Area<'a>> {
+pub(crate) fn headed<'a>(area: &Area<'a>, title: &str, styles: &[(&str, ShapeStyle)]) -> Outcome<Area<'a>> {
     let area = area.margin(px(10), 0, 0, 0).titled(title, font(20))?;
     let (head, rest) = area.split_vertically(px(24));
     let mut x = px(72) as i32;
@@ -370,7 +370,7 @@ fn headed<'a>(area: &Area<'a>, title: &str, styles: &[(&str, ShapeStyle)]) -> Ou
     Ok(rest)
 }
 
-fn chart<'a, 'b>(area: &'a Area<'b>) -> ChartBuilder<'a, 'b, SVGBackend<'b>> {
+pub(crate) fn chart<'a, 'b>(area: &'a Area<'b>) -> ChartBuilder<'a, 'b, SVGBackend<'b>> {
     let mut chart = ChartBuilder::on(area);
     chart
         .margin(px(12))
@@ -381,9 +381,10 @@ fn chart<'a, 'b>(area: &'a Area<'b>) -> ChartBuilder<'a, 'b, SVGBackend<'b>> {
     chart
 }
 
-type Axes = Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>;
+pub(crate) type Axes =
+    Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>;
 
-fn mesh(chart: &mut ChartContext<'_, SVGBackend<'_>, Axes>, x: &str, y: &str) -> Outcome<()> {
+pub(crate) fn mesh(chart: &mut ChartContext<'_, SVGBackend<'_>, Axes>, x: &str, y: &str) -> Outcome<()> {
     let label = |value: &f64| format!("{}", (value * 1e6).round() / 1e6);
     chart
         .configure_mesh()

@@ -13,6 +13,7 @@
 .const  LATE    = 64                    ; periods without a word of a packet that has begun
 .const  SILENCE = 313                   ; periods of 1.6 ms without a packet while the robot moves: 0.5 s
 .const  LONGEST = 600                   ; s, of a motion
+.const  HALTED  = 2                     ; of `halting`: it stands, as of the period before
 .const  BEATS   = 2                     ; periods of the kinematic core at least, of four to one of this
 
 ; ---- Ports --------------------------------------------------------------------------------------------------------------------
@@ -39,6 +40,7 @@
 .state  number:bits last:int            ; its sequence number; the last good one's
 .state  silence:int pending:int locked:int started:int jogging:int halting:int ; motions and outputs in the queue; …; until the kinematic core says
 .state  now:int resets:int              ; stops and resets so far
+.state  ready_number:int                ; of a reset that is to be answered
 .state  beats:int                       ; where the beat stood
 .state  raw:int                         ; inputs a period ago
 .state  tool[3]                         ; m
@@ -89,7 +91,7 @@ highest:    .float high1, high2, high3, high4, high5, high6
         silence, pending, locked, started, jogging, halting = 0, 0, 0, 0, 0, 0
         via_before, space, back, elbow_up, wrist_up = 0, 0, 0, 0, 0
         tool[1], tool[2], tool[3] = 0, 0, 0
-        now, resets, beats, raw = 0, 0, 0, 0
+        now, resets, beats, raw, ready_number = 0, 0, 0, 0, 0
         pops, pushes, reports, taken = 0, 0, 0, 0
         epoch, stop_cause, stop_sequence, reset = 0, 0, 0, 0
         outputs, level1, level2 = 0, 0, 0
@@ -121,6 +123,17 @@ period:
         beats = here - BEATS
         call    say
 awake:
+; The kinematic core has said that it stands after a stop: what is known of it here is from then, too.
+.reg    stands:int
+        stands = halting == HALTED
+        bz      stands, not_halted
+        halting = 0
+        bz      ready_number, not_halted
+        mov     rs, ready_number
+        mov     ready_number, zero
+        rk, rc, rw = REPORT_READY, 0, 0
+        call    say
+not_halted:
 
 ; ---- The kinematic core must have had its periods -----------------------------------------------------------------------------------
 .reg    behind:int
@@ -320,7 +333,7 @@ jog:    li      refuse, 7
         idle_or_jog = (mode == MODE_STANDING) | (mode == MODE_JOGGING)
         is = pending | halting | !idle_or_jog
         bnz     is, refused
-        is = jogging & (which != jog_kind) ; one kind of rates ends before another begins
+        is = (jogging != 0) & (which != jog_kind) ; one kind of rates ends before another begins
         bnz     is, refused
         .rep    i, 1, 6
         ld      c{i}, payload + i
@@ -390,9 +403,7 @@ resetting:
         mov     stop_sequence, zero
         resets = resets + 1
         mov     reset, resets
-        mov     rs, number
-        rk, rc, rw = REPORT_READY, 0, 0
-        call    say
+        mov     ready_number, number
         jmp     next_word
 words_end:
         bz      planning, no_plan
@@ -439,7 +450,7 @@ heard:
 next_reply:
         none = reply_empty | (answers == 0)
         bnz     none, replies_end
-.reg    re:int halts:int done:int locks:int current:int sets_now:int
+.reg    re:int halts:int jogged:int done:int locks:int current:int sets_now:int
         answers = answers - 1
         r = reply
         rs = reply_sequence
@@ -452,11 +463,11 @@ taken_reply:
         current = re == now
         done = r & REPLY_DONE
         done = current & (done != 0)
-        is = jogging & (rs == jogging) & done ; a jog, then
-        pending = is ? pending : pending - done
-        jogging = is ? 0 : jogging
+        pending = pending - done
+        jogged = r & REPLY_JOGGED
+        jogging = (jogged != 0) & (rs == jogging) ? 0 : jogging
         halts = r & REPLY_HALTED
-        halting = (halts != 0) & current ? 0 : halting
+        halting = (halts != 0) & current ? HALTED : halting
         locks = r & REPLY_LOCK
         sets_now = r & REPLY_SET
         iand    rk, r, 0xff
@@ -518,7 +529,7 @@ known_error:
 
 ; Nothing in the queue counts any more.
 drop:   now = now + 1
-        mov     pending, zero
+        pending, jogging = 0, 0
         li      halting, 1
         mov     epoch, now
         ret

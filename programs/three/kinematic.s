@@ -21,13 +21,14 @@
 .const  MOVE  = 1
 .const  JOG   = 2
 .const  SLOWEST_STOP = 2                ; 1/s: a stop lasts 0.5 s at most
-.const  MARGIN = 0.98                   ; of a torque, for a stop
+.const  PATIENCE = 8                    ; periods
+.const  MARGIN = 0.95                   ; of a torque, for a stop
 .const  LINE_RAMP = 1                   ; m/s², of a jog in the world
 .const  TURN_RAMP = 3                   ; rad/s²
 .state  motion:int on:int beats:int pushes:int pops:int points:int ; motion: one of the above
 .state  known:int resets:int            ; stops and resets that have been dealt with
 .state  error:int stopping:int halt_number:int ; after an error; on the way to standstill, and the order to answer then
-.state  strayed:int                     ; a joint did not follow: reset takes the measured angles
+.state  strayed:int patience:int        ; a joint did not follow: reset takes the measured angles, which the servo needs some periods for
 .state  tool[3]                         ; m
 ; Two segments overlap at a point that is passed: the one that comes in, in its first half, and the one that goes out, in its second. Where they meet
 ; is `anchor`; coordinates are joints, or those of the pose.
@@ -49,6 +50,7 @@
         .preset stopping = 0
         .preset halt_number = 0
         .preset strayed = 0
+        .preset patience = 0
         .preset world = 0
         .preset jog_mode = 0
         .preset jog_number = 0
@@ -162,9 +164,11 @@ running:
         error = 0
         bz      strayed, ordered
         strayed = 0
+        patience = PATIENCE
         call    measure
 ordered:
-        bad = (lost != 0) & (error == 0)
+        bad = (lost != 0) & (error == 0) & (patience == 0)
+        patience = patience == 0 ? 0 : patience - 1
         bz      bad, followed
         strayed = 1
         fc, fx = CAUSE_TRACKING, itof(lost)
@@ -303,10 +307,12 @@ take:   pops = pops + 1
 begun:
         jogs = motion == JOG
         bnz     jogs, jogging
-        motion = in_on | out_on ? motion : STAND
-        bnz     motion, moving
+        bz      motion, resting
+        motion = in_on | out_on ? MOVE : STAND ; of a motion that has ended, this is the last point
+        jmp     moving
+resting:
         call    stay
-        space, pace, pacedot, world = 0, 0, 0, 0
+        space, pace, pacedot = 0, 0, 0
         jmp     solved
 
 ; ---- Where it is on its way --------------------------------------------------------------------------------------------------------------
@@ -391,7 +397,7 @@ jog:    ld      jr, jog_rates[j]
         bnz     any, jogs_on
         call    halted
         bad = stopping | jog_held
-        rk = bad ? REPLY_DONE : REPORT_FINISHED | REPLY_DONE
+        rk = bad ? REPLY_JOGGED : REPORT_FINISHED | REPLY_JOGGED
         rn, rc, rx = jog_number, 0, 0
         call    send
         jog_held = 0

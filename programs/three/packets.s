@@ -68,6 +68,7 @@
 .const  REPLY_SET   = 0x200             ; the queue has come to an output or a level: cause and value are its two words
 .const  REPLY_LOCK  = 0x400             ; only a reset ends this
 .const  REPLY_HALTED = 0x800            ; it stands after a stop
+.const  REPLY_JOGGED = 0x1000           ; a jog has ended
 
 .const  MODE_STANDING = 0
 .const  MODE_MOVING   = 1

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex};
 use takt_asm::{Assembled, MemoryLoader, Options, Schedule, Search};
 use takt_emu::{Emulator, PeriodError, PeriodReport};
-use takt_isa::{Machine, Program, Register, Type};
+use takt_isa::{Machine, Program, Register};
 use takt_programs::hybrid::Binding;
 use takt_programs::hybrid::ports::{INPUTS, OUTPUTS};
 use takt_programs::hybrid::{Inputs, Outputs, TrackingController};

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::OnceLock;
 use takt_asm::{MemoryLoader, Options, Search, assemble};
-use takt_isa::Program;
+use takt_isa::{Program, Register};
 use takt_programs::three::dynamics::nominal;
 use takt_programs::three::profile::Profile;
 use takt_programs::three::servo::{COUNT, Point};
@@ -11,40 +11,40 @@ use takt_programs::three::{DA, DB, DC, SERVO_PERIOD, Six};
 use takt_programs::{LIBRARY, THREE};
 use takt_system::{Description, ProgramError, System};
 
-pub const TICK: u64 = 12_500;
+pub(crate) const TICK: u64 = 12_500;
 /// Cycles before a tick in which the host writes: more than any link needs.
 const LEAD: u64 = 64;
 /// Words that the host sends in a tick.
 const WORDS: usize = 4;
 
 /// Reports and causes, as `packets.s` numbers them.
-pub const ACCEPTED: u32 = 1;
-pub const STARTED: u32 = 2;
-pub const FINISHED: u32 = 3;
-pub const REFUSED: u32 = 4;
-pub const STOPPED: u32 = 5;
-pub const READY: u32 = 6;
-pub const CHECKED: u32 = 7;
+pub(crate) const ACCEPTED: u32 = 1;
+pub(crate) const STARTED: u32 = 2;
+pub(crate) const FINISHED: u32 = 3;
+pub(crate) const REFUSED: u32 = 4;
+pub(crate) const STOPPED: u32 = 5;
+pub(crate) const READY: u32 = 6;
+pub(crate) const CHECKED: u32 = 7;
 
-pub const MOVE: u32 = 1;
-pub const MOVEL: u32 = 2;
-pub const JOG: u32 = 3;
-pub const STOP: u32 = 4;
-pub const RESET: u32 = 7;
+pub(crate) const MOVE: u32 = 1;
+pub(crate) const MOVEL: u32 = 2;
+pub(crate) const JOG: u32 = 3;
+pub(crate) const STOP: u32 = 4;
+pub(crate) const RESET: u32 = 7;
 
 /// A robot that stands so is in the middle of the work space.
-pub const HOME: [f64; 6] = [0.1, 1.0, 0.1, 0.2, -1.1, 0.3];
+pub(crate) const HOME: [f64; 6] = [0.1, 1.0, 0.1, 0.2, -1.1, 0.3];
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Report {
-    pub kind: u32,
-    pub sequence: u32,
-    pub cause: u32,
-    pub value: f32,
+pub(crate) struct Report {
+    pub(crate) kind: u32,
+    pub(crate) sequence: u32,
+    pub(crate) cause: u32,
+    pub(crate) value: f32,
 }
 
 /// CRC-32 of words, bit by bit: not the core's way.
-pub fn checksum(words: &[u32]) -> u32 {
+pub(crate) fn checksum(words: &[u32]) -> u32 {
     let mut crc = u32::MAX;
     for byte in words.iter().flat_map(|word| word.to_le_bytes()) {
         crc ^= u32::from(byte);
@@ -55,29 +55,29 @@ pub fn checksum(words: &[u32]) -> u32 {
     !crc
 }
 
-pub fn packet(kind: u32, sequence: u32, payload: &[u32]) -> Vec<u32> {
+pub(crate) fn packet(kind: u32, sequence: u32, payload: &[u32]) -> Vec<u32> {
     let mut words = vec![0x54 << 24 | kind << 16 | payload.len() as u32, sequence];
     words.extend(payload);
     words.push(checksum(&words));
     words
 }
 
-pub fn bits(values: &[f64]) -> Vec<u32> {
+pub(crate) fn bits(values: &[f64]) -> Vec<u32> {
     values.iter().map(|value| (*value as f32).to_bits()).collect()
 }
 
 /// What a motion's packet says beside its target.
 #[derive(Clone, Copy)]
-pub struct How {
-    pub profile: Profile,
+pub(crate) struct How {
+    pub(crate) profile: Profile,
     /// 0 time, 1 speed, 2 fast.
-    pub how: u32,
-    pub amount: f64,
+    pub(crate) how: u32,
+    pub(crate) amount: f64,
     /// 1 via, 2 check.
-    pub flags: u32,
+    pub(crate) flags: u32,
 }
 
-pub const fn fast(profile: Profile) -> How {
+pub(crate) const fn fast(profile: Profile) -> How {
     How { profile, how: 2, amount: 0.0, flags: 0 }
 }
 
@@ -124,9 +124,9 @@ impl Plant {
             let det = m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1);
             a[1] = (b[1] * m(2, 2) - b[2] * m(1, 2)) / det;
             a[2] = (b[2] * m(1, 1) - b[1] * m(2, 1)) / det;
-            for i in 0..6 {
-                self.v[i] += a[i] * h;
-                self.q[i] += self.v[i] * h;
+            for ((q, v), a) in self.q.iter_mut().zip(&mut self.v).zip(a) {
+                *v += a * h;
+                *q += *v * h;
             }
         }
     }
@@ -134,48 +134,63 @@ impl Plant {
 
 /// What is seen in a kinematic period.
 #[derive(Clone, Debug)]
-pub struct Seen {
+pub(crate) struct Seen {
     /// The point that went to the dynamic core.
-    pub points: [Point; 6],
-    pub pose: Six,
-    pub mode: u32,
-    pub segment: u32,
+    pub(crate) points: [Point; 6],
+    pub(crate) pose: Six,
+    pub(crate) mode: u32,
+    pub(crate) segment: u32,
 }
 
 impl Seen {
-    pub fn q(&self) -> Six {
+    pub(crate) fn q(&self) -> Six {
         self.points.map(|point| point.q)
     }
-    pub fn v(&self) -> Six {
+    pub(crate) fn v(&self) -> Six {
         self.points.map(|point| point.v)
     }
-    pub fn a(&self) -> Six {
+    pub(crate) fn a(&self) -> Six {
         self.points.map(|point| point.a)
     }
 }
 
-pub struct Bench {
+/// What is seen in a tick: what went to the drives, the encoders' counts, the point that came, the reference.
+pub(crate) type Served = (Six, [i32; 6], Option<[Point; 6]>, Six);
+
+/// Output ports that are looked at often.
+struct Ports {
+    u: [Register; 6],
+    r: [Register; 6],
+    pose: [Register; 6],
+    mode: Register,
+    segment: Register,
+    enable: Register,
+}
+
+pub(crate) struct Bench {
     system: System,
     plant: Plant,
     next: u64,
     words: VecDeque<u32>,
-    pub sequence: u32,
+    pub(crate) sequence: u32,
     quiet: u64,
     /// Whether the host says that it is there.
-    pub alive: bool,
-    pub reports: Vec<Report>,
-    pub seen: Vec<Seen>,
-    /// What went to the drives, in the tick, with the encoders' counts and the point that came.
-    pub servo: Vec<([f64; 6], [i32; 6], Option<[Point; 6]>, [f64; 6])>,
+    pub(crate) alive: bool,
+    pub(crate) reports: Vec<Report>,
+    pub(crate) seen: Vec<Seen>,
+    /// Each tick.
+    pub(crate) servo: Vec<Served>,
     links: [usize; 3],
+    ports: Ports,
 }
 
 impl Bench {
-    pub fn new() -> Bench {
+    /// The robot stands at [`HOME`].
+    pub(crate) fn new() -> Bench {
         Bench::at(HOME)
     }
 
-    pub fn at(joints: Six) -> Bench {
+    pub(crate) fn at(joints: Six) -> Bench {
         let description = description();
         let link = |name: &str| {
             description.links.iter().position(|link| link.name == name).expect("the system has this link")
@@ -186,6 +201,19 @@ impl Bench {
         for (i, counts) in plant.counts().iter().enumerate() {
             system.set_input(&format!("n{}", i + 1), *counts as u32).expect("an input");
         }
+        let find = |core: usize, name: &str| {
+            let port = description.cores[core].program.outputs.iter().find(|port| port.name == name);
+            port.unwrap_or_else(|| panic!("no port {name}")).register
+        };
+        let six = |core: usize, name: &str| std::array::from_fn(|i| find(core, &format!("{name}{}", i + 1)));
+        let ports = Ports {
+            u: six(0, "u"),
+            r: six(0, "r"),
+            pose: ["x", "y", "z", "roll", "pitch", "yaw"].map(|name| find(1, name)),
+            mode: find(1, "mode"),
+            segment: find(1, "segment"),
+            enable: find(0, "enable"),
+        };
         let start = system.run_to_start(200_000).expect("no fault").expect("it starts");
         let mut bench = Bench {
             system,
@@ -199,6 +227,7 @@ impl Bench {
             seen: Vec::new(),
             servo: Vec::new(),
             links,
+            ports,
         };
         bench.run(40);
         assert_eq!(bench.reports[0].kind, READY);
@@ -206,51 +235,56 @@ impl Bench {
         bench
     }
 
-    pub fn block(&mut self) {
+    pub(crate) fn block(&mut self) {
         self.plant.blocked = true;
     }
 
     /// The words go as they are.
-    pub fn send_words(&mut self, words: &[u32]) {
+    pub(crate) fn send_words(&mut self, words: &[u32]) {
         self.words.extend(words);
     }
 
     /// The next packet; its sequence number.
-    pub fn send(&mut self, kind: u32, payload: &[u32]) -> u32 {
+    pub(crate) fn send(&mut self, kind: u32, payload: &[u32]) -> u32 {
         self.sequence += 1;
         self.send_words(&packet(kind, self.sequence, payload));
         self.sequence
     }
 
-    pub fn motion(&mut self, kind: u32, target: Six, how: How) -> u32 {
+    pub(crate) fn motion(&mut self, kind: u32, target: Six, how: How) -> u32 {
         let mut payload = bits(&target);
         payload.extend([how.profile as u32, how.how, (how.amount as f32).to_bits(), how.flags]);
         self.send(kind, &payload)
     }
 
-    pub fn jog(&mut self, mode: u32, rates: Six) -> u32 {
+    pub(crate) fn jog(&mut self, mode: u32, rates: Six) -> u32 {
         let mut payload = vec![mode];
         payload.extend(bits(&rates));
         self.send(JOG, &payload)
     }
 
-    fn output(&self, name: &str) -> u32 {
+    /// An output of the system.
+    pub(crate) fn output(&self, name: &str) -> u32 {
         self.system.output(name).expect("an output")
     }
 
-    fn number(&self, name: &str) -> f64 {
-        f64::from(f32::from_bits(self.output(name)))
+    fn word(&self, core: usize, register: Register) -> u32 {
+        self.system.core(core).register(register).unwrap_or(0)
+    }
+
+    fn six(&self, core: usize, registers: &[Register; 6]) -> Six {
+        registers.map(|register| f64::from(f32::from_bits(self.word(core, register))))
     }
 
     /// Base ticks.
-    pub fn run(&mut self, ticks: u64) {
+    pub(crate) fn run(&mut self, ticks: u64) {
         for _ in 0..ticks {
             self.step();
         }
     }
 
     /// Until a report of a kind about a packet, and that.
-    pub fn until(&mut self, kind: u32, sequence: u32) -> Report {
+    pub(crate) fn until(&mut self, kind: u32, sequence: u32) -> Report {
         for _ in 0..200_000 {
             let known = |report: &&Report| report.kind == kind && report.sequence == sequence;
             if let Some(report) = self.reports.iter().find(known) {
@@ -290,16 +324,14 @@ impl Bench {
             })
         });
         if let Some(points) = points {
-            let pose =
-                ["x", "y", "z", "roll", "pitch", "yaw"].map(|name| self.number(&format!("state.{name}")));
-            let (mode, segment) = (self.output("state.mode"), self.output("state.segment"));
+            let pose = self.six(1, &self.ports.pose);
+            let (mode, segment) = (self.word(1, self.ports.mode), self.word(1, self.ports.segment));
             self.seen.push(Seen { points, pose, mode, segment });
         }
         self.system.run_until(self.next + 2000).expect("no fault");
-        let u: Six = std::array::from_fn(|i| self.number(&format!("u{}", i + 1)));
-        let r: Six = std::array::from_fn(|i| self.number(&format!("r{}", i + 1)));
+        let (u, r) = (self.six(0, &self.ports.u), self.six(0, &self.ports.r));
         self.servo.push((u, counts, points, r));
-        if self.output("enable") == 1 {
+        if self.word(0, self.ports.enable) == 1 {
             self.plant.step(&u);
         }
         while let Some(entry) = self.system.pop(self.links[1]).expect("a link") {
@@ -315,17 +347,28 @@ impl Bench {
     }
 
     /// What was seen from when a segment first ran to the end.
-    pub fn from_segment(&self, sequence: u32) -> &[Seen] {
+    pub(crate) fn since(&self, sequence: u32) -> &[Seen] {
         let first = self.seen.iter().position(|seen| seen.segment == sequence).expect("it ran");
         &self.seen[first..]
     }
 
-    pub fn longest_periods(&self) -> [u64; 3] {
-        std::array::from_fn(|core| self.system.periods(core).longest)
+    pub(crate) fn last(&self) -> &Seen {
+        self.seen.last().expect("it has run")
+    }
+
+    /// Until the robot's mode is this.
+    pub(crate) fn until_mode(&mut self, mode: u32) {
+        for _ in 0..50_000 {
+            if self.last().mode == mode {
+                return;
+            }
+            self.step();
+        }
+        panic!("mode {mode} does not come: {:?} {:?}", self.last(), self.reports);
     }
 }
 
 /// The largest difference of six values.
-pub fn apart(a: &Six, b: &Six) -> f64 {
+pub(crate) fn apart(a: &Six, b: &Six) -> f64 {
     (0..6).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max)
 }

@@ -1,43 +1,272 @@
-//! Motion in joint space against the binary64 synthesis, and the servo along it.
+//! Motion in joint space against the binary64 synthesis; limits; stops.
 
-use crate::bench::{ACCEPTED, Bench, FINISHED, HOME, How, MOVE, MOVEL, REFUSED, STARTED, apart, fast};
-use takt_programs::three::profile::Profile;
+use crate::bench::{
+    ACCEPTED, Bench, CHECKED, FINISHED, HOME, How, MOVE, REFUSED, STARTED, STOP, STOPPED, Seen, apart, bits,
+    fast,
+};
+use takt_programs::three::dynamics::nominal;
+use takt_programs::three::plan::{Demand, Limits, admissible, course};
+use takt_programs::three::profile::{Course, Profile};
+use takt_programs::three::synthesis::{Motion, Segment};
+use takt_programs::three::{DA, DB, DC, PERIOD, Six, TORQUES, VELOCITIES};
+
+const LIMITS: Limits = Limits { velocities: VELOCITIES, torques: TORQUES };
+
+/// A target that is away from another by so much of each joint.
+fn away(from: &Six, by: Six) -> Six {
+    std::array::from_fn(|i| f64::from((from[i] + by[i]) as f32))
+}
+
+/// The course that the core plans, by the binary64 model.
+fn planned(from: &Six, to: &Six, demand: Demand, profile: Profile, via: bool) -> Course {
+    let way = |sigma: f64| std::array::from_fn(|i| from[i] + (to[i] - from[i]) * sigma);
+    let (speed, acceleration) = admissible(way, false, &LIMITS, 32);
+    let share = if via { 0.5 } else { 1.0 };
+    course(demand, profile, (speed * 0.999, acceleration * 0.95 * share)).expect("it is possible")
+}
+
+/// The errors of angles, velocities and accelerations against a motion that began in the first period seen; accelerations not in `steps`,
+/// where they have two values.
+fn errors(seen: &[Seen], motion: &Motion, steps: &[u32]) -> [f64; 3] {
+    let mut worst = [0f64; 3];
+    for (k, seen) in seen.iter().enumerate() {
+        let at = motion.at(k as f64 * PERIOD);
+        worst[0] = worst[0].max(apart(&seen.q(), &at[0]));
+        worst[1] = worst[1].max(apart(&seen.v(), &at[1]));
+        if !steps.contains(&(k as u32)) {
+            worst[2] = worst[2].max(apart(&seen.a(), &at[2]));
+        }
+    }
+    worst
+}
+
+/// The planned course, or a neighbour: where a duration in binary64 is a whole number of periods, binary32 may round it up. Largest errors allowed: rad, rad/s, rad/s².
+fn matches(seen: &[Seen], from: Six, to: Six, course: Course, allowed: [f64; 3]) {
+    let neighbours = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(ramp, periods)| Course {
+        ramp: course.ramp + ramp,
+        periods: course.periods + periods,
+        ..course
+    });
+    let all = neighbours.map(|course| {
+        let steps = [0, course.ramp, course.periods - course.ramp, course.periods];
+        let steps = if course.profile == Profile::Rectangular { &steps[..] } else { &[] };
+        errors(seen, &Motion::new(from, &[Segment { to, course, via: false }]), steps)
+    });
+    let best = all.iter().min_by(|a, b| (a[0] + a[1]).total_cmp(&(b[0] + b[1]))).expect("there are four");
+    println!("{course:?}: {best:?}");
+    assert!((0..3).all(|i| best[i] <= allowed[i]), "{course:?}: {best:?}");
+}
 
 #[test]
-fn probe() {
+fn each_profile_is_its_binary64_model() {
     let mut bench = Bench::new();
-    let mut target = HOME;
-    target[0] += 0.5;
-    target[3] -= 0.4;
-    let sequence = bench.motion(MOVE, target, fast(Profile::Trapezoidal));
-    bench.run(6000);
-    println!("{:?}", bench.reports);
-    println!("{:?}", bench.longest_periods());
-    for seen in bench.from_segment(sequence).iter().step_by(60).take(20) {
-        println!("{} {:?} {:?} {:?} {:?}", seen.mode, seen.q(), seen.v(), seen.a(), seen.pose);
+    let mut from = bench.last().q();
+    for (number, profile) in Profile::ALL.into_iter().enumerate() {
+        let sign = if number % 2 == 0 { 1.0 } else { -1.0 };
+        let to = away(&HOME, [0.2, -0.1, 0.12, 0.3, 0.2, -0.25].map(|by: f64| by * sign));
+        let sequence = bench.motion(MOVE, to, fast(profile));
+        let accepted = bench.until(ACCEPTED, sequence);
+        bench.until(FINISHED, sequence);
+        let seen = bench.since(sequence);
+        let course = planned(&from, &to, Demand::Fast, profile, false);
+        let expected = f64::from(course.periods) * PERIOD;
+        assert!((f64::from(accepted.value) - expected).abs() < 1.5 * PERIOD, "{accepted:?}, not {expected}");
+        matches(seen, from, to, course, [3e-7, 1e-5, 2e-3]);
+        continuous(seen, course, &from, &to);
+        assert_eq!(
+            seen.last().expect("some").q(),
+            to.map(|to| f64::from(to as f32)),
+            "it ends exactly there"
+        );
+        from = to;
     }
-    let worst = bench
-        .servo
-        .iter()
-        .map(|(_, n, _, r)| {
-            (0..6)
-                .map(|i| (r[i] - f64::from(n[i]) * takt_programs::three::servo::COUNT).abs())
-                .fold(0.0, f64::max)
-        })
-        .fold(0.0, f64::max);
-    println!("{worst} {:?}", bench.servo.last());
+}
+
+/// The velocity has no steps; the acceleration has none but with the rectangular profile; with the cosine, the jerk has none.
+fn continuous(seen: &[Seen], course: Course, from: &Six, to: &Six) {
+    let longest = apart(from, to);
+    let ramp = f64::from(course.ramp) * PERIOD;
+    let rate = longest / (f64::from(course.periods) * PERIOD - ramp) / ramp;
+    // Of the pulse's slope and of that one's, over the ramp.
+    let (slope, bend) = match course.profile {
+        Profile::Rectangular => (f64::INFINITY, f64::INFINITY),
+        Profile::Trapezoidal => (course.profile.top() / 0.25, f64::INFINITY),
+        Profile::Parabolic => (6.0, f64::INFINITY),
+        Profile::Cosine => (std::f64::consts::TAU, std::f64::consts::TAU.powi(2)),
+    };
+    let part = PERIOD / ramp;
+    for window in seen.windows(3) {
+        let [a, b, c] = [0, 1, 2].map(|i| &window[i]);
+        assert!(apart(&a.v(), &b.v()) <= rate * course.profile.top() * PERIOD * 1.001 + 1e-5);
+        assert!(apart(&a.a(), &b.a()) <= rate * slope * part * 1.001 + 1e-3, "{course:?}");
+        let second: Six = std::array::from_fn(|i| a.a()[i] - 2.0 * b.a()[i] + c.a()[i]);
+        assert!(apart(&second, &[0.0; 6]) <= rate * bend * part * part * 1.001 + 2e-3, "{course:?}");
+    }
+}
+
+#[test]
+fn times_are_met_and_speeds_are_reached() {
     let mut bench = Bench::new();
-    let pose = takt_programs::three::kinematics::pose(&HOME, &[0.0; 3]).0;
-    let mut to = pose;
-    to[1] += 0.1;
-    to[2] += 0.05;
-    to[5] += 0.2;
-    println!("{pose:?}");
-    let sequence = bench.motion(MOVEL, to, How { profile: Profile::Cosine, how: 0, amount: 0.6, flags: 0 });
-    bench.run(8000);
-    println!("{:?}", bench.reports);
-    for seen in bench.from_segment(sequence).iter().step_by(100).take(20) {
-        println!("{} {:?} {:?} {:?} {:?}", seen.mode, seen.q(), seen.v(), seen.a(), seen.pose);
+    let from = bench.last().q();
+    let to = away(&from, [0.1, 0.0, 0.05, -0.1, 0.0, 0.02]);
+    let how = How { profile: Profile::Parabolic, how: 0, amount: 0.25, flags: 0 };
+    let sequence = bench.motion(MOVE, to, how);
+    bench.until(FINISHED, sequence);
+    let moving = bench.seen.iter().filter(|seen| seen.mode == 1).count();
+    assert_eq!(moving, 625, "0.25 s");
+    let course = planned(&from, &to, Demand::Time(0.25), Profile::Parabolic, false);
+    matches(bench.since(sequence), from, to, course, [3e-7, 1e-5, 2e-3]);
+    // Given speed: the fastest joint's.
+    let back = bench.motion(MOVE, from, How { how: 1, amount: 0.7, ..how });
+    bench.until(FINISHED, back);
+    let fastest = bench.since(back).iter().flat_map(Seen::v).fold(0.0, |a: f64, v| a.max(v.abs()));
+    assert!((0.695..=0.7).contains(&fastest), "{fastest}");
+    // Only checked: no motion.
+    let checked = bench.motion(MOVE, to, How { flags: 2, ..how });
+    let report = bench.until(CHECKED, checked);
+    assert!((report.value - 0.25).abs() < 1e-6);
+    bench.run(100);
+    assert_eq!(bench.last().mode, 0);
+    // What is NaN stays as it is.
+    let mut part = [f64::NAN; 6];
+    part[2] = to[2];
+    let sequence = bench.motion(MOVE, part, fast(Profile::Cosine));
+    bench.until(FINISHED, sequence);
+    let mut expected = from;
+    expected[2] = to[2];
+    assert!(apart(&bench.last().q(), &expected) < 1e-7);
+}
+
+#[test]
+fn via_points_are_passed_without_a_pause() {
+    let mut bench = Bench::new();
+    let from = bench.last().q();
+    let corners = [
+        [0.15, 0.0, 0.0, 0.1, 0.0, 0.0],
+        [0.2, -0.12, 0.05, 0.2, 0.0, 0.1],
+        [0.05, -0.2, 0.1, 0.1, -0.1, 0.2],
+    ];
+    let targets = corners.map(|by| away(&from, by));
+    let mut last = from;
+    let (mut segments, mut sequences) = (Vec::new(), Vec::new());
+    for (number, to) in targets.iter().enumerate() {
+        let via = number < 2;
+        let flags = u32::from(via);
+        sequences.push(bench.motion(MOVE, *to, How { flags, ..fast(Profile::Trapezoidal) }));
+        let course = planned(&last, to, Demand::Fast, Profile::Trapezoidal, true);
+        segments.push(Segment { to: *to, course, via });
+        last = *to;
     }
-    let _ = (ACCEPTED, FINISHED, REFUSED, STARTED, apart);
+    bench.until(FINISHED, sequences[2]);
+    assert!(bench.reports.iter().all(|report| report.kind != STOPPED), "{:?}", bench.reports);
+    let motion = Motion::new(from, &segments);
+    let seen: Vec<Seen> = bench.since(sequences[0]).to_vec();
+    let moving = seen.iter().position(|seen| seen.mode == 0).expect("it has ended");
+    // A course that is longer by a period shifts those after it: durations within 3 periods, and the shape by its continuity.
+    assert!((moving as i64 - i64::from(motion.periods())).abs() <= 3, "{moving}, {}", motion.periods());
+    let speed = |seen: &Seen| seen.v().iter().map(|v| v * v).sum::<f64>().sqrt();
+    let top = seen.iter().map(speed).fold(0.0, f64::max);
+    let ramp = segments[0].course.ramp as usize;
+    let slowest =
+        seen[ramp..moving - segments[2].course.ramp as usize].iter().map(speed).fold(f64::MAX, f64::min);
+    assert!(slowest > 0.25 * top, "slows down to {slowest} of {top}");
+    for pair in seen.windows(2) {
+        assert!(apart(&pair[0].v(), &pair[1].v()) < 0.02 && apart(&pair[0].a(), &pair[1].a()) < 3.0);
+    }
+    // The corner is rounded: by less than what a ramp covers.
+    for corner in &targets[..2] {
+        let nearest = seen.iter().map(|seen| apart(&seen.q(), corner)).fold(f64::MAX, f64::min);
+        assert!(nearest > 1e-4 && nearest < 0.06, "{nearest}");
+    }
+    within_limits(&seen, &TORQUES, 1.0);
+    assert_eq!(bench.last().q(), targets[2].map(|to| f64::from(to as f32)));
+}
+
+/// Torques by the binary64 dynamics stay within a part of the limits; the largest part that is used.
+fn within_limits(seen: &[Seen], torques: &Six, part: f64) -> f64 {
+    let mut used = 0f64;
+    for seen in seen {
+        let torque = nominal(&seen.q()).torques(&seen.a());
+        for i in 0..6 {
+            used = used.max(torque[i].abs() / torques[i]);
+        }
+    }
+    assert!(used <= part, "uses {used} of a torque");
+    used
+}
+
+#[test]
+fn torque_limits_are_met_and_hit() {
+    let mut bench = Bench::new();
+    let from = bench.last().q();
+    let to = away(&from, [0.3, 0.1, 0.0, 0.0, 0.0, 0.0]);
+    let sequence = bench.motion(MOVE, to, fast(Profile::Rectangular));
+    let free = bench.until(ACCEPTED, sequence).value;
+    bench.until(FINISHED, sequence);
+    // As fast as may be: close to the limit, and not beyond.
+    assert!(within_limits(bench.since(sequence), &TORQUES, 1.0) > 0.9);
+    // In half the time it is not possible, and joint 1 is why.
+    let how = How { profile: Profile::Rectangular, how: 0, amount: f64::from(free) / 2.0, flags: 0 };
+    let refused = bench.motion(MOVE, from, how);
+    let report = bench.until(REFUSED, refused);
+    assert_eq!((report.cause, report.value), (11, 1.0));
+    // Limits that are lowered in mid-motion are hit: the nominal torque is held there.
+    let back = bench.motion(MOVE, from, fast(Profile::Rectangular));
+    bench.until(STARTED, back);
+    let mut lower = TORQUES;
+    lower[0] = 60.0;
+    let limits = bench.send(9, &bits(&[VELOCITIES, lower].concat()));
+    bench.until(ACCEPTED, limits);
+    bench.until(FINISHED, back);
+    let mut held = 0;
+    for seen in &bench.since(back)[40..] {
+        let torque = nominal(&seen.q()).torques(&seen.a())[0].clamp(-60.0, 60.0);
+        let point = seen.points[0];
+        assert!((point.u - (DA * torque + DB * point.v + DC * point.a)).abs() < 1e-4, "{point:?} {torque}");
+        held += usize::from(torque.abs() == 60.0);
+    }
+    assert!(held > 100, "{held}");
+    // And with them, what is planned takes longer.
+    let slower = bench.motion(MOVE, to, fast(Profile::Rectangular));
+    let value = bench.until(ACCEPTED, slower).value;
+    assert!(value > free * 1.5, "{value} {free}");
+    // Higher than those built in is refused, with the joint.
+    let mut higher = TORQUES;
+    higher[3] = 20.0;
+    let limits = bench.send(9, &bits(&[VELOCITIES, higher].concat()));
+    let report = bench.until(REFUSED, limits);
+    assert_eq!((report.cause, report.value), (11, 4.0));
+}
+
+#[test]
+fn a_stop_stays_on_the_path_and_within_the_torques() {
+    let mut bench = Bench::new();
+    let from = bench.last().q();
+    let to = away(&from, [0.8, -0.3, 0.2, 0.4, 0.2, -0.6]);
+    let sequence = bench.motion(MOVE, to, fast(Profile::Cosine));
+    bench.until(STARTED, sequence);
+    bench.run(1600);
+    let before = bench.seen.len();
+    let stop = bench.send(STOP, &[]);
+    let report = bench.until(STOPPED, stop);
+    assert_eq!(report.cause, 0);
+    bench.run(40);
+    let seen: Vec<Seen> = bench.seen[before..].to_vec();
+    let stopping = seen.iter().filter(|seen| seen.mode == 3).count();
+    assert!(stopping > 20 && stopping < 400, "{stopping} periods");
+    for seen in &seen {
+        let part = (seen.q()[0] - from[0]) / (to[0] - from[0]);
+        let on_path = away(&from, std::array::from_fn(|i| (to[i] - from[i]) * part));
+        assert!(apart(&seen.q(), &on_path) < 2e-6);
+    }
+    let used = within_limits(&seen, &TORQUES, 1.0);
+    assert!(used > 0.9, "as fast as may be: {used}");
+    for pair in seen.windows(2) {
+        assert!(apart(&pair[0].v(), &pair[1].v()) < 0.03, "velocities have no step");
+    }
+    assert_eq!((bench.last().mode, bench.last().v()), (0, [0.0; 6]));
+    // The queue is empty, and the next motion begins there.
+    let next = bench.motion(MOVE, from, How { profile: Profile::Trapezoidal, how: 1, amount: 2.0, flags: 0 });
+    bench.until(FINISHED, next);
+    assert!(apart(&bench.last().q(), &from) < 1e-6);
 }

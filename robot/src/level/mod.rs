@@ -81,6 +81,10 @@ struct Subprogram {
     entry: usize,
 }
 
+/// A program on its way.
+#[derive(Clone, Debug)]
+pub struct Running(Machine);
+
 /// A session of the command level.
 #[derive(Clone)]
 pub struct Session<R> {
@@ -276,6 +280,23 @@ impl<R: Robot + Clone> Session<R> {
             Some(code) => self.execute(code),
             None => Ok(()),
         }
+    }
+
+    /// Begins a program, which [`Session::advance`] executes statement by statement.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn begin(&mut self, name: &str, text: &str) -> Result<Running, Diagnostics> {
+        let code = self.read(name, text, false, false)?.unwrap_or_default();
+        Ok(Running(Machine::new(self.adopt(code))))
+    }
+
+    /// Executes a program's next operation; whether there are more.
+    ///
+    /// # Errors
+    /// What went wrong: the program is over.
+    pub fn advance(&mut self, running: &mut Running) -> Result<bool, Diagnostics> {
+        self.step(&mut running.0).map_err(|mistake| self.broken_off(*mistake))
     }
 
     /// Runs a program in a copy of the robot, which stays where it is. Signals are taken to come.

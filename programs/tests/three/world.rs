@@ -1,0 +1,168 @@
+//! Motion in the world against binary64 kinematics.
+
+use crate::bench::{Bench, FINISHED, HOME, How, MOVEL, REFUSED, Seen, apart, fast};
+use takt_programs::three::kinematics::{joints, pose};
+use takt_programs::three::profile::{Course, Profile};
+use takt_programs::three::{PERIOD, Six};
+
+const TOOL: [f64; 3] = [0.0; 3];
+
+/// Joints with their derivatives by differences in binary64 of the inverse along a line.
+fn along(course: &Course, from: &Six, to: &Six, time: f64) -> [Six; 3] {
+    let branch = pose(&HOME, &TOOL).1;
+    let total = f64::from(course.periods) * PERIOD;
+    let at = |time: f64| {
+        let way = course.at(time)[0];
+        let line = std::array::from_fn(|i| from[i] + (to[i] - from[i]) * way);
+        joints(&line, &TOOL, branch).expect("the line is in reach")
+    };
+    let h = 2e-5;
+    let time = time.clamp(h, total - h);
+    let [before, here, after] = [at(time - h), at(time), at(time + h)];
+    [
+        here,
+        std::array::from_fn(|i| (after[i] - before[i]) / (2.0 * h)),
+        std::array::from_fn(|i| (after[i] - 2.0 * here[i] + before[i]) / (h * h)),
+    ]
+}
+
+fn line(bench: &mut Bench) -> (Six, Six) {
+    let from = pose(&bench.last().q(), &TOOL).0;
+    let mut to = from;
+    for (i, by) in [0.02, 0.1, 0.05, 0.1, -0.08, 0.15].iter().enumerate() {
+        to[i] = f64::from((to[i] + by) as f32);
+    }
+    (from, to)
+}
+
+#[test]
+fn a_line_is_straight_and_its_joints_are_binary64s() {
+    let mut bench = Bench::new();
+    let (from, to) = line(&mut bench);
+    let how = How { profile: Profile::Cosine, how: 0, amount: 0.5, flags: 0 };
+    let sequence = bench.motion(MOVEL, to, how);
+    bench.until(FINISHED, sequence);
+    let seen = bench.since(sequence);
+    // Its ramps are a quarter of the time, unless limits say otherwise: here they do not.
+    let course = Course { ramp: 313, periods: 1250, profile: Profile::Cosine };
+    let (mut off, mut worst, mut tool) = (0f64, [0f64; 3], 0f64);
+    for (k, seen) in seen.iter().enumerate() {
+        let [q, v, a] = along(&course, &from, &to, k as f64 * PERIOD);
+        let here = pose(&seen.q(), &TOOL).0;
+        let way = course.at(k as f64 * PERIOD)[0];
+        let should: Six = std::array::from_fn(|i| from[i] + (to[i] - from[i]) * way);
+        off = off.max(apart(&here, &should));
+        tool = tool.max(apart(&seen.pose, &here));
+        for (worst, (is, should)) in worst.iter_mut().zip([(seen.q(), q), (seen.v(), v), (seen.a(), a)]) {
+            *worst = worst.max(apart(&is, &should));
+        }
+    }
+    println!("pose {off:.2e} m and rad, joints {worst:?}, reported pose {tool:.2e}");
+    assert!(off < 3e-6, "{off}");
+    assert!(tool < 2e-6, "{tool}");
+    // The acceleration is a difference over a period: late by half of one, and as noisy as the velocity's last places.
+    assert!(worst[0] < 5e-6 && worst[1] < 5e-5 && worst[2] < 0.2, "{worst:?}");
+}
+
+#[test]
+fn a_square_is_gone_round_without_a_pause() {
+    let mut bench = Bench::new();
+    let (from, _) = line(&mut bench);
+    let side = 0.06;
+    let corners = [[0.0, side], [side, side], [side, 0.0], [0.0, 0.0]].map(|[y, z]| {
+        let mut corner = from;
+        corner[1] += y;
+        corner[2] += z;
+        corner
+    });
+    let mut sequences = Vec::new();
+    for (number, corner) in corners.iter().enumerate() {
+        let flags = u32::from(number < 3);
+        sequences.push(bench.motion(
+            MOVEL,
+            *corner,
+            How { profile: Profile::Parabolic, how: 1, amount: 0.3, flags },
+        ));
+    }
+    bench.until(FINISHED, sequences[3]);
+    let seen: Vec<Seen> = bench.since(sequences[0]).to_vec();
+    let end = seen.iter().position(|seen| seen.mode == 0).expect("it has ended");
+    let poses: Vec<Six> = seen[..end].iter().map(|seen| pose(&seen.q(), &TOOL).0).collect();
+    let speeds: Vec<f64> = poses
+        .windows(2)
+        .map(|p| (0..3).map(|i| (p[1][i] - p[0][i]).powi(2)).sum::<f64>().sqrt() / PERIOD)
+        .collect();
+    let at_speed = |speed: &f64| *speed > 0.29;
+    let first = speeds.iter().position(at_speed).expect("it gets there");
+    let last = speeds.iter().rposition(at_speed).expect("it gets there");
+    let inner = &speeds[first..last];
+    // At a right corner both speeds are half: 0.707 of one, less where one ramp is longer.
+    assert!(
+        inner.iter().all(|speed| *speed > 0.12 && *speed < 0.31),
+        "{:?}",
+        inner.iter().copied().fold(f64::MAX, f64::min)
+    );
+    for pose in &poses {
+        assert!(
+            (pose[0] - from[0]).abs() < 3e-6
+                && apart(
+                    &[pose[3], pose[4], pose[5], 0.0, 0.0, 0.0],
+                    &[from[3], from[4], from[5], 0.0, 0.0, 0.0]
+                ) < 5e-6
+        );
+    }
+    assert!(apart(&bench.last().pose, &from) < 3e-6);
+}
+
+#[test]
+fn what_is_out_of_reach_is_refused() {
+    let mut bench = Bench::new();
+    let (from, _) = line(&mut bench);
+    let mut far = from;
+    far[0] += 1.0;
+    let sequence = bench.motion(MOVEL, far, fast(Profile::Cosine));
+    assert_eq!(bench.until(REFUSED, sequence).cause, 8);
+    // The target is in reach, but the way there leads along joint 1's axis.
+    let through: Six = std::array::from_fn(|i| if i < 2 { -from[i] } else { from[i] });
+    let sequence = bench.motion(MOVEL, through, fast(Profile::Cosine));
+    let cause = bench.until(REFUSED, sequence).cause;
+    assert!([7, 8, 9].contains(&cause), "{cause}");
+    // A wrist that stretches.
+    let mut straight = bench.last().q();
+    straight[4] = -0.02;
+    let to = pose(&straight, &TOOL).0;
+    let sequence = bench.motion(MOVEL, to, fast(Profile::Cosine));
+    let cause = bench.until(REFUSED, sequence).cause;
+    assert!([7, 9].contains(&cause), "{cause}");
+    // In joint space, beyond a joint's range: the joint is named.
+    let mut beyond = HOME;
+    beyond[1] = 3.0;
+    let sequence = bench.motion(crate::bench::MOVE, beyond, fast(Profile::Cosine));
+    let report = bench.until(REFUSED, sequence);
+    assert_eq!((report.cause, report.value), (7, 2.0));
+    bench.run(40);
+    assert_eq!((bench.last().mode, bench.last().v()), (0, [0.0; 6]));
+}
+
+#[test]
+fn a_tool_moves_the_point_that_is_led() {
+    let mut bench = Bench::new();
+    let tool = [0.01, -0.02, 0.08].map(|t: f32| f64::from(t));
+    let sequence = bench.send(8, &crate::bench::bits(&tool));
+    bench.until(crate::bench::ACCEPTED, sequence);
+    bench.run(40);
+    let from = pose(&bench.last().q(), &tool).0;
+    assert!(apart(&bench.last().pose, &from) < 2e-6);
+    let mut to = from;
+    to[5] += 0.2;
+    let sequence =
+        bench.motion(MOVEL, to, How { profile: Profile::Trapezoidal, how: 0, amount: 0.3, flags: 0 });
+    bench.until(FINISHED, sequence);
+    for seen in bench.since(sequence) {
+        let here = pose(&seen.q(), &tool).0;
+        assert!(
+            (0..5).all(|i| (here[i] - from[i]).abs() < 5e-6),
+            "the point stays while the tool turns: {here:?}"
+        );
+    }
+}
