@@ -254,10 +254,10 @@ impl SystemSession {
 
     /// Goes back to the last position before this one that is looked for.
     fn seek_back(&mut self, wanted: impl Fn(&[(usize, Event)], &[LinkEvent]) -> Hits) -> SystemWhy {
-        let origin = self.cycle();
-        let mut end = origin;
-        while end > 0 {
-            self.restore(end - 1);
+        // Looked for are positions before `end`, from a checkpoint before `before` on.
+        let (mut end, mut before) = (self.cycle(), self.cycle());
+        while before > 0 {
+            self.restore(before - 1);
             let start = self.cycle();
             let mut hits = Hits::new();
             let mut cores = Vec::new();
@@ -270,19 +270,16 @@ impl SystemSession {
                     break;
                 }
             }
-            // At its first cycle a stretch belongs to the one before.
+            // What has just happened where a stretch begins is known of the one before.
             let last =
                 hits.into_iter().filter(|(cycle, _)| *cycle < end && (*cycle > start || start == 0)).max();
             if let Some((cycle, id)) = last {
                 self.go_to(cycle);
                 return id.map_or(SystemWhy::Done, SystemWhy::Stop);
             }
-            end = if start == 0 { 0 } else { start + 1 };
+            (end, before) = (start + 1, start);
             if self.interrupted() {
                 return SystemWhy::Interrupted;
-            }
-            if start == 0 {
-                break;
             }
         }
         self.go_to(0);
