@@ -50,6 +50,76 @@ fn bound_follows_a_command_through_the_cores() {
 }
 
 #[test]
+fn a_session_sees_all_cores() {
+    let folder = Folder::new();
+    let (toml, csv) = (speed("speed.toml"), speed("speed.csv"));
+    folder.write(
+        "script.txt",
+        "cores\nbreak link moves pushed\ncontinue\nlinks moves\ncore servo\nstep period\nprint u\nstep bundle 3\nback bundle\n\
+         goto cycle 126000\ncheck cycle == 126000\ncore watch\ncheck cycle == 126000\nreverse\nreverse\n",
+    );
+    let text = folder.line(&format!("debug {toml} --inputs {csv} --script script.txt")).ok();
+    assert!(text.contains("> profile") && text.contains("stop 1: break link moves pushed"), "{text}");
+    assert!(text.contains("moves: 1 of 8 entries (") && text.contains("core servo: "), "{text}");
+    assert!(text.trim_end().contains("the beginning of the run"), "{text}");
+    folder.write("wrong.txt", "stp\n");
+    let wrong = folder.line(&format!("debug {toml} --script wrong.txt"));
+    assert!(wrong.stderr.contains("wrong.txt:1: there is no command `stp`"), "{}", wrong.stderr);
+    let wrong = folder.line(&format!("debug {toml} --tick 5 --script script.txt"));
+    assert!(wrong.stderr.contains("--tick with a system"), "{}", wrong.stderr);
+}
+
+#[test]
+fn analyse_tells_where_each_core_s_cycles_went() {
+    let folder = Folder::new();
+    let (toml, csv) = (speed("speed.toml"), speed("speed.csv"));
+    let text = folder.line(&format!("analyse {toml} --inputs {csv}")).ok();
+    assert!(text.starts_with("10 base ticks, ") && text.contains("\nservo, t3: "), "{text}");
+    let json: Value = serde_json::from_str(&folder.line(&format!("analyse {toml} --json")).ok()).unwrap();
+    for core in ["profile", "servo", "watch"] {
+        let core = &json["cores"][core];
+        let stalls: u64 =
+            core["stalls"].as_object().unwrap().values().map(|cycles| cycles.as_u64().unwrap()).sum();
+        assert_eq!(core["bundles"].as_u64().unwrap() + stalls, core["cycles"].as_u64().unwrap());
+    }
+    let wrong = folder.line(&format!("analyse {toml} --html x.html"));
+    assert!(wrong.stderr.contains("--html with a system"), "{}", wrong.stderr);
+}
+
+#[test]
+fn a_trace_shows_all_cores_on_one_axis() {
+    let folder = Folder::new();
+    let (toml, csv) = (speed("speed.toml"), speed("speed.csv"));
+    let run = |more: &str| folder.line(&format!("run {toml} --inputs {csv} --periods 2 {more}"));
+    run("--trace out.vcd --trace-cycles 124900..126100").ok();
+    let text = folder.read_text("out.vcd");
+    for scope in ["takt", "profile", "servo", "watch", "links"] {
+        assert_eq!(text.matches(&format!("$scope module {scope} $end")).count(), 1, "{scope}");
+    }
+    assert_eq!(text.matches("$scope").count(), text.matches("$upscope").count());
+    // Every core sees its first tick in its own cycle of the one axis.
+    let identifier = |scope: &str| {
+        let rest = &text[text.find(&format!("$scope module {scope} ")).unwrap()..];
+        let line = rest.lines().find(|line| line.ends_with(" tick $end")).unwrap();
+        line.split(' ').nth(3).unwrap().to_owned()
+    };
+    for (core, tick) in [("profile", 125_000), ("servo", 125_500), ("watch", 126_000)] {
+        let wanted = format!("1{}", identifier(core));
+        let mut time = 0;
+        let found = text.lines().find_map(|line| {
+            if let Some(cycle) = line.strip_prefix('#') {
+                time = cycle.parse::<u64>().unwrap();
+            }
+            (line == wanted).then_some(time)
+        });
+        assert_eq!(found, Some(tick), "{core}");
+    }
+    run("--trace few.fst --trace-cycles 0..1000 --trace-signals servo.outputs.u,links.moves.count").ok();
+    assert!(run("--trace x.kanata").stderr.contains("a system is traced as .vcd or .fst"));
+    assert!(run("--trace x.vcd --trace-signals servo.nix").stderr.contains("no signal is named `servo.nix`"));
+}
+
+#[test]
 fn what_a_system_is_not() {
     let folder = Folder::new();
     folder.write("a.s", ".input x\n.output y\n.once\n wait p\n.period\np: mov y, x\n wait p\n");
