@@ -120,6 +120,18 @@ period:
         nc[1], nc[2], nline = centre_1, centre_2, line
         taken = taken + 1
         pop = taken
+; What is read after it may be the next block's.
+.order  kind, pop
+.order  line, pop
+.order  sweep, pop
+.order  feed, pop
+.order  periods, pop
+        .rep i, 1, 5
+.order  to_{i}, pop
+        .endr
+        .rep i, 1, 2
+.order  centre_{i}, pop
+        .endr
 prepared:
 
 ; ---- Begin it where the last one has ended ----------------------------------------------------------------------------------
