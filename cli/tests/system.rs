@@ -155,3 +155,36 @@ fn what_a_system_is_not() {
         assert!(done.stderr.contains(said), "{line}: {}", done.stderr);
     }
 }
+
+#[test]
+fn the_hybrid_robot_on_two_processors() {
+    let folder = Folder::new();
+    let two = common::source("two.toml");
+    let json = |line: &str| -> serde_json::Value {
+        serde_json::from_str(&folder.line(&format!("track -q --json --periods 3000 {line}")).ok()).unwrap()
+    };
+    let (one, both) = (json(""), json(&format!("--system {two}")));
+    let number = |value: &serde_json::Value| value.as_f64().unwrap_or_else(|| panic!("{value} in {both}"));
+    // The path's points come from a core: the robot follows them as it follows the host's.
+    let overall = |run: &serde_json::Value| number(&run["tracking_error_m"]["overall"]);
+    assert!((overall(&one) - overall(&both)).abs() < 1e-7, "{both} {one}");
+    assert_eq!(both["missed"], 0);
+    assert_eq!(both["cores"][0]["longest"], 319);
+    assert!(number(&both["points"][0]["largest_error"]) < 6.2e-8, "{both}");
+    let text = folder.line(&format!("track -q --periods 10 --system {two}")).ok();
+    assert!(text.contains("n1, n2, n3, … (5) -> F1, F2, F3, … (20), through tracking"), "{text}");
+    folder.write(
+        "other.toml",
+        "tick = 500\n[[core]]\nname = \"a\"\nprogram = \"a.s\"\n[[wire]]\nfrom = \"a.y\"\nto = \"host.y\"\n",
+    );
+    folder.write("a.s", ".output y\n.once\n wait p\n.period\np: mov y, zero\n wait p\n");
+    for (line, said) in [
+        ("track --system other.toml", "base tick is 500 cycles"),
+        ("track --system other.toml --clock 5", "it has no input `n1`"),
+        ("track --system other.toml --machine t1", "cannot be used with"),
+    ] {
+        let done = folder.line(line);
+        assert_ne!(done.status, Some(0), "{line}");
+        assert!(done.stderr.contains(said), "{line}: {}", done.stderr);
+    }
+}

@@ -9,18 +9,6 @@ use takt_emu::LoadError;
 use takt_isa::T3;
 use takt_system::{CorePeriods, Description, HostError, ProgramError, ReadError, Request, System};
 
-/// The files of the controller: its system and the programs of its cores.
-pub const FILES: &[(&str, &str)] = &[
-    ("controller.toml", include_str!("../../programs/three/controller.toml")),
-    ("communication.s", include_str!("../../programs/three/communication.s")),
-    ("dynamic.s", include_str!("../../programs/three/dynamic.s")),
-    ("geometry.s", include_str!("../../programs/three/geometry.s")),
-    ("kinematic.s", include_str!("../../programs/three/kinematic.s")),
-    ("packets.s", include_str!("../../programs/three/packets.s")),
-    ("planning.s", include_str!("../../programs/three/planning.s")),
-    ("profile.s", include_str!("../../programs/three/profile.s")),
-    ("ums7.s", include_str!("../../programs/three/ums7.s")),
-];
 /// Cycles in which the cores must have come to their first ticks.
 const START: u64 = 10_000_000;
 /// Ticks between two records.
@@ -33,12 +21,13 @@ const RECORDS: usize = 1 << 20;
 /// # Errors
 /// If its own programs are wrong, in words.
 pub fn standard() -> Result<Description, String> {
-    let text = |name: &str| FILES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
+    let text =
+        |name: &str| takt_programs::THREE.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
     let read = takt_system::read(
         "controller.toml",
         text("controller.toml").unwrap_or(""),
         |request: &Request<'_>| {
-            let loader = Search::new(MemoryLoader::new(FILES)).library(takt_programs::LIBRARY);
+            let loader = Search::new(MemoryLoader::new(takt_programs::THREE)).library(takt_programs::LIBRARY);
             let options = Options { machine: request.machine.unwrap_or(&T3), ..Options::default() };
             match assemble(request.path, &loader, &options) {
                 Ok(assembled) => Ok(assembled.program),

@@ -1,13 +1,12 @@
 //! The two tables of the numbers on the link, in Rust and in assembly, say the same.
 
-use takt_robot::controller::FILES;
 use takt_robot::packet::{
     Cause, FLAG_CHECK, FLAG_VIA, How, JogMode, Kind, MAGIC, PAYLOAD_WORDS, Profile, ReportKind,
 };
 
 /// `.const NAME = value` of packets.s.
 fn constants() -> Vec<(String, u32)> {
-    let (_, text) = FILES.iter().find(|(name, _)| *name == "packets.s").expect("the file");
+    let (_, text) = takt_programs::THREE.iter().find(|(name, _)| *name == "packets.s").expect("the file");
     let number = |text: &str| match text.strip_prefix("0x") {
         Some(digits) => u32::from_str_radix(digits, 16).ok(),
         None => text.parse().ok(),

@@ -56,7 +56,7 @@ pub(crate) struct Robot {
 const EXAMPLES: &str = "\
 Examples:
   takt robot                                         at a prompt; `help` lists the commands
-  takt robot programs/three/demonstration.robot      a program, and tables of what it came to
+  takt robot robot/programs/demonstration.robot      a program, and tables of what it came to
   takt robot demonstration.robot --plot robot.svg    with a picture
   takt robot square.robot --check                    can it run?
   takt robot square.robot --faults corrupt@1.5       what the controller does about a bad packet
@@ -128,7 +128,7 @@ pub(crate) fn run(arguments: &Robot, color: bool, out: &mut Out) -> Result<()> {
 
     let description = match &arguments.system {
         Some(path) => system::load(path, &SourceArguments::default(), color)?.description,
-        None => standard().map_err(|text| Failure::Diagnostics(text))?,
+        None => standard().map_err(Failure::Diagnostics)?,
     };
     let controller = Controller::new(&description, Plant::standard())?;
     let interrupt = Arc::new(AtomicBool::new(false));
@@ -192,6 +192,8 @@ impl Desk<'_> {
             for line in lines {
                 writeln!(self.out, "{:13}{line}", "")?;
             }
+            // A minute of the robot's time takes a while: what it says is shown when it says it.
+            self.out.flush()?;
         }
         Ok(())
     }
@@ -223,9 +225,6 @@ impl Desk<'_> {
             let more = self.session.advance(&mut running);
             if self.told(more)? != Some(true) {
                 return Ok(());
-            }
-            if std::io::stdout().is_terminal() {
-                self.out.flush()?;
             }
         }
     }

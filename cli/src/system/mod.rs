@@ -6,6 +6,7 @@ pub(crate) mod cosim;
 pub(crate) mod debug;
 mod host;
 pub(crate) mod run;
+pub(crate) mod track;
 
 use crate::fault;
 use crate::files;

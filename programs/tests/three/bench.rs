@@ -235,8 +235,9 @@ impl Bench {
         bench
     }
 
-    pub(crate) fn block(&mut self) {
-        self.plant.blocked = true;
+    /// Whether something holds the joints.
+    pub(crate) fn block(&mut self, blocked: bool) {
+        self.plant.blocked = blocked;
     }
 
     /// The words go as they are.

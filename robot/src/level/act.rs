@@ -5,7 +5,7 @@ use super::value::{self, Surroundings, Value, evaluate, number_in, short};
 use super::{BUILT_IN, Session};
 use crate::dynamics::{JOINTS, Joints};
 use crate::geometry::{joints_of, pose_of};
-use crate::host::{Event, Host, Inputs, Mode, Problem, Robot, degrees, radians, ticks};
+use crate::host::{Event, Host, Inputs, Problem, Robot, degrees, radians, ticks};
 use crate::language::tree::{Action, Course, Expression, Item, Pace, Simulation};
 use crate::limits;
 use crate::packet::{Cause, Command, How, JogMode, Motion, Profile, Report, ReportKind};
@@ -51,8 +51,8 @@ impl<R: Robot + Clone> Session<R> {
                 let motion = self.motion(machine, *line, *course, pace.as_ref(), *profile)?;
                 self.move_to(*line, goal, target.span, motion, *course, span)?;
             }
-            Action::Jog(mode, rates, time) => self.jog(machine, *mode, rates, time.as_ref())?,
-            Action::JogOff => self.jog_off()?,
+            Action::Jog(mode, rates, time) => self.jog(machine, *mode, rates, time.as_ref(), span)?,
+            Action::JogOff => self.jog_off(span)?,
             Action::Stop => self.halt()?,
             Action::Speed(joints, line) => {
                 let around = self.around(machine);
@@ -95,6 +95,7 @@ impl<R: Robot + Clone> Session<R> {
             Action::LimitTorque(list) => self.limit(machine, list, 1, |value| value as f32)?,
             Action::Reset => {
                 self.host.command(&Command::Reset)?;
+                self.jogging = None;
                 self.open.clear();
             }
             Action::Where => {
@@ -285,6 +286,7 @@ impl<R: Robot + Clone> Session<R> {
         mode: JogMode,
         rates: &[Expression],
         time: Option<&Expression>,
+        span: Span,
     ) -> Result<(), Failure> {
         let around = self.around(machine);
         let mut values = [0.0; JOINTS];
@@ -297,17 +299,23 @@ impl<R: Robot + Clone> Session<R> {
             Some(time) => Some(number_in(time, "a time", 0.0, limits::LONGEST, &around)?),
             None => None,
         };
+        // The controller changes from one mode to another only where it stands.
+        if self.jogging.is_some_and(|held| held != mode) {
+            self.jog_off(span)?;
+        }
         self.host.command(&Command::Jog { mode, rates: values })?;
+        self.jogging = Some(mode);
         if let Some(time) = time {
             self.pause(time)?;
-            self.jog_off()?;
+            self.jog_off(span)?;
         }
         Ok(())
     }
 
-    fn jog_off(&mut self) -> Result<(), Failure> {
-        if self.host.view().mode == Mode::Jogging {
-            self.host.command(&Command::Jog { mode: JogMode::Joints, rates: [0.0; JOINTS] })?;
+    fn jog_off(&mut self, span: Span) -> Result<(), Failure> {
+        if let Some(mode) = self.jogging.take() {
+            let (sequence, _) = self.host.command(&Command::Jog { mode, rates: [0.0; JOINTS] })?;
+            self.under_way(sequence, span);
         }
         self.done()
     }
@@ -315,23 +323,21 @@ impl<R: Robot + Clone> Session<R> {
     /// Stops the robot and waits until it stands.
     pub(super) fn halt(&mut self) -> Result<(), Failure> {
         self.host.command(&Command::Stop)?;
+        self.jogging = None;
         self.open.clear();
         self.done()
     }
 
     /// Waits until nothing moves.
     pub(super) fn done(&mut self) -> Result<(), Failure> {
+        if self.jogging.is_some() && self.host.stopped().is_none() {
+            // It does not end by itself.
+            return Err(Problem::Late("the robot jogs: `jog off` ends it".to_owned()).into());
+        }
         let open = std::mem::take(&mut self.open);
         let interrupt = self.interrupt.clone();
         let interrupted = move || interrupt.load(std::sync::atomic::Ordering::Relaxed);
         let late = || format!("the motion did not end within {} s", short(limits::LONGEST));
-        let jogs = self.host.view().mode == Mode::Jogging;
-        if jogs && open.is_empty() {
-            // A jog that is held does not end by itself; one that ends takes a moment.
-            let slowing = ticks(JOG_END);
-            let late = || "the robot jogs: `jog off` ends it".to_owned();
-            return Ok(self.host.wait_until(slowing, late, &interrupted, |host| Ok(host.stands()))?);
-        }
         let ended = |host: &mut Host<R>| {
             for open in &open {
                 if !host.finished(*open)? {
@@ -428,9 +434,6 @@ impl<R: Robot + Clone> Session<R> {
         )
     }
 }
-
-/// How long a jog may take to end, s.
-const JOG_END: f64 = 10.0;
 
 /// A target whose open values are taken from where it begins.
 fn completed(target: &[f64; 6], begin: &[f64; 6]) -> [f64; 6] {

@@ -12,7 +12,7 @@ use crate::language::code::{Code, Known, compile};
 use crate::language::tree::{Console, StatementKind};
 use crate::language::{parse, table};
 use crate::limits;
-use crate::packet::{Profile, ReportKind};
+use crate::packet::{JogMode, Profile, ReportKind};
 use execute::Machine;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -101,6 +101,8 @@ pub struct Session<R> {
     open: Vec<u32>,
     /// Where the latest motions stand in the sources.
     motions: VecDeque<(u32, Span)>,
+    /// The jog that is held.
+    jogging: Option<JogMode>,
     cause: u32,
     messages: Vec<Message>,
     /// The session's program, its lines.
@@ -142,6 +144,7 @@ impl<R: Robot + Clone> Session<R> {
             planned,
             open: Vec::new(),
             motions: VecDeque::new(),
+            jogging: None,
             cause: 0,
             messages: Vec::new(),
             program: Vec::new(),

@@ -171,6 +171,9 @@ impl State {
                 self.rates = std::array::from_fn(|i| float(i + 1));
                 let stands = self.rates.iter().all(|rate| *rate == 0.0);
                 self.mode = if stands { Mode::Standing } else { Mode::Jogging };
+                if stands {
+                    return self.report(ReportKind::Finished, sequence, 0, 0.0);
+                }
             }
             Kind::Stop => {
                 self.queue.clear();

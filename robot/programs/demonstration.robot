@@ -2,7 +2,6 @@
 # and what can go wrong. docs/robot-commands.md
 
 let home = joints(0, 90, 0, 0, -45, 0)
-let level = frame(0, 0, 0, 0, 0, 0)
 
 sub expect(name, wanted)
   if cause() != wanted
@@ -101,16 +100,45 @@ end
 say "faults of the link"
 try
   simulate corrupt after 0.2
-  move home in 1
+  start move joints(40, _, _, _, _, _) in 2
+  wait 0.5
+  signal 2 on
+  wait done
 else
   call expect(6, 1)
   reset
 end
+move home fast
+try
+  simulate order after 0.2
+  start move joints(40, _, _, _, _, _) in 2
+  wait 0.5
+  signal 2 on
+  wait done
+else
+  call expect(7, 2)
+  reset
+end
+move home fast
+try
+  simulate late after 0.2
+  start move joints(40, _, _, _, _, _) in 2
+  wait 0.5
+  signal 2 on
+  wait done
+else
+  call expect(8, 4)
+  reset
+end
+move home fast
 try
   simulate silent after 0.1
-  move joints(40, _, _, _, _, _) in 2
+  start move joints(40, _, _, _, _, _) in 2
+  wait 0.5
+  signal 2 on
+  wait done
 else
-  call expect(7, 5)
+  call expect(9, 5)
   reset
 end
 move home fast

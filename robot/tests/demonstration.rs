@@ -1,0 +1,87 @@
+//! The demonstration on the three cores and the plant, from end to end.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use takt_robot::controller::{Controller, standard};
+use takt_robot::geometry::pose_of;
+use takt_robot::host::degrees;
+use takt_robot::level::{Files, Session};
+use takt_robot::plant::Plant;
+
+struct NoFiles;
+
+impl Files for NoFiles {
+    fn read(&self, name: &str) -> Result<String, String> {
+        Err(format!("there is no file {name}"))
+    }
+
+    fn write(&self, name: &str, _: &str) -> Result<(), String> {
+        Err(format!("{name} cannot be written"))
+    }
+}
+
+#[test]
+fn the_demonstration_runs() {
+    let description = standard().unwrap_or_else(|error| panic!("{error}"));
+    let controller = Controller::new(&description, Plant::standard()).expect("a controller");
+    let interrupt = Arc::new(AtomicBool::new(false));
+    let mut session = Session::new(controller, Arc::new(NoFiles), interrupt).expect("it gets ready");
+    let text = include_str!("../programs/demonstration.robot");
+    let result = session.run("demonstration.robot", text).and_then(|()| session.finish());
+    let messages = session.take_messages();
+    let said: Vec<&str> = messages.iter().map(|message| message.text.as_str()).collect();
+    let report = said.join("\n");
+    if let Err(error) = result {
+        panic!("{}\n{report}", error.render(false));
+    }
+    assert!(!report.contains("not what was expected"), "{report}");
+    let counted = |kind: &str| messages.iter().filter(|message| message.kind == kind).count();
+    // Four refusals; a buffer run dry and four faults of the link, each told once.
+    assert_eq!((counted("caught"), counted("stopped")), (9, 5), "{report}");
+    for part in ["profiles", "square", "jogs", "signals", "refusals", "output 1 on", "output 1 off", "end"] {
+        assert!(said.contains(&part), "{part} is missing\n{report}");
+    }
+
+    let controller = session.host().robot();
+    let tracking = controller.tracking();
+    // Where the robot is at the end, it is by its reference, and the reference is where the program sent it.
+    let home = [0.0, 90.0, 0.0, 0.0, -45.0, 0.0];
+    for ((plant, view), home) in
+        degrees(&controller.plant().joints()).iter().zip(degrees(&session.host().view().joints)).zip(home)
+    {
+        assert!((plant - view).abs() < 5e-3 && (view - home).abs() < 1e-3, "{plant} {view} {home}");
+    }
+    for joint in 0..6 {
+        let largest = tracking.largest[joint].to_degrees();
+        assert!(largest > 0.0 && largest < 0.1, "joint {}: {largest}", joint + 1);
+    }
+    // Both steps fit a period of 10 kHz.
+    for (name, periods) in controller.periods() {
+        assert!(name == "communication" || periods.longest < description.tick, "{name}: {periods:?}");
+    }
+    // The square goes round its corners without stopping: at the corners, too, the tool moves.
+    let square = |from: &str, to: &str| {
+        let time =
+            |text: &str| messages.iter().find(|message| message.text == text).map(|message| message.time);
+        (time(from).expect("a time"), time(to).expect("a time"))
+    };
+    let (begin, end) = square("output 1 on", "output 1 off");
+    let records: Vec<_> =
+        controller.records().iter().filter(|record| record.time > begin && record.time < end).collect();
+    let place = |record: &takt_robot::controller::Record| {
+        let ([x, y, z, ..], _) = pose_of(&degrees(&record.reference), [0.0; 3]);
+        [x, y, z]
+    };
+    let speeds: Vec<f64> = records
+        .windows(11)
+        .map(|window| {
+            let (a, b) = (place(window[0]), place(window[10]));
+            let way: f64 = (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
+            way / (window[10].time - window[0].time)
+        })
+        .collect();
+    let moving: Vec<f64> = speeds.iter().copied().skip_while(|speed| *speed < 30.0).collect();
+    let stop = moving.iter().position(|speed| *speed < 1.0).unwrap_or(moving.len());
+    // Eight sides of 60 to 120 mm at 200 mm/s take more than 4 s.
+    assert!(stop as f64 * 1e-3 > 4.0, "it stops after {stop} ms: {report}");
+}
