@@ -7,7 +7,7 @@
 //   A record is {core, space, slot, address, value}, as the core's loader takes them (docs/hardware.md); space 3 is an input port.
 
 module takt_loader #(
-    parameter IMAGE   = "image.hex",
+    parameter IMAGE   = "",
     parameter RECORDS = 1,
     parameter CORES   = 1,
     parameter SLOTS   = 1,     // of the core with the most
@@ -32,7 +32,12 @@ module takt_loader #(
     localparam [2:0]  DATA_SLOT = SLOTS;   // beyond the slots of program memory
 
     reg [72:0]     records [0:RECORDS-1];
-    initial $readmemh(IMAGE, records);
+    generate
+        // Tools that look at the module alone have no file.
+        if (IMAGE != "") begin : g_image
+            initial $readmemh(IMAGE, records);
+        end
+    endgenerate
 
     // 0: zeros, 1: records, 2: settles.
     reg [1:0]      state;
