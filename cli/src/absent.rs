@@ -40,6 +40,7 @@ module!("editor", lsp, Lsp by run);
 module!("editor", dap, Dap by run);
 module!("board", board, Boards by run);
 module!("board", live, LoadBoard by load, Live by live);
+module!("robot", robot, Robot by run);
 
 #[cfg(test)]
 mod tests {

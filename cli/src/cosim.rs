@@ -2,11 +2,12 @@
 
 use crate::fault;
 use crate::files::{self, Out};
-use crate::load::Load;
+use crate::load::{self, Load};
 use crate::number;
 use crate::output::{self, Failure};
 use crate::ports;
 use crate::select::{OptionalMachine, SourceArguments};
+use crate::system;
 use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::{Value, json};
@@ -21,11 +22,11 @@ use takt_rtl::{Design, Library, export};
 ///
 /// Compared are the cycle and address of every bundle that issues, every register, flag, data word and output port that is
 /// written, missed deadlines, halts and faults. Each row of --inputs is one period. With --seed or --programs it is random
-/// programs that run. On a difference the waveform around it is written.
+/// programs that run. Of a system, that is compared of every core, and what happens on every link and on every pin. On a difference the waveform around it is written.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Cosim {
-    /// Source or image; `-` is standard input.
+    /// Source or image, `-` being standard input; or a system, a `.toml` file.
     #[arg(required_unless_present_any = ["seed", "programs"], conflicts_with_all = ["seed", "programs"])]
     file: Option<PathBuf>,
     #[command(flatten)]
@@ -59,6 +60,7 @@ const EXAMPLES: &str = "\
 Examples:
   takt track --periods 100 --csv in.csv            record inputs,
   takt cosim programs/hybrid/tracking.s --inputs in.csv   and run the circuit on them
+  takt cosim system.toml --inputs in.csv           several cores: a base tick for each row
   takt cosim --programs 10000 --machine t1         random programs
   takt cosim --seed 4711                           one of them again";
 
@@ -74,6 +76,21 @@ pub(crate) fn run(arguments: &Cosim, color: bool, out: &mut Out) -> Result<()> {
     reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
     files::check(&reads, &[("--waveform", &arguments.waveform)])?;
     match &arguments.file {
+        Some(file) if load::is_system(file) => {
+            if arguments.machine.machine.is_some() {
+                let message = "--machine with a system: the system's file names each core's".to_owned();
+                return Err(Failure::Usage(message).into());
+            }
+            let system = system::cosim::Arguments {
+                file,
+                source: &arguments.source,
+                inputs: arguments.inputs.as_deref(),
+                periods: arguments.periods,
+                waveform: &arguments.waveform,
+                json: arguments.json,
+            };
+            system::cosim::run(&system, color, out)
+        }
         Some(file) => one(arguments, file, color, out),
         None => many(arguments, out),
     }

@@ -41,6 +41,7 @@ mod output;
 mod plot;
 mod ports;
 mod report;
+#[cfg(feature = "robot")]
 mod robot;
 mod rtl;
 mod run;
@@ -52,6 +53,8 @@ mod track;
 
 #[cfg(not(feature = "model"))]
 use absent::model;
+#[cfg(not(feature = "robot"))]
+use absent::robot;
 #[cfg(not(feature = "board"))]
 use absent::{board, live};
 #[cfg(not(feature = "editor"))]
@@ -72,6 +75,10 @@ struct Arguments {
     /// Colour of messages: auto (on a terminal, unless NO_COLOR is set), always or never.
     #[arg(long, global = true, value_enum, default_value_t = Color::Auto, value_name = "WHEN", hide_possible_values = true)]
     color: Color,
+    /// Do not compile what the emulator runs often: slower, and otherwise the same.
+    #[cfg(feature = "jit")]
+    #[arg(long, global = true)]
+    no_jit: bool,
 }
 
 const AFTER_HELP: &str = "\
@@ -185,6 +192,10 @@ fn main() -> ExitCode {
         Err(status) => return status,
     };
     let color = arguments.color.on_stderr();
+    #[cfg(feature = "jit")]
+    if arguments.no_jit {
+        takt_emu::Emulator::switch_compiler_off();
+    }
     let result = run(&arguments, color, &mut out);
     // What was written before an error still goes out; the first error is the one that counts.
     let flushed = out.flush().map_err(anyhow::Error::from);

@@ -1,11 +1,12 @@
-//! `takt rtl`: the circuit of a machine as Verilog.
+//! `takt rtl`: the circuit of a machine, or of a system, as Verilog.
 
 use crate::files::{self, Out};
-use crate::load::Load;
+use crate::load::{self, Load};
 use crate::number;
 use crate::output;
 use crate::ports;
 use crate::select::{OptionalMachine, SourceArguments};
+use crate::system;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::json;
@@ -14,13 +15,20 @@ use std::path::{Path, PathBuf};
 use takt_isa::MACHINES;
 use takt_rtl::{Library, bench, export};
 
-/// Write the circuit of a machine: a complete Verilog design, with a test bench.
+/// Write the circuit of a machine, or of a system of several cores: a complete Verilog design.
 ///
-/// The folder then holds the core and its parts, one module per file; `takt_<machine>.f`, the list of them for other tools; a top
+/// Of a system the folder holds one top with all cores and links, their programs in a memory image that it reads at power-up
+/// (docs/system.md), and the lists of files.
+/// Of a machine it holds a core and a test bench.
+///
+/// The folder of a machine holds the core and its parts, one module per file; `takt_<machine>.f`, the list of them for other tools; a top
 /// level for synthesis without a board; a test bench, which with --program runs that program on the rows of --inputs.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Rtl {
+    /// A system, a `.toml` file; without it, a machine's circuit is written.
+    #[arg(value_name = "SYSTEM", conflicts_with_all = ["machine", "program", "inputs", "periods"])]
+    system: Option<PathBuf>,
     /// The folder; it is made if it is not there.
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
@@ -46,6 +54,7 @@ const EXAMPLES: &str = "\
 Examples:
   takt rtl -o t3                                 the fast machine
   takt rtl -o t1 --machine t1 --program prog.s --inputs in.csv   the small one, and what its test bench runs
+  takt rtl system.toml -o system                 several cores and their links (docs/system.md)
   cd t1 && iverilog -g2005 -f takt_t1_bench.f -o bench && ./bench";
 
 /// Periods without `--inputs`.
@@ -55,6 +64,14 @@ pub(crate) fn run(arguments: &Rtl, color: bool, out: &mut Out) -> Result<()> {
     let reads = [("--program", &arguments.program), ("--inputs", &arguments.inputs)];
     let reads: Vec<_> = reads.into_iter().filter_map(|(name, path)| Some((name, path.as_deref()?))).collect();
     files::check(&reads, &[])?;
+    if let Some(file) = &arguments.system {
+        if !load::is_system(file) {
+            let name = file.display();
+            let message = format!("{name} is no system (`.toml`); a program's core: --program {name}");
+            return Err(output::Failure::Usage(message).into());
+        }
+        return of_system(arguments, file, color, out);
+    }
     let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
     let program = arguments.program.as_deref().map(|path| load.program(path)).transpose()?;
     let machine = match (&program, arguments.machine.machine) {
@@ -87,6 +104,25 @@ pub(crate) fn run(arguments: &Rtl, color: bool, out: &mut Out) -> Result<()> {
     }
     let folder = arguments.output.display();
     writeln!(out, "{} files in {folder}; the core is {}.v", written.len(), design.top)?;
+    Ok(())
+}
+
+/// The circuit of a system.
+fn of_system(arguments: &Rtl, file: &Path, color: bool, out: &mut Out) -> Result<()> {
+    let design = system::circuit(&system::load(file, &arguments.source, color)?, file)?;
+    let mut written = Vec::new();
+    for file in design.folder() {
+        write(&arguments.output, &file.name, &file.text)?;
+        written.push(file.name);
+    }
+    if arguments.json {
+        let cores = design.plan.description.cores.iter();
+        let cores: Vec<_> =
+            cores.map(|core| json!({ "name": core.name, "machine": core.program.machine.name })).collect();
+        return output::json(&json!({ "cores": cores, "top": design.top, "files": written }), out);
+    }
+    let folder = arguments.output.display();
+    writeln!(out, "{} files in {folder}; the system is {}.v", written.len(), design.top)?;
     Ok(())
 }
 

@@ -99,3 +99,45 @@ fn latched_ports_come_from_the_program() {
     let text = cosim(&folder, "cosim p.s --machine t1 --inputs in.csv").ok();
     assert!(text.contains("3 periods on t1") && text.contains("no difference"), "{text}");
 }
+
+/// The system that comes with the repository: three cores, two machines.
+#[test]
+fn a_system_is_a_circuit() {
+    let folder = Folder::new();
+    let file = |name: &str| format!("{}/../programs/systems/{name}", env!("CARGO_MANIFEST_DIR"));
+    let (toml, csv) = (file("speed.toml"), file("speed.csv"));
+    assert!(folder.line(&format!("rtl {toml} -o out")).ok().contains("the system is takt_system_speed.v"));
+    for line in folder.read_text("out/takt_system_speed.f").lines() {
+        let module =
+            line.rsplit('/').next().and_then(|name| name.strip_suffix(".v")).expect("a Verilog file");
+        assert!(folder.read_text(&format!("out/{line}")).contains(&format!("module {module}")), "{line}");
+    }
+    assert!(folder.read_text("out/takt_system_speed_ecp5.f").contains("ecp5/takt_bank.v"));
+    let text = cosim(&folder, &format!("cosim {toml} --inputs {csv} --periods 2")).ok();
+    assert!(text.starts_with("2 base ticks, ") && text.ends_with(", no difference\n"), "{text}");
+}
+
+#[test]
+fn what_a_system_s_circuit_is_not() {
+    let folder = Folder::new();
+    folder.write("p.s", PROGRAM);
+    let wire = |from: &str, to: &str| format!("[[wire]]\nfrom = \"{from}\"\nto = \"{to}\"\n");
+    let core = "tick = 500\n[[core]]\nname = \"a\"\nprogram = \"p.s\"\n";
+    folder.write("right.toml", format!("{core}{}{}", wire("host.in0", "a.in0"), wire("a.out0", "host.y")));
+    // The pins of two wires and of a snapshot to the host.
+    let snapshot = "[[snapshot]]\nname = \"s\"\nfrom = \"a\"\nto = \"host\"\nports = [\"out0 -> x\"]\n";
+    folder.write(
+        "twice.toml",
+        format!("{core}{}{}{snapshot}", wire("host.in0", "a.in0"), wire("a.out0", "host.s_x")),
+    );
+    for (line, text) in [
+        ("rtl twice.toml -o out", "two things named `out_s_x`"),
+        ("rtl p.s -o out", "p.s is no system (`.toml`); a program's core: --program p.s"),
+        ("rtl right.toml -o out -m t1", "cannot be used with"),
+        ("cosim right.toml -m t1", "the system's file names each core's"),
+        ("rtl none.toml -o out", "none.toml"),
+    ] {
+        let done = folder.line(line);
+        assert!(done.status != Some(0) && done.stderr.contains(text), "{line}: {}", done.stderr);
+    }
+}

@@ -2,11 +2,12 @@
 //!
 //! [`Model`] compiles an exported design with Verilator, [`Lockstep`] runs a program on it and on the emulator and compares all
 //! that can be seen, cycle by cycle: bundles that issue, registers, flags and memory that are written, output ports, deadlines,
-//! halts, faults. [`random`] makes programs and inputs for it.
+//! halts, faults. [`random`] makes programs and inputs for it. [`system`] does the same for systems of several cores.
 
 mod lockstep;
 mod model;
 pub mod random;
+pub mod system;
 
 pub use lockstep::{Difference, Lockstep, LockstepError, circuit_stops};
 pub use model::{CircuitEvent, EventKind, Model, ModelError, Pin, Simulation, cache_folder};

@@ -11,7 +11,7 @@ use takt_rtl::export::{INPUT_DELAY, LATCHED_INPUT_DELAY, TICK_DELAY};
 use thiserror::Error;
 
 /// The circuit tells of an event at most so many cycles after it.
-const REPORT_DELAY: Cycle = 3;
+pub(crate) const REPORT_DELAY: Cycle = 3;
 
 /// Why a lockstep run came to no result.
 #[derive(Debug, Error)]
@@ -316,7 +316,7 @@ impl Lockstep {
 }
 
 /// `bundle 12 (tracking.s:40): fadd a1, a2, a3`, with one slot's instruction or all.
-fn describe(program: &Program, address: BundleAddress, slot: Option<u8>) -> String {
+pub(crate) fn describe(program: &Program, address: BundleAddress, slot: Option<u8>) -> String {
     let mut text = program.bundle_text(address);
     let machine = program.machine;
     let words = SlotIndex::all().zip(program.words(address).unwrap_or_default());
@@ -333,7 +333,7 @@ fn describe(program: &Program, address: BundleAddress, slot: Option<u8>) -> Stri
     text
 }
 
-fn show(program: &Program, event: &CircuitEvent) -> String {
+pub(crate) fn show(program: &Program, event: &CircuitEvent) -> String {
     let name = || {
         let register = Register::new(event.register.into());
         register.map_or_else(|| format!("?{}", event.register), |register| program.register_text(register))
@@ -352,6 +352,7 @@ fn show(program: &Program, event: &CircuitEvent) -> String {
         ),
         EventKind::Port => format!("output port {} takes 0x{:08x}", name(), event.value),
         EventKind::Publish => format!("output {} is published as 0x{:08x}", event.register, event.value),
+        EventKind::Input => format!("input port {} is given 0x{:08x}", name(), event.value),
         EventKind::Missed => "the deadline is missed".to_owned(),
         EventKind::Lost => "the tick is lost".to_owned(),
         EventKind::Halt => "halts".to_owned(),
@@ -374,7 +375,7 @@ pub fn circuit_stops(fault: &Fault) -> bool {
 }
 
 /// The circuit's number for a fault; `None` for one that only the emulator knows.
-fn fault_code(kind: &FaultKind) -> Option<u16> {
+pub(crate) fn fault_code(kind: &FaultKind) -> Option<u16> {
     match kind {
         FaultKind::IllegalWord(_) | FaultKind::ProgramCounter { .. } => Some(1),
         FaultKind::DataAddress { .. } => Some(2),
@@ -387,12 +388,12 @@ fn fault_code(kind: &FaultKind) -> Option<u16> {
 }
 
 /// An event of which only kind and cycle are known.
-fn bare(kind: EventKind, cycle: Cycle) -> CircuitEvent {
+pub(crate) fn bare(kind: EventKind, cycle: Cycle) -> CircuitEvent {
     CircuitEvent { cycle, kind, slot: 0, address: 0, register: 0, value: 0, flags: 0 }
 }
 
 /// What the circuit is expected to show of an event of the emulator.
-fn expect(event: &Event) -> Option<CircuitEvent> {
+pub(crate) fn expect(event: &Event) -> Option<CircuitEvent> {
     Some(match *event {
         Event::Issue { cycle, address } => {
             CircuitEvent { address: address.get(), ..bare(EventKind::Issue, cycle) }

@@ -104,32 +104,95 @@ fn ports(design: &Design) -> String {
     text
 }
 
+/// What a simulation is compiled of.
+pub(crate) struct Sources<'a> {
+    /// The top's module.
+    pub(crate) top: &'a str,
+    /// Verilog.
+    pub(crate) files: Vec<(&'a str, &'a str)>,
+    /// The program around it, in C++.
+    pub(crate) driver: &'a str,
+    /// The prefix of the classes that Verilator makes.
+    pub(crate) prefix: &'static str,
+    /// What the driver includes.
+    pub(crate) header: (&'static str, String),
+    /// Further arguments for Verilator.
+    pub(crate) arguments: Vec<String>,
+}
+
+impl Sources<'_> {
+    /// Compiles them, or finds them in the folder as they were compiled before. With `trace` the program can write waveforms.
+    pub(crate) fn build(&self, folder: &Path, trace: bool) -> Result<PathBuf, ModelError> {
+        // Threads that need the same design build it once.
+        static ONE: Mutex<()> = Mutex::new(());
+        let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+        let version = run("verilator", "verilator", Command::new("verilator").arg("--version"))?;
+        let mut hasher = DefaultHasher::new();
+        (version, self.driver, &self.header, &self.arguments, trace).hash(&mut hasher);
+        self.files.hash(&mut hasher);
+        let name = format!("{}-{:016x}", self.top, hasher.finish());
+        let program = folder.join(&name);
+        if program.exists() {
+            return Ok(program);
+        }
+        let work = folder.join(format!("{name}.{}.partial", std::process::id()));
+        let compiled = self
+            .compile(&work, trace)
+            .and_then(|built| fs::rename(built, &program).map_err(file_error(&program)));
+        let _ = fs::remove_dir_all(&work);
+        compiled.map(|()| program)
+    }
+
+    fn compile(&self, work: &Path, trace: bool) -> Result<PathBuf, ModelError> {
+        let write = |name: &str, text: &str| {
+            let path = work.join(name);
+            let parent = path.parent().unwrap_or(work);
+            fs::create_dir_all(parent).map_err(file_error(parent))?;
+            fs::write(&path, text).map_err(file_error(&path))?;
+            Ok(path)
+        };
+        let mut sources = Vec::new();
+        for (name, text) in &self.files {
+            sources.push(write(name, text)?);
+        }
+        let driver = write("driver.cpp", self.driver)?;
+        write(self.header.0, &self.header.1)?;
+        // X becomes random: what the circuit does not initialise must not matter.
+        let mut command = Command::new("verilator");
+        command.args(["--cc", "--exe", "--build", "-O3", "--x-assign", "unique", "--x-initial", "unique"]);
+        command.args(["--prefix", self.prefix, "--top-module", self.top, "-o", "simulation"]);
+        command.args(&self.arguments);
+        command.args([
+            "-CFLAGS",
+            "-O1 -std=gnu++17",
+            "-MAKEFLAGS",
+            "OPT_FAST=-O1 OPT_SLOW=-O0 OPT_GLOBAL=-O1",
+        ]);
+        if trace {
+            command.args(["--trace", "-CFLAGS", "-DTRACE"]);
+        }
+        command.arg("-CFLAGS").arg(format!("-I{}", work.display()));
+        command.arg("--Mdir").arg(work.join("obj")).arg(driver).args(sources);
+        run("verilator", "verilator", &mut command)?;
+        Ok(work.join("obj/simulation"))
+    }
+}
+
 impl Model {
     /// Compiles a design, or finds it in the folder as it was compiled before. With `trace` it can write waveforms.
     ///
     /// # Errors
     /// If Verilator or a C++ compiler is missing or fails.
     pub fn build(design: &Design, folder: &Path, trace: bool) -> Result<Model, ModelError> {
-        // Threads that need the same design build it once.
-        static ONE: Mutex<()> = Mutex::new(());
-        let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
-        let version = run("verilator", "verilator", Command::new("verilator").arg("--version"))?;
-        let ports = ports(design);
-        let mut hasher = DefaultHasher::new();
-        (version, DRIVER, &ports, trace).hash(&mut hasher);
-        for file in &design.files {
-            (&file.name, &file.text).hash(&mut hasher);
-        }
-        let name = format!("{}-{:016x}", design.top, hasher.finish());
-        let program = folder.join(&name);
-        if program.exists() {
-            return Ok(Model { program, latched: design.latched });
-        }
-        let work = folder.join(format!("{name}.{}.partial", std::process::id()));
-        let compiled = compile(design, &ports, &work, trace)
-            .and_then(|built| fs::rename(built, &program).map_err(file_error(&program)));
-        let _ = fs::remove_dir_all(&work);
-        compiled.map(|()| Model { program, latched: design.latched })
+        let sources = Sources {
+            top: &design.top,
+            files: design.files.iter().map(|file| (file.name.as_str(), file.text.as_str())).collect(),
+            driver: DRIVER,
+            prefix: "Vcore",
+            header: ("ports.h", ports(design)),
+            arguments: vec![format!("-GLATCHED={}", design.latched)],
+        };
+        Ok(Model { program: sources.build(folder, trace)?, latched: design.latched })
     }
 
     /// Starts a simulation. A model that can trace writes its waveform to the first argument; others are Verilog's plusargs.
@@ -137,45 +200,8 @@ impl Model {
     /// # Errors
     /// If the process cannot be started.
     pub fn start(&self, arguments: &[&OsStr]) -> Result<Simulation, ModelError> {
-        let mut process = Command::new(&self.program)
-            .args(arguments)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .map_err(file_error(&self.program))?;
-        let (stdin, stdout) = (process.stdin.take(), process.stdout.take());
-        Ok(Simulation { process, stdin, stdout, latched: self.latched })
+        Ok(Simulation { process: Process::start(&self.program, arguments, None)?, latched: self.latched })
     }
-}
-
-fn compile(design: &Design, ports: &str, work: &Path, trace: bool) -> Result<PathBuf, ModelError> {
-    let write = |name: &str, text: &str| {
-        let path = work.join(name);
-        let parent = path.parent().unwrap_or(work);
-        fs::create_dir_all(parent).map_err(file_error(parent))?;
-        fs::write(&path, text).map_err(file_error(&path))?;
-        Ok(path)
-    };
-    let mut sources = Vec::new();
-    for file in &design.files {
-        sources.push(write(&file.name, &file.text)?);
-    }
-    let driver = write("driver.cpp", DRIVER)?;
-    write("ports.h", ports)?;
-    // X becomes random: what the circuit does not initialise must not matter.
-    let mut command = Command::new("verilator");
-    command.args(["--cc", "--exe", "--build", "-O3", "--x-assign", "unique", "--x-initial", "unique"]);
-    command.args(["--prefix", "Vcore", "--top-module", &design.top, "-o", "simulation"]);
-    command.arg(format!("-GLATCHED={}", design.latched));
-    command.args(["-CFLAGS", "-O1 -std=gnu++17", "-MAKEFLAGS", "OPT_FAST=-O1 OPT_SLOW=-O0 OPT_GLOBAL=-O1"]);
-    if trace {
-        command.args(["--trace", "-CFLAGS", "-DTRACE"]);
-    }
-    command.arg("-CFLAGS").arg(format!("-I{}", work.display()));
-    command.arg("--Mdir").arg(work.join("obj")).arg(driver).args(sources);
-    run("verilator", "verilator", &mut command)?;
-    Ok(work.join("obj/simulation"))
 }
 
 /// Something that happens in the circuit.
@@ -218,9 +244,11 @@ pub enum EventKind {
     Fault,
     /// A `wait` issues, and what was written to an output port since the last one is what the outside sees there.
     Publish,
+    /// A value stands on the input pins: of a system, where the driver shows it.
+    Input,
 }
 
-const KINDS: [EventKind; 9] = [
+const KINDS: [EventKind; 10] = [
     EventKind::Issue,
     EventKind::Store,
     EventKind::Retire,
@@ -230,6 +258,7 @@ const KINDS: [EventKind; 9] = [
     EventKind::Halt,
     EventKind::Fault,
     EventKind::Publish,
+    EventKind::Input,
 ];
 
 /// What stands on a pin in a cycle.
@@ -246,30 +275,51 @@ pub enum Pin {
     },
 }
 
-/// A running simulation.
+/// A compiled simulation that runs, and the pipes to it.
 #[derive(Debug)]
-pub struct Simulation {
+pub(crate) struct Process {
     process: Child,
     stdin: Option<ChildStdin>,
     stdout: Option<ChildStdout>,
-    latched: u16,
 }
 
-impl Simulation {
-    /// The input ports of this circuit that are latched; 0 if its ports are not.
-    pub fn latched(&self) -> u16 {
-        self.latched
+impl Process {
+    /// Starts a program, in a folder if there is one.
+    pub(crate) fn start(
+        program: &Path,
+        arguments: &[&OsStr],
+        folder: Option<&Path>,
+    ) -> Result<Process, ModelError> {
+        let mut command = Command::new(program);
+        if let Some(folder) = folder {
+            command.current_dir(folder);
+        }
+        let mut process = command
+            .args(arguments)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(file_error(program))?;
+        let (stdin, stdout) = (process.stdin.take(), process.stdout.take());
+        Ok(Process { process, stdin, stdout })
     }
 
-    fn send(&mut self, words: &[u32]) -> Result<(), ModelError> {
+    pub(crate) fn send(&mut self, words: &[u32]) -> Result<(), ModelError> {
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
         let sent = self.stdin.as_mut().map(|stdin| stdin.write_all(&bytes).and_then(|()| stdin.flush()));
         if matches!(sent, Some(Ok(()))) { Ok(()) } else { Err(self.ended()) }
     }
 
-    fn receive(&mut self, bytes: &mut [u8]) -> Result<(), ModelError> {
-        let read = self.stdout.as_mut().map(|stdout| stdout.read_exact(bytes));
-        if matches!(read, Some(Ok(()))) { Ok(()) } else { Err(self.ended()) }
+    /// So many words.
+    pub(crate) fn receive(&mut self, count: usize) -> Result<Vec<u32>, ModelError> {
+        let mut bytes = vec![0; 4 * count];
+        let read = self.stdout.as_mut().map(|stdout| stdout.read_exact(&mut bytes));
+        if !matches!(read, Some(Ok(()))) {
+            return Err(self.ended());
+        }
+        let word = |bytes: &[u8]| bytes.iter().rev().fold(0, |word, &byte| word << 8 | u32::from(byte));
+        Ok(bytes.chunks_exact(4).map(word).collect())
     }
 
     fn ended(&mut self) -> ModelError {
@@ -279,6 +329,50 @@ impl Simulation {
             let _ = stderr.read_to_string(&mut text);
         }
         ModelError::Ended(text)
+    }
+
+    /// Ends it in order.
+    pub(crate) fn finish(&mut self) {
+        self.stdin = None;
+        let _ = self.process.wait();
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // It ends when nobody speaks or listens to it.
+        (self.stdin, self.stdout) = (None, None);
+        let _ = self.process.wait();
+    }
+}
+
+/// Words of an event, as the drivers send it.
+pub(crate) const EVENT_WORDS: usize = 8;
+
+/// A core's event from a driver's words; `None` if it is of another kind.
+pub(crate) fn circuit_event(words: &[u32]) -> Option<CircuitEvent> {
+    Some(CircuitEvent {
+        kind: *KINDS.get(words[0] as usize)?,
+        cycle: words[1].into(),
+        address: words[2],
+        slot: words[3] as u8,
+        register: words[4] as u16,
+        value: words[5],
+        flags: words[6] as u8,
+    })
+}
+
+/// A running simulation.
+#[derive(Debug)]
+pub struct Simulation {
+    process: Process,
+    latched: u16,
+}
+
+impl Simulation {
+    /// The input ports of this circuit that are latched; 0 if its ports are not.
+    pub fn latched(&self) -> u16 {
+        self.latched
     }
 
     /// Resets the circuit and loads a program and the first values of input ports.
@@ -296,7 +390,7 @@ impl Simulation {
         for LoadRecord { space, slot, address, value } in records {
             words.extend([space as u32, slot.into(), address.into(), value as u32, (value >> 32) as u32]);
         }
-        self.send(&words)
+        self.process.send(&words)
     }
 
     /// Runs until so many cycles have passed since reset. `pins` are sorted by cycle; none of a cycle that has passed.
@@ -311,26 +405,10 @@ impl Simulation {
                 Pin::Input { index, value } => [cycle as u32, 2, index.into(), value],
             });
         }
-        self.send(&words)?;
-        let mut count = [0; 4];
-        self.receive(&mut count)?;
-        let mut bytes = vec![0; 32 * u32::from_le_bytes(count) as usize];
-        self.receive(&mut bytes)?;
-        let word = |bytes: &[u8], i: usize| {
-            let mut word = [0; 4];
-            word.copy_from_slice(&bytes[4 * i..4 * i + 4]);
-            u32::from_le_bytes(word)
-        };
-        let event = |bytes: &[u8]| CircuitEvent {
-            kind: KINDS[word(bytes, 0) as usize % KINDS.len()],
-            cycle: word(bytes, 1).into(),
-            address: word(bytes, 2),
-            slot: word(bytes, 3) as u8,
-            register: word(bytes, 4) as u16,
-            value: word(bytes, 5),
-            flags: word(bytes, 6) as u8,
-        };
-        Ok(bytes.chunks_exact(32).map(event).collect())
+        self.process.send(&words)?;
+        let count = self.process.receive(1)?[0] as usize;
+        let words = self.process.receive(EVENT_WORDS * count)?;
+        Ok(words.chunks_exact(EVENT_WORDS).filter_map(circuit_event).collect())
     }
 
     /// Writes a waveform of these cycles of the next run; the model must have been built for it.
@@ -338,20 +416,11 @@ impl Simulation {
     /// # Errors
     /// If the process has ended.
     pub fn trace(&mut self, first: Cycle, last: Cycle) -> Result<(), ModelError> {
-        self.send(&[3, first as u32, last as u32])
+        self.process.send(&[3, first as u32, last as u32])
     }
 
     /// Ends the simulation in order, so that its waveform is whole.
     pub fn finish(mut self) {
-        self.stdin = None;
-        let _ = self.process.wait();
-    }
-}
-
-impl Drop for Simulation {
-    fn drop(&mut self) {
-        // It ends when nobody speaks or listens to it.
-        (self.stdin, self.stdout) = (None, None);
-        let _ = self.process.wait();
+        self.process.finish();
     }
 }

@@ -6,6 +6,7 @@
 //! scoreboard and keeps what came out: offsets, stalls, counts, and the operations as a flat list of [`crate::micro`]s.
 
 use crate::code::{Code, Decoded};
+use crate::jit;
 use crate::machine::RegisterSet;
 use crate::micro::{Check, Emitter, Late, Micro};
 use crate::statistics::Tally;
@@ -23,6 +24,9 @@ const MAX_BLOCKS: usize = 1 << 14;
 /// Successors that a block remembers; others it looks up every time.
 const MAX_EDGES: usize = 8;
 
+/// Runs that a block's code may leave to the interpreter, however few there are.
+const MAX_LEFT: u64 = 16;
+
 /// The block that follows when execution goes to `target`, delivered `distance` cycles after the last issue.
 #[derive(Clone, Copy, Debug)]
 struct Edge {
@@ -33,6 +37,17 @@ struct Edge {
 
 /// Bundles issued of late, in order, each with the number of cycles since.
 pub(crate) type Ages = Box<[(BundleAddress, u8)]>;
+
+/// Whether a block is run by the host's own instructions.
+#[derive(Clone, Debug)]
+pub(crate) enum Compiled {
+    /// It has not run often enough.
+    NotYet,
+    /// By this code, which so many times left a run to the interpreter.
+    Code(jit::Code, u64),
+    /// Never: there is no code for it, or it left too many runs to the interpreter.
+    Never,
+}
 
 /// A straight line of bundles. Offsets are cycles from the entry, the first cycle in which the first bundle may issue.
 #[derive(Clone, Debug)]
@@ -65,6 +80,7 @@ pub(crate) struct Block {
 
     /// How often it ran.
     pub(crate) runs: u64,
+    pub(crate) compiled: Compiled,
     /// What each run adds to the statistics.
     stalls: Box<[(BundleAddress, Cause, u32)]>,
     operations: Box<[(Op, u32)]>,
@@ -89,6 +105,27 @@ impl Block {
     #[inline]
     pub(crate) fn end(&self) -> BundleAddress {
         self.entry.offset(self.bundles)
+    }
+
+    /// Compiles it, once it has run `after` times.
+    #[inline]
+    pub(crate) fn compile_after(&mut self, after: u64, depth: u32) {
+        if matches!(self.compiled, Compiled::NotYet) && self.runs >= after {
+            self.compiled = match jit::compile(self, depth) {
+                Some(code) => Compiled::Code(code, 0),
+                None => Compiled::Never,
+            };
+        }
+    }
+
+    /// Its code has left a run to the interpreter. Where that happens often, it costs more than it saves.
+    pub(crate) fn left(&mut self) {
+        if let Compiled::Code(_, times) = &mut self.compiled {
+            *times += 1;
+            if *times > MAX_LEFT && *times > self.runs / 4 {
+                self.compiled = Compiled::Never;
+            }
+        }
     }
 
     fn count(&self, tally: &mut Tally) {
@@ -277,6 +314,7 @@ fn compile(code: &Code, pauses: &[BundleAddress], entry: BundleAddress, recent: 
         recent: ages(code, inherited.chain(own)),
         edges: Vec::new(),
         runs: 0,
+        compiled: Compiled::NotYet,
         stalls: stalls.into(),
         operations: ROWS
             .iter()

@@ -46,6 +46,8 @@ pub(crate) struct Decoded {
 #[derive(Clone)]
 pub(crate) struct Code {
     pub(crate) machine: &'static Machine,
+    /// The machine's input ports.
+    pub(crate) inputs: RegisterSet,
     bundles: Vec<Result<Decoded, (SlotIndex, IllegalWord)>>,
     /// Loops whose turns are counted, by ascending address of their heads.
     pub(crate) loops: Vec<LoopBound>,
@@ -84,7 +86,9 @@ impl Code {
             let (flow, timing) = (Flow::of(&instructions), Bundle::new(machine, &instructions));
             Ok(Decoded { operations: operations.into(), flow, timing, reach })
         });
-        Ok(Code { machine, bundles: bundles.collect(), loops: program.loop_bounds.clone() })
+        let mut inputs = RegisterSet::default();
+        Register::all().filter(|&register| machine.is_input(register)).for_each(|port| inputs.insert(port));
+        Ok(Code { machine, inputs, bundles: bundles.collect(), loops: program.loop_bounds.clone() })
     }
 
     /// Marks the operations that write these output ports.

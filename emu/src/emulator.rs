@@ -5,6 +5,7 @@ use crate::code::Code;
 use crate::event::{Event, PortWrite, Retire};
 use crate::fast::{Fast, Journal};
 use crate::fault::{Fault, FaultKind, LoadError};
+use crate::jit;
 use crate::machine::{RegisterSet, State};
 use crate::statistics::{Statistics, Tally};
 use crate::system::{Period, PeriodReport, Ticks};
@@ -16,6 +17,9 @@ use takt_isa::{BundleAddress, Machine, Program, Register, SlotIndex};
 
 /// The cycle limit that always holds, so that cycle arithmetic cannot overflow: a thousand years at 125 MHz.
 pub const MAX_CYCLE: Cycle = 1 << 62;
+
+/// Runs after which a block is compiled: so many take about as long as the compiler.
+const COMPILE_AFTER: u64 = 500;
 
 /// What the machine is doing.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -61,6 +65,15 @@ pub enum Step {
     },
     /// The machine has halted before; no cycle passed.
     Halted,
+}
+
+/// Runs of compiled blocks ([`Emulator::set_compile_after`]).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CompiledRuns {
+    /// Those that their code did.
+    pub done: u64,
+    /// Those that it left to the interpreter, because of an infinity, a NaN, a flag or a fault.
+    pub left: u64,
 }
 
 /// Why a run ended.
@@ -171,6 +184,9 @@ pub struct Emulator {
     pub(crate) journal: Journal,
     pub(crate) cycle_limit: Cycle,
     pub(crate) blocks_enabled: bool,
+    /// After how many runs blocks are compiled; `None`: never.
+    pub(crate) compile_after: Option<u64>,
+    pub(crate) compiled_runs: CompiledRuns,
     /// Bundles before whose issue runs pause, ascending.
     pub(crate) pauses: Arc<[BundleAddress]>,
 }
@@ -228,6 +244,8 @@ impl Emulator {
             journal: Journal::default(),
             cycle_limit: MAX_CYCLE,
             blocks_enabled: true,
+            compile_after: Some(COMPILE_AFTER),
+            compiled_runs: CompiledRuns::default(),
             pauses: Arc::default(),
             program: Arc::new(program.clone()),
             code: Arc::new(code),
@@ -272,6 +290,30 @@ impl Emulator {
     /// compare the two ways.
     pub fn set_blocks(&mut self, enabled: bool) {
         self.blocks_enabled = enabled;
+    }
+
+    /// After how many runs a block is compiled to the host's instructions, or `None`: never. Only time tells. Where there is no
+    /// compiler ([`Emulator::compiles`]) this changes nothing.
+    pub fn set_compile_after(&mut self, runs: Option<u64>) {
+        if self.compile_after != runs {
+            self.compile_after = runs;
+            self.drop_blocks();
+        }
+    }
+
+    /// Whether this build, on this host, can compile blocks: feature `jit`, on x86-64.
+    pub fn compiles() -> bool {
+        jit::is_available()
+    }
+
+    /// From now on this process compiles no block, whatever its emulators are set to.
+    pub fn switch_compiler_off() {
+        jit::switch_off();
+    }
+
+    /// How often compiled blocks ran since loading.
+    pub fn compiled_runs(&self) -> CompiledRuns {
+        self.compiled_runs
     }
 
     /// Lets runs pause at these bundles: once a cycle has passed, wherever the cycle to come is the one in which one of them
@@ -613,6 +655,14 @@ impl Observed<'_> {
     /// As there.
     pub fn run_to_wait(&mut self) -> Result<Stop, Fault> {
         self.drive(Goal { wait: true, ..self.emulator.goal() })
+    }
+
+    /// As [`Emulator::run_to_wait_until`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn run_to_wait_until(&mut self, cycle: Cycle) -> Result<Stop, Fault> {
+        self.drive(Goal { until: cycle, wait: true, ..self.emulator.goal() })
     }
 
     /// As [`Emulator::run`].

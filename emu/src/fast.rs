@@ -1,9 +1,10 @@
 //! Running blocks. What is out of the ordinary is left to the stepper: before a block, if that can be seen; else the block
 //! is undone.
 
-use crate::block::Block;
-use crate::emulator::{Emulator, Recent, Status};
+use crate::block::{Block, Compiled};
+use crate::emulator::{CompiledRuns, Emulator, Recent, Status};
 use crate::execute::stack_fault;
+use crate::jit;
 use crate::machine::{Pending, RegisterSet, State, Word};
 use crate::micro::{self, Context, Outside};
 use takt_isa::fp::{Flags, Value};
@@ -35,6 +36,7 @@ pub(crate) struct Journal {
     writes: Vec<(u32, u32)>,
     logged: usize,
     late: Vec<(Flags, Option<u32>)>,
+    words: jit::Words,
 }
 
 impl Journal {
@@ -76,15 +78,6 @@ impl Emulator {
     /// Runs blocks as long as they end before cycle `bound`; until a `wait` issues, if `stop_at_wait`. The machine must
     /// be running and the next bundle not have been charged a stall but the front end's.
     pub(crate) fn run_blocks(&mut self, bound: Cycle, stop_at_wait: bool) -> Fast {
-        let mut journal = std::mem::take(&mut self.journal);
-        let why = self.chain(bound, stop_at_wait, &mut journal);
-        self.journal = journal;
-        why
-    }
-}
-
-impl Emulator {
-    fn chain(&mut self, bound: Cycle, stop_at_wait: bool, journal: &mut Journal) -> Fast {
         loop {
             let entered = self.front.delivered;
             let Some(id) = self.next_block() else { return Fast::Step { until: entered + 1 } };
@@ -94,12 +87,15 @@ impl Emulator {
                 return Fast::Step { until: bound.max(self.now + 1) };
             }
             self.begin_cycle();
-            let block = &self.cache.blocks[id as usize];
+            let block = &mut self.cache.blocks[id as usize];
             let (state, flow) = (&mut self.state, block.flow);
+            if let Some(after) = self.compile_after {
+                block.compile_after(after, self.code.machine.data_depth);
+            }
             if stack_fault(flow, state, self.code.machine).is_some()
                 || beyond_bound
                 || !(block.verified || has_required(state, block, last))
-                || !run(block, state, journal, entered)
+                || !run(block, &mut self.compiled_runs, state, &mut self.journal, entered)
             {
                 return Fast::Step { until: last + 1 };
             }
@@ -163,10 +159,25 @@ pub(crate) fn has_required(state: &State, block: &Block, last: Cycle) -> bool {
 }
 
 /// Runs a block entered in cycle `entered`. If it faults, nothing has happened, and the answer is false.
-fn run(block: &Block, state: &mut State, journal: &mut Journal, entered: Cycle) -> bool {
+fn run(
+    block: &mut Block,
+    runs: &mut CompiledRuns,
+    state: &mut State,
+    journal: &mut Journal,
+    entered: Cycle,
+) -> bool {
     let last = entered + Cycle::from(block.last);
     journal.begin(state, block, last);
     state.write_back_until(last);
+    if let Compiled::Code(code, _) = &block.compiled {
+        if code.run(block, state, &mut journal.words, &mut journal.late, &mut journal.writes) {
+            finish(block, state, journal, entered);
+            runs.done += 1;
+            return true;
+        }
+        runs.left += 1;
+        block.left();
+    }
     let mut context = Context {
         registers: &mut state.registers,
         memory: &mut state.memory,
@@ -184,6 +195,12 @@ fn run(block: &Block, state: &mut State, journal: &mut Journal, entered: Cycle) 
         return false;
     }
     state.flags = flags;
+    finish(block, state, journal, entered);
+    true
+}
+
+/// After a block's operations: its late results are in flight, its writes to ports recorded.
+fn finish(block: &Block, state: &mut State, journal: &Journal, entered: Cycle) {
     for (i, (late, &(flags, memory))) in block.late.iter().zip(&journal.late).enumerate() {
         let value = Value { bits: state.get(Word::late(i)), flags };
         state.pending.push(late.pending(entered, value, memory));
@@ -193,5 +210,4 @@ fn run(block: &Block, state: &mut State, journal: &mut Journal, entered: Cycle) 
     }
     let writes = journal.writes.iter();
     state.port_writes.extend(writes.map(|&(check, bits)| block.checks[check as usize].write(entered, bits)));
-    true
 }

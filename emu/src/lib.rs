@@ -34,6 +34,12 @@ mod event;
 mod execute;
 mod fast;
 mod fault;
+#[cfg(all(feature = "jit", target_arch = "x86_64"))]
+mod jit;
+/// Where there is no compiler, blocks are interpreted.
+#[cfg(not(all(feature = "jit", target_arch = "x86_64")))]
+#[path = "jit/absent.rs"]
+mod jit;
 mod machine;
 mod micro;
 mod statistics;
@@ -42,7 +48,7 @@ mod system;
 pub mod testing;
 
 pub use batch::Batch;
-pub use emulator::{Emulator, MAX_CYCLE, Observed, Status, Step, Stop, Upcoming};
+pub use emulator::{CompiledRuns, Emulator, MAX_CYCLE, Observed, Status, Step, Stop, Upcoming};
 pub use event::{Event, PortWrite, Retire};
 pub use fault::{Fault, FaultKind, LoadError, ShownFault};
 pub use machine::MAX_NAN_WRITES;

@@ -62,10 +62,12 @@ impl From<Register> for Word {
 pub(crate) struct RegisterSet([u64; Register::COUNT / 64]);
 
 impl RegisterSet {
+    #[inline]
     pub(crate) fn insert(&mut self, register: Register) {
         self.0[register.index() / 64] |= 1 << (register.index() % 64);
     }
 
+    #[inline]
     pub(crate) fn contains(&self, register: Register) -> bool {
         self.0[register.index() / 64] >> (register.index() % 64) & 1 != 0
     }
@@ -195,6 +197,7 @@ impl State {
     }
 
     /// The host sets an input port.
+    #[inline]
     pub(crate) fn set_input(&mut self, register: Register, bits: u32) {
         let Some(latches) = &mut self.latches else { return self.set(register, bits) };
         latches.inputs[register.index()] = bits;

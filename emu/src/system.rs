@@ -3,7 +3,7 @@
 use crate::emulator::{Emulator, Goal, Sink, Status, Stop, emit};
 use crate::event::{Event, PortWrite};
 use crate::fault::Fault;
-use std::collections::BTreeSet;
+use std::collections::VecDeque;
 use std::num::NonZeroU64;
 use takt_isa::program::Port;
 use takt_isa::timing::{self, Cycle};
@@ -17,8 +17,8 @@ pub type Rows = Vec<Row>;
 /// Ticks to come and ticks that came.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Ticks {
-    /// Those that the host asked for, by cycle.
-    asked: BTreeSet<Cycle>,
+    /// Those that the host asked for, ascending: a queue, as they come one by one.
+    asked: VecDeque<Cycle>,
     /// The distance of the regular ones.
     every: Option<NonZeroU64>,
     /// The next regular one; there are none before the first `wait`.
@@ -40,7 +40,7 @@ impl Ticks {
     /// The cycle of the next tick.
     #[inline]
     pub(crate) fn next(&self) -> Option<Cycle> {
-        match (self.asked.first().copied(), self.regular) {
+        match (self.asked.front().copied(), self.regular) {
             (Some(a), Some(b)) => Some(a.min(b)),
             (a, b) => a.or(b),
         }
@@ -50,12 +50,23 @@ impl Ticks {
     /// for in the same cycle are one.
     #[inline]
     pub(crate) fn take(&mut self, cycle: Cycle) -> bool {
-        let asked = !self.asked.is_empty() && self.asked.remove(&cycle);
+        // None is before the cycle to come.
+        let asked = self.asked.front() == Some(&cycle);
+        if asked {
+            self.asked.pop_front();
+        }
         let regular = self.regular == Some(cycle);
         if regular {
             self.regular = self.every.map(|every| cycle.saturating_add(every.get()));
         }
         asked || regular
+    }
+
+    fn ask(&mut self, cycle: Cycle) {
+        let place = self.asked.partition_point(|&asked| asked < cycle);
+        if self.asked.get(place) != Some(&cycle) {
+            self.asked.insert(place, cycle);
+        }
     }
 
     /// The same ticks, each so many cycles later.
@@ -284,8 +295,9 @@ impl Emulator {
     ///
     /// # Errors
     /// If the machine has no such port.
+    #[inline]
     pub fn set_input_bits(&mut self, register: Register, bits: u32) -> Result<(), PortError> {
-        if !self.machine().is_input(register) {
+        if !self.code.inputs.contains(register) {
             return Err(PortError::NoInput { register });
         }
         self.state.set_input(register, bits);
@@ -324,7 +336,7 @@ impl Emulator {
     pub fn tick_at(&mut self, cycle: Cycle) -> bool {
         let to_come = cycle >= self.now;
         if to_come {
-            self.ticks.asked.insert(cycle);
+            self.ticks.ask(cycle);
         }
         to_come
     }

@@ -1,4 +1,4 @@
-//! Blocks and stepper do the same: random programs, run both ways in the same chunks, agree in all that can be seen.
+//! Blocks, compiled or not, and stepper do the same: random programs, run both ways in the same chunks, agree in all that can be seen.
 
 use std::num::NonZeroU64;
 use takt_emu::testing::{INPUTS, Options, Random, input_ports, random_program};
@@ -8,6 +8,9 @@ use takt_isa::{BundleAddress, Effect, MACHINES, Program, ROWS, Register, Row};
 
 /// Programs of each kind and machine.
 const PROGRAMS: u64 = 1500;
+
+/// Of so many programs one is compiled: the compiler takes longer than all else here.
+const COMPILED: u32 = 5;
 
 /// Everything that can be seen from outside must be equal.
 fn assert_same(seed: u64, fast: &mut Emulator, step: &mut Emulator) {
@@ -59,6 +62,9 @@ fn pair(program: &Program, random: &mut Random, wild: bool) -> [Emulator; 2] {
     // Some output ports are watched.
     let outputs = program.outputs.iter().map(|port| port.register);
     fast.set_watched(outputs.filter(|_| random.once_in(2)).collect::<Vec<_>>());
+    // Some are compiled, where that can be, at once or when they have run.
+    let compiled = random.once_in(COMPILED).then(|| u64::from(random.below(3)));
+    fast.set_compile_after(compiled);
     let mut step = fast.clone();
     step.set_blocks(false);
     [fast, step]

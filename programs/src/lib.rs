@@ -44,6 +44,7 @@ pub const SOURCES: &[(&str, &str)] = &[
 pub const THREE: &[(&str, &str)] = &[
     ("communication.s", include_str!("../three/communication.s")),
     ("controller.toml", include_str!("../three/controller.toml")),
+    ("demonstration.robot", include_str!("../three/demonstration.robot")),
     ("dynamic.s", include_str!("../three/dynamic.s")),
     ("geometry.s", include_str!("../three/geometry.s")),
     ("kinematic.s", include_str!("../three/kinematic.s")),

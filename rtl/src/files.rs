@@ -58,6 +58,19 @@ pub(crate) const CORE: &[File] = files!("core":
     "takt_in_flight.v"
 );
 
+/// The modules between the cores of a system.
+#[rustfmt::skip]
+pub(crate) const SYSTEM: &[File] = files!("system":
+    "takt_delay.v"
+    "takt_fifo.v"
+    "takt_gate.v"
+    "takt_loader.v"
+    "takt_pace.v"
+    "takt_snapshot.v"
+    "takt_start.v"
+    "takt_wire.v"
+);
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -75,5 +88,6 @@ mod tests {
         };
         assert_eq!(UNITS.len(), count("units") + count("units/common"));
         assert_eq!((ECP5.len(), CORE.len()), (count("ecp5"), count("core")));
+        assert_eq!(SYSTEM.len(), count("system"));
     }
 }

@@ -329,6 +329,18 @@ impl Description {
         ports
     }
 
+    /// What a lane's port shows before anything has arrived.
+    pub fn initial(&self, source: Source) -> u32 {
+        match source {
+            Source::Field { link, field } => {
+                let link = &self.links[link];
+                let fifo = matches!(link.kind, LinkKind::Fifo { .. });
+                if fifo { 0 } else { link.fields[field].initial }
+            }
+            Source::Status { status, .. } => status.initial(),
+        }
+    }
+
     /// The link of this name.
     pub fn link_named(&self, name: &str) -> Option<usize> {
         self.links.iter().position(|link| link.name == name)

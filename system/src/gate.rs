@@ -21,16 +21,16 @@ impl Gate {
         self.arrivals.entry(cycle).or_default().push((lane, value));
     }
 
-    /// Puts on the pins what goes in before cycle `end`: `pin` gets the lane and the value. Everything that arrives two cycles
+    /// Puts on the pins what goes in before cycle `end`: `pin` gets the cycle, the lane and the value. Everything that arrives two cycles
     /// before `end` or earlier must be known.
-    pub(crate) fn run(&mut self, end: Cycle, mut pin: impl FnMut(usize, u32)) {
+    pub(crate) fn run(&mut self, end: Cycle, mut pin: impl FnMut(Cycle, usize, u32)) {
         while self.next < end {
             while let Some(arrival) = self.arrivals.first_entry().filter(|entry| *entry.key() < self.next) {
                 self.waiting.extend(arrival.remove());
             }
             match self.waiting.pop_first() {
                 Some((lane, value)) => {
-                    pin(lane, value);
+                    pin(self.next, lane, value);
                     self.next += 1;
                 }
                 None => {

@@ -194,7 +194,7 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
 fn speed() -> Result<()> {
     install()?;
     let mut measure = cargo();
-    measure.args(["run", "--release", "--package", "takt-benches", "--bin", "speed"]);
+    measure.args(["run", "--release", "--package", "takt-benches", "--features", "jit", "--bin", "speed"]);
     let output = measure.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
     if !output.status.success() {
         bail!("measuring failed ({})", output.status);

@@ -1,6 +1,8 @@
 //! Systems of several cores: their files, and the commands that take them.
 
 pub(crate) mod bound;
+pub(crate) mod cosim;
+mod host;
 pub(crate) mod run;
 
 use crate::fault;
@@ -11,6 +13,7 @@ use crate::select::SourceArguments;
 use anyhow::{Result, anyhow};
 use std::path::Path;
 use takt_asm::nearest;
+use takt_rtl::{Library, SystemDesign, export_system};
 use takt_system::{Description, ProgramError, ReadError, Request, SystemFault, TEXT_BYTES};
 
 /// A system and, for each core, its program with what is known of its source.
@@ -69,4 +72,10 @@ fn missing(asked: &str, file: &Path) -> ProgramError<anyhow::Error> {
 pub(crate) fn told(fault: &SystemFault, system: &LoadedSystem, color: bool) -> anyhow::Error {
     let note = format!("core {}", fault.name);
     Failure::Diagnostics(fault::rendered(&fault.fault, &system.programs[fault.core], &note, color)).into()
+}
+
+/// The circuit of a system, whose top has the file's name.
+pub(crate) fn circuit(system: &LoadedSystem, file: &Path) -> Result<SystemDesign> {
+    let name = file.file_stem().unwrap_or_default().to_string_lossy();
+    Ok(export_system(&system.description, &name, &Library::builtin())?)
 }

@@ -1,5 +1,6 @@
 //! `takt run SYSTEM.toml`: a base tick for each row of inputs.
 
+use super::host::Host;
 use super::{LoadedSystem, load, told};
 use crate::account::Account;
 use crate::files::{self, Out};
@@ -11,10 +12,8 @@ use anyhow::{Result, bail};
 use serde_json::{Map, Value, json};
 use std::io::Write;
 use std::path::Path;
-use takt_isa::program::Port;
 use takt_isa::timing::Cycle;
-use takt_isa::{Register, Type};
-use takt_system::{Description, End, LinkKind, System, SystemPort};
+use takt_system::System;
 
 /// What a run of a system takes of `takt run`.
 pub(crate) struct Arguments<'a> {
@@ -26,81 +25,6 @@ pub(crate) struct Arguments<'a> {
     pub(crate) max_cycles: Option<u64>,
     pub(crate) stats: bool,
     pub(crate) json: bool,
-}
-
-/// The column that says whether a row's entry goes into a FIFO.
-const PUSH: &str = "push";
-
-/// The host's side of a run: columns, and what they do.
-struct Host {
-    inputs: Vec<SystemPort>,
-    /// Snapshots from the host.
-    snapshots: Vec<usize>,
-    /// FIFOs from the host.
-    pushes: Vec<usize>,
-    /// FIFOs to the host.
-    pops: Vec<usize>,
-    outputs: Vec<SystemPort>,
-}
-
-impl Host {
-    fn new(description: &Description) -> Host {
-        let links = |wanted: &dyn Fn(&takt_system::Link) -> bool| -> Vec<usize> {
-            let numbered = description.links.iter().enumerate();
-            numbered.filter(|(_, link)| wanted(link)).map(|(number, _)| number).collect()
-        };
-        let fifo = |link: &takt_system::Link| matches!(link.kind, LinkKind::Fifo { .. });
-        Host {
-            inputs: description.inputs(),
-            snapshots: links(&|link| link.is_snapshot() && link.from == End::Host),
-            pushes: links(&|link| fifo(link) && link.from == End::Host),
-            pops: links(&|link| fifo(link) && link.to == End::Host),
-            outputs: description.outputs(),
-        }
-    }
-
-    /// The columns of the inputs: their values come in this order.
-    fn columns(&self, description: &Description) -> Vec<Port> {
-        // The table of inputs wants a register; nobody asks for it here.
-        let port = |name, ty| Port { name, register: Register::ZERO, ty };
-        let inputs = self.inputs.iter().map(|input| port(input.name.clone(), input.ty));
-        let pushes =
-            self.pushes.iter().map(|link| port(format!("{}.{PUSH}", description.links[*link].name), Type::I));
-        inputs.chain(pushes).collect()
-    }
-
-    /// Does what a row says; how many entries did not fit.
-    fn write(&self, system: &mut System, row: &takt_emu::Row) -> Result<u64> {
-        let (inputs, pushes) = row.split_at(self.inputs.len());
-        for (input, (_, bits)) in self.inputs.iter().zip(inputs) {
-            system.set_input(&input.name, *bits)?;
-        }
-        for &link in &self.snapshots {
-            system.publish(link)?;
-        }
-        let mut refused = 0;
-        for (&link, (_, push)) in self.pushes.iter().zip(pushes) {
-            if *push != 0 && !system.push(link)? {
-                refused += 1;
-            }
-        }
-        Ok(refused)
-    }
-
-    /// The outputs as the host sees them now. Of each FIFO one entry is taken; none where it is empty.
-    fn read(&self, system: &mut System) -> Result<Vec<Option<u32>>> {
-        let mut heads = Vec::new();
-        for &link in &self.pops {
-            heads.push((link, system.pop(link)?));
-        }
-        let value = |output: &SystemPort| -> Result<Option<u32>> {
-            match heads.iter().find(|(link, _)| *link == output.link) {
-                Some((_, entry)) => Ok(entry.as_ref().map(|entry| entry[output.field])),
-                None => Ok(Some(system.output(&output.name)?)),
-            }
-        };
-        self.outputs.iter().map(value).collect()
-    }
 }
 
 /// What a run came to.

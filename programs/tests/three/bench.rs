@@ -124,9 +124,9 @@ impl Plant {
             let det = m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1);
             a[1] = (b[1] * m(2, 2) - b[2] * m(1, 2)) / det;
             a[2] = (b[2] * m(1, 1) - b[1] * m(2, 1)) / det;
-            for i in 0..6 {
-                self.v[i] += a[i] * h;
-                self.q[i] += self.v[i] * h;
+            for ((q, v), a) in self.q.iter_mut().zip(&mut self.v).zip(a) {
+                *v += a * h;
+                *q += *v * h;
             }
         }
     }
@@ -235,8 +235,9 @@ impl Bench {
         bench
     }
 
-    pub(crate) fn block(&mut self) {
-        self.plant.blocked = true;
+    /// Whether something holds the joints.
+    pub(crate) fn block(&mut self, blocked: bool) {
+        self.plant.blocked = blocked;
     }
 
     /// The words go as they are.

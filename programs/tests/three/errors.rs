@@ -30,7 +30,7 @@ fn a_queue_that_runs_dry_is_reported() {
 fn a_joint_that_does_not_follow_stops_the_robot() {
     let mut bench = Bench::new();
     bench.motion(MOVE, near(0.5), fast(Profile::Cosine));
-    bench.block();
+    bench.block(true);
     let report = bench.until(STOPPED, 1);
     assert_eq!((report.cause, report.value), (14, 6.0));
     bench.until_mode(4);

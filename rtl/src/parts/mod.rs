@@ -14,7 +14,7 @@ mod write_back;
 
 use crate::plan::names::net;
 use crate::plan::{Plan, SlotPlan};
-use crate::verilog::{Expr, Module, ModuleError, Parameter, concat};
+use crate::verilog::{Expr, Module, ModuleError, Parameter, concat, number};
 
 impl Plan {
     /// The same of every slot, slot 0 lowest.
@@ -28,7 +28,7 @@ pub(crate) fn core(plan: &Plan, latched: u16) -> Result<String, ModuleError> {
     let mut m = Module::new(&plan.top(), heading(plan), ports::ports(plan));
     m.takes(Parameter {
         net: net::LATCHED.clone(),
-        value: u32::from(latched),
+        value: number(latched.into()),
         heading:
             "0, or how many input ports are latched, from port 0 on: a power of two; then outputs are, too"
                 .to_owned(),

@@ -167,6 +167,11 @@ pub fn number(value: u32) -> Expr {
     Expr::Literal(value.to_string())
 }
 
+/// A string, as parameters are.
+pub fn string(text: &str) -> Expr {
+    Expr::Literal(format!("\"{text}\""))
+}
+
 /// A number in hexadecimal, of all its digits.
 pub fn hexadecimal(width: u32, value: u64) -> Expr {
     Expr::Literal(format!("{width}'h{value:0digits$x}", digits = width.div_ceil(4) as usize))

@@ -9,7 +9,7 @@ mod print;
 
 pub use expression::{
     Expr, Net, Place, Select, any, binary, choose, concat, decimal, gated, hexadecimal, no, number, repeat,
-    yes,
+    string, yes,
 };
 
 use std::collections::BTreeSet;
@@ -84,7 +84,7 @@ impl Port {
 pub(crate) struct Parameter {
     pub(crate) net: Net,
     /// Unless an instance says otherwise.
-    pub(crate) value: u32,
+    pub(crate) value: Expr,
     /// Said on a line of its own before it.
     pub(crate) heading: String,
 }
@@ -181,8 +181,20 @@ impl Instance {
         self
     }
 
+    /// A parameter that is more than a number.
+    pub(crate) fn parameter_is(mut self, name: &'static str, value: Expr) -> Instance {
+        self.parameters.push((name, value));
+        self
+    }
+
     pub(crate) fn port(mut self, name: impl Into<String>, value: impl Into<Expr>) -> Instance {
         self.ports.push((name.into(), value.into()));
+        self
+    }
+
+    /// Outputs that are left open.
+    pub(crate) fn open(mut self, names: impl IntoIterator<Item = impl Into<String>>) -> Instance {
+        self.ports.extend(names.into_iter().map(|name| (name.into(), Expr::Literal(String::new()))));
         self
     }
 

@@ -1,6 +1,6 @@
 //! What the host does between runs.
 
-use super::{HostError, LinkState, System};
+use super::{HostError, LinkEventKind, LinkState, System};
 use crate::description::{End, LinkKind};
 use std::sync::Arc;
 use takt_emu::Number;
@@ -49,7 +49,9 @@ impl System {
             (Some(known), Some(LinkState::Snapshot { working, published, .. }))
                 if known.from == End::Host =>
             {
-                published.push_back((now + known.transit() + 1, working.clone()));
+                let first = now + known.transit() + 1;
+                published.push_back((first, working.clone()));
+                self.event(first, link, LinkEventKind::Published);
                 Ok(())
             }
             (known, _) => {

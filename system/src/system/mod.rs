@@ -8,12 +8,12 @@ mod host;
 mod links;
 mod run;
 
-use crate::description::{Description, End, Lane, Link, LinkKind, Source};
+use crate::description::{Description, End, Lane, Link, LinkKind, Source, Status};
 use crate::fifo::{Fifo, FifoCounts};
 use crate::gate::Gate;
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
-use takt_emu::{Emulator, Fault, LoadError, PeriodReport};
+use takt_emu::{Emulator, Event, Fault, LoadError, PeriodReport};
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Program, Register};
 
@@ -85,6 +85,43 @@ pub enum LinkEventKind {
     Underflow,
 }
 
+/// A value on a core's input pins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct InputEvent {
+    /// The cycle.
+    pub cycle: Cycle,
+    /// The core.
+    pub core: usize,
+    /// The input port.
+    pub register: Register,
+    /// Its new value.
+    pub value: u32,
+}
+
+impl LinkEventKind {
+    /// In words.
+    pub fn text(self) -> String {
+        match self {
+            LinkEventKind::Value(value) => format!("the value 0x{value:08x} arrives"),
+            other => other.name().to_owned(),
+        }
+    }
+
+    /// In a word or two, without the value.
+    pub fn name(self) -> &'static str {
+        match self {
+            LinkEventKind::Value(_) => "value",
+            LinkEventKind::Published => "published",
+            LinkEventKind::Taken => "taken",
+            LinkEventKind::Skipped => "skipped",
+            LinkEventKind::Pushed => "pushed",
+            LinkEventKind::Popped => "popped",
+            LinkEventKind::Overflow => "overflow",
+            LinkEventKind::Underflow => "underflow",
+        }
+    }
+}
+
 /// What a core's periods came to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CorePeriods {
@@ -107,7 +144,7 @@ struct CoreState {
     moving: Arc<[Source]>,
     /// Whether it has no tick to come, for good.
     halted: bool,
-    /// The cycle of its first `wait`.
+    /// The cycle of its first `wait`, or of its halt before that.
     waited: Option<Cycle>,
     /// Its next tick; there only once ticks have started.
     tick: Cycle,
@@ -157,6 +194,10 @@ pub struct System {
     starting: bool,
     fault: Option<SystemFault>,
     events: Option<Vec<LinkEvent>>,
+    /// What the cores did, each with its core.
+    recorded: Option<Vec<(usize, Event)>>,
+    /// What stood on the cores' input pins.
+    inputs: Option<Vec<InputEvent>>,
 }
 
 /// The input ports that a bundle of the program reads.
@@ -183,7 +224,7 @@ impl System {
             let lanes: Arc<[Lane]> = description.lanes(number).into();
             for port in &core.program.inputs {
                 let lane = lanes.iter().find(|lane| lane.register == port.register);
-                let initial = lane.map_or(0, |lane| initial(&description, lane.source));
+                let initial = lane.map_or(0, |lane| description.initial(lane.source));
                 // The port is the program's own.
                 let _ = emulator.set_input_bits(port.register, initial);
             }
@@ -232,6 +273,8 @@ impl System {
             starting: false,
             fault: None,
             events: None,
+            recorded: None,
+            inputs: None,
         })
     }
 
@@ -290,12 +333,40 @@ impl System {
         }
     }
 
+    /// What a FIFO tells about itself now; `None` for other links.
+    pub fn fifo_status(&self, link: usize, status: Status) -> Option<u32> {
+        match self.links.get(link)? {
+            LinkState::Fifo { fifo, .. } => Some(fifo.store.status(status)),
+            _ => None,
+        }
+    }
+
     /// Entries of a FIFO now, the head first; none of other links.
     pub fn fifo_entries(&self, link: usize) -> Vec<Vec<u32>> {
         match self.links.get(link) {
             Some(LinkState::Fifo { fifo, .. }) => fifo.store.entries.iter().cloned().collect(),
             _ => Vec::new(),
         }
+    }
+
+    /// Keeps what the cores do from now on, until it is taken. Cores then run slower: no block of bundles runs as a whole.
+    pub fn keep_core_events(&mut self) {
+        self.recorded.get_or_insert_default();
+        self.inputs.get_or_insert_default();
+    }
+
+    /// What stood on the cores' input pins since this was last asked, by cycle; that of the last
+    /// [`INPUT_DELAY`](takt_isa::timing::INPUT_DELAY) cycles comes with the next run.
+    pub fn take_input_events(&mut self) -> Vec<InputEvent> {
+        let mut inputs = self.inputs.as_mut().map(std::mem::take).unwrap_or_default();
+        inputs.sort();
+        inputs
+    }
+
+    /// What the cores did since this was last asked: of each core in the order of its run. After a fault, cores that had run
+    /// ahead of it are in it with what came later.
+    pub fn take_core_events(&mut self) -> Vec<(usize, Event)> {
+        self.recorded.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
     /// Keeps the events on links from now on, until they are taken.
@@ -314,18 +385,6 @@ impl System {
 
 pub(super) fn latched(description: &Description, end: End) -> bool {
     description.core(end).is_some_and(|core| core.program.latched)
-}
-
-/// What a port shows before anything has arrived.
-pub(crate) fn initial(description: &Description, source: Source) -> u32 {
-    match source {
-        Source::Field { link, field } => {
-            let link = &description.links[link];
-            let fifo = matches!(link.kind, LinkKind::Fifo { .. });
-            if fifo { 0 } else { link.fields[field].initial }
-        }
-        Source::Status { status, .. } => status.initial(),
-    }
 }
 
 /// The output ports of a core whose every write counts.

@@ -1,10 +1,10 @@
 //! Running ahead: each core to where it needs to know of others.
 
-use super::{System, SystemFault, latched};
+use super::{InputEvent, System, SystemFault, latched};
 use crate::description::{End, LinkKind, MIN_LATENCY, Side, Source};
 use crate::system::CoreState;
 use std::sync::Arc;
-use takt_emu::{Fault, Status, Stop};
+use takt_emu::{Event, Fault, Status, Stop};
 use takt_isa::timing::{Cycle, ENDED_DELAY};
 
 /// Cycles that a core runs ahead of the one that is behind all others at most, so that what is under way stays small.
@@ -81,7 +81,7 @@ impl System {
     /// Ticks start once every core has waited, in the first cycle that is a multiple of their distance and that leaves the
     /// host and the snapshots their time.
     fn try_start(&mut self) {
-        if self.start.is_some() || self.cores.iter().any(|core| core.waited.is_none() && !core.halted) {
+        if self.start.is_some() || self.halted() || self.cores.iter().any(|core| core.waited.is_none()) {
             return;
         }
         let Some(last) = self.cores.iter().filter_map(|core| core.waited).max() else { return };
@@ -133,9 +133,14 @@ impl System {
     fn enter(&mut self, core: usize, now: Cycle) {
         let delay = self.description.cores[core].input_delay();
         let CoreState { emulator, gate, lanes, .. } = &mut self.cores[core];
-        gate.run((now + 1).saturating_sub(delay), |lane, value| {
+        let inputs = &mut self.inputs;
+        gate.run((now + 1).saturating_sub(delay), |cycle, lane, value| {
+            let register = lanes[lane].register;
             // A lane's port is an input.
-            let _ = emulator.set_input_bits(lanes[lane].register, value);
+            let _ = emulator.set_input_bits(register, value);
+            if let Some(inputs) = inputs {
+                inputs.push(InputEvent { cycle, core, register, value });
+            }
         });
     }
 
@@ -177,7 +182,13 @@ impl System {
         }
         self.enter(core, now);
         let state = &mut self.cores[core];
-        let stop = state.emulator.run_to_wait_until(end);
+        let stop = match &mut self.recorded {
+            None => state.emulator.run_to_wait_until(end),
+            Some(events) => {
+                let mut sink = |event: &Event| events.push((core, event.clone()));
+                state.emulator.observed(&mut sink).run_to_wait_until(end)
+            }
+        };
         let writes = state.emulator.take_port_writes();
         if let Some(report) = state.emulator.take_period() {
             let periods = &mut state.periods;
@@ -188,8 +199,12 @@ impl System {
             state.last = Some(report);
         }
         let waited = if let Ok(Stop::Wait { cycle, .. }) = stop { Some(cycle) } else { None };
-        state.waited = state.waited.or(waited);
         state.halted = stop == Ok(Stop::Halted);
+        let halted = match *state.emulator.status() {
+            Status::Halted { cycle, .. } => Some(cycle),
+            _ => None,
+        };
+        state.waited = state.waited.or(waited).or(halted);
         // Its inputs for the tick are in: on to the next one.
         if self.start.is_some() && state.taken && state.emulator.now() >= state.tick - ENDED_DELAY + delay {
             state.taken = false;

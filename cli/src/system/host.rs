@@ -1,0 +1,135 @@
+//! The host's side of a run of a system: a row of inputs for each base tick, and a row of outputs.
+
+use anyhow::Result;
+use takt_cosim::system::SystemLockstep;
+use takt_isa::program::Port;
+use takt_isa::{Register, Type};
+use takt_system::{Description, End, LinkKind, System, SystemPort};
+
+/// What the host does with a system, or with one on both sides.
+pub(crate) trait HostSide {
+    fn set_input(&mut self, name: &str, bits: u32) -> Result<()>;
+    fn publish(&mut self, link: usize) -> Result<()>;
+    fn push(&mut self, link: usize) -> Result<bool>;
+    fn pop(&mut self, link: usize) -> Result<Option<Vec<u32>>>;
+    fn system(&self) -> &System;
+}
+
+impl HostSide for System {
+    fn set_input(&mut self, name: &str, bits: u32) -> Result<()> {
+        Ok(System::set_input(self, name, bits)?)
+    }
+
+    fn publish(&mut self, link: usize) -> Result<()> {
+        Ok(System::publish(self, link)?)
+    }
+
+    fn push(&mut self, link: usize) -> Result<bool> {
+        Ok(System::push(self, link)?)
+    }
+
+    fn pop(&mut self, link: usize) -> Result<Option<Vec<u32>>> {
+        Ok(System::pop(self, link)?)
+    }
+
+    fn system(&self) -> &System {
+        self
+    }
+}
+
+impl HostSide for SystemLockstep {
+    fn set_input(&mut self, name: &str, bits: u32) -> Result<()> {
+        Ok(SystemLockstep::set_input(self, name, bits)?)
+    }
+
+    fn publish(&mut self, link: usize) -> Result<()> {
+        Ok(SystemLockstep::publish(self, link)?)
+    }
+
+    fn push(&mut self, link: usize) -> Result<bool> {
+        Ok(SystemLockstep::push(self, link)?)
+    }
+
+    fn pop(&mut self, link: usize) -> Result<Option<Vec<u32>>> {
+        Ok(SystemLockstep::pop(self, link)?)
+    }
+
+    fn system(&self) -> &System {
+        SystemLockstep::system(self)
+    }
+}
+
+/// The column that says whether a row's entry goes into a FIFO.
+const PUSH: &str = "push";
+
+/// The host's side of a run: columns, and what they do.
+pub(crate) struct Host {
+    pub(crate) inputs: Vec<SystemPort>,
+    /// Snapshots from the host.
+    snapshots: Vec<usize>,
+    /// FIFOs from the host.
+    pushes: Vec<usize>,
+    /// FIFOs to the host.
+    pops: Vec<usize>,
+    pub(crate) outputs: Vec<SystemPort>,
+}
+
+impl Host {
+    pub(crate) fn new(description: &Description) -> Host {
+        let links = |wanted: &dyn Fn(&takt_system::Link) -> bool| -> Vec<usize> {
+            let numbered = description.links.iter().enumerate();
+            numbered.filter(|(_, link)| wanted(link)).map(|(number, _)| number).collect()
+        };
+        let fifo = |link: &takt_system::Link| matches!(link.kind, LinkKind::Fifo { .. });
+        Host {
+            inputs: description.inputs(),
+            snapshots: links(&|link| link.is_snapshot() && link.from == End::Host),
+            pushes: links(&|link| fifo(link) && link.from == End::Host),
+            pops: links(&|link| fifo(link) && link.to == End::Host),
+            outputs: description.outputs(),
+        }
+    }
+
+    /// The columns of the inputs: their values come in this order.
+    pub(crate) fn columns(&self, description: &Description) -> Vec<Port> {
+        // The table of inputs wants a register; nobody asks for it here.
+        let port = |name, ty| Port { name, register: Register::ZERO, ty };
+        let inputs = self.inputs.iter().map(|input| port(input.name.clone(), input.ty));
+        let pushes =
+            self.pushes.iter().map(|link| port(format!("{}.{PUSH}", description.links[*link].name), Type::I));
+        inputs.chain(pushes).collect()
+    }
+
+    /// Does what a row says; how many entries did not fit.
+    pub(crate) fn write(&self, system: &mut impl HostSide, row: &takt_emu::Row) -> Result<u64> {
+        let (inputs, pushes) = row.split_at(self.inputs.len());
+        for (input, (_, bits)) in self.inputs.iter().zip(inputs) {
+            system.set_input(&input.name, *bits)?;
+        }
+        for &link in &self.snapshots {
+            system.publish(link)?;
+        }
+        let mut refused = 0;
+        for (&link, (_, push)) in self.pushes.iter().zip(pushes) {
+            if *push != 0 && !system.push(link)? {
+                refused += 1;
+            }
+        }
+        Ok(refused)
+    }
+
+    /// The outputs as the host sees them now. Of each FIFO one entry is taken; none where it is empty.
+    pub(crate) fn read(&self, system: &mut impl HostSide) -> Result<Vec<Option<u32>>> {
+        let mut heads = Vec::new();
+        for &link in &self.pops {
+            heads.push((link, system.pop(link)?));
+        }
+        let value = |output: &SystemPort| -> Result<Option<u32>> {
+            match heads.iter().find(|(link, _)| *link == output.link) {
+                Some((_, entry)) => Ok(entry.as_ref().map(|entry| entry[output.field])),
+                None => Ok(Some(system.system().output(&output.name)?)),
+            }
+        };
+        self.outputs.iter().map(value).collect()
+    }
+}

@@ -1,0 +1,393 @@
+//! A system on both sides.
+
+use super::model::{PinAction, SystemEvent, SystemSimulation};
+use crate::lockstep::{REPORT_DELAY, bare, circuit_stops, describe, expect, show};
+use crate::model::{CircuitEvent, EventKind, ModelError};
+use takt_emu::{LoadError, Status};
+use takt_isa::BundleAddress;
+use takt_isa::timing::{Cycle, INPUT_DELAY};
+use takt_rtl::system::{Pin, PinKind, SystemPlan};
+use takt_rtl::verilog::Direction;
+use takt_system::{Description, HostError, LinkEventKind, LinkKind, System, SystemFault};
+use thiserror::Error;
+
+/// Why a lockstep run of a system came to no result.
+#[derive(Debug, Error)]
+pub enum SystemLockstepError {
+    /// The emulator does not take a program.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// The simulation does not run.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The host cannot do what it was to do.
+    #[error(transparent)]
+    Host(#[from] HostError),
+    /// The two sides differ.
+    #[error(transparent)]
+    Difference(#[from] Box<SystemDifference>),
+}
+
+/// The first thing in which the two sides differ.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SystemDifference {
+    /// Its cycle.
+    pub cycle: Cycle,
+    /// The core or the link.
+    pub place: String,
+    text: String,
+}
+
+impl std::fmt::Display for SystemDifference {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+impl std::error::Error for SystemDifference {}
+
+/// A system on the emulator and on the circuit.
+///
+/// The emulator goes ahead; the circuit follows to the same cycle, with what the host does put on its pins in the cycle in which
+/// the emulator's host did it.
+pub struct SystemLockstep {
+    system: System,
+    simulation: SystemSimulation,
+    pins: Vec<Pin>,
+    expected: Vec<SystemEvent>,
+    found: Vec<SystemEvent>,
+    actions: Vec<PinAction>,
+    simulated: Cycle,
+    compared: u64,
+}
+
+impl SystemLockstep {
+    /// Both sides after reset.
+    ///
+    /// # Errors
+    /// If the emulator does not take a program.
+    pub fn new(
+        description: &Description,
+        plan: &SystemPlan,
+        simulation: SystemSimulation,
+    ) -> Result<SystemLockstep, SystemLockstepError> {
+        let mut system = System::new(description)?;
+        system.keep_events();
+        system.keep_core_events();
+        Ok(SystemLockstep {
+            system,
+            simulation,
+            pins: plan.pins(),
+            expected: Vec::new(),
+            found: Vec::new(),
+            actions: Vec::new(),
+            simulated: 0,
+            compared: 0,
+        })
+    }
+
+    /// The emulator.
+    pub fn system(&self) -> &System {
+        &self.system
+    }
+
+    /// Events and values on pins that were the same on both sides.
+    pub fn compared(&self) -> u64 {
+        self.compared
+    }
+
+    /// The simulation, when all is compared.
+    pub fn into_simulation(self) -> SystemSimulation {
+        self.simulation
+    }
+
+    /// As [`System::set_input`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn set_input(&mut self, name: &str, bits: u32) -> Result<(), SystemLockstepError> {
+        self.system.set_input(name, bits)?;
+        let description = self.system.description();
+        let own = |pin: &&Pin| {
+            let link = &description.links[pin.link];
+            let PinKind::Field(field) = pin.kind else { return false };
+            pin.direction == Direction::Input
+                && match link.kind {
+                    LinkKind::Wire => link.fields[field].from == name,
+                    _ => name
+                        .strip_prefix(&link.name)
+                        .and_then(|rest| rest.strip_prefix('.'))
+                        .is_some_and(|name| name == link.fields[field].from),
+                }
+        };
+        let Some(link) = self.pins.iter().find(own).map(|pin| pin.link) else { return Ok(()) };
+        let wire = matches!(description.links[link].kind, LinkKind::Wire);
+        let pin = self.pins.iter().position(|pin| own(&pin));
+        self.actions.extend(pin.map(|pin| (self.system.now(), pin, bits)));
+        if wire {
+            self.strobe(link, PinKind::Send);
+        }
+        Ok(())
+    }
+
+    /// As [`System::publish`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn publish(&mut self, link: usize) -> Result<(), SystemLockstepError> {
+        self.system.publish(link)?;
+        self.strobe(link, PinKind::Send);
+        Ok(())
+    }
+
+    /// As [`System::push`]; no more than one a cycle.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn push(&mut self, link: usize) -> Result<bool, SystemLockstepError> {
+        let room = self.system.push(link)?;
+        self.strobe(link, PinKind::Send);
+        Ok(room)
+    }
+
+    fn strobe(&mut self, link: usize, kind: PinKind) {
+        let pin = self.pins.iter().position(|pin| pin.link == link && pin.kind == kind);
+        self.actions.extend(pin.map(|pin| (self.system.now(), pin, 1)));
+    }
+
+    /// The host writes all fields of a link that it drives: of a wire its value, of a snapshot what it publishes, of a FIFO an
+    /// entry. False if a FIFO is full, as far as the host can know.
+    ///
+    /// # Errors
+    /// If it drives no such link.
+    pub fn write(&mut self, link: usize, values: &[u32]) -> Result<bool, SystemLockstepError> {
+        let unknown = || HostError::Unknown { what: "link from the host", name: link.to_string() };
+        let known = self.system.description().links.get(link).cloned().ok_or_else(unknown)?;
+        for (field, &value) in known.fields.iter().zip(values) {
+            match known.kind {
+                LinkKind::Wire => self.set_input(&field.from, value)?,
+                _ => self.set_input(&format!("{}.{}", known.name, field.from), value)?,
+            }
+        }
+        match known.kind {
+            LinkKind::Wire => Ok(true),
+            LinkKind::Snapshot { .. } => self.publish(link).map(|()| true),
+            LinkKind::Fifo { .. } => self.push(link),
+        }
+    }
+
+    /// The host takes the head of a FIFO; `None` if it is empty. No more than one a cycle.
+    ///
+    /// # Errors
+    /// If there is no such FIFO.
+    pub fn pop(&mut self, link: usize) -> Result<Option<Vec<u32>>, SystemLockstepError> {
+        let head = self.system.pop(link)?;
+        if head.is_some() {
+            self.strobe(link, PinKind::Pop);
+        }
+        Ok(head)
+    }
+
+    /// Runs both until ticks have started, or every core has halted, but no further than until `limit` cycles have passed. The
+    /// cycle of the first base tick, if it is known then.
+    ///
+    /// # Errors
+    /// A difference, or a simulation that ended.
+    pub fn run_to_start(&mut self, limit: Cycle) -> Result<Option<Cycle>, SystemLockstepError> {
+        let start = self.system.run_to_start(limit);
+        self.follow()?;
+        Ok(start.unwrap_or_default())
+    }
+
+    /// Runs both until `cycle` cycles have passed; false if a core has stopped the system with a fault.
+    ///
+    /// # Errors
+    /// A difference, or a simulation that ended.
+    pub fn run_until(&mut self, cycle: Cycle) -> Result<bool, SystemLockstepError> {
+        let result = self.system.run_until(cycle);
+        self.follow()?;
+        Ok(result.is_ok())
+    }
+
+    /// The fault that the emulator stopped with.
+    pub fn fault(&self) -> Option<&SystemFault> {
+        self.system.fault()
+    }
+
+    /// Lets the circuit follow, and compares.
+    fn follow(&mut self) -> Result<(), SystemLockstepError> {
+        let now = self.system.now();
+        let cores = self.system.take_core_events().into_iter();
+        self.expected.extend(
+            cores.filter_map(|(core, event)| Some(SystemEvent::Core { core, event: expect(&event)? })),
+        );
+        let inputs = self.system.take_input_events().into_iter().map(|input| {
+            let register = input.register.get();
+            let event = CircuitEvent { register, value: input.value, ..bare(EventKind::Input, input.cycle) };
+            SystemEvent::Core { core: input.core, event }
+        });
+        self.expected.extend(inputs);
+        self.expected.extend(self.system.take_events().into_iter().map(SystemEvent::Link));
+        if now > self.simulated {
+            self.actions.sort_by_key(|&(cycle, ..)| cycle);
+            let due = self.actions.partition_point(|&(cycle, ..)| cycle < now);
+            let actions: Vec<_> = self.actions.drain(..due).collect();
+            let (found, pins) = self.simulation.run(now, &actions)?;
+            self.found.extend(found);
+            self.simulated = now;
+            let known = now.saturating_sub(REPORT_DELAY);
+            self.check(known)?;
+            if self.system.fault().is_none() {
+                self.check_pins(now, &pins)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Lets the circuit tell of the last cycles, and compares them. The host can do nothing more.
+    ///
+    /// # Errors
+    /// A difference, or a simulation that ended.
+    pub fn finish(&mut self) -> Result<(), SystemLockstepError> {
+        let now = self.system.now();
+        let (found, _) = self.simulation.run(now + REPORT_DELAY, &[])?;
+        self.found.extend(found);
+        self.simulated = now + REPORT_DELAY;
+        // A fault that the circuit does not look at is no event, and what it does in that cycle is another thing.
+        let end = match self.system.fault() {
+            Some(fault) if circuit_stops(&fault.fault) => fault.fault.cycle + 1,
+            Some(fault) => fault.fault.cycle,
+            None => now,
+        };
+        self.check(end)
+    }
+
+    /// What the host sees, on each of its pins.
+    fn check_pins(&mut self, now: Cycle, values: &[u32]) -> Result<(), SystemLockstepError> {
+        for (pin, &found) in self.pins.iter().zip(values) {
+            if pin.direction != Direction::Output {
+                continue;
+            }
+            let link = &self.system.description().links[pin.link];
+            let expected = match (pin.kind, &link.kind) {
+                (PinKind::Status(status), _) => self.system.fifo_status(pin.link, status),
+                // Without an entry there is no head.
+                (_, LinkKind::Fifo { .. }) if self.system.fifo_entries(pin.link).is_empty() => None,
+                (PinKind::Field(field), kind) => {
+                    let name = &link.fields[field].to;
+                    let name = match kind {
+                        LinkKind::Wire => name.clone(),
+                        _ => format!("{}.{name}", link.name),
+                    };
+                    Some(self.system.output(&name)?)
+                }
+                _ => None,
+            };
+            let Some(expected) = expected else { continue };
+            if expected != found {
+                let text = format!(
+                    "cycle {now}, pin {}\n  emulator: 0x{expected:08x}\n  circuit:  0x{found:08x}",
+                    pin.net
+                );
+                let place = format!("pin {}", pin.net);
+                return Err(Box::new(SystemDifference { cycle: now, place, text }).into());
+            }
+            self.compared += 1;
+        }
+        Ok(())
+    }
+
+    /// Compares the events before a cycle, in order.
+    fn check(&mut self, end: Cycle) -> Result<(), SystemLockstepError> {
+        // After its halt a core is still ticked, of which the emulator says nothing.
+        let description = self.system.description();
+        let halts: Vec<Option<Cycle>> = (0..description.cores.len())
+            .map(|core| match *self.system.core(core).status() {
+                Status::Halted { cycle, .. } => Some(cycle),
+                _ => None,
+            })
+            .collect();
+        let after_halt = |event: &SystemEvent| match event {
+            SystemEvent::Core { core, event }
+                if matches!(event.kind, EventKind::Missed | EventKind::Lost) =>
+            {
+                halts[*core].is_some_and(|halt| event.cycle > halt)
+            }
+            SystemEvent::Link(event) if event.kind == LinkEventKind::Skipped => {
+                let to = description.links[event.link].to;
+                let takt_system::End::Core(core) = to else { return false };
+                halts[core].is_some_and(|halt| event.cycle > halt)
+            }
+            _ => false,
+        };
+        // The emulator puts a value on the pins when it counts.
+        let known = |event: &SystemEvent| match event {
+            SystemEvent::Core { event, .. } if event.kind == EventKind::Input => {
+                event.cycle + INPUT_DELAY < end
+            }
+            event => event.cycle() < end,
+        };
+        let take = |events: &mut Vec<SystemEvent>| {
+            let (mut taken, left): (Vec<_>, Vec<_>) =
+                events.drain(..).filter(|event| !after_halt(event)).partition(|event| known(event));
+            *events = left;
+            taken.sort_by_key(key);
+            taken
+        };
+        let (expected, found) = (take(&mut self.expected), take(&mut self.found));
+        let same = expected.iter().zip(&found).take_while(|(a, b)| a == b).count();
+        self.compared += same as u64;
+        match (expected.get(same), found.get(same)) {
+            (None, None) => Ok(()),
+            (emulator, circuit) => Err(Box::new(self.difference(emulator, circuit)).into()),
+        }
+    }
+
+    fn difference(&self, emulator: Option<&SystemEvent>, circuit: Option<&SystemEvent>) -> SystemDifference {
+        // Events of one place are shown side by side; else the earlier one is what the other side lacks.
+        let place = |event: &SystemEvent| {
+            let (cycle, kind, place, ..) = key(event);
+            (cycle, kind, place)
+        };
+        let (emulator, circuit) = match (emulator, circuit) {
+            (Some(a), Some(b)) if place(a) < place(b) => (Some(a), None),
+            (Some(a), Some(b)) if place(a) > place(b) => (None, Some(b)),
+            pair => pair,
+        };
+        let description = self.system.description();
+        let cycle = emulator.or(circuit).map_or(0, SystemEvent::cycle);
+        let mut instruction = String::new();
+        let name = match emulator.or(circuit) {
+            Some(SystemEvent::Core { core, event }) => {
+                let program = &description.cores[*core].program;
+                if matches!(event.kind, EventKind::Issue | EventKind::Retire | EventKind::Fault) {
+                    let slot = (event.kind == EventKind::Retire).then_some(event.slot);
+                    instruction = describe(program, BundleAddress::new(event.address), slot);
+                }
+                format!("core {}", description.cores[*core].name)
+            }
+            Some(SystemEvent::Link(event)) => format!("link {}", description.links[event.link].name),
+            None => String::new(),
+        };
+        let side = |event: Option<&SystemEvent>| match event {
+            None => "nothing".to_owned(),
+            Some(SystemEvent::Core { core, event }) => show(&description.cores[*core].program, event),
+            Some(SystemEvent::Link(event)) => event.kind.text(),
+        };
+        let at = if instruction.is_empty() { String::new() } else { format!(" at {instruction}") };
+        let text = format!(
+            "cycle {cycle}, {name}{at}\n  emulator: {}\n  circuit:  {}",
+            side(emulator),
+            side(circuit)
+        );
+        SystemDifference { cycle, place: name, text }
+    }
+}
+
+/// By what events are in order: cycle, cores before links, which of them, and the event itself.
+fn key(event: &SystemEvent) -> (Cycle, u8, usize, Option<CircuitEvent>, Option<LinkEventKind>) {
+    match *event {
+        SystemEvent::Core { core, event } => (event.cycle, 0, core, Some(event), None),
+        SystemEvent::Link(event) => (event.cycle, 1, event.link, None, Some(event.kind)),
+    }
+}

@@ -1,0 +1,13 @@
+//! A system of several cores: its circuit against its emulator, in lockstep.
+//!
+//! [`SystemModel`] compiles an exported system with Verilator, [`SystemLockstep`] runs it and its emulator and compares, cycle by
+//! cycle, what every core does, what happens on every link, and what the host sees. [`random`] makes systems for it.
+
+mod lockstep;
+mod model;
+mod probe;
+pub mod random;
+
+pub use lockstep::{SystemDifference, SystemLockstep, SystemLockstepError};
+pub use model::{SystemEvent, SystemModel, SystemSimulation};
+pub use probe::PROBE;

@@ -1,0 +1,77 @@
+//! The one place with `unsafe`: machine code is made executable and called.
+#![expect(unsafe_code, reason = "a call of machine code made at run time has no safe form")]
+
+use crate::machine::WORDS;
+use cranelift::codegen::Context;
+use cranelift::codegen::control::ControlPlane;
+use cranelift::codegen::ir::Function;
+use cranelift::prelude::isa::{OwnedTargetIsa, TargetIsa};
+use cranelift::prelude::{AbiParam, Configurable, Signature, settings, types};
+use memmap2::{Mmap, MmapMut};
+use std::sync::OnceLock;
+
+/// The code of a block.
+type Entry = unsafe extern "C" fn(registers: *mut u32, memory: *mut u32, scratch: *mut u32) -> u32;
+
+/// A compiled block.
+pub(super) struct Native {
+    code: Mmap,
+    memory: usize,
+    scratch: usize,
+}
+
+/// The host's instruction set; `None` if code cannot be made for it.
+pub(super) fn target() -> Option<&'static dyn TargetIsa> {
+    static TARGET: OnceLock<Option<OwnedTargetIsa>> = OnceLock::new();
+    let target = TARGET.get_or_init(|| {
+        let mut flags = settings::builder();
+        // Its optimiser would take operations from where they are, and leave everything waiting in memory for them.
+        flags.set("opt_level", "none").ok()?;
+        // In release it costs time only: what it checks is Cranelift's own.
+        flags.set("enable_verifier", if cfg!(debug_assertions) { "true" } else { "false" }).ok()?;
+        cranelift::native::builder().ok()?.finish(settings::Flags::new(flags)).ok()
+    });
+    target.as_deref()
+}
+
+/// How a block's code is called: registers, data memory and scratch words; 0 if it did its work.
+pub(super) fn signature(target: &dyn TargetIsa) -> Signature {
+    let mut signature = Signature::new(target.default_call_conv());
+    signature.params.extend([AbiParam::new(types::I64); 3]);
+    signature.returns.push(AbiParam::new(types::I32));
+    signature
+}
+
+impl Native {
+    /// Machine code for a function with [`signature`], which reads and writes no more than [`WORDS`] registers, `memory`
+    /// words of data memory and `scratch` words. `None` if there is no code for it, or no memory.
+    pub(super) fn new(function: Function, memory: usize, scratch: usize) -> Option<Native> {
+        let target = target()?;
+        let mut context = Context::for_function(function);
+        let compiled = context.compile(target, &mut ControlPlane::default()).ok()?;
+        // It refers to nothing outside by name: what it calls, it calls by address.
+        if !compiled.buffer.relocs().is_empty() {
+            return None;
+        }
+        let code = compiled.code_buffer();
+        let mut pages = MmapMut::map_anon(code.len()).ok()?;
+        pages.copy_from_slice(code);
+        Some(Native { code: pages.make_exec().ok()?, memory, scratch })
+    }
+
+    /// Runs the block. If something was out of the ordinary, the answer is false: then every register that the block reads
+    /// before it writes it is as it was.
+    pub(super) fn call(&self, registers: &mut [u32; WORDS], memory: &mut [u32], scratch: &mut [u32]) -> bool {
+        assert!(memory.len() >= self.memory && scratch.len() >= self.scratch, "the block needs more words");
+        // SAFETY: the pages hold a whole function of this signature and calling convention, made by Cranelift; they are
+        // executable and stay where they are as long as `self` lives. `graph`, which alone makes such functions, addresses
+        // the registers by `Word::index`, which is below `WORDS`, the memory by indices compared with `self.memory`, and
+        // the scratch words by numbers below `self.scratch`. The three are borrowed for the time of the call, and nothing
+        // of them is kept.
+        let status = unsafe {
+            let entry = std::mem::transmute::<*const u8, Entry>(self.code.as_ptr());
+            entry(registers.as_mut_ptr(), memory.as_mut_ptr(), scratch.as_mut_ptr())
+        };
+        status == 0
+    }
+}

@@ -1,0 +1,40 @@
+//! What the loader writes into the cores in reset, once their memories have been cleared.
+
+use super::SystemPlan;
+use crate::bench::{LoadRecord, Space, load_records};
+use crate::export::DesignFile;
+use std::fmt::Write as _;
+
+/// A record, with the core that it is for.
+pub(super) type Record = (usize, LoadRecord);
+
+/// Programs, data, presets, and what input ports show before anything has arrived. Zeros of memories are there already.
+pub(super) fn records(plan: &SystemPlan) -> Vec<Record> {
+    let mut records = Vec::new();
+    for (number, core) in plan.description.cores.iter().enumerate() {
+        let cleared =
+            |record: &LoadRecord| matches!(record.space, Space::Program | Space::Data) && record.value == 0;
+        let loaded = load_records(&core.program).into_iter().filter(|record| !cleared(record));
+        records.extend(loaded.map(|record| (number, record)));
+        let machine = core.program.machine;
+        for lane in &plan.lanes[number] {
+            let Some(index) = machine.inputs.index(lane.register) else { continue };
+            let value = plan.description.initial(lane.source).into();
+            records.push((number, LoadRecord { space: Space::Input, slot: 0, address: index.get(), value }));
+        }
+    }
+    records
+}
+
+/// The records for `$readmemh`, so many of them: the last one again where there are fewer.
+pub(super) fn file(plan: &SystemPlan, records: &[Record], count: usize) -> DesignFile {
+    let mut text =
+        String::from("// {core, space, slot, address, value}: what takt_loader writes into the cores\n");
+    let more = records.last().into_iter().cycle().take(count.saturating_sub(records.len()));
+    for &(core, LoadRecord { space, slot, address, value }) in records.iter().chain(more) {
+        let place = (core as u128) << 5 | (space as u128) << 3 | u128::from(slot);
+        let word = place << 64 | u128::from(address) << 48 | u128::from(value);
+        let _ = writeln!(text, "{word:019x}");
+    }
+    DesignFile { name: format!("{}.hex", plan.top), text }
+}

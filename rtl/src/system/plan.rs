@@ -1,0 +1,240 @@
+//! Every name in the generated part of a system, and the top's pins.
+
+use super::core::STATUS;
+use super::top::DUE;
+use crate::plan::Plan;
+use crate::verilog::{Direction, Expr, Net, no};
+use takt_isa::Register;
+use takt_isa::timing::Cycle;
+use takt_system::{Description, End, Lane, LinkKind, Status};
+
+/// The plan of a system's circuit.
+#[derive(Clone, Debug)]
+pub struct SystemPlan {
+    /// Cores and links.
+    pub description: Description,
+    /// The plan of each core.
+    pub cores: Vec<Plan>,
+    /// The top's module.
+    pub top: String,
+    /// The lanes of each core's gate.
+    pub lanes: Vec<Vec<Lane>>,
+}
+
+/// A pin of the top that is a host's end of a link.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Pin {
+    /// Its name and width.
+    pub net: Net,
+    /// From outside or to it.
+    pub direction: Direction,
+    /// What it is; of a value that goes on several wires, on the first.
+    pub kind: PinKind,
+    /// The link.
+    pub link: usize,
+}
+
+/// What a host's pin is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PinKind {
+    /// A field of the link.
+    Field(usize),
+    /// To the system: high for a cycle to write the wire, publish the snapshot, push the entry.
+    Send,
+    /// To the system: high for a cycle to take the FIFO's head out.
+    Pop,
+    /// What the FIFO tells about itself.
+    Status(Status),
+}
+
+/// The output ports of a core that a link uses, with the names of their nets.
+pub(super) struct OutputPort {
+    pub(super) register: Register,
+    pub(super) name: String,
+    /// Whether its value is sent; else only that it is written.
+    pub(super) sent: bool,
+}
+
+impl SystemPlan {
+    pub(super) fn new(description: Description, cores: Vec<Plan>, name: &str) -> SystemPlan {
+        let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+        let lanes = (0..cores.len()).map(|core| description.lanes(core)).collect();
+        SystemPlan { description, cores, top: format!("takt_system_{plain}"), lanes }
+    }
+
+    /// The module of a core with its gate.
+    pub fn core_module(&self, core: usize) -> String {
+        format!("{}_{}", self.top, self.description.cores[core].name)
+    }
+
+    /// Its instance in the top.
+    pub fn core_instance(&self, core: usize) -> String {
+        format!("core_{}", self.description.cores[core].name)
+    }
+
+    /// The instance of a link in the top.
+    pub fn link_instance(&self, link: usize) -> String {
+        let known = &self.description.links[link];
+        match known.kind {
+            LinkKind::Wire => format!("wire{link}_{}", known.fields[0].to),
+            LinkKind::Snapshot { .. } => format!("snapshot_{}", known.name),
+            LinkKind::Fifo { .. } => format!("fifo_{}", known.name),
+        }
+    }
+
+    /// A net of a link: what a port of its instance is connected to.
+    pub(super) fn of_link(&self, link: usize, port: &str) -> Net {
+        Net::named(format!("{}_{port}", self.link_instance(link)))
+    }
+
+    /// A net of a core in the top.
+    pub fn of_core(&self, core: usize, what: &str) -> Net {
+        Net::named(format!("{}_{what}", self.description.cores[core].name))
+    }
+
+    /// Bits of the number of a FIFO's entries.
+    pub(super) fn count_bits(depth: u32) -> u32 {
+        (u32::BITS - depth.leading_zeros()).max(2)
+    }
+
+    /// The output ports of a core that links use, each once.
+    pub(super) fn outputs(&self, core: usize) -> Vec<OutputPort> {
+        let here = End::Core(core);
+        let mut used: Vec<(Register, bool)> = Vec::new();
+        for link in &self.description.links {
+            let mut add =
+                |register: Register, sent: bool| match used.iter_mut().find(|(own, _)| *own == register) {
+                    Some((_, known)) => *known |= sent,
+                    None => used.push((register, sent)),
+                };
+            if link.from == here {
+                link.fields.iter().filter_map(|field| field.output).for_each(|register| add(register, true));
+                match link.kind {
+                    LinkKind::Snapshot { strobe: Some(strobe) } => add(strobe, false),
+                    LinkKind::Fifo { push: Some(push), .. } => add(push, false),
+                    _ => {}
+                }
+            }
+            if let (LinkKind::Fifo { pop: Some(pop), .. }, true) = (&link.kind, link.to == here) {
+                add(*pop, false);
+            }
+        }
+        let program = &self.description.cores[core].program;
+        let name = |register: Register| {
+            let port = program.outputs.iter().find(|port| port.register == register);
+            port.map_or_else(|| program.register_text(register), |port| port.name.clone())
+        };
+        used.into_iter().map(|(register, sent)| OutputPort { register, name: name(register), sent }).collect()
+    }
+
+    /// Whether a link goes by the `wait`s of a core.
+    pub(super) fn is_waited_for(&self, core: usize) -> bool {
+        let latched = self.description.cores[core].program.latched;
+        let own = self.description.links.iter().filter(|link| link.from == End::Core(core));
+        own.into_iter().any(|link| match link.kind {
+            LinkKind::Wire => latched,
+            LinkKind::Snapshot { strobe } => strobe.is_none(),
+            LinkKind::Fifo { .. } => false,
+        })
+    }
+
+    fn port_net(&self, end: End, register: Option<Register>, what: &str) -> Option<Net> {
+        let (End::Core(core), Some(register)) = (end, register) else { return None };
+        let port = self.outputs(core).into_iter().find(|port| port.register == register)?;
+        Some(self.of_core(core, &format!("{}_{what}", port.name)))
+    }
+
+    /// Whether an output port of a core is written in this cycle; constant 0 if it is none.
+    pub(super) fn write(&self, end: End, register: Option<Register>) -> Expr {
+        self.port_net(end, register, "write").map_or_else(no, Into::into)
+    }
+
+    /// What an output port of a core is given.
+    pub(super) fn value(&self, end: End, register: Option<Register>) -> Option<Expr> {
+        Some(self.port_net(end, register, "value")?.wide(32).into())
+    }
+
+    /// Cycles from `due` to a base tick.
+    pub(super) fn lead(&self) -> Cycle {
+        self.description.lead()
+    }
+
+    /// The host's ends of links, in the order of the links.
+    pub fn pins(&self) -> Vec<Pin> {
+        let mut pins: Vec<Pin> = Vec::new();
+        for (link, known) in self.description.links.iter().enumerate() {
+            let stem = |name: &str| match known.kind {
+                LinkKind::Wire => name.to_owned(),
+                _ => format!("{}_{name}", known.name),
+            };
+            let mut put = |direction: Direction, name: String, width: u32, kind: PinKind| {
+                let prefix = if direction == Direction::Input { "in" } else { "out" };
+                let net = Net::named(format!("{prefix}_{name}"));
+                let net = if width > 1 { net.wide(width) } else { net };
+                // One value of the host's may go on several wires.
+                if !(known.from == End::Host
+                    && matches!(known.kind, LinkKind::Wire)
+                    && pins.iter().any(|pin: &Pin| pin.net == net))
+                {
+                    pins.push(Pin { net, direction, kind, link });
+                }
+            };
+            let fields = || known.fields.iter().enumerate();
+            if known.from == End::Host {
+                let send = match known.kind {
+                    LinkKind::Wire => format!("{}_write", known.fields[0].from),
+                    LinkKind::Snapshot { .. } => stem("publish"),
+                    LinkKind::Fifo { .. } => stem("push"),
+                };
+                put(Direction::Input, send, 1, PinKind::Send);
+                for (i, field) in fields() {
+                    put(Direction::Input, stem(&field.from), 32, PinKind::Field(i));
+                }
+            }
+            if known.to == End::Host {
+                if let LinkKind::Fifo { .. } = known.kind {
+                    put(Direction::Input, stem("pop"), 1, PinKind::Pop);
+                }
+                for (i, field) in fields() {
+                    put(Direction::Output, stem(&field.to), 32, PinKind::Field(i));
+                }
+            }
+            if let LinkKind::Fifo { depth, .. } = known.kind
+                && (known.from == End::Host || known.to == End::Host)
+            {
+                for status in Status::ALL {
+                    let width = if status == Status::Count { SystemPlan::count_bits(depth) } else { 1 };
+                    put(Direction::Output, stem(status.name()), width, PinKind::Status(status));
+                }
+            }
+        }
+        pins
+    }
+
+    /// The top's pins that say what it does, and are no link's: `due`, then what each core tells, core 0 lowest.
+    pub fn status_pins(&self) -> Vec<Net> {
+        let cores = self.cores.len() as u32;
+        let told =
+            STATUS.into_iter().skip(1).map(|net| Net::named(net.name().to_owned()).wide(net.width() * cores));
+        [DUE].into_iter().chain(told).collect()
+    }
+
+    /// The pin of a host's end.
+    pub(super) fn pin(&self, link: usize, kind: PinKind) -> Option<Net> {
+        let pins = self.pins();
+        let own = pins.iter().find(|pin| pin.link == link && pin.kind == kind);
+        // The value of a wire may be that of an earlier one.
+        let first = || {
+            let known = &self.description.links[link];
+            let same = |pin: &&Pin| {
+                let other = &self.description.links[pin.link];
+                pin.kind == kind
+                    && pin.direction == Direction::Input
+                    && matches!((&other.kind, &known.kind), (LinkKind::Wire, LinkKind::Wire))
+                    && other.fields[0].from == known.fields[0].from
+            };
+            pins.iter().find(same)
+        };
+        own.or_else(first).map(|pin| pin.net.clone())
+    }
+}

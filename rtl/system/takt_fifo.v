@@ -1,0 +1,117 @@
+// takt_fifo: a queue between two cores (docs/system.md, FIFO). It stands at the receiver.
+//
+// Contract
+//   write, value: the sender's ports, in the cycle of writeback; push in cycle s puts in, in e = s + LENGTH, what was written to
+//   them last, in s or before. HOST: the entry is value, in the cycle of push.
+//   pop in cycle e takes the head out; in one cycle first one is taken out, then one put in. An entry that finds it full is
+//   refused, a pop that finds it empty takes nothing; overflow and underflow stand from then on.
+//   In e + 1: another, if e brought another head; changed, if e brought a push or a pop, accepted or not; head and status, as e
+//   left them. head means nothing while it is empty. told and what follows: changed and the status LENGTH cycles later, for the sender.
+//   pushed, popped, refused, missed: what e brought, in e.
+
+module takt_fifo #(
+    parameter FIELDS = 1,
+    parameter DEPTH  = 2,
+    parameter COUNT  = 2,    // bits of the number of entries, DEPTH included
+    parameter LENGTH = 0,
+    parameter HOST   = 0,
+    parameter [32*FIELDS-1:0] INITIAL = 0
+) (
+    input  wire                 clk,
+    input  wire                 rst,
+    input  wire [FIELDS-1:0]    write,
+    input  wire [32*FIELDS-1:0] value,
+    input  wire                 push,
+    input  wire                 pop,
+    output wire [32*FIELDS-1:0] head,
+    output reg                  another,
+    output reg                  changed,
+    output wire                 empty,
+    output wire                 full,
+    output reg  [COUNT-1:0]     count,
+    output reg                  overflow,
+    output reg                  underflow,
+    output wire                 told,
+    output wire                 told_empty,
+    output wire                 told_full,
+    output wire [COUNT-1:0]     told_count,
+    output wire                 told_overflow,
+    output wire                 told_underflow,
+    output wire                 pushed,
+    output wire                 popped,
+    output wire                 refused,
+    output wire                 missed
+);
+
+    localparam WIDTH   = 32 * FIELDS;
+    localparam ADDRESS = DEPTH > 1 ? $clog2(DEPTH) : 1;
+    localparam LAST    = DEPTH - 1;
+    localparam [COUNT-1:0] MOST = DEPTH, ONE = 1, NONE = 0;
+
+    // ---- the sender's side
+
+    wire [WIDTH-1:0] sent, entry;
+    wire             put;
+    genvar f;
+    generate
+        if (HOST) begin : g_host
+            assign sent = value;
+            wire unused = &{1'b0, write};
+        end else begin : g_core
+            reg [WIDTH-1:0] working;
+            always @(posedge clk) working <= rst ? INITIAL : sent;
+            for (f = 0; f < FIELDS; f = f + 1) begin : g_field
+                assign sent[32*f +: 32] = write[f] ? value[32*f +: 32] : working[32*f +: 32];
+            end
+        end
+    endgenerate
+    takt_delay #(.LENGTH(LENGTH), .WIDTH(WIDTH)) way (
+        .clk(clk), .in_valid(push), .in(sent), .out_valid(put), .out(entry)
+    );
+
+    // ---- the queue
+
+    (* no_rw_check *)
+    reg  [WIDTH-1:0]   words [0:DEPTH-1];
+    reg  [WIDTH-1:0]   read, latest;
+    reg                is_latest;
+    reg  [ADDRESS-1:0] first, free;
+    assign empty   = count == NONE;
+    assign full    = count == MOST;
+    assign popped  = pop & ~empty;
+    assign missed  = pop & empty;
+    assign pushed  = put & (~full | popped);
+    assign refused = put & full & ~popped;
+    wire [ADDRESS-1:0] second = first == LAST[ADDRESS-1:0] ? {ADDRESS{1'b0}} : first + 1'b1;
+    wire [ADDRESS-1:0] next   = popped ? second : first;
+    // An entry that is the head at once has not been in the memory yet.
+    assign head = is_latest ? latest : read;
+
+    always @(posedge clk) begin
+        if (pushed) words[free] <= entry;
+        read      <= words[next];
+        latest    <= entry;
+        is_latest <= pushed & free == next;
+        first     <= next;
+        if (pushed) free <= free == LAST[ADDRESS-1:0] ? {ADDRESS{1'b0}} : free + 1'b1;
+        count     <= count + {{COUNT-1{1'b0}}, pushed} - {{COUNT-1{1'b0}}, popped};
+        overflow  <= overflow | refused;
+        underflow <= underflow | missed;
+        another   <= (popped & count != ONE) | (pushed & (empty | (popped & count == ONE)));
+        changed   <= put | pop;
+        if (rst) begin
+            {first, free}         <= {2 * ADDRESS{1'b0}};
+            count                 <= NONE;
+            {overflow, underflow} <= 2'b00;
+            {another, changed}    <= 2'b00;
+        end
+    end
+
+    // ---- back to the sender
+
+    takt_delay #(.LENGTH(LENGTH), .WIDTH(COUNT + 4)) back (
+        .clk(clk), .in_valid(changed), .in({empty, full, count, overflow, underflow}),
+        .out_valid(told), .out({told_empty, told_full, told_count, told_overflow, told_underflow})
+    );
+
+endmodule

@@ -1,0 +1,43 @@
+// takt_gate: what stands before a core's input pins (docs/system.md, The gate).
+//
+// Contract
+//   arrives, values: for each lane, a value that arrives in cycle a. It waits from a + 1 on; of the lanes on which a value waits,
+//   the lowest goes in: its value is on the pins in that cycle. A value that arrives while an older one waits replaces it.
+//   NUMBERS: the number of each lane's input port, INDEX bits each.
+
+module takt_gate #(
+    parameter LANES = 1,
+    parameter INDEX = 8,
+    parameter [LANES*INDEX-1:0] NUMBERS = 0
+) (
+    input  wire                clk,
+    input  wire                rst,
+    input  wire [LANES-1:0]    arrives,
+    input  wire [32*LANES-1:0] values,
+    output wire                input_write,
+    output reg  [INDEX-1:0]    input_index,
+    output reg  [31:0]         input_value
+);
+
+    reg  [LANES-1:0]    waits;
+    reg  [32*LANES-1:0] held;
+    wire [LANES-1:0]    goes = waits & (~waits + 1'b1);
+    assign input_write = |waits;
+
+    integer i;
+    always @* begin
+        input_index = {INDEX{1'b0}};
+        input_value = 32'd0;
+        for (i = 0; i < LANES; i = i + 1) begin
+            input_index = input_index | (NUMBERS[INDEX*i +: INDEX] & {INDEX{goes[i]}});
+            input_value = input_value | (held[32*i +: 32] & {32{goes[i]}});
+        end
+    end
+
+    integer k;
+    always @(posedge clk) begin
+        waits <= (arrives | (waits & ~goes)) & {LANES{~rst}};
+        for (k = 0; k < LANES; k = k + 1) if (arrives[k]) held[32*k +: 32] <= values[32*k +: 32];
+    end
+
+endmodule

@@ -1,0 +1,37 @@
+// takt_pace: a core's ticks (docs/system.md, One time), and when it takes its snapshots before them.
+//
+// Contract
+//   starts is high in the cycle LEAD before the first base tick B. The core sees its ticks in T = B + OFFSET, and every PERIOD
+//   cycles from then on: tick is high one cycle before. take is high in T - SNAPSHOTS - 2, SNAPSHOTS being the number of fields of
+//   all its snapshots. stop: no tick comes any more.
+
+module takt_pace #(
+    parameter PERIOD    = 2,
+    parameter OFFSET    = 0,
+    parameter LEAD      = 6,
+    parameter SNAPSHOTS = 0,
+    parameter BITS      = 4     // of the greatest number of cycles to count
+) (
+    input  wire clk,
+    input  wire rst,
+    input  wire starts,
+    input  wire stop,
+    output wire tick,
+    output wire take
+);
+
+    // From the cycle after `starts` to that of `tick`.
+    localparam FIRST = LEAD + OFFSET - 2;
+    localparam LAST  = PERIOD - 1;
+    localparam TAKE  = SNAPSHOTS + 1;
+    reg [BITS-1:0] left;
+    reg            runs;
+    assign tick = runs & left == {BITS{1'b0}};
+    assign take = runs & left == TAKE[BITS-1:0];
+
+    always @(posedge clk) begin
+        runs <= ~rst & ~stop & (runs | starts);
+        left <= starts ? FIRST[BITS-1:0] : left == {BITS{1'b0}} ? LAST[BITS-1:0] : left - 1'b1;
+    end
+
+endmodule
