@@ -193,12 +193,10 @@ fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, op
     let (mut context, flat) = expand::Expander::new(context, loader).expand(path);
     let mut ir = resolve::resolve(&mut context, loader, flat);
     let index = index::index(&mut context, &ir);
-    let packs = |scheduled| match options.schedule {
-        Schedule::AsWritten => scheduled,
-        Schedule::All => true,
-        Schedule::None => false,
-    };
-    ir.bundles.iter_mut().for_each(|bundle| bundle.scheduled = packs(bundle.scheduled));
+    if options.schedule != Schedule::AsWritten {
+        ir.scheduled = options.schedule == Schedule::All;
+        ir.bundles.iter_mut().for_each(|bundle| bundle.scheduled = options.schedule == Schedule::All);
+    }
     check::types::check(&mut context, &ir);
     // Of a program that cannot fit nothing else is worth its time.
     let homes = if emit::is_too_long(&ir) {
@@ -261,7 +259,7 @@ impl Checked {
         let placement = place::place(&ir, &mut sink);
         let mut emitted = emit::emit(&ir, &placement, &mut sink);
         emitted.program.parts = names::parts(&sources, &emitted);
-        let names = names::names(&context, &ir, &placement, &emitted);
+        let names = names::names(&mut context, &ir, &placement, &mut emitted);
         let report = sink.finish(Arc::clone(&sources));
         if report.has_errors() {
             return Err(report);

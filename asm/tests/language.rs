@@ -159,6 +159,29 @@ fn operations_go_to_their_slots_in_any_order() {
     assert_eq!(one.program.bundles(), 1);
 }
 
+/// Names that two uses of a macro declare between each other's, in whatever way they are kept.
+#[test]
+fn uses_keep_their_many_locals_apart() {
+    let locals: String = (0..20).map(|i| format!(".const K{i} = BASE + {i}\n")).collect();
+    let body = "m.word K0\n.word K7\n.word K8\n.word K19\n";
+    let source = format!(
+        ".macro m BASE, inner\n{locals}.if inner\n m BASE + 100, 0\n.endif\n{}.endm\n.data\n m 1000, 1\n m 2000, 0\n",
+        body.replacen('m', "", 1)
+    );
+    let words = |base: u32| [base, base + 7, base + 8, base + 19];
+    assert_eq!(good(&source).program.data, [words(1100), words(1000), words(2000)].concat());
+}
+
+/// Types are followed in the order of the source, and a value may come from further down.
+#[test]
+fn types_from_below_are_warned_of() {
+    let text =
+        ".input n:int\n.output F\n.reg b\n.period\nagain:\n fadd F, b, 1\nlow:\n mov b, n\n wait again\n";
+    let warnings = good(text).warnings;
+    let codes: Vec<&str> = warnings.list.iter().map(|warning| warning.code).collect();
+    assert_eq!(codes, ["types"], "{}", warnings.render(false));
+}
+
 #[test]
 fn macro_locals_are_of_each_use() {
     let assembled = good(

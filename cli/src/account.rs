@@ -73,10 +73,22 @@ impl Account {
         self.stalls.iter().map(|(kind, count)| (kind.replace(' ', "_"), Value::from(*count))).collect()
     }
 
+    /// Stalled cycles of a kind of cause.
+    pub(crate) fn stall(&self, kind: &str) -> u64 {
+        self.stalls.get(kind).copied().unwrap_or(0)
+    }
+
+    /// The costliest stalls with their places, so many; waiting for the tick is left out.
+    pub(crate) fn longest(&self, most: usize) -> impl Iterator<Item = (BundleAddress, Cause, u64)> {
+        let mut causes: Vec<_> = self.causes.iter().filter(|((_, cause), _)| *cause != Cause::Wait).collect();
+        causes.sort_by_key(|((address, _), count)| (std::cmp::Reverse(*count), *address));
+        causes.into_iter().take(most).map(|&((address, cause), count)| (address, cause, count))
+    }
+
     /// The share of each kind, then the costliest stalls with their places; waiting for the tick is left out.
     pub(crate) fn stall_table(&self, program: &Program, most: usize) -> String {
         let mut out = String::new();
-        let waiting = self.stalls.get(Cause::Wait.name()).copied().unwrap_or(0);
+        let waiting = self.stall(Cause::Wait.name());
         let _ = writeln!(out, "  {:<14} {:>9}", "issue", self.bundles);
         for (kind, count) in
             self.stalls.iter().filter(|(kind, count)| **kind != Cause::Wait.name() && **count > 0)
@@ -84,17 +96,16 @@ impl Account {
             let _ = writeln!(out, "  {kind:<14} {count:>9}");
         }
         let _ = writeln!(out, "  {:<14} {:>9}", "all", self.cycles - waiting);
-        let mut causes: Vec<_> = self.causes.iter().filter(|((_, cause), _)| *cause != Cause::Wait).collect();
-        causes.sort_by_key(|((address, _), count)| (std::cmp::Reverse(*count), *address));
-        if !causes.is_empty() && most > 0 {
+        let mut causes = self.longest(most).peekable();
+        if causes.peek().is_some() {
             out.push_str("  the longest stalls:\n");
         }
-        for ((address, cause), count) in causes.iter().take(most) {
+        for (address, cause, count) in causes {
             let _ = writeln!(
                 out,
                 "  {count:>8}  {}: {}",
-                program.bundle_text(*address),
-                program.cause_text(*cause)
+                program.bundle_text(address),
+                program.cause_text(cause)
             );
         }
         out

@@ -3,11 +3,12 @@
 use crate::accuracy::Measured;
 use crate::fault;
 use crate::files::{self, Out};
-use crate::load::Load;
+use crate::load::{self, Load};
 use crate::number;
-use crate::output;
+use crate::output::{self, Failure};
 use crate::ports;
 use crate::select::{OptionalMachine, SourceArguments};
+use crate::system;
 use anyhow::{Result, bail};
 use clap::Args;
 use std::io::Write;
@@ -22,12 +23,14 @@ use takt_isa::{Machine, Program};
 
 /// Show where the cycles of a period went: every bundle, every stall, the chain that sets the time.
 ///
+/// Of a system it shows where each core's cycles went, in all its periods.
+///
 /// Runs the program and looks at its last period; at a program without periods from reset to `halt`. Input ports are 0
 /// unless --inputs says otherwise.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Analyse {
-    /// Source or image; `-` is standard input.
+    /// Source or image, `-` being standard input; or a system, a `.toml` file.
     file: PathBuf,
     #[command(flatten)]
     machine: OptionalMachine,
@@ -52,6 +55,7 @@ Examples:
   takt analyse prog.s                     the second period: stalls, critical path, what a faster unit would bring
   takt analyse prog.s --html prog.html    the pipeline as a picture
   takt analyse prog.s --periods 0         what runs once
+  takt analyse system.toml --inputs in.csv   each core's cycles, over all rows
   takt analyse prog.s --inputs in.csv     the last period of recorded inputs";
 
 pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()> {
@@ -62,6 +66,25 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
         writes.push(("--json", Path::new("-")));
     }
     files::check(&reads, &writes)?;
+    if load::is_system(&arguments.file) {
+        let refused = [
+            ("--machine", arguments.machine.machine.is_some(), "the system's file names each core's"),
+            ("--html", arguments.html.is_some(), "the picture is one program's"),
+        ];
+        for (option, given, why) in refused {
+            if given {
+                return Err(Failure::Usage(format!("{option} with a system: {why}")).into());
+            }
+        }
+        let system = system::analyse::Arguments {
+            file: &arguments.file,
+            source: &arguments.source,
+            inputs: arguments.inputs.as_deref(),
+            periods: arguments.periods,
+            json: arguments.json,
+        };
+        return system::analyse::run(&system, color, out);
+    }
     let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
     let loaded = load.with_source(&arguments.file)?;
     let program = &loaded.program;

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use takt_isa::MACHINES;
 use takt_rtl::{Library, bench, export};
 
-/// Write the circuit of a machine, or of a system of several cores: a complete Verilog design.
+/// Write the circuit of a machine, or of a system: a complete Verilog design.
 ///
 /// Of a system the folder holds one top with all cores and links, their programs in a memory image that it reads at power-up
 /// (docs/system.md), and the lists of files.

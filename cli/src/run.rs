@@ -173,7 +173,6 @@ impl Run {
             ("--machine", self.machine.machine.is_some(), "the system's file names each core's"),
             ("--tick", self.tick.is_some(), "the system's file has it"),
             ("--batch", self.batch.is_some(), "a system runs once"),
-            ("--trace", self.trace.given().is_some(), "a system has no trace"),
             ("--deny", self.deny.is_given(), "a system's run is not watched"),
         ];
         if let Some((option, _, why)) = given.into_iter().find(|(_, given, _)| *given) {
@@ -190,6 +189,7 @@ impl Run {
             max_cycles,
             stats: *stats,
             json: *json,
+            trace: Some(&self.trace),
         })
     }
 }

@@ -7,8 +7,9 @@ use anyhow::{Result, anyhow};
 use clap::Args;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use takt_debug::trace::{Also, Format, Options, Tracer};
+use takt_debug::trace::{Also, Format, Options, SystemTracer, Tracer};
 use takt_emu::{Emulator, PeriodError, PeriodReport, Stop};
+use takt_system::System;
 
 #[derive(Args)]
 pub(crate) struct TraceArguments {
@@ -66,14 +67,45 @@ impl TraceArguments {
         Out::create(path).map(Some)
     }
 
-    pub(crate) fn begin<'o>(&self, emulator: &Emulator, file: &'o mut Out) -> Result<Trace<'o>> {
-        let path = self.trace.clone().unwrap_or_default();
-        let options = Options {
-            format: Self::format(&path)?,
+    fn options(&self, path: &Path) -> Result<Options> {
+        Ok(Options {
+            format: Self::format(path)?,
             cycles: self.trace_cycles.clone().unwrap_or(0..u64::MAX),
             signals: self.trace_signals.clone(),
             limit: self.trace_limit.saturating_mul(1 << 20),
-        };
+        })
+    }
+
+    /// A trace of a system, which is a waveform.
+    pub(crate) fn of_system<'o>(&self, system: &System, file: &'o mut Out) -> Result<SystemTracer<'o>> {
+        let path = self.trace.clone().unwrap_or_default();
+        let options = self.options(&path)?;
+        if !matches!(options.format, Format::Vcd | Format::Fst) {
+            let text = format!("--trace {}: a system is traced as .vcd or .fst", path.display());
+            return Err(Failure::Usage(text).into());
+        }
+        SystemTracer::new(system, Box::new(file), options)
+            .map_err(|error| Failure::Usage(format!("--trace-signals: {error}")).into())
+    }
+
+    /// Completes a system's trace.
+    pub(crate) fn finish_system(&self, tracer: SystemTracer<'_>, color: bool) -> Result<()> {
+        let summary = tracer.finish().map_err(|error| anyhow!(error))?;
+        let name = self.trace.clone().unwrap_or_default();
+        let name = name.display();
+        if summary.cut {
+            let (end, limit) = (summary.cycles.end, self.trace_limit);
+            let text = format!("{name} ends before cycle {end}: --trace-limit is {limit} MiB");
+            output::warning(&text, color);
+        } else if summary.cycles.is_empty() {
+            output::warning(&format!("{name} is empty: the run does not reach its first cycle"), color);
+        }
+        Ok(())
+    }
+
+    pub(crate) fn begin<'o>(&self, emulator: &Emulator, file: &'o mut Out) -> Result<Trace<'o>> {
+        let path = self.trace.clone().unwrap_or_default();
+        let options = self.options(&path)?;
         let tracer = Tracer::new(emulator, Box::new(file), options)
             .map_err(|error| Failure::Usage(format!("--trace-signals: {error}")))?;
         Ok(Trace { tracer, name: path.display().to_string(), limit: self.trace_limit })

@@ -40,28 +40,35 @@ pub(crate) struct Track {
     /// printed), `tracking_equations`, or a source or image of your own.
     #[arg(long, value_name = "NAME|FILE", default_value = "tracking")]
     program: PathBuf,
+    /// Several cores instead of one program: one computes the path's points from motion blocks, one tracks them (docs/system.md).
+    #[arg(
+        long,
+        value_name = "TOML",
+        conflicts_with_all = ["program", "machine", "csv", "monte_carlo", "fit_friction", "deny"]
+    )]
+    system: Option<PathBuf>,
     #[command(flatten)]
     machine: OptionalMachine,
     #[command(flatten)]
-    source: SourceArguments,
+    pub(crate) source: SourceArguments,
     /// Tool path in G-code [default: the letters AGH]; `-` is standard input.
     #[arg(long, value_name = "FILE")]
-    gcode: Option<PathBuf>,
+    pub(crate) gcode: Option<PathBuf>,
     /// Stop after this many periods [default: the whole path].
     #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
-    periods: Option<u64>,
+    pub(crate) periods: Option<u64>,
     /// Clock in MHz, for cycles to time and for the deadline; the paper's is 125.
     #[arg(long, value_name = "MHZ", default_value_t = select::PAPER_CLOCK, value_parser = number::clock, allow_hyphen_values = true)]
-    clock: f64,
+    pub(crate) clock: f64,
     /// Write inputs, outputs, cycles and errors of every period as CSV, which `takt run --inputs` reads; `-` is standard
     /// output.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Draw the tool path and the tracking error over time as SVG; `-` is standard output.
     #[arg(long, value_name = "FILE")]
-    plot: Option<PathBuf>,
+    pub(crate) plot: Option<PathBuf>,
     #[command(flatten)]
-    robot: SpreadArguments,
+    pub(crate) robot: SpreadArguments,
     /// Drive so many robots that differ, and print how their tracking errors spread; --plot draws a histogram.
     #[arg(
         long,
@@ -79,10 +86,10 @@ pub(crate) struct Track {
     deny: DenyArguments,
     /// Print the result as JSON.
     #[arg(long)]
-    json: bool,
+    pub(crate) json: bool,
     /// Show no progress.
     #[arg(long, short)]
-    quiet: bool,
+    pub(crate) quiet: bool,
 }
 
 const EXAMPLES: &str = "\
@@ -92,6 +99,7 @@ Examples:
   takt track --program mine.s --gcode part.ngc   your own controller, your own path
   takt track --periods 1000 --csv path.csv       record inputs and outputs for `takt run`
   takt track --program tracking_friction         with a model of friction, fed forward
+  takt track --system programs/hybrid/two.toml   the path's points on a processor of their own
   takt track --fit-friction                      identify that model's parameters
   takt track -q --deny all                       for CI: status 3 if a deadline is missed, …
   takt track --monte-carlo 100 --plot errors.svg  a hundred robots that differ";
@@ -155,7 +163,10 @@ impl Totals {
 }
 
 pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
-    let mut reads: Vec<Given<'_>> = vec![("--program", &arguments.program)];
+    let mut reads: Vec<Given<'_>> = match &arguments.system {
+        Some(system) => vec![("--system", system)],
+        None => vec![("--program", &arguments.program)],
+    };
     reads.extend(arguments.gcode.as_deref().map(|path| ("--gcode", path)));
     reads.extend(arguments.robot.spread.as_deref().map(|path| ("--spread", path)));
     let outputs = [("--csv", arguments.csv.as_deref()), ("--plot", arguments.plot.as_deref())];
@@ -170,6 +181,9 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
         return Err(output::Failure::Usage(text.to_owned()).into());
     }
 
+    if let Some(system) = &arguments.system {
+        return crate::system::track::run(arguments, system, color, out);
+    }
     let builtin = if arguments.fit_friction { FRICTION_PATH } else { AGH_PATH };
     let (path, trajectory) = trajectory_or(arguments.gcode.as_deref(), builtin)?;
     let (name, loaded) =

@@ -50,6 +50,76 @@ fn bound_follows_a_command_through_the_cores() {
 }
 
 #[test]
+fn a_session_sees_all_cores() {
+    let folder = Folder::new();
+    let (toml, csv) = (speed("speed.toml"), speed("speed.csv"));
+    folder.write(
+        "script.txt",
+        "cores\nbreak link moves pushed\ncontinue\nlinks moves\ncore servo\nstep period\nprint u\nstep bundle 3\nback bundle\n\
+         goto cycle 126000\ncheck cycle == 126000\ncore watch\ncheck cycle == 126000\nreverse\nreverse\n",
+    );
+    let text = folder.line(&format!("debug {toml} --inputs {csv} --script script.txt")).ok();
+    assert!(text.contains("> profile") && text.contains("stop 1: break link moves pushed"), "{text}");
+    assert!(text.contains("moves: 1 of 8 entries (") && text.contains("core servo: "), "{text}");
+    assert!(text.trim_end().contains("the beginning of the run"), "{text}");
+    folder.write("wrong.txt", "stp\n");
+    let wrong = folder.line(&format!("debug {toml} --script wrong.txt"));
+    assert!(wrong.stderr.contains("wrong.txt:1: there is no command `stp`"), "{}", wrong.stderr);
+    let wrong = folder.line(&format!("debug {toml} --tick 5 --script script.txt"));
+    assert!(wrong.stderr.contains("--tick with a system"), "{}", wrong.stderr);
+}
+
+#[test]
+fn analyse_tells_where_each_core_s_cycles_went() {
+    let folder = Folder::new();
+    let (toml, csv) = (speed("speed.toml"), speed("speed.csv"));
+    let text = folder.line(&format!("analyse {toml} --inputs {csv}")).ok();
+    assert!(text.starts_with("10 base ticks, ") && text.contains("\nservo, t3: "), "{text}");
+    let json: Value = serde_json::from_str(&folder.line(&format!("analyse {toml} --json")).ok()).unwrap();
+    for core in ["profile", "servo", "watch"] {
+        let core = &json["cores"][core];
+        let stalls: u64 =
+            core["stalls"].as_object().unwrap().values().map(|cycles| cycles.as_u64().unwrap()).sum();
+        assert_eq!(core["bundles"].as_u64().unwrap() + stalls, core["cycles"].as_u64().unwrap());
+    }
+    let wrong = folder.line(&format!("analyse {toml} --html x.html"));
+    assert!(wrong.stderr.contains("--html with a system"), "{}", wrong.stderr);
+}
+
+#[test]
+fn a_trace_shows_all_cores_on_one_axis() {
+    let folder = Folder::new();
+    let (toml, csv) = (speed("speed.toml"), speed("speed.csv"));
+    let run = |more: &str| folder.line(&format!("run {toml} --inputs {csv} --periods 2 {more}"));
+    run("--trace out.vcd --trace-cycles 124900..126100").ok();
+    let text = folder.read_text("out.vcd");
+    for scope in ["takt", "profile", "servo", "watch", "links"] {
+        assert_eq!(text.matches(&format!("$scope module {scope} $end")).count(), 1, "{scope}");
+    }
+    assert_eq!(text.matches("$scope").count(), text.matches("$upscope").count());
+    // Every core sees its first tick in its own cycle of the one axis.
+    let identifier = |scope: &str| {
+        let rest = &text[text.find(&format!("$scope module {scope} ")).unwrap()..];
+        let line = rest.lines().find(|line| line.ends_with(" tick $end")).unwrap();
+        line.split(' ').nth(3).unwrap().to_owned()
+    };
+    for (core, tick) in [("profile", 125_000), ("servo", 125_500), ("watch", 126_000)] {
+        let wanted = format!("1{}", identifier(core));
+        let mut time = 0;
+        let found = text.lines().find_map(|line| {
+            if let Some(cycle) = line.strip_prefix('#') {
+                time = cycle.parse::<u64>().unwrap();
+            }
+            (line == wanted).then_some(time)
+        });
+        assert_eq!(found, Some(tick), "{core}");
+    }
+    run("--trace few.fst --trace-cycles 0..1000 --trace-signals servo.outputs.u,links.moves.count").ok();
+    assert!(run("--trace x.kanata").stderr.contains("a system is traced as .vcd or .fst"));
+    assert!(run("--trace x.vcd --trace-signals servo.nix").stderr.contains("no signal is named `servo.nix`"));
+}
+
+#[test]
 fn what_a_system_is_not() {
     let folder = Folder::new();
     folder.write("a.s", ".input x\n.output y\n.once\n wait p\n.period\np: mov y, x\n wait p\n");
@@ -79,6 +149,39 @@ fn what_a_system_is_not() {
         ("bound missing.toml", "there is no program b.s"),
         ("bound right.toml --machine t1", "--machine with a system"),
         ("asm right.toml", "is a system, and one program is wanted"),
+    ] {
+        let done = folder.line(line);
+        assert_ne!(done.status, Some(0), "{line}");
+        assert!(done.stderr.contains(said), "{line}: {}", done.stderr);
+    }
+}
+
+#[test]
+fn the_hybrid_robot_on_two_processors() {
+    let folder = Folder::new();
+    let two = common::source("two.toml");
+    let json = |line: &str| -> serde_json::Value {
+        serde_json::from_str(&folder.line(&format!("track -q --json --periods 3000 {line}")).ok()).unwrap()
+    };
+    let (one, both) = (json(""), json(&format!("--system {two}")));
+    let number = |value: &serde_json::Value| value.as_f64().unwrap_or_else(|| panic!("{value} in {both}"));
+    // The path's points come from a core: the robot follows them as it follows the host's.
+    let overall = |run: &serde_json::Value| number(&run["tracking_error_m"]["overall"]);
+    assert!((overall(&one) - overall(&both)).abs() < 1e-7, "{both} {one}");
+    assert_eq!(both["missed"], 0);
+    assert_eq!(both["cores"][0]["longest"], 319);
+    assert!(number(&both["points"][0]["largest_error"]) < 6.2e-8, "{both}");
+    let text = folder.line(&format!("track -q --periods 10 --system {two}")).ok();
+    assert!(text.contains("n1, n2, n3, … (5) -> F1, F2, F3, … (20), through tracking"), "{text}");
+    folder.write(
+        "other.toml",
+        "tick = 500\n[[core]]\nname = \"a\"\nprogram = \"a.s\"\n[[wire]]\nfrom = \"a.y\"\nto = \"host.y\"\n",
+    );
+    folder.write("a.s", ".output y\n.once\n wait p\n.period\np: mov y, zero\n wait p\n");
+    for (line, said) in [
+        ("track --system other.toml", "base tick is 500 cycles"),
+        ("track --system other.toml --clock 5", "it has no input `n1`"),
+        ("track --system other.toml --machine t1", "cannot be used with"),
     ] {
         let done = folder.line(line);
         assert_ne!(done.status, Some(0), "{line}");

@@ -145,7 +145,7 @@ pub fn complete(session: &Session, line: &str) -> (usize, Vec<String>) {
 }
 
 /// A line's command and its arguments; `None` for a blank line or a comment.
-fn split(line: &str) -> Option<(&str, &str)> {
+pub(crate) fn split(line: &str) -> Option<(&str, &str)> {
     let line = line.trim();
     if line.is_empty() || line.starts_with('#') || line.starts_with(';') {
         return None;
@@ -153,9 +153,75 @@ fn split(line: &str) -> Option<(&str, &str)> {
     Some(line.split_once(char::is_whitespace).map_or((line, ""), |(name, rest)| (name, rest.trim())))
 }
 
-/// The first line of a script that is no command, and why.
-pub fn first_mistake(script: &str) -> Option<(usize, String)> {
-    script.lines().enumerate().find_map(|(i, line)| Some((i + 1, find(split(line)?.0).err()?)))
+/// The first line of a script that is no command of these, and why.
+pub fn first_mistake<C: Commands>(script: &str) -> Option<(usize, String)> {
+    script.lines().enumerate().find_map(|(i, line)| Some((i + 1, C::mistake(line)?)))
+}
+
+/// Commands that look at a machine and neither move nor change it: of a system, they are about the selected core.
+pub(crate) const INSPECTION: &[&str] = &[
+    "print",
+    "info",
+    "ulp",
+    "check",
+    "registers",
+    "ports",
+    "memory",
+    "flight",
+    "stalls",
+    "list",
+    "display",
+    "echo",
+];
+
+/// The name of the command that is meant.
+pub(crate) fn named(name: &str) -> Result<&'static str, String> {
+    find(name).map(|command| command.name)
+}
+
+/// What reads lines and answers: the console of a session, or of a system's.
+pub trait Commands {
+    /// Executes a line; what it has to say, in whole lines.
+    ///
+    /// # Errors
+    /// What is wrong with it. The session is as it was.
+    fn execute(&mut self, line: &str) -> Result<String, String>;
+
+    /// Whether `quit` was said.
+    fn quit(&self) -> bool;
+
+    /// Where the session is.
+    fn place(&mut self) -> String;
+
+    /// Names that complete the word that a line ends with, and where that word begins.
+    fn complete(&self, line: &str) -> (usize, Vec<String>);
+
+    /// What is wrong with a line that is no command.
+    fn mistake(line: &str) -> Option<String>
+    where
+        Self: Sized;
+}
+
+impl Commands for Console {
+    fn execute(&mut self, line: &str) -> Result<String, String> {
+        Console::execute(self, line)
+    }
+
+    fn quit(&self) -> bool {
+        self.quit
+    }
+
+    fn place(&mut self) -> String {
+        Console::place(self)
+    }
+
+    fn complete(&self, line: &str) -> (usize, Vec<String>) {
+        complete(&self.session, line)
+    }
+
+    fn mistake(line: &str) -> Option<String> {
+        find(split(line)?.0).err()
+    }
 }
 
 /// A session with what commands add to it.

@@ -7,6 +7,7 @@ mod info;
 pub mod inputs;
 pub mod panes;
 pub mod session;
+pub mod system;
 pub mod trace;
 pub mod value;
 #[cfg(feature = "tui")]

@@ -141,7 +141,7 @@ fn any_size_and_any_text() {
 #[test]
 fn keys_stand_for_commands() {
     let script: String = KEYS.iter().map(|(_, line)| format!("{line}\n")).collect();
-    assert_eq!(first_mistake(&script), None);
+    assert_eq!(first_mistake::<Console>(&script), None);
     let mut keys: Vec<char> = KEYS.iter().map(|(key, _)| *key).collect();
     keys.sort_unstable();
     keys.dedup();

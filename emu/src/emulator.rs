@@ -19,7 +19,7 @@ use takt_isa::{BundleAddress, Machine, Program, Register, SlotIndex};
 pub const MAX_CYCLE: Cycle = 1 << 62;
 
 /// Runs after which a block is compiled: so many take about as long as the compiler.
-const COMPILE_AFTER: u64 = 500;
+const COMPILE_AFTER: u64 = 10_000;
 
 /// What the machine is doing.
 #[derive(Clone, Debug, PartialEq, Eq)]

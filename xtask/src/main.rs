@@ -235,12 +235,15 @@ fn fuzz(minutes: u32) -> Result<()> {
     seed()?;
     for target in ["assemble", "image"] {
         // cargo-fuzz needs unstable compiler flags; the variable admits them on the stable compiler.
-        run(cargo().env("RUSTC_BOOTSTRAP", "1").args(["fuzz", "run", "--fuzz-dir", "asm/fuzz", target, "--"]).args([
-            format!("-max_total_time={}", 60 * minutes),
-            "-max_len=65536".to_owned(),
-            "-rss_limit_mb=4096".to_owned(),
-            "-timeout=60".to_owned(),
-        ]))?;
+        run(cargo()
+            .env("RUSTC_BOOTSTRAP", "1")
+            .args(["fuzz", "run", "--fuzz-dir", "asm/fuzz", target, "--"])
+            .args([
+                format!("-max_total_time={}", 60 * minutes),
+                "-max_len=65536".to_owned(),
+                "-rss_limit_mb=4096".to_owned(),
+                "-timeout=60".to_owned(),
+            ]))?;
     }
     Ok(())
 }

@@ -5,23 +5,26 @@
 
 use crate::venv::{NEXTPNR, Venv, YOSYS};
 use crate::{docs, root};
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use std::{fs, thread};
+use takt_asm::{FileLoader, Search};
 use takt_board::tools::{MAPPING, OPTIONS};
 use takt_isa::spec::machines::MACHINES;
 use takt_isa::{Machine, UNITS, Unit};
 use takt_rtl::export::{export, synthesis_top};
 use takt_rtl::synthesis::{self, Resources, Synthesis};
-use takt_rtl::{Circuit, Library, wishbone};
+use takt_rtl::verilog::{Direction, Net};
+use takt_rtl::{Circuit, Library, export_system, wishbone};
+use takt_system::{ProgramError, ReadError};
 
 /// Where measurements are recorded; [`takt_rtl::synthesis::committed`] has them.
 const RECORD: &str = "docs/synthesis.json";
@@ -42,6 +45,9 @@ pub(crate) struct Arguments {
     /// The machine, with its memories.
     #[arg(long, default_value = "t3", conflicts_with = "unit")]
     machine: String,
+    /// A system of several cores instead, with its programs; nothing is recorded.
+    #[arg(long, value_name = "SYSTEM.toml", conflicts_with_all = ["machine", "unit"])]
+    system: Option<PathBuf>,
     /// Units alone between registers instead; `all` for every one.
     #[arg(long, num_args = 1..)]
     unit: Vec<String>,
@@ -117,6 +123,10 @@ pub(crate) fn synth(arguments: &Arguments) -> Result<()> {
         println!("{}", in_words(&row, &arguments.seeds()));
         measured.push(row);
     }
+    if arguments.system.is_some() {
+        println!("not recorded: a system's programs are part of it");
+        return Ok(());
+    }
     if arguments.seed.is_some() || arguments.freq != TARGET_MHZ {
         println!("not recorded: it takes seeds from 1 on, and the target of {TARGET_MHZ} MHz");
         return Ok(());
@@ -163,6 +173,9 @@ fn designs(arguments: &Arguments) -> Result<Vec<Design>> {
         let product = fs::read_to_string(root().join("rtl/ecp5/takt_product.v"))?;
         library.put("common/takt_product.v", product);
     }
+    if let Some(file) = &arguments.system {
+        return Ok(vec![system(file, &library, ecp5)?]);
+    }
     if arguments.unit.is_empty() {
         let machine = Machine::from_name(&arguments.machine).with_context(|| {
             let names: Vec<_> = MACHINES.iter().map(|machine| machine.name).collect();
@@ -197,6 +210,86 @@ fn core(machine: &'static Machine, library: &Library, ecp5: bool) -> Result<Desi
     files.insert("synthesis.v".to_owned(), wishbone::on_few_pins(&core));
     let top = synthesis_top(machine);
     Ok(Design { name: machine.name.to_owned(), files, top, pins: PINS, wrapper: wishbone::PINS })
+}
+
+/// A system as `takt rtl` writes it, its host's pins behind a shift register and a parity.
+fn system(file: &Path, library: &Library, ecp5: bool) -> Result<Design> {
+    let text = fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
+    let folder = file.parent().unwrap_or(Path::new(""));
+    let name = file.file_stem().unwrap_or_default().to_string_lossy();
+    let description = takt_system::read(&file.display().to_string(), &text, |request| {
+        let path = folder.join(request.path);
+        let machine = request.machine.unwrap_or(MACHINES[0]);
+        let options = takt_asm::Options { machine, ..takt_asm::Options::default() };
+        let source = fs::read(&path).map_err(|error| ProgramError::Missing {
+            message: format!("{}: {error}", path.display()),
+            help: None,
+        })?;
+        let beside = path.parent().unwrap_or(Path::new(""));
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let loader = Search::new(FileLoader::new(beside)).library(takt_programs::LIBRARY);
+        match takt_asm::assemble_bytes(&name, source, &loader, &options) {
+            Ok(assembled) => Ok(assembled.program),
+            Err(mistakes) => Err(ProgramError::Invalid(anyhow!("{}", mistakes.render(false)))),
+        }
+    });
+    let description = description.map_err(|error| match error {
+        ReadError::Mistakes(mistakes) => anyhow!("{}", mistakes.render(false)),
+        ReadError::Program(error) => error,
+    })?;
+    let design = export_system(&description, &name, library)?;
+    let base = |name: &str| name.rsplit('/').next().unwrap_or(name).to_owned();
+    let mut files = BTreeMap::new();
+    for file in design.files.iter().chain(design.ecp5.iter().filter(|_| ecp5)).chain([&design.image]) {
+        files.insert(base(&file.name), file.text.clone());
+    }
+    // All inputs out of a shift register, all outputs into a register and a parity.
+    let pins = design.plan.pins();
+    let of = |direction| pins.iter().filter(move |pin| pin.direction == direction);
+    let status = design.plan.status_pins();
+    let width = |nets: &mut dyn Iterator<Item = u32>| nets.sum::<u32>();
+    let inputs = width(&mut of(Direction::Input).map(|pin| pin.net.width())).max(2);
+    let outputs =
+        1 + width(&mut of(Direction::Output).map(|pin| pin.net.width()).chain(status.iter().map(Net::width)));
+    let mut connections = String::new();
+    let mut low = 0;
+    for pin in of(Direction::Input) {
+        write!(connections, ".{}(operands[{low} +: {}]), ", pin.net, pin.net.width())?;
+        low += pin.net.width();
+    }
+    low = 1;
+    for net in of(Direction::Output).map(|pin| &pin.net).chain(&status) {
+        write!(connections, ".{net}(shown[{low} +: {}]), ", net.width())?;
+        low += net.width();
+    }
+    let (top, last, seen) = (&design.top, inputs - 2, outputs - 1);
+    files.insert(
+        "wrapper.v".to_owned(),
+        format!(
+            "module wrapper (input wire clk, input wire rst, input wire serial_in, output reg serial_out);
+    reg  [{inputs}-1:0] shift, operands;
+    wire [{seen}:0] shown;
+    reg  [{seen}:0] outputs;
+    reg  load;
+    {top} system (.clk(clk), .rst(rst), {connections}.running(shown[0]));
+    always @(posedge clk) begin
+        shift <= {{shift[{last}:0], serial_in}};
+        load  <= shift[0] & shift[1];
+        if (load) operands <= shift;
+        outputs    <= load ? shown : {{outputs[0], outputs[{seen}:1]}};
+        serial_out <= outputs[0];
+    end
+endmodule
+"
+        ),
+    );
+    // A shift register in, one out, and a multiplexer before each of its flip-flops.
+    let wrapper = Resources {
+        luts: u64::from(outputs) + 1,
+        flip_flops: u64::from(2 * inputs + outputs) + 2,
+        ..Resources::default()
+    };
+    Ok(Design { name: name.into_owned(), files, top: "wrapper".to_owned(), pins: PINS, wrapper })
 }
 
 /// A unit between registers, on few pins: the operands come out of a shift register and a second register, the results go
@@ -244,7 +337,8 @@ endmodule
     );
     // 9 LUT4 for the groups of four, 3 for the rest. A constant output has no register: the count of flip-flops may be low by two.
     let wrapper = Resources { luts: 12, flip_flops: u64::from(2 * bits) + 46, ..Resources::default() };
-    Ok(Design { name: circuit.unit.name.to_owned(), files, top: "wrapper".to_owned(), pins: "", wrapper })
+    let (name, top) = (circuit.unit.name.to_owned(), "wrapper".to_owned());
+    Ok(Design { name, files, top, pins: "", wrapper })
 }
 
 // ---- The tools

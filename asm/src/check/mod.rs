@@ -34,12 +34,17 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
     let complete = context.reports.sink.errors == 0;
     let mut uses = vec![Use::default(); ir.registers.len()];
     let mut opaque = false;
+    let end = ir.bundles.len() as u32;
+    let mut beyond: Vec<Where> = Vec::new();
     for (index, bundle) in (0..).zip(&ir.bundles) {
         for (number, operation) in (0..).zip(&bundle.operations) {
             for (which, source) in operation.reads().iter().enumerate() {
                 uses[source.index()].read.get_or_insert(((index, number), which));
             }
             opaque |= matches!(operation.constant, Constant::Raw(_));
+            if target(ir, operation).is_some_and(|target| target >= end) {
+                beyond.push((index, number));
+            }
             let (Some(dest), Some(slot)) = (operation.dest, operation.slot) else { continue };
             let found = &mut uses[dest.index()];
             found.once |= index < ir.period;
@@ -70,7 +75,9 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
             state(context, ir, register, used);
         }
     }
-    targets(context, ir);
+    for place in beyond {
+        leaves(context, at(ir, place), end);
+    }
     // What a mistake leaves unused is no mistake of its own.
     if context.reports.sink.errors > 0 {
         return;
@@ -280,18 +287,12 @@ fn target(ir: &Ir, operation: &Operation) -> Option<u32> {
     operation.row().shape.fields().contains(&Field::Target).then_some(target)
 }
 
-/// Targets where there is no bundle.
-fn targets(context: &mut Context, ir: &Ir) {
-    let end = ir.bundles.len() as u32;
-    for operation in ir.operations() {
-        if target(ir, operation).is_some_and(|target| target >= end) {
-            let span = operand(context, operation, |operand| *operand == Operand::Target);
-            let message = "this continues past the end of the program";
-            let warning =
-                Diagnostic::warning("target", span, message).note(format!("the program has {end} bundles"));
-            context.report(ScopeId(operation.expansion), warning);
-        }
-    }
+/// Warns of a target where there is no bundle, in a program of so many.
+fn leaves(context: &mut Context, operation: &Operation, end: u32) {
+    let span = operand(context, operation, |operand| *operand == Operand::Target);
+    let message = "this continues past the end of the program";
+    let warning = Diagnostic::warning("target", span, message).note(format!("the program has {end} bundles"));
+    context.report(ScopeId(operation.expansion), warning);
 }
 
 /// A period that never comes to a `wait` has no end.

@@ -14,8 +14,9 @@ use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::resolve::forms::passed;
 use crate::syntax::expr::Value;
+use foldhash::HashMap;
 use smallvec::SmallVec;
-use std::collections::HashMap;
+use std::cell::Cell;
 use takt_isa::program::Space;
 use takt_isa::{Effect, ROWS, Row, Type};
 
@@ -54,7 +55,7 @@ pub(crate) fn check(context: &mut Context, ir: &Ir) {
     let mut types = Types::new(context, ir, &given);
     let runs = runs(ir);
     for pass in 0.. {
-        types.changed = false;
+        (types.changed, types.mistaken) = (false, false);
         types.walk(&runs, None);
         if !types.changed {
             break;
@@ -63,7 +64,9 @@ pub(crate) fn check(context: &mut Context, ir: &Ir) {
             types.forget();
         }
     }
-    types.walk(&runs, Some(context));
+    if types.mistaken {
+        types.walk(&runs, Some(context));
+    }
 }
 
 struct Types<'i> {
@@ -79,13 +82,18 @@ struct Types<'i> {
     tables: HashMap<LabelId, Typed>,
     /// For each instruction, the sources whose bits its result is.
     passed: Vec<Vec<usize>>,
+    /// Registers whose type at the beginning of a run, as it was so far, has been read.
+    read: Vec<Cell<bool>>,
+    /// What was read has changed since.
     changed: bool,
+    /// Something is read, or goes to a register of, another type than its own.
+    mistaken: bool,
 }
 
 impl<'i> Types<'i> {
     fn new(context: &Context, ir: &'i Ir, given: &'i GivenTypes) -> Types<'i> {
         // A raw word may write anything.
-        let opaque = ir.bundles.iter().any(|bundle| bundle.is_opaque());
+        let opaque = ir.is_opaque();
         let mut declared = Vec::with_capacity(ir.registers.len());
         let mut entry = Vec::with_capacity(ir.registers.len());
         for (index, register) in ir.registers.iter().enumerate() {
@@ -110,7 +118,8 @@ impl<'i> Types<'i> {
         let now = entry.iter().map(|typed| (usize::MAX, *typed)).collect();
         let passed = ROWS.iter().map(passed).collect();
         let tables = tables(ir, &context.declared.data_types);
-        Types { ir, given, entry, declared, now, tables, passed, changed: false }
+        let read = vec![Cell::new(false); ir.registers.len()];
+        Types { ir, given, entry, declared, now, tables, passed, read, changed: false, mistaken: false }
     }
 
     /// Gives up on what is still changing.
@@ -123,6 +132,21 @@ impl<'i> Types<'i> {
         self.tables.values_mut().for_each(|table| *table = Typed::ANY);
     }
 
+    /// Whether an operation reads what it follows now as another type than it is, or choose between two.
+    fn is_mistaken(&self, run: usize, operation: &Operation) -> bool {
+        let (mut int, mut float) = (false, false);
+        for which in &self.passed[operation.op as usize] {
+            let kind = self.source(run, operation, *which).kind;
+            (int, float) = (int | (kind == Kind::Int), float | (kind == Kind::Float));
+        }
+        let row = operation.row();
+        let mistaken = |which| match row.source_type(which) {
+            Type::B => false,
+            wanted => self.source(run, operation, which).kind.mistaken_for(wanted).is_some(),
+        };
+        int && float || (0..operation.reads().len()).any(mistaken)
+    }
+
     /// Follows the types through every run, and reports mistakes if there is a context to report to.
     fn walk(&mut self, runs: &[Run], mut context: Option<&mut Context>) {
         let ir = self.ir;
@@ -132,6 +156,9 @@ impl<'i> Types<'i> {
                     for operation in &bundle.operations {
                         self.reads(number, operation, context);
                     }
+                } else if !self.mistaken {
+                    let is_mistaken = |operation| self.is_mistaken(number, operation);
+                    self.mistaken = bundle.operations.iter().any(is_mistaken);
                 }
                 // All operations of a bundle read before any writes.
                 let results: SmallVec<[Typed; 3]> =
@@ -154,7 +181,10 @@ impl<'i> Types<'i> {
                 match (self.ir.registers[index].kind, self.now[index]) {
                     (RegisterKind::Constant(_) | RegisterKind::Zero, _) => Typed::ANY,
                     (_, (written, typed)) if written == run => typed,
-                    _ => self.entry[index],
+                    _ => {
+                        self.read[index].set(true);
+                        self.entry[index]
+                    }
                 }
             }
         }
@@ -216,10 +246,11 @@ impl<'i> Types<'i> {
         let register = self.ir.register(dest);
         let value = if !self.declared[index] {
             let joined = self.entry[index].join(result);
-            self.changed |= joined.kind != self.entry[index].kind;
+            self.changed |= joined.kind != self.entry[index].kind && self.read[index].get();
             self.entry[index] = joined;
             result
         } else if let Some(ty) = result.kind.mistaken_for(register.ty) {
+            self.mistaken = true;
             if let Some(context) = context {
                 wrong_register(context, self.ir, operation, register, ty, result);
             }

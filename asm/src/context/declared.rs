@@ -8,8 +8,9 @@ use crate::report::source::Span;
 use crate::syntax::ast::{Operand, Section};
 use crate::syntax::expr::Value;
 use crate::syntax::name::NameId;
+use foldhash::{HashMap, HashSet};
 use smallvec::SmallVec;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::BTreeMap;
 use takt_isa::{Register, Type};
 
 #[derive(Clone, Debug)]
@@ -75,8 +76,8 @@ pub(crate) struct Declared {
     pub(crate) elements: usize,
     pub(crate) constants: Vec<NamedConstant>,
     pub(crate) arguments: Vec<Argument>,
-    /// Parameters of macros' uses that stand for registers, as far as operations use them.
-    pub(crate) parameters: HashMap<(ScopeId, NameId), RegisterId>,
+    /// Parameters of macros' uses that stand for registers, as far as operations use them; some several times.
+    pub(crate) parameters: Vec<(ScopeId, NameId, RegisterId)>,
     /// Labels. While the source is read a code label's position counts the statements of its section.
     pub(crate) labels: Vec<Label>,
     /// The section of each label.
@@ -98,16 +99,16 @@ impl Declared {
         };
         Declared {
             registers: vec![zero],
-            by_address: HashMap::from([(Register::ZERO, RegisterId::ZERO)]),
+            by_address: [(Register::ZERO, RegisterId::ZERO)].into_iter().collect(),
             numbered: BTreeMap::new(),
-            results: HashSet::new(),
-            typed: HashSet::new(),
+            results: HashSet::default(),
+            typed: HashSet::default(),
             given: GivenTypes::default(),
             arrays: Vec::new(),
             elements: 0,
             constants: Vec::new(),
             arguments: Vec::new(),
-            parameters: HashMap::new(),
+            parameters: Vec::new(),
             labels: Vec::new(),
             label_sections: Vec::new(),
             data_types: Vec::new(),

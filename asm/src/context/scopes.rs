@@ -6,11 +6,11 @@ use crate::report::source::Span;
 use crate::syntax::ast::{Ast, DirectiveKind};
 use crate::syntax::intern::Interner;
 use crate::syntax::name::NameId;
-use std::collections::HashMap;
+use foldhash::HashMap;
 use std::rc::Rc;
 
 /// An expansion: what a use of a macro, or one turn of a repetition, adds to the names around it.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
 pub(crate) struct ScopeId(pub(crate) u32);
 
 impl ScopeId {
@@ -28,7 +28,21 @@ pub(crate) struct Scope {
     pub(crate) kind: ScopeKind,
     /// The use of the macro, or the `.rep`.
     pub(crate) site: Span,
+    /// Of a macro's use the latest of its first names, and how many those are.
+    latest: u32,
+    near: u32,
 }
+
+/// A name of a macro's use, and which name of that use came before: an index into the list of these.
+struct Near {
+    name: NameId,
+    binding: Binding,
+    before: u32,
+}
+
+/// Names of a macro's use that are searched one by one, which for the few that most have, its parameters, is faster than a
+/// table for all uses; that has the others.
+const NEAR: u32 = 8;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum ScopeKind {
@@ -90,6 +104,7 @@ pub(crate) struct Scopes {
     scopes: Vec<Scope>,
     /// What names mean in the root scope, by number.
     globals: Vec<Binding>,
+    near: Vec<Near>,
     locals: HashMap<(u32, NameId), Binding>,
     pub(crate) macros: HashMap<NameId, MacroDefinition>,
 }
@@ -102,13 +117,16 @@ impl Scopes {
             within: ScopeId::ROOT,
             kind: ScopeKind::Root,
             site: Span::default(),
+            latest: 0,
+            near: 0,
         };
         Scopes {
             names: Interner::new(),
             scopes: vec![root],
             globals: Vec::new(),
-            locals: HashMap::new(),
-            macros: HashMap::new(),
+            near: Vec::new(),
+            locals: HashMap::default(),
+            macros: HashMap::default(),
         }
     }
 
@@ -124,6 +142,11 @@ impl Scopes {
         self.names.text(name)
     }
 
+    /// How many scopes there are; their numbers are below it.
+    pub(crate) fn count(&self) -> usize {
+        self.scopes.len()
+    }
+
     pub(crate) fn scope(&self, id: ScopeId) -> &Scope {
         &self.scopes[id.0 as usize]
     }
@@ -132,7 +155,7 @@ impl Scopes {
     pub(crate) fn open(&mut self, parent: ScopeId, within: ScopeId, kind: ScopeKind, site: Span) -> ScopeId {
         let id = ScopeId(self.scopes.len() as u32);
         let owner = if matches!(kind, ScopeKind::Macro(..)) { id } else { self.scope(parent).owner };
-        self.scopes.push(Scope { parent, owner, within, kind, site });
+        self.scopes.push(Scope { parent, owner, within, kind, site, latest: 0, near: 0 });
         id
     }
 
@@ -144,8 +167,8 @@ impl Scopes {
             match here.kind {
                 ScopeKind::Rep(variable, value) if variable == name => return Binding::Count(value),
                 ScopeKind::Macro(..) => {
-                    if let Some(binding) = self.locals.get(&(scope.0, name)) {
-                        return *binding;
+                    if let Some(binding) = self.local(scope, name) {
+                        return binding;
                     }
                 }
                 _ => {}
@@ -158,11 +181,11 @@ impl Scopes {
     /// What a name is bound to in one scope that takes declarations.
     pub(crate) fn bound(&self, owner: ScopeId, name: NameId) -> Binding {
         let binding = if owner == ScopeId::ROOT {
-            self.globals.get(name.0 as usize)
+            self.globals.get(name.0 as usize).copied()
         } else {
-            self.locals.get(&(owner.0, name))
+            self.local(owner, name)
         };
-        binding.copied().unwrap_or(Binding::None)
+        binding.unwrap_or(Binding::None)
     }
 
     /// Binds a name in a scope, without asking whether it is bound.
@@ -174,8 +197,45 @@ impl Scopes {
             }
             self.globals[index] = binding;
         } else {
-            self.locals.insert((scope.0, name), binding);
+            match self.near_index(scope, name) {
+                Some(index) => self.near[index].binding = binding,
+                None if self.scope(scope).near < NEAR => {
+                    let index = self.near.len() as u32;
+                    let of = &mut self.scopes[scope.0 as usize];
+                    self.near.push(Near { name, binding, before: of.latest });
+                    (of.latest, of.near) = (index, of.near + 1);
+                }
+                None => {
+                    self.locals.insert((scope.0, name), binding);
+                }
+            }
         }
+    }
+
+    /// Where a name is in the list of those that are searched one by one.
+    #[inline]
+    fn near_index(&self, scope: ScopeId, name: NameId) -> Option<usize> {
+        let Scope { latest, near, .. } = *self.scope(scope);
+        let mut index = latest as usize;
+        for _ in 0..near {
+            if self.near[index].name == name {
+                return Some(index);
+            }
+            index = self.near[index].before as usize;
+        }
+        None
+    }
+
+    /// What a name is bound to in a use of a macro.
+    #[inline]
+    fn local(&self, scope: ScopeId, name: NameId) -> Option<Binding> {
+        if let Some(index) = self.near_index(scope, name) {
+            return Some(self.near[index].binding);
+        }
+        if self.scope(scope).near < NEAR {
+            return None;
+        }
+        self.locals.get(&(scope.0, name)).copied()
     }
 
     /// The text of a name declared in a scope, as the symbol map shows it: unique to a macro's use.

@@ -8,8 +8,8 @@ mod choose;
 use crate::homes;
 use crate::ir::matching;
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, runs};
+use foldhash::{HashMap, HashSet};
 use smallvec::SmallVec;
-use std::collections::{HashMap, HashSet};
 use takt_isa::program::Location;
 use takt_isa::{Fusion, Slots, fusions};
 
@@ -68,9 +68,11 @@ pub(crate) fn contract(ir: &mut Ir, is_on: impl Fn(usize) -> bool) -> Contracted
     let mut contracted = Contracted::default();
     let hosted = |fusion: &&Fusion| ir.machine.host(fusion.fused.row().function).is_some();
     let known: Vec<&Fusion> = fusions().iter().filter(hosted).collect();
+    if known.is_empty() || !(0..ir.bundles.len()).any(&is_on) {
+        return contracted;
+    }
     // Where every bundle must keep its address, and where words may read anything, nothing can be taken out.
-    let fixed = runs::jumps_to_numbers(ir) || ir.bundles.iter().any(|bundle| bundle.is_opaque());
-    if known.is_empty() || fixed || !(0..ir.bundles.len()).any(&is_on) {
+    if runs::jumps_to_numbers(ir) || ir.is_opaque() {
         return contracted;
     }
     let exposed = exposed(ir);
@@ -88,7 +90,7 @@ pub(crate) fn contract(ir: &mut Ir, is_on: impl Fn(usize) -> bool) -> Contracted
             let free = !(product.stale || product.last && exposed[product.dest.index()]);
             (wanted && free && has_place(ir, reader, fusion)).then_some((reader, **fusion))
         };
-        let mut wishes = Wishes::new();
+        let mut wishes = Wishes::default();
         for product in &products {
             if let Some((sum, fusion)) = fits(product) {
                 wishes.entry(sum).or_default().push((product.at, fusion));

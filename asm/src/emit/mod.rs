@@ -107,7 +107,12 @@ fn word(ir: &Ir, operation: &Operation, slot: SlotIndex, placement: &Placement, 
 
 /// Whether no packing of the operations fits the program memory.
 pub(crate) fn is_too_long(ir: &Ir) -> bool {
-    let words = (ir.machine.code_depth as usize).saturating_mul(ir.machine.slots.len());
+    let depth = ir.machine.code_depth as usize;
+    // A bundle has no more operations that need a slot than there are slots.
+    if ir.bundles.len() <= depth {
+        return false;
+    }
+    let words = depth.saturating_mul(ir.machine.slots.len());
     ir.operations().filter(|operation| operation.slot.is_some()).count() > words
 }
 

@@ -15,7 +15,7 @@ use crate::ir::runs::{self, Run};
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::output::listing;
 use crate::report::source::Span;
-use std::collections::HashSet;
+use foldhash::HashSet;
 use takt_isa::fp::Host;
 use takt_isa::program::Location;
 use takt_isa::{BundleAddress, Effect, Machine, Op, ROWS, Register, Row, SlotIndex, Slots, Type, compute};

@@ -12,7 +12,8 @@ use crate::ir::flow::Flow;
 use crate::ir::matching;
 use crate::ir::runs::{self, Run};
 use crate::ir::{Ir, Operation, RegisterId, RegisterKind};
-use std::collections::{BTreeMap, HashSet, VecDeque};
+use foldhash::HashSet;
+use std::collections::{BTreeMap, VecDeque};
 use takt_isa::{SlotIndex, Slots};
 
 /// An operation: its bundle, and which of its operations.
@@ -49,7 +50,7 @@ impl Choice {
             Choice { of: BTreeMap::new(), sets: Vec::new(), bundles: Vec::new(), able: BTreeMap::new() };
         let mut writers: BTreeMap<RegisterId, Vec<At>> = BTreeMap::new();
         // Registers used so far. What sets one to a constant before anything uses it may become a preset, whatever its bank.
-        let mut used: HashSet<RegisterId> = HashSet::new();
+        let mut used: HashSet<RegisterId> = HashSet::default();
         let runs = runs::runs(ir);
         let flow = Flow::new(ir, &runs);
         for (b, bundle) in ir.bundles.iter().enumerate() {

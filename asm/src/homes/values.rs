@@ -49,7 +49,7 @@ pub(crate) struct Copy {
 /// Splits names into values where that matters. Returns the values that are still to be copied home, in order.
 pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
     let mut copies = Vec::new();
-    if homes.of.iter().all(Option::is_none) && !ir.bundles.iter().any(|bundle| bundle.scheduled) {
+    if homes.of.iter().all(Option::is_none) && !ir.scheduled {
         return copies;
     }
     let mut names = vec![Name::default(); ir.registers.len()];

@@ -2,7 +2,7 @@
 //! after its run, what is issued only once, how often a place is issued.
 
 use crate::ir::runs::{self, Run};
-use crate::ir::{Bundle, Ir, Operation, RegisterId};
+use crate::ir::{Ir, Operation, RegisterId};
 use std::collections::HashMap;
 use takt_isa::Effect;
 
@@ -65,7 +65,7 @@ impl Flow {
                 }
             }
         }
-        let unknown = runs::jumps_to_numbers(ir) || ir.bundles.iter().any(Bundle::is_opaque);
+        let unknown = runs::jumps_to_numbers(ir) || ir.is_opaque();
         let once = if unknown { 0 } else { once(ir, &jumps) };
         Flow { sources, ends, once, weights: weights(ir, &jumps), unknown }
     }

@@ -3,8 +3,8 @@
 use crate::ir::{LabelId, Operation};
 use crate::report::source::Span;
 use crate::syntax::expr::Value;
+use foldhash::HashMap;
 use smallvec::SmallVec;
-use std::collections::HashMap;
 use takt_isa::Type;
 
 /// What is known of a value's type.

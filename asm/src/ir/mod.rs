@@ -187,6 +187,9 @@ impl Operation {
 
     /// The bundle that it may continue at: by its label, or else by number.
     pub(crate) fn target(&self) -> Option<Result<LabelId, u32>> {
+        if matches!(self.constant, Constant::None) {
+            return None;
+        }
         let has_target = self.row().shape.operands().contains(&Operand::Target);
         match self.constant {
             Constant::Code(label) if has_target => Some(Ok(label)),
@@ -323,6 +326,8 @@ pub struct Ir {
     pub latched: bool,
     /// Outputs whose number the source gives, by number: `@ 3`, or that of the register it names.
     pub numbers: BTreeMap<u16, RegisterId>,
+    /// Whether the scheduler may move any bundle.
+    pub scheduled: bool,
     /// Data memory.
     pub data: Vec<u32>,
     /// Words given bit by bit.
@@ -352,6 +357,11 @@ impl Ir {
             bound.position = moved(bound.position);
         }
         self.bundles = bundles;
+    }
+
+    /// Whether it holds a word given bit by bit, so that not all of what it does is known.
+    pub(crate) fn is_opaque(&self) -> bool {
+        !self.raw.is_empty() && self.bundles.iter().any(Bundle::is_opaque)
     }
 
     /// Every operation, in order.

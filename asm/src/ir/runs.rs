@@ -1,6 +1,6 @@
 //! The straight runs of a program: control enters one at its first bundle only, and leaves it after its last only.
 
-use crate::ir::{Ir, Operation};
+use crate::ir::Ir;
 use takt_isa::Effect;
 use takt_isa::program::Space;
 
@@ -29,18 +29,21 @@ pub(crate) fn runs(ir: &Ir) -> Vec<Run> {
     for bound in &ir.loop_bounds {
         cut[bound.position as usize] = true;
     }
-    for address in ir.operations().filter_map(Operation::target_number) {
-        if let Some(cut) = cut.get_mut(address as usize) {
-            *cut = true;
-        }
-    }
+    let mut before = ir.bundles.first().is_some_and(|bundle| bundle.scheduled);
     for (i, bundle) in ir.bundles.iter().enumerate() {
         // The status register sees every operation before and none after: a wall.
-        let flags =
-            |operation: &Operation| matches!(operation.row().effect, Effect::ReadFlags | Effect::ClearFlags);
-        let is_wall = bundle.is_opaque() || bundle.operations.iter().any(flags);
-        cut[i] |= is_wall || (i > 0 && ir.bundles[i - 1].scheduled != bundle.scheduled);
-        cut[i + 1] |= is_wall || bundle.operations.iter().any(Operation::redirects);
+        let (mut is_wall, mut redirects) = (bundle.is_opaque(), false);
+        for operation in &bundle.operations {
+            let effect = operation.row().effect;
+            is_wall |= matches!(effect, Effect::ReadFlags | Effect::ClearFlags);
+            redirects |= effect.redirects();
+            if let Some(cut) = operation.target_number().and_then(|address| cut.get_mut(address as usize)) {
+                *cut = true;
+            }
+        }
+        cut[i] |= is_wall || bundle.scheduled != before;
+        cut[i + 1] |= is_wall || redirects;
+        before = bundle.scheduled;
     }
     let mut runs = Vec::new();
     let mut start = 0;

@@ -106,36 +106,43 @@ pub(crate) fn parts(sources: &Sources, emitted: &Emitted) -> Vec<(u32, Columns)>
 }
 
 /// What the names of a program stand for.
-pub(crate) fn names(context: &Context, ir: &Ir, placement: &Placement, emitted: &Emitted) -> Names {
+pub(crate) fn names(context: &mut Context, ir: &Ir, placement: &Placement, emitted: &mut Emitted) -> Names {
     let (positions, scopes) = positions(context, ir, emitted);
     Names { positions, scopes, values: values(ir, placement, emitted) }
 }
 
-fn positions(context: &Context, ir: &Ir, emitted: &Emitted) -> (Vec<Option<Position>>, Vec<Scope>) {
-    let mut parameters: BTreeMap<u32, Vec<(String, String)>> = BTreeMap::new();
-    for (&(scope, name), register) in &context.declared.parameters {
-        let register = &ir.register(*register).name;
-        if !register.is_empty() {
-            let names = (context.scopes.text(name).to_owned(), register.clone());
-            parameters.entry(scope.0).or_default().push(names);
-        }
-    }
+fn positions(context: &mut Context, ir: &Ir, emitted: &mut Emitted) -> (Vec<Option<Position>>, Vec<Scope>) {
+    let mut given = std::mem::take(&mut context.declared.parameters);
+    given.sort_unstable();
+    given.dedup_by_key(|(scope, name, _)| (*scope, *name));
+    let parameters = |owner: ScopeId| {
+        let of_owner = &given[given.partition_point(|(scope, ..)| *scope < owner)..];
+        let of_owner = of_owner.iter().take_while(|(scope, ..)| *scope == owner);
+        let named = of_owner.filter(|(.., register)| !ir.register(*register).name.is_empty());
+        let names = named.map(|(_, name, register)| {
+            (context.scopes.text(*name).to_owned(), ir.register(*register).name.clone())
+        });
+        let mut names: Vec<(String, String)> = names.collect();
+        names.sort_unstable();
+        names
+    };
     let mut scopes = vec![Scope::default()];
-    let mut numbers: HashMap<u32, u32> = HashMap::new();
+    // By owner; 0 for those that have none yet, as for the code outside of macros.
+    let mut numbers = vec![0; context.scopes.count()];
     let mut position = |(order, expansion): (u32, u32)| {
         let owner = context.scopes.scope(ScopeId(expansion)).owner;
-        let scope = match context.scopes.scope_name(owner) {
-            None => 0,
-            Some(name) => *numbers.entry(owner.0).or_insert_with(|| {
-                let mut parameters = parameters.remove(&owner.0).unwrap_or_default();
-                parameters.sort_unstable();
-                scopes.push(Scope { name, parameters });
-                scopes.len() as u32 - 1
-            }),
-        };
-        Position { order, scope }
+        let number = &mut numbers[owner.0 as usize];
+        if *number == 0
+            && let Some(name) = context.scopes.scope_name(owner)
+        {
+            *number = scopes.len() as u32;
+            scopes.push(Scope { name, parameters: parameters(owner) });
+        }
+        Position { order, scope: *number }
     };
-    let positions = emitted.origins.iter().map(|origin| origin.map(&mut position)).collect();
+    // In the memory that the origins have.
+    let origins = std::mem::take(&mut emitted.origins);
+    let positions = origins.into_iter().map(|origin| origin.map(&mut position)).collect();
     (positions, scopes)
 }
 
@@ -153,6 +160,9 @@ fn values(ir: &Ir, placement: &Placement, emitted: &Emitted) -> Vec<NamedValue> 
     let shared = (0..ir.registers.len()).filter(|index| placement.shared[*index]).map(RegisterId::new);
     for id in shared.filter(|id| !made.contains(id)) {
         split.entry(id).or_default();
+    }
+    if split.is_empty() {
+        return Vec::new();
     }
     let ranges = ranges(ir);
     let own_names: HashMap<Register, &str> =

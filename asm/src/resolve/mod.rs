@@ -1,6 +1,7 @@
 //! Names to registers, labels and numbers: the expanded source as [`Ir`].
 
 mod address;
+mod advice;
 pub(crate) mod equation;
 mod expression;
 mod fast;
@@ -21,8 +22,9 @@ use crate::report::source::Span;
 use crate::resolve::forms::Forms;
 use crate::resolve::sharing::Sharing;
 use crate::syntax::ast::*;
+use foldhash::HashMap;
 use smallvec::SmallVec;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::rc::Rc;
 use takt_isa::program::{Location, Range};
 use takt_isa::spec::instructions::Function;
@@ -54,6 +56,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         demands: Vec::new(),
         latched: flat.ports.is_some_and(|(latched, _)| latched),
         numbers: BTreeMap::new(),
+        scheduled: false,
         data: Vec::new(),
         raw: Vec::new(),
         contracted: Vec::new(),
@@ -65,7 +68,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         Data::Value(..) => 1,
     };
     let data_words = flat.data.iter().map(words).sum();
-    let (pool, own_files) = (HashMap::new(), Vec::new());
+    let (pool, own_files) = (HashMap::default(), Vec::new());
     let mut resolver = Resolver {
         context,
         loader,
@@ -103,9 +106,6 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
     ir.numbers = std::mem::take(&mut context.declared.numbered);
     ir.labels = std::mem::take(&mut context.declared.labels);
     ir.files = flat.files;
-    for (order, bundle) in (0..).zip(&mut ir.bundles) {
-        bundle.operations.iter_mut().for_each(|operation| operation.order = order);
-    }
     ir
 }
 
@@ -258,9 +258,12 @@ impl Resolver<'_> {
     }
 
     /// Adds a bundle to the program.
-    fn push(&mut self, bundle: Bundle) {
+    fn push(&mut self, mut bundle: Bundle) {
         let is_opaque = bundle.is_opaque();
-        for operation in &bundle.operations {
+        let order = self.ir.bundles.len() as u32;
+        self.ir.scheduled |= bundle.scheduled;
+        for operation in &mut bundle.operations {
+            operation.order = order;
             if let Some(dest) = operation.dest {
                 let kind = self.result_kind(operation);
                 self.set_kind(dest, kind);
@@ -468,7 +471,7 @@ impl Resolver<'_> {
     }
 
     fn ranges(&mut self) {
-        let mut seen: HashMap<RegisterId, Span> = HashMap::new();
+        let mut seen: HashMap<RegisterId, Span> = HashMap::default();
         for (at, directive) in std::mem::take(&mut self.flat.ranges) {
             let ast = Rc::clone(&self.context.asts[at.ast as usize]);
             let DirectiveKind::Range { registers, placed, low, high } =

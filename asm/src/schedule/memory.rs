@@ -144,7 +144,7 @@ pub(super) fn fixed(ir: &Ir) -> Vec<Option<u32>> {
             RegisterKind::Input | RegisterKind::Output => None,
         })
         .collect();
-    let opaque = ir.bundles.iter().any(crate::ir::Bundle::is_opaque);
+    let opaque = ir.is_opaque();
     for (bits, register) in fixed.iter_mut().zip(&ir.registers) {
         // A raw word may write any register, and from outside an input may be written.
         let input = register.pinned.is_some_and(|address| ir.machine.is_input(address));

@@ -63,6 +63,9 @@ pub struct Report {
 
 /// Schedules every block of bundles that ask for it ([`Bundle::scheduled`]), and checks what is demanded of ports.
 pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
+    if ir.demands.is_empty() && !ir.scheduled {
+        return Report::default();
+    }
     let fixed = runs::jumps_to_numbers(ir);
     if fixed && ir.demands.is_empty() {
         return Report::default();

@@ -498,6 +498,9 @@ impl Operator {
         }
     }
 
+    /// How tightly operators before their one operand bind: less than powers.
+    pub const PREFIX: u16 = 7;
+
     /// How tightly it binds as a binary operator, from 1; 0 if it is not one.
     pub const fn precedence(self) -> u16 {
         match self {

@@ -143,21 +143,24 @@ impl NameId {
     }
 }
 
-/// Multiply and fold, eight bytes at a time.
+/// Multiply and fold, eight bytes at a time; the last eight overlap those before.
 fn hash(bytes: &[u8]) -> u64 {
     const K: u64 = 0x9e37_79b9_7f4a_7c15;
     let fold = |h: u64, word: u64| {
         let product = u128::from(h ^ word) * u128::from(K);
         (product as u64) ^ ((product >> 64) as u64)
     };
+    let four = |bytes: &[u8; 4]| u64::from(u32::from_le_bytes(*bytes));
     let mut h = K ^ bytes.len() as u64;
-    let mut chunks = bytes.chunks_exact(8);
-    for chunk in &mut chunks {
-        h = fold(h, chunk.iter().rev().fold(0, |word, &byte| word << 8 | u64::from(byte)));
-    }
-    let rest = chunks.remainder();
-    if !rest.is_empty() {
-        h = fold(h, rest.iter().rev().fold(0, |word, &byte| word << 8 | u64::from(byte)));
+    if let Some(last) = bytes.last_chunk() {
+        for chunk in bytes[..bytes.len() - 1].as_chunks().0 {
+            h = fold(h, u64::from_le_bytes(*chunk));
+        }
+        h = fold(h, u64::from_le_bytes(*last));
+    } else if let (Some(first), Some(last)) = (bytes.first_chunk(), bytes.last_chunk()) {
+        h = fold(h, four(first) | four(last) << 32);
+    } else {
+        h = fold(h, bytes.iter().fold(0, |word, &byte| word << 8 | u64::from(byte)));
     }
     h ^ h >> 29
 }

@@ -307,12 +307,38 @@ mod tests {
             pieces in prop::collection::vec(
                 prop::sample::select(vec![
                     "a", "b", "fadd", "l:", ":", "1", "2.5", ",", ", ", " ", " ", "||", " || ", "||\n", "\n", "[", "]", "4[a]",
-                    "t[b]", "=", " = ", "?", "t[b,c]", "2.5[a]", "@", "@m3", "-", "+", "x{i}", "(", ")", ".reg", "; c",
+                    "t[b]", "=", " = ", "?", "t[b,c]", "2.5[a]", "@", "@m3", "-", "+", "*", "^", "==", "<<", "~", "x{i}", "(", ")",
+                    ".reg", "; c",
                 ]),
                 0..14,
             )
         ) {
             let text = pieces.concat();
+            prop_assert_eq!(read(&text, true), read(&text, false));
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 3000, ..ProptestConfig::default() })]
+
+        /// Nor in expressions, most of them well formed.
+        #[test]
+        fn the_shortcut_computes_the_same(
+            parts in prop::collection::vec(
+                (
+                    prop::sample::select(vec!["", "", "", "-", "~", "!", "(", "((", "-(", "+"]),
+                    prop::sample::select(vec!["1", "2.5", "k", "x", "sin(k)"]),
+                    prop::sample::select(vec!["", "", "", ")", "))"]),
+                    prop::sample::select(vec!["+", "-", "*", "/", "%", "^", "^", "<<", "|", "&", "==", "<", "~", "?", "[x]"]),
+                ),
+                1..7,
+            )
+        ) {
+            let mut text = String::from(" fmul a, ");
+            for (index, (before, atom, after, operator)) in parts.iter().enumerate() {
+                let operator = if index + 1 < parts.len() { *operator } else { "\n" };
+                text.extend([*before, *atom, *after, operator]);
+            }
             prop_assert_eq!(read(&text, true), read(&text, false));
         }
     }

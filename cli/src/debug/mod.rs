@@ -7,11 +7,12 @@ mod screen;
 
 use crate::absent;
 use crate::files::{self, Given, Out};
-use crate::load::{Load, Loaded};
+use crate::load::{self, Load, Loaded};
 use crate::number;
 use crate::output::{self, Failure};
 use crate::ports;
 use crate::select::{OptionalMachine, SourceArguments};
+use crate::system;
 use crate::track::{ClosedLoopArguments, Recording};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
@@ -22,8 +23,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Duration;
-use takt_debug::console::{Console, first_mistake};
+use takt_debug::console::{Commands, Console, first_mistake};
 use takt_debug::session::{Control, Options, Session, Unit, Why};
+use takt_debug::system::SystemConsole;
 use takt_emu::Rows;
 
 /// Step through a program, forward and back, and look at everything.
@@ -33,7 +35,7 @@ use takt_emu::Rows;
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Debug {
-    /// Source or image. With --track, `tracking` (as if nothing is said) or another that `takt track` knows, or a file.
+    /// Source or image, or a system, a `.toml` file. With --track, `tracking` (as if nothing is said) or another that `takt track` knows, or a file.
     #[arg(required_unless_present = "track")]
     pub(crate) file: Option<PathBuf>,
     #[command(flatten)]
@@ -62,6 +64,7 @@ Examples:
   takt debug prog.s --tui                    full-screen; `?` shows keys and commands
   takt debug prog.s --inputs in.csv          with recorded inputs
   takt debug prog.s --script checks.txt      commands from a file: a test
+  takt debug system.toml --inputs in.csv     several cores in one time: a base tick for each row
   takt debug --track                         the robot's controller, where the tracking error is largest";
 
 /// Rows of inputs; more is an error.
@@ -84,8 +87,11 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
         let text = "commands come from standard input: give --script, or files in place of `-`";
         return Err(Failure::Usage(text.to_owned()).into());
     }
+    if let Some(file) = arguments.file.as_deref().filter(|file| load::is_system(file)) {
+        return of_system(arguments, file, color, out);
+    }
     // A mistake in a script is found before the program runs.
-    let script = arguments.script.as_deref().map(script).transpose()?;
+    let script = arguments.script.as_deref().map(script::<Console>).transpose()?;
 
     if arguments.tui && !cfg!(feature = "tui") {
         return absent::left_out("tui");
@@ -100,20 +106,51 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
     if let Some(why) = why {
         writeln!(out, "{why}")?;
     }
-    let mut console = Console::new(session);
     #[cfg(feature = "tui")]
     if arguments.tui {
+        let mut console = Console::new(session);
         out.flush()?;
         return screen::run(&mut console, &control);
     }
+    converse(Console::new(session), script, &control, color, out)
+}
+
+/// Commands from where they come.
+fn converse<C: Commands + Send + 'static>(
+    mut console: C,
+    script: Option<(String, String)>,
+    control: &Arc<Control>,
+    color: bool,
+    out: &mut Out,
+) -> Result<()> {
     let place = console.place();
     out.write_all(place.as_bytes())?;
     match script {
         Some((name, text)) => batch(&mut console, &name, &mut text.as_bytes(), color, out)?,
-        None if std::io::stdin().is_terminal() => prompt::run(console, &control, color, out)?,
+        None if std::io::stdin().is_terminal() => prompt::run(console, control, color, out)?,
         None => batch(&mut console, "standard input", &mut BufReader::new(std::io::stdin()), color, out)?,
     }
     Ok(())
+}
+
+/// A session on a system.
+fn of_system(arguments: &Debug, file: &Path, color: bool, out: &mut Out) -> Result<()> {
+    let refused = [
+        ("--machine", arguments.machine.machine.is_some(), "the system's file names each core's"),
+        ("--tick", arguments.tick.is_some(), "the system's file has it"),
+        ("--track", arguments.closed_loop.track, "it is for a program"),
+        ("--tui", arguments.tui, "it shows a single core"),
+    ];
+    for (option, given, why) in refused {
+        if given {
+            return Err(Failure::Usage(format!("{option} with a system: {why}")).into());
+        }
+    }
+    let script = arguments.script.as_deref().map(script::<SystemConsole>).transpose()?;
+    let control = Arc::new(Control::default());
+    let loaded = system::load(file, &arguments.source, color)?;
+    let console = system::debug::console(loaded, arguments.inputs.as_deref(), ROWS, &control)?;
+    converse(console, script, &control, color, out)
 }
 
 /// The session that the command line asks for, and why it begins where it does, if there is a reason.
@@ -154,11 +191,11 @@ fn changed_sources(path: &Path, loaded: &Loaded, color: bool) {
 }
 
 /// A script's name and text.
-fn script(path: &Path) -> Result<(String, String)> {
+fn script<C: Commands>(path: &Path) -> Result<(String, String)> {
     let name = files::input_name(path);
     let text = String::from_utf8(files::read(path, SCRIPT_LIMIT)?);
     let text = text.map_err(|_| anyhow!("{name} is not UTF-8 text"))?;
-    if let Some((line, mistake)) = first_mistake(&text) {
+    if let Some((line, mistake)) = first_mistake::<C>(&text) {
         bail!("{name}:{line}: {mistake}");
     }
     Ok((name, text))
@@ -191,7 +228,7 @@ fn in_recording(recording: Recording, control: &Arc<Control>) -> Result<(Session
 
 /// Commands from a file or a pipe: all are executed, whatever becomes of one.
 fn batch(
-    console: &mut Console,
+    console: &mut dyn Commands,
     name: &str,
     lines: &mut dyn BufRead,
     color: bool,
@@ -212,7 +249,7 @@ fn batch(
                 output::error(&format!("{name}:{number}: {error}"), color);
             }
         }
-        if console.quit {
+        if console.quit() {
             break;
         }
     }
@@ -220,8 +257,8 @@ fn batch(
 }
 
 /// Executes a line in a thread of its own; `meanwhile` is called every so often until there is an answer.
-fn execute(
-    console: &mut Console,
+fn execute<C: Commands + Send>(
+    console: &mut C,
     line: &str,
     control: &Control,
     mut meanwhile: impl FnMut() -> Result<()>,

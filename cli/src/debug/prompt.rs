@@ -16,23 +16,23 @@ use std::cell::RefCell;
 use std::io::{IsTerminal, Write};
 use std::rc::Rc;
 use std::sync::Arc;
-use takt_debug::console::{Console, complete};
+use takt_debug::console::Commands;
 use takt_debug::session::Control;
 
 /// Clears a terminal's line from here on.
 const CLEAR: &str = "\x1b[K";
 
 /// Completion over the session of the prompt.
-struct Prompt(Rc<RefCell<Console>>);
+struct Prompt<C>(Rc<RefCell<C>>);
 
-impl Helper for Prompt {}
-impl Highlighter for Prompt {}
-impl Validator for Prompt {}
-impl Hinter for Prompt {
+impl<C: Commands> Helper for Prompt<C> {}
+impl<C: Commands> Highlighter for Prompt<C> {}
+impl<C: Commands> Validator for Prompt<C> {}
+impl<C: Commands> Hinter for Prompt<C> {
     type Hint = String;
 }
 
-impl Completer for Prompt {
+impl<C: Commands> Completer for Prompt<C> {
     type Candidate = String;
 
     fn complete(
@@ -41,17 +41,22 @@ impl Completer for Prompt {
         at: usize,
         _: &rustyline::Context<'_>,
     ) -> rustyline::Result<(usize, Vec<String>)> {
-        Ok(complete(&self.0.borrow().session, &line[..at]))
+        Ok(self.0.borrow().complete(&line[..at]))
     }
 }
 
 /// Reads and executes commands until there are no more.
-pub(super) fn run(console: Console, control: &Arc<Control>, color: bool, out: &mut Out) -> Result<()> {
+pub(super) fn run<C: Commands + Send + 'static>(
+    console: C,
+    control: &Arc<Control>,
+    color: bool,
+    out: &mut Out,
+) -> Result<()> {
     let heard = Arc::clone(control);
     ctrlc::set_handler(move || heard.interrupt()).context("cannot catch Ctrl-C")?;
     let console = Rc::new(RefCell::new(console));
     let Past { history, file } = Past::load();
-    let mut editor: Editor<Prompt, FileHistory> =
+    let mut editor: Editor<Prompt<C>, FileHistory> =
         Editor::with_history(history::config(), history).context("cannot use the terminal")?;
     editor.set_helper(Some(Prompt(Rc::clone(&console))));
     loop {
@@ -65,7 +70,7 @@ pub(super) fn run(console: Console, control: &Arc<Control>, color: bool, out: &m
         history::append(editor.history_mut(), file.as_deref());
         let mut console = console.borrow_mut();
         let mut shown = false;
-        let answer = execute(&mut console, &line, control, || {
+        let answer = execute(&mut *console, &line, control, || {
             shown = std::io::stderr().is_terminal();
             if shown {
                 // A bar would fill the line, and the terminal's `^C` break it.
@@ -80,7 +85,7 @@ pub(super) fn run(console: Console, control: &Arc<Control>, color: bool, out: &m
             Ok(text) => out.write_all(text.as_bytes())?,
             Err(error) => output::error(&error, color),
         }
-        if console.quit {
+        if console.quit() {
             return Ok(());
         }
     }

@@ -21,7 +21,6 @@ pub(super) fn draw(title: &str, records: &[Record]) -> Result<String> {
 }
 
 fn draw_into(title: &str, records: &[Record], svg: &mut String) -> Outcome<()> {
-    debug_assert!(FINE > 0);
     let root = SVGBackend::with_string(svg, (px(SIZE), px(HEIGHT))).into_drawing_area();
     root.fill(&WHITE)?;
     let (angles, rest) = root.split_vertically(px(PANEL));

@@ -17,13 +17,7 @@ pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
         return Err(Failure::Usage(why.to_owned()).into());
     }
     let LoadedSystem { description, .. } = load(&arguments.file, &arguments.source, color)?;
-    let mut bounds = Vec::new();
-    for core in &description.cores {
-        bounds.push(
-            takt_analysis::bound(&core.program)
-                .map_err(|error| anyhow!("core {}: no bound: {error}", core.name))?,
-        );
-    }
+    let bounds = bounds(&description)?;
     let deadline = arguments.deadline.map(|deadline| deadline.cycles(arguments.clock));
     let ways = latencies(&description, &bounds).map_err(|error| anyhow!("no end-to-end bound: {error}"));
     let late =
@@ -41,6 +35,14 @@ pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
         Some(late) if late > 0 => Err(Failure::Reported.into()),
         _ => Ok(()),
     }
+}
+
+/// The bounds of each core's sections.
+pub(super) fn bounds(description: &Description) -> Result<Vec<Bounds>> {
+    let bound = |core: &Core| {
+        takt_analysis::bound(&core.program).map_err(|error| anyhow!("core {}: no bound: {error}", core.name))
+    };
+    description.cores.iter().map(bound).collect()
 }
 
 fn result_json(
@@ -98,7 +100,28 @@ fn write_text(arguments: &Bound, description: &Description, bounds: &[Bounds], o
 /// Names that are shown of a link with many.
 const SHOWN: usize = 3;
 
-fn write_ways(
+/// Ways through the same cores in the same time as one, of all their inputs to all their outputs.
+fn grouped(ways: &[Latency]) -> Vec<Latency> {
+    let mut groups: Vec<Latency> = Vec::new();
+    let alike = |a: &Latency, b: &Latency| (&a.cores, a.best, a.worst) == (&b.cores, b.best, b.worst);
+    // First the outputs of the same inputs, then the inputs of the same outputs: so each of one group leads to each of the other.
+    for way in ways {
+        match groups.iter_mut().find(|group| alike(group, way) && group.inputs == way.inputs) {
+            Some(group) => group.outputs.extend(way.outputs.iter().cloned()),
+            None => groups.push(way.clone()),
+        }
+    }
+    let mut merged: Vec<Latency> = Vec::new();
+    for group in groups {
+        match merged.iter_mut().find(|other| alike(other, &group) && other.outputs == group.outputs) {
+            Some(other) => other.inputs.extend(group.inputs),
+            None => merged.push(group),
+        }
+    }
+    merged
+}
+
+pub(super) fn write_ways(
     description: &Description,
     ways: &[Latency],
     clock: f64,
@@ -114,7 +137,7 @@ fn write_ways(
         many if many.len() > SHOWN => format!("{}, … ({})", many[..SHOWN].join(", "), many.len()),
         few => few.join(", "),
     };
-    for way in ways {
+    for way in grouped(ways) {
         let cores: Vec<&str> = way.cores.iter().map(|core| description.cores[*core].name.as_str()).collect();
         writeln!(out, "  {} -> {}, through {}", names(&way.inputs), names(&way.outputs), cores.join(", "))?;
         let late = deadline.map_or("", |deadline| if way.worst > deadline { ": too late" } else { ": kept" });

@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 use takt_cosim::system::SystemLockstep;
+use takt_debug::system::Turn;
 use takt_isa::program::Port;
 use takt_isa::{Register, Type};
 use takt_system::{Description, End, LinkKind, System, SystemPort};
@@ -70,7 +71,7 @@ pub(crate) struct Host {
     /// FIFOs from the host.
     pushes: Vec<usize>,
     /// FIFOs to the host.
-    pops: Vec<usize>,
+    pub(crate) pops: Vec<usize>,
     pub(crate) outputs: Vec<SystemPort>,
 }
 
@@ -116,6 +117,18 @@ impl Host {
             }
         }
         Ok(refused)
+    }
+
+    /// What the host does with a row, for a debugger.
+    pub(crate) fn turn(&self, row: &takt_emu::Row) -> Turn {
+        let (inputs, pushes) = row.split_at(self.inputs.len());
+        let inputs = self.inputs.iter().zip(inputs);
+        let pushes = self.pushes.iter().zip(pushes).filter(|(_, (_, push))| *push != 0);
+        Turn {
+            inputs: inputs.map(|(input, (_, bits))| (input.name.clone(), *bits)).collect(),
+            publish: self.snapshots.clone(),
+            push: pushes.map(|(link, _)| *link).collect(),
+        }
     }
 
     /// The outputs as the host sees them now. Of each FIFO one entry is taken; none where it is empty.

@@ -1,9 +1,12 @@
 //! Systems of several cores: their files, and the commands that take them.
 
+pub(crate) mod analyse;
 pub(crate) mod bound;
 pub(crate) mod cosim;
+pub(crate) mod debug;
 mod host;
 pub(crate) mod run;
+pub(crate) mod track;
 
 use crate::fault;
 use crate::files;

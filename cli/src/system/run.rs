@@ -8,10 +8,12 @@ use crate::output;
 use crate::ports::{self, Inputs};
 use crate::run::PERIOD_LIMIT;
 use crate::select::SourceArguments;
+use crate::trace::TraceArguments;
 use anyhow::{Result, bail};
 use serde_json::{Map, Value, json};
 use std::io::Write;
 use std::path::Path;
+use takt_debug::trace::SystemTracer;
 use takt_isa::timing::Cycle;
 use takt_system::System;
 
@@ -25,6 +27,7 @@ pub(crate) struct Arguments<'a> {
     pub(crate) max_cycles: Option<u64>,
     pub(crate) stats: bool,
     pub(crate) json: bool,
+    pub(crate) trace: Option<&'a TraceArguments>,
 }
 
 /// What a run came to.
@@ -46,7 +49,16 @@ pub(crate) fn run(arguments: &Arguments<'_>, color: bool, out: &mut Out) -> Resu
     let mut system = System::new(description)?;
     let mut ran = (Vec::new(), 0, 0);
     let has_ticks = arguments.inputs.is_some() || arguments.periods.is_some();
-    let result = drive(arguments, &loaded, &host, &mut system, has_ticks, &mut ran);
+    let mut file = arguments.trace.map(TraceArguments::create).transpose()?.flatten();
+    let mut tracer = match (arguments.trace, &mut file) {
+        (Some(trace), Some(file)) => Some(trace.of_system(&system, file)?),
+        _ => None,
+    };
+    let result = drive(arguments, &loaded, &host, &mut system, has_ticks, tracer.as_mut(), &mut ran);
+    if let (Some(trace), Some(tracer)) = (arguments.trace, tracer) {
+        trace.finish_system(tracer, color)?;
+    }
+    file.map_or(Ok(()), Out::finish)?;
     if let Some(fault) = system.fault() {
         return Err(told(fault, &loaded, color));
     }
@@ -66,12 +78,13 @@ pub(crate) fn run(arguments: &Arguments<'_>, color: bool, out: &mut Out) -> Resu
     Ok(())
 }
 
-fn drive(
+pub(super) fn drive(
     arguments: &Arguments<'_>,
     loaded: &LoadedSystem,
     host: &Host,
     system: &mut System,
     has_ticks: bool,
+    mut tracer: Option<&mut SystemTracer<'_>>,
     (last, ticks, refused): &mut (Vec<Option<u32>>, u64, u64),
 ) -> Result<()> {
     let description = &loaded.description;
@@ -88,7 +101,14 @@ fn drive(
         ports::write_row(outputs, host.outputs.iter().map(|output| output.name.clone()))?;
         outputs.flush()?;
     }
-    let start = system.run_to_start(limit)?;
+    let start = match &mut tracer {
+        Some(tracer) => tracer.run_to_start(system, limit)?,
+        None => system.run_to_start(limit)?,
+    };
+    let mut run = |system: &mut System, cycle: Cycle| match &mut tracer {
+        Some(tracer) => tracer.run_until(system, cycle),
+        None => system.run_until(cycle),
+    };
     if !has_ticks {
         if start.is_some() && !system.halted() {
             bail!("the system goes on from tick to tick: give it base ticks with --inputs or --periods");
@@ -106,13 +126,13 @@ fn drive(
     let mut next: Cycle = start - description.lead();
     while arguments.periods.is_none_or(|most| *ticks < most) {
         let Some(row) = inputs.next()? else { break };
-        system.run_until(next)?;
+        run(system, next)?;
         *refused += host.write(system, row)?;
         next += description.tick;
         if arguments.max_cycles.is_some_and(|most| next > most) {
             return Err(stop(system));
         }
-        system.run_until(next)?;
+        run(system, next)?;
         *ticks += 1;
         *last = host.read(system)?;
         if let Some(outputs) = &mut outputs {

@@ -82,6 +82,12 @@ impl Control {
         self.interrupt.store(false, Ordering::Relaxed);
     }
 
+    /// Tells how far the command has come; whether it is to stop.
+    pub(crate) fn report(&self, cycle: Cycle) -> bool {
+        self.cycle.store(cycle, Ordering::Relaxed);
+        self.interrupt.load(Ordering::Relaxed)
+    }
+
     /// How far the command has come.
     pub fn cycle(&self) -> Cycle {
         self.cycle.load(Ordering::Relaxed)
@@ -390,6 +396,14 @@ impl Session {
         let names = expression::names(self.program(), &self.options.constants, &self.options.names);
         let found: BTreeSet<&str> = names.filter(|name| name.starts_with(beginning)).collect();
         found.into_iter().map(str::to_owned).collect()
+    }
+
+    /// Looks at a machine that somebody else runs, of this program: what there is to see is its. This session does not move it.
+    pub(crate) fn look(&mut self, emulator: Emulator, periods: u64) {
+        self.core = Core { emulator, periods, boundary: false, report: None, edits: 0 };
+        self.checkpoints.clear();
+        self.edits.clear();
+        self.checkpoints.push(self.core.checkpoint());
     }
 
     // ---- Changing.

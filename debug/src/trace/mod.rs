@@ -6,6 +6,7 @@
 mod jsonl;
 mod kanata;
 mod signal;
+mod system;
 mod wave;
 
 use std::cell::Cell;
@@ -17,6 +18,7 @@ use takt_isa::BundleAddress;
 use takt_isa::timing::{Cause, Cycle};
 
 pub use signal::SignalError;
+pub use system::SystemTracer;
 
 /// What a trace is written as.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -237,8 +239,11 @@ impl<'w> Tracer<'w> {
             .map_err(|error| io::Error::other(error.to_string()))
             .and_then(|signals| -> io::Result<Box<dyn Writer + 'w>> {
                 Ok(match self.options.format {
-                    Format::Vcd => wave::vcd(emulator, signals, target)?,
-                    Format::Fst => wave::fst(emulator, signals, target)?,
+                    Format::Vcd => {
+                        let machine = format!("machine {}", emulator.machine().name);
+                        wave::vcd(&machine, signals, target)?
+                    }
+                    Format::Fst => wave::fst(start, signals, target)?,
                     Format::Kanata => Box::new(kanata::Kanata::new(emulator, target)?),
                     Format::JsonLines => Box::new(jsonl::JsonLines::new(program, signals, target)),
                 })

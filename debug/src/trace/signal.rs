@@ -2,6 +2,7 @@
 
 use super::Format;
 use crate::matches;
+use std::sync::Arc;
 use takt_asm::nearest;
 use takt_emu::Emulator;
 use takt_isa::timing::Cause;
@@ -22,11 +23,17 @@ pub(super) enum Source {
     Stall(usize),
     /// A register.
     Register(Register),
+    /// Of a system: what arrived last on a link, the field.
+    Arrived(usize, usize),
+    /// The number of entries of a FIFO.
+    Count(usize),
 }
 
 /// A signal.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) struct Signal {
+    /// The core of a system that it belongs to, or `links`; none of a single core.
+    pub(super) part: Option<Arc<str>>,
     /// The group that it stands in; none at the top.
     pub(super) scope: Option<&'static str>,
     pub(super) name: String,
@@ -47,8 +54,8 @@ pub(super) const TOP: &str = "takt";
 impl Signal {
     /// Its name with the groups that it stands in, as viewers show it.
     fn path(&self) -> String {
-        let scope = self.scope.map_or(String::new(), |scope| format!("{scope}."));
-        format!("{TOP}.{scope}{}", self.name)
+        let group = |name: Option<&str>| name.map_or(String::new(), |name| format!("{name}."));
+        format!("{TOP}.{}{}{}", group(self.part.as_deref()), group(self.scope), self.name)
     }
 
     /// Whether a pattern means it: by its name, by its group and name, or by its whole path. A name may have points of its
@@ -57,7 +64,12 @@ impl Signal {
         let grouped = |(group, name): (&str, &str)| {
             self.scope.is_some_and(|scope| matches(group, scope)) && matches(name, &self.name)
         };
+        let in_part = |(part, rest): (&str, &str)| {
+            self.part.as_deref().is_some_and(|own| matches(part, own))
+                && (matches(rest, &self.name) || rest.split_once('.').is_some_and(grouped))
+        };
         matches(pattern, &self.name)
+            || pattern.split_once('.').is_some_and(in_part)
             || pattern.split_once('.').is_some_and(grouped)
             || pattern.strip_prefix(TOP).is_some_and(|rest| rest.starts_with('.'))
                 && matches(pattern, &self.path())
@@ -82,6 +94,8 @@ impl Signal {
                 emulator.output_bits(register)
             }
             Source::Register(register) => emulator.register(register),
+            // A system's.
+            Source::Arrived(..) | Source::Count(_) => None,
         }
     }
 }
@@ -106,9 +120,10 @@ pub enum SignalError {
 }
 
 /// Every signal of a program.
-fn all(program: &Program) -> Vec<Signal> {
+pub(super) fn all(program: &Program) -> Vec<Signal> {
     let address_bits = u32::BITS - program.bundles().leading_zeros();
     let wire = |scope, name: &str, source, width| Signal {
+        part: None,
         scope,
         name: name.to_owned(),
         source,
@@ -127,6 +142,7 @@ fn all(program: &Program) -> Vec<Signal> {
         [("inputs", &program.inputs), ("outputs", &program.outputs), ("registers", &program.registers)]
     {
         signals.extend(ports.iter().map(|port| Signal {
+            part: None,
             scope: Some(scope),
             name: port.name.clone(),
             source: Source::Register(port.register),
@@ -142,7 +158,15 @@ pub(super) fn select(
     format: Format,
     patterns: &[String],
 ) -> Result<Vec<Signal>, SignalError> {
-    let signals = all(program);
+    select_of(all(program), format, patterns)
+}
+
+/// Those of some signals that match the patterns.
+pub(super) fn select_of(
+    signals: Vec<Signal>,
+    format: Format,
+    patterns: &[String],
+) -> Result<Vec<Signal>, SignalError> {
     if patterns.is_empty() {
         return Ok(signals);
     }

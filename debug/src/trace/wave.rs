@@ -1,6 +1,7 @@
 //! Waveforms: VCD and FST, from the same samples. A time unit is a cycle.
 
 use super::signal::{Signal, SignalType};
+use super::system::SystemWriter;
 use super::{Record, Writer};
 use fst_writer::{
     FstBodyWriter, FstFileType, FstHeaderWriter, FstInfo, FstScopeType, FstSignalId, FstSignalType,
@@ -22,7 +23,7 @@ trait File {
 }
 
 /// Samples signals and writes those that changed.
-struct Wave<'w> {
+pub(super) struct Wave<'w> {
     file: Box<dyn File + 'w>,
     signals: Vec<Signal>,
     /// What was last written for each.
@@ -30,16 +31,17 @@ struct Wave<'w> {
     digits: String,
 }
 
-impl Writer for Wave<'_> {
-    fn cycle(&mut self, record: &Record, emulator: &Emulator) -> io::Result<()> {
+impl Wave<'_> {
+    /// Writes what has changed in a cycle.
+    fn sample(&mut self, cycle: Cycle, value: &dyn Fn(&Signal) -> Option<u32>) -> io::Result<()> {
         let mut timed = false;
         for (i, signal) in self.signals.iter().enumerate() {
-            let value = signal.value(record, emulator);
+            let value = value(signal);
             if self.last[i].replace(value) == Some(value) {
                 continue;
             }
             if !timed {
-                self.file.time(record.cycle)?;
+                self.file.time(cycle)?;
                 timed = true;
             }
             match signal.ty {
@@ -60,6 +62,26 @@ impl Writer for Wave<'_> {
         }
         Ok(())
     }
+}
+
+impl SystemWriter for Wave<'_> {
+    fn cycle(&mut self, cycle: Cycle, value: &dyn Fn(&Signal) -> Option<u32>) -> io::Result<()> {
+        self.sample(cycle, value)
+    }
+
+    fn finish(self: Box<Self>, cycle: Cycle) -> io::Result<()> {
+        Writer::finish(self, cycle)
+    }
+
+    fn kept(&self) -> u64 {
+        self.file.kept()
+    }
+}
+
+impl Writer for Wave<'_> {
+    fn cycle(&mut self, record: &Record, emulator: &Emulator) -> io::Result<()> {
+        self.sample(record.cycle, &|signal| signal.value(record, emulator))
+    }
 
     fn finish(mut self: Box<Self>, cycle: Cycle) -> io::Result<()> {
         self.file.time(cycle)?;
@@ -71,32 +93,40 @@ impl Writer for Wave<'_> {
     }
 }
 
-fn wave<'w>(file: Box<dyn File + 'w>, signals: Vec<Signal>) -> Box<dyn Writer + 'w> {
+fn wave<'w>(file: Box<dyn File + 'w>, signals: Vec<Signal>) -> Box<Wave<'w>> {
     Box::new(Wave { file, last: vec![None; signals.len()], signals, digits: String::new() })
 }
 
 /// Calls `signal` for each signal and `scope` where a group begins (with its name) and ends.
 fn hierarchy<E>(signals: &[Signal], mut visit: impl FnMut(Part<'_>) -> Result<(), E>) -> Result<(), E> {
-    let mut inside = None;
+    // The groups that are open: of a system's core, and in it.
+    let mut inside: (Option<&str>, Option<&str>) = (None, None);
     visit(Part::Begin(super::signal::TOP))?;
     for (i, signal) in signals.iter().enumerate() {
-        if signal.scope != inside {
-            if inside.is_some() {
+        let own = (signal.part.as_deref(), signal.scope);
+        if own != inside {
+            if inside.1.is_some() {
                 visit(Part::End)?;
             }
-            inside = signal.scope;
-            inside.map_or(Ok(()), |name| visit(Part::Begin(name)))?;
+            if own.0 != inside.0 {
+                if inside.0.is_some() {
+                    visit(Part::End)?;
+                }
+                own.0.map_or(Ok(()), |name| visit(Part::Begin(name)))?;
+            }
+            own.1.map_or(Ok(()), |name| visit(Part::Begin(name)))?;
+            inside = own;
         }
         visit(Part::Signal(i, signal))?;
     }
-    if inside.is_some() {
+    for _ in [inside.0, inside.1].into_iter().flatten() {
         visit(Part::End)?;
     }
     visit(Part::End)
 }
 
 enum Part<'s> {
-    Begin(&'static str),
+    Begin(&'s str),
     End,
     Signal(usize, &'s Signal),
 }
@@ -121,12 +151,11 @@ struct Vcd<'w> {
 
 /// A VCD of these signals.
 pub(super) fn vcd<'w>(
-    emulator: &Emulator,
+    of: &str,
     signals: Vec<Signal>,
     mut target: Box<dyn Write + 'w>,
-) -> io::Result<Box<dyn Writer + 'w>> {
-    let machine = emulator.machine().name;
-    writeln!(target, "$comment machine {machine}; one time unit is one cycle $end")?;
+) -> io::Result<Box<Wave<'w>>> {
+    writeln!(target, "$comment {of}; one time unit is one cycle $end")?;
     writeln!(target, "$version takt {} $end\n$timescale 1 ns $end", env!("CARGO_PKG_VERSION"))?;
     let identifiers: Vec<String> = (0..signals.len()).map(identifier).collect();
     hierarchy(&signals, |part| match part {
@@ -174,10 +203,10 @@ struct Fst<'w> {
 
 /// An FST of these signals. It is made in memory, since its format needs to go back in its file and targets may be pipes.
 pub(super) fn fst<'w>(
-    emulator: &Emulator,
+    start: Cycle,
     signals: Vec<Signal>,
     target: Box<dyn Write + 'w>,
-) -> io::Result<Box<dyn Writer + 'w>> {
+) -> io::Result<Box<Wave<'w>>> {
     let info = FstInfo {
         // The writer's own start; before the window, values are unknown.
         start_time: 0,
@@ -203,7 +232,7 @@ pub(super) fn fst<'w>(
     .map_err(told)?;
     let body = header.finish().map_err(told)?;
     let mut file = Fst { body, ids, target };
-    if emulator.now() > 0 {
+    if start > 0 {
         for (i, signal) in signals.iter().enumerate() {
             match signal.ty {
                 SignalType::Real => file.real(i, f64::NAN)?,

@@ -28,7 +28,7 @@ pub enum SystemError {
         /// The core.
         core: String,
         /// Why.
-        error: ExportError,
+        error: Box<ExportError>,
     },
     /// Names in the file make the same name in the circuit.
     #[error(
@@ -86,7 +86,7 @@ pub fn export_system(
             Some(design) => design,
             None => {
                 let design = export(machine, library)
-                    .map_err(|error| SystemError::Core { core: core.name.clone(), error })?;
+                    .map_err(|error| SystemError::Core { core: core.name.clone(), error: Box::new(error) })?;
                 designs.push(design);
                 &designs[designs.len() - 1]
             }

@@ -355,6 +355,11 @@ impl System {
         self.inputs.get_or_insert_default();
     }
 
+    /// Keeps them no longer.
+    pub fn drop_core_events(&mut self) {
+        (self.recorded, self.inputs) = (None, None);
+    }
+
     /// What stood on the cores' input pins since this was last asked, by cycle; that of the last
     /// [`INPUT_DELAY`](takt_isa::timing::INPUT_DELAY) cycles comes with the next run.
     pub fn take_input_events(&mut self) -> Vec<InputEvent> {

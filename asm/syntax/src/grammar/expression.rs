@@ -77,7 +77,7 @@ pub(super) fn expression<'t, 'a: 't>(elements: bool) -> Rule<'t, 'a, ()> {
         };
         let computed = atom.pratt((
             prefix(
-                7,
+                Operator::PREFIX,
                 select! { Token::Operator(operator) if operator.is_prefix() => operator }
                     .labelled(What::Operand),
                 |operator, (), e| {

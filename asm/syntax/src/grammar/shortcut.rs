@@ -6,8 +6,8 @@ use crate::lex::Token;
 use crate::name::NameRef;
 use crate::report::source::Span;
 
-/// The line that most are: perhaps a label, then operations whose operands are names, numbers and `offset[name]` with one
-/// of each. It says nothing that the grammar does not, only sooner; anything else it leaves to that, and what it has
+/// The line that most are: perhaps a label, then operations whose operands are names, numbers, `offset[name]` with one of
+/// each, or expressions of names and numbers. It says nothing that the grammar does not, only sooner; anything else it leaves to that, and what it has
 /// written until then to be taken out again.
 pub(crate) fn common_line(tokens: &[(Token, Span)], builder: &mut Builder<'_>) -> Option<Line> {
     let mut rest = tokens;
@@ -46,21 +46,17 @@ fn common_operands<'t>(
         return Some((*end, behind));
     }
     loop {
-        let [(value, mut span), ref behind @ ..] = *rest else { return None };
         let first = builder.ast.nodes.len() as u32;
-        let mut kind = match value {
-            Token::Name(name) => OperandKind::Name(NameRef::plain(name)),
-            Token::Int(value) => {
-                builder.node(NodeKind::Int(value), span);
-                OperandKind::Expr(ExprId { first, count: 1 })
+        let mut span;
+        (rest, span) = common_expression(rest, 0, builder)?;
+        let count_of = |builder: &Builder<'_>| builder.ast.nodes.len() as u32 - first;
+        let mut kind = match builder.ast.nodes[first as usize..] {
+            [Node { kind: NodeKind::Name(name), .. }] => {
+                builder.ast.nodes.truncate(first as usize);
+                OperandKind::Name(name)
             }
-            Token::Real(value) => {
-                builder.node(NodeKind::Real(value), span);
-                OperandKind::Expr(ExprId { first, count: 1 })
-            }
-            _ => return None,
+            _ => OperandKind::Expr(ExprId { first, count: count_of(builder) }),
         };
-        rest = behind;
         if let [(Token::BracketOpen, _), behind @ ..] = rest {
             let [(Token::Name(base), inside), (Token::BracketClose, close), behind @ ..] = behind else {
                 return None;
@@ -69,7 +65,7 @@ fn common_operands<'t>(
             if let OperandKind::Name(name) = kind {
                 builder.node(NodeKind::Name(name), span);
             }
-            let offset = Some(Expr { id: ExprId { first, count: 1 }, span });
+            let offset = Some(Expr { id: ExprId { first, count: count_of(builder) }, span });
             builder.ast.memories.push(Memory { offset, base });
             kind = OperandKind::Memory(builder.ast.memories.len() as u32 - 1);
             span = span.to(*close);
@@ -89,4 +85,48 @@ fn common_operands<'t>(
             _ => return None,
         }
     }
+}
+
+/// An expression of names, numbers, operators and parentheses whose operators bind at least as tightly as `least`: what
+/// follows it, and its place. Nesting is bounded before a line is parsed.
+fn common_expression<'t>(
+    tokens: &'t [(Token, Span)],
+    least: u16,
+    builder: &mut Builder<'_>,
+) -> Option<(&'t [(Token, Span)], Span)> {
+    let [(token, place), behind @ ..] = tokens else { return None };
+    let (mut rest, mut span) = (behind, *place);
+    match *token {
+        // A call, an element or a memory operand may follow a name; the last is the caller's.
+        Token::Name(name) if !matches!(rest, [(Token::Open, _), ..]) => {
+            builder.node(NodeKind::Name(NameRef::plain(name)), span);
+        }
+        Token::Int(value) => builder.node(NodeKind::Int(value), span),
+        Token::Real(value) => builder.node(NodeKind::Real(value), span),
+        Token::Open => {
+            let [(Token::Close, close), behind @ ..] = common_expression(rest, 0, builder)?.0 else {
+                return None;
+            };
+            (rest, span) = (behind, span.to(*close));
+        }
+        Token::Operator(operator) if operator.is_prefix() => {
+            let operand;
+            (rest, operand) = common_expression(rest, Operator::PREFIX, builder)?;
+            span = span.to(operand);
+            builder.node(NodeKind::Prefix(operator), span);
+        }
+        _ => return None,
+    }
+    while let [(Token::Operator(operator), _), behind @ ..] = rest {
+        let precedence = operator.precedence();
+        if precedence < least.max(1) {
+            break;
+        }
+        let right = precedence + u16::from(*operator != Operator::Power);
+        let operand;
+        (rest, operand) = common_expression(behind, right, builder)?;
+        span = span.to(operand);
+        builder.node(NodeKind::Infix(*operator), span);
+    }
+    Some((rest, span))
 }

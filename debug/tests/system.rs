@@ -1,0 +1,153 @@
+//! Sessions on systems of several cores, against the emulator that goes forward only.
+
+use std::collections::BTreeMap;
+use takt_debug::console::Commands;
+use takt_debug::session::{Options, Session};
+use takt_debug::system::{Step, SystemConsole, SystemOptions, SystemSession, SystemStop, SystemWhy};
+use takt_emu::Event;
+use takt_emu::testing::Random;
+use takt_isa::{MACHINES, Register};
+use takt_system::testing::random_description;
+use takt_system::{Description, System};
+
+const CYCLES: u64 = 20_000;
+
+fn session(description: &Description) -> SystemSession {
+    SystemSession::new(description, SystemOptions::default()).expect("a random system loads")
+}
+
+/// All that can be seen of a system.
+fn state(system: &System) -> (Vec<Vec<Option<u32>>>, Vec<Vec<u32>>, Vec<Vec<Vec<u32>>>) {
+    let cores = 0..system.description().cores.len();
+    let registers =
+        cores.clone().map(|core| Register::all().map(|r| system.core(core).register(r)).collect());
+    let memories = cores.map(|core| system.core(core).memory().to_vec());
+    let fifos = (0..system.description().links.len()).map(|link| system.fifo_entries(link));
+    (registers.collect(), memories.collect(), fifos.collect())
+}
+
+/// Systems that run without a fault for as long as the tests look at them.
+fn systems() -> impl Iterator<Item = (u64, Description)> {
+    let all = (0..12).map(|seed| (seed, random_description(seed, MACHINES)));
+    let runs = |(_, description): &(u64, Description)| {
+        let mut system = System::new(description).expect("it loads");
+        system.run_until(CYCLES + 2000).is_ok() && !system.halted() && system.start().is_some()
+    };
+    all.filter(runs).take(4)
+}
+
+#[test]
+fn every_position_is_what_a_run_from_reset_gives() {
+    for (seed, description) in systems() {
+        let mut session = session(&description);
+        let mut random = Random::new(seed);
+        for _ in 0..12 {
+            let cycle = u64::from(random.below(CYCLES as u32));
+            assert_eq!(session.go_to(cycle), SystemWhy::Done, "seed {seed}");
+            let mut fresh = System::new(&description).expect("it loads");
+            fresh.run_until(cycle).expect("no fault");
+            assert_eq!(session.cycle(), cycle);
+            assert_eq!(state(session.system()), state(&fresh), "seed {seed}: cycle {cycle}");
+        }
+    }
+}
+
+#[test]
+fn stops_at_every_event_forward_and_back() {
+    let mut kinds = BTreeMap::new();
+    for (seed, description) in systems() {
+        let mut system = System::new(&description).expect("it loads");
+        system.keep_events();
+        system.run_until(CYCLES).expect("no fault");
+        let events = system.take_events();
+        // The rarest kind of event that there is a handful of.
+        let mut counts: BTreeMap<(usize, &str), Vec<u64>> = BTreeMap::new();
+        for event in events.iter().filter(|event| event.cycle + 1100 < CYCLES) {
+            counts.entry((event.link, event.kind.name())).or_default().push(event.cycle + 1);
+        }
+        let Some(((link, name), mut cycles)) =
+            counts.into_iter().filter(|(_, cycles)| cycles.len() > 3).min_by_key(|(_, cycles)| cycles.len())
+        else {
+            continue;
+        };
+        cycles.dedup();
+        cycles.truncate(40);
+        let kind = events.iter().find(|event| event.kind.name() == name).expect("it was seen").kind;
+        *kinds.entry(name).or_insert(0) += 1;
+        let mut session = session(&description);
+        let id = session.add_stop(SystemStop::Link(link, Some(kind)), String::new());
+        for &cycle in &cycles {
+            assert_eq!(session.resume(), SystemWhy::Stop(id), "seed {seed}: {name} at {cycle}");
+            assert_eq!(session.cycle(), cycle, "seed {seed}: {name} of link {link}");
+        }
+        for &cycle in cycles.iter().rev().skip(1) {
+            assert_eq!(session.resume_back(), SystemWhy::Stop(id), "seed {seed}: back to {name} at {cycle}");
+            assert_eq!(session.cycle(), cycle, "seed {seed}: back to {name} of link {link}");
+        }
+        assert_eq!(session.resume_back(), SystemWhy::Start);
+    }
+    assert!(!kinds.is_empty(), "no system has an event that comes often enough");
+}
+
+#[test]
+fn bundles_and_periods_of_each_core() {
+    let (_, description) = systems().next().expect("a system");
+    let mut system = System::new(&description).expect("it loads");
+    system.keep_core_events();
+    system.run_until(CYCLES).expect("no fault");
+    let events = system.take_core_events();
+    for core in 0..description.cores.len() {
+        let mut session = session(&description);
+        let own = || events.iter().filter(|(own, _)| *own == core).map(|(_, event)| event);
+        let issues = own().filter_map(|event| match event {
+            Event::Issue { cycle, .. } => Some(*cycle),
+            _ => None,
+        });
+        let waits = own().filter_map(|event| match event {
+            Event::Wait { cycle, .. } => Some(*cycle + 1),
+            _ => None,
+        });
+        for cycle in issues.take(30) {
+            assert_eq!((session.step(Step::Bundle(core)), session.cycle()), (SystemWhy::Done, cycle));
+        }
+        session.go_to(0);
+        let waits: Vec<u64> = waits.take(5).collect();
+        for &cycle in &waits {
+            assert_eq!((session.step(Step::Period(core)), session.cycle()), (SystemWhy::Done, cycle));
+        }
+        for &cycle in waits.iter().rev().skip(1) {
+            assert_eq!((session.step_back(Step::Period(core)), session.cycle()), (SystemWhy::Done, cycle));
+        }
+    }
+}
+
+#[test]
+fn mistakes_are_told() {
+    let (_, description) = systems().next().expect("a system");
+    let views = description
+        .cores
+        .iter()
+        .map(|core| Session::new(&core.program, Options::default()).expect("it loads"));
+    let mut console = SystemConsole::new(session(&description), views.collect());
+    for (line, text) in [
+        ("core none", "there is no core `none` (cores: c0"),
+        ("break link none", "there is no link `none`"),
+        ("break period 3", "a system stops at `cycle N`"),
+        ("step 0", "neither a count nor one of"),
+        ("goto cycle x", "`x` is no number of a cycle"),
+        ("set x = 1", "for a single core's session"),
+        ("stepp", "did you mean `step`?"),
+        ("delete 7", "there is no stop 7"),
+        ("print nothing", "nothing"),
+    ] {
+        let error = console.execute(line).expect_err(line);
+        assert!(error.contains(text), "{line}: {error}");
+    }
+    assert!(console.execute("cores").expect("a list").contains("> c0"));
+    console.execute("goto cycle 500").expect("it is there");
+    assert!(console.execute("check cycle == 500").is_ok());
+    assert!(console.execute("check cycle == 501").is_err());
+    console.execute("core c1").expect("there is one");
+    console.execute("back cycle 100").expect("it is there");
+    assert!(console.execute("check cycle == 400").is_ok(), "every core is in the same cycle");
+}
