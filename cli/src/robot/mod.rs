@@ -56,7 +56,7 @@ pub(crate) struct Robot {
 const EXAMPLES: &str = "\
 Examples:
   takt robot                                         at a prompt; `help` lists the commands
-  takt robot robot/programs/demonstration.robot      a program, and tables of what it came to
+  takt robot programs/three/demonstration.robot      a program, and tables of what it came to
   takt robot demonstration.robot --plot robot.svg    with a picture
   takt robot square.robot --check                    can it run?
   takt robot square.robot --faults corrupt@1.5       what the controller does about a bad packet

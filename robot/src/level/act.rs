@@ -28,6 +28,9 @@ fn wrong(code: &'static str, span: Span, message: impl Into<String>) -> Failure 
     Failure::Program(Box::new(Diagnostic::error(code, span, message)))
 }
 
+/// s in which the communication core learns that a jog has ended: three of its periods.
+const SETTLE: f64 = 0.0048;
+
 /// What the host itself finds out about a target, as the controller would say it.
 fn refused(cause: Cause) -> Problem {
     Problem::Refused(Report { kind: ReportKind::Refused, sequence: 0, cause: Some(cause), value: 0.0 })
@@ -316,6 +319,8 @@ impl<R: Robot + Clone> Session<R> {
         if let Some(mode) = self.jogging.take() {
             let (sequence, _) = self.host.command(&Command::Jog { mode, rates: [0.0; JOINTS] })?;
             self.under_way(sequence, span);
+            self.done()?;
+            return self.pause(SETTLE);
         }
         self.done()
     }
