@@ -72,7 +72,7 @@ else
   call expect(2, 7)
 end
 try
-  move joints(90, _, _, _, _, _) in 0.3
+  move joints(90, _, _, _, _, _) in 0.9 profile rectangular
 else
   call expect(3, 10)
 end

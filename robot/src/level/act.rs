@@ -400,9 +400,10 @@ impl<R: Robot + Clone> Session<R> {
         on_link: fn(f64) -> f32,
     ) -> Result<(), Failure> {
         let mut limits = self.settings.limits;
-        for (limit, value) in limits[which].iter_mut().zip(list) {
-            let value = number_in(value, "a limit", 1e-3, f64::from(BUILT_IN), &self.around(machine))?;
-            *limit = on_link(value);
+        for ((limit, value), own) in limits[which].iter_mut().zip(list).zip(BUILT_IN[which]) {
+            let value = number_in(value, "a limit", 1e-3, FARTHEST, &self.around(machine))?;
+            // A higher one stands for the controller's own.
+            *limit = on_link(value).min(own as f32);
         }
         self.done()?;
         let [velocities, torques] = limits;

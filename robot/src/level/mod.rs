@@ -70,8 +70,8 @@ struct Settings {
 
 /// The speeds that a session begins with: deg/s of the fastest joint, mm/s along lines.
 pub const SPEEDS: (f64, f64) = (45.0, 150.0);
-/// What stands for a built-in limit.
-const BUILT_IN: f32 = 1e9;
+/// The controller's own limits, rad/s and N·m: it refuses higher ones.
+const BUILT_IN: [[f64; 6]; 2] = [takt_programs::three::VELOCITIES, takt_programs::three::TORQUES];
 
 /// A subprogram, wherever it came from.
 #[derive(Clone, Debug)]
@@ -139,7 +139,7 @@ impl<R: Robot + Clone> Session<R> {
                 speed: Some(SPEEDS),
                 profile: Profile::Trapezoidal,
                 tool: [0.0; 3],
-                limits: [[BUILT_IN; 6]; 2],
+                limits: BUILT_IN.map(|limits| limits.map(|limit| limit as f32)),
             },
             planned,
             open: Vec::new(),
