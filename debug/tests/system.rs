@@ -16,8 +16,10 @@ fn session(description: &Description) -> SystemSession {
     SystemSession::new(description, SystemOptions::default()).expect("a random system loads")
 }
 
-/// All that can be seen of a system.
-fn state(system: &System) -> (Vec<Vec<Option<u32>>>, Vec<Vec<u32>>, Vec<Vec<Vec<u32>>>) {
+/// All that can be seen of a system: registers and memory of each core, and the entries of each FIFO.
+type State = (Vec<Vec<Option<u32>>>, Vec<Vec<u32>>, Vec<Vec<Vec<u32>>>);
+
+fn state(system: &System) -> State {
     let cores = 0..system.description().cores.len();
     let registers =
         cores.clone().map(|core| Register::all().map(|r| system.core(core).register(r)).collect());

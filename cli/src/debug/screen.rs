@@ -195,7 +195,7 @@ impl Front<'_> {
     fn execute(&mut self, line: &str) -> Result<()> {
         let Front { console, control, terminal, screen, .. } = self;
         screen.typed = None;
-        let answer = execute(console, line, control, || {
+        let answer = execute(&mut **console, line, control, || {
             while event::poll(Duration::ZERO)? {
                 match event::read()? {
                     Event::Key(key) if is_control(key, 'c') || key.code == KeyCode::Esc => {

@@ -1,6 +1,6 @@
 //! The picture of a session: joint angles, velocities and tracking errors over time, and the tool's path from two sides.
 
-use crate::plot::{Area, FINE, JOINT_COLORS, Outcome, POINTS, SIZE, chart, headed, in_pixels, mesh, px};
+use crate::plot::{Area, JOINT_COLORS, Outcome, POINTS, SIZE, chart, headed, in_pixels, mesh, px};
 use anyhow::{Result, anyhow};
 use plotters::prelude::*;
 use takt_robot::controller::{RECORD_TICKS, Record};
