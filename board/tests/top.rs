@@ -221,7 +221,7 @@ fn board_runs_talks_and_fails_safe() {
     for (source, cause) in [
         (instead(SLOW), "missed deadline"),
         (instead("        halt\n"), "halt"),
-        (nan, "output that is no number"),
+        (nan, "NaN output"),
     ] {
         let records = top::image(&program(&source)).expect("it fits");
         host.load(&records, top::RECORDS).expect("it is loaded");

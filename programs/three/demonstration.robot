@@ -44,6 +44,7 @@ level 1, 2.5
 
 # ---- Jogs ----------------------------------------------------------------------------------------------------------------------
 say "jogs"
+wait done                                            # signals and levels too
 jog joints 20, 0, 0, -30, 0, 40 for 0.6
 jog world 0, 0, 60, 0, 0, 0 for 0.6
 jog gripper 0, 0, 60, 0, 0, 20 for 0.6
@@ -72,7 +73,7 @@ else
   call expect(2, 7)
 end
 try
-  move joints(90, _, _, _, _, _) in 0.9 profile rectangular
+  move joints(90, _, _, _, _, _) in 0.6 profile rectangular
 else
   call expect(3, 10)
 end

@@ -18,6 +18,8 @@ pub const IDLE_STEPS: u64 = 1_000_000;
 pub const SHOWN: usize = 20;
 /// What a wait for a signal lasts at most if the program does not say, s.
 pub const SIGNAL_TIME: f64 = 60.0;
+/// What a stop lasts at most, s: ten times what the controller takes.
+pub const STOP_TIME: f64 = 5.0;
 /// What anything may last at most, s.
 pub const LONGEST: f64 = 3600.0;
 /// Messages that a session keeps until they are taken.

@@ -153,7 +153,8 @@ pub(crate) fn run(arguments: &Robot, color: bool, out: &mut Out) -> Result<()> {
         (None, None) if std::io::stdin().is_terminal() && !desk.json => prompt::run(&mut desk)?,
         (None, None) => desk.lines("standard input", &mut BufReader::new(std::io::stdin()))?,
     }
-    if !arguments.check && !desk.session.quit {
+    // What broke a program off has stopped the robot already.
+    if !arguments.check && !desk.session.quit && !(desk.failed && arguments.file.is_some()) {
         let result = desk.session.finish();
         desk.told(result)?;
     }

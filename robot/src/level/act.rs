@@ -306,6 +306,10 @@ impl<R: Robot + Clone> Session<R> {
         if self.jogging.is_some_and(|held| held != mode) {
             self.jog_off(span)?;
         }
+        if self.jogging.is_none() {
+            // The controller takes a jog where nothing is queued.
+            self.done()?;
+        }
         self.host.command(&Command::Jog { mode, rates: values })?;
         self.jogging = Some(mode);
         if let Some(time) = time {
@@ -330,11 +334,16 @@ impl<R: Robot + Clone> Session<R> {
         self.host.command(&Command::Stop)?;
         self.jogging = None;
         self.open.clear();
-        self.done()
+        self.stands_within(limits::STOP_TIME)
     }
 
     /// Waits until nothing moves.
     pub(super) fn done(&mut self) -> Result<(), Failure> {
+        self.stands_within(limits::LONGEST)
+    }
+
+    /// Waits until nothing moves, so many seconds at most.
+    fn stands_within(&mut self, time: f64) -> Result<(), Failure> {
         if self.jogging.is_some() && self.host.stopped().is_none() {
             // It does not end by itself.
             return Err(Problem::Late("the robot jogs: `jog off` ends it".to_owned()).into());
@@ -342,7 +351,7 @@ impl<R: Robot + Clone> Session<R> {
         let open = std::mem::take(&mut self.open);
         let interrupt = self.interrupt.clone();
         let interrupted = move || interrupt.load(std::sync::atomic::Ordering::Relaxed);
-        let late = || format!("the motion did not end within {} s", short(limits::LONGEST));
+        let late = || format!("the robot did not come to a standstill within {} s", short(time));
         let ended = |host: &mut Host<R>| {
             for open in &open {
                 if !host.finished(*open)? {
@@ -351,7 +360,7 @@ impl<R: Robot + Clone> Session<R> {
             }
             Ok(host.stands())
         };
-        Ok(self.host.wait_until(ticks(limits::LONGEST), late, &interrupted, ended)?)
+        Ok(self.host.wait_until(ticks(time), late, &interrupted, ended)?)
     }
 
     /// Lets time pass.

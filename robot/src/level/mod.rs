@@ -354,7 +354,7 @@ impl<R: Robot + Clone> Session<R> {
         let list = match (self.host.stopped(), self.host.stands()) {
             (None, false) => match self.halt() {
                 Ok(()) => vec![mistake.note("the robot was stopped")],
-                Err(_) => vec![mistake],
+                Err(_) => vec![mistake.note("and the robot did not stop")],
             },
             _ => vec![mistake],
         };
