@@ -218,11 +218,9 @@ fn board_runs_talks_and_fails_safe() {
     // A program that misses its deadlines, one that halts, one that makes no number.
     let instead = |what: &str| PROGRAM.replace("        mov     lit, 1\n", what);
     let nan = PROGRAM.replace("fmul    force, f, 0.25", "fdiv    force, zero, zero");
-    for (source, cause) in [
-        (instead(SLOW), "missed deadline"),
-        (instead("        halt\n"), "halt"),
-        (nan, "NaN output"),
-    ] {
+    for (source, cause) in
+        [(instead(SLOW), "missed deadline"), (instead("        halt\n"), "halt"), (nan, "NaN output")]
+    {
         let records = top::image(&program(&source)).expect("it fits");
         host.load(&records, top::RECORDS).expect("it is loaded");
         assert!(safe(&mut host.line), "while it is loaded");

@@ -143,4 +143,5 @@ else
   reset
 end
 move home fast
+wait 0.3                                             # the servo comes to rest
 say "end"
