@@ -154,7 +154,8 @@ pub(crate) fn run(arguments: &Robot, color: bool, out: &mut Out) -> Result<()> {
         (None, None) => desk.lines("standard input", &mut BufReader::new(std::io::stdin()))?,
     }
     // What broke a program off has stopped the robot already.
-    if !arguments.check && !desk.session.quit && !(desk.failed && arguments.file.is_some()) {
+    let broken_off = desk.failed && arguments.file.is_some();
+    if !(arguments.check || desk.session.quit || broken_off) {
         let result = desk.session.finish();
         desk.told(result)?;
     }
