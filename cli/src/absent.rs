@@ -19,9 +19,8 @@ macro_rules! module {
         #[cfg(not(feature = $feature))]
         pub(crate) mod $module {
             $(
-            #[doc = concat!("Not in this build of takt: it takes the feature `", $feature, "`.")]
             #[derive(clap::Args)]
-            #[command(disable_help_flag = true)]
+            #[command(about = concat!("Not in this build of takt: it takes the feature `", $feature, "`"), disable_help_flag = true)]
             pub(crate) struct $arguments {
                 #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
                 _any: Vec<std::ffi::OsString>,
