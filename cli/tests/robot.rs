@@ -1,4 +1,4 @@
-//! `takt robot`: the command level on the command line. What the language does is in robot/tests.
+//! `takt robot`: the command level on the command line. What the language does is in programs/robot/tests.
 
 mod common;
 

@@ -192,7 +192,7 @@ fn every_command_has_an_example() {
     for function in FUNCTIONS {
         assert!(function.syntax.starts_with(function.name));
     }
-    let text = include_str!("../../docs/robot-commands.md");
+    let text = include_str!("../../../docs/robot-commands.md");
     let rows = COMMANDS.iter().map(|row| (row.syntax, row.text));
     for (syntax, text_of) in rows.chain(FUNCTIONS.iter().map(|row| (row.syntax, row.text))) {
         let row = format!("- `{syntax}`: {text_of}\n");
@@ -207,7 +207,7 @@ fn every_command_has_an_example() {
 /// What the documentation shows can be read, and the examples run.
 #[test]
 fn the_documents_program_is_one() {
-    let text = include_str!("../../docs/robot-commands.md");
+    let text = include_str!("../../../docs/robot-commands.md");
     let listing =
         text.split("```robot\n").nth(1).and_then(|rest| rest.split("```").next()).expect("a listing");
     let (mut session, _) = session();

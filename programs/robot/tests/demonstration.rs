@@ -26,7 +26,7 @@ fn the_demonstration_runs() {
     let controller = Controller::new(&description, Plant::standard()).expect("a controller");
     let interrupt = Arc::new(AtomicBool::new(false));
     let mut session = Session::new(controller, Arc::new(NoFiles), interrupt).expect("it gets ready");
-    let text = include_str!("../../programs/three/demonstration.robot");
+    let text = include_str!("../../three/demonstration.robot");
     let result = session.run("demonstration.robot", text).and_then(|()| session.finish());
     let messages = session.take_messages();
     let said: Vec<&str> = messages.iter().map(|message| message.text.as_str()).collect();
