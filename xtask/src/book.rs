@@ -50,7 +50,10 @@ const PARTS: &[(&str, &[&str])] = &[
     ("Running them", &["debugging", "traces", "batch", "plant", "python", "system"]),
     ("The processor", &["isa", "timing", "trig", "image", "machine-choice"]),
     ("The circuit", &["hardware", "headers", "board", "protocol", "synthesis"]),
-    ("Robots", &["robot", "friction", "generation", "arm", "controller", "robot-commands", "model", "models"]),
+    (
+        "Robots",
+        &["robot", "friction", "generation", "arm", "controller", "robot-commands", "model", "models"],
+    ),
     ("Reference", &["glossary", "speed", "reach"]),
 ];
 /// The part of the others.
