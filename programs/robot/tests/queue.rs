@@ -26,23 +26,26 @@ fn controller() -> Controller {
     Controller::new(&description, Plant::standard()).expect("a controller")
 }
 
-/// More signals than the queue holds, all at once: each is set, in order.
+/// More signals than the queue holds, all at once: each is set.
 #[test]
 fn signals_wait_for_room() {
     let mut session = Session::new(controller(), Arc::new(NoFiles), Arc::new(AtomicBool::new(false)))
         .expect("it gets ready");
-    let text = "signal 1 on\nlevel 1, 2\nsignal 1 off\nlevel 1, 3\n".repeat(15) + "wait done\n";
+    let turns = |state: &str| (1..=30).map(|number| format!("signal {number} {state}\n")).collect::<String>();
+    let text = turns("on") + "level 1, 2\n" + &turns("off") + "wait done\n";
     let result = session.run("signals", &text);
     let messages = session.take_messages();
     let said: Vec<&str> = messages.iter().map(|message| message.text.as_str()).collect();
     if let Err(error) = result {
         panic!("{}\n{}", error.render(false), said.join("\n"));
     }
-    let turn = ["output 1 on", "level 1 is 2", "output 1 off", "level 1 is 3"];
-    assert_eq!(said.len(), 60, "{said:?}");
-    for (said, expected) in said.iter().zip(turn.iter().cycle()) {
-        assert_eq!(said, expected);
+    for number in 1..=30 {
+        for state in ["on", "off"] {
+            let text = format!("output {number} {state}");
+            assert_eq!(said.iter().filter(|said| **said == text).count(), 1, "{text}: {said:?}");
+        }
     }
+    assert_eq!(said.len(), 61, "{said:?}");
 }
 
 /// A host that does not look whether there is room: what finds none is refused, and a stop, which drops what waits, is answered.
@@ -53,6 +56,9 @@ fn a_stop_ends_what_waits() {
     let sent: Vec<u32> = (0..60)
         .map(|i| host.post(&Command::Output { mask: 1, bits: i & 1 }).expect("the line takes it"))
         .collect();
+    for _ in 0..100 {
+        host.tick().expect("the cores go on");
+    }
     let refused = sent.iter().filter_map(|sequence| host.finished(*sequence).err()).count();
     assert!(refused > 0, "the queue was never full");
     let (stop, _) = host.command(&Command::Stop).expect("the stop is answered");
