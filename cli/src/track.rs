@@ -63,7 +63,7 @@ pub(crate) struct Track {
     /// Write inputs, outputs, cycles and errors of every period as CSV, which `takt run --inputs` reads; with --system the
     /// inputs, which `takt cosim` reads too. `-` is standard output.
     #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
+    pub(crate) csv: Option<PathBuf>,
     /// Draw the tool path and the tracking error over time as SVG; `-` is standard output.
     #[arg(long, value_name = "FILE")]
     pub(crate) plot: Option<PathBuf>,
