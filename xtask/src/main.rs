@@ -116,13 +116,14 @@ fn works(program: &str, argument: &str) -> bool {
 }
 
 /// What the tests call, how to ask whether it works, and the Debian package that has it.
-const TOOLS: [(&str, &str, &str); 9] = [
+const TOOLS: [(&str, &str, &str); 10] = [
     // Berkeley SoftFloat, the reference arithmetic, is C.
     ("cc", "--version", "gcc"),
     // The circuit runs in Verilator, which builds with make and a C++ compiler, and in Icarus Verilog.
     ("c++", "--version", "g++"),
     ("make", "--version", "make"),
     ("verilator", "--version", "verilator"),
+    ("llvm-mca", "--version", "llvm"),
     ("iverilog", "-V", "iverilog"),
     // The language server is used by the client of an editor.
     ("nvim", "--version", "neovim"),
