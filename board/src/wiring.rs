@@ -351,8 +351,8 @@ impl<'a> Reader<'a> {
         };
         let parameters = kind.parameters.iter().map(|parameter| {
             table
-                .integer(parameter.name, parameter.least, parameter.most)
-                .map_or(parameter.default, |at| at.value)
+                .signed(parameter.name, parameter.least, parameter.most)
+                .map_or(parameter.default, |at| at.value as u32)
         });
         let parameters = parameters.collect();
         let at_publish = kind.strobes.start
