@@ -243,7 +243,9 @@ pub enum LinkError {
     )]
     Busy,
     /// No period ends.
-    #[error("no period has ended for a while: the program has stopped, or is held; `takt live PORT status` says which")]
+    #[error(
+        "no period has ended for a while: the program has stopped, or is held; `takt live PORT status` says which"
+    )]
     Still,
     /// Something else answers.
     #[error("what answers is no board of Takt: its register `id` is {0:#010x}")]

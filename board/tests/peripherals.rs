@@ -225,7 +225,11 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
     ],
     &[("takt_filter.v", "rst | s1 == level", "rst")],
     &[
-        ("takt_quadrature.v", "{count, at_index, indices, errors} <= {START", "{count, at_index, indices, errors} <= {32'd0"),
+        (
+            "takt_quadrature.v",
+            "{count, at_index, indices, errors} <= {START",
+            "{count, at_index, indices, errors} <= {32'd0",
+        ),
         ("takt_pwm.v", "wanted[33] ? 17'd0 :", ""),
         ("takt_spi.v", "(shift & mask) | extend", "shift & mask"),
     ],

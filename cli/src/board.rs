@@ -8,7 +8,7 @@ use crate::load::Load;
 use crate::number;
 use crate::output::{self, Failure};
 use crate::select::{OptionalMachine, SourceArguments};
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, Subcommand};
 use serde_json::json;
 use std::io::Write;
@@ -185,6 +185,22 @@ impl Target {
     }
 }
 
+/// The wiring of a file for a program, and its board: the one that is named, else the one that it names itself.
+pub(crate) fn wired(
+    path: &Path,
+    board: Option<&str>,
+    program: &Program,
+    color: bool,
+) -> Result<(Board, Wiring)> {
+    let (name, text) = text(path)?;
+    let own = Wiring::board(&name, &text);
+    let board = board.or(own.as_deref()).with_context(|| format!("{name} names no board: --board NAME"))?;
+    let board = find(board, color)?;
+    let wiring = right(Wiring::read(&name, &text, &board), color)?;
+    right(wiring.check(&name, &text, program), color)?;
+    Ok((board, wiring))
+}
+
 pub(crate) fn run(arguments: &Boards, color: bool, out: &mut Out) -> Result<()> {
     match &arguments.command {
         Command::List(list) => self::list(list, color, out),
@@ -347,15 +363,18 @@ impl Axis {
 fn sim(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
     let (board, wiring, program) = arguments.target.read(color)?;
     let folder = takt_cosim::cache_folder().join(format!("board-{}", std::process::id()));
-    output::message("compiling the circuit …");
+    let simulation = || {
+        output::message("compiling the circuit …");
+        Simulation::new(&board, &wiring, &program, &folder)
+    };
     let mut run = || -> Result<()> {
         if arguments.robot {
             let drive = robot::Drive::new(&program, &wiring, arguments.gcode.as_deref(), arguments.periods)?;
-            let mut sim = Simulation::new(&board, &wiring, &program, &folder)?;
+            let mut sim = simulation()?;
             sim.noise = arguments.noise;
             return drive.run(&board.name, sim, out);
         }
-        serve(arguments, &wiring, Simulation::new(&board, &wiring, &program, &folder)?, out)
+        serve(arguments, &wiring, simulation()?, out)
     };
     let ended = run();
     let _ = std::fs::remove_dir_all(&folder);

@@ -1,9 +1,9 @@
 //! `takt load` and `takt live`: a board, over its serial port.
 
 use crate::files::{self, Out};
-use crate::shadow;
 use crate::load::Load;
 use crate::select::{OptionalMachine, SourceArguments};
+use crate::shadow;
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::{Args, Subcommand};
 use std::io::Write;

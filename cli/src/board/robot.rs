@@ -68,10 +68,13 @@ impl Axis {
             "the robot stands at {count} counts of `{input}`, and `{}` starts at {start}: `start = {count}`",
             encoder.name
         );
-        let wired = |peripheral: &Peripheral| peripheral.writes[0].as_ref().is_some_and(|write| write.port == output);
+        let wired =
+            |peripheral: &Peripheral| peripheral.writes[0].as_ref().is_some_and(|write| write.port == output);
         let motor = of("pwm", &wired);
         let motor = motor.with_context(|| {
-            format!("the wiring has no pwm whose `duty` is the port `{output}`: an axis of the robot is missing")
+            format!(
+                "the wiring has no pwm whose `duty` is the port `{output}`: an axis of the robot is missing"
+            )
         })?;
         ensure!(
             parameter(motor, "signed") == 1 && motor.pins.iter().all(Option::is_some),
@@ -210,7 +213,7 @@ impl<'a> Drive<'a> {
             vec![(self.reference, reference.to_array().map(f32::to_bits).to_vec())]
         };
         let first = samples.first().context("a path has a point")?;
-        // In reset ports are zeros: they are set again once it waits.
+        // Held, so that the first period has the first point, too.
         host.set("control", protocol::RUN | protocol::HOLD | protocol::ENABLE)?;
         for (address, words) in row(first) {
             host.write(address, &words)?;
@@ -226,7 +229,12 @@ impl<'a> Drive<'a> {
     }
 
     /// The board's half, with the robot: where the tool was at each tick.
-    fn robot(&self, mut sim: Simulation, mut terminal: Terminal, is_over: &AtomicBool) -> Result<Vec<[f64; 3]>> {
+    fn robot(
+        &self,
+        mut sim: Simulation,
+        mut terminal: Terminal,
+        is_over: &AtomicBool,
+    ) -> Result<Vec<[f64; 3]>> {
         let lost = || anyhow!("an axis has left the range of its encoder");
         let step = self.wiring.period / STEPS;
         let seconds = SAMPLE_TIME / f64::from(STEPS);
@@ -252,7 +260,8 @@ impl<'a> Drive<'a> {
             let seen = |name: &str, pin: &str| sim.output(&format!("{name}_{pin}")).unwrap_or_default();
             if next == step && seen("signal", "drive").0 {
                 let high = |axis: &Axis, pin| f64::from(seen(&axis.motor, pin).1);
-                let force = |axis: &Axis| (high(axis, "high") - high(axis, "low")) / f64::from(step) * axis.full;
+                let force =
+                    |axis: &Axis| (high(axis, "high") - high(axis, "low")) / f64::from(step) * axis.full;
                 let [a, b, c, d, e] = std::array::from_fn(|i| force(&self.axes[i]));
                 plant.advance_by(seconds, [a, b, c], [d, e]);
                 counts = plant.counts().ok_or_else(lost)?;
