@@ -207,7 +207,8 @@ impl<L: Line> Host<L> {
                 self.write(address, &words)?;
             }
             // Periods that ended before the answer did not have it.
-            if let Some(ended) = self.stream.drain(..).filter_map(|frame| frame.words.first().copied()).last()
+            if let Some(ended) =
+                self.stream.drain(..).filter_map(|frame| frame.words.first().copied()).next_back()
             {
                 fed.late += ended.wrapping_sub(period);
                 period = ended;
