@@ -122,6 +122,11 @@ impl<'a> Table<'a> {
         self.entries.iter().find(|(name, _)| name.get_ref() == key).map(|(_, value)| value)
     }
 
+    /// Where a key stands, if it does.
+    pub(crate) fn place_of(&self, key: &str) -> Option<Range<usize>> {
+        self.entries.keys().find(|name| name.get_ref() == key).map(Spanned::span)
+    }
+
     /// The value of a key that may be missing, as `read` understands it.
     fn get<T>(
         &self,

@@ -139,7 +139,15 @@ impl Wiring {
     /// Everything that is wrong with it, in the order of the file.
     pub fn read(file: &str, text: &str, board: &Board) -> Result<Wiring, Vec<Mistake>> {
         let document = Document::new(file, text);
-        let wiring = document.top().and_then(|top| Reader::new(&document, board).wiring(&top));
+        let wiring = document.top().and_then(|top| match top.place_of("core") {
+            // One error instead of one for each of its keys.
+            Some(place) => {
+                let text = "this is a system of several cores, and a wiring is wanted, which says what is at a board's pins";
+                document.mistake(&place, text);
+                None
+            }
+            None => Reader::new(&document, board).wiring(&top),
+        });
         document.finish(wiring)
     }
 
