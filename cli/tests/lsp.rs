@@ -397,6 +397,37 @@ fn cycles_stand_beside_the_lines() {
     session.end();
 }
 
+/// A program that another one includes is one all the same: its own cycles stand above its section. A mistake while it is
+/// written changes nothing of that; without its section it is a part of the other.
+#[test]
+fn a_program_that_another_includes_has_its_own_cycles() {
+    let inner = ".input  x\n.output y\n.period\nperiod: fadd    y, x, x\n.if macro.longer\n        longer  y\n\
+                 .endif\n        wait    period\n";
+    let outer =
+        ".macro  longer y\n        fmul    y, y, y\n        fmul    y, y, y\n.endm\n.include \"inner.s\"\n";
+    let mut session = Session::new(&[("inner.s", inner), ("outer.s", outer)]);
+    let lens = |session: &mut Session| {
+        session.client.wait(|message| message["method"] == "workspace/inlayHint/refresh");
+        let document = json!({ "textDocument": { "uri": session.uri("inner.s") } });
+        let lenses = session.ask("textDocument/codeLens", document);
+        lenses[0]["command"]["title"].as_str().unwrap().to_owned()
+    };
+    session.open("inner.s", inner);
+    let own = lens(&mut session);
+    let wrong = session.edit("inner.s", inner, "fadd", "fadf");
+    assert!(session.told("inner.s").iter().any(|one| one["code"] == "unknown-instruction"));
+    session.edit("inner.s", &wrong, "fadf", "fadd");
+    assert_eq!(lens(&mut session), own);
+    for (file, cycles) in [("inner.s", own.as_str()), ("outer.s", "20 cycles")] {
+        let bound: Value =
+            serde_json::from_str(&session.folder.line(&format!("bound {file} --json")).stdout).unwrap();
+        let sections = bound["sections"].as_array().unwrap();
+        let worst = &sections.iter().find(|section| section["name"] == "period").unwrap()["cycles"]["worst"];
+        assert!(cycles.contains(&format!("{worst} cycles")), "{file}: {cycles}, {worst}");
+    }
+    session.end();
+}
+
 /// The view of the pipeline: the cycles of the inlay hints, and lines that follow what is written.
 #[test]
 fn the_picture_has_each_operation_at_its_line() {

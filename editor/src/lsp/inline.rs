@@ -106,6 +106,16 @@ mod tests {
         assert!(!more, "there is one program");
         let counted = ask(&mut server, "textDocument/inlayHint", hints);
         assert!(counted.as_array().is_some_and(|hints| !hints.is_empty()), "{counted}");
+        assert!(
+            counted.to_string().contains("(main.s:7)"),
+            "what a line waits for is named by the document: {counted}"
+        );
+        let rename = |name: &str, line: u32, character: u32| json!({ "textDocument": { "uri": "main.s" }, "position": { "line": line, "character": character }, "newName": name });
+        let here = ask(&mut server, "textDocument/rename", rename("other", 6, 15));
+        assert_eq!(here["changes"]["main.s"].as_array().map(Vec::len), Some(2), "{here}");
+        // `part.s` is no document of the client's: what is declared there keeps its name.
+        let there = ask(&mut server, "textDocument/rename", rename("whole", 6, 18));
+        assert_eq!(there, Value::Null);
 
         let change = json!({ "textDocument": { "uri": "main.s", "version": 2 }, "contentChanges": [{ "text": "    fmull\n" }] });
         notify(&mut server, "textDocument/didChange", change);
