@@ -358,6 +358,36 @@ fn a_misspelt_name_is_mended_as_advised() {
     session.end();
 }
 
+/// What the assembler's help says is offered as a fix, and mends it.
+#[test]
+fn what_is_advised_is_a_fix() {
+    let cases = [
+        (".input n:int\n.output y\n.period\np: y = n*2.0\n wait p\n", "n*", "write `itof(n)`"),
+        (
+            ".include \"math.s\"\n.output y\n.period\np: mov y, zero\n wait p\n",
+            ".inc",
+            "write `.include <math.s>`",
+        ),
+        ("; about\n.output y\n.period\np: fadd y, x, 1.0\n wait p\n", "x, 1", "add `.input x`"),
+        (".input x\n.period\np: fadd y, x, 1.0\n wait p\n", "y, x", "add `.output y`"),
+        ("; about\n.input x\n.output y\n.period\np: exp y, x\n wait p\n", "exp", "add `.include <math.s>`"),
+    ];
+    let mut session = Session::new(&[]);
+    for (number, (text, at, title)) in cases.into_iter().enumerate() {
+        let name = format!("{number}.s");
+        assert!(session.open(&name, text).iter().any(|one| one["severity"] == 1), "{text}");
+        let at = position(text, at, 0);
+        let params = json!({ "textDocument": { "uri": session.uri(&name) }, "range": { "start": at, "end": at }, "context": { "diagnostics": [] } });
+        let actions = session.ask("textDocument/codeAction", params);
+        let fix = actions.as_array().unwrap().iter().find(|action| action["title"] == title);
+        let fix = fix.unwrap_or_else(|| panic!("{title}: {actions}"));
+        let mended = session.applied(&json!({ "result": fix["edit"] }), &[(&name, text)]).remove(0);
+        session.folder.write(&name, &mended);
+        assert_eq!(session.folder.line(&format!("asm {name} --check")).status, Some(0), "{title}:\n{mended}");
+    }
+    session.end();
+}
+
 /// Cycles beside the lines and above the section, and where they go when lines are added.
 #[test]
 fn cycles_stand_beside_the_lines() {
