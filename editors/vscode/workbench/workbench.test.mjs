@@ -146,7 +146,10 @@ test('cycles, a mistake and its fix, the pipeline beside the source, the debugge
     const at = () => page.locator('.debug-call-stack .stack-frame .line-number').first().textContent();
     const first = await at();
     await page.keyboard.press('F10');
-    await page.waitForFunction((old) => document.querySelector('.debug-call-stack .stack-frame .line-number')?.textContent !== old, first);
+    await page.waitForFunction((old) => {
+      const now = document.querySelector('.debug-call-stack .stack-frame .line-number')?.textContent;
+      return now && now !== old;
+    }, first);
     await shot(page, 'debugger');
     await page.click('.debug-toolbar .codicon-debug-step-back');
     await page.waitForFunction((old) => document.querySelector('.debug-call-stack .stack-frame .line-number')?.textContent === old, first);
