@@ -22,7 +22,7 @@
 .output report:int, sequence:int, cause:int, value, report_push:int
 .output item:int, item_sequence:int, item_epoch:int, c1:bits, c2:bits, c3:bits, c4:bits, c5:bits, c6:bits
 .output profile:int, periods:int, ramp_periods:int, flags:int, item_push:int
-.input  item_full:int
+.input  item_count:int                 ; entries of the queue, its depth at most
 .output epoch:int                       ; counts stops: items of an earlier one are dropped
 .output stop_cause:int, stop_sequence:int, reset:int
 .input  reply:int, reply_sequence:int, reply_cause:int, reply_value:bits, reply_epoch:int, reply_empty:int
@@ -243,13 +243,18 @@ in_order:
         bnz     locked, refused
         is = kind == KIND_STOP
         bnz     is, stopping
+; Room in the queue: two items for limits, none for a motion that is only checked.
+.reg    moves:int jogs:int sets:int only:int needs:int crowded:int
+        moves = (kind == KIND_MOVE) | (kind == KIND_MOVEL)
+        ld      only, payload + 9       ; a motion's flags
+        only = moves & ((only & FLAG_CHECK) != 0)
+        needs = kind == KIND_LIMITS ? 2 : only ? 0 : 1
+        crowded = item_count + needs > QUEUE
         li      rc, CAUSE_QUEUEFULL
-        bnz     item_full, refused
+        bnz     crowded, refused
         .rep    i, 1, 6
         ld      c{i}, payload + i - 1
         .endr
-.reg    moves:int jogs:int sets:int
-        moves = (kind == KIND_MOVE) | (kind == KIND_MOVEL)
         jogs = kind == KIND_JOG
         sets = (kind == KIND_OUTPUT) | (kind == KIND_LEVEL)
         bnz     moves, motion

@@ -61,7 +61,14 @@ enum Task {
     /// Build the Python package's wheel, for every Python from 3.10 on (installs maturin in .venv).
     Wheel(python::Arguments),
     /// Build the extension for VS Code, editors/vscode/dist/takt.vsix, with its tests (installs with npm what it lacks).
-    Extension,
+    Extension {
+        /// Install it in VS Code's workbench, in a headless browser, and use it there (installs 300 MB with npm, once).
+        #[arg(long)]
+        workbench: bool,
+        /// Keep pictures of the workbench in this folder.
+        #[arg(long, value_name = "FOLDER", requires = "workbench")]
+        screenshots: Option<PathBuf>,
+    },
     /// Fuzz the assembler and the image loader, one after the other (installs cargo-fuzz if it is not there).
     Fuzz {
         /// Minutes for each target.
@@ -82,7 +89,10 @@ fn main() -> Result<()> {
         Task::Book(arguments) => book::book(&arguments),
         Task::Speed => speed(),
         Task::Wheel(arguments) => python::wheel(&arguments),
-        Task::Extension => extension(),
+        Task::Extension { workbench, screenshots } => {
+            extension()?;
+            if workbench { self::workbench(screenshots.as_deref()) } else { Ok(()) }
+        }
         Task::Fuzz { minutes } => fuzz(minutes),
     }
 }
@@ -171,6 +181,28 @@ fn extension() -> Result<()> {
         run(Command::new("npm").args(["run", "--silent", script]).current_dir(&folder))?;
     }
     Ok(())
+}
+
+/// Uses the extension in VS Code's workbench, as the package code-server has it. Its native modules are left out: what needs them,
+/// the terminal, is not used, and they would take minutes to compile.
+fn workbench(screenshots: Option<&Path>) -> Result<()> {
+    let folder = root().join("editors/vscode/workbench");
+    npm_install(&folder)?;
+    let code = folder.join("node_modules/code-server/lib/vscode");
+    for part in [code.clone(), code.join("extensions")] {
+        if !part.join("node_modules").is_dir() {
+            let install = ["install", "--omit=dev", "--no-audit", "--no-fund", "--ignore-scripts"];
+            run(Command::new("npm").args(install).current_dir(part))?;
+        }
+    }
+    run(cargo().args(["build", "--release", "--package", "takt", "--features", EVERYTHING]))?;
+    let mut tests = Command::new("node");
+    tests.args(["--test", "--test-reporter=spec", "workbench.test.mjs"]).current_dir(folder);
+    tests.env("TAKT", root().join("target/release/takt"));
+    if let Some(folder) = screenshots {
+        tests.env("TAKT_SCREENSHOTS", std::path::absolute(folder)?);
+    }
+    run(&mut tests)
 }
 
 fn test(full: bool, rest: &[String]) -> Result<()> {

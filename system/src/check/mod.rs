@@ -107,6 +107,13 @@ fn syntax(error: &toml::de::Error, text: &str) -> Diagnostic {
     // "unknown field `a`, expected one of `b`, `c`".
     let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
     match quoted[..] {
+        // What only a wiring says, whose first key is one of these.
+        ["board" | "clock" | "period" | "signals" | "peripheral", ..]
+            if message.starts_with("unknown field") =>
+        {
+            diagnostic
+                .help("this is a board's wiring, and a system is wanted: `takt board check` takes a wiring")
+        }
         [unknown, ref known @ ..] if message.starts_with("unknown field") => {
             diagnostic.did_you_mean(nearest(unknown, known.iter().copied()))
         }
