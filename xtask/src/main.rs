@@ -2,6 +2,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod book;
+mod clients;
 mod docs;
 mod formal;
 mod python;
@@ -53,6 +54,8 @@ enum Task {
     Reach(reach::Arguments),
     /// Build the playground, a page for any file server, in target/playground (installs what it lacks); --test opens it in a browser.
     Web(web::Arguments),
+    /// Verify the core's bus slaves and a board's UART with clients that other projects wrote, in Icarus Verilog (a share of `test`).
+    Clients,
     /// Write the documentation as a site, in target/book/site: docs/, the crates' documentation, the playground (installs mdbook).
     Book(book::Arguments),
     /// Measure how fast emulator, assembler and lockstep are beside native code, GNU `as` and one another; print it and write
@@ -79,6 +82,10 @@ fn main() -> Result<()> {
         Task::Synth(arguments) => synth::synth(&arguments),
         Task::Reach(arguments) => reach::reach(&arguments),
         Task::Web(arguments) => web::web(&arguments),
+        Task::Clients => {
+            install()?;
+            clients::test()
+        }
         Task::Book(arguments) => book::book(&arguments),
         Task::Speed => speed(),
         Task::Wheel(arguments) => python::wheel(&arguments),
@@ -180,6 +187,7 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
     if rest.is_empty() {
         extension()?;
         formal::formal(&formal::Arguments::SHARE)?;
+        clients::test()?;
     }
     let mut tests = cargo();
     tests.args(["test", "--workspace", "--features", EVERYTHING, "--no-fail-fast", "--release"]).args(rest);
