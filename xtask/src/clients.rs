@@ -106,7 +106,7 @@ pub(crate) fn test() -> Result<()> {
     let folder = root().join("target/clients");
     let options = Options { machine: MACHINE, ..Options::default() };
     let source = fs::read_to_string(root().join(PROGRAM))?;
-    let loader = MemoryLoader::new(&[(PROGRAM, &source)]);
+    let loader = MemoryLoader::new(&[(PROGRAM, source.as_str())]);
     let program =
         assemble(PROGRAM, &loader, &options).map_err(|error| anyhow!("{PROGRAM}: {error:?}"))?.program;
     core(&program, &folder.join("core"))?;

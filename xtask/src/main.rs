@@ -3,6 +3,7 @@
 
 mod book;
 mod clients;
+mod dist;
 mod docs;
 mod formal;
 mod python;
@@ -56,6 +57,8 @@ enum Task {
     Web(web::Arguments),
     /// Verify the core's bus slaves and a board's UART with clients that other projects wrote, in Icarus Verilog (a share of `test`).
     Clients,
+    /// Write an archive for each machine, target/dist/takt-*.tar.gz: its Verilog, a FuseSoC core, headers, the data sheet as PDF.
+    Dist(dist::Arguments),
     /// Write the documentation as a site, in target/book/site: docs/, the crates' documentation, the playground (installs mdbook).
     Book(book::Arguments),
     /// Measure how fast emulator, assembler and lockstep are beside native code, GNU `as` and one another; print it and write
@@ -86,6 +89,7 @@ fn main() -> Result<()> {
             install()?;
             clients::test()
         }
+        Task::Dist(arguments) => dist::dist(&arguments),
         Task::Book(arguments) => book::book(&arguments),
         Task::Speed => speed(),
         Task::Wheel(arguments) => python::wheel(&arguments),
@@ -188,6 +192,7 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
         extension()?;
         formal::formal(&formal::Arguments::SHARE)?;
         clients::test()?;
+        dist::test()?;
     }
     let mut tests = cargo();
     tests.args(["test", "--workspace", "--features", EVERYTHING, "--no-fail-fast", "--release"]).args(rest);
