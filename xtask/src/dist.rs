@@ -231,7 +231,8 @@ pub(crate) fn test() -> Result<()> {
     for (port, expected) in OUTPUTS.iter().zip(expected.to_array()).take(3) {
         let force =
             number(port.name).and_then(written).with_context(|| format!("no {} in\n{sim}", port.name))?;
-        ensure!((force / expected - 1.0).abs() < 1e-4, "{}: {force} N, binary64 {expected} N", port.name);
+        // Lengths in binary32 are off by up to 8e-8 m, of which the gain makes 0.7 N.
+        ensure!((force - expected).abs() < 1.0, "{}: {force} N, binary64 {expected} N", port.name);
     }
     let pages = fs::metadata(package.join("takt.pdf"))?.len();
     ensure!(pages > 100_000, "the data sheet has {pages} bytes");
