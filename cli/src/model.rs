@@ -240,12 +240,7 @@ fn write_counts(function: &Function, count: &Count, out: &mut Out) -> Result<()>
     for note in &function.notes {
         writeln!(out, "  {note}")?;
     }
-    let Count { add, mul, div, trig, other } = *count;
-    writeln!(
-        out,
-        "{} operations: {add} sums, {mul} products, {div} divisions and roots, {trig} sines and the like, {other} others",
-        count.total()
-    )?;
+    writeln!(out, "{count}")?;
     Ok(())
 }
 

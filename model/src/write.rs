@@ -132,18 +132,7 @@ pub fn source(function: &Function) -> String {
 }
 
 fn header(function: &Function, text: &mut String) {
-    let count = function.count();
-    let _ = writeln!(text, "; {}", function.title);
-    let _ = writeln!(
-        text,
-        "; {} operations: {} sums, {} products, {} divisions and roots, {} sines and the like, {} others",
-        count.total(),
-        count.add,
-        count.mul,
-        count.div,
-        count.trig,
-        count.other
-    );
+    let _ = writeln!(text, "; {}\n; {}", function.title, function.count());
     for note in &function.notes {
         let _ = writeln!(text, "; {note}");
     }

@@ -2,7 +2,9 @@
 
 use crate::{cargo, run as start};
 use anyhow::{Context, Result, bail};
+use std::io::Write;
 use std::path::Path;
+use std::process::{Command, Stdio};
 
 /// What an editor colours by itself.
 const GRAMMAR: &str = "editors/vscode/syntaxes/takt.tmLanguage.json";
@@ -10,12 +12,16 @@ const GRAMMAR: &str = "editors/vscode/syntaxes/takt.tmLanguage.json";
 const TREE_SITTER: &str = "editors/tree-sitter-takt/src/grammar.json";
 /// The parser: as C, because editors compile that.
 const PARSER: &str = "editors/tree-sitter-takt/src/parser.c";
+/// The kinds of token, as logos reads them, and the lexer that it makes of them.
+const TOKENS: &str = "asm/syntax/lexer/raw.rs";
+const LEXER: &str = "asm/syntax/src/lex/raw.rs";
 /// What synthesis measured.
 pub(crate) const SYNTHESIS: &str = "docs/synthesis.md";
 
 /// Generated files: path from the project's folder, and contents.
-fn generated() -> Result<Vec<(&'static str, String)>> {
+fn generated(root: &Path) -> Result<Vec<(&'static str, String)>> {
     Ok(vec![
+        (LEXER, lexer(root)?),
         ("docs/isa.md", takt_isa::manual::markdown()),
         (GRAMMAR, takt_editor::grammar::textmate_text()),
         (TREE_SITTER, takt_editor::tree_sitter::grammar_text()),
@@ -33,6 +39,33 @@ fn mark() -> String {
     format!("/* of grammar.json {hash:016x} */\n")
 }
 
+/// The lexer, by logos' generator.
+fn lexer(root: &Path) -> Result<String> {
+    let tokens =
+        std::fs::read_to_string(root.join(TOKENS)).with_context(|| format!("cannot read {TOKENS}"))?;
+    // The file's own `//!` comment is none of the enumeration's.
+    let tokens: String =
+        tokens.lines().filter(|line| !line.starts_with("//!")).map(|line| format!("{line}\n")).collect();
+    let tokens: proc_macro2::TokenStream =
+        tokens.parse().map_err(|error| anyhow::anyhow!("{TOKENS}: {error}"))?;
+    let kinds = logos_codegen::strip_attributes(tokens.clone());
+    let implementation = logos_codegen::generate(tokens);
+    let text = format!("//! Generated from {TOKENS} by `cargo xtask docs`.\n\n{kinds}\n\n{implementation}\n");
+    let mut rustfmt = Command::new("rustfmt");
+    rustfmt
+        .args(["--edition", "2024", "--config-path"])
+        .arg(root)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped());
+    let mut rustfmt = rustfmt.spawn().context("cannot start rustfmt (`rustup component add rustfmt`)")?;
+    rustfmt.stdin.take().context("rustfmt has no stdin")?.write_all(text.as_bytes())?;
+    let done = rustfmt.wait_with_output()?;
+    if !done.status.success() {
+        bail!("rustfmt refuses what logos made of {TOKENS}");
+    }
+    Ok(String::from_utf8(done.stdout)?)
+}
+
 /// Has tree-sitter generate the parser, by a program in a workspace of its own.
 fn generate_parser(root: &Path) -> Result<()> {
     let folder = root.join("editors/tree-sitter-takt");
@@ -45,7 +78,7 @@ fn generate_parser(root: &Path) -> Result<()> {
 /// Writes every generated file, or checks that it is as it would be written.
 pub(crate) fn run(root: &Path, check: bool) -> Result<()> {
     let mut stale = Vec::new();
-    for (path, contents) in generated()? {
+    for (path, contents) in generated(root)? {
         let file = root.join(path);
         let is_fresh = std::fs::read_to_string(&file).is_ok_and(|old| old == contents);
         if is_fresh {

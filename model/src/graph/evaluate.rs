@@ -62,10 +62,21 @@ pub struct Count {
     pub mul: usize,
     /// Divisions and square roots.
     pub div: usize,
-    /// Sines, cosines and their like.
+    /// Trigonometric functions and their inverses.
     pub trig: usize,
     /// Negations, comparisons, choices and the rest.
     pub other: usize,
+}
+
+impl std::fmt::Display for Count {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Count { add, mul, div, trig, other } = *self;
+        let total = self.total();
+        write!(
+            f,
+            "operations: {total} (sums {add}, products {mul}, divisions and roots {div}, trigonometric {trig}, others {other})"
+        )
+    }
 }
 
 impl Count {

@@ -67,7 +67,7 @@ pub fn read<E>(
     let mut sources = Sources::default();
     sources.add(name, text.into());
     let mut mistakes = Mistakes { list: Vec::new() };
-    let description = match toml::from_str::<File>(text) {
+    let description = match parse(text) {
         Ok(file) => Checker::new(&mut mistakes).check(&file, load).map_err(ReadError::Program)?,
         Err(error) => {
             mistakes.list.push(syntax(&error, text));
@@ -85,6 +85,11 @@ pub fn read<E>(
             }))
         }
     }
+}
+
+/// The file's tables. A function of its own, so that its parser is compiled here and not with each caller of [`read`].
+fn parse(text: &str) -> Result<File, toml::de::Error> {
+    toml::from_str(text)
 }
 
 fn span(range: Range<usize>) -> Span {
