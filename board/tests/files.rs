@@ -91,6 +91,14 @@ fn system_is_read() {
     wiring.check("robot.toml", RIGHT, &program(PROGRAM)).expect("the program has its ports");
 }
 
+/// One error instead of one for each of its keys.
+#[test]
+fn a_system_is_no_wiring() {
+    let said = said(include_str!("../../programs/three/controller.toml"));
+    assert_eq!(said.len(), 1, "{said:?}");
+    assert!(said[0].contains("this is a system of several cores, and a wiring is wanted"), "{said:?}");
+}
+
 /// What takes the place of what, and what is then said.
 const WRONG: &[(&str, &str, &str)] = &[
     (

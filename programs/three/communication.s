@@ -38,7 +38,7 @@
 .state  planning:int                    ; it is a motion, to be planned
 .state  jog_kind:int                    ; rates of the jog that goes on
 .state  number:bits last:int            ; its sequence number; the last good one's
-.state  silence:int pending:int locked:int started:int jogging:int halting:int ; motions and outputs in the queue; …; until the kinematic core says
+.state  silence:int pending:int motions:int locked:int started:int jogging:int halting:int ; motions and outputs in the queue, motions of them; …; until the kinematic core says
 .state  now:int resets:int              ; stops and resets so far
 .state  ready_number:int                ; of a reset that is to be answered
 .state  beats:int                       ; where the beat stood
@@ -88,7 +88,7 @@ highest:    .float high1, high2, high3, high4, high5, high6
         got, need, kind, idle, planning = 0, 0, 0, 0, 0
         li      crc, 0xffffffff
         number, last, jog_kind = 0, 0, 0
-        silence, pending, locked, started, jogging, halting = 0, 0, 0, 0, 0, 0
+        silence, pending, motions, locked, started, jogging, halting = 0, 0, 0, 0, 0, 0, 0
         via_before, space, back, elbow_up, wrist_up = 0, 0, 0, 0, 0
         tool[1], tool[2], tool[3] = 0, 0, 0
         now, resets, beats, raw, ready_number = 0, 0, 0, 0, 0
@@ -383,7 +383,7 @@ motion:
         bz      positive, refused
 ; It goes on where the motion before ends; without one, the robot must stand.
         li      rc, CAUSE_NOTWHILEMOVING
-        is = jogging | halting | (!pending & (mode != MODE_STANDING))
+        is = jogging | halting | (!motions & (mode != MODE_STANDING))
         bnz     is, refused
         planning = 1                    ; the words that follow are for the next period
         mov     left, zero
@@ -413,8 +413,8 @@ resetting:
 words_end:
         bz      planning, no_plan
         planning = 0
-        bnz     pending, plan_motion
-; Nothing is going on: the way begins where the robot stands.
+        bnz     motions, plan_motion
+; No motion is going on: the way begins where the robot stands.
         mov     via_before, zero
         .rep    i, 1, 6
         st      planned + i - 1, stand{i}
@@ -468,13 +468,15 @@ taken_reply:
         current = re == now
         done = r & REPLY_DONE
         done = current & (done != 0)
+        sets_now = r & REPLY_SET
         pending = pending - done
+        done = done & (sets_now == 0)
+        motions = motions - done
         jogged = r & REPLY_JOGGED
         jogging = (jogged != 0) & (rs == jogging) ? 0 : jogging
         halts = r & REPLY_HALTED
         halting = (halts != 0) & current ? HALTED : halting
         locks = r & REPLY_LOCK
-        sets_now = r & REPLY_SET
         iand    rk, r, 0xff
         bnz     sets_now, setting
         bz      locks, unlocked
@@ -534,7 +536,7 @@ known_error:
 
 ; Nothing in the queue counts any more.
 drop:   now = now + 1
-        pending, jogging = 0, 0
+        pending, motions, jogging = 0, 0, 0
         li      halting, 1
         mov     epoch, now
         ret

@@ -151,7 +151,8 @@ pub(crate) fn run(arguments: &Robot, color: bool, out: &mut Out) -> Result<()> {
     let json = arguments.json;
     let (messages, mistakes) = (Vec::new(), Vec::new());
     let mut desk = Desk { session, interrupt, out, color, json, messages, mistakes, failed: false };
-    let plotted = [&arguments.plot, &arguments.record].iter().any(|path| path.as_deref().is_some_and(files::is_dash));
+    let plotted =
+        [&arguments.plot, &arguments.record].iter().any(|path| path.as_deref().is_some_and(files::is_dash));
     desk.json |= plotted;
     match (program, script) {
         (Some((name, text)), _) if arguments.check => {

@@ -222,7 +222,8 @@ pub(crate) fn run(arguments: &Track, file: &Path, color: bool, out: &mut Out) ->
     let ran = Ran { arguments, file, path, loaded: &loaded, system, periods, errors, points, ways };
     if arguments.json {
         output::json(&ran.json(), out)
-    } else if [&arguments.plot, &arguments.csv].iter().any(|path| path.as_deref().is_some_and(files::is_dash)) {
+    } else if [&arguments.plot, &arguments.csv].iter().any(|path| path.as_deref().is_some_and(files::is_dash))
+    {
         Ok(())
     } else {
         ran.text(out)

@@ -104,3 +104,32 @@ fn limits_need_room_for_both_halves() {
     bench.until(ACCEPTED, taken);
     assert_eq!(bench.overflows(), 0);
 }
+
+/// A motion that is planned while outputs wait begins where the robot stands: after power-up, and after a stop on its way.
+#[test]
+fn a_motion_behind_an_output_begins_where_the_robot_stands() {
+    let mut bench = Bench::new();
+    let mut to = HOME;
+    for round in 0..2 {
+        bench.reports.clear();
+        let output = bench.send(OUTPUT, &[1, round & 1]);
+        to[0] += 0.02;
+        let how = How { profile: Profile::Cosine, how: 0, amount: 0.3, flags: 0 };
+        let motion = bench.motion(MOVE, to, how);
+        bench.until(FINISHED, output);
+        bench.until(STARTED, motion);
+        if round == 0 {
+            bench.run(1000);
+            let stop = bench.send(STOP, &[]);
+            bench.until(STOPPED, stop);
+            bench.until_mode(0);
+        } else {
+            bench.until(FINISHED, motion);
+        }
+        assert!(bench.reports.iter().all(|report| report.cause == 0), "{:?}", bench.reports);
+        let seen = bench.since(motion);
+        let steps = seen.windows(2).map(|pair| (pair[1].q()[0] - pair[0].q()[0]).abs());
+        assert!(steps.fold(0.0, f64::max) < 2e-4, "it jumps");
+    }
+    assert!((bench.last().q()[0] - to[0]).abs() < 1e-6);
+}

@@ -103,17 +103,18 @@ fn syntax(error: &toml::de::Error, text: &str) -> Diagnostic {
     let line = text[range.start..].find('\n').map_or(text.len(), |end| range.start + end);
     range.end = range.end.min(line).max(range.start);
     let message = error.message().trim().replace('\n', ": ");
+    let wiring = |file: toml::Table| {
+        !file.contains_key("core") && ["board", "peripheral"].iter().any(|key| file.contains_key(*key))
+    };
+    if toml::from_str(text).is_ok_and(wiring) {
+        let message = "this is a board's wiring, and a system of cores is wanted";
+        return Diagnostic::error("toml", span(range), message)
+            .help("a wiring is for `takt board`; docs/system.md says what a system's file has");
+    }
     let diagnostic = Diagnostic::error("toml", span(range), message.clone());
     // "unknown field `a`, expected one of `b`, `c`".
     let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
     match quoted[..] {
-        // What only a wiring says, whose first key is one of these.
-        ["board" | "clock" | "period" | "signals" | "peripheral", ..]
-            if message.starts_with("unknown field") =>
-        {
-            diagnostic
-                .help("this is a board's wiring, and a system is wanted: `takt board check` takes a wiring")
-        }
         [unknown, ref known @ ..] if message.starts_with("unknown field") => {
             diagnostic.did_you_mean(nearest(unknown, known.iter().copied()))
         }
