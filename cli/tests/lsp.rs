@@ -529,7 +529,11 @@ fn completion_knows_what_an_operand_can_be() {
     };
     has(&labels("        fadd    F, p1, p2\n", "        fa\n"), &["fadd", "scale", ".reg"], &["p1", "K"]);
     has(&labels("fadd    F, p1", "fadd    F"), &["F", "p1"], &["x", "K", "fadd", "period"]);
-    has(&labels("F, p1, p2\n", "F, p1, p\n"), &["p2", "x", "K", "sqrt", "pi"], &["i", "period", "tmp", "fadd"]);
+    has(
+        &labels("F, p1, p2\n", "F, p1, p\n"),
+        &["p2", "x", "K", "sqrt", "pi"],
+        &["i", "period", "tmp", "fadd"],
+    );
     has(&labels("p{i}, 2\n", "p{i}, \n"), &["i", "p2", "K"], &["fadd"]);
     has(&labels("wait    period\n", "wait    pe\n"), &["period"], &["p1", "K"]);
     has(&labels("n:int\n", "n:i\n"), &["int", "float", "bits"], &["p1"]);
