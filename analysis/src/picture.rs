@@ -140,14 +140,10 @@ impl<'p> Picture<'p> {
         let (program, slot) = (self.program, self.program.machine.slot(s));
         let function = instruction.op.row().function;
         let unit = &slot.units[slot.unit_for(function).filter(|_| function != Function::Idle)?];
-        let target = |address: BundleAddress| match program.nearest_label(address) {
-            Some((label, 0)) => label.to_owned(),
-            _ => address.to_string(),
-        };
         Some(json!({
             "slot": slot.name,
             "unit": unit.name,
-            "text": instruction.text_with(program.machine, s, |register| program.register_text(register), target),
+            "text": program.operation_text(s, instruction),
             "place": program.operation_place(address, s),
             "latency": instruction.writes(slot).map(|_| unit.latency),
         }))

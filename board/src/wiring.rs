@@ -127,6 +127,12 @@ impl Wiring {
         signal.chain(pins.filter(|(at, _)| *at == Some(pin)).map(|(_, name)| name())).next()
     }
 
+    /// The board that a wiring is for, if its text says so.
+    pub fn board(file: &str, text: &str) -> Option<String> {
+        let document = Document::new(file, text);
+        Some(document.top()?.string("board")?.value)
+    }
+
     /// Reads a wiring for a board, from the text of a file.
     ///
     /// # Errors
@@ -359,8 +365,8 @@ impl<'a> Reader<'a> {
         };
         let parameters = kind.parameters.iter().map(|parameter| {
             table
-                .integer(parameter.name, parameter.least, parameter.most)
-                .map_or(parameter.default, |at| at.value)
+                .signed(parameter.name, parameter.least, parameter.most)
+                .map_or(parameter.default, |at| at.value as u32)
         });
         let parameters = parameters.collect();
         let at_publish = kind.strobes.start

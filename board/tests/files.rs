@@ -80,7 +80,7 @@ fn system_is_read() {
     let wiring = Wiring::read("robot.toml", RIGHT, &ulx3s()).expect("it is right");
     assert_eq!((wiring.clock, wiring.period, wiring.lead, wiring.baud), (50.0, 20_000, 250, 1_000_000));
     assert_eq!((wiring.autostart, wiring.deadlines, wiring.host), (true, 3, 100));
-    assert_eq!(wiring.peripherals[0].parameters, [4]);
+    assert_eq!(wiring.peripherals[0].parameters, [4, 0]);
     assert_eq!(wiring.peripherals[1].parameters, [1000, 25, 1]);
     assert_eq!(
         wiring.peripherals[1].writes[0].as_ref().map(|w| (w.port.as_str(), w.scale)),

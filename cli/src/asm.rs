@@ -15,7 +15,7 @@ use takt_asm::schedule::DemandKind;
 use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, Resources, SharedBound, TimingReport};
 use takt_asm::{Adjustment, Assembled, Contraction, Made, Schedule, image, listing};
 use takt_isa::{Program, SlotIndex, Slots};
-use takt_rtl::header::{Cycles, Header, Language, Span};
+use takt_rtl::header::{Header, Language};
 
 /// Assemble a source into an image.
 ///
@@ -208,18 +208,7 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
 fn header(program: &Program, source: &Path) -> Header {
     let stem = source.file_stem().filter(|_| !files::is_dash(source));
     let name = stem.map_or_else(|| "program".into(), |stem| stem.to_string_lossy());
-    let span = |span: takt_analysis::Span| Span { best: span.best, worst: span.worst };
-    let cycles = takt_analysis::bound(program).map(|bounds| {
-        let section = |section: &takt_analysis::SectionBounds| Cycles {
-            name: section.name.clone(),
-            address: section.address,
-            once: section.once,
-            cycles: span(if section.once { section.cycles } else { section.in_time }),
-            missed: (!section.once).then_some(span(section.missed)),
-        };
-        bounds.sections.iter().map(section).collect()
-    });
-    Header::new(program, &name, cycles.map_err(|error| error.to_string()))
+    Header::new(program, &name)
 }
 
 /// What the scheduler made of each block, beside its bound.

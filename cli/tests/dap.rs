@@ -242,6 +242,25 @@ turn:   isub    n, n, 1
     end(client);
 }
 
+/// What an editor calls running without debugging: nothing stops it, and its end ends the session.
+#[test]
+fn it_runs_without_debugging() {
+    let folder = Folder::new();
+    folder.write("sum.s", SUM);
+    folder.write("read.s", ".reg _a i:int\n li i, 5000\n ld _a, [i]\n halt\n");
+    for (program, told) in [("sum.s", "the program has halted"), ("read.s", "5000")] {
+        let mut client = launched(&folder, json!({ "program": program, "noDebug": true }));
+        let source = json!({ "source": { "path": program }, "breakpoints": [{ "line": 3 }] });
+        ok(&mut client, "setBreakpoints", source);
+        ok(&mut client, "configurationDone", json!({}));
+        let output = client.event("output")["body"]["output"].as_str().unwrap().to_owned();
+        assert!(output.contains(told), "{output}");
+        let ended = client.wait(|message| message["event"] == "terminated" || message["event"] == "stopped");
+        assert_eq!(ended["event"], "terminated");
+        end(client);
+    }
+}
+
 #[test]
 fn a_missed_deadline_stops() {
     let folder = Folder::new();

@@ -358,6 +358,36 @@ fn a_misspelt_name_is_mended_as_advised() {
     session.end();
 }
 
+/// What the assembler's help says is offered as a fix, and mends it.
+#[test]
+fn what_is_advised_is_a_fix() {
+    let cases = [
+        (".input n:int\n.output y\n.period\np: y = n*2.0\n wait p\n", "n*", "write `itof(n)`"),
+        (
+            ".include \"math.s\"\n.output y\n.period\np: mov y, zero\n wait p\n",
+            ".inc",
+            "write `.include <math.s>`",
+        ),
+        ("; about\n.output y\n.period\np: fadd y, x, 1.0\n wait p\n", "x, 1", "add `.input x`"),
+        (".input x\n.period\np: fadd y, x, 1.0\n wait p\n", "y, x", "add `.output y`"),
+        ("; about\n.input x\n.output y\n.period\np: exp y, x\n wait p\n", "exp", "add `.include <math.s>`"),
+    ];
+    let mut session = Session::new(&[]);
+    for (number, (text, at, title)) in cases.into_iter().enumerate() {
+        let name = format!("{number}.s");
+        assert!(session.open(&name, text).iter().any(|one| one["severity"] == 1), "{text}");
+        let at = position(text, at, 0);
+        let params = json!({ "textDocument": { "uri": session.uri(&name) }, "range": { "start": at, "end": at }, "context": { "diagnostics": [] } });
+        let actions = session.ask("textDocument/codeAction", params);
+        let fix = actions.as_array().unwrap().iter().find(|action| action["title"] == title);
+        let fix = fix.unwrap_or_else(|| panic!("{title}: {actions}"));
+        let mended = session.applied(&json!({ "result": fix["edit"] }), &[(&name, text)]).remove(0);
+        session.folder.write(&name, &mended);
+        assert_eq!(session.folder.line(&format!("asm {name} --check")).status, Some(0), "{title}:\n{mended}");
+    }
+    session.end();
+}
+
 /// Cycles beside the lines and above the section, and where they go when lines are added.
 #[test]
 fn cycles_stand_beside_the_lines() {
@@ -394,6 +424,37 @@ fn cycles_stand_beside_the_lines() {
     let after = lines(&session.ask("textDocument/inlayHint", params));
     let moved: Vec<_> = before.iter().map(|(line, text)| (line + 2, text.clone())).collect();
     assert_eq!(after, moved);
+    session.end();
+}
+
+/// A program that another one includes is one all the same: its own cycles stand above its section. A mistake while it is
+/// written changes nothing of that; without its section it is a part of the other.
+#[test]
+fn a_program_that_another_includes_has_its_own_cycles() {
+    let inner = ".input  x\n.output y\n.period\nperiod: fadd    y, x, x\n.if macro.longer\n        longer  y\n\
+                 .endif\n        wait    period\n";
+    let outer =
+        ".macro  longer y\n        fmul    y, y, y\n        fmul    y, y, y\n.endm\n.include \"inner.s\"\n";
+    let mut session = Session::new(&[("inner.s", inner), ("outer.s", outer)]);
+    let lens = |session: &mut Session| {
+        session.client.wait(|message| message["method"] == "workspace/inlayHint/refresh");
+        let document = json!({ "textDocument": { "uri": session.uri("inner.s") } });
+        let lenses = session.ask("textDocument/codeLens", document);
+        lenses[0]["command"]["title"].as_str().unwrap().to_owned()
+    };
+    session.open("inner.s", inner);
+    let own = lens(&mut session);
+    let wrong = session.edit("inner.s", inner, "fadd", "fadf");
+    assert!(session.told("inner.s").iter().any(|one| one["code"] == "unknown-instruction"));
+    session.edit("inner.s", &wrong, "fadf", "fadd");
+    assert_eq!(lens(&mut session), own);
+    for (file, cycles) in [("inner.s", own.as_str()), ("outer.s", "20 cycles")] {
+        let bound: Value =
+            serde_json::from_str(&session.folder.line(&format!("bound {file} --json")).stdout).unwrap();
+        let sections = bound["sections"].as_array().unwrap();
+        let worst = &sections.iter().find(|section| section["name"] == "period").unwrap()["cycles"]["worst"];
+        assert!(cycles.contains(&format!("{worst} cycles")), "{file}: {cycles}, {worst}");
+    }
     session.end();
 }
 
@@ -468,7 +529,12 @@ fn completion_knows_what_an_operand_can_be() {
     };
     has(&labels("        fadd    F, p1, p2\n", "        fa\n"), &["fadd", "scale", ".reg"], &["p1", "K"]);
     has(&labels("fadd    F, p1", "fadd    F"), &["F", "p1"], &["x", "K", "fadd", "period"]);
-    has(&labels("F, p1, p2\n", "F, p1, p\n"), &["p2", "x", "K", "sqrt", "pi"], &["period", "tmp", "fadd"]);
+    has(
+        &labels("F, p1, p2\n", "F, p1, p\n"),
+        &["p2", "x", "K", "sqrt", "pi"],
+        &["i", "period", "tmp", "fadd"],
+    );
+    has(&labels("p{i}, 2\n", "p{i}, \n"), &["i", "p2", "K"], &["fadd"]);
     has(&labels("wait    period\n", "wait    pe\n"), &["period"], &["p1", "K"]);
     has(&labels("n:int\n", "n:i\n"), &["int", "float", "bits"], &["p1"]);
     has(&labels(".schedule on\n", ".schedule o\n"), &["on", "off"], &["p1"]);

@@ -308,4 +308,18 @@ impl Program {
             .max_by_key(|symbol| symbol.address)
             .map(|symbol| (symbol.name.as_str(), address.get() - symbol.address))
     }
+
+    /// A target as the source names it: the label there, or else the bundle's number.
+    pub fn target_text(&self, target: BundleAddress) -> String {
+        match self.nearest_label(target) {
+            Some((label, 0)) => label.to_owned(),
+            _ => target.to_string(),
+        }
+    }
+
+    /// An operation with the source's names for its registers and its target.
+    pub fn operation_text(&self, slot: SlotIndex, instruction: &Instruction) -> String {
+        let register = |register| self.register_text(register);
+        instruction.text_with(self.machine, slot, register, |target| self.target_text(target))
+    }
 }

@@ -1,6 +1,7 @@
 //! Programs to start from.
 
 use crate::{CYCLES, PERIODS, SOURCE_BYTES};
+use serde::Deserialize;
 use serde_json::{Value, json};
 use std::sync::OnceLock;
 use takt_isa::MACHINES;
@@ -19,6 +20,21 @@ pub(crate) fn beside() -> &'static [(&'static str, &'static str)] {
 
 fn file_name(path: &'static str) -> &'static str {
     path.rsplit_once('/').map_or(path, |(_, name)| name)
+}
+
+/// Which file is to be read.
+#[derive(Deserialize)]
+pub(crate) struct Source {
+    name: String,
+}
+
+/// The text of a file that a program can include: one that comes with Takt, or of the library, `<math.s>`.
+pub(crate) fn source(wanted: Source) -> Result<Value, String> {
+    let Source { name } = wanted;
+    let bare = name.trim_start_matches('<').trim_end_matches('>');
+    let known = if bare == name { beside() } else { takt_programs::LIBRARY };
+    let text = known.iter().find(|(known, _)| *known == bare).map(|(_, text)| Value::from(*text));
+    text.ok_or_else(|| format!("there is no file `{name}` to be shown"))
 }
 
 /// What an example is: the words of its first comment.

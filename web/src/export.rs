@@ -3,7 +3,7 @@
 use crate::program::Loaded;
 use serde::Deserialize;
 use serde_json::{Value, json};
-use takt_rtl::header::{Cycles, Header, Language, Span};
+use takt_rtl::header::{Header, Language};
 use takt_rtl::{Library, bench, export};
 
 /// Rows of recorded inputs that the test bench gets.
@@ -42,19 +42,6 @@ pub(crate) fn header(loaded: &Loaded, params: Value) -> Result<Value, String> {
         "svd" => Language::Svd,
         other => return Err(format!("there is no header in `{other}` (languages: c, rust, json, svd)")),
     };
-    let program = &loaded.assembled.program;
-    let span = |span: takt_analysis::Span| Span { best: span.best, worst: span.worst };
-    let cycles = takt_analysis::bound(program).map(|bounds| {
-        let section = |section: &takt_analysis::SectionBounds| Cycles {
-            name: section.name.clone(),
-            address: section.address,
-            once: section.once,
-            cycles: span(if section.once { section.cycles } else { section.in_time }),
-            missed: (!section.once).then_some(span(section.missed)),
-        };
-        bounds.sections.iter().map(section).collect()
-    });
     let stem = loaded.name.strip_suffix(".s").unwrap_or(&loaded.name);
-    let header = Header::new(program, stem, cycles.map_err(|error| error.to_string()));
-    Ok(Value::from(header.text(language)))
+    Ok(Value::from(Header::new(&loaded.assembled.program, stem).text(language)))
 }

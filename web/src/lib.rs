@@ -12,6 +12,7 @@
 //! | `execute` | a command of the debugger's console |
 //! | `run` | periods on the emulator, so many at a call |
 //! | `track` | periods of the closed loop along the AGH path |
+//! | `source` | the text of a file that a program includes |
 //! | `picture` | the pipeline's picture as a page |
 //! | `listing`, `header`, `verilog`, `image` | what can be taken away |
 //!
@@ -101,6 +102,7 @@ impl Playground {
             "execute" => self.execute(parameters(method, params)?),
             "run" => self.run(parameters(method, params)?),
             "track" => self.track(parameters(method, params)?),
+            "source" => examples::source(parameters(method, params)?),
             "picture" => self.picture(parameters(method, params)?),
             "listing" => Ok(Value::from(takt_asm::listing::listing(&self.loaded()?.assembled))),
             "header" => export::header(self.loaded()?, params),

@@ -5,6 +5,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use takt_debug::console::Console;
 use takt_debug::panes::Named;
+use takt_debug::session::{Stop, Where};
 
 /// A line for the debugger's console.
 #[derive(Deserialize)]
@@ -33,7 +34,15 @@ pub(crate) fn view(console: &mut Console) -> Value {
     let session = &console.session;
     let next = panes.lines.iter().find(|line| line.next).map(|line| line.number);
     let part: Vec<u32> = panes.lines.iter().filter(|line| line.part).map(|line| line.number).collect();
-    let stops: Vec<u32> = panes.lines.iter().filter(|line| line.stop).map(|line| line.number).collect();
+    let program = session.program();
+    let breaks = session.stops().iter().filter_map(|(id, stop)| {
+        let at = match stop {
+            Stop::Break { at: Where::Line(at, _), .. } => *at,
+            Stop::Break { at: Where::Bundle(bundle), .. } => program.location(*bundle)?,
+            _ => return None,
+        };
+        Some(json!({ "id": id, "file": program.files.get(at.file as usize), "line": at.line }))
+    });
     let rows = |rows: &[Named]| rows.iter().map(named).collect::<Vec<_>>();
     let flight = panes.flight.iter().map(|one| {
         json!({ "left": one.left, "register": one.register, "mnemonic": one.mnemonic, "from": one.from })
@@ -51,7 +60,7 @@ pub(crate) fn view(console: &mut Console) -> Value {
         "file": panes.file,
         "line": next,
         "part": part,
-        "stops": stops,
+        "breaks": breaks.collect::<Vec<_>>(),
         "bundle": bundle.collect::<Vec<_>>(),
         "registers": rows(&panes.registers),
         "inputs": rows(&panes.inputs),

@@ -139,6 +139,32 @@ fn steps_forward_and_back() {
 }
 
 #[test]
+fn breakpoints_are_told_with_their_lines() {
+    let mut playground = Playground::default();
+    assemble(&mut playground, DOUBLE, "x\n1\n3\n");
+    let told = call(&mut playground, "execute", json!({ "line": "break a.s:6" }));
+    let stop = told["view"]["breaks"][0].clone();
+    assert_eq!((&stop["file"], &stop["line"]), (&json!("a.s"), &json!(6)));
+    let error = playground.call("execute", json!({ "line": "break a.s:1" })).expect_err("no code is there");
+    assert!(error.contains("line 1 of a.s has no instruction"), "{error}");
+    let told = call(&mut playground, "execute", json!({ "line": "continue" }));
+    assert_eq!(told["view"]["line"], 6);
+    let told = call(&mut playground, "execute", json!({ "line": format!("delete {}", stop["id"]) }));
+    assert_eq!(told["view"]["breaks"], json!([]));
+}
+
+#[test]
+fn files_that_programs_include_can_be_read() {
+    let mut playground = Playground::default();
+    for (name, word) in [("robot.s", ".const"), ("<math.s>", ".macro")] {
+        let text = call(&mut playground, "source", json!({ "name": name }));
+        assert!(text.as_str().is_some_and(|text| text.contains(word)), "{name}");
+    }
+    let error = playground.call("source", json!({ "name": "none.s" })).expect_err("there is none");
+    assert_eq!(error, "there is no file `none.s` to be shown");
+}
+
+#[test]
 fn the_robot_follows_the_path() {
     let mut playground = Playground::default();
     let about = call(&mut playground, "about", Value::Null);

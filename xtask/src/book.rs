@@ -21,6 +21,9 @@ pub(crate) struct Arguments {
     /// Take the playground as it was built last, if it was.
     #[arg(long)]
     no_web: bool,
+    /// Open it in a headless browser: the search, and every listing in the playground.
+    #[arg(long)]
+    test: bool,
 }
 
 /// The version of mdbook that the site is written for.
@@ -84,7 +87,7 @@ pub(crate) fn book(arguments: &Arguments) -> Result<()> {
     println!(
         "{pages} pages in {SITE}, {links} links checked: `python3 -m http.server -d {SITE}` serves them"
     );
-    Ok(())
+    if arguments.test { web::in_browser("test/book.test.mjs", &[("TAKT_BOOK", &site)]) } else { Ok(()) }
 }
 
 /// mdbook in the version that is written down: the one installed, or else one made here.
@@ -113,15 +116,18 @@ fn write_source(folder: &Path) -> Result<()> {
     let docs = root().join("docs");
     let chapters = folder.join("src");
     std::fs::create_dir_all(&chapters)?;
-    let mut titles = BTreeMap::new();
+    let (mut titles, mut texts) = (BTreeMap::new(), Vec::new());
     for entry in std::fs::read_dir(&docs).context("cannot read docs/")? {
         let path = entry?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let Some(stem) = name.strip_suffix(".md") else { continue };
         let text = std::fs::read_to_string(&path).with_context(|| format!("cannot read docs/{name}"))?;
         let title = text.lines().find_map(|line| line.strip_prefix("# ")).unwrap_or(stem).to_owned();
-        std::fs::write(chapters.join(&name), chapter(&name, &text, &chapters)?)?;
         titles.insert(stem.to_owned(), title);
+        texts.push((name, text));
+    }
+    for (name, text) in texts {
+        std::fs::write(chapters.join(&name), titled(&chapter(&name, &text, &chapters)?, &titles))?;
     }
     copy(&docs.join("pictures"), &chapters.join("pictures"))?;
     let mut summary = "# Summary\n\n[Takt](takt.md)\n".to_owned();
@@ -164,6 +170,7 @@ limit-results = 40
 ";
 
 const CSS: &str = "\
+:root { --content-max-width: 980px; }
 .playground-link { display: block; text-align: right; font-size: 0.85em; margin: -1em 0 1.2em; }
 .content main table { font-size: 0.95em; }
 ";
@@ -188,6 +195,15 @@ fn chapter(name: &str, text: &str, folder: &Path) -> Result<String> {
     }
     out.push_str(rest);
     outside(name, &out, folder)
+}
+
+/// Links that show a document's file name, `[glossary.md](glossary.md)`, show its title: a book has no files.
+fn titled(text: &str, titles: &BTreeMap<String, String>) -> String {
+    let link = |text: String, (stem, title): (&String, &String)| {
+        let shown = format!("[{stem}.md]({stem}.md");
+        text.replace(&shown, &format!("[{title}]({stem}.md"))
+    };
+    titles.iter().fold(text.to_owned(), link)
 }
 
 /// The part of an address behind `#` that the playground unpacks (`web/page/src/link.js`).
@@ -317,6 +333,15 @@ mod tests {
         let (before, link) = chapter.split_once("#p1=").expect("it has a link");
         assert!(before.contains("```asm\na\n```\n"), "{before}");
         assert!(link.ends_with("\">Open in the playground</a>\n\nend\n"), "{link}");
+    }
+
+    #[test]
+    fn links_show_titles() {
+        let titles = BTreeMap::from([("glossary".to_owned(), "Glossary".to_owned())]);
+        assert_eq!(
+            titled("([glossary.md](glossary.md#ulp), [x](glossary.md), [isa.md](isa.md))", &titles),
+            "([Glossary](glossary.md#ulp), [x](glossary.md), [isa.md](isa.md))"
+        );
     }
 
     #[test]

@@ -2,6 +2,8 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod book;
+mod clients;
+mod dist;
 mod docs;
 mod formal;
 mod python;
@@ -53,6 +55,10 @@ enum Task {
     Reach(reach::Arguments),
     /// Build the playground, a page for any file server, in target/playground (installs what it lacks); --test opens it in a browser.
     Web(web::Arguments),
+    /// Verify the core's bus slaves and a board's UART with clients that other projects wrote, in Icarus Verilog (a share of `test`).
+    Clients,
+    /// Write an archive for each machine, target/dist/takt-*.tar.gz: its Verilog, a FuseSoC core, headers, the data sheet as PDF.
+    Dist(dist::Arguments),
     /// Write the documentation as a site, in target/book/site: docs/, the crates' documentation, the playground (installs mdbook).
     Book(book::Arguments),
     /// Measure how fast emulator, assembler and lockstep are beside native code, GNU `as` and one another; print it and write
@@ -61,7 +67,14 @@ enum Task {
     /// Build the Python package's wheel, for every Python from 3.10 on (installs maturin in .venv).
     Wheel(python::Arguments),
     /// Build the extension for VS Code, editors/vscode/dist/takt.vsix, with its tests (installs with npm what it lacks).
-    Extension,
+    Extension {
+        /// Install it in VS Code's workbench, in a headless browser, and use it there (installs 300 MB with npm, once).
+        #[arg(long)]
+        workbench: bool,
+        /// Keep pictures of the workbench in this folder.
+        #[arg(long, value_name = "FOLDER", requires = "workbench")]
+        screenshots: Option<PathBuf>,
+    },
     /// Fuzz the assembler and the image loader, one after the other (installs cargo-fuzz if it is not there).
     Fuzz {
         /// Minutes for each target.
@@ -79,10 +92,18 @@ fn main() -> Result<()> {
         Task::Synth(arguments) => synth::synth(&arguments),
         Task::Reach(arguments) => reach::reach(&arguments),
         Task::Web(arguments) => web::web(&arguments),
+        Task::Clients => {
+            install()?;
+            clients::test()
+        }
+        Task::Dist(arguments) => dist::dist(&arguments),
         Task::Book(arguments) => book::book(&arguments),
         Task::Speed => speed(),
         Task::Wheel(arguments) => python::wheel(&arguments),
-        Task::Extension => extension(),
+        Task::Extension { workbench, screenshots } => {
+            extension()?;
+            if workbench { self::workbench(screenshots.as_deref()) } else { Ok(()) }
+        }
         Task::Fuzz { minutes } => fuzz(minutes),
     }
 }
@@ -116,13 +137,14 @@ fn works(program: &str, argument: &str) -> bool {
 }
 
 /// What the tests call, how to ask whether it works, and the Debian package that has it.
-const TOOLS: [(&str, &str, &str); 9] = [
+const TOOLS: [(&str, &str, &str); 10] = [
     // Berkeley SoftFloat, the reference arithmetic, is C.
     ("cc", "--version", "gcc"),
     // The circuit runs in Verilator, which builds with make and a C++ compiler, and in Icarus Verilog.
     ("c++", "--version", "g++"),
     ("make", "--version", "make"),
     ("verilator", "--version", "verilator"),
+    ("llvm-mca", "--version", "llvm"),
     ("iverilog", "-V", "iverilog"),
     // The language server is used by the client of an editor.
     ("nvim", "--version", "neovim"),
@@ -172,6 +194,28 @@ fn extension() -> Result<()> {
     Ok(())
 }
 
+/// Uses the extension in VS Code's workbench, as the package code-server has it. Its native modules are left out: what needs them,
+/// the terminal, is not used, and they would take minutes to compile.
+fn workbench(screenshots: Option<&Path>) -> Result<()> {
+    let folder = root().join("editors/vscode/workbench");
+    npm_install(&folder)?;
+    let code = folder.join("node_modules/code-server/lib/vscode");
+    for part in [code.clone(), code.join("extensions")] {
+        if !part.join("node_modules").is_dir() {
+            let install = ["install", "--omit=dev", "--no-audit", "--no-fund", "--ignore-scripts"];
+            run(Command::new("npm").args(install).current_dir(part))?;
+        }
+    }
+    run(cargo().args(["build", "--release", "--package", "takt", "--features", EVERYTHING]))?;
+    let mut tests = Command::new("node");
+    tests.args(["--test", "--test-reporter=spec", "workbench.test.mjs"]).current_dir(folder);
+    tests.env("TAKT", root().join("target/release/takt"));
+    if let Some(folder) = screenshots {
+        tests.env("TAKT_SCREENSHOTS", std::path::absolute(folder)?);
+    }
+    run(&mut tests)
+}
+
 fn test(full: bool, rest: &[String]) -> Result<()> {
     install()?;
     venv::Venv::with(&venv::MODELS)?;
@@ -180,6 +224,8 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
     if rest.is_empty() {
         extension()?;
         formal::formal(&formal::Arguments::SHARE)?;
+        clients::test()?;
+        dist::test()?;
     }
     let mut tests = cargo();
     tests.args(["test", "--workspace", "--features", EVERYTHING, "--no-fail-fast", "--release"]).args(rest);

@@ -69,18 +69,25 @@ fn packages() -> Result<PathBuf> {
 }
 
 fn test(arguments: &Arguments) -> Result<()> {
+    let page = root().join(PAGE);
+    let mut environment = vec![("TAKT_PAGE", page.as_path())];
+    if arguments.bench {
+        environment.push(("TAKT_BENCH", Path::new("1")));
+    }
+    let folder = arguments.screenshots.as_ref().map(std::path::absolute).transpose()?;
+    if let Some(folder) = &folder {
+        std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+        environment.push(("TAKT_SCREENSHOTS", folder));
+    }
+    in_browser("test/page.test.mjs", &environment)
+}
+
+/// Runs a test of the page's folder that uses a headless browser.
+pub(crate) fn in_browser(test: &str, environment: &[(&str, &Path)]) -> Result<()> {
     if !works("chromium", "--version") {
         apt_install(&["chromium"])?;
     }
     let mut tests = Command::new("node");
-    tests.args(["--test", "--test-reporter=spec", "test/"]).current_dir(root().join("web/page"));
-    tests.env("TAKT_PAGE", root().join(PAGE));
-    if arguments.bench {
-        tests.env("TAKT_BENCH", "1");
-    }
-    if let Some(folder) = &arguments.screenshots {
-        std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
-        tests.env("TAKT_SCREENSHOTS", std::path::absolute(folder)?);
-    }
-    run(&mut tests)
+    tests.args(["--test", "--test-reporter=spec", test]).current_dir(packages()?);
+    run(tests.envs(environment.iter().copied()))
 }

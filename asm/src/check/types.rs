@@ -367,9 +367,10 @@ fn wrong_source(
         context.report(
             scope,
             match instead {
-                Some(instead) => {
-                    warning.help(format!("write `{instead}`, or `{name}:bits` there if these bits are meant"))
-                }
+                Some(instead) => warning.mend(
+                    format!("write `{instead}`, or `{name}:bits` there if these bits are meant"),
+                    instead,
+                ),
                 None => warning.help(format!("write `{name}:bits` there if these bits are meant")),
             },
         );

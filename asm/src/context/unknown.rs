@@ -94,17 +94,23 @@ impl Context {
                 }
                 Some(meant) => error.did_you_mean(Some(meant)),
                 None if self.machine.register_address(&text).is_some() => {
-                    error.help(format!("write `@{text}` for the register at that place"))
+                    error.mend(format!("write `@{text}` for the register at that place"), format!("@{text}"))
                 }
                 None if name.op().is_some() => error.note(format!("`{text}` is an instruction")),
                 None => match wanted {
-                    Wanted::Dest => error.help(format!("declare it with `.reg {text}` or `.output {text}`")),
-                    Wanted::Left => error.help(format!(
-                        "declare it with `.reg {text}` or `.output {text}`; a constant is `.const {text} = …`"
-                    )),
-                    Wanted::Source => error.help(format!(
-                        "declare it with `.reg {text}`, `.input {text}` or `.const {text} = …`"
-                    )),
+                    Wanted::Dest => error
+                        .help(format!("declare it with `.reg {text}` or `.output {text}`"))
+                        .missing([format!(".reg {text}"), format!(".output {text}")]),
+                    Wanted::Left => error
+                        .help(format!(
+                            "declare it with `.reg {text}` or `.output {text}`; a constant is `.const {text} = …`"
+                        ))
+                        .missing([format!(".reg {text}"), format!(".output {text}")]),
+                    Wanted::Source => error
+                        .help(format!(
+                            "declare it with `.reg {text}`, `.input {text}` or `.const {text} = …`"
+                        ))
+                        .missing([format!(".reg {text}"), format!(".input {text}")]),
                     Wanted::Target => {
                         error.help(format!("put the label `{text}:` before the bundle to continue at"))
                     }

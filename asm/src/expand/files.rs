@@ -166,7 +166,8 @@ impl Expander<'_> {
         let (folders, libraries): (Vec<&Place>, Vec<&Place>) =
             self.loader.places().iter().partition(|place| place.takes_quoted());
         if libraries.iter().any(|library| library.load(path).is_ok()) {
-            return error.help(format!("write `.include <{path}>` for the library's"));
+            let instead = format!(".include <{path}>");
+            return error.mend(format!("write `{instead}` for the library's"), instead);
         }
         match folders.iter().map(|folder| format!("`{}`", folder.name_of(""))).collect::<Vec<_>>() {
             folders if folders.is_empty() => error,
@@ -190,7 +191,8 @@ impl Expander<'_> {
         match meant {
             Some(meant) => error.did_you_mean(Some(format!(".include <{meant}>"))),
             None if self.loader.load(path).is_ok() => {
-                error.help(format!("write `.include \"{path}\"` for the project's"))
+                let instead = format!(".include \"{path}\"");
+                error.mend(format!("write `{instead}` for the project's"), instead)
             }
             None => error,
         }

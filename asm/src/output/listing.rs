@@ -6,7 +6,7 @@ use crate::syntax::expr::Value;
 use serde::Serialize;
 use std::fmt::Write as _;
 use takt_isa::program::{Columns, Location, Port, Space};
-use takt_isa::{BundleAddress, Instruction, Program, SlotIndex, Type};
+use takt_isa::{Instruction, Program, SlotIndex, Type};
 
 /// The listing of an assembled program: for each bundle its address, its words in the order of the slots, and the source
 /// lines that they come from. An operation that a macro, a repetition or the assembler made is shown as what it became, behind a `+`;
@@ -172,10 +172,7 @@ impl<'a> Lister<'a> {
         let word = program.code[index];
         match Instruction::decode(word) {
             Ok(instruction) => {
-                let target = |address: BundleAddress| match program.nearest_label(address) {
-                    Some((label, 0)) => label.to_owned(),
-                    _ => address.to_string(),
-                };
+                let target = |address| program.target_text(address);
                 instruction.text_with(program.machine, slot, |register| self.register(register), target)
             }
             Err(_) => format!(".raw 0x{word:012x}"),

@@ -75,7 +75,7 @@ impl Resolver<'_> {
         let error = if Directive::ALL.iter().any(|known| known.name() == directive) {
             error.did_you_mean(Some(directive))
         } else if let Some(file) = self.library_with(&text) {
-            error.help(format!("the library defines it: `.include <{file}>`"))
+            from_library(error, &file)
         } else if let Some(help) = absent(&text.to_ascii_lowercase()) {
             error.help(help)
         } else {
@@ -88,6 +88,12 @@ impl Resolver<'_> {
         };
         self.context.report(at.scope, error)
     }
+}
+
+/// Says which file of the library defines what is missing.
+pub(crate) fn from_library(error: Diagnostic, file: &str) -> Diagnostic {
+    let line = format!(".include <{file}>");
+    error.help(format!("the library defines it: `{line}`")).missing([line])
 }
 
 impl Resolver<'_> {

@@ -285,18 +285,18 @@ impl Resolver<'_> {
         let (name, declared) = (name.clone(), *declared);
         let message = format!("this is {}, and `{name}` {}", words(is), words(to));
         let written = self.context.reports.sources.text(term.span);
-        let written = if written.len() > 24 { "…" } else { written };
-        let help = match self.forms.conversion(is, to) {
-            Some(convert) => {
-                format!("convert it: `{convert}({written})`, or declare `{name}:{}`", type_name(is))
-            }
-            None => format!("declare `{name}:{}`", type_name(is)),
-        };
         let error = Diagnostic::error("equation", term.span, message)
             .here(words(is))
             .also(span, format!("`{name}` is written here"))
-            .also(declared, format!("declared here, as {}", words(to)))
-            .help(help);
+            .also(declared, format!("declared here, as {}", words(to)));
+        let error = match self.forms.conversion(is, to) {
+            Some(convert) => {
+                let shown = if written.len() > 24 { "…" } else { written };
+                let help = format!("convert it: `{convert}({shown})`, or declare `{name}:{}`", type_name(is));
+                error.mend(help, format!("{convert}({written})"))
+            }
+            None => error.help(format!("declare `{name}:{}`", type_name(is))),
+        };
         Err(self.context.report(at.scope, error))
     }
 

@@ -6,6 +6,7 @@ use crate::report::diag::Diagnostic;
 use crate::report::nearest;
 use crate::report::source::Span;
 use crate::resolve::Resolver;
+use crate::resolve::advice::from_library;
 use crate::resolve::equation::Term;
 use takt_isa::Type;
 
@@ -30,7 +31,7 @@ impl Resolver<'_> {
                 terms[0].span,
                 "a condition is an integer, as comparisons give it, and this is a float",
             )
-            .help(format!("compare it: `{condition} != 0`"));
+            .mend(format!("compare it: `{condition} != 0`"), format!("{condition} != 0"));
             return self.context.report(at.scope, error);
         }
         // What the instructions with this form want.
@@ -50,7 +51,9 @@ impl Resolver<'_> {
                 match (convert(Type::I, Type::F), convert(Type::F, Type::I)) {
                     (Some(float_of), Some(int_of)) if wants(Type::I) => error
                         .help(format!("convert one of them: `{float_of}({name})` or `{int_of}({other})`")),
-                    (Some(float_of), _) => error.help(format!("convert it: `{float_of}({name})`")),
+                    (Some(float_of), _) => {
+                        error.mend(format!("convert it: `{float_of}({name})`"), format!("{float_of}({name})"))
+                    }
                     _ => error,
                 }
             }
@@ -66,7 +69,9 @@ impl Resolver<'_> {
                     error = error.also(real.span, "a real number");
                 }
                 match convert(Type::I, Type::F) {
-                    Some(convert) => error.help(format!("convert it: `{convert}({name})`")),
+                    Some(convert) => {
+                        error.mend(format!("convert it: `{convert}({name})`"), format!("{convert}({name})"))
+                    }
                     None => error,
                 }
             }
@@ -75,9 +80,12 @@ impl Resolver<'_> {
                 let message = format!("{shown} takes integers, and `{name}` is a float");
                 let error = Diagnostic::error("equation", float.span, message).here("a float");
                 match convert(Type::F, Type::I) {
-                    Some(convert) => error.help(format!(
-                        "convert it: `{convert}({name})`, or declare it `:bits` if its pattern is meant"
-                    )),
+                    Some(convert) => error.mend(
+                        format!(
+                            "convert it: `{convert}({name})`, or declare it `:bits` if its pattern is meant"
+                        ),
+                        format!("{convert}({name})"),
+                    ),
                     None => error,
                 }
             }
@@ -126,7 +134,7 @@ impl Resolver<'_> {
                     .also(defined, "a macro of that name is defined only here")
                     .help("move the definition up")
             }
-            (None, Some(file)) => error.help(format!("the library defines it: `.include <{file}>`")),
+            (None, Some(file)) => from_library(error, &file),
             (None, None) => {
                 let mut known: Vec<&str> =
                     macros.keys().map(|name| self.context.scopes.text(*name)).collect();

@@ -543,7 +543,10 @@ impl Resolver<'_> {
                     format!("`{text}` is {kind}, not a place in memory"),
                 );
                 if matches!(binding, Binding::Register(_)) {
-                    error = error.help(format!("write `[{text}]` for the word that it points to"));
+                    error = error.mend(
+                        format!("write `[{text}]` for the word that it points to"),
+                        format!("[{text}]"),
+                    );
                 }
                 return Err(self.context.report(at.scope, error));
             }

@@ -320,12 +320,7 @@ impl Session {
                 .zip(&instructions)
                 .map(|(slot, instruction)| {
                     let idle = instruction.op.row().function == takt_isa::Function::Idle;
-                    let target = |target: BundleAddress| match program.nearest_label(target) {
-                        Some((label, 0)) => label.to_owned(),
-                        _ => target.to_string(),
-                    };
-                    let name = |register| program.register_text(register);
-                    (!idle).then(|| instruction.text_with(program.machine, slot, name, target))
+                    (!idle).then(|| program.operation_text(slot, instruction))
                 })
                 .collect(),
         }

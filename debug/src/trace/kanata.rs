@@ -104,13 +104,8 @@ impl<'w> Kanata<'w> {
         for (slot, instruction) in operations {
             let id = self.next_id;
             self.next_id += 1;
-            let text = instruction.as_ref().map_or("nop".to_owned(), |instruction| {
-                let target = |target: BundleAddress| match program.nearest_label(target) {
-                    Some((label, 0)) => label.to_owned(),
-                    _ => target.to_string(),
-                };
-                instruction.text_with(machine, slot, |register| program.register_text(register), target)
-            });
+            let operation = |instruction: &Instruction| program.operation_text(slot, instruction);
+            let text = instruction.as_ref().map_or("nop".to_owned(), operation);
             self.line(cycle, format_args!("I\t{id}\t{id}\t0"));
             self.line(
                 cycle,

@@ -56,6 +56,8 @@ struct Server<'c> {
     /// Lines and columns count from 1.
     from_one: (bool, bool),
     stop_on_entry: bool,
+    /// The client only wants it run: nothing stops it, and its end is the session's.
+    no_debug: bool,
     /// What is to be done once the answer is sent.
     then: Then,
     ended: bool,
@@ -108,6 +110,7 @@ pub fn serve(
         filters: Filters::default(),
         from_one: (true, true),
         stop_on_entry: true,
+        no_debug: false,
         then: Then::Nothing,
         ended: false,
     };
@@ -189,7 +192,8 @@ impl Server<'_> {
                     return Err("a program is being debugged already".to_owned());
                 }
                 let Launched { session, note, folder } = launcher.launch(arguments, &self.control)?;
-                self.stop_on_entry = arguments["stopOnEntry"].as_bool().unwrap_or(true);
+                self.no_debug = arguments["noDebug"].as_bool().unwrap_or(false);
+                self.stop_on_entry = !self.no_debug && arguments["stopOnEntry"].as_bool().unwrap_or(true);
                 self.debugged = Some(Debugged {
                     console: Console::new(session),
                     breakpoints: Breakpoints::default(),

@@ -139,7 +139,7 @@ impl Server<'_> {
     /// Runs on to what stops, past what only logs or has not been met often enough.
     fn resume(&mut self) {
         loop {
-            let filters = self.filters;
+            let filters = if self.no_debug { Filters::default() } else { self.filters };
             let Some(debugged) = &mut self.debugged else { return };
             let (why, exception) = debugged.run(filters);
             if let Some((id, text)) = exception {
@@ -148,6 +148,7 @@ impl Server<'_> {
             }
             match why {
                 Why::Limit(_) => {}
+                Why::Stop { .. } if self.no_debug => {}
                 Why::Stop { id, .. } => {
                     let session = &debugged.console.session;
                     let Some(more) = debugged.breakpoints.more.get_mut(&id) else {
@@ -206,6 +207,9 @@ impl Server<'_> {
                 let text = told.lines().next().unwrap_or("").to_owned();
                 debugged.exception = Some((fault.kind.name().to_owned(), told.clone()));
                 self.output(&told);
+                if self.no_debug {
+                    return self.event("terminated", json!({}));
+                }
                 self.stopped("exception", Some(text), None);
             }
             // Where a run ends there is still a way back; the second time, it is over.
@@ -218,6 +222,9 @@ impl Server<'_> {
                     "the recorded inputs end here"
                 };
                 self.output(what);
+                if self.no_debug {
+                    return self.event("terminated", json!({}));
+                }
                 self.stopped("pause", Some(what.to_owned()), None);
             }
             Why::Limit(cycles) => self.stopped("pause", Some(format!("after {cycles} cycles")), None),

@@ -9,6 +9,7 @@ use lsp_types::{
 use std::collections::BTreeMap;
 use takt_asm::expr::{BUILTINS, Function};
 use takt_asm::index::SymbolKind;
+use takt_asm::source::Span;
 use takt_asm::tokens::{self, Token, TokenKind};
 use takt_asm::{Directive, type_name};
 use takt_isa::{Op, Operand, ROWS, Row, Type};
@@ -258,6 +259,21 @@ fn macro_around(front: &Front, file: &File, byte: usize) -> Option<(usize, usize
     })
 }
 
+/// Whether a byte of a file lies in the repetition that counts in the name declared at `span`.
+fn repeats(front: &Front, file: &File, byte: usize, span: Span) -> bool {
+    let line = file.text.line_of(byte);
+    let mut counting = front.index.blocks.iter().filter(|block| {
+        block.directive == Directive::Rep && (block.open.start..block.open.end).contains(&span.start)
+    });
+    counting.any(|block| {
+        let open = front.files.place(block.open);
+        open.is_some_and(|(number, bytes)| {
+            let lines = file.text.line_of(bytes.start)..block.last_line as usize;
+            std::ptr::eq(&front.files.0[number], file) && lines.contains(&line)
+        })
+    })
+}
+
 /// Names of some kinds that can be seen at a place.
 fn named(
     wanted: &Wanted<'_>,
@@ -272,6 +288,9 @@ fn named(
         let Some((number, bytes)) = front.files.place(symbol.span) else { continue };
         let of = &front.files.0[number];
         let within = macro_around(front, of, bytes.start);
+        if symbol.kind == SymbolKind::Count && !repeats(front, file, byte, symbol.span) {
+            continue;
+        }
         // A macro's names are seen in it only, as they are written there.
         if within.is_some() && (within != around || !std::ptr::eq(of, file)) {
             continue;

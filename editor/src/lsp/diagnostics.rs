@@ -1,22 +1,26 @@
 //! The assembler's diagnostics as the protocol has them, and its own advice as edits.
 
 use crate::lsp::program::Files;
-use crate::lsp::text::Encoding;
+use crate::lsp::text::{Encoding, Text};
 use crate::lsp::uri;
 use lsp_types::{
     CodeAction, CodeActionKind, Diagnostic, DiagnosticRelatedInformation, DiagnosticSeverity, Location,
-    NumberOrString, Range, TextEdit, Uri, WorkspaceEdit,
+    NumberOrString, Position, Range, TextEdit, Uri, WorkspaceEdit,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
+use takt_asm::Directive;
 use takt_asm::diag::{self, Diagnostics, Severity};
+use takt_asm::tokens::{self, Token, TokenKind};
 
-/// What a diagnostic carries along for its fix.
+/// What a diagnostic carries along for its fixes.
 #[derive(Serialize, Deserialize)]
 struct Data {
     /// What to write in the place of the mistake.
-    replacement: String,
+    replacement: Option<String>,
+    /// Lines of which one is missing.
+    missing: Vec<String>,
 }
 
 /// Diagnostics by file; those without a place are at the beginning of `root`.
@@ -80,30 +84,75 @@ fn convert(files: &Files, diagnostic: &diag::Diagnostic, encoding: Encoding) -> 
         message,
         related_information: Some(related.collect::<Vec<_>>()).filter(|related| !related.is_empty()),
         tags: None,
-        data: diagnostic
-            .replacement
-            .clone()
-            .and_then(|replacement| serde_json::to_value(Data { replacement }).ok()),
+        data: Some(Data { replacement: diagnostic.replacement.clone(), missing: diagnostic.missing.clone() })
+            .filter(|data| data.replacement.is_some() || !data.missing.is_empty())
+            .and_then(|data| serde_json::to_value(data).ok()),
     }
 }
 
-/// The fixes of diagnostics: what the assembler itself would write there.
-pub(crate) fn fixes(uri: &Uri, range: Range, diagnostics: &[Diagnostic]) -> Vec<CodeAction> {
+/// The fixes of diagnostics: what the assembler itself would write there, and lines that it misses.
+pub(crate) fn fixes(uri: &Uri, text: &Text, range: Range, diagnostics: &[Diagnostic]) -> Vec<CodeAction> {
     let touches = |other: &Range| other.start <= range.end && range.start <= other.end;
-    let fix = |diagnostic: &Diagnostic| {
-        let data: Data = serde_json::from_value(diagnostic.data.clone()?).ok()?;
-        let edit = TextEdit { range: diagnostic.range, new_text: data.replacement.clone() };
+    let fix = |diagnostic: &Diagnostic, title: String, preferred: bool, edit: TextEdit| {
         // Uri has interior mutability in its parsed form; as a key of the protocol's own type there is no way around.
         #[allow(clippy::mutable_key_type)]
         let changes = HashMap::from([(uri.clone(), vec![edit])]);
-        Some(CodeAction {
-            title: format!("write `{}`", data.replacement),
+        CodeAction {
+            title,
             kind: Some(CodeActionKind::QUICKFIX),
             diagnostics: Some(vec![diagnostic.clone()]),
             edit: Some(WorkspaceEdit { changes: Some(changes), ..WorkspaceEdit::default() }),
-            is_preferred: Some(true),
+            is_preferred: Some(preferred),
             ..CodeAction::default()
-        })
+        }
     };
-    diagnostics.iter().filter(|diagnostic| touches(&diagnostic.range)).filter_map(fix).collect()
+    let mut found = Vec::new();
+    for diagnostic in diagnostics.iter().filter(|diagnostic| touches(&diagnostic.range)) {
+        let data = diagnostic.data.clone().and_then(|data| serde_json::from_value::<Data>(data).ok());
+        let Some(Data { replacement, missing }) = data else { continue };
+        if let Some(replacement) = replacement {
+            let edit = TextEdit { range: diagnostic.range, new_text: replacement.clone() };
+            found.push(fix(diagnostic, format!("write `{replacement}`"), true, edit));
+        }
+        for line in missing {
+            let at = Position::new(home(text, &line, diagnostic.range.start.line), 0);
+            let edit = TextEdit { range: Range::new(at, at), new_text: format!("{line}\n") };
+            found.push(fix(diagnostic, format!("add `{line}`"), false, edit));
+        }
+    }
+    found
+}
+
+/// The line, from 0, before which a missing one goes: an `.include` behind the comment that a source begins with, a declaration
+/// before the section that has the mistake.
+fn home(text: &Text, missing: &str, mistake: u32) -> u32 {
+    let lines = tokens::lines(&text.text);
+    let is_one_of = |line: &Vec<Token>, directives: &[Directive]| {
+        let mut words = line.iter().filter(|token| token.kind == TokenKind::Directive);
+        words.any(|token| directives.iter().any(|known| known.name() == &text.text[token.range.clone()]))
+    };
+    let before = &lines[..lines.len().min(mistake as usize)];
+    let place = if missing.starts_with(Directive::Include.name()) {
+        before.iter().position(|line| line.iter().any(|token| token.kind != TokenKind::Comment))
+    } else {
+        let opens = [Directive::Once, Directive::Period, Directive::Data];
+        before.iter().position(|line| is_one_of(line, &opens))
+    };
+    place.map_or(mistake, |line| line as u32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn missing_lines_have_a_place() {
+        let text = Text::new("; about\n\n.input x\n.once\n wait p\n.period\np: fadd y, x, a\n");
+        assert_eq!(home(&text, ".reg a", 6), 3, "before the sections");
+        assert_eq!(home(&text, ".include <math.s>", 6), 2, "behind the first comment");
+        let text = Text::new("fadd y, x, a\n");
+        assert_eq!((home(&text, ".reg a", 0), home(&text, ".include <math.s>", 0)), (0, 0));
+        let text = Text::new(".reg b\n; it\nfadd y, x, a\n.period\n");
+        assert_eq!(home(&text, ".reg a", 2), 2, "of a part, before the mistake");
+    }
 }

@@ -89,13 +89,17 @@ pub(crate) fn instruction(row: &Row, settings: &Settings) -> String {
         }
         None => format!("{} has no unit for it", settings.machine.name),
     };
+    let head = format!("{} {}", entry.mnemonic, entry.syntax);
+    let head = head.trim_end();
+    let said = [head, entry.summary, entry.text];
+    // The manual's entry without what stands above.
+    let more = manual::entry_text(entry);
+    let more: Vec<&str> = more.lines().map(str::trim).filter(|line| !said.contains(line)).collect();
     format!(
-        "```takt\n{} {}\n```\n{}\n\n{}\n\n{here}\n\n```text\n{}```",
-        entry.mnemonic,
-        entry.syntax,
+        "```takt\n{head}\n```\n{}\n\n{}\n\n{here}\n\n```text\n{}\n```",
         entry.summary,
         entry.text,
-        manual::entry_text(entry)
+        more.join("\n")
     )
 }
 

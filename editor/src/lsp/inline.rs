@@ -95,7 +95,7 @@ mod tests {
     fn works_when_called() {
         let mut server = Inline::new(settings());
         ask(&mut server, "initialize", json!({ "capabilities": {} }));
-        let source = ".include \"part.s\"\n.input x\n.output y\n.period\n.schedule on\nstart:\n    fmul y, x, half\n    wait start\n";
+        let source = ".include \"part.s\"\n.input x\n.output y\n.reg a\n.period\n.schedule on\nstart:\n    fmul a, x, half\n    fadd y, a, x\n    wait start\n";
         let document = |text: &str| json!({ "textDocument": { "uri": "main.s", "languageId": "takt", "version": 1, "text": text } });
         let opened = notify(&mut server, "textDocument/didOpen", document(source));
         assert!(opened.is_empty(), "nothing is read while the client types: {opened:?}");
@@ -106,6 +106,16 @@ mod tests {
         assert!(!more, "there is one program");
         let counted = ask(&mut server, "textDocument/inlayHint", hints);
         assert!(counted.as_array().is_some_and(|hints| !hints.is_empty()), "{counted}");
+        assert!(
+            counted.to_string().contains("(main.s:8)"),
+            "what a line waits for is named by the document: {counted}"
+        );
+        let rename = |name: &str, line: u32, character: u32| json!({ "textDocument": { "uri": "main.s" }, "position": { "line": line, "character": character }, "newName": name });
+        let here = ask(&mut server, "textDocument/rename", rename("other", 7, 12));
+        assert_eq!(here["changes"]["main.s"].as_array().map(Vec::len), Some(3), "{here}");
+        // `part.s` is no document of the client's: what is declared there keeps its name.
+        let there = ask(&mut server, "textDocument/rename", rename("whole", 7, 15));
+        assert_eq!(there, Value::Null);
 
         let change = json!({ "textDocument": { "uri": "main.s", "version": 2 }, "contentChanges": [{ "text": "    fmull\n" }] });
         notify(&mut server, "textDocument/didChange", change);

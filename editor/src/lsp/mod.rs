@@ -262,9 +262,26 @@ impl Server {
         }
     }
 
+    /// Finds out whether files that others include are programs by themselves: those that open a section and assemble alone. Their
+    /// own cycles are shown, not those of a program that includes them.
+    fn find_programs(&mut self) {
+        for path in self.workspace.candidates() {
+            let roots = self.workspace.roots(&path);
+            if roots.contains(&path) || !roots.iter().any(|root| self.stale.contains(root)) {
+                continue;
+            }
+            let (front, _) = program::check(&self.settings, &path, &self.workspace.texts());
+            if !front.diagnostics.has_errors() {
+                self.workspace.is_program(&path);
+                self.stale.insert(path);
+            }
+        }
+    }
+
     /// Reads and checks what has changed.
     fn read(&mut self) {
         self.read_at = None;
+        self.find_programs();
         let wanted: BTreeSet<PathBuf> =
             self.workspace.open.keys().flat_map(|path| self.workspace.roots(path)).collect();
         // Programs that no open document is part of any more.

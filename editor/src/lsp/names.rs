@@ -103,6 +103,9 @@ pub(crate) fn rename(
             let file = &front.files.0[file];
             let path =
                 file.path.clone().ok_or_else(|| format!("it is used in the library, {}", file.name))?;
+            if path.is_relative() && !open.contains_key(&path) {
+                return Err(format!("it is used in {}, which cannot be changed here", file.name));
+            }
             edits.entry(path).or_default().insert((bytes.start, bytes.end), text);
         }
         counts.push(Some(references.len()));

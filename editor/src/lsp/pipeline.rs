@@ -2,7 +2,7 @@
 //! from. The same cycles as in the inlay hints.
 
 use crate::lsp::program::Counted;
-use crate::lsp::timing::{cycle_from, operation_text};
+use crate::lsp::timing::cycle_from;
 use lsp_types::Uri;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -84,7 +84,7 @@ pub(crate) fn pipeline(
             Some(Operation {
                 slot: of.name,
                 unit: unit.name,
-                text: operation_text(program, slot, &instruction),
+                text: program.operation_text(slot, &instruction),
                 latency: instruction.writes(of).map(|_| unit.latency),
                 file: place.map(|place| place.0),
                 line: place.map(|place| place.1),

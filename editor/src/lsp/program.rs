@@ -134,17 +134,16 @@ pub(crate) fn check(settings: &Settings, root: &Path, open: &Open) -> (Front, Ch
         (Some(folder), Some(name)) if root.is_absolute() => {
             (folder.to_owned(), name.to_string_lossy().into_owned())
         }
-        // A document that lies nowhere.
-        _ => (PathBuf::new(), root.to_string_lossy().into_owned()),
+        _ => (PathBuf::new(), bare_name(root)),
     };
     let options = Options { machine: settings.machine, levels: settings.levels, ..Options::default() };
     let check = |project: &dyn Loader, name: &str| takt_asm::check(name, project, &options);
     let checked = if folder.as_os_str().is_empty() {
         let mut alone = MemoryLoader::new(settings.beside);
         if let Some(text) = open.get(root) {
-            alone.add(UNNAMED, text.as_bytes());
+            alone.add(&name, text.as_bytes());
         }
-        check(&search(settings, alone, open), UNNAMED)
+        check(&search(settings, alone, open), &name)
     } else {
         check(&search(settings, FileLoader::new(&folder).with_open(Arc::clone(open)), open), &name)
     };
@@ -158,8 +157,13 @@ pub(crate) fn check(settings: &Settings, root: &Path, open: &Open) -> (Front, Ch
     (front, checked)
 }
 
-/// What a document without a file is called.
-const UNNAMED: &str = "untitled.s";
+/// What messages call a document that lies nowhere: `Untitled-1`, if its URI is `untitled:Untitled-1`.
+fn bare_name(root: &Path) -> String {
+    let uri = root.to_string_lossy();
+    let name = uri.rsplit(['/', '\\', ':']).next().unwrap_or_default();
+    // What begins so names a file of the library, or of a further folder.
+    if name.is_empty() || name.starts_with(['<', '.']) { "untitled.s".to_owned() } else { name.to_owned() }
+}
 
 fn search<L: Loader>(settings: &Settings, project: L, open: &Open) -> Search<L> {
     let folders = settings.folders.iter();

@@ -324,7 +324,8 @@ impl Server {
         let path = uri::path(&params.text_document.uri);
         let told: Vec<_> =
             self.published.get(&path).into_iter().flat_map(|by| by.values().flatten().cloned()).collect();
-        diagnostics::fixes(&params.text_document.uri, params.range, &told)
+        let Some(text) = self.workspace.open.get(&path) else { return Vec::new() };
+        diagnostics::fixes(&params.text_document.uri, text, params.range, &told)
     }
 
     /// The lines that laying the document out changes.

@@ -80,15 +80,6 @@ pub(crate) fn cycle_from(program: &Program, from: BundleAddress) -> String {
     }
 }
 
-/// An operation with the program's names for its registers and its target.
-pub(crate) fn operation_text(program: &Program, slot: SlotIndex, instruction: &Instruction) -> String {
-    let name = |register| program.register_text(register);
-    instruction.text_with(program.machine, slot, name, |target| match program.nearest_label(target) {
-        Some((label, 0)) => label.to_owned(),
-        _ => target.to_string(),
-    })
-}
-
 fn short(counted: &Counted, words: &[Word]) -> String {
     let program = &counted.assembled.program;
     let shown = |(address, slot): &Word| {
@@ -120,7 +111,7 @@ fn explained(counted: &Counted, words: &[Word]) -> String {
         let word = program.words(address).and_then(|words| words.get(slot.index()).copied());
         let Some(instruction) = word.and_then(|word| Instruction::decode(word).ok()) else { continue };
         let name = |register| program.register_text(register);
-        let operation = operation_text(program, slot, &instruction);
+        let operation = program.operation_text(slot, &instruction);
         let slot_name = program.machine.slots[slot.index()].name;
         let _ = write!(
             text,

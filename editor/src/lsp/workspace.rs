@@ -28,12 +28,19 @@ pub(crate) struct Workspace {
     on_disk: BTreeMap<PathBuf, (Option<SystemTime>, Vec<PathBuf>)>,
     /// What each open source includes.
     of_open: BTreeMap<PathBuf, Vec<PathBuf>>,
+    /// Open sources that open a section, and whether they are known to be programs by themselves, whoever includes them.
+    sections: BTreeMap<PathBuf, bool>,
 }
 
 impl Workspace {
     /// A document is open with this text from now on. True if it includes other files than before.
     pub(crate) fn set(&mut self, path: &Path, text: Text) -> bool {
         let includes = includes(path, &text.text);
+        if opens_section(&text.text) {
+            self.sections.entry(path.to_owned()).or_default();
+        } else {
+            self.sections.remove(path);
+        }
         self.open.insert(path.to_owned(), text);
         let before = self.of_open.insert(path.to_owned(), includes);
         before.as_ref() != self.of_open.get(path)
@@ -42,6 +49,17 @@ impl Workspace {
     pub(crate) fn close(&mut self, path: &Path) {
         self.open.remove(path);
         self.of_open.remove(path);
+        self.sections.remove(path);
+    }
+
+    /// Open files that others include and that open a section, but are not known to be programs by themselves.
+    pub(crate) fn candidates(&self) -> Vec<PathBuf> {
+        self.sections.iter().filter(|(_, known)| !**known).map(|(path, _)| path.clone()).collect()
+    }
+
+    /// This file assembles by itself. While it is written it may not, and stays a program all the same.
+    pub(crate) fn is_program(&mut self, path: &Path) {
+        self.sections.insert(path.to_owned(), true);
     }
 
     /// The open texts, as the assembler takes them.
@@ -90,8 +108,8 @@ impl Workspace {
         self.on_disk = found;
     }
 
-    /// The programs that a file is of: those files that include it, perhaps through others, and that no file includes; the file
-    /// itself if there is none.
+    /// The programs that a file is of: first the file itself, if it is a program; then those files that include it, perhaps
+    /// through others, and that no file includes. The file itself if there is none.
     pub(crate) fn roots(&self, path: &Path) -> Vec<PathBuf> {
         let mut roots = Vec::new();
         let mut seen = BTreeSet::from([path.to_owned()]);
@@ -113,6 +131,10 @@ impl Workspace {
             roots.push(path.to_owned());
         }
         roots.sort();
+        if self.sections.get(path) == Some(&true) {
+            roots.retain(|root| root != path);
+            roots.insert(0, path.to_owned());
+        }
         roots.truncate(ROOTS);
         roots
     }
@@ -137,6 +159,18 @@ fn includes(path: &Path, text: &str) -> Vec<PathBuf> {
         }
     }
     files
+}
+
+/// Whether a source opens a section of code, as programs do and few parts.
+fn opens_section(text: &str) -> bool {
+    let names = [Directive::Once, Directive::Period].map(|directive| directive.name());
+    let is_one = |line: &&str| names.iter().any(|name| line.contains(name));
+    text.lines().filter(is_one).any(|line| {
+        let is_section = |token: &tokens::Token| {
+            token.kind == TokenKind::Directive && names.contains(&&line[token.range.clone()])
+        };
+        tokens::lines(line).iter().flatten().any(is_section)
+    })
 }
 
 /// A path without `.` and `..`.
@@ -172,5 +206,21 @@ mod tests {
         assert_eq!(roots("/p/parts/b.s"), [PathBuf::from("/p/a.s")]);
         assert_eq!(roots("/p/a.s"), [PathBuf::from("/p/a.s")]);
         assert_eq!(roots("/p/c.s"), [PathBuf::from("/p/c.s")]);
+    }
+
+    #[test]
+    fn a_program_comes_before_those_that_include_it() {
+        let mut workspace = Workspace::default();
+        let (inner, outer) = (Path::new("/p/inner.s"), Path::new("/p/outer.s"));
+        workspace.set(outer, Text::new(".include \"inner.s\"\n"));
+        workspace.set(inner, Text::new("start: .period\n"));
+        assert_eq!(workspace.candidates(), [inner]);
+        assert_eq!(workspace.roots(inner), [outer], "until it is known to assemble");
+        workspace.is_program(inner);
+        assert_eq!(workspace.roots(inner), [inner, outer]);
+        workspace.set(inner, Text::new(".period\n  fadf\n"));
+        assert_eq!(workspace.roots(inner), [inner, outer], "a mistake does not make it a part");
+        workspace.set(inner, Text::new("; .period\n"));
+        assert_eq!(workspace.roots(inner), [outer], "what opens no section is a part");
     }
 }

@@ -4,6 +4,7 @@ import * as vscode from 'vscode';
 import { LanguageClient } from 'vscode-languageclient/node';
 import { Beside } from './beside';
 import type { Pipeline } from './pipeline';
+import { reason } from './reason';
 import { COMMANDS, words, type Definition } from './tasks';
 
 let client: LanguageClient | undefined;
@@ -38,7 +39,7 @@ async function start() {
     await client.start();
   } catch (error) {
     const open = 'Open the setting';
-    const text = `Takt: \`${program} lsp\` does not start (setting takt.command): ${(error as Error).message}`;
+    const text = `Takt: \`${program} lsp\` does not start (setting takt.command): ${reason(error)}`;
     void vscode.window.showErrorMessage(text, open).then((chosen) => {
       if (chosen === open) void vscode.commands.executeCommand('workbench.action.openSettings', 'takt.command');
     });
@@ -62,7 +63,7 @@ function goTo(what: 'cycle' | 'period') {
     try {
       await session.customRequest(what === 'cycle' ? 'takt/gotoCycle' : 'takt/gotoPeriod', { [what]: Number(text) });
     } catch (error) {
-      void vscode.window.showErrorMessage(`Takt: ${(error as Error).message}`);
+      void vscode.window.showErrorMessage(`Takt: ${reason(error)}`);
     }
   };
 }

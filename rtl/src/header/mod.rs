@@ -12,6 +12,7 @@ mod svd;
 use crate::bench::{LoadRecord, Space, load_records};
 use crate::wishbone::{self, REGISTERS};
 use serde::Serialize;
+use takt_analysis::SectionBounds;
 use takt_isa::program::Port;
 use takt_isa::{BundleAddress, Program, Type};
 
@@ -152,9 +153,22 @@ pub struct Cycles {
     pub missed: Option<Span>,
 }
 
+impl Cycles {
+    fn of(section: &SectionBounds) -> Cycles {
+        let span = |span: takt_analysis::Span| Span { best: span.best, worst: span.worst };
+        Cycles {
+            name: section.name.clone(),
+            address: section.address,
+            once: section.once,
+            cycles: span(if section.once { section.cycles } else { section.in_time }),
+            missed: (!section.once).then_some(span(section.missed)),
+        }
+    }
+}
+
 impl Header {
-    /// What a host must know of a program; its cycles as far as the caller has bounds for them, else why there are none.
-    pub fn new(program: &Program, name: &str, cycles: Result<Vec<Cycles>, String>) -> Header {
+    /// What a host must know of a program; its cycles where they can be bounded, else why they cannot.
+    pub fn new(program: &Program, name: &str) -> Header {
         let machine = program.machine;
         let port = |port: &Port, number: Option<u16>, base: u16| {
             let number = number.unwrap_or_default();
@@ -174,9 +188,9 @@ impl Header {
         });
         let record =
             |LoadRecord { space, slot, address, value }| Record { space: space as u8, slot, address, value };
-        let (cycles, no_bound) = match cycles {
-            Ok(cycles) => (Some(cycles), None),
-            Err(reason) => (None, Some(reason)),
+        let (cycles, no_bound) = match takt_analysis::bound(program) {
+            Ok(bounds) => (Some(bounds.sections.iter().map(Cycles::of).collect()), None),
+            Err(reason) => (None, Some(reason.to_string())),
         };
         let field =
             |of: &wishbone::Field| BusField { name: of.name, low: of.low, width: of.width, text: of.text };

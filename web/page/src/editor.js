@@ -1,9 +1,15 @@
 // The editor: CodeMirror as a client of Takt's language server. Everything that it knows of the language, the colours too,
 // are the server's answers.
-import { basicSetup } from "codemirror";
-import { Decoration, EditorView, GutterMarker, ViewPlugin, WidgetType, gutter, keymap } from "@codemirror/view";
+import { autocompletion, closeBrackets, closeBracketsKeymap, completionKeymap } from "@codemirror/autocomplete";
+import { defaultKeymap, history, historyKeymap } from "@codemirror/commands";
+import { bracketMatching, foldGutter, foldKeymap, foldService } from "@codemirror/language";
+import { lintGutter, lintKeymap, setDiagnostics } from "@codemirror/lint";
+import { highlightSelectionMatches, searchKeymap } from "@codemirror/search";
 import { Compartment, EditorState, RangeSet, StateEffect, StateField } from "@codemirror/state";
-import { lintGutter, setDiagnostics } from "@codemirror/lint";
+import {
+  Decoration, EditorView, GutterMarker, WidgetType, drawSelection, gutter, highlightActiveLine, highlightActiveLineGutter,
+  highlightSpecialChars, keymap, lineNumbers, rectangularSelection,
+} from "@codemirror/view";
 import {
   LSPClient, LSPPlugin, findReferencesKeymap, formatKeymap, hoverTooltips, jumpToDefinitionKeymap, renameKeymap, serverCompletion,
 } from "@codemirror/lsp-client";
@@ -73,6 +79,57 @@ const hints = StateField.define({
   provide: (field) => EditorView.decorations.from(field),
 });
 
+// ---- Folds: lines by the line that stays.
+
+const setFolds = StateEffect.define();
+const folds = StateField.define({
+  create: () => RangeSet.empty,
+  update(value, tr) {
+    value = value.map(tr.changes);
+    for (const effect of tr.effects) if (effect.is(setFolds)) value = effect.value;
+    return value;
+  },
+});
+const mark = Decoration.mark({});
+const folding = foldService.of((state, start, end) => {
+  let found = null;
+  // Of what begins on one line, the longest.
+  state.field(folds).between(start, end, (from, to) => {
+    if (from >= start && from <= end && to > end && to > (found?.to ?? 0)) found = { from: end, to };
+  });
+  return found;
+});
+
+/** CodeMirror's own parts. What folds is known when the server has answered. */
+const base = [
+  lineNumbers(), highlightActiveLineGutter(), highlightSpecialChars(), history(), drawSelection(), bracketMatching(), closeBrackets(),
+  foldGutter({ foldingChanged: (update) => update.transactions.some((tr) => tr.effects.some((effect) => effect.is(setFolds))) }),
+  autocompletion(), rectangularSelection(), highlightActiveLine(), highlightSelectionMatches(), EditorState.allowMultipleSelections.of(true),
+  keymap.of([...closeBracketsKeymap, ...defaultKeymap, ...searchKeymap, ...historyKeymap, ...foldKeymap, ...completionKeymap, ...lintKeymap]),
+];
+
+// ---- Breakpoints: lines of which the debugger is told each time that it begins anew.
+
+class Stop extends GutterMarker {
+  toDOM() {
+    const element = document.createElement("span");
+    element.className = "stop";
+    element.textContent = "●";
+    element.title = "a breakpoint; click to remove it";
+    return element;
+  }
+}
+const stop = new Stop();
+const setStops = StateEffect.define();
+const stops = StateField.define({
+  create: () => RangeSet.empty,
+  update(value, tr) {
+    value = value.map(tr.changes);
+    for (const effect of tr.effects) if (effect.is(setStops)) value = RangeSet.of(effect.value.map((line) => stop.range(tr.state.doc.line(line).from)));
+    return value;
+  },
+});
+
 // ---- Where the debugger stands.
 
 class Arrow extends GutterMarker {
@@ -109,15 +166,26 @@ const theme = EditorView.theme({
   ".cm-lsp-documentation": { padding: "2px 8px" },
 });
 
+/** A text to be read, with the editor's looks. */
+export function reader(parent, text, about) {
+  return new EditorView({
+    parent,
+    state: EditorState.create({ doc: text, extensions: [base, theme, EditorState.readOnly.of(true), EditorView.contentAttributes.of({ "aria-label": about })] }),
+  });
+}
+
 export class Editor {
   /**
    * @param parent where it goes
    * @param thread the language server's worker
    * @param told called with what goes wrong
    * @param changed called when the text has changed
+   * @param stopped called with a line whose breakpoint is to be set or removed
+   * @param showFile called with the name of another file; gives the view that shows it, if there is one
    */
-  constructor(parent, { thread, told, changed, keys }) {
-    Object.assign(this, { thread, told });
+  constructor(parent, { thread, told, changed, stopped, showFile }) {
+    Object.assign(this, { thread, told, showFile });
+    this.stopped = stopped;
     this.server = new Compartment();
     this.version = 0;
     this.scheduled = 0;
@@ -131,8 +199,11 @@ export class Editor {
       parent,
       state: EditorState.create({
         extensions: [
-          keymap.of(keys), basicSetup, lintGutter(), theme, colours, hints, place, follow,
-          gutter({ class: "cm-arrow", markers: (view) => view.state.field(place).markers, initialSpacer: () => arrow }),
+          base, lintGutter(), theme, colours, hints, place, stops, folds, folding, follow,
+          gutter({
+            class: "cm-arrow", markers: (view) => [view.state.field(place).markers, view.state.field(stops)], initialSpacer: () => arrow,
+            domEventHandlers: { mousedown: (view, line) => (stopped(view.state.doc.lineAt(line.from).number), true) },
+          }),
           EditorView.contentAttributes.of({ "aria-label": "Takt source", spellcheck: "false", autocorrect: "off", autocapitalize: "off" }),
           this.server.of([]),
         ],
@@ -181,6 +252,7 @@ export class Editor {
       ],
     });
     this.client = client;
+    client.workspace.displayFile = async (uri) => (uri === this.name ? this.view : this.showFile(uri));
     await this.ask("lsp.start", { machine: this.machine });
     if (this.client !== client) return;
     this.handlers = new Set();
@@ -241,10 +313,15 @@ export class Editor {
       client.sync();
       this.said(client, await this.ask("lsp.check"));
       const document = { textDocument: { uri: this.name } };
-      const tokens = await client.request("textDocument/semanticTokens/full", document);
+      const [tokens, ranges] = await Promise.all([
+        client.request("textDocument/semanticTokens/full", document),
+        client.request("textDocument/foldingRange", document),
+      ]);
       if (this.client !== client || this.version !== version) return;
-      const legend = client.serverCapabilities.semanticTokensProvider.legend.tokenTypes;
-      this.view.dispatch({ effects: setColours.of(decorations(this.view.state.doc, tokens.data, legend)) });
+      const legend = client.serverCapabilities.semanticTokensProvider.legend.tokenTypes, { doc } = this.view.state;
+      const fold = ({ startLine, endLine }) => mark.range(doc.line(startLine + 1).from, doc.line(endLine + 1).to);
+      const there = ranges.filter(({ endLine }) => endLine < doc.lines).map(fold);
+      this.view.dispatch({ effects: [setColours.of(decorations(doc, tokens.data, legend)), setFolds.of(RangeSet.of(there, true))] });
     } catch {
       // The server was begun again, or the text is another by now.
     }
@@ -326,6 +403,28 @@ export class Editor {
     const effects = [setPlace.of({ lines: Decoration.set(lines, true), markers })];
     if (exists(line)) effects.push(EditorView.scrollIntoView(doc.line(line).from, { y: "nearest", yMargin: 60 }));
     this.view.dispatch({ effects });
+  }
+
+  /** Puts the cursor on a line, from 1, at a column, from 0. */
+  goTo(line, column) {
+    this.view.dispatch({ selection: { anchor: this.view.state.doc.line(line).from + column }, scrollIntoView: true });
+    this.focus();
+  }
+
+  /** The line of the cursor. */
+  get line() {
+    return this.view.state.doc.lineAt(this.view.state.selection.main.head).number;
+  }
+
+  /** Lines with a breakpoint, where they are by now. */
+  get stops() {
+    const { doc } = this.view.state, lines = [];
+    this.view.state.field(stops).between(0, doc.length, (from) => void lines.push(doc.lineAt(from).number));
+    return [...new Set(lines)];
+  }
+
+  set stops(lines) {
+    this.view.dispatch({ effects: setStops.of(lines.filter((line) => line >= 1 && line <= this.view.state.doc.lines).sort((a, b) => a - b)) });
   }
 
   focus() {

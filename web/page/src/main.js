@@ -1,5 +1,5 @@
 import { zipSync, strToU8 } from "fflate";
-import { Editor } from "./editor.js";
+import { Editor, reader } from "./editor.js";
 import { LINK_CHARACTERS, pack, unpack } from "./link.js";
 import { Plots, chart } from "./plot.js";
 import { Robot } from "./robot.js";
@@ -17,7 +17,7 @@ const DRIVE = 2000;
 /** Why a worker is stopped for another program. */
 const REPLACED = "another program was opened";
 
-const state = { works: 0, name: "main.s", about: null, program: null, stale: true, run: null };
+const state = { works: 0, breaks: [], name: "main.s", about: null, program: null, stale: true, run: null };
 let machine, editor, plots, robot, errorChart;
 
 function notice(message) {
@@ -104,6 +104,7 @@ async function open({ name, source, inputs, machine: wanted }, assembleIt = true
   state.name = name || "main.s";
   if (wanted && [...el("machine").options].some((option) => option.value === wanted)) el("machine").value = wanted;
   el("table").value = inputs ?? "";
+  editor.stops = [];
   const opened = editor.open(state.name, source, el("machine").value);
   if (assembleIt) await assemble();
   await opened;
@@ -151,6 +152,13 @@ function showProgram(program) {
 
 const asked = () => ({ name: state.name, source: editor.text, machine: el("machine").value, inputs: table(), tick: Number(el("tick").value) || 0 });
 
+/** Assembles, with the breakpoints that there were. */
+async function begin() {
+  state.program = await machine.call("assemble", asked());
+  await setStops();
+  showProgram(state.program);
+}
+
 /** Runs what the machine's worker is asked for; a stop or an error is told. */
 async function work(doing) {
   const mine = ++state.works;
@@ -175,7 +183,7 @@ async function work(doing) {
 
 const assemble = () => work(async () => {
   state.stale = false;
-  showProgram(await machine.call("assemble", asked()));
+  await begin();
   keep();
   const { program } = state;
   if (!program.assembled || program.inputs_error) return select("messages");
@@ -186,7 +194,7 @@ const assemble = () => work(async () => {
 async function current() {
   if (!state.stale && state.program?.assembled) return true;
   state.stale = false;
-  showProgram(await machine.call("assemble", asked()));
+  await begin();
   if (!state.program.assembled || state.program.inputs_error) {
     select("messages");
     return false;
@@ -235,6 +243,53 @@ function showView(view) {
   rows("stalls", view.stalls.map((one) => [{ text: one.cycles.toLocaleString("en"), className: "value" }, one.text]));
   const here = view.file === state.name;
   editor.stand(here ? view.line : 0, here ? view.part : []);
+  state.breaks = view.breaks;
+  editor.stops = view.breaks.filter(({ file }) => file === state.name).map(({ line }) => line);
+}
+
+/** Tells a debugger that begins anew of the breakpoints that were set before; those whose line has no code now go. */
+async function setStops() {
+  const lines = editor.stops;
+  if (!state.program?.view) return;
+  for (const line of lines) {
+    try {
+      const { view } = await machine.call("execute", { line: `break ${state.name}:${line}` });
+      state.program.view = view;
+    } catch (error) {
+      if (error instanceof Stopped) throw error;
+    }
+  }
+}
+
+/** Sets a breakpoint on a line of the source, or removes it. */
+function toggleStop(line) {
+  return work(async () => {
+    if (!(await current())) return;
+    const known = state.breaks.filter((one) => one.file === state.name && one.line === line);
+    const commands = known.length ? known.map(({ id }) => `delete ${id}`) : [`break ${state.name}:${line}`];
+    for (const command of commands) {
+      const { text: answer, view } = await machine.call("execute", { line: command });
+      el("answer").textContent = answer;
+      showView(view);
+    }
+  });
+}
+
+/** Shows a file that the program includes, to be read. */
+async function showFile(name) {
+  let source;
+  try {
+    source = await machine.call("source", { name });
+  } catch (error) {
+    notice(error.message);
+    return null;
+  }
+  el("file-name").textContent = name;
+  el("file-text").replaceChildren();
+  el("file-shown").showModal();
+  const view = reader(el("file-text"), source, name);
+  view.focus();
+  return view;
 }
 
 async function execute(line) {
@@ -291,7 +346,7 @@ function drive() {
     robot.over = true;
     const { poses } = robot;
     errorChart = chart(el("error-chart"), {
-      x: poses.map((pose) => pose[0] * robot.sampleTime), label: "s", height: 150,
+      x: poses.map((pose) => pose[0] * robot.sampleTime), label: "s", height: 130,
       curves: [{ name: "tool error, µm", values: poses.map((pose) => pose[6] * 1e6) }],
     });
   });
@@ -367,6 +422,7 @@ async function openAddress(first) {
 const KEYS = [
   ["Mod-Enter", "assemble and run", () => assemble()],
   ["F10", "step", () => step("step")], ["Shift-F10", "step back", () => step("back")],
+  ["F9", "set a breakpoint on the line, or remove it", () => toggleStop(editor.line)],
   ["F8", "run on to a breakpoint", () => step("continue")], ["Shift-F8", "run back to one", () => step("reverse")],
   ["Mod-Alt-e", "to the source", () => editor.focus()], ["Mod-Alt-c", "to the debugger's commands", () => (select("step"), el("command").focus())],
 ];
@@ -386,8 +442,8 @@ async function start() {
   machine = new Thread(module, new URL("worker.js", location.href));
   const language = new Thread(module, new URL("worker.js", location.href));
   plots = new Plots(el("charts"), el("choice"));
-  robot = new Robot(el("scene"), (pose, index) => (el("time").value = index));
-  editor = new Editor(el("source"), { thread: language, told: notice, changed, keys: [] });
+  robot = new Robot(el("scene"), (pose, index) => (el("time").value = index), () => (el("play").textContent = "Play"));
+  editor = new Editor(el("source"), { thread: language, told: notice, changed, stopped: toggleStop, showFile });
   state.about = await machine.call("about");
   el("machine").replaceChildren(...state.about.machines.map(({ name, text }) => new Option(name, name)));
   el("machine").value = "t3";
@@ -466,6 +522,12 @@ globalThis.takt = {
   },
   get text() {
     return editor.text;
+  },
+  get stops() {
+    return editor.stops;
+  },
+  goTo(line, column = 0) {
+    editor.goTo(line, column);
   },
   LINK_CHARACTERS,
 };

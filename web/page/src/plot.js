@@ -15,7 +15,7 @@ export function chart(parent, { title, x, label, curves, height = 190 }) {
   parent.append(element);
   const width = () => Math.max(240, parent.clientWidth - 8);
   const plot = new uPlot({
-    title, width: width(), height, scales: { x: { time: false } }, axes: [{ ...axis, label }, { ...axis, size: 64 }],
+    title, width: width(), height, scales: { x: { time: false } }, axes: [axis, { ...axis, size: 64, space: 24 }],
     series: [{ label }, ...curves.map(({ name, values, stepped }, i) => ({
       label: name, stroke: COLOURS[i % COLOURS.length], width: 1.4, points: { show: values.length < 40 },
       ...(stepped && { paths: uPlot.paths.stepped({ align: 1 }) }),
@@ -56,8 +56,8 @@ export class Plots {
     const x = run.cycles.map((_, i) => i + 1);
     const of = (kind, columns) => Object.entries(columns).filter(([name]) => this.chosen.get(`${kind} ${name}`)).map(([name, values]) => ({ name, values }));
     for (const curve of [...of("out", run.outputs), ...of("in", run.inputs)]) {
-      this.charts.push(chart(this.parent, { x, label: "period", curves: [curve], height: 170 }));
+      this.charts.push(chart(this.parent, { x, label: "period", curves: [curve], height: 140 }));
     }
-    this.charts.push(chart(this.parent, { x, label: "period", curves: [{ name: "cycles", values: run.cycles, stepped: true }], height: 150 }));
+    this.charts.push(chart(this.parent, { x, label: "period", curves: [{ name: "cycles", values: run.cycles, stepped: true }], height: 120 }));
   }
 }

@@ -49,6 +49,8 @@ pub struct Diagnostic {
     pub help: Option<String>,
     /// What to write in the place of the mistake.
     pub replacement: Option<String>,
+    /// Lines of which one is missing, for an editor to offer: declarations of a name, the `.include` of what defines it.
+    pub missing: Vec<String>,
 }
 
 impl Diagnostic {
@@ -62,6 +64,7 @@ impl Diagnostic {
             notes: Vec::new(),
             help: None,
             replacement: None,
+            missing: Vec::new(),
         }
     }
 
@@ -102,6 +105,18 @@ impl Diagnostic {
     /// Says what to do.
     pub fn help(mut self, help: impl Into<String>) -> Diagnostic {
         self.help = Some(help.into());
+        self
+    }
+
+    /// Says what to do, and what is to be written in the place of the mistake.
+    pub fn mend(mut self, help: impl Into<String>, replacement: impl Into<String>) -> Diagnostic {
+        self.replacement = Some(replacement.into());
+        self.help(help)
+    }
+
+    /// Lines of which one is missing; the help names them too.
+    pub fn missing(mut self, lines: impl IntoIterator<Item = String>) -> Diagnostic {
+        self.missing.extend(lines);
         self
     }
 

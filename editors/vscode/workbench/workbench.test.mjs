@@ -1,0 +1,159 @@
+// The extension in VS Code's own workbench, in a browser: `cargo xtask extension --workbench`. The workbench and its extension host
+// are those of the package code-server, without its native modules: no terminal, so no tasks.
+import assert from 'node:assert/strict';
+import { spawn, execFileSync } from 'node:child_process';
+import { cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+import { chromium } from 'playwright-core';
+
+const HERE = import.meta.dirname;
+const SERVER = join(HERE, 'node_modules/code-server/lib/vscode');
+const PACKAGE = join(HERE, '../dist/takt.vsix');
+const { TAKT, TAKT_SCREENSHOTS: SHOTS } = process.env;
+/** A browser on a busy machine; ms. */
+const PATIENCE = 60_000;
+const limit = { timeout: 5 * PATIENCE };
+
+let folder, browser;
+const servers = [];
+
+before(async () => {
+  assert.ok(TAKT, 'TAKT says which `takt`: `cargo xtask extension --workbench` sets it');
+  folder = mkdtempSync(join(tmpdir(), 'takt-workbench-'));
+  mkdirSync(join(folder, 'project'));
+  cpSync(join(HERE, '../../../programs/examples/pi.s'), join(folder, 'project/pi.s'));
+  const install = ['out/server-main.js', ...folders('good'), '--install-extension', PACKAGE];
+  execFileSync(process.execPath, install, { cwd: SERVER, env: environment(), timeout: PATIENCE, stdio: 'pipe' });
+  browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium', args: ['--no-sandbox'] });
+}, limit);
+
+after(async () => {
+  await browser?.close();
+  for (const server of servers) server.kill();
+  if (folder) rmSync(folder, { recursive: true, force: true, maxRetries: 5 });
+});
+
+function environment() {
+  return { ...process.env, HOME: folder };
+}
+
+function folders(name) {
+  return ['--accept-server-license-terms', '--extensions-dir', join(folder, 'extensions'), '--server-data-dir', join(folder, name)];
+}
+
+/** A workbench on the project, with `takt` as its settings name it. */
+async function open(name, takt) {
+  const machine = join(folder, name, 'data/Machine');
+  mkdirSync(machine, { recursive: true });
+  const settings = { 'takt.command': takt, 'workbench.startupEditor': 'none', 'telemetry.telemetryLevel': 'off', 'extensions.ignoreRecommendations': true };
+  writeFileSync(join(machine, 'settings.json'), JSON.stringify(settings));
+  const options = ['--host', '127.0.0.1', '--port', '0', '--without-connection-token', '--disable-workspace-trust', ...folders(name)];
+  const server = spawn(process.execPath, ['out/server-main.js', ...options], { cwd: SERVER, env: environment() });
+  servers.push(server);
+  const port = await new Promise((resolve, reject) => {
+    let said = '';
+    server.stdout.on('data', (data) => {
+      said += data;
+      const found = /listening on (\d+)/.exec(said);
+      if (found) resolve(found[1]);
+    });
+    server.stderr.resume();
+    server.on('exit', () => reject(new Error(`the server ended: ${said}`)));
+  });
+  const page = await browser.newPage({ viewport: { width: 1400, height: 900 } });
+  page.setDefaultTimeout(PATIENCE);
+  await page.goto(`http://127.0.0.1:${port}/?folder=${join(folder, 'project')}`);
+  await page.dblclick('.explorer-folders-view .monaco-list-row[aria-label="pi.s"]');
+  await page.waitForSelector('.monaco-editor .view-line');
+  return page;
+}
+
+async function shot(page, name) {
+  if (!SHOTS) return;
+  mkdirSync(SHOTS, { recursive: true });
+  await page.screenshot({ path: join(SHOTS, `vscode-${name}.png`) });
+}
+
+/** Puts the cursor at the beginning of a line. */
+async function goTo(page, line) {
+  // The first group of editors has the source, whatever had the focus.
+  await page.keyboard.press('Control+1');
+  await page.keyboard.press('Control+g');
+  await page.keyboard.type(`${line}`);
+  await page.keyboard.press('Enter');
+  await page.keyboard.press('Home');
+}
+
+const source = () => readFileSync(join(folder, 'project/pi.s'), 'utf8');
+const LINES = readFileSync(join(HERE, '../../../programs/examples/pi.s'), 'utf8').split('\n');
+/** The first operation of the period, from 1. */
+const FIRST = LINES.findIndex((line) => /^\s+fsub\s+e,/.test(line)) + 1;
+
+test('a server that does not start is told with the reason', limit, async () => {
+  const page = await open('broken', '/nowhere/takt');
+  const told = page.locator('.notification-list-item', { hasText: 'does not start' });
+  await told.waitFor();
+  const text = await told.textContent();
+  assert.match(text, /\/nowhere\/takt lsp.*takt\.command/);
+  assert.doesNotMatch(text, /undefined/);
+  await page.close();
+});
+
+test('cycles, a mistake and its fix, the pipeline beside the source, the debugger', limit, async (t) => {
+  const page = await open('good', TAKT);
+  await t.test('cycles stand above sections and behind lines', limit, async () => {
+    await page.locator('.codelens-decoration', { hasText: 'period: 38 cycles, bound 38' }).waitFor();
+    await page.locator('.view-line', { hasText: 'fsub' }).filter({ hasText: '1 · add' }).first().waitFor();
+  });
+  await t.test('a mistake is marked as it is typed, and mended by its fix', limit, async () => {
+    await goTo(page, FIRST);
+    await page.keyboard.type('x');
+    await page.waitForSelector('.squiggly-error');
+    const fix = page.locator('.action-widget .monaco-list-row', { hasText: 'write `fsub`' });
+    // Asked for while the diagnostic is on its way, there is none yet.
+    for (let asked = 0; asked < 10 && !(await fix.isVisible()); asked++) {
+      await page.keyboard.press('Escape');
+      await page.keyboard.press('Control+.');
+      await page.waitForTimeout(2000);
+    }
+    await shot(page, 'fix');
+    // By the keyboard: a menu of VS Code's keeps the mouse off for a while.
+    await page.keyboard.press('Enter');
+    await page.locator('.view-line', { hasText: 'xfsub' }).waitFor({ state: 'detached' });
+    await page.keyboard.press('Control+s');
+    for (let looked = 0; looked < 40 && source().includes('xfsub'); looked++) await page.waitForTimeout(500);
+    assert.equal(source(), LINES.join('\n'));
+  });
+  await t.test('the pipeline follows the cursor, and the cursor the pipeline', limit, async () => {
+    await page.keyboard.press('Control+k');
+    await page.keyboard.press('p');
+    const picture = page.frameLocator('iframe.webview').frameLocator('#active-frame');
+    const row = (text) => picture.locator('div[data-row]', { hasText: text });
+    await row('fsub e, w_ref, w').waitFor();
+    await goTo(page, FIRST);
+    await picture.locator('div[data-row].on', { hasText: 'fsub e, w_ref, w' }).waitFor();
+    await shot(page, 'pipeline');
+    await row('wait period').last().click();
+    const wait = LINES.findLastIndex((line) => /^\s+wait\s+period/.test(line)) + 1;
+    await page.locator('.statusbar-item', { hasText: `Ln ${wait},` }).waitFor();
+  });
+  await t.test('the debugger stops, steps and steps back', limit, async () => {
+    await goTo(page, FIRST);
+    await page.keyboard.press('F5');
+    await page.locator('.debug-call-stack', { hasText: 'pi.s' }).waitFor();
+    const at = () => page.locator('.debug-call-stack .stack-frame .line-number').first().textContent();
+    const first = await at();
+    await page.keyboard.press('F10');
+    await page.waitForFunction((old) => {
+      const now = document.querySelector('.debug-call-stack .stack-frame .line-number')?.textContent;
+      return now && now !== old;
+    }, first);
+    await shot(page, 'debugger');
+    await page.click('.debug-toolbar .codicon-debug-step-back');
+    await page.waitForFunction((old) => document.querySelector('.debug-call-stack .stack-frame .line-number')?.textContent === old, first);
+    await page.keyboard.press('Shift+F5');
+    await page.waitForSelector('.debug-toolbar', { state: 'hidden' });
+  });
+});
