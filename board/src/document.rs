@@ -122,6 +122,11 @@ impl<'a> Table<'a> {
         self.entries.iter().find(|(name, _)| name.get_ref() == key).map(|(_, value)| value)
     }
 
+    /// Where a key stands, if it does.
+    pub(crate) fn place_of(&self, key: &str) -> Option<Range<usize>> {
+        self.entries.keys().find(|name| name.get_ref() == key).map(Spanned::span)
+    }
+
     /// The value of a key that may be missing, as `read` understands it.
     fn get<T>(
         &self,
@@ -150,6 +155,12 @@ impl<'a> Table<'a> {
 
     /// A whole number in a range.
     pub(crate) fn integer(&self, key: &'static str, least: u32, most: u32) -> Option<At<u32>> {
+        let At { value, place } = self.signed(key, least.into(), most.into())?;
+        u32::try_from(value).ok().map(|value| At { value, place })
+    }
+
+    /// A whole number in a range that may begin below 0.
+    pub(crate) fn signed(&self, key: &'static str, least: i64, most: i64) -> Option<At<i64>> {
         let expected = format!("a whole number from {least} to {most}");
         self.get(key, &expected, |value| integer(value).filter(|n| (least..=most).contains(n)))
     }
@@ -264,9 +275,9 @@ fn named(key: &Spanned<toml::de::DeString<'_>>) -> At<String> {
     At { value: key.get_ref().clone().into_owned(), place: key.span() }
 }
 
-fn integer(value: &DeValue<'_>) -> Option<u32> {
+fn integer(value: &DeValue<'_>) -> Option<i64> {
     let integer = value.as_integer()?;
-    u32::from_str_radix(integer.as_str(), integer.radix()).ok()
+    i64::from_str_radix(integer.as_str(), integer.radix()).ok()
 }
 
 fn number(value: &DeValue<'_>) -> Option<f64> {

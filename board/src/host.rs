@@ -22,6 +22,21 @@ pub struct Host<L> {
     pub retries: u64,
 }
 
+/// Times in a row that a stream may bring nothing until it is given up.
+const STILL: u32 = 50;
+
+/// Words for ports with consecutive numbers, the address of the first one ahead.
+pub type Ports = (u16, Vec<u32>);
+
+/// What became of rows that were fed.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Fed {
+    /// The first period that had each row.
+    pub used: Vec<u32>,
+    /// Periods that had the row of the period before once more, or of which nobody knows.
+    pub late: u32,
+}
+
 /// What the register `status` says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Status(pub u32);
@@ -174,6 +189,50 @@ impl<L: Line> Host<L> {
             return Err(LinkError::Image(at / 4));
         }
         self.set("records", records.len() as u32)
+    }
+
+    /// Sets input ports once for each period, a row each: what they have in the period after the one that has just ended. The stream
+    /// says when one has.
+    ///
+    /// # Errors
+    /// If the board does not answer, or no period ends.
+    pub fn feed(&mut self, rows: impl IntoIterator<Item = Vec<Ports>>) -> Result<Fed, LinkError> {
+        let mut fed = Fed::default();
+        // Every period; a stream has a word at least, and that of the register is with every frame.
+        self.set("stream", 1 << 20 | 1 << 16 | u32::from(address("periods")))?;
+        self.stream.clear();
+        let mut period = self.period()?;
+        for row in rows {
+            for (address, words) in row {
+                self.write(address, &words)?;
+            }
+            // Periods that ended before the answer did not have it.
+            if let Some(ended) =
+                self.stream.drain(..).filter_map(|frame| frame.words.first().copied()).next_back()
+            {
+                fed.late += ended.wrapping_sub(period);
+                period = ended;
+            }
+            fed.used.push(period.wrapping_add(1));
+            let ended = self.period()?;
+            fed.late += ended.wrapping_sub(period).saturating_sub(1);
+            period = ended;
+        }
+        self.set("stream", 0)?;
+        self.stream.clear();
+        Ok(fed)
+    }
+
+    /// The next period that ends, as the stream says.
+    fn period(&mut self) -> Result<u32, LinkError> {
+        for _ in 0..STILL {
+            if let Some(frame) = self.streamed()?
+                && let Some(period) = frame.words.first()
+            {
+                return Ok(*period);
+            }
+        }
+        Err(LinkError::Still)
     }
 
     /// The next frame of the stream: what stands in the line, or after waiting a little.

@@ -37,10 +37,10 @@ pub struct Register {
 pub struct Parameter {
     /// Its name in wiring files; in the module the same in capitals.
     pub name: &'static str,
-    /// The least value.
-    pub least: u32,
+    /// The least value; one below 0 is a register's two's complement.
+    pub least: i64,
     /// The greatest.
-    pub most: u32,
+    pub most: i64,
     /// Unless stated.
     pub default: u32,
     /// What it is, with its unit.
@@ -100,7 +100,7 @@ const fn scaled(name: &'static str, text: &'static str) -> Register {
     Register { name, scaled: true, text }
 }
 
-const fn parameter(name: &'static str, least: u32, most: u32, default: u32, text: &'static str) -> Parameter {
+const fn parameter(name: &'static str, least: i64, most: i64, default: u32, text: &'static str) -> Parameter {
     Parameter { name, least, most, default, text }
 }
 
@@ -126,7 +126,16 @@ pub const KINDS: &[Kind] = &[
             register("errors", "times that both pins changed at once"),
         ],
         writes: &[],
-        parameters: &[FILTER],
+        parameters: &[
+            FILTER,
+            parameter(
+                "start",
+                i32::MIN as i64,
+                i32::MAX as i64,
+                0,
+                "the count at power-up and reset, where the axis is parked",
+            ),
+        ],
         strobes: PLAIN,
     },
     Kind {
@@ -180,7 +189,7 @@ pub const KINDS: &[Kind] = &[
             parameter("polarity", 0, 1, 0, "level of the clock at rest"),
             parameter("phase", 0, 1, 0, "0: data is sampled at the clock's first edge, 1: at its second"),
             parameter("signed", 0, 1, 0, "1: the highest bit received is a sign"),
-            parameter("send", 0, u32::MAX, 0, "what is sent until the program has written `send`"),
+            parameter("send", 0, u32::MAX as i64, 0, "what is sent until the program has written `send`"),
         ],
         strobes: STARTED,
     },

@@ -9,6 +9,7 @@ pub mod build;
 mod document;
 pub mod host;
 pub mod kind;
+pub mod latency;
 pub mod pll;
 pub mod protocol;
 pub mod serial;

@@ -14,6 +14,15 @@ pub const IMAGE: u16 = 0x4000;
 /// Words of a request, at most.
 pub const WORDS: usize = 16;
 
+/// Bit of the register `control`: the program runs; while it is 0 the core is in reset.
+pub const RUN: u32 = 1;
+/// No ticks but those of the register `step`.
+pub const HOLD: u32 = 1 << 1;
+/// Outputs may drive.
+pub const ENABLE: u32 = 1 << 2;
+/// Written, it starts the program again.
+pub const RESTART: u32 = 1 << 8;
+
 /// First byte of a request.
 pub const REQUEST: u8 = 0xa5;
 /// First byte of an answer.
@@ -233,6 +242,11 @@ pub enum LinkError {
         "the program does not wait for its tick, so its ports cannot be read or set between periods; `takt live PORT stop` stops it"
     )]
     Busy,
+    /// No period ends.
+    #[error(
+        "no period has ended for a while: the program has stopped, or is held; `takt live PORT status` says which"
+    )]
+    Still,
     /// Something else answers.
     #[error("what answers is no board of Takt: its register `id` is {0:#010x}")]
     Stranger(u32),

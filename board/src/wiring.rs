@@ -127,13 +127,27 @@ impl Wiring {
         signal.chain(pins.filter(|(at, _)| *at == Some(pin)).map(|(_, name)| name())).next()
     }
 
+    /// The board that a wiring is for, if its text says so.
+    pub fn board(file: &str, text: &str) -> Option<String> {
+        let document = Document::new(file, text);
+        Some(document.top()?.string("board")?.value)
+    }
+
     /// Reads a wiring for a board, from the text of a file.
     ///
     /// # Errors
     /// Everything that is wrong with it, in the order of the file.
     pub fn read(file: &str, text: &str, board: &Board) -> Result<Wiring, Vec<Mistake>> {
         let document = Document::new(file, text);
-        let wiring = document.top().and_then(|top| Reader::new(&document, board).wiring(&top));
+        let wiring = document.top().and_then(|top| match top.place_of("core") {
+            // One error instead of one for each of its keys.
+            Some(place) => {
+                let text = "this is a system of several cores, and a wiring is wanted, which says what is at a board's pins";
+                document.mistake(&place, text);
+                None
+            }
+            None => Reader::new(&document, board).wiring(&top),
+        });
         document.finish(wiring)
     }
 
@@ -351,8 +365,8 @@ impl<'a> Reader<'a> {
         };
         let parameters = kind.parameters.iter().map(|parameter| {
             table
-                .integer(parameter.name, parameter.least, parameter.most)
-                .map_or(parameter.default, |at| at.value)
+                .signed(parameter.name, parameter.least, parameter.most)
+                .map_or(parameter.default, |at| at.value as u32)
         });
         let parameters = parameters.collect();
         let at_publish = kind.strobes.start

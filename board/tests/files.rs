@@ -80,7 +80,7 @@ fn system_is_read() {
     let wiring = Wiring::read("robot.toml", RIGHT, &ulx3s()).expect("it is right");
     assert_eq!((wiring.clock, wiring.period, wiring.lead, wiring.baud), (50.0, 20_000, 250, 1_000_000));
     assert_eq!((wiring.autostart, wiring.deadlines, wiring.host), (true, 3, 100));
-    assert_eq!(wiring.peripherals[0].parameters, [4]);
+    assert_eq!(wiring.peripherals[0].parameters, [4, 0]);
     assert_eq!(wiring.peripherals[1].parameters, [1000, 25, 1]);
     assert_eq!(
         wiring.peripherals[1].writes[0].as_ref().map(|w| (w.port.as_str(), w.scale)),
@@ -89,6 +89,14 @@ fn system_is_read() {
     assert_eq!(wiring.at("gn2").as_deref(), Some("motor.low"));
     assert_eq!((wiring.at("gp10").as_deref(), wiring.at("gp9")), (Some("drive"), None));
     wiring.check("robot.toml", RIGHT, &program(PROGRAM)).expect("the program has its ports");
+}
+
+/// One error instead of one for each of its keys.
+#[test]
+fn a_system_is_no_wiring() {
+    let said = said(include_str!("../../programs/three/controller.toml"));
+    assert_eq!(said.len(), 1, "{said:?}");
+    assert!(said[0].contains("this is a system of several cores, and a wiring is wanted"), "{said:?}");
 }
 
 /// What takes the place of what, and what is then said.

@@ -44,7 +44,8 @@ impl Random {
 /// Parameters to test a kind with, in the order of its table: shortest, usual, longest that a short run can see.
 fn variants(kind: &Kind) -> Vec<Vec<u32>> {
     match kind.name {
-        "quadrature" | "step" => vec![vec![1], vec![3], vec![10]],
+        "quadrature" => vec![vec![1, 0], vec![3, 3_572_338], vec![10, u32::MAX - 3]],
+        "step" => vec![vec![1], vec![3], vec![10]],
         "pwm" => vec![vec![1, 0, 1], vec![20, 3, 1], vec![33, 0, 0], vec![50, 60, 0], vec![7, 1, 0]],
         "sigma-delta" => vec![vec![0], vec![1]],
         "spi" => vec![
@@ -223,7 +224,15 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_uart_send.v", "{1'b1, shift[9:1]}", "{1'b0, shift[9:1]}"),
     ],
     &[("takt_filter.v", "rst | s1 == level", "rst")],
-    &[("takt_pwm.v", "wanted[33] ? 17'd0 :", ""), ("takt_spi.v", "(shift & mask) | extend", "shift & mask")],
+    &[
+        (
+            "takt_quadrature.v",
+            "{count, at_index, indices, errors} <= {START",
+            "{count, at_index, indices, errors} <= {32'd0",
+        ),
+        ("takt_pwm.v", "wanted[33] ? 17'd0 :", ""),
+        ("takt_spi.v", "(shift & mask) | extend", "shift & mask"),
+    ],
 ];
 
 #[test]

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 use takt_asm::{MemoryLoader, Options, assemble};
+use takt_board::latency::{self, Part};
 use takt_board::protocol::{INPUTS, LinkError, OUTPUTS};
 use takt_board::simulation::{Simulation, Turn};
-use takt_board::{Board, Host, Wiring, top};
+use takt_board::{Board, Host, Wiring, top, twin};
 use takt_isa::{Program, T1};
 
 const WIRING: &str = r#"
@@ -19,6 +20,7 @@ host = 400
 drive = "gp10"
 fault = "gp11"
 deadline = "gp12"
+tick = "gp13"
 stop = "gn10"
 
 [peripheral.encoder]
@@ -44,7 +46,7 @@ ports = { level = "lit" }
 /// Cycles of a period, as the system has them.
 const PERIOD: u32 = 2000;
 
-/// A proportional controller with a set point that the host sets; `force` is a quarter of the difference.
+/// A proportional controller with a set point that the host sets; `force` is a quarter of the difference, and the lamp is lit at odd counts.
 const PROGRAM: &str = "
 .schedule on
 .input n:int wanted:int
@@ -59,7 +61,7 @@ period:
         isub    e, wanted, n
         itof    f, e
         fmul    force, f, 0.25
-        mov     lit, 1
+        iand    lit, n, 1
         wait    period
 ";
 
@@ -105,6 +107,52 @@ fn pulse(board: &mut Simulation) -> u32 {
     board.output("motor_high").expect("a pin").1
 }
 
+/// Cycles from an edge of the encoder, which stands at a count and goes on by one so many cycles before a tick, to that of the lamp.
+fn measured(board: &mut Simulation, before: u64, encoder: [usize; 2], count: i32) -> u64 {
+    let is_high = |board: &mut Simulation, pin: &str| {
+        board.run(1, &[]).expect("it runs");
+        board.output(pin).expect("a pin").1 == 1
+    };
+    assert!((0..PERIOD).any(|_| is_high(board, "signal_tick")), "no tick");
+    board.run(PERIOD - 1 - before as u32, &[]).expect("it runs");
+    let was = board.output("lamp_out").expect("a pin").0;
+    board.turns.push(Turn { pins: encoder, from: count, by: 1 });
+    (0..2 * u64::from(PERIOD)).find(|_| is_high(board, "lamp_out") != was).expect("the lamp follows")
+}
+
+/// Of a PWM, in every phase, the first cycle in which a new duty shows.
+#[test]
+fn a_duty_shows_as_late_as_the_bound_says() {
+    let (half, dead) = (13, 3);
+    let text = format!(
+        "period = 40\n[peripheral.motor]\nkind = \"pwm\"\npins = {{ high = \"gp2\", low = \"gn2\" }}\nhalf = {half}\ndead = {dead}\nports = {{ duty = \"force\" }}\n"
+    );
+    let board = Board::from_name("ulx3s-85f").expect("a board").expect("a right one");
+    let wiring = Wiring::read("w.toml", &text, &board).expect("a right wiring");
+    let bound = Part::sum("", &latency::ways(&wiring, (0, 0)).outputs[0].parts);
+    let pwm = &wiring.peripherals[0];
+    let (mut least, mut most) = (u64::MAX, 0);
+    for (old, new) in (-half..=half).flat_map(|old| (-half..=half).map(move |new| (old, new))) {
+        for phase in 0..2 * half {
+            let twins = [old, new].map(|duty| (twin::of(pwm.kind, &pwm.parameters).expect("a twin"), duty));
+            let [mut a, mut b] = twins;
+            let puts = [0, 4 * half + phase];
+            let first = (0..10 * half).find(|cycle| {
+                for (twin, duty) in [&mut a, &mut b] {
+                    let duty = if *cycle == puts[0] { old } else { *duty };
+                    twin.clock(&[0, 1, puts.contains(cycle).into(), duty as u32]);
+                }
+                a.0.outputs()[0] != b.0.outputs()[0]
+            });
+            // Outputs after the clock's edge of a cycle are those of the next one. Pulses within the dead time are not seen.
+            let Some(first) = first else { continue };
+            let cycles = (first + 1 - puts[1]) as u64;
+            (least, most) = (least.min(cycles), most.max(cycles));
+        }
+    }
+    assert_eq!((least, most), (bound.best, bound.worst));
+}
+
 #[test]
 fn board_runs_talks_and_fails_safe() {
     let board = Board::from_name("ulx3s-85f").expect("a board").expect("a right one");
@@ -128,6 +176,17 @@ fn board_runs_talks_and_fails_safe() {
     periods(&mut sim, 3);
     assert_eq!(pulse(&mut sim), 250 - 160 - 5);
 
+    // From pin to pin, in cycles: with an edge that is counted just before a tick, and one that is counted just after it.
+    let bounds = takt_analysis::bound(&first).expect("it can be bounded");
+    let period = bounds.sections.iter().find(|section| !section.once).expect("it has a period").cycles;
+    let ways = latency::ways(&wiring, (period.best, period.worst));
+    let [edge, lamp] = [&ways.inputs[0].parts, &ways.outputs[1].parts];
+    let bound = Part::sum("", edge.iter().chain(&ways.between).chain(lamp));
+    assert_eq!(measured(&mut sim, edge[0].best, encoder, 40), bound.best);
+    assert_eq!(measured(&mut sim, edge[0].best - 1, encoder, 41), bound.worst);
+    sim.turns.push(Turn { pins: encoder, from: 42, by: -2 });
+    periods(&mut sim, 2);
+
     // Glitches shorter than the filter are not counted.
     for _ in 0..5 {
         sim.set("encoder_a", true);
@@ -146,7 +205,9 @@ fn board_runs_talks_and_fails_safe() {
     assert_eq!(host.read(port(&first, "force"), 1).expect("a port")[0], 3.0_f32.to_bits());
     assert_eq!(pulse(&mut host.line), 250 + 48 - 5);
     let cycles = host.register("cycles").expect("a register");
-    assert!((20..200).contains(&cycles), "{cycles} cycles from tick to outputs");
+    // Of them the first part, the wait for the tick, is not counted.
+    let exact = Part::sum("", &ways.between[1..]);
+    assert_eq!((exact.best, exact.worst), (cycles.into(), cycles.into()), "cycles from tick to outputs");
     assert_eq!(host.register("misses").expect("a register"), 0);
 
     // Hold, then one period at a time.
@@ -191,8 +252,10 @@ fn board_runs_talks_and_fails_safe() {
     host.line.unplugged = false;
     let status = host.status().expect("it is back");
     assert_eq!(status.causes().collect::<Vec<_>>(), ["host silent"]);
-    // A start makes it drive again.
+    // A start makes it drive again. What is set at once waits until the start's zeros are written.
     host.set("control", 0x105).expect("control");
+    host.write(port(&first, "wanted"), &[52]).expect("a port");
+    assert_eq!(host.read(port(&first, "wanted"), 1).expect("a port")[0], 52);
     periods(&mut host.line, 5);
     assert!(host.status().expect("status").drives());
 
@@ -216,7 +279,7 @@ fn board_runs_talks_and_fails_safe() {
     assert!(host.status().expect("status").drives(), "after a reset");
 
     // A program that misses its deadlines, one that halts, one that makes no number.
-    let instead = |what: &str| PROGRAM.replace("        mov     lit, 1\n", what);
+    let instead = |what: &str| PROGRAM.replace("        iand    lit, n, 1\n", what);
     let nan = PROGRAM.replace("fmul    force, f, 0.25", "fdiv    force, zero, zero");
     for (source, cause) in
         [(instead(SLOW), "missed deadline"), (instead("        halt\n"), "halt"), (nan, "NaN output")]

@@ -30,6 +30,8 @@ module takt_guard #(
     localparam [15:0] MOST  = DEADLINES;
     localparam [15:0] QUIET = HOST;
 
+    initial drive = 1'b0;  // safe before the first clock edge, too
+
     reg  [15:0] row, silence;
     reg         published;
     wire        late  = missed & row + 16'd1 == MOST;

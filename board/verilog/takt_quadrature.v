@@ -6,10 +6,11 @@
 //   at_index is count at the last rising edge of index, indices the number of those. Pins pass through takt_filter with HOLD = FILTER.
 //   An edge of a pin in cycle t is in count in t + 3 + FILTER.
 //   take: registers r_… hold from the next cycle on what they are in this one.
-//   rst: all are 0.
+//   rst: count is START, the others are 0.
 
 module takt_quadrature #(
-    parameter FILTER = 1
+    parameter FILTER = 1,
+    parameter [31:0] START = 0
 ) (
     input  wire        clk,
     input  wire        rst,
@@ -45,8 +46,8 @@ module takt_quadrature #(
         end
         if (take) {r_count, r_at_index, r_indices, r_errors} <= {count, at_index, indices, errors};
         if (rst) begin
-            {count, at_index, indices, errors} <= 128'd0;
-            {r_count, r_at_index, r_indices, r_errors} <= 128'd0;
+            {count, at_index, indices, errors} <= {START, 96'd0};
+            {r_count, r_at_index, r_indices, r_errors} <= {START, 96'd0};
         end
     end
 

@@ -1,10 +1,14 @@
 //! `takt board`: boards, their pins, and wirings that are to run on them.
 
+#[cfg(unix)]
+mod robot;
+
 use crate::files::{self, Out};
 use crate::load::Load;
+use crate::number;
 use crate::output::{self, Failure};
 use crate::select::{OptionalMachine, SourceArguments};
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, Subcommand};
 use serde_json::json;
 use std::io::Write;
@@ -92,6 +96,16 @@ struct Sim {
     /// A motor that turns an encoder: the peripherals' names, and counts per second at full duty; may be repeated.
     #[arg(long, value_name = "PWM,QUADRATURE,SPEED")]
     axis: Vec<String>,
+    /// Put the hybrid robot behind the pins and drive it along a tool path, this command being the host at the UART: the tracking
+    /// error through the pins beside that of `takt track`.
+    #[arg(long, conflicts_with_all = ["axis", "cycles"])]
+    robot: bool,
+    /// With --robot: tool path in G-code [default: the letters AGH].
+    #[arg(long, value_name = "FILE", requires = "robot")]
+    gcode: Option<PathBuf>,
+    /// With --robot: periods to drive, from the path's beginning.
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = number::count, requires = "robot", allow_hyphen_values = true)]
+    periods: u64,
     /// One in so many bits of the UART is flipped, in either direction.
     #[arg(long, default_value_t = 0, value_name = "N")]
     noise: u32,
@@ -169,6 +183,22 @@ impl Target {
         right(wiring.check(&name, &text, &program), color)?;
         Ok((board, wiring, program))
     }
+}
+
+/// The wiring of a file for a program, and its board: the one that is named, else the one that it names itself.
+pub(crate) fn wired(
+    path: &Path,
+    board: Option<&str>,
+    program: &Program,
+    color: bool,
+) -> Result<(Board, Wiring)> {
+    let (name, text) = text(path)?;
+    let own = Wiring::board(&name, &text);
+    let board = board.or(own.as_deref()).with_context(|| format!("{name} names no board: --board NAME"))?;
+    let board = find(board, color)?;
+    let wiring = right(Wiring::read(&name, &text, &board), color)?;
+    right(wiring.check(&name, &text, program), color)?;
+    Ok((board, wiring))
 }
 
 pub(crate) fn run(arguments: &Boards, color: bool, out: &mut Out) -> Result<()> {
@@ -333,9 +363,20 @@ impl Axis {
 fn sim(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
     let (board, wiring, program) = arguments.target.read(color)?;
     let folder = takt_cosim::cache_folder().join(format!("board-{}", std::process::id()));
-    output::message("compiling the circuit …");
-    let sim = Simulation::new(&board, &wiring, &program, &folder);
-    let ended = sim.map_err(anyhow::Error::from).and_then(|sim| serve(arguments, &wiring, sim, out));
+    let simulation = || {
+        output::message("compiling the circuit …");
+        Simulation::new(&board, &wiring, &program, &folder)
+    };
+    let mut run = || -> Result<()> {
+        if arguments.robot {
+            let drive = robot::Drive::new(&program, &wiring, arguments.gcode.as_deref(), arguments.periods)?;
+            let mut sim = simulation()?;
+            sim.noise = arguments.noise;
+            return drive.run(&board.name, sim, out);
+        }
+        serve(arguments, &wiring, simulation()?, out)
+    };
+    let ended = run();
     let _ = std::fs::remove_dir_all(&folder);
     ended
 }

@@ -1,5 +1,8 @@
 //! `takt bound`: the best and the worst that each section can take, from the program alone.
 
+#[cfg(feature = "board")]
+mod pins;
+
 use crate::files::{self, Out};
 use crate::load::{self, Load};
 use crate::number::{self, Time};
@@ -35,6 +38,18 @@ pub(crate) struct Bound {
     /// Clock in MHz, for a deadline in seconds and for cycles to time.
     #[arg(long, value_name = "MHZ", default_value_t = select::PAPER_CLOCK, value_parser = number::clock, allow_hyphen_values = true)]
     pub(crate) clock: f64,
+    /// From an edge at a pin of a board to one at another: the cycles of each part of the way, with the peripherals of --wiring.
+    #[cfg(feature = "board")]
+    #[arg(long, requires = "wiring")]
+    pins: bool,
+    /// With --pins: which peripherals are at which pins (docs/board.md).
+    #[cfg(feature = "board")]
+    #[arg(long, value_name = "TOML", requires = "pins")]
+    wiring: Option<PathBuf>,
+    /// With --pins: the board, where the wiring does not name it.
+    #[cfg(feature = "board")]
+    #[arg(long, value_name = "BOARD", requires = "pins")]
+    board: Option<String>,
     /// Print the result as JSON.
     #[arg(long)]
     pub(crate) json: bool,
@@ -44,6 +59,7 @@ const EXAMPLES: &str = "\
 Examples:
   takt bound prog.s                                  best and worst of every section
   takt bound prog.s --deadline 100us --clock 125MHz  for CI: status 1 if a period can take longer
+  takt bound robot.s --pins --wiring robot.toml      from an encoder's edge to a PWM's, on a board
   takt bound system.toml                             of each core, and from the host's inputs to outputs";
 
 /// The deadline against the worst period.
@@ -62,11 +78,19 @@ impl Verdict {
 pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
     files::check(&[("FILE", &arguments.file)], &[])?;
     if load::is_system(&arguments.file) {
+        #[cfg(feature = "board")]
+        if arguments.pins {
+            bail!("--pins: a board has one core, and {} is a system", files::input_name(&arguments.file));
+        }
         return system::bound::run(arguments, color, out);
     }
     let program =
         Load::new(arguments.machine.machine, color).with(&arguments.source).program(&arguments.file)?;
     let bounds = takt_analysis::bound(&program).map_err(|error| anyhow!("no bound: {error}"))?;
+    #[cfg(feature = "board")]
+    if let Some(wiring) = &arguments.wiring {
+        return pins::run(arguments, wiring, &program, &bounds, color, out);
+    }
     let verdict = match (arguments.deadline, bounds.worst_period()) {
         (None, _) => None,
         (Some(_), None) => bail!("a deadline, and the program has no period: it never waits for the tick"),

@@ -3,13 +3,14 @@
 use crate::files::{self, Out};
 use crate::load::Load;
 use crate::select::{OptionalMachine, SourceArguments};
+use crate::shadow;
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::{Args, Subcommand};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 use takt_board::Host;
-use takt_board::protocol::{INPUTS, OUTPUTS};
+use takt_board::protocol::{ENABLE, HOLD, INPUTS, OUTPUTS, RESTART, RUN};
 use takt_board::serial::Serial;
 use takt_board::top::{RECORDS, image};
 use takt_isa::{Program, Type};
@@ -69,11 +70,6 @@ pub(crate) fn load(arguments: &LoadBoard, color: bool, out: &mut Out) -> Result<
     Ok(())
 }
 
-const RUN: u32 = 1;
-const HOLD: u32 = 2;
-const ENABLE: u32 = 4;
-const RESTART: u32 = 1 << 8;
-
 /// See and steer a program on a board while it runs, over its serial port.
 #[derive(Args)]
 pub(crate) struct Live {
@@ -115,6 +111,18 @@ enum Command {
         #[arg(required = true)]
         values: Vec<String>,
     },
+    /// Run the program from its beginning, a period at a time, beside the emulator with the same inputs, and name the first output
+    /// that differs. Outputs stay safe unless --drive is given; afterwards the board is held.
+    Shadow {
+        /// `name=value`: input ports that the host sets, before the first period.
+        values: Vec<String>,
+        /// Periods to compare.
+        #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
+        periods: u32,
+        /// Let outputs drive. Periods take as long as the line does: nothing may hang on them.
+        #[arg(long)]
+        drive: bool,
+    },
     /// Print an output port every so many periods, with the period's number.
     Stream {
         /// The port.
@@ -129,7 +137,7 @@ enum Command {
 }
 
 /// A port's address and type.
-fn find(program: &Program, name: &str) -> Result<(u16, Type)> {
+pub(crate) fn find(program: &Program, name: &str) -> Result<(u16, Type)> {
     let input = program.inputs.iter().find(|port| port.name == name);
     if let Some(port) = input {
         let index = program.machine.inputs.index(port.register).context("an input is in the inputs' bank")?;
@@ -145,7 +153,7 @@ fn find(program: &Program, name: &str) -> Result<(u16, Type)> {
     })
 }
 
-fn shown(bits: u32, ty: Type) -> String {
+pub(crate) fn shown(bits: u32, ty: Type) -> String {
     match ty {
         Type::F => f32::from_bits(bits).to_string(),
         Type::I => (bits as i32).to_string(),
@@ -170,7 +178,7 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
     let program = || program.as_ref().context("ports have names in the program: --program FILE");
     // What the command line says is checked before the line is opened.
     let mut settings = Vec::new();
-    if let Command::Set { values } = &arguments.command {
+    if let Command::Set { values } | Command::Shadow { values, .. } = &arguments.command {
         for value in values {
             let (name, text) =
                 value.split_once('=').with_context(|| format!("`{value}` is not `name=value`"))?;
@@ -180,6 +188,9 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
             settings.push((address, bits));
         }
         settings.sort_unstable();
+    }
+    if matches!(arguments.command, Command::Shadow { .. }) {
+        program()?;
     }
     let mut host = arguments.port.open()?;
     let control = host.register("control")?;
@@ -224,12 +235,13 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
                 writeln!(out, "{name} = {}", shown(value, ty))?;
             }
         }
-        Command::Set { .. } => {
-            // Ports whose numbers follow each other change together.
-            for together in settings.chunk_by(|a, b| a.0 + 1 == b.0) {
-                let values: Vec<u32> = together.iter().map(|(_, bits)| *bits).collect();
-                host.write(together[0].0, &values)?;
-            }
+        Command::Set { .. } => set(&mut host, &settings)?,
+        Command::Shadow { periods, drive, .. } => {
+            let enable = if *drive { ENABLE } else { 0 };
+            // Held from its beginning on, so that no period goes by unseen.
+            host.set("control", RUN | HOLD | enable | RESTART)?;
+            set(&mut host, &settings)?;
+            shadow::run(&mut host, program()?, *periods, out)?;
         }
         Command::Stream { name, every, count } => {
             let (address, ty) = find(program()?, name)?;
@@ -256,6 +268,15 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
                 );
             }
         }
+    }
+    Ok(())
+}
+
+/// Sets input ports, in ascending order; those whose numbers follow each other change together.
+fn set(host: &mut Host<Serial>, settings: &[(u16, u32)]) -> Result<()> {
+    for together in settings.chunk_by(|a, b| a.0 + 1 == b.0) {
+        let values: Vec<u32> = together.iter().map(|(_, bits)| *bits).collect();
+        host.write(together[0].0, &values)?;
     }
     Ok(())
 }

@@ -46,6 +46,8 @@ mod robot;
 mod rtl;
 mod run;
 mod select;
+#[cfg(feature = "board")]
+mod shadow;
 mod synthesis;
 mod system;
 mod trace;

@@ -44,7 +44,7 @@ pub(crate) struct Track {
     #[arg(
         long,
         value_name = "TOML",
-        conflicts_with_all = ["program", "machine", "csv", "monte_carlo", "fit_friction", "deny"]
+        conflicts_with_all = ["program", "machine", "monte_carlo", "fit_friction", "deny"]
     )]
     system: Option<PathBuf>,
     #[command(flatten)]
@@ -60,10 +60,10 @@ pub(crate) struct Track {
     /// Clock in MHz, for cycles to time and for the deadline; the paper's is 125.
     #[arg(long, value_name = "MHZ", default_value_t = select::PAPER_CLOCK, value_parser = number::clock, allow_hyphen_values = true)]
     pub(crate) clock: f64,
-    /// Write inputs, outputs, cycles and errors of every period as CSV, which `takt run --inputs` reads; `-` is standard
-    /// output.
+    /// Write inputs, outputs, cycles and errors of every period as CSV, which `takt run --inputs` reads; with --system the
+    /// inputs, which `takt cosim` reads too. `-` is standard output.
     #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
+    pub(crate) csv: Option<PathBuf>,
     /// Draw the tool path and the tracking error over time as SVG; `-` is standard output.
     #[arg(long, value_name = "FILE")]
     pub(crate) plot: Option<PathBuf>,

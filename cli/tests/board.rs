@@ -129,9 +129,117 @@ fn the_loop_closes_through_the_pins_of_a_simulated_board() {
     assert!(error().abs() <= 2);
     live("step");
     assert!((-62..=-58).contains(&error()), "{}", live("read"));
+    // Beside the emulator, from the beginning: the program that runs there, then one that differs where the board had 0.02.
+    let same = live("shadow wanted=7 --periods 12");
+    assert_eq!(same, "12 periods, 2 input ports, 2 output ports: no difference; the board is held\n");
+    let status = live("status");
+    assert!(status.contains("the program held; outputs are safe"), "{status}");
+    let planted = std::fs::read_to_string(&program).unwrap().replace("gain = 0.02", "gain = 0.03");
+    folder.write("planted.s", planted);
+    let shadow =
+        format!("live {port} --baud {baud} --program planted.s --machine t1 shadow wanted=7 --periods 12");
+    let different = folder.line(&shadow);
+    assert_eq!((different.status, different.stdout.as_str()), (Some(1), ""), "{different:?}");
+    let says = "period 1: output port `duty` is ";
+    assert!(
+        different.stderr.contains(says) && different.stderr.contains("wanted = 7"),
+        "{}",
+        different.stderr
+    );
+    let without = folder.line(&format!("live {port} --baud {baud} shadow"));
+    assert!(without.stderr.contains("ports have names in the program: --program FILE"), "{}", without.stderr);
     let loaded = folder.line(&format!("load {port} --baud {baud} {program} --machine t1 --stopped")).ok();
     assert!(loaded.contains("records loaded and compared; stopped"), "{loaded}");
     let broken = folder.line(&format!("live {port} --baud {baud} --program {program} set nothing=1"));
     assert_eq!(broken.status, Some(1));
     assert!(broken.stderr.contains("the program has no port `nothing`"), "{}", broken.stderr);
+}
+
+fn hybrid(name: &str) -> String {
+    format!("{}/../programs/hybrid/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The tracking error through encoders, PWMs and UART of the complete top level is that of the emulator, and what the pins add: forces in
+/// steps of 0.5 N, a PWM's period later.
+#[test]
+fn the_hybrid_robot_closes_its_loop_through_pins() {
+    let folder = Folder::new();
+    let sim = |wiring: &str, more: &str| {
+        let program = hybrid("tracking.s");
+        folder.line(&format!(
+            "board sim --board ulx3s-85f --wiring {wiring} --program {program} --robot {more}"
+        ))
+    };
+    let wiring = std::fs::read_to_string(hybrid("board.toml")).unwrap();
+    for (what, by, says) in [
+        (
+            "start = 3572338 ",
+            "start = 3572000 ",
+            "the robot stands at 3572338 counts of `n1`, and `encoder1` starts at 3572000",
+        ),
+        ("{ count = \"n5\" }", "{}", "the wiring has no quadrature whose `count` is the port `n5`"),
+        (
+            "{ duty = \"tau5\" }\nscale = { duty = 8 }",
+            "{}",
+            "the wiring has no pwm whose `duty` is the port `tau5`",
+        ),
+        ("tick = \"gp23\"", "", "the robot needs the signal `tick` on a pin"),
+        ("period = 100 ", "period = 200 ", "the robot's period is 100 µs, the wiring's 200 µs"),
+        (", low = \"gn7\"", "", "`motor1`: a force in both directions needs a signed pwm with both pins"),
+        ("deadlines = 2", "autostart = true", "the host starts the robot: leave out `autostart`"),
+    ] {
+        assert_eq!(wiring.matches(what).count().min(1), 1, "{what}");
+        folder.write("wrong.toml", wiring.replacen(what, by, 1));
+        let done = sim("wrong.toml", "");
+        assert!(done.status == Some(1) && done.stderr.contains(says), "{by}: {done:?}");
+    }
+    let done = sim(&hybrid("board.toml"), "--periods 400");
+    assert_eq!((done.status, done.stderr.as_str()), (Some(0), "compiling the circuit …\n"));
+    let text = done.stdout;
+    assert!(
+        text.starts_with("tracking.s on ulx3s-85f, simulated: t3 at 60 MHz, 400 periods of agh.ngc"),
+        "{text}"
+    );
+    assert!(text.contains("0 deadlines missed; 0 points of the path late"), "{text}");
+    let overall = text.lines().find(|line| line.starts_with("  overall")).unwrap_or_else(|| panic!("{text}"));
+    let errors: Vec<f64> = overall.split_whitespace().skip(1).map(|error| error.parse().unwrap()).collect();
+    let [pins, alone] = errors[..] else { panic!("{text}") };
+    assert!(alone > 5.0 && (pins / alone - 1.0).abs() < 0.1, "{text}");
+}
+
+#[test]
+fn the_way_from_pin_to_pin_has_a_bound() {
+    let folder = Folder::new();
+    let program = hybrid("tracking.s");
+    let bound = |more: &str| folder.line(&format!("bound {program} --pins {more}"));
+    let wiring = hybrid("board.toml");
+    let text = bound(&format!("--wiring {wiring}")).ok();
+    for says in [
+        "  edge to `count`                                   6 ",
+        "encoder4 (n4), encoder5 (n5)\n",
+        "motor5 (tau5)\n",
+    ] {
+        assert!(text.contains(says), "{says}: {text}");
+    }
+    let json: serde_json::Value =
+        serde_json::from_str(&bound(&format!("--wiring {wiring} --json")).ok()).unwrap();
+    let sum = |edge: &str| {
+        let parts = [&json["inputs"][0]["parts"], &json["between"], &json["outputs"][0]["parts"]];
+        parts
+            .iter()
+            .flat_map(|parts| parts.as_array().unwrap())
+            .map(|part| part[edge].as_u64().unwrap())
+            .sum::<u64>()
+    };
+    assert_eq!(json["total"]["best"], sum("best"));
+    assert_eq!(json["total"]["worst"], sum("worst"));
+    let refused = |more: &str, says: &str| {
+        let done = bound(more);
+        assert!(done.status == Some(1) && done.stderr.contains(says), "{more}: {done:?}");
+    };
+    refused(&format!("--wiring {wiring} --board colorlight-i5"), "this wiring is for the board `ulx3s-85f`");
+    refused(&format!("--wiring {wiring} --deadline 100us"), "--deadline is not for --pins");
+    folder.write("none.toml", "period = 100\n");
+    refused("--wiring none.toml", "none.toml names no board: --board NAME");
+    refused("--wiring none.toml --board ulx3s-85f", "none.toml: no way from pin to pin");
 }

@@ -39,6 +39,20 @@ fn a_program_with_a_fault_of_the_link() {
     assert!(text.contains("a.robot can run: it takes 1."), "{text}");
 }
 
+/// What host and encoders said is a table on which the cores run again, to the same end.
+#[test]
+fn a_session_is_recorded() {
+    let folder = Folder::new();
+    folder.write("a.robot", "signal 3 on\nmove joints(2, _, _, _, _, _)\n");
+    folder.line("robot a.robot --record in.csv").ok();
+    let toml = format!("{}/../programs/three/controller.toml", env!("CARGO_MANIFEST_DIR"));
+    let run = folder.line(&format!("run {toml} --inputs in.csv --json")).ok();
+    let json: Value = serde_json::from_str(&run).unwrap();
+    assert_eq!((&json["outputs"]["outputs"], &json["outputs"]["enable"]), (&4.into(), &1.into()), "{json}");
+    let angle = json["outputs"]["state.q1"].as_f64().unwrap();
+    assert!((angle - 2f64.to_radians()).abs() < 1e-6, "{json}");
+}
+
 #[test]
 fn mistakes_on_the_command_line() {
     let folder = Folder::new();
@@ -51,6 +65,7 @@ fn mistakes_on_the_command_line() {
         ("robot --check", 2, "FILE"),
         ("robot none.robot", 1, "none.robot"),
         ("robot a.robot --plot a.robot", 2, "--plot would overwrite"),
+        ("robot a.robot --record a.robot", 2, "--record would overwrite"),
     ] {
         let done = folder.line(line);
         assert_eq!(done.status, Some(status), "{line}: {done:?}");

@@ -188,3 +188,26 @@ fn the_hybrid_robot_on_two_processors() {
         assert!(done.stderr.contains(said), "{line}: {}", done.stderr);
     }
 }
+
+/// What the host of a run said is a table on which the system runs again; with `TAKT_FULL=1` its circuit, too.
+#[test]
+fn what_a_host_said_is_a_table() {
+    let folder = Folder::new();
+    let two = common::source("two.toml");
+    folder.line(&format!("track -q --periods 40 --system {two} --csv in.csv")).ok();
+    // A tick of its own for the block that places the robot.
+    assert_eq!(folder.read_text("in.csv").lines().count(), 1 + 41);
+    let run = |line: &str| folder.line(&format!("run {two} --inputs in.csv {line}")).ok();
+    let text = run("");
+    assert!(text.contains("41 base ticks") && text.contains("; 0 refused when full"), "{text}");
+    // The first block's place, as the path begins: the core got it.
+    let json: Value = serde_json::from_str(&run("--json")).unwrap();
+    assert!(json["fifos"]["blocks"]["pushed"].as_u64() > Some(8), "{json}");
+    assert!(json["outputs"]["progress.block"].as_u64() > Some(1), "{json}");
+    if std::env::var_os("TAKT_FULL").is_some() {
+        let mut command = folder.command(&["cosim", &two, "--inputs", "in.csv"]);
+        command.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
+        let text = common::Done::of(command).ok();
+        assert!(text.contains("no difference"), "{text}");
+    }
+}

@@ -77,16 +77,20 @@ fn stops_at_every_event_forward_and_back() {
         let kind = events.iter().find(|event| event.kind.name() == name).expect("it was seen").kind;
         *kinds.entry(name).or_insert(0) += 1;
         let mut session = session(&description);
-        let id = session.add_stop(SystemStop::Link(link, Some(kind)), String::new());
+        let id = session.add_stop(SystemStop { link, kind: Some(kind) }, String::new());
         for &cycle in &cycles {
-            assert_eq!(session.resume(), SystemWhy::Stop(id), "seed {seed}: {name} at {cycle}");
+            assert_eq!(session.resume(&mut []), SystemWhy::Stop(id), "seed {seed}: {name} at {cycle}");
             assert_eq!(session.cycle(), cycle, "seed {seed}: {name} of link {link}");
         }
         for &cycle in cycles.iter().rev().skip(1) {
-            assert_eq!(session.resume_back(), SystemWhy::Stop(id), "seed {seed}: back to {name} at {cycle}");
+            assert_eq!(
+                session.resume_back(&mut []),
+                SystemWhy::Stop(id),
+                "seed {seed}: back to {name} at {cycle}"
+            );
             assert_eq!(session.cycle(), cycle, "seed {seed}: back to {name} of link {link}");
         }
-        assert_eq!(session.resume_back(), SystemWhy::Start);
+        assert_eq!(session.resume_back(&mut []), SystemWhy::Start);
     }
     assert!(!kinds.is_empty(), "no system has an event that comes often enough");
 }
@@ -134,10 +138,14 @@ fn mistakes_are_told() {
     for (line, text) in [
         ("core none", "there is no core `none` (cores: c0"),
         ("break link none", "there is no link `none`"),
-        ("break period 3", "a system stops at `cycle N`"),
+        ("break nowhere", "no label is named `nowhere`"),
+        ("watch nothing", "nothing"),
+        ("until", "an expression is missing"),
+        ("set nothing = 1", "nothing"),
+        ("set zero = 1", "`zero` is always zero"),
         ("step 0", "neither a count nor one of"),
         ("goto cycle x", "`x` is no number of a cycle"),
-        ("set x = 1", "for a single core's session"),
+        ("accuracy", "for a single core's session"),
         ("stepp", "did you mean `step`?"),
         ("delete 7", "there is no stop 7"),
         ("print nothing", "nothing"),
@@ -152,4 +160,111 @@ fn mistakes_are_told() {
     console.execute("core c1").expect("there is one");
     console.execute("back cycle 100").expect("it is there");
     assert!(console.execute("check cycle == 400").is_ok(), "every core is in the same cycle");
+}
+
+/// What core 1 of a system has in a register, at each position, is what a watchpoint on it tells of, forward and back; and stops
+/// with conditions are those of the positions at which they hold.
+#[test]
+fn watchpoints_and_conditions_see_every_position() {
+    const END: u64 = 1500;
+    let mut changes = 0;
+    for (seed, description) in systems() {
+        let names: Vec<String> = description.cores.iter().map(|core| core.name.clone()).collect();
+        let views = || {
+            let cores = description.cores.iter();
+            cores.map(|core| Session::new(&core.program, Options::default()).expect("it loads")).collect()
+        };
+        let console = || {
+            let mut console = SystemConsole::new(session(&description), views());
+            console.session.run_limit = 3 * END;
+            console.execute(&format!("core {}", names[1])).expect("it is there");
+            console
+        };
+        // An output port, an input port, and a register of the machine.
+        let program = &description.cores[1].program;
+        let ports = program.outputs.iter().take(1).chain(program.inputs.iter().take(2));
+        let watched: Vec<String> = ports.map(|port| format!("{}:int", port.name)).collect();
+        for what in &watched {
+            // Position by position.
+            let mut one = console();
+            let value =
+                |console: &mut SystemConsole| console.execute(&format!("print {what}")).expect("a value");
+            let mut before = value(&mut one);
+            let mut expected = Vec::new();
+            for cycle in 1..END {
+                one.execute("step cycle").expect("a cycle");
+                let now = value(&mut one);
+                let bits = |text: &str| text.split("  (").next().unwrap_or_default().trim().to_owned();
+                if bits(&now) != bits(&before) {
+                    expected.push(cycle);
+                }
+                before = now;
+            }
+            changes += expected.len();
+            let mut watching = console();
+            watching.execute(&format!("watch {what}")).expect("it can be watched");
+            let mut cycles = Vec::new();
+            loop {
+                let said = watching.execute("continue").expect("it runs");
+                let cycle = watching.session.cycle();
+                if cycle >= END || !said.contains("stop 1") {
+                    break;
+                }
+                cycles.push(cycle);
+            }
+            assert_eq!(cycles, expected, "seed {seed}: {what}");
+            watching.execute(&format!("goto cycle {END}")).expect("it is there");
+            let mut back = Vec::new();
+            while watching.execute("reverse").expect("it runs").contains("stop 1") {
+                back.push(watching.session.cycle());
+            }
+            back.reverse();
+            assert_eq!(back, expected, "seed {seed}: {what}, back");
+        }
+        // A condition: of all bundles that issue, those in even cycles.
+        let mut stepping = console();
+        let mut expected = Vec::new();
+        let mut bundle = None;
+        while stepping.session.cycle() < END {
+            stepping.execute("step bundle").expect("a bundle");
+            let here = stepping.session.system().core(1).next_address();
+            let cycle = stepping.session.cycle();
+            if *bundle.get_or_insert(here) == here && cycle % 2 == 0 {
+                expected.push(cycle);
+            }
+        }
+        expected.retain(|cycle| *cycle < END);
+        let mut stopping = console();
+        let place = format!("break bundle {} if cycle % 2 == 0", bundle.expect("one has issued").get());
+        assert!(stopping.execute(&place).expect("a place").contains("stop 1"));
+        for cycle in expected {
+            stopping.execute("continue").expect("it runs");
+            assert_eq!(stopping.session.cycle(), cycle, "seed {seed}: {place}");
+        }
+    }
+    assert!(changes > 20, "{changes} changes are too few to tell");
+}
+
+/// What is set is there when a session comes back to it, and gone before.
+#[test]
+fn what_is_set_stays() {
+    let (_, description) = systems().next().expect("a system");
+    let views = description.cores.iter();
+    let views = views.map(|core| Session::new(&core.program, Options::default()).expect("it loads"));
+    let mut console = SystemConsole::new(session(&description), views.collect());
+    let port = description.cores[0].program.inputs[0].name.clone();
+    let mut run = |line: &str| console.execute(line).unwrap_or_else(|error| panic!("{line}: {error}"));
+    run("goto cycle 700");
+    run(&format!("set {port}:int = 12345"));
+    run(&format!("check {port}:int == 12345"));
+    run("back cycle 600");
+    run(&format!("check {port}:int != 12345"));
+    run(&format!("until {port}:int == 12345"));
+    run("check cycle == 700");
+    run("break cycle 690");
+    run("reverse");
+    run("check cycle == 690");
+    assert!(run("stops").contains("break cycle 690 of core c0"));
+    run("delete 1");
+    assert_eq!(run("stops"), "");
 }

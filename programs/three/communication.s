@@ -22,7 +22,7 @@
 .output report:int, sequence:int, cause:int, value, report_push:int
 .output item:int, item_sequence:int, item_epoch:int, c1:bits, c2:bits, c3:bits, c4:bits, c5:bits, c6:bits
 .output profile:int, periods:int, ramp_periods:int, flags:int, item_push:int
-.input  item_full:int
+.input  item_count:int                 ; entries of the queue, its depth at most
 .output epoch:int                       ; counts stops: items of an earlier one are dropped
 .output stop_cause:int, stop_sequence:int, reset:int
 .input  reply:int, reply_sequence:int, reply_cause:int, reply_value:bits, reply_epoch:int, reply_empty:int
@@ -38,7 +38,7 @@
 .state  planning:int                    ; it is a motion, to be planned
 .state  jog_kind:int                    ; rates of the jog that goes on
 .state  number:bits last:int            ; its sequence number; the last good one's
-.state  silence:int pending:int locked:int started:int jogging:int halting:int ; motions and outputs in the queue; …; until the kinematic core says
+.state  silence:int pending:int motions:int locked:int started:int jogging:int halting:int ; motions and outputs in the queue, motions of them; …; until the kinematic core says
 .state  now:int resets:int              ; stops and resets so far
 .state  ready_number:int                ; of a reset that is to be answered
 .state  beats:int                       ; where the beat stood
@@ -88,7 +88,7 @@ highest:    .float high1, high2, high3, high4, high5, high6
         got, need, kind, idle, planning = 0, 0, 0, 0, 0
         li      crc, 0xffffffff
         number, last, jog_kind = 0, 0, 0
-        silence, pending, locked, started, jogging, halting = 0, 0, 0, 0, 0, 0
+        silence, pending, motions, locked, started, jogging, halting = 0, 0, 0, 0, 0, 0, 0
         via_before, space, back, elbow_up, wrist_up = 0, 0, 0, 0, 0
         tool[1], tool[2], tool[3] = 0, 0, 0
         now, resets, beats, raw, ready_number = 0, 0, 0, 0, 0
@@ -243,13 +243,18 @@ in_order:
         bnz     locked, refused
         is = kind == KIND_STOP
         bnz     is, stopping
+; Room in the queue: two items for limits, none for a motion that is only checked.
+.reg    moves:int jogs:int sets:int only:int needs:int crowded:int
+        moves = (kind == KIND_MOVE) | (kind == KIND_MOVEL)
+        ld      only, payload + 9       ; a motion's flags
+        only = moves & ((only & FLAG_CHECK) != 0)
+        needs = kind == KIND_LIMITS ? 2 : only ? 0 : 1
+        crowded = item_count + needs > QUEUE
         li      rc, CAUSE_QUEUEFULL
-        bnz     item_full, refused
+        bnz     crowded, refused
         .rep    i, 1, 6
         ld      c{i}, payload + i - 1
         .endr
-.reg    moves:int jogs:int sets:int
-        moves = (kind == KIND_MOVE) | (kind == KIND_MOVEL)
         jogs = kind == KIND_JOG
         sets = (kind == KIND_OUTPUT) | (kind == KIND_LEVEL)
         bnz     moves, motion
@@ -378,7 +383,7 @@ motion:
         bz      positive, refused
 ; It goes on where the motion before ends; without one, the robot must stand.
         li      rc, CAUSE_NOTWHILEMOVING
-        is = jogging | halting | (!pending & (mode != MODE_STANDING))
+        is = jogging | halting | (!motions & (mode != MODE_STANDING))
         bnz     is, refused
         planning = 1                    ; the words that follow are for the next period
         mov     left, zero
@@ -408,8 +413,8 @@ resetting:
 words_end:
         bz      planning, no_plan
         planning = 0
-        bnz     pending, plan_motion
-; Nothing is going on: the way begins where the robot stands.
+        bnz     motions, plan_motion
+; No motion is going on: the way begins where the robot stands.
         mov     via_before, zero
         .rep    i, 1, 6
         st      planned + i - 1, stand{i}
@@ -463,13 +468,15 @@ taken_reply:
         current = re == now
         done = r & REPLY_DONE
         done = current & (done != 0)
+        sets_now = r & REPLY_SET
         pending = pending - done
+        done = done & (sets_now == 0)
+        motions = motions - done
         jogged = r & REPLY_JOGGED
         jogging = (jogged != 0) & (rs == jogging) ? 0 : jogging
         halts = r & REPLY_HALTED
         halting = (halts != 0) & current ? HALTED : halting
         locks = r & REPLY_LOCK
-        sets_now = r & REPLY_SET
         iand    rk, r, 0xff
         bnz     sets_now, setting
         bz      locks, unlocked
@@ -529,7 +536,7 @@ known_error:
 
 ; Nothing in the queue counts any more.
 drop:   now = now + 1
-        pending, jogging = 0, 0
+        pending, motions, jogging = 0, 0, 0
         li      halting, 1
         mov     epoch, now
         ret

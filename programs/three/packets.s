@@ -63,7 +63,10 @@
 .const  CAUSE_NOTWHILEMOVING = 16
 .const  CAUSE_DEADLINE       = 17
 
-; ---- Between the cores: bits beside a reply's kind ------------------------------------------------------------------------------
+; ---- Between the cores ---------------------------------------------------------------------------------------------------------
+.const  QUEUE = 32                      ; items that wait for the kinematic core at most: depth of the FIFO `items`
+
+; Bits beside a reply's kind.
 .const  REPLY_DONE  = 0x100             ; a motion, an output or a level leaves the queue
 .const  REPLY_SET   = 0x200             ; the queue has come to an output or a level: cause and value are its two words
 .const  REPLY_LOCK  = 0x400             ; only a reset ends this

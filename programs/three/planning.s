@@ -152,7 +152,7 @@ periods_of:
         call    say
         bnz     check, no_plan
         via_before = fl & FLAG_VIA
-        pending = pending + 1
+        pending, motions = pending + 1, motions + 1
         profile, periods, ramp_periods, flags = pr, N, M, fl
         j = 0
         .loop_bound 6

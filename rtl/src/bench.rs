@@ -1,7 +1,7 @@
 //! What stands beside the core in an exported folder: file lists, memory image, test bench.
 
 use crate::export::{Design, DesignFile, INPUT_DELAY, RESET_CYCLES, synthesis_top};
-use crate::wishbone;
+use crate::{axi, wishbone};
 use std::fmt::Write as _;
 use takt_isa::{Machine, Program, Register};
 
@@ -99,6 +99,7 @@ pub fn folder(
     files.push(put(format!("{bench_name}.f"), list(std::slice::from_ref(&bench_file), false)));
     files.push(put(synthesis, wishbone::on_few_pins(design)));
     files.push(put(format!("{}.v", wishbone::name(design)), wishbone::wrapper(design, latched)));
+    files.push(put(format!("{}.v", axi::name(design)), axi::wrapper(design, latched)));
     files.push(put(bench_file, bench(machine, top, latched)));
     let nothing = || "// no program: `takt rtl --program FILE` writes one\n".to_owned();
     files.push(put("program.hex".to_owned(), program.map_or_else(nothing, image)));

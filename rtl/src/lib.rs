@@ -5,6 +5,7 @@
 //! ([`circuit`]), the tables of `takt-isa` say how many operands they have and how long they take; [`plan`] says what follows from a machine's row,
 //! and [`export()`] writes the complete core of a machine from it, by a small model of Verilog ([`verilog`]).
 
+pub mod axi;
 pub mod bench;
 pub mod circuit;
 pub mod export;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Synthesis {
-    /// Name of the machine, or of the unit.
+    /// Name of the machine, or of the unit; path of a system's file.
     pub design: String,
     /// The device, as its maker calls it: `LFE5U-85F`.
     pub device: String,
@@ -22,6 +22,19 @@ pub struct Synthesis {
     pub date: String,
     /// The tools and their versions.
     pub tools: String,
+    /// What the parts of a system take, before place and route; else none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parts: Vec<Part>,
+}
+
+/// A part of a system: a core with its gate, a link, or what is left.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Part {
+    /// What it is, in words.
+    pub name: String,
+    /// What it takes.
+    pub resources: Resources,
 }
 
 /// What a design takes of a device.
@@ -101,6 +114,7 @@ mod tests {
             critical_path: String::new(),
             date: String::new(),
             tools: String::new(),
+            parts: Vec::new(),
         };
         assert_eq!(row(&[]).median(), None);
         assert_eq!(row(&[3.0, 1.0, 2.0]).median(), Some(2.0));

@@ -45,6 +45,10 @@ fn no_tool_complains() {
         let open = "-Wno-PINCONNECTEMPTY".to_owned();
         let own = [format!("{top}_wishbone.v"), format!("{synthesis}.v")];
         verilator(&[&[open, "-f".to_owned(), format!("{top}.f")], &own[..]].concat(), &synthesis);
+        let axi = format!("{top}_axi");
+        let own = [format!("{top}_wishbone.v"), format!("{axi}.v")];
+        let open = "-Wno-PINCONNECTEMPTY".to_owned();
+        verilator(&[&[open, "-f".to_owned(), format!("{top}.f")], &own[..]].concat(), &axi);
         let mut icarus = Command::new("iverilog");
         icarus.current_dir(folder).args(["-g2005", "-Wall", "-Wno-timescale", "-t", "null", "-s"]);
         silent(icarus.args([format!("{top}_bench"), "-f".to_owned(), format!("{top}_bench.f")]));

@@ -20,4 +20,6 @@ pub use description::{
     MIN_LATENCY, Side, Source, Status, SystemPort, TEXT_BYTES,
 };
 pub use fifo::FifoCounts;
-pub use system::{CorePeriods, HostError, InputEvent, LinkEvent, LinkEventKind, System, SystemFault};
+pub use system::{
+    CorePeriods, HostAction, HostError, InputEvent, LinkEvent, LinkEventKind, System, SystemFault,
+};

@@ -53,6 +53,7 @@ fn mistakes() {
         ("an empty file", String::new()),
         ("no TOML", "tick = = 3".to_owned()),
         ("no core", "tick = 5".to_owned()),
+        ("a board's wiring", include_str!("../../programs/examples/board/position.toml").to_owned()),
         ("an unknown key", changed("latency", "latencey")),
         ("a missing key", changed("program = \"a.s\"\n", "")),
         ("a missing program", changed("\"a.s\"", "\"b.s\"")),

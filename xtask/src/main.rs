@@ -2,6 +2,8 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod book;
+mod clients;
+mod dist;
 mod docs;
 mod formal;
 mod python;
@@ -53,6 +55,10 @@ enum Task {
     Reach(reach::Arguments),
     /// Build the playground, a page for any file server, in target/playground (installs what it lacks); --test opens it in a browser.
     Web(web::Arguments),
+    /// Verify the core's bus slaves and a board's UART with clients that other projects wrote, in Icarus Verilog (a share of `test`).
+    Clients,
+    /// Write an archive for each machine, target/dist/takt-*.tar.gz: its Verilog, a FuseSoC core, headers, the data sheet as PDF.
+    Dist(dist::Arguments),
     /// Write the documentation as a site, in target/book/site: docs/, the crates' documentation, the playground (installs mdbook).
     Book(book::Arguments),
     /// Measure how fast emulator, assembler and lockstep are beside native code, GNU `as` and one another; print it and write
@@ -86,6 +92,11 @@ fn main() -> Result<()> {
         Task::Synth(arguments) => synth::synth(&arguments),
         Task::Reach(arguments) => reach::reach(&arguments),
         Task::Web(arguments) => web::web(&arguments),
+        Task::Clients => {
+            install()?;
+            clients::test()
+        }
+        Task::Dist(arguments) => dist::dist(&arguments),
         Task::Book(arguments) => book::book(&arguments),
         Task::Speed => speed(),
         Task::Wheel(arguments) => python::wheel(&arguments),
@@ -126,13 +137,14 @@ fn works(program: &str, argument: &str) -> bool {
 }
 
 /// What the tests call, how to ask whether it works, and the Debian package that has it.
-const TOOLS: [(&str, &str, &str); 9] = [
+const TOOLS: [(&str, &str, &str); 10] = [
     // Berkeley SoftFloat, the reference arithmetic, is C.
     ("cc", "--version", "gcc"),
     // The circuit runs in Verilator, which builds with make and a C++ compiler, and in Icarus Verilog.
     ("c++", "--version", "g++"),
     ("make", "--version", "make"),
     ("verilator", "--version", "verilator"),
+    ("llvm-mca", "--version", "llvm"),
     ("iverilog", "-V", "iverilog"),
     // The language server is used by the client of an editor.
     ("nvim", "--version", "neovim"),
@@ -212,6 +224,8 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
     if rest.is_empty() {
         extension()?;
         formal::formal(&formal::Arguments::SHARE)?;
+        clients::test()?;
+        dist::test()?;
     }
     let mut tests = cargo();
     tests.args(["test", "--workspace", "--features", EVERYTHING, "--no-fail-fast", "--release"]).args(rest);

@@ -7,15 +7,17 @@ use super::{Filter, Twin, high};
 pub struct Quadrature {
     pins: [Filter; 3],
     was: [bool; 3],
+    start: u32,
     now: [u32; 4],
     taken: [u32; 4],
 }
 
 impl Quadrature {
-    /// With levels that have stood for `filter` cycles.
-    pub fn new(filter: u32) -> Quadrature {
+    /// With levels that have stood for `filter` cycles, and the count after a reset.
+    pub fn new(filter: u32, start: u32) -> Quadrature {
         let pins = [(); 3].map(|()| Filter::new(filter));
-        Quadrature { pins, was: [false; 3], now: [0; 4], taken: [0; 4] }
+        let now = [start, 0, 0, 0];
+        Quadrature { pins, was: [false; 3], start, now, taken: now }
     }
 }
 
@@ -45,7 +47,8 @@ impl Twin for Quadrature {
         }
         self.was = [a, b, index];
         if rst {
-            (self.now, self.taken) = ([0; 4], [0; 4]);
+            self.now = [self.start, 0, 0, 0];
+            self.taken = self.now;
         }
         for (i, pin) in self.pins.iter_mut().enumerate() {
             pin.clock(rst, high(inputs, 2 + i));

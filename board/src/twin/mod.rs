@@ -31,7 +31,7 @@ pub fn of(kind: &Kind, parameters: &[u32]) -> Option<Box<dyn Twin>> {
         parameters.get(i).copied().unwrap_or_else(|| kind.parameters.get(i).map_or(0, |p| p.default))
     };
     Some(match kind.name {
-        "quadrature" => Box::new(Quadrature::new(value(0))),
+        "quadrature" => Box::new(Quadrature::new(value(0), value(1))),
         "step" => Box::new(Step::new(value(0))),
         "pwm" => Box::new(Pwm::new(value(0), value(1), value(2) != 0)),
         "sigma-delta" => Box::new(SigmaDelta::new(value(0) != 0)),

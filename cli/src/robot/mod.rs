@@ -48,6 +48,10 @@ pub(crate) struct Robot {
     /// Draw joint angles, velocities, tracking errors and the tool's path as SVG; `-` is standard output.
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
+    /// Write what the host and the encoders say, a row for each base tick of 100 µs, as CSV for `takt run`, `cosim` and
+    /// `debug` of the system; the line to the controller then takes one word a tick.
+    #[arg(long, value_name = "CSV", conflicts_with = "check")]
+    record: Option<PathBuf>,
     /// Print messages and tables as JSON.
     #[arg(long)]
     json: bool,
@@ -59,6 +63,8 @@ Examples:
   takt robot programs/three/demonstration.robot      a program, and tables of what it came to
   takt robot demonstration.robot --plot robot.svg    with a picture
   takt robot square.robot --check                    can it run?
+  takt robot square.robot --record in.csv            and programs/three/controller.toml runs on it again:
+  takt cosim programs/three/controller.toml --inputs in.csv --periods 300
   takt robot square.robot --faults corrupt@1.5       what the controller does about a bad packet
   echo 'move joints(30, _, _, _, _, _)' | takt robot";
 
@@ -113,6 +119,7 @@ pub(crate) fn run(arguments: &Robot, color: bool, out: &mut Out) -> Result<()> {
     reads.extend(arguments.system.as_deref().map(|path| ("--system", path)));
     let mut writes: Vec<Given<'_>> = Vec::new();
     writes.extend(arguments.plot.as_deref().map(|path| ("--plot", path)));
+    writes.extend(arguments.record.as_deref().map(|path| ("--record", path)));
     if arguments.json {
         writes.push(("--json", Path::new("-")));
     }
@@ -130,7 +137,10 @@ pub(crate) fn run(arguments: &Robot, color: bool, out: &mut Out) -> Result<()> {
         Some(path) => system::load(path, &SourceArguments::default(), color)?.description,
         None => standard().map_err(Failure::Diagnostics)?,
     };
-    let controller = Controller::new(&description, Plant::standard())?;
+    let mut controller = Controller::new(&description, Plant::standard())?;
+    if arguments.record.is_some() {
+        controller.keep_host_actions();
+    }
     let interrupt = Arc::new(AtomicBool::new(false));
     let mut session = Session::new(controller, Arc::new(OnDisk), Arc::clone(&interrupt))?;
     for (fault, time) in &arguments.faults {
@@ -141,7 +151,8 @@ pub(crate) fn run(arguments: &Robot, color: bool, out: &mut Out) -> Result<()> {
     let json = arguments.json;
     let (messages, mistakes) = (Vec::new(), Vec::new());
     let mut desk = Desk { session, interrupt, out, color, json, messages, mistakes, failed: false };
-    let plotted = arguments.plot.as_deref().is_some_and(files::is_dash);
+    let plotted =
+        [&arguments.plot, &arguments.record].iter().any(|path| path.as_deref().is_some_and(files::is_dash));
     desk.json |= plotted;
     match (program, script) {
         (Some((name, text)), _) if arguments.check => {
@@ -160,12 +171,15 @@ pub(crate) fn run(arguments: &Robot, color: bool, out: &mut Out) -> Result<()> {
         desk.told(result)?;
     }
     let controller = desk.session.host().robot();
+    if let Some(path) = &arguments.record {
+        system::record::write(controller.system(), path)?;
+    }
     let summary = Summary::of(controller, desk.session.host().time());
     if let Some(path) = &arguments.plot {
         let name = arguments.file.as_deref().or(arguments.script.as_deref());
         let title = name.map_or_else(|| "the session".to_owned(), files::input_name);
         let svg = picture::draw(&title, controller.records())?;
-        if plotted {
+        if files::is_dash(path) {
             desk.out.write_all(svg.as_bytes())?;
         } else {
             files::write(path, svg.as_bytes())?;

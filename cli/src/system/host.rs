@@ -96,9 +96,13 @@ impl Host {
         // The table of inputs wants a register; nobody asks for it here.
         let port = |name, ty| Port { name, register: Register::ZERO, ty };
         let inputs = self.inputs.iter().map(|input| port(input.name.clone(), input.ty));
-        let pushes =
-            self.pushes.iter().map(|link| port(format!("{}.{PUSH}", description.links[*link].name), Type::I));
+        let pushes = self.pushes.iter().map(|link| port(Host::push_column(description, *link), Type::I));
         inputs.chain(pushes).collect()
+    }
+
+    /// The name of the column that says whether an entry goes into a FIFO.
+    pub(crate) fn push_column(description: &Description, link: usize) -> String {
+        format!("{}.{PUSH}", description.links[link].name)
     }
 
     /// Does what a row says; how many entries did not fit.

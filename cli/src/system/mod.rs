@@ -5,6 +5,7 @@ pub(crate) mod bound;
 pub(crate) mod cosim;
 pub(crate) mod debug;
 mod host;
+pub(crate) mod record;
 pub(crate) mod run;
 pub(crate) mod track;
 

@@ -1,7 +1,7 @@
 //! `takt track --system`: the hybrid robot on a system of cores, one of which computes the path's points.
 
 use super::bound::{bounds, write_ways};
-use super::{LoadedSystem, load, told};
+use super::{LoadedSystem, load, record, told};
 use crate::files::{self, Out};
 use crate::output;
 use crate::plot::Plot;
@@ -175,6 +175,9 @@ pub(crate) fn run(arguments: &Track, file: &Path, color: bool, out: &mut Out) ->
     let ways = latencies(description, &bounds).map_err(|error| anyhow!("no end-to-end bound: {error}"))?;
     let robot = arguments.robot.robot(&trajectory)?;
     let mut controller = OnSystem::new(description, blocks(&trajectory)?)?;
+    if arguments.csv.is_some() {
+        controller.system.keep_host_actions();
+    }
     let fault = |error: StepError| match error {
         StepError::Fault(fault) => told(&fault, &loaded, color),
         other => other.into(),
@@ -213,10 +216,14 @@ pub(crate) fn run(arguments: &Track, file: &Path, color: bool, out: &mut Out) ->
         file.finish()?;
     }
     let system = &closed_loop.controller().system;
+    if let Some(path) = &arguments.csv {
+        record::write(system, path)?;
+    }
     let ran = Ran { arguments, file, path, loaded: &loaded, system, periods, errors, points, ways };
     if arguments.json {
         output::json(&ran.json(), out)
-    } else if arguments.plot.as_deref().is_some_and(files::is_dash) {
+    } else if [&arguments.plot, &arguments.csv].iter().any(|path| path.as_deref().is_some_and(files::is_dash))
+    {
         Ok(())
     } else {
         ran.text(out)

@@ -3,12 +3,13 @@
 use super::model::{PinAction, SystemEvent, SystemSimulation};
 use crate::lockstep::{REPORT_DELAY, bare, circuit_stops, describe, expect, show};
 use crate::model::{CircuitEvent, EventKind, ModelError};
+use std::collections::BTreeMap;
 use takt_emu::{LoadError, Status};
 use takt_isa::BundleAddress;
 use takt_isa::timing::{Cycle, INPUT_DELAY};
 use takt_rtl::system::{Pin, PinKind, SystemPlan};
 use takt_rtl::verilog::Direction;
-use takt_system::{Description, HostError, LinkEventKind, LinkKind, System, SystemFault};
+use takt_system::{Description, HostAction, HostError, LinkEventKind, LinkKind, System, SystemFault};
 use thiserror::Error;
 
 /// Why a lockstep run of a system came to no result.
@@ -59,6 +60,10 @@ pub struct SystemLockstep {
     actions: Vec<PinAction>,
     simulated: Cycle,
     compared: u64,
+    /// Of each link, what the host has written to a FIFO's fields, by pin; and the first cycles in which its next entry goes in,
+    /// and comes out.
+    working: Vec<BTreeMap<usize, u32>>,
+    free: Vec<[Cycle; 2]>,
 }
 
 impl SystemLockstep {
@@ -83,6 +88,8 @@ impl SystemLockstep {
             actions: Vec::new(),
             simulated: 0,
             compared: 0,
+            working: vec![BTreeMap::new(); description.links.len()],
+            free: vec![[0; 2]; description.links.len()],
         })
     }
 
@@ -121,11 +128,16 @@ impl SystemLockstep {
                 }
         };
         let Some(link) = self.pins.iter().find(own).map(|pin| pin.link) else { return Ok(()) };
-        let wire = matches!(description.links[link].kind, LinkKind::Wire);
-        let pin = self.pins.iter().position(|pin| own(&pin));
-        self.actions.extend(pin.map(|pin| (self.system.now(), pin, bits)));
-        if wire {
-            self.strobe(link, PinKind::Send);
+        let Some(pin) = self.pins.iter().position(|pin| own(&pin)) else { return Ok(()) };
+        let now = self.system.now();
+        match description.links[link].kind {
+            LinkKind::Wire => {
+                self.actions.push((now, pin, bits));
+                self.strobe(now, link, PinKind::Send);
+            }
+            LinkKind::Snapshot { .. } => self.actions.push((now, pin, bits)),
+            // On the pins when its entry goes in.
+            LinkKind::Fifo { .. } => drop(self.working[link].insert(pin, bits)),
         }
         Ok(())
     }
@@ -136,23 +148,45 @@ impl SystemLockstep {
     /// As there.
     pub fn publish(&mut self, link: usize) -> Result<(), SystemLockstepError> {
         self.system.publish(link)?;
-        self.strobe(link, PinKind::Send);
+        self.strobe(self.system.now(), link, PinKind::Send);
         Ok(())
     }
 
-    /// As [`System::push`]; no more than one a cycle.
+    /// As [`System::push`]: of several in one cycle, each goes in a cycle after the one before.
     ///
     /// # Errors
     /// As there.
     pub fn push(&mut self, link: usize) -> Result<bool, SystemLockstepError> {
         let room = self.system.push(link)?;
-        self.strobe(link, PinKind::Send);
+        let cycle = self.turn(link, 0);
+        self.actions.extend(self.working[link].iter().map(|(&pin, &bits)| (cycle, pin, bits)));
+        self.strobe(cycle, link, PinKind::Send);
         Ok(room)
     }
 
-    fn strobe(&mut self, link: usize, kind: PinKind) {
+    fn strobe(&mut self, cycle: Cycle, link: usize, kind: PinKind) {
         let pin = self.pins.iter().position(|pin| pin.link == link && pin.kind == kind);
-        self.actions.extend(pin.map(|pin| (self.system.now(), pin, 1)));
+        self.actions.extend(pin.map(|pin| (cycle, pin, 1)));
+    }
+
+    /// The cycle in which a FIFO takes the host's next entry, or gives it one: one a cycle.
+    fn turn(&mut self, link: usize, way: usize) -> Cycle {
+        let cycle = self.system.now().max(self.free[link][way]);
+        self.free[link][way] = cycle + 1;
+        cycle
+    }
+
+    /// Does what a host did, as [`System::host_actions`] has it.
+    ///
+    /// # Errors
+    /// If the system is another one.
+    pub fn act(&mut self, action: &HostAction) -> Result<(), SystemLockstepError> {
+        match action {
+            HostAction::Input { name, bits } => self.set_input(name, *bits),
+            HostAction::Publish(link) => self.publish(*link),
+            HostAction::Push(link) => self.push(*link).map(drop),
+            HostAction::Pop(link) => self.pop(*link).map(drop),
+        }
     }
 
     /// The host writes all fields of a link that it drives: of a wire its value, of a snapshot what it publishes, of a FIFO an
@@ -176,14 +210,15 @@ impl SystemLockstep {
         }
     }
 
-    /// The host takes the head of a FIFO; `None` if it is empty. No more than one a cycle.
+    /// The host takes the head of a FIFO; `None` if it is empty. Of several in one cycle as of [`SystemLockstep::push`].
     ///
     /// # Errors
     /// If there is no such FIFO.
     pub fn pop(&mut self, link: usize) -> Result<Option<Vec<u32>>, SystemLockstepError> {
         let head = self.system.pop(link)?;
         if head.is_some() {
-            self.strobe(link, PinKind::Pop);
+            let cycle = self.turn(link, 1);
+            self.strobe(cycle, link, PinKind::Pop);
         }
         Ok(head)
     }

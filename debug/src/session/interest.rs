@@ -87,6 +87,21 @@ impl Interest {
         self.bundles.iter().copied().filter(|_| !self.every && !self.clock)
     }
 
+    /// Whether every position matters in which something can happen.
+    pub(super) fn is_each(&self) -> bool {
+        self.every || self.clock
+    }
+
+    /// Whether those of a bundle matter.
+    pub(super) fn is_of(&self, address: BundleAddress) -> bool {
+        self.bundles.contains(&address)
+    }
+
+    /// The numbers of cycles that matter, of a range.
+    pub(super) fn cycles(&self, begin: Cycle, end: Cycle) -> impl Iterator<Item = Cycle> {
+        self.cycles.iter().copied().filter(move |cycle| (begin..=end).contains(cycle))
+    }
+
     /// The next position that matters but for the pauses, at `until` at the latest; `issuing` is about to issue.
     pub(super) fn next(&self, emulator: &Emulator, issuing: Option<BundleAddress>, until: Cycle) -> Cycle {
         let now = emulator.now();

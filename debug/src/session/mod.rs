@@ -16,11 +16,13 @@ mod interest;
 mod meaning;
 mod number;
 mod run;
+mod search;
 mod stops;
 
 pub use expression::{Live, Place};
 pub use meaning::Life;
 pub use number::{Shown, UlpDistance, hex_float, ulp_distance};
+pub(crate) use search::Search;
 pub use stops::{Stop, Test, Where};
 
 use expression::Machine;
@@ -91,6 +93,20 @@ impl Control {
     /// How far the command has come.
     pub fn cycle(&self) -> Cycle {
         self.cycle.load(Ordering::Relaxed)
+    }
+}
+
+/// Sets a register or a data word.
+pub(crate) fn put(emulator: &mut Emulator, place: Place, bits: u32) {
+    match place {
+        Place::Register(register) => {
+            emulator.set_register(register, bits);
+        }
+        Place::Word(word) => {
+            if let Some(word) = emulator.memory_mut().get_mut(word as usize) {
+                *word = bits;
+            }
+        }
     }
 }
 
@@ -394,8 +410,9 @@ impl Session {
     }
 
     /// Looks at a machine that somebody else runs, of this program: what there is to see is its. This session does not move it.
-    pub(crate) fn look(&mut self, emulator: Emulator, periods: u64) {
-        self.core = Core { emulator, periods, boundary: false, report: None, edits: 0 };
+    /// `boundary`: whether a period has just ended.
+    pub(crate) fn look(&mut self, emulator: Emulator, periods: u64, boundary: bool) {
+        self.core = Core { emulator, periods, boundary, report: None, edits: 0 };
         self.checkpoints.clear();
         self.edits.clear();
         self.checkpoints.push(self.core.checkpoint());
@@ -430,16 +447,7 @@ impl Session {
     fn make_edits(&mut self) {
         let now = self.core.emulator.now();
         while let Some(edit) = self.edits.get(self.core.edits).filter(|edit| edit.cycle == now) {
-            match edit.place {
-                Place::Register(register) => {
-                    self.core.emulator.set_register(register, edit.bits);
-                }
-                Place::Word(word) => {
-                    if let Some(word) = self.core.emulator.memory_mut().get_mut(word as usize) {
-                        *word = edit.bits;
-                    }
-                }
-            }
+            put(&mut self.core.emulator, edit.place, edit.bits);
             self.core.edits += 1;
         }
     }
@@ -461,6 +469,11 @@ impl Session {
         self.next_id += 1;
         self.stops.push((id, stop));
         id
+    }
+
+    /// The number that the next one gets.
+    pub(crate) fn next_stop(&mut self) -> &mut u32 {
+        &mut self.next_id
     }
 
     /// Removes one; whether there was one.

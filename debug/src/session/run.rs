@@ -354,7 +354,7 @@ impl Session {
     }
 
     /// Whether an expression has a value other than zero.
-    pub(super) fn holds(&self, live: &Live) -> bool {
+    pub(crate) fn holds(&self, live: &Live) -> bool {
         self.evaluate(live).is_ok_and(|value| !value.is_zero())
     }
 }

@@ -1,8 +1,8 @@
 //! Commands on a system's session: those that move all cores, and a single core's for what there is to see of the one selected.
 
 use super::{Step, SystemSession, SystemStop, SystemWhy};
-use crate::console::{Commands, Console, INSPECTION, named};
-use crate::session::{Session, Shown, Where};
+use crate::console::{Commands, Console, INSPECTION, named, told};
+use crate::session::{Session, Shown};
 use std::fmt::Write as _;
 use takt_asm::nearest;
 use takt_emu::Status;
@@ -35,11 +35,16 @@ const COMMANDS: &[Row] = &[
     ),
     Row("back", "b", "[UNIT] [N]", "Step back by the same units.", |c, a| c.step(a, true)),
     Row("continue", "c", "", "Run on to a stop.", |c, _| {
-        let why = c.session.resume();
+        let why = c.session.resume(&mut sessions(&mut c.views));
         Ok(c.arrive(&why))
     }),
     Row("reverse", "rc", "", "Run back to one.", |c, _| {
-        let why = c.session.resume_back();
+        let why = c.session.resume_back(&mut sessions(&mut c.views));
+        Ok(c.arrive(&why))
+    }),
+    Row("until", "u", "EXPR", "Run on until an expression over the selected core is not zero.", |c, a| {
+        let live = c.views[c.selected].session.parse(a)?;
+        let why = c.session.run_until(&mut sessions(&mut c.views), c.selected, live);
         Ok(c.arrive(&why))
     }),
     Row(
@@ -52,14 +57,26 @@ const COMMANDS: &[Row] = &[
     Row(
         "break",
         "br",
-        "PLACE",
-        "Stop at `link NAME [EVENT]`, at `cycle N`, or where a bundle of the selected core is about to issue: `label`, `:12`, `bundle 3`.",
+        "PLACE [if EXPR]",
+        "Stop at `link NAME [EVENT]`, or, as with a single core, where a bundle of the selected one is about to issue: `label`, `:12`, `bundle 3`; at `cycle N`, or its `period N`.",
         SystemConsole::add_break,
     ),
+    Row(
+        "watch",
+        "w",
+        "EXPR [== EXPR | > EXPR | nan | subnormal]",
+        "Stop when a value of the selected core changes, or becomes equal, above, a NaN, a subnormal number.",
+        |c, a| c.add_stop("watch", a),
+    ),
+    Row(
+        "set",
+        "",
+        "PLACE = EXPR",
+        "Set a register, port or data word of the selected core; links do not notice. What was run beyond this position is forgotten.",
+        SystemConsole::set,
+    ),
     Row("delete", "d", "[N]", "Remove a stop, or all.", SystemConsole::delete),
-    Row("stops", "", "", "List stops.", |c, _| {
-        Ok(c.session.stops().map(|(id, text)| format!("{id:>3}  {text}\n")).collect())
-    }),
+    Row("stops", "", "", "List stops.", |c, _| Ok(c.stops())),
     Row("where", "", "", "This position.", |c, _| Ok(c.place())),
     Row("help", "h", "", "This list.", |_, _| Ok(help())),
     Row("quit", "q", "", "Leave.", |c, _| {
@@ -98,6 +115,11 @@ pub struct SystemConsole {
     quit: bool,
     /// The last step, which an empty line repeats.
     last: String,
+}
+
+/// The cores' own sessions.
+fn sessions(views: &mut [Console]) -> Vec<&mut Session> {
+    views.iter_mut().map(|view| &mut view.session).collect()
 }
 
 /// What a line is.
@@ -147,7 +169,7 @@ impl SystemConsole {
     fn look(&mut self) {
         let system = self.session.system();
         for (core, view) in self.views.iter_mut().enumerate() {
-            view.session.look(system.core(core).clone(), system.periods(core).count);
+            view.session.look(system.core(core).clone(), system.periods(core).count, false);
         }
     }
 
@@ -161,6 +183,11 @@ impl SystemConsole {
         self.look();
         let mut text = match why {
             SystemWhy::Done => String::new(),
+            SystemWhy::Core(core, why) => {
+                // What is looked at next is where it has stopped.
+                self.selected = *core;
+                told(why.clone(), &self.views[*core].session)
+            }
             SystemWhy::Stop(id) => {
                 let known = self.session.stops().find(|(known, _)| known == id);
                 format!("stop {id}: {}\n", known.map_or("", |(_, text)| text))
@@ -340,47 +367,70 @@ impl SystemConsole {
                     Some((name.trim(), kind))
                 });
                 match event {
-                    Some((name, kind)) => SystemStop::Link(self.link(name)?, Some(kind)),
+                    Some((name, kind)) => SystemStop { link: self.link(name)?, kind: Some(kind) },
                     None => {
                         let link = self.link(rest.trim()).map_err(|error| {
                             let kinds: Vec<&str> = EVENTS.iter().map(|kind| kind.name()).collect();
                             format!("{error}; events: {}", kinds.join(" "))
                         })?;
-                        SystemStop::Link(link, None)
+                        SystemStop { link, kind: None }
                     }
                 }
             }
-            None => match Where::parse(arguments, self.views[self.selected].session.program())? {
-                Where::Bundle(bundle) => SystemStop::Bundle(self.selected, vec![bundle]),
-                Where::Line(_, bundles) => SystemStop::Bundle(self.selected, bundles),
-                Where::Cycle(cycle) => SystemStop::Cycle(cycle),
-                Where::Period(_) => {
-                    return Err(
-                        "a system stops at `cycle N`, at a link's event, or at a core's bundle".to_owned()
-                    );
-                }
-            },
+            None => return self.add_stop("break", arguments),
         };
-        let text = match stop {
-            SystemStop::Bundle(core, _) => {
-                format!("break {arguments} of core {}", self.system().description().cores[core].name)
-            }
-            _ => format!("break {arguments}"),
-        };
+        let text = format!("break {arguments}");
         let id = self.session.add_stop(stop, text.clone());
         Ok(format!("stop {id}: {text}\n"))
     }
 
-    fn delete(&mut self, arguments: &str) -> Result<String, String> {
-        if arguments.is_empty() {
-            let all: Vec<u32> = self.session.stops().map(|(id, _)| id).collect();
-            all.iter().for_each(|id| {
-                self.session.remove_stop(*id);
-            });
-            return Ok(format!("{} removed\n", all.len()));
+    /// Adds a stop of the selected core's own session.
+    fn add_stop(&mut self, command: &str, arguments: &str) -> Result<String, String> {
+        let view = &mut self.views[self.selected];
+        *view.session.next_stop() = *self.session.next_stop();
+        let said = view.execute(&format!("{command} {arguments}"))?;
+        *self.session.next_stop() = *view.session.next_stop();
+        Ok(said)
+    }
+
+    /// Each with its number and text, and that of the core's name, in the order of their numbers.
+    fn all_stops(&self) -> Vec<(u32, String)> {
+        let mut stops: Vec<(u32, String)> =
+            self.session.stops().map(|(id, text)| (id, text.to_owned())).collect();
+        for (view, core) in self.views.iter().zip(&self.system().description().cores) {
+            let own = view.session.stops().iter();
+            stops.extend(own.map(|(id, stop)| (*id, format!("{} of core {}", stop.text(), core.name))));
         }
-        let id = arguments.parse().ok().filter(|id| self.session.remove_stop(*id));
-        id.map(|_| String::new()).ok_or_else(|| format!("there is no stop {arguments} (`stops` lists them)"))
+        stops.sort();
+        stops
+    }
+
+    fn stops(&self) -> String {
+        self.all_stops().into_iter().map(|(id, text)| format!("{id:>3}  {text}\n")).collect()
+    }
+
+    fn set(&mut self, arguments: &str) -> Result<String, String> {
+        let view = &mut self.views[self.selected];
+        let (place, bits, text) = view.setting(arguments)?;
+        // Whether there is such a place is known there.
+        view.session.set(place, bits)?;
+        self.session.set(self.selected, place, bits);
+        self.look();
+        Ok(text)
+    }
+
+    fn delete(&mut self, arguments: &str) -> Result<String, String> {
+        let all = self.all_stops();
+        let (session, views) = (&mut self.session, &mut self.views);
+        let mut remove =
+            |id: u32| session.remove_stop(id) || views.iter_mut().any(|view| view.session.remove_stop(id));
+        if !arguments.is_empty() {
+            let id = arguments.parse().ok().filter(|id| remove(*id));
+            let unknown = || format!("there is no stop {arguments} (`stops` lists them)");
+            return id.map(|_| String::new()).ok_or_else(unknown);
+        }
+        let removed = all.into_iter().filter(|(id, _)| remove(*id)).count();
+        Ok(format!("{removed} removed\n"))
     }
 }
 

@@ -7,18 +7,21 @@
 //! inputs for each base tick, written so early that the periods which begin there read them; of each FIFO to it, one entry taken.
 //!
 //! Looking back and ahead for what a command waits for, all that happens in a stretch is recorded, and the session then goes to
-//! the first or the last of it.
+//! the first or the last of it. What a core's own session stops at (breakpoints with conditions, watchpoints) is asked of that
+//! session, which looks at the core at each position that matters to it.
 
 mod console;
 
 pub use console::SystemConsole;
 
-use crate::session::{Control, RUN_LIMIT};
+use crate::session::{self, Control, Live, Place, RUN_LIMIT, Search, Session, Why};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use takt_emu::{Event, LoadError};
-use takt_isa::BundleAddress;
 use takt_isa::timing::Cycle;
-use takt_system::{Description, HostError, LinkEvent, LinkEventKind, MAX_LATENCY, System, SystemFault};
+use takt_system::{
+    Description, HostError, InputEvent, LinkEvent, LinkEventKind, MAX_LATENCY, System, SystemFault,
+};
 
 /// Cycles that are recorded at once.
 const STRETCH: Cycle = 1 << 12;
@@ -56,8 +59,10 @@ pub struct SystemOptions {
 pub enum SystemWhy {
     /// It is done.
     Done,
-    /// A stop, by number.
+    /// An event on a link, by the stop's number.
     Stop(u32),
+    /// What the session of a core has stopped at, or waited for.
+    Core(usize, Why),
     /// The beginning was reached.
     Start,
     /// Every core has halted.
@@ -74,15 +79,13 @@ pub enum SystemWhy {
     Host(HostError),
 }
 
-/// What to stop at.
+/// What to stop at: an event on a link; without a kind, any. (Stops at what a core does are those of its own session.)
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum SystemStop {
-    /// A core's bundle, of these, is about to issue.
-    Bundle(usize, Vec<BundleAddress>),
-    /// An event on a link; without a kind, any.
-    Link(usize, Option<LinkEventKind>),
-    /// So many cycles have passed.
-    Cycle(Cycle),
+pub struct SystemStop {
+    /// The link.
+    pub link: usize,
+    /// The event.
+    pub kind: Option<LinkEventKind>,
 }
 
 /// What to step by.
@@ -104,7 +107,28 @@ struct Point {
     turns: u64,
     /// Events on links that may be ahead of the position.
     links: Vec<LinkEvent>,
+    /// Edits that have been made.
+    edits: usize,
 }
+
+/// What was set by hand.
+#[derive(Clone, Copy, Debug)]
+struct Edit {
+    cycle: Cycle,
+    core: usize,
+    place: Place,
+    bits: u32,
+}
+
+/// What the cores did in a stretch.
+#[derive(Default)]
+struct Seen {
+    cores: Vec<(usize, Event)>,
+    inputs: Vec<InputEvent>,
+}
+
+/// What a core's session has found: where, which core, and what.
+type Found = (Cycle, usize, Why);
 
 /// What is looked for: positions at which to stop, with the stop's number if it is one.
 type Hits = Vec<(Cycle, Option<u32>)>;
@@ -118,6 +142,8 @@ pub struct SystemSession {
     interval: Cycle,
     stops: Vec<(u32, SystemStop, String)>,
     next_id: u32,
+    /// By cycle, ascending.
+    edits: Vec<Edit>,
     /// Cycles for which a command may run.
     pub run_limit: Cycle,
 }
@@ -130,7 +156,7 @@ impl SystemSession {
     pub fn new(description: &Description, options: SystemOptions) -> Result<SystemSession, LoadError> {
         let mut system = System::new(description)?;
         system.keep_events();
-        let point = Point { system, turns: 0, links: Vec::new() };
+        let point = Point { system, turns: 0, links: Vec::new(), edits: 0 };
         Ok(SystemSession {
             options,
             checkpoints: vec![point.clone()],
@@ -138,6 +164,7 @@ impl SystemSession {
             interval: STRETCH,
             stops: Vec::new(),
             next_id: 1,
+            edits: Vec::new(),
             run_limit: RUN_LIMIT,
         })
     }
@@ -165,6 +192,11 @@ impl SystemSession {
         self.next_id += 1;
         self.stops.push((id, stop, text));
         id
+    }
+
+    /// The number that the next one gets: one count for links and for all cores' sessions.
+    fn next_stop(&mut self) -> &mut u32 {
+        &mut self.next_id
     }
 
     /// Removes one; whether there was one.
@@ -202,7 +234,7 @@ impl SystemSession {
     pub fn step(&mut self, step: Step) -> SystemWhy {
         match step {
             Step::Cycle => self.go_to(self.cycle() + 1),
-            _ => self.seek(|cores, links| found(step, cores, links)),
+            _ => self.seek(&mut [], Vec::new(), |cores, _| found(step, cores)),
         }
     }
 
@@ -211,31 +243,88 @@ impl SystemSession {
         match (step, self.cycle()) {
             (_, 0) => SystemWhy::Start,
             (Step::Cycle, now) => self.go_to(now - 1),
-            _ => self.seek_back(|cores, links| found(step, cores, links)),
+            _ => self.seek_back(&mut [], |cores, _| found(step, cores)),
         }
     }
 
-    /// Runs on to a stop.
-    pub fn resume(&mut self) -> SystemWhy {
+    /// Runs on to a stop: an event on a link, or one of a core's session. `views` has a session for each core, or none.
+    pub fn resume(&mut self, views: &mut [&mut Session]) -> SystemWhy {
+        self.show(views);
         let stops = self.stops.clone();
-        self.seek(|cores, links| stopped(&stops, cores, links))
+        let searches = views.iter().map(|view| Search::stops(view)).collect();
+        self.seek(views, searches, |_, links| stopped(&stops, links))
     }
 
-    /// Runs back to a stop.
-    pub fn resume_back(&mut self) -> SystemWhy {
+    /// Runs back to one.
+    pub fn resume_back(&mut self, views: &mut [&mut Session]) -> SystemWhy {
         let stops = self.stops.clone();
-        self.seek_back(|cores, links| stopped(&stops, cores, links))
+        self.seek_back(views, |_, links| stopped(&stops, links))
+    }
+
+    /// Runs on to the next position at which an expression over a core holds.
+    pub fn run_until(&mut self, views: &mut [&mut Session], core: usize, live: Live) -> SystemWhy {
+        let Some(view) = views.get_mut(core) else { return SystemWhy::Done };
+        // As of a single core: what holds already may still hold in the next cycle.
+        if view.holds(&live) {
+            let why = self.go_to(self.cycle() + 1);
+            if why != SystemWhy::Done {
+                return why;
+            }
+            self.show_core(core, view, false);
+            if view.holds(&live) {
+                return SystemWhy::Core(core, Why::Holds);
+            }
+        }
+        let mut searches: Vec<Option<Search>> = views.iter().map(|_| None).collect();
+        searches[core] = Some(Search::value(live, views[core]));
+        self.seek(views, searches, |_, _| Hits::new())
+    }
+
+    /// Sets a register or a data word of a core. What was recorded of the run after this position is forgotten.
+    pub fn set(&mut self, core: usize, place: Place, bits: u32) {
+        let now = self.cycle();
+        self.edits.truncate(self.point.edits);
+        self.checkpoints.retain(|point| point.system.now() <= now);
+        self.edits.push(Edit { cycle: now, core, place, bits });
+        make_edits(&self.edits, &mut self.point);
+    }
+
+    /// Shows the cores to their sessions.
+    fn show(&self, views: &mut [&mut Session]) {
+        for (core, view) in views.iter_mut().enumerate() {
+            self.show_core(core, view, false);
+        }
+    }
+
+    fn show_core(&self, core: usize, view: &mut Session, boundary: bool) {
+        let system = self.system();
+        view.look(system.core(core).clone(), system.periods(core).count, boundary);
     }
 
     /// Goes on to the first position after this one that is looked for.
-    fn seek(&mut self, wanted: impl Fn(&[(usize, Event)], &[LinkEvent]) -> Hits) -> SystemWhy {
+    fn seek(
+        &mut self,
+        views: &mut [&mut Session],
+        mut searches: Vec<Option<Search>>,
+        wanted: impl Fn(&[(usize, Event)], &[LinkEvent]) -> Hits,
+    ) -> SystemWhy {
         let origin = self.cycle();
+        let looks = searches.iter().any(Option::is_some);
         loop {
-            let mut cores = Vec::new();
-            let why = self.advance(self.cycle() + STRETCH, Some(&mut cores));
+            let begin = looks.then(|| self.point.clone());
+            let mut seen = Seen::default();
+            let why = self.advance(self.cycle() + STRETCH, Some(&mut seen));
             let now = self.cycle();
-            let hits = wanted(&cores, &self.point.links).into_iter();
+            let hits = wanted(&seen.cores, &self.point.links).into_iter();
             let first = hits.filter(|(cycle, _)| *cycle > origin && *cycle <= now).min();
+            if let Some(begin) = begin {
+                let end = first.map_or(now, |(cycle, _)| cycle);
+                let found = self.walk(begin, end, &seen, views, &mut searches, true).pop();
+                if let Some((cycle, core, why)) = found {
+                    self.go_to(cycle);
+                    return SystemWhy::Core(core, why);
+                }
+            }
             if let Some((cycle, id)) = first {
                 self.go_to(cycle);
                 return id.map_or(SystemWhy::Done, SystemWhy::Stop);
@@ -252,20 +341,32 @@ impl SystemSession {
         }
     }
 
-    /// Goes back to the last position before this one that is looked for.
-    fn seek_back(&mut self, wanted: impl Fn(&[(usize, Event)], &[LinkEvent]) -> Hits) -> SystemWhy {
+    /// Goes back to the last position before this one that is looked for: that `wanted` finds, or a session's stops.
+    fn seek_back(
+        &mut self,
+        views: &mut [&mut Session],
+        wanted: impl Fn(&[(usize, Event)], &[LinkEvent]) -> Hits,
+    ) -> SystemWhy {
         // Looked for are positions before `end`, from a checkpoint before `before` on.
         let (mut end, mut before) = (self.cycle(), self.cycle());
         while before > 0 {
             self.restore(before - 1);
             let start = self.cycle();
+            self.show(views);
+            let mut searches: Vec<Option<Search>> = views.iter().map(|view| Search::stops(view)).collect();
+            let looks = searches.iter().any(Option::is_some);
             let mut hits = Hits::new();
-            let mut cores = Vec::new();
+            let mut found: Option<Found> = None;
             // What is told of late, too.
             while self.cycle() < end + LATE {
-                let why = self.advance((self.cycle() + STRETCH).min(end + LATE), Some(&mut cores));
-                hits.extend(wanted(&cores, &self.point.links));
-                cores.clear();
+                let begin = (looks && self.cycle() + 1 < end).then(|| self.point.clone());
+                let mut seen = Seen::default();
+                let why = self.advance((self.cycle() + STRETCH).min(end + LATE), Some(&mut seen));
+                hits.extend(wanted(&seen.cores, &self.point.links));
+                if let Some(begin) = begin {
+                    let last = self.cycle().min(end - 1);
+                    found = self.walk(begin, last, &seen, views, &mut searches, false).pop().or(found);
+                }
                 if why != SystemWhy::Done {
                     break;
                 }
@@ -273,9 +374,16 @@ impl SystemSession {
             // What has just happened where a stretch begins is known of the one before.
             let last =
                 hits.into_iter().filter(|(cycle, _)| *cycle < end && (*cycle > start || start == 0)).max();
-            if let Some((cycle, id)) = last {
-                self.go_to(cycle);
-                return id.map_or(SystemWhy::Done, SystemWhy::Stop);
+            match (last, found) {
+                (last, Some((cycle, core, why))) if last.is_none_or(|(other, _)| other < cycle) => {
+                    self.go_to(cycle);
+                    return SystemWhy::Core(core, why);
+                }
+                (Some((cycle, id)), _) => {
+                    self.go_to(cycle);
+                    return id.map_or(SystemWhy::Done, SystemWhy::Stop);
+                }
+                _ => {}
             }
             (end, before) = (start + 1, start);
             if self.interrupted() {
@@ -284,6 +392,65 @@ impl SystemSession {
         }
         self.go_to(0);
         SystemWhy::Start
+    }
+
+    /// Goes again from `begin` to `end`, over which the cores did what was seen, and shows each core to its session at each position
+    /// that matters to its search. What they have found, in order: the first, or all. The session is where it was.
+    fn walk(
+        &mut self,
+        begin: Point,
+        end: Cycle,
+        seen: &Seen,
+        views: &mut [&mut Session],
+        searches: &mut [Option<Search>],
+        first: bool,
+    ) -> Vec<Found> {
+        let here = std::mem::replace(&mut self.point, begin);
+        let start = self.cycle();
+        let mut positions: BTreeMap<Cycle, Vec<usize>> = BTreeMap::new();
+        let mut issues = BTreeMap::new();
+        let mut boundaries = Vec::new();
+        for (core, search) in searches.iter().enumerate() {
+            let Some(search) = search else { continue };
+            let events: Vec<&Event> =
+                seen.cores.iter().filter(|(own, _)| *own == core).map(|(_, event)| event).collect();
+            let inputs: Vec<&InputEvent> = seen.inputs.iter().filter(|input| input.core == core).collect();
+            for event in &events {
+                match event {
+                    Event::Issue { cycle, address } => drop(issues.insert((core, *cycle), *address)),
+                    Event::Wait { cycle, .. } => boundaries.push((core, cycle + 1)),
+                    _ => {}
+                }
+            }
+            let mut own = search.positions(&events, &inputs, start, end);
+            let edits = self.edits.iter().filter(|edit| edit.core == core).map(|edit| edit.cycle);
+            own.extend(edits.filter(|cycle| (start + 1..=end).contains(cycle)));
+            if start == 0 {
+                // The first values of input ports are there from the first cycle on.
+                own.insert(1);
+            }
+            for position in own {
+                positions.entry(position).or_default().push(core);
+            }
+        }
+        let mut found = Vec::new();
+        'positions: for (cycle, cores) in positions {
+            if self.advance(cycle, None) != SystemWhy::Done || self.cycle() != cycle {
+                break;
+            }
+            for core in cores {
+                let (Some(search), Some(view)) = (&mut searches[core], views.get_mut(core)) else { continue };
+                self.show_core(core, view, boundaries.contains(&(core, cycle)));
+                if let Some(why) = search.visit(view, issues.get(&(core, cycle)).copied()) {
+                    found.push((cycle, core, why));
+                    if first {
+                        break 'positions;
+                    }
+                }
+            }
+        }
+        self.point = here;
+        found
     }
 
     fn interrupted(&self) -> bool {
@@ -313,9 +480,11 @@ impl SystemSession {
         }
     }
 
-    /// Lets the system run until so many cycles have passed, with the host's turns on the way. `cores` gets what the cores do.
-    fn advance(&mut self, cycle: Cycle, mut cores: Option<&mut Vec<(usize, Event)>>) -> SystemWhy {
+    /// Lets the system run until so many cycles have passed, with the host's turns and the edits on the way. `seen` gets what the
+    /// cores do.
+    fn advance(&mut self, cycle: Cycle, mut seen: Option<&mut Seen>) -> SystemWhy {
         let point = &mut self.point;
+        make_edits(&self.edits, point);
         let now = point.system.now();
         // What has happened long ago is of no interest.
         point.links.retain(|event| event.cycle + LATE + STRETCH >= now);
@@ -326,18 +495,21 @@ impl SystemSession {
                 break;
             }
             let turn = turn(&point.system, point.turns);
-            if cores.is_some() {
+            let edit = self.edits.get(point.edits).map_or(Cycle::MAX, |edit| edit.cycle);
+            let until = cycle.min(edit);
+            if seen.is_some() {
                 point.system.keep_core_events();
             } else {
                 point.system.drop_core_events();
             }
             let result = match turn {
-                None => point.system.run_to_start(cycle).map(|_| ()),
-                Some(turn) => point.system.run_until(cycle.min(turn)),
+                None => point.system.run_to_start(until).map(|_| ()),
+                Some(turn) => point.system.run_until(until.min(turn)),
             };
             point.links.extend(point.system.take_events());
-            if let Some(cores) = &mut cores {
-                cores.extend(point.system.take_core_events());
+            if let Some(seen) = &mut seen {
+                seen.cores.extend(point.system.take_core_events());
+                seen.inputs.extend(point.system.take_input_events());
             }
             if let Err(fault) = result {
                 why = SystemWhy::Fault(fault);
@@ -348,12 +520,21 @@ impl SystemSession {
                     Err(error) => SystemWhy::Host(error),
                 };
             }
+            make_edits(&self.edits, point);
         }
         self.options.control.report(self.cycle());
         if why == SystemWhy::Done {
             self.checkpoint();
         }
         why
+    }
+}
+
+/// Makes the edits of this position that have not been made.
+fn make_edits(edits: &[Edit], point: &mut Point) {
+    while let Some(edit) = edits.get(point.edits).filter(|edit| edit.cycle == point.system.now()) {
+        session::put(point.system.core_mut(edit.core), edit.place, edit.bits);
+        point.edits += 1;
     }
 }
 
@@ -391,7 +572,7 @@ fn take_turn(options: &SystemOptions, point: &mut Point) -> Result<bool, HostErr
     Ok(true)
 }
 
-fn found(step: Step, cores: &[(usize, Event)], _: &[LinkEvent]) -> Hits {
+fn found(step: Step, cores: &[(usize, Event)]) -> Hits {
     let of = |wanted: usize, position: &dyn Fn(&Event) -> Option<Cycle>| -> Hits {
         let own = cores.iter().filter(|(core, _)| *core == wanted);
         own.filter_map(|(_, event)| Some((position(event)?, None))).collect()
@@ -409,26 +590,13 @@ fn found(step: Step, cores: &[(usize, Event)], _: &[LinkEvent]) -> Hits {
     }
 }
 
-fn stopped(stops: &[(u32, SystemStop, String)], cores: &[(usize, Event)], links: &[LinkEvent]) -> Hits {
+fn stopped(stops: &[(u32, SystemStop, String)], links: &[LinkEvent]) -> Hits {
     let mut hits = Hits::new();
     for (id, stop, _) in stops {
-        match stop {
-            SystemStop::Bundle(core, bundles) => {
-                hits.extend(cores.iter().filter_map(|(own, event)| match event {
-                    Event::Issue { cycle, address } if own == core && bundles.contains(address) => {
-                        Some((*cycle, Some(*id)))
-                    }
-                    _ => None,
-                }))
-            }
-            SystemStop::Link(link, kind) => {
-                let same = |event: &&LinkEvent| {
-                    event.link == *link && kind.is_none_or(|kind| kind.name() == event.kind.name())
-                };
-                hits.extend(links.iter().filter(same).map(|event| (event.cycle + 1, Some(*id))));
-            }
-            SystemStop::Cycle(cycle) => hits.push((*cycle, Some(*id))),
-        }
+        let same = |event: &&LinkEvent| {
+            event.link == stop.link && stop.kind.is_none_or(|kind| kind.name() == event.kind.name())
+        };
+        hits.extend(links.iter().filter(same).map(|event| (event.cycle + 1, Some(*id))));
     }
     hits
 }

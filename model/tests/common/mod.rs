@@ -3,6 +3,8 @@
 //! `cargo xtask test` installs them; TAKT_VENV names another environment that has them.
 #![allow(dead_code, unreachable_pub)]
 
+pub mod processors;
+
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};

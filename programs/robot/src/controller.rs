@@ -170,6 +170,8 @@ pub struct Controller {
     inputs: Inputs,
     /// What the encoders stood for in the last tick, and the controls that were held since.
     sampled: Option<(Joints, Joints)>,
+    /// Whether the host's side is kept.
+    kept: bool,
     records: Vec<Record>,
     tracking: Tracking,
 }
@@ -206,9 +208,17 @@ impl Controller {
             view,
             inputs: Inputs::default(),
             sampled: None,
+            kept: false,
             records: Vec::new(),
             tracking: Tracking::default(),
         })
+    }
+
+    /// Keeps what the host and the encoders say from now on, for [`System::host_actions`]. The line then takes one word a tick, as
+    /// a row of a table does.
+    pub fn keep_host_actions(&mut self) {
+        self.system.keep_host_actions();
+        self.kept = true;
     }
 
     /// The plant.
@@ -322,7 +332,8 @@ impl Robot for Controller {
     fn room(&self) -> usize {
         let taken = self.system.fifo_entries(self.ports.commands).len() + self.words.len();
         // Entries of the last tick may still be on their way.
-        (self.ports.depth / 2).saturating_sub(taken)
+        let room = (self.ports.depth / 2).saturating_sub(taken);
+        if self.kept { room.min(1usize.saturating_sub(self.words.len())) } else { room }
     }
 
     fn send(&mut self, word: u32) {

@@ -399,7 +399,9 @@ impl<R: Robot> Host<R> {
                     self.stopped.get_or_insert(report);
                     return;
                 }
-                // It was asked for, and stands now.
+                // It was asked for, and stands now. What waited in the queue before it was dropped, without a word of it.
+                let stop = report.sequence;
+                self.fates.retain(|sequence, _| *sequence >= stop);
                 Fate::Finished
             }
         };
@@ -556,11 +558,18 @@ impl<R: Robot> Host<R> {
         }
     }
 
+    /// Packets that have not been answered. What is posted is answered when the queue has come to it.
+    pub fn unanswered(&self) -> usize {
+        self.fates.values().filter(|fate| **fate == Fate::Sent).count()
+    }
+
     /// Whether nothing moves and nothing waits.
     pub fn stands(&self) -> bool {
         let view = self.view();
-        let open = self.fates.values().any(|fate| *fate == Fate::Sent);
-        matches!(view.mode, Mode::Standing) && view.queued == 0 && !open && self.out.is_empty()
+        matches!(view.mode, Mode::Standing)
+            && view.queued == 0
+            && self.unanswered() == 0
+            && self.out.is_empty()
     }
 }
 

@@ -26,3 +26,5 @@ pub const LONGEST: f64 = 3600.0;
 pub const MESSAGES: usize = 100_000;
 /// Segments that the host lets stand in the robot's queue before it sends another one.
 pub const QUEUE_AHEAD: u32 = 4;
+/// Outputs and levels that the host lets wait, beside what stands in the queue: with the motions, fewer than the queue holds.
+pub const SIGNALS_AHEAD: usize = 16;

@@ -269,6 +269,12 @@ impl Bench {
         self.system.output(name).expect("an output")
     }
 
+    /// Entries that any FIFO has refused so far.
+    pub(crate) fn overflows(&self) -> u64 {
+        let links = 0..self.system.description().links.len();
+        links.filter_map(|link| self.system.fifo_counts(link)).map(|counts| counts.overflows).sum()
+    }
+
     fn word(&self, core: usize, register: Register) -> u32 {
         self.system.core(core).register(register).unwrap_or(0)
     }

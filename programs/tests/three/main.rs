@@ -8,5 +8,6 @@ mod errors;
 mod jog;
 mod motion;
 mod packets;
+mod queue;
 mod servo;
 mod world;

@@ -103,6 +103,14 @@ fn syntax(error: &toml::de::Error, text: &str) -> Diagnostic {
     let line = text[range.start..].find('\n').map_or(text.len(), |end| range.start + end);
     range.end = range.end.min(line).max(range.start);
     let message = error.message().trim().replace('\n', ": ");
+    let wiring = |file: toml::Table| {
+        !file.contains_key("core") && ["board", "peripheral"].iter().any(|key| file.contains_key(*key))
+    };
+    if toml::from_str(text).is_ok_and(wiring) {
+        let message = "this is a board's wiring, and a system of cores is wanted";
+        return Diagnostic::error("toml", span(range), message)
+            .help("a wiring is for `takt board`; docs/system.md says what a system's file has");
+    }
     let diagnostic = Diagnostic::error("toml", span(range), message.clone());
     // "unknown field `a`, expected one of `b`, `c`".
     let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();

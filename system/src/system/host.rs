@@ -1,11 +1,17 @@
 //! What the host does between runs.
 
-use super::{HostError, LinkEventKind, LinkState, System};
+use super::{HostAction, HostError, LinkEventKind, LinkState, System};
 use crate::description::{End, LinkKind};
 use std::sync::Arc;
 use takt_emu::Number;
 
 impl System {
+    fn acted(&mut self, action: impl FnOnce() -> HostAction) {
+        if let Some(actions) = &mut self.actions {
+            actions.push((self.now, action()));
+        }
+    }
+
     /// Writes an input of the system: it is on its way from now on. A field of a snapshot or of a FIFO waits for
     /// [`System::publish`], [`System::push`].
     ///
@@ -35,7 +41,11 @@ impl System {
                 }
             }
         }
-        if found { Ok(()) } else { Err(HostError::Unknown { what: "input", name: name.to_owned() }) }
+        if !found {
+            return Err(HostError::Unknown { what: "input", name: name.to_owned() });
+        }
+        self.acted(|| HostAction::Input { name: name.to_owned(), bits });
+        Ok(())
     }
 
     /// Publishes the host's values of a snapshot.
@@ -52,6 +62,7 @@ impl System {
                 let first = now + known.transit() + 1;
                 published.push_back((first, working.clone()));
                 self.event(first, link, LinkEventKind::Published);
+                self.acted(|| HostAction::Publish(link));
                 Ok(())
             }
             (known, _) => {
@@ -75,6 +86,7 @@ impl System {
                 let room = fifo.store.entries.len() + fifo.pushing() < depth as usize;
                 let cycle = (now + known.transit()).max(fifo.free().0);
                 fifo.push(cycle, working.clone());
+                self.acted(|| HostAction::Push(link));
                 Ok(room)
             }
             (known, _) => {
@@ -96,6 +108,7 @@ impl System {
                 let entry = fifo.store.entries.get(fifo.popping()).cloned();
                 if entry.is_some() {
                     fifo.pop(now.max(fifo.free().1));
+                    self.acted(|| HostAction::Pop(link));
                 }
                 Ok(entry)
             }

@@ -122,6 +122,24 @@ impl LinkEventKind {
     }
 }
 
+/// What the host did.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum HostAction {
+    /// [`System::set_input`].
+    Input {
+        /// The input's name.
+        name: String,
+        /// Its value.
+        bits: u32,
+    },
+    /// [`System::publish`] of a link.
+    Publish(usize),
+    /// [`System::push`] of a link.
+    Push(usize),
+    /// [`System::pop`] of a link that had an entry.
+    Pop(usize),
+}
+
 /// What a core's periods came to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CorePeriods {
@@ -198,6 +216,8 @@ pub struct System {
     recorded: Option<Vec<(usize, Event)>>,
     /// What stood on the cores' input pins.
     inputs: Option<Vec<InputEvent>>,
+    /// What the host did, in which cycle.
+    actions: Option<Vec<(Cycle, HostAction)>>,
 }
 
 /// The input ports that a bundle of the program reads.
@@ -275,6 +295,7 @@ impl System {
             events: None,
             recorded: None,
             inputs: None,
+            actions: None,
         })
     }
 
@@ -372,6 +393,16 @@ impl System {
     /// ahead of it are in it with what came later.
     pub fn take_core_events(&mut self) -> Vec<(usize, Event)> {
         self.recorded.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+
+    /// Keeps what the host does from now on.
+    pub fn keep_host_actions(&mut self) {
+        self.actions.get_or_insert_default();
+    }
+
+    /// What the host did since, each with the cycle before which it did it.
+    pub fn host_actions(&self) -> &[(Cycle, HostAction)] {
+        self.actions.as_deref().unwrap_or_default()
     }
 
     /// Keeps the events on links from now on, until they are taken.

@@ -252,21 +252,27 @@ impl<R: Robot + Clone> Session<R> {
         }
     }
 
-    /// Sends what takes effect when the queue has come to it.
+    /// Sends what takes effect when the queue has come to it, when there is room in it.
     fn post(&mut self, command: &Command, span: Span) -> Result<(), Failure> {
+        // What was sent may not stand in the queue yet; what stands in it counts twice.
+        self.room(|host| host.view().queued as usize + host.unanswered() < limits::SIGNALS_AHEAD)?;
         let sequence = self.host.post(command)?;
         self.under_way(sequence, span);
         Ok(())
     }
 
-    /// Sends a motion when there is room in the queue.
-    fn offer(&mut self, command: &Command) -> Result<(u32, f64), Problem> {
+    /// Waits for room in the queue.
+    fn room(&mut self, there_is: impl Fn(&Host<R>) -> bool) -> Result<(), Problem> {
         let longest = ticks(limits::LONGEST);
         let interrupt = self.interrupt.clone();
         let interrupted = move || interrupt.load(std::sync::atomic::Ordering::Relaxed);
         let late = || "the queue stays full".to_owned();
-        let room = |host: &mut Host<R>| Ok(host.view().queued < limits::QUEUE_AHEAD);
-        self.host.wait_until(longest, late, &interrupted, room)?;
+        self.host.wait_until(longest, late, &interrupted, |host| Ok(there_is(host)))
+    }
+
+    /// Sends a motion when there is room in the queue.
+    fn offer(&mut self, command: &Command) -> Result<(u32, f64), Problem> {
+        self.room(|host| host.view().queued < limits::QUEUE_AHEAD)?;
         let mut offers = 0;
         loop {
             match self.host.command(command) {

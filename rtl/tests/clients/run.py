@@ -1,0 +1,52 @@
+"""Builds each circuit in Icarus Verilog and runs its client: run.py FOLDER. What is in FOLDER: xtask/src/clients.rs."""
+
+import sys
+from pathlib import Path
+
+from cocotb.runner import get_results, get_runner
+
+HERE = Path(__file__).parent
+
+
+def run(folder, module, top, files):
+    """Runs one client's tests; the number of those that failed."""
+    runner = get_runner("icarus")
+    build = folder / f"build_{module}"
+    runner.build(
+        verilog_sources=[folder / name for name in files],
+        hdl_toplevel=top,
+        build_args=["-g2005"],
+        build_dir=build,
+        always=True,
+        timescale=("1ns", "1ps"),
+    )
+    # Memory images are found where it runs.
+    results = runner.test(
+        hdl_toplevel=top,
+        test_module=module,
+        build_dir=build,
+        test_dir=folder,
+        results_xml=f"{module}.xml",
+        extra_env={"COCOTB_LOG_LEVEL": "WARNING"},
+    )
+    tests, failed = get_results(Path(results))
+    print(f"{module}: {tests} tests, {failed} failed")
+    return failed + (tests == 0)
+
+
+def main():
+    folder = Path(sys.argv[1])
+    sys.path.insert(0, str(HERE))
+
+    def files(name):
+        return (folder / name).read_text().split()
+
+    core = folder / "core"
+    failed = run(core, "wishbone_client", "takt_t1_wishbone", [*files("core/takt_t1.f"), "takt_t1_wishbone.v"])
+    failed += run(core, "axi_client", "takt_t1_axi", [*files("core/takt_t1.f"), "takt_t1_wishbone.v", "takt_t1_axi.v"])
+    failed += run(folder / "board", "uart_client", "takt_board", files("board/files.f"))
+    return int(failed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,116 @@
+//! The core's bus slaves and a board's UART against clients that other projects wrote, in Icarus Verilog: rtl/tests/clients/.
+
+use crate::{root, run, venv::Venv};
+use anyhow::{Context, Result, anyhow};
+use serde_json::{Map, Value, json};
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use takt_asm::{MemoryLoader, Options, assemble};
+use takt_board::{Board, Wiring, protocol, top};
+use takt_isa::{Machine, Program, T1};
+use takt_rtl::bench::{self, LoadRecord, Space, load_records};
+use takt_rtl::{Library, export, wishbone};
+
+/// The clients, and what runs them.
+const CLIENTS: [&str; 4] =
+    ["cocotb==1.9.2", "cocotbext-axi==0.1.28", "cocotbext-uart==0.1.4", "cocotbext-wishbone==0.2.2"];
+
+/// The smallest machine, and a program with integers and floats.
+const MACHINE: &Machine = &T1;
+const PROGRAM: &str = "programs/examples/board/position.s";
+const WIRING: &str = "programs/examples/board/position.toml";
+
+/// Bundles behind a program's end that are fetched, at most.
+const FETCHED: usize = 16;
+
+/// Ports by name, at their addresses.
+fn ports(program: &Program, inputs: u16, outputs: u16) -> Result<(Map<String, Value>, Map<String, Value>)> {
+    let index = |register| program.machine.inputs.index(register).context("an input port");
+    let mut given = Map::new();
+    for port in &program.inputs {
+        given.insert(port.name.clone(), (inputs + index(port.register)?.get()).into());
+    }
+    let number = |register: takt_isa::Register| register.get() % program.machine.outputs_per_bank;
+    let shown =
+        program.outputs.iter().map(|port| (port.name.clone(), (outputs + number(port.register)).into()));
+    Ok((given, shown.collect()))
+}
+
+fn write(folder: &Path, name: &str, text: &str) -> Result<()> {
+    let path = folder.join(name);
+    fs::create_dir_all(path.parent().unwrap_or(folder))?;
+    fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// The core with its slaves, and what a client must know of the program.
+fn core(program: &Program, folder: &Path) -> Result<()> {
+    let design = export(MACHINE, &Library::builtin())?.latching(program.latched_inputs())?;
+    for file in bench::folder(&design, Some(program), &[]) {
+        write(folder, &file.name, &file.text)?;
+    }
+    let registers: Map<String, Value> = wishbone::REGISTERS
+        .iter()
+        .map(|register| (register.name.to_owned(), register.address.into()))
+        .collect();
+    let (inputs, outputs) = ports(program, wishbone::INPUTS, wishbone::OUTPUTS)?;
+    // Memories are loaded as a whole; simulated here, what is fetched behind the program's end is enough.
+    let end = program.code.len() / MACHINE.slots.len() + FETCHED;
+    let is_read = |record: &LoadRecord| match record.space {
+        Space::Program => usize::from(record.address) < end,
+        Space::Data => record.value != 0,
+        _ => true,
+    };
+    let records = load_records(program).into_iter().filter(is_read);
+    let records: Vec<Value> = records
+        .map(|record| json!([record.space as u8, record.slot, record.address, record.value]))
+        .collect();
+    let description = json!({
+        "registers": registers, "input": wishbone::INPUTS, "inputs": inputs, "outputs": outputs, "records": records,
+    });
+    write(folder, "core.json", &description.to_string())
+}
+
+/// A board at its own clock, so that there is no PLL, and what a host must know of it.
+fn board(program: &Program, folder: &Path) -> Result<()> {
+    let wrong = |mistakes: Vec<takt_board::Mistake>| {
+        anyhow!("{}", mistakes.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))
+    };
+    let text = fs::read_to_string(root().join(WIRING))?;
+    let board = Board::from_name("ulx3s-85f").context("there is this board")?.map_err(wrong)?;
+    let wiring = Wiring::read(WIRING, &text, &board).map_err(wrong)?;
+    let period = (board.clock.1 * f64::from(wiring.period) / wiring.clock).round() as u32;
+    let wiring = Wiring { clock: board.clock.1, period, ..wiring };
+    let circuit = top::circuit(&board, &wiring, program)?;
+    for file in &circuit.files {
+        write(folder, &file.name, &file.text)?;
+    }
+    let sources = circuit.files.iter().map(|file| format!("{}\n", file.name));
+    write(folder, "files.f", &sources.filter(|name| name.trim().ends_with(".v")).collect::<String>())?;
+    let registers: Map<String, Value> = protocol::REGISTERS
+        .iter()
+        .map(|register| (register.name.to_owned(), register.address.into()))
+        .collect();
+    let (inputs, outputs) = ports(program, protocol::INPUTS, protocol::OUTPUTS)?;
+    let released = board.reset.as_ref().is_none_or(|reset| !reset.level);
+    let description = json!({
+        "registers": registers, "inputs": inputs, "outputs": outputs, "baud": wiring.baud, "period": wiring.period,
+        "released": u8::from(released),
+    });
+    write(folder, "board.json", &description.to_string())
+}
+
+/// Writes the circuits and runs every client.
+pub(crate) fn test() -> Result<()> {
+    let venv = Venv::with(&CLIENTS)?;
+    let folder = root().join("target/clients");
+    let options = Options { machine: MACHINE, ..Options::default() };
+    let source = fs::read_to_string(root().join(PROGRAM))?;
+    let loader = MemoryLoader::new(&[(PROGRAM, source.as_str())]);
+    let program =
+        assemble(PROGRAM, &loader, &options).map_err(|error| anyhow!("{PROGRAM}: {error:?}"))?.program;
+    core(&program, &folder.join("core"))?;
+    board(&program, &folder.join("board"))?;
+    let mut client = Command::new(venv.tool("python3"));
+    run(client.arg(root().join("rtl/tests/clients/run.py")).arg(&folder))
+}

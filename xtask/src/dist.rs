@@ -1,0 +1,241 @@
+//! What a hardware engineer needs without Rust: for each machine an archive with its Verilog, a FuseSoC core, headers and data sheet.
+
+use crate::{root, run, venv::Venv};
+use anyhow::{Context, Result, anyhow, ensure};
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use takt_asm::{FileLoader, Options, assemble};
+use takt_isa::{MACHINES, Machine, Program, Register};
+use takt_programs::hybrid::closed_loop::Inputs;
+use takt_programs::hybrid::ports::{INPUTS, OUTPUTS};
+use takt_programs::hybrid::{Controller, Outputs, Plant};
+use takt_programs::trajectory::Trajectory;
+use takt_programs::{AGH, gcode};
+use takt_rtl::bench;
+use takt_rtl::header::{Header, Language};
+use takt_rtl::{Library, axi, export, wishbone};
+
+/// What makes the data sheet: pandoc as a wheel, and typst.
+const DATA_SHEET: [&str; 2] = ["pypandoc-binary==1.17", "typst==0.15.2"];
+/// What reads the core's description.
+const FUSESOC: [&str; 2] = ["edalize==0.6.8", "fusesoc==2.4.7"];
+
+const PROGRAM: &str = "programs/hybrid/tracking.s";
+const PERIODS: usize = 3;
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// What is archived.
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// One machine only.
+    #[arg(long)]
+    machine: Option<String>,
+    /// Archive nothing; run the smallest machine's FuseSoC targets and compare what its test bench computes (a share of `test`).
+    #[arg(long, conflicts_with = "machine")]
+    test: bool,
+}
+
+/// `cargo xtask dist`.
+pub(crate) fn dist(arguments: &Arguments) -> Result<()> {
+    if arguments.test {
+        return test();
+    }
+    let is_wanted =
+        |machine: &&&Machine| arguments.machine.as_deref().is_none_or(|name| name == machine.name);
+    let machines: Vec<&Machine> = MACHINES.iter().filter(is_wanted).copied().collect();
+    let names = || MACHINES.iter().map(|machine| machine.name).collect::<Vec<_>>().join(", ");
+    ensure!(!machines.is_empty(), "there is no such machine; there are {}", names());
+    let folder = root().join("target/dist");
+    fs::create_dir_all(&folder)?;
+    let sheet = data_sheet(&folder)?;
+    for machine in machines {
+        let package = package(machine, &folder, &sheet)?;
+        let name = package.file_name().context("it has a name")?;
+        let archive = folder.join(format!("{}.tar.gz", name.to_string_lossy()));
+        let mut tar = Command::new("tar");
+        // The same archive from the same sources.
+        tar.args(["--sort=name", "--mtime=@0", "--owner=0", "--group=0", "--numeric-owner", "-C"]);
+        run(tar.arg(&folder).arg("-czf").arg(&archive).arg(name))?;
+        println!("{}", archive.display());
+    }
+    Ok(())
+}
+
+fn data_sheet(folder: &Path) -> Result<PathBuf> {
+    let venv = Venv::with(&DATA_SHEET)?;
+    let sheet = folder.join("takt.pdf");
+    let mut make = Command::new(venv.tool("python3"));
+    make.arg(root().join("rtl/dist/datasheet.py")).arg(root().join("docs")).arg(VERSION).arg(&sheet);
+    run(&mut make)?;
+    Ok(sheet)
+}
+
+fn program(machine: &'static Machine) -> Result<Program> {
+    let options = Options { machine, ..Options::default() };
+    let (loader, name) =
+        FileLoader::of_file(root().join(PROGRAM)).map_err(|error| anyhow!("{PROGRAM}: {error}"))?;
+    Ok(assemble(&name, &loader, &options).map_err(|error| anyhow!("{PROGRAM}: {error:?}"))?.program)
+}
+
+/// The inputs of the first periods of the letters' path, the robot standing where it begins, and what binary64 computes of them.
+fn periods() -> Result<Vec<(Inputs, Outputs<f64>)>> {
+    let path = gcode::read(AGH).map_err(|error| anyhow!("the path: {error:?}"))?;
+    let trajectory = Trajectory::plan(&path).map_err(|error| anyhow!("the path: {error}"))?;
+    let counts = Plant::at_rest(&trajectory.start()).counts().context("it begins within reach")?;
+    let mut controller = Controller::<f64>::new();
+    let inputs = trajectory.samples().take(PERIODS).map(|sample| {
+        let inputs = Inputs { counts, reference: sample.reference.convert() };
+        (inputs, controller.step(inputs.counts, &inputs.reference.convert()))
+    });
+    Ok(inputs.collect())
+}
+
+/// Writes the folder of a machine.
+fn package(machine: &'static Machine, folder: &Path, sheet: &Path) -> Result<PathBuf> {
+    let package = folder.join(format!("takt-{}-{VERSION}", machine.name));
+    if package.exists() {
+        fs::remove_dir_all(&package)?;
+    }
+    let write = |name: &str, text: &str| -> Result<()> {
+        let path = package.join(name);
+        fs::create_dir_all(path.parent().unwrap_or(&package))?;
+        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
+    };
+    let program = program(machine)?;
+    let design = export(machine, &Library::builtin())?.latching(program.latched_inputs())?;
+    let register = |name: &str| -> Result<Register> {
+        let port = program.inputs.iter().find(|port| port.name == name);
+        Ok(port.with_context(|| format!("{PROGRAM} has no input `{name}`"))?.register)
+    };
+    let registers = INPUTS.iter().map(|port| register(port.name)).collect::<Result<Vec<_>>>()?;
+    let periods: Vec<Vec<(Register, u32)>> = periods()?
+        .iter()
+        .map(|(inputs, _)| registers.iter().copied().zip(inputs.to_words()).collect())
+        .collect();
+    for file in bench::folder(&design, Some(&program), &periods) {
+        write(&file.name, &file.text)?;
+    }
+    let list = fs::read_to_string(package.join(format!("{}.f", design.top)))?;
+    let slaves = [wishbone::name(&design), axi::name(&design)];
+    write(&format!("{}.core", design.top), &core(machine, &design.top, list.lines(), &slaves))?;
+    let header = Header::new(&program, "tracking", Err("`takt asm --header c` computes them".to_owned()));
+    for (end, language) in [("h", Language::C), ("svd", Language::Svd), ("json", Language::Json)] {
+        write(&format!("tracking.{end}"), &header.text(language))?;
+    }
+    let readme = fs::read_to_string(root().join("rtl/dist/README.md"))?;
+    let values = [("@MACHINE@", machine.name), ("@VERSION@", VERSION), ("@TEXT@", machine.text)];
+    write("README.md", &values.iter().fold(readme, |text, (name, value)| text.replace(name, value)))?;
+    for licence in ["LICENSE-APACHE", "LICENSE-MIT"] {
+        write(licence, &fs::read_to_string(root().join(licence))?)?;
+    }
+    fs::copy(sheet, package.join("takt.pdf"))?;
+    Ok(package)
+}
+
+/// The machine for FuseSoC, in its CAPI2.
+fn core<'a>(machine: &Machine, top: &str, files: impl Iterator<Item = &'a str>, slaves: &[String]) -> String {
+    let list = |files: &mut dyn Iterator<Item = String>| -> String {
+        files.fold(String::new(), |mut text, file| {
+            let _ = writeln!(text, "      - {file}");
+            text
+        })
+    };
+    let rtl = list(&mut files.map(str::to_owned));
+    let bus = list(&mut slaves.iter().map(|slave| format!("{slave}.v")));
+    let axi = slaves.last().map_or(top, String::as_str);
+    format!(
+        "CAPI=2:
+name: takt:takt:{name}:{VERSION}
+description: \"Takt {name}: a floating-point processor for robot control\"
+
+filesets:
+  rtl:
+    files:
+{rtl}    file_type: verilogSource-2005
+  bus:
+    files:
+{bus}    file_type: verilogSource-2005
+  bench:
+    files:
+      - {top}_bench.v: {{file_type: verilogSource-2005}}
+      - program.hex: {{file_type: user, copyto: program.hex}}
+      - inputs.hex: {{file_type: user, copyto: inputs.hex}}
+
+targets:
+  default:
+    filesets: [rtl, bus]
+    toplevel: {axi}
+  sim:
+    description: The test bench with its program, in Icarus Verilog
+    flow: sim
+    flow_options:
+      tool: icarus
+      iverilog_options: [-g2005]
+    filesets: [rtl, bench]
+    toplevel: {top}_bench
+  lint:
+    description: Verilator's warnings
+    flow: lint
+    flow_options:
+      tool: verilator
+      verilator_options: [-Wall, -Wno-PINCONNECTEMPTY, -Wno-DECLFILENAME]
+    filesets: [rtl, bus]
+    toplevel: {axi}
+",
+        name = machine.name,
+    )
+}
+
+/// Makes the smallest machine's folder, runs its targets with FuseSoC, and compares its forces with binary64's.
+pub(crate) fn test() -> Result<()> {
+    let machine = MACHINES.iter().copied().min_by_key(|machine| machine.slots.len()).context("a machine")?;
+    let folder = root().join("target/dist/test");
+    fs::create_dir_all(&folder)?;
+    let package = package(machine, &folder, &data_sheet(&folder)?)?;
+    let venv = Venv::with(&FUSESOC)?;
+    let fusesoc = |target: &str| -> Result<String> {
+        let mut command = Command::new(venv.tool("fusesoc"));
+        command.current_dir(&folder).arg("--cores-root").arg(&package);
+        command.args(["run", "--build-root", "build", "--target", target]);
+        command.arg(format!("takt:takt:{}", machine.name));
+        let output = command.output().context("cannot start fusesoc")?;
+        let text =
+            String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+        ensure!(output.status.success(), "fusesoc, target {target}:\n{text}");
+        Ok(text)
+    };
+    let lint = fusesoc("lint")?;
+    ensure!(!lint.contains("%Warning"), "fusesoc, target lint:\n{lint}");
+    let sim = fusesoc("sim")?;
+    ensure!(sim.lines().any(|line| line == "end"), "the test bench did not come to its end:\n{sim}");
+    let program = program(machine)?;
+    let number = |port: &str| {
+        let port = program.outputs.iter().find(|output| output.name == port)?;
+        machine.output_number(port.register)
+    };
+    // Of the last period: a line `cycle output number bits` for each write.
+    let written = |number: u16| {
+        let of = |line: &str| {
+            let [_, "output", port, bits] = line.split_whitespace().collect::<Vec<_>>()[..] else {
+                return None;
+            };
+            let bits = u32::from_str_radix(bits, 16).ok()?;
+            (port.parse() == Ok(number)).then(|| f64::from(f32::from_bits(bits)))
+        };
+        sim.lines().filter_map(of).last()
+    };
+    let periods = periods()?;
+    let (_, expected) = periods.last().context("there are periods")?;
+    for (port, expected) in OUTPUTS.iter().zip(expected.to_array()).take(3) {
+        let force =
+            number(port.name).and_then(written).with_context(|| format!("no {} in\n{sim}", port.name))?;
+        // Lengths in binary32 are off by up to 8e-8 m, of which the gain makes 0.7 N.
+        ensure!((force - expected).abs() < 1.0, "{}: {force} N, binary64 {expected} N", port.name);
+    }
+    let pages = fs::metadata(package.join("takt.pdf"))?.len();
+    ensure!(pages > 100_000, "the data sheet has {pages} bytes");
+    println!("{}: FuseSoC's targets lint and sim, three forces as in binary64", package.display());
+    Ok(())
+}

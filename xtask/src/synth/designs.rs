@@ -1,0 +1,118 @@
+//! Machines and units, as they are synthesised.
+
+use super::{Arguments, Design, Device, PINS, system};
+use crate::root;
+use anyhow::{Context, Result, ensure};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::fs;
+use takt_isa::spec::machines::MACHINES;
+use takt_isa::{Machine, UNITS, Unit};
+use takt_rtl::export::{export, synthesis_top};
+use takt_rtl::synthesis::Resources;
+use takt_rtl::{Circuit, Library, wishbone};
+
+/// What the arguments ask for.
+pub(super) fn designs(arguments: &Arguments) -> Result<Vec<Design>> {
+    let mut library = Library::load(&root().join("rtl/units")).context("cannot read rtl/units")?;
+    let ecp5 = arguments.device != Device::CycloneV;
+    if ecp5 {
+        // Of what units share; the core's are in its files.
+        let product = fs::read_to_string(root().join("rtl/ecp5/takt_product.v"))?;
+        library.put("common/takt_product.v", product);
+    }
+    if let Some(file) = &arguments.system {
+        return Ok(vec![system::system(file, &library, ecp5)?]);
+    }
+    if arguments.unit.is_empty() {
+        let machine = Machine::from_name(&arguments.machine).with_context(|| {
+            let names: Vec<_> = MACHINES.iter().map(|machine| machine.name).collect();
+            format!("there is no machine `{}`; there are {}", arguments.machine, names.join(", "))
+        })?;
+        return Ok(vec![core(machine, &library, ecp5)?]);
+    }
+    let all = |unit: &&Unit| library.text(&format!("{}.v", unit.name)).is_some();
+    let offered: Vec<&Unit> = UNITS.iter().filter(all).collect();
+    let mut designs = Vec::new();
+    for name in &arguments.unit {
+        let wanted = offered.iter().filter(|unit| name == "all" || unit.name == name);
+        let before = designs.len();
+        for unit in wanted {
+            designs.push(between_registers(&library, &library.circuit(unit)?)?);
+        }
+        let names = || offered.iter().map(|unit| unit.name).collect::<Vec<_>>().join(", ");
+        ensure!(designs.len() > before, "there is no unit `{name}`; there are {} and `all`", names());
+    }
+    Ok(designs)
+}
+
+/// A machine with its memories as `takt rtl` writes it: its bus slave on a few pins, what serves verification only left out.
+fn core(machine: &'static Machine, library: &Library, ecp5: bool) -> Result<Design> {
+    let core = export(machine, library)?;
+    let mut files = BTreeMap::new();
+    for file in core.files.iter().chain(core.ecp5.iter().filter(|_| ecp5)) {
+        let name = file.name.rsplit('/').next().unwrap_or(&file.name);
+        files.insert(name.to_owned(), file.text.clone());
+    }
+    files.insert("wishbone.v".to_owned(), wishbone::wrapper(&core, 0));
+    files.insert("synthesis.v".to_owned(), wishbone::on_few_pins(&core));
+    let top = synthesis_top(machine);
+    Ok(Design {
+        name: machine.name.to_owned(),
+        files,
+        top,
+        pins: PINS,
+        wrapper: wishbone::PINS,
+        parts: Vec::new(),
+        recorded: true,
+    })
+}
+
+/// A unit between registers, on few pins: the operands come out of a shift register and a second register, the results go
+/// into a register and through a tree of XOR.
+fn between_registers(library: &Library, circuit: &Circuit) -> Result<Design> {
+    let text = |name: &String| Some((name.replace('/', "_"), library.text(name)?.to_owned()));
+    let mut files: BTreeMap<_, _> = circuit.files.iter().filter_map(text).collect();
+    let operands = ["a", "b", "c"].into_iter().take(circuit.operands).map(|name| (name, 32));
+    let inputs: Vec<_> = [("in_valid", 1), ("op", circuit.op_bits)]
+        .into_iter()
+        .filter(|port| port.1 > 0)
+        .chain(operands)
+        .collect();
+    let bits: u32 = inputs.iter().map(|port| port.1).sum();
+    let mut connections = String::new();
+    let mut low = 0;
+    for (name, width) in inputs {
+        write!(connections, ".{name}(operands[{low} +: {width}]), ")?;
+        low += width;
+    }
+    let parameters: Vec<_> = circuit.parameters().map(|(name, value)| format!(".{name}({value})")).collect();
+    let (module, parameters, last) = (circuit.unit.rtl, parameters.join(", "), bits - 2);
+    files.insert(
+        "wrapper.v".to_owned(),
+        format!(
+            "module wrapper (input wire clk, input wire serial_in, input wire load, output reg serial_out);
+    reg [{bits}-1:0] shift, operands;
+    wire out_valid;
+    wire [31:0] result;
+    wire [2:0] flags;
+    reg [35:0] outputs;
+    reg [8:0] parity;
+    {module} #({parameters}) unit (.clk(clk), {connections}.out_valid(out_valid), .result(result), .flags(flags));
+    integer i;
+    always @(posedge clk) begin
+        shift <= {{shift[{last}:0], serial_in}};
+        if (load) operands <= shift;  // unconditionally it would be the shift register one bit on, and be merged with it
+        outputs <= {{out_valid, flags, result}};
+        for (i = 0; i < 9; i = i + 1) parity[i] <= ^outputs[4 * i +: 4];
+        serial_out <= ^parity;
+    end
+endmodule
+"
+        ),
+    );
+    // 9 LUT4 for the groups of four, 3 for the rest. A constant output has no register: the count of flip-flops may be low by two.
+    let wrapper = Resources { luts: 12, flip_flops: u64::from(2 * bits) + 46, ..Resources::default() };
+    let (name, top) = (circuit.unit.name.to_owned(), "wrapper".to_owned());
+    Ok(Design { name, files, top, pins: "", wrapper, parts: Vec::new(), recorded: true })
+}

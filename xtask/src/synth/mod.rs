@@ -1,0 +1,164 @@
+//! Synthesis, place and route: how fast and how large the circuit is on a device that one can buy.
+//!
+//! yosys makes the netlist, nextpnr places and routes it once for each seed. What is measured is recorded in
+//! `docs/synthesis.json`, from which `docs/synthesis.md` is written and `takt track` takes the clock.
+
+mod designs;
+mod reports;
+mod system;
+mod text;
+mod tools;
+
+pub(crate) use text::markdown;
+
+use crate::venv::{NEXTPNR, Venv, YOSYS};
+use crate::{docs, root};
+use anyhow::{Context, Result};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::PathBuf;
+use takt_isa::UNITS;
+use takt_isa::spec::machines::MACHINES;
+use takt_rtl::synthesis::{self, Resources, Synthesis};
+
+/// Where measurements are recorded; [`takt_rtl::synthesis::committed`] has them.
+const RECORD: &str = "docs/synthesis.json";
+/// Seeds of a measurement unless stated.
+const SEEDS: u32 = 5;
+/// What place and route strives for, in MHz: more than any design reaches.
+const TARGET_MHZ: u32 = 200;
+/// Where the pins of a machine's top level are (those of the ULX3S board). Without a fixed place the placer takes ten times as long.
+const PINS: &str = "LOCATE COMP \"clk\" SITE \"G2\";
+LOCATE COMP \"rst\" SITE \"D6\";
+LOCATE COMP \"serial_in\" SITE \"R18\";
+LOCATE COMP \"serial_out\" SITE \"U1\";
+";
+
+/// What is measured, and how.
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// The machine, with its memories.
+    #[arg(long, default_value = "t3", conflicts_with = "unit")]
+    machine: String,
+    /// A system of several cores instead, with its programs; recorded if it is one of this repository's.
+    #[arg(long, value_name = "SYSTEM.toml", conflicts_with_all = ["machine", "unit"])]
+    system: Option<PathBuf>,
+    /// Units alone between registers instead; `all` for every one.
+    #[arg(long, num_args = 1..)]
+    unit: Vec<String>,
+    /// The device: Lattice ECP5 of 24,000, 44,000 or 84,000 LUT4, or Intel Cyclone V, where resources are counted only.
+    #[arg(long, value_enum, default_value_t = Device::Ecp5Large)]
+    device: Device,
+    /// Speed grade of the ECP5.
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u8).range(6..=8))]
+    grade: u8,
+    /// Seeds of place and route, from 1 on. A measurement with fewer seeds than the recorded one does not replace it.
+    #[arg(long, default_value_t = SEEDS, value_parser = clap::value_parser!(u32).range(1..=100))]
+    seeds: u32,
+    /// One seed only, and nothing is recorded.
+    #[arg(long, conflicts_with_all = ["seeds", "jobs"])]
+    seed: Option<u32>,
+    /// What place and route strives for, in MHz; nothing is recorded unless it is the usual 200.
+    #[arg(long, default_value_t = TARGET_MHZ, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    freq: u32,
+    /// Seeds at a time (each takes half a gigabyte); as many as there are cores unless stated.
+    #[arg(long)]
+    jobs: Option<usize>,
+}
+
+impl Arguments {
+    /// The seeds that are measured.
+    fn seeds(&self) -> Vec<u32> {
+        self.seed.map_or_else(|| (1..=self.seeds).collect(), |seed| vec![seed])
+    }
+}
+
+/// A device to synthesise for.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Device {
+    #[value(name = "85k")]
+    Ecp5Large,
+    #[value(name = "45k")]
+    Ecp5Middle,
+    #[value(name = "25k")]
+    Ecp5Small,
+    #[value(name = "cyclonev")]
+    CycloneV,
+}
+
+impl Device {
+    /// Its maker's name for it, and nextpnr's.
+    const fn names(self) -> (&'static str, &'static str) {
+        match self {
+            Device::Ecp5Large => ("LFE5U-85F", "--85k"),
+            Device::Ecp5Middle => ("LFE5U-45F", "--45k"),
+            Device::Ecp5Small => ("LFE5U-25F", "--25k"),
+            Device::CycloneV => ("Cyclone V", ""),
+        }
+    }
+}
+
+/// Something to synthesise: Verilog files by name, the top module, and what of it is only there to be measured.
+struct Design {
+    name: String,
+    files: BTreeMap<String, String>,
+    top: String,
+    pins: &'static str,
+    wrapper: Resources,
+    /// Of a system: the instances in `system`, and what they count as.
+    parts: Vec<(String, String)>,
+    /// Whether the measurement is one that is recorded.
+    recorded: bool,
+}
+
+/// `cargo xtask synth`.
+pub(crate) fn synth(arguments: &Arguments) -> Result<()> {
+    let designs = designs::designs(arguments)?;
+    let packages: &[&str] = if arguments.device == Device::CycloneV { &[YOSYS] } else { &[YOSYS, NEXTPNR] };
+    let venv = Venv::with(packages)?;
+    let mut measured = Vec::new();
+    for design in designs {
+        let is_ours = design.recorded;
+        let row = tools::measure(&venv, design, arguments)?;
+        println!("{}", text::in_words(&row, &arguments.seeds()));
+        if is_ours {
+            measured.push(row);
+        } else {
+            println!("{} not recorded: it is no file of this repository", row.design);
+        }
+    }
+    if arguments.seed.is_some() || arguments.freq != TARGET_MHZ {
+        println!("not recorded: it takes seeds from 1 on, and the target of {TARGET_MHZ} MHz");
+        return Ok(());
+    }
+    let mut rows = recorded()?;
+    for new in measured {
+        let same =
+            |old: &Synthesis| (&new.design, &new.device, new.grade) == (&old.design, &old.device, old.grade);
+        if let Some(old) = rows.iter().find(|old| same(old) && old.mhz.len() > new.mhz.len()) {
+            eprintln!("{} not recorded: what is recorded has {} seeds", new.design, old.mhz.len());
+            continue;
+        }
+        rows.retain(|old| !same(old));
+        rows.push(new);
+    }
+    rows.sort_by_key(|row| (place(&row.design), row.device.clone(), std::cmp::Reverse(row.grade)));
+    fs::write(root().join(RECORD), serde_json::to_string_pretty(&rows)? + "\n")?;
+    fs::write(root().join(docs::SYNTHESIS), text::markdown(&rows))?;
+    println!("recorded in {RECORD} and {}", docs::SYNTHESIS);
+    Ok(())
+}
+
+/// What was measured before.
+pub(crate) fn recorded() -> Result<Vec<Synthesis>> {
+    let text = fs::read_to_string(root().join(RECORD)).with_context(|| format!("cannot read {RECORD}"))?;
+    synthesis::parse(&text).with_context(|| format!("cannot read {RECORD}"))
+}
+
+/// The order of the rows: machines, then units, as their tables have them, then systems.
+fn place(design: &str) -> usize {
+    let machine = MACHINES.iter().position(|machine| machine.name == design);
+    machine
+        .or_else(|| Some(MACHINES.len() + UNITS.iter().position(|unit| unit.name == design)?))
+        .unwrap_or(usize::MAX)
+}

@@ -1,0 +1,174 @@
+//! What is written: for the terminal, and `docs/synthesis.md`.
+
+use super::TARGET_MHZ;
+use std::fmt::Write as _;
+use takt_board::tools::{MAPPING, OPTIONS};
+use takt_isa::spec::machines::MACHINES;
+use takt_rtl::synthesis::{Part, Resources, Synthesis};
+
+/// A measurement, as the terminal shows it.
+pub(super) fn in_words(row: &Synthesis, seeds: &[u32]) -> String {
+    let Resources { luts, carries, flip_flops, multipliers, block_rams } = row.resources;
+    let mut text = format!("{} on {}", row.design, row.device);
+    if let (Some(grade), Some(least), Some(median), Some(greatest)) =
+        (row.grade, row.least(), row.median(), row.greatest())
+    {
+        let _ = write!(text, ", speed grade {grade}\n  clock after place and route, by seed:");
+        for (seed, mhz) in seeds.iter().zip(&row.mhz) {
+            let _ = write!(text, " {seed}: {mhz:.1}");
+        }
+        let _ = write!(
+            text,
+            " MHz\n  least {least:.1}, median {median:.1}, greatest {greatest:.1} MHz\n  longest path: {}",
+            row.critical_path
+        );
+    }
+    let _ = write!(
+        text,
+        "\n  {luts} LUTs{}, {flip_flops} flip-flops, {multipliers} multipliers, {block_rams} block RAMs",
+        carries.map_or_else(String::new, |carries| format!(
+            " ({} LUT4, {carries} halves of carry cells)",
+            luts - carries
+        ))
+    );
+    if MACHINES.iter().any(|machine| machine.name == row.design) {
+        let (clock, [luts, flip_flops, memory, multipliers]) = PAPER;
+        let _ = write!(
+            text,
+            "\n  the paper's processor (Stratix III EP3SL150, tables 2 and 4): {clock} MHz, {luts} LUTs, {flip_flops} flip-flops, {multipliers} multipliers, {memory} kB"
+        );
+    }
+    if !row.parts.is_empty() {
+        text += "\n";
+        text += &parts_in_words(&row.parts);
+    }
+    text
+}
+
+/// What each part of a system takes, a line each.
+pub(super) fn parts_in_words(parts: &[Part]) -> String {
+    let line = |part: &Part| {
+        let Resources { luts, flip_flops, multipliers, block_rams, .. } = part.resources;
+        let name = &part.name;
+        format!(
+            "  {name}: {luts} LUT4, {flip_flops} flip-flops, {multipliers} multipliers, {block_rams} block RAMs"
+        )
+    };
+    parts.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// The founding paper's processor, FPGA3 on a Stratix III EP3SL150: MHz (table 2); LUTs, registers, kB of memory, 18-bit
+/// multipliers (table 4).
+const PAPER: (u32, [&str; 4]) = (125, ["12,010", "7,489", "120", "8"]);
+
+/// `docs/synthesis.md`.
+pub(crate) fn markdown(rows: &[Synthesis]) -> String {
+    let mut text = String::from(
+        "# Synthesis\n
+<!-- Written by `cargo xtask synth` and `cargo xtask docs` from synthesis.json. -->\n
+How fast the circuit is and how much of a device it takes, after place and route with open tools. `cargo xtask synth`
+measures it and writes this file; the first run installs the tools (400 MB) in `.venv`, or in the folder that `TAKT_VENV` names.\n
+Clocks are nextpnr's, for the slowest conditions of the speed grade, with the seeds 1, 2, … up to the stated
+number. The median (of an even number, the lower of the two in the middle) is the clock that the README and `takt track`
+use. The total is nextpnr's TRELLIS_COMB: LUT4, those of memories in logic included, and the halves of carry chains' cells,
+which take a LUT4's place each (older rows have the total only). Multipliers have 18 x 18 bits, block RAMs 18 kbit.
+`--seed N` measures one seed, `--freq F` with another target than 200 MHz; neither is recorded.\n",
+    );
+    let is_machine = |row: &&Synthesis| MACHINES.iter().any(|machine| machine.name == row.design);
+    let (machines, others): (Vec<_>, Vec<_>) = rows.iter().partition(is_machine);
+    let (systems, units): (Vec<_>, Vec<_>) = others.into_iter().partition(|row| !row.parts.is_empty());
+    let placed = |rows: &[&Synthesis]| rows.iter().any(|row| row.grade.is_some());
+    if placed(&machines) {
+        text += "\n## Machines\n\nWith their memories, as a Wishbone slave between registers that are not counted (in rows before 2026-11-22: the core on a shift register).\n`cargo xtask synth --machine t3 --device 85k --grade 8`, and so on.\n";
+        text += &table(&machines);
+        let (clock, [luts, flip_flops, memory, multipliers]) = PAPER;
+        let _ = writeln!(
+            text,
+            "| the paper's FPGA3 | Stratix III EP3SL150 | | | {clock} | | | | {luts} ALUTs | {flip_flops} | {multipliers} | {memory} kB |"
+        );
+        text += "\nThe last line is the processor of the founding paper (its tables 2 and 4). Longest paths, of the median seed:\n\n";
+        for row in machines.iter().filter(|row| row.grade.is_some()) {
+            let _ = writeln!(
+                text,
+                "- {}, {}-{}: {}.",
+                row.design,
+                row.device,
+                row.grade.unwrap_or(0),
+                row.critical_path
+            );
+        }
+    }
+    if placed(&units) {
+        text += "\n## Units\n\nEach unit alone, between registers that are not counted. `cargo xtask synth --unit all`.\n";
+        text += &table(&units);
+    }
+    if placed(&systems) {
+        text += "\n## Systems\n\nSeveral cores in one clock ([system.md](system.md)) with their programs and links, the host's pins behind a shift\nregister that is not counted. `cargo xtask synth --system programs/three/controller.toml --seeds 1`, and so on.\n";
+        text += &table(&systems);
+        text += "\nLongest paths, of the median seed:\n\n";
+        for row in systems.iter().filter(|row| row.grade.is_some()) {
+            let _ = writeln!(text, "- {}: {}.", row.design, row.critical_path);
+        }
+        for row in systems {
+            let _ = writeln!(
+                text,
+                "\nParts of {}, each core with its gate, as yosys leaves them: what placing adds is in the total only.\n\n\
+                 | part | LUT4, carry halves included | flip-flops | multipliers | block RAMs |\n|---|---|---|---|---|",
+                row.design
+            );
+            for Part { name, resources } in &row.parts {
+                let Resources { luts, flip_flops, multipliers, block_rams, .. } = resources;
+                let _ = writeln!(text, "| {name} | {luts} | {flip_flops} | {multipliers} | {block_rams} |");
+            }
+        }
+    }
+    let counted: Vec<_> = rows.iter().filter(|row| row.grade.is_none()).collect();
+    if !counted.is_empty() {
+        text += "\n## Intel Cyclone V\n
+The nearest open relative of the paper's Stratix III. Resources after synthesis only; there is no open place and route.
+Multipliers have up to 27 x 27 bits, block RAMs 10 kbit. `cargo xtask synth --device cyclonev`.\n
+| design | ALUTs | flip-flops | multipliers | block RAMs | date |\n|---|---|---|---|---|---|\n";
+        for row in counted {
+            let Resources { luts, flip_flops, multipliers, block_rams, .. } = row.resources;
+            let _ = writeln!(
+                text,
+                "| {} | {luts} | {flip_flops} | {multipliers} | {block_rams} | {} |",
+                row.design, row.date
+            );
+        }
+    }
+    let mut tools: Vec<_> = rows.iter().map(|row| row.tools.as_str()).collect();
+    tools.sort_by_key(|tools| std::cmp::Reverse(tools.len()));
+    if let Some(tools) = tools.first() {
+        let _ = writeln!(
+            text,
+            "\nTools: {tools}. Synthesis: `{MAPPING}; synth_lattice -family ecp5 {OPTIONS}`; place and route aims at {TARGET_MHZ} MHz."
+        );
+    }
+    text
+}
+
+fn table(rows: &[&Synthesis]) -> String {
+    let mut text = String::from(
+        "\n| design | device and grade | seeds | MHz least | median | greatest | LUT4 | carry halves | total | flip-flops | multipliers | block RAMs | date |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for row in rows {
+        let (Some(grade), Some(least), Some(median), Some(greatest)) =
+            (row.grade, row.least(), row.median(), row.greatest())
+        else {
+            continue;
+        };
+        let Resources { luts, carries, flip_flops, multipliers, block_rams } = row.resources;
+        let apart =
+            carries.map_or_else(|| " | ".to_owned(), |carries| format!("{} | {carries}", luts - carries));
+        let _ = writeln!(
+            text,
+            "| {} | {}-{grade} | {} | {least:.1} | {median:.1} | {greatest:.1} | {apart} | {luts} | {flip_flops} | {multipliers} | {block_rams} | {} |",
+            row.design,
+            row.device,
+            row.mhz.len(),
+            row.date
+        );
+    }
+    text
+}
