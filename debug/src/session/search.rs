@@ -20,7 +20,7 @@ enum Goal {
     /// The session's breakpoints and watchpoints.
     Stops(Watcher),
     /// That this is not zero.
-    Holds(Live),
+    Holds(Box<Live>),
 }
 
 impl Search {
@@ -33,7 +33,7 @@ impl Search {
 
     /// For an expression that holds.
     pub(crate) fn value(live: Live, session: &Session) -> Search {
-        Search { interest: Interest::value(&live, session.program()), goal: Goal::Holds(live) }
+        Search { interest: Interest::value(&live, session.program()), goal: Goal::Holds(Box::new(live)) }
     }
 
     /// The positions after `begin`, up to `end`, that matter, given what the machine did meanwhile.

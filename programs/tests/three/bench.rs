@@ -81,7 +81,7 @@ pub(crate) const fn fast(profile: Profile) -> How {
     How { profile, how: 2, amount: 0.0, flags: 0 }
 }
 
-fn description() -> &'static Description {
+pub(crate) fn description() -> &'static Description {
     static ONCE: OnceLock<Description> = OnceLock::new();
     ONCE.get_or_init(|| {
         let search = Search::new(MemoryLoader::new(THREE)).library(LIBRARY);
@@ -267,6 +267,11 @@ impl Bench {
     /// An output of the system.
     pub(crate) fn output(&self, name: &str) -> u32 {
         self.system.output(name).expect("an output")
+    }
+
+    /// Sets an input of the system, for the tick to come.
+    pub(crate) fn input(&mut self, name: &str, bits: u32) {
+        self.system.set_input(name, bits).expect("an input");
     }
 
     /// Entries that any FIFO has refused so far.

@@ -10,4 +10,5 @@ mod motion;
 mod packets;
 mod queue;
 mod servo;
+mod signals;
 mod world;
