@@ -253,8 +253,8 @@ fn it_runs_without_debugging() {
         let source = json!({ "source": { "path": program }, "breakpoints": [{ "line": 3 }] });
         ok(&mut client, "setBreakpoints", source);
         ok(&mut client, "configurationDone", json!({}));
-        let output = client.event("output")["body"]["output"].as_str().unwrap().to_owned();
-        assert!(output.contains(told), "{output}");
+        let said = client.wait(|message| message["event"] == "output" || message["event"] == "stopped");
+        assert!(said["body"]["output"].as_str().is_some_and(|output| output.contains(told)), "{said}");
         let ended = client.wait(|message| message["event"] == "terminated" || message["event"] == "stopped");
         assert_eq!(ended["event"], "terminated");
         end(client);

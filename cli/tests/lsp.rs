@@ -448,12 +448,12 @@ fn a_program_that_another_includes_has_its_own_cycles() {
     assert!(session.told("inner.s").iter().any(|one| one["code"] == "unknown-instruction"));
     session.edit("inner.s", &wrong, "fadf", "fadd");
     assert_eq!(lens(&mut session), own);
-    for (file, cycles) in [("inner.s", own.as_str()), ("outer.s", "20 cycles")] {
+    for (file, cycles) in [("inner.s", own.as_str()), ("outer.s", "period: 20 cycles")] {
         let bound: Value =
             serde_json::from_str(&session.folder.line(&format!("bound {file} --json")).stdout).unwrap();
         let sections = bound["sections"].as_array().unwrap();
         let worst = &sections.iter().find(|section| section["name"] == "period").unwrap()["cycles"]["worst"];
-        assert!(cycles.contains(&format!("{worst} cycles")), "{file}: {cycles}, {worst}");
+        assert!(cycles.contains(&format!("period: {worst} cycles")), "{file}: {cycles}, {worst}");
     }
     session.end();
 }

@@ -224,7 +224,7 @@ pub(crate) fn test() -> Result<()> {
             let bits = u32::from_str_radix(bits, 16).ok()?;
             (port.parse() == Ok(number)).then(|| f64::from(f32::from_bits(bits)))
         };
-        sim.lines().filter_map(of).last()
+        sim.lines().filter_map(of).next_back()
     };
     let periods = periods()?;
     let (_, expected) = periods.last().context("there are periods")?;
