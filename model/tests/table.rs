@@ -153,20 +153,23 @@ fn line(case: &Case, what: What, row: &Row) -> String {
 const HEAD: &str = "\
 # Robots and what their equations take
 
-Written by `TAKT_BLESS=1 cargo test --release -p takt-model --test table`; docs/model.md says how the equations come about.
+Written by `TAKT_BLESS=1 cargo test --release -p takt-model --test table`; docs/model.md says how the equations come
+about.
 
 - *operations*: sums, products, divisions, roots, sines and cosines, signs, as `takt model` prints them.
-- *CasADi*: the same function in CasADi 3.7 as the textbooks have it (`model/tests/reference.py`: Newton and Euler in link
-  frames, composite bodies, articulated bodies or elimination, whichever is shorter), zeros of the geometry left out, after `cse`.
+- *CasADi*: the same function in CasADi 3.7 as the textbooks have it (`model/tests/reference.py`: Newton and Euler in
+  link frames, composite bodies, articulated bodies or elimination, whichever is shorter), zeros of the geometry left
+  out, after `cse`.
 - *saved*: operations fewer than CasADi's.
 - *t3*, *t1*: cycles of a period, and the bound that no schedule can beat; or why it does not fit.
-- OTHERS: cycles of the same operations in binary32 on processors that one buys, the last being one of the class of soft
-  cores: models of LLVM RELEASE (`llvm-mca`), not measurements, with perfect caches; products are fused into sums, sine and
-  cosine are polynomials in line (12 products and sums each). Rocket has no conditional move: both ways of a branch count.
-- *binary64*: the largest relative error of the equations, in binary64, against Pinocchio over STATES random states. It is not less
-  where the file writes quarter turns with ten digits, which are taken for exact ones.
-- *t3's result*: the relative error of what the machine computes, in binary32: nine states of ten stay below the first figure, the
-  second is the worst. Relative to the largest output of the state.
+- OTHERS: cycles of the same operations in binary32 on processors that one buys, and on
+  one of the class of soft cores: models of LLVM RELEASE (`llvm-mca`), not measurements, with perfect caches. Products
+  are fused into sums; sine and cosine are polynomials in line (12 products and sums each). Rocket has no conditional
+  move: both ways of a branch count.
+- *binary64*: the largest relative error of the equations, in binary64, against Pinocchio over STATES random states. It
+  is not less where the file writes quarter turns with ten digits, which are taken for exact ones.
+- *t3's result*: the relative error of what the machine computes, in binary32: nine states of ten stay below the first
+  figure, the second is the worst. Relative to the largest output of the state.
 
 ";
 
