@@ -12,16 +12,17 @@ const GRAMMAR: &str = "editors/vscode/syntaxes/takt.tmLanguage.json";
 const TREE_SITTER: &str = "editors/tree-sitter-takt/src/grammar.json";
 /// The parser: as C, because editors compile that.
 const PARSER: &str = "editors/tree-sitter-takt/src/parser.c";
-/// The kinds of token, as logos reads them, and the lexer that it makes of them.
-const TOKENS: &str = "asm/syntax/lexer/raw.rs";
-const LEXER: &str = "asm/syntax/src/lex/raw.rs";
+/// The lexers that logos makes, and the kinds of token that it makes them of.
+const LEXERS: [(&str, &str); 2] = [
+    ("asm/syntax/src/lex/raw.rs", "asm/syntax/lexer/raw.rs"),
+    ("programs/robot/src/language/tokens.rs", "programs/robot/lexer/tokens.rs"),
+];
 /// What synthesis measured.
 pub(crate) const SYNTHESIS: &str = "docs/synthesis.md";
 
 /// Generated files: path from the project's folder, and contents.
 fn generated(root: &Path) -> Result<Vec<(&'static str, String)>> {
-    Ok(vec![
-        (LEXER, lexer(root)?),
+    let mut files = vec![
         ("docs/isa.md", takt_isa::manual::markdown()),
         (GRAMMAR, takt_editor::grammar::textmate_text()),
         (TREE_SITTER, takt_editor::tree_sitter::grammar_text()),
@@ -29,7 +30,11 @@ fn generated(root: &Path) -> Result<Vec<(&'static str, String)>> {
         ("editors/helix/queries/takt/highlights.scm", takt_editor::tree_sitter::helix_highlights()),
         ("editors/tree-sitter-takt/queries/folds.scm", takt_editor::tree_sitter::folds()),
         (SYNTHESIS, crate::synth::markdown(&crate::synth::recorded()?)),
-    ])
+    ];
+    for (lexer, tokens) in LEXERS {
+        files.push((lexer, generate_lexer(root, tokens)?));
+    }
+    Ok(files)
 }
 
 /// The last line of tree-sitter's parser, which tells of what grammar it is: its FNV-1a hash.
@@ -39,18 +44,17 @@ fn mark() -> String {
     format!("/* of grammar.json {hash:016x} */\n")
 }
 
-/// The lexer, by logos' generator.
-fn lexer(root: &Path) -> Result<String> {
-    let tokens =
-        std::fs::read_to_string(root.join(TOKENS)).with_context(|| format!("cannot read {TOKENS}"))?;
+/// A lexer, by logos' generator.
+fn generate_lexer(root: &Path, file: &str) -> Result<String> {
+    let tokens = std::fs::read_to_string(root.join(file)).with_context(|| format!("cannot read {file}"))?;
     // The file's own `//!` comment is none of the enumeration's.
     let tokens: String =
         tokens.lines().filter(|line| !line.starts_with("//!")).map(|line| format!("{line}\n")).collect();
     let tokens: proc_macro2::TokenStream =
-        tokens.parse().map_err(|error| anyhow::anyhow!("{TOKENS}: {error}"))?;
+        tokens.parse().map_err(|error| anyhow::anyhow!("{file}: {error}"))?;
     let kinds = logos_codegen::strip_attributes(tokens.clone());
     let implementation = logos_codegen::generate(tokens);
-    let text = format!("//! Generated from {TOKENS} by `cargo xtask docs`.\n\n{kinds}\n\n{implementation}\n");
+    let text = format!("//! Generated from {file} by `cargo xtask docs`.\n\n{kinds}\n\n{implementation}\n");
     let mut rustfmt = Command::new("rustfmt");
     rustfmt
         .args(["--edition", "2024", "--config-path"])
@@ -61,7 +65,7 @@ fn lexer(root: &Path) -> Result<String> {
     rustfmt.stdin.take().context("rustfmt has no stdin")?.write_all(text.as_bytes())?;
     let done = rustfmt.wait_with_output()?;
     if !done.status.success() {
-        bail!("rustfmt refuses what logos made of {TOKENS}");
+        bail!("rustfmt refuses what logos made of {file}");
     }
     Ok(String::from_utf8(done.stdout)?)
 }
