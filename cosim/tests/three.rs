@@ -8,22 +8,10 @@ use std::sync::atomic::AtomicBool;
 use takt_cosim::system::{SystemLockstep, SystemModel};
 use takt_isa::timing::Cycle;
 use takt_robot::controller::{Controller, standard};
-use takt_robot::level::{Files, Session};
+use takt_robot::level::{NoFiles, Session};
 use takt_robot::plant::Plant;
 use takt_rtl::{Library, export_system};
 use takt_system::HostAction;
-
-struct NoFiles;
-
-impl Files for NoFiles {
-    fn read(&self, name: &str) -> Result<String, String> {
-        Err(format!("there is no file {name}"))
-    }
-
-    fn write(&self, name: &str, _: &str) -> Result<(), String> {
-        Err(format!("{name} cannot be written"))
-    }
-}
 
 /// Packets are taken and answered, a motion is planned and begins, and the servo follows it. With `TAKT_FULL=1` more of the
 /// demonstration's beginning.

@@ -5,20 +5,8 @@ use std::sync::atomic::AtomicBool;
 use takt_robot::controller::{Controller, standard};
 use takt_robot::geometry::pose_of;
 use takt_robot::host::degrees;
-use takt_robot::level::{Files, Session};
+use takt_robot::level::{NoFiles, Session};
 use takt_robot::plant::Plant;
-
-struct NoFiles;
-
-impl Files for NoFiles {
-    fn read(&self, name: &str) -> Result<String, String> {
-        Err(format!("there is no file {name}"))
-    }
-
-    fn write(&self, name: &str, _: &str) -> Result<(), String> {
-        Err(format!("{name} cannot be written"))
-    }
-}
 
 #[test]
 fn the_demonstration_runs() {

@@ -4,22 +4,10 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use takt_robot::controller::{Controller, standard};
 use takt_robot::host::{Host, News, Problem};
-use takt_robot::level::{Files, Session};
+use takt_robot::level::{NoFiles, Session};
 use takt_robot::limits;
 use takt_robot::packet::{Cause, Command};
 use takt_robot::plant::Plant;
-
-struct NoFiles;
-
-impl Files for NoFiles {
-    fn read(&self, name: &str) -> Result<String, String> {
-        Err(format!("there is no file {name}"))
-    }
-
-    fn write(&self, name: &str, _: &str) -> Result<(), String> {
-        Err(format!("{name} cannot be written"))
-    }
-}
 
 fn controller() -> Controller {
     let description = standard().unwrap_or_else(|error| panic!("{error}"));

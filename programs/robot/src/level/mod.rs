@@ -36,6 +36,19 @@ pub trait Files {
     fn write(&self, name: &str, text: &str) -> Result<(), String>;
 }
 
+/// Surroundings without files.
+pub struct NoFiles;
+
+impl Files for NoFiles {
+    fn read(&self, name: &str) -> Result<String, String> {
+        Err(format!("there is no file {name}"))
+    }
+
+    fn write(&self, name: &str, _: &str) -> Result<(), String> {
+        Err(format!("{name} cannot be written"))
+    }
+}
+
 /// What there is to say.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Message {
