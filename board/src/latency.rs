@@ -62,8 +62,7 @@ const BEGIN: u64 = 5;
 const END: u64 = 14;
 
 fn parameter(peripheral: &Peripheral, name: &str) -> u64 {
-    let at = peripheral.kind.parameters.iter().position(|parameter| parameter.name == name);
-    at.and_then(|at| peripheral.parameters.get(at)).copied().unwrap_or(0).into()
+    peripheral.parameter(name).into()
 }
 
 /// From a pin's edge to the register, of peripherals that have such a pin.

@@ -198,8 +198,7 @@ fn around(wiring: &Wiring, program: &Program, core: &str, records: usize, to_int
             let found = write.as_ref().and_then(|write| Some((output(&write.port)?, write.scale)));
             let Some((number, scale)) = found else {
                 // Nobody writes it: an SPI sends its preset, others stay at rest.
-                let preset = kind.parameters.iter().position(|parameter| parameter.name == register.name);
-                let preset = preset.and_then(|at| peripheral.parameters.get(at)).copied().unwrap_or(0);
+                let preset = peripheral.parameter(register.name);
                 ports.push(format!(".w_{}(32'd{preset})", register.name));
                 continue;
             };

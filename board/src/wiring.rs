@@ -90,6 +90,14 @@ pub struct Peripheral {
     ports: Vec<(String, Direction, Range<usize>)>,
 }
 
+impl Peripheral {
+    /// The parameter of this name; 0 if its kind has none.
+    pub fn parameter(&self, name: &str) -> u32 {
+        let at = self.kind.parameters.iter().position(|parameter| parameter.name == name);
+        at.and_then(|at| self.parameters.get(at)).copied().unwrap_or(0)
+    }
+}
+
 /// A register that the program writes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Write {

@@ -46,12 +46,6 @@ struct Axis {
     full: f64,
 }
 
-/// The parameter of a peripheral.
-fn parameter(peripheral: &Peripheral, name: &str) -> u32 {
-    let at = peripheral.kind.parameters.iter().position(|parameter| parameter.name == name);
-    at.and_then(|at| peripheral.parameters.get(at)).copied().unwrap_or(0)
-}
-
 impl Axis {
     /// The axis whose count is this input port, and whose duty that output port; it stands at `count`.
     fn new(wiring: &Wiring, input: &str, output: &str, count: i32) -> Result<Axis> {
@@ -62,7 +56,7 @@ impl Axis {
         let encoder = encoder.with_context(|| {
             format!("the wiring has no quadrature whose `count` is the port `{input}`: an axis of the robot is missing")
         })?;
-        let start = parameter(encoder, "start").cast_signed();
+        let start = encoder.parameter("start").cast_signed();
         ensure!(
             start == count,
             "the robot stands at {count} counts of `{input}`, and `{}` starts at {start}: `start = {count}`",
@@ -77,12 +71,12 @@ impl Axis {
             )
         })?;
         ensure!(
-            parameter(motor, "signed") == 1 && motor.pins.iter().all(Option::is_some),
+            motor.parameter("signed") == 1 && motor.pins.iter().all(Option::is_some),
             "`{}`: a force in both directions needs a signed pwm with both pins",
             motor.name
         );
         let scale = motor.writes[0].as_ref().and_then(|write| write.scale).unwrap_or(0);
-        let full = f64::from(parameter(motor, "half")) / f64::from(scale).exp2();
+        let full = f64::from(motor.parameter("half")) / f64::from(scale).exp2();
         Ok(Axis { encoder: encoder.name.clone(), motor: motor.name.clone(), full })
     }
 }
@@ -158,17 +152,11 @@ impl<'a> Drive<'a> {
         let Hosted { fed, cycles, misses } = host?;
         let positions = positions?;
         let mut error = TrackingError::default();
-        let mut add = |position: [f64; 3], sample: &Sample| {
-            let off = distance(position, sample.reference.position);
-            error.overall = error.overall.max(off);
-            if sample.cutting {
-                error.cutting = error.cutting.max(off);
-            }
-        };
         for (sample, period) in samples.iter().zip(&fed.used[STANDS..]) {
             // Periods count from 1.
             let position = positions.get((*period as usize).wrapping_sub(1));
-            add(*position.with_context(|| format!("the board has had no period {period}"))?, sample);
+            let position = position.with_context(|| format!("the board has had no period {period}"))?;
+            error.add_distance(distance(*position, sample.reference.position), sample.cutting);
         }
         let alone = self.without_pins()?;
         writeln!(

@@ -157,7 +157,7 @@ pub fn release() -> String {
 
 /// Cycles from the first instruction to the last result, on each of [`PROCESSORS`]. Where there is a branch (Rocket has no
 /// conditional move), both ways count.
-pub fn cycles(function: &Function) -> Option<[u64; 3]> {
+pub fn cycles(function: &Function) -> Option<[u64; PROCESSORS.len()]> {
     let code = through("opt", &["-O2", "-S"], &code(function)?);
     Some(PROCESSORS.each_ref().map(|processor| {
         let abi = format!("-target-abi={}", processor.abi);

@@ -196,9 +196,14 @@ pub struct TrackingError {
 impl TrackingError {
     /// Takes one period into account.
     pub fn add(&mut self, record: &Record) {
-        if record.sample.cutting {
-            self.cutting = self.cutting.max(record.tool_error);
+        self.add_distance(record.tool_error, record.sample.cutting);
+    }
+
+    /// Takes a distance of the tool from its reference into account, m.
+    pub fn add_distance(&mut self, distance: f64, cutting: bool) {
+        if cutting {
+            self.cutting = self.cutting.max(distance);
         }
-        self.overall = self.overall.max(record.tool_error);
+        self.overall = self.overall.max(distance);
     }
 }
