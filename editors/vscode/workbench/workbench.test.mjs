@@ -1,5 +1,5 @@
 // The extension in VS Code's own workbench, in a browser: `cargo xtask extension --workbench`. The workbench and its extension host
-// are those of the package code-server, without its native modules: no terminal, so no tasks.
+// are those of the package code-server; of its native modules there is only the terminal's, which tasks run in.
 import assert from 'node:assert/strict';
 import { spawn, execFileSync } from 'node:child_process';
 import { cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -74,6 +74,15 @@ async function shot(page, name) {
   if (!SHOTS) return;
   mkdirSync(SHOTS, { recursive: true });
   await page.screenshot({ path: join(SHOTS, `vscode-${name}.png`) });
+}
+
+/** Executes a command of the palette by its title. */
+async function command(page, title) {
+  await page.keyboard.press('F1');
+  await page.locator('.quick-input-widget input.input').waitFor();
+  await page.keyboard.type(title);
+  await page.locator('.quick-input-list .monaco-list-row', { hasText: title }).first().waitFor();
+  await page.keyboard.press('Enter');
 }
 
 /** Puts the cursor at the beginning of a line. */
@@ -155,5 +164,77 @@ test('cycles, a mistake and its fix, the pipeline beside the source, the debugge
     await page.waitForFunction((old) => document.querySelector('.debug-call-stack .stack-frame .line-number')?.textContent === old, first);
     await page.keyboard.press('Shift+F5');
     await page.waitForSelector('.debug-toolbar', { state: 'hidden' });
+  });
+});
+
+test('tasks, the problem matcher, snippets, the walkthrough', limit, async (t) => {
+  writeFileSync(join(folder, 'project/wrong.s'), '.reg a\n        fad     a, a\n        halt\n');
+  const page = await open('tasks', TAKT);
+  const task = async (name) => {
+    await command(page, 'Tasks: Run Task');
+    await page.locator('.quick-input-list .monaco-list-row', { hasText: 'takt' }).first().waitFor();
+    await page.keyboard.type('takt');
+    await page.keyboard.press('Enter');
+    await page.locator('.quick-input-list .monaco-list-row', { hasText: name }).first().waitFor();
+    await page.keyboard.type(name);
+    await page.keyboard.press('Enter');
+  };
+  const terminal = () => page.evaluate(() => [...document.querySelectorAll('.xterm-rows > div')].map((row) => row.textContent).join('\n'));
+  const said = (pattern) => page.waitForFunction((source) => {
+    const rows = [...document.querySelectorAll('.xterm-rows > div')].map((row) => row.textContent.replaceAll('\u00a0', ' '));
+    return new RegExp(source).test(rows.join('\n'));
+  }, pattern).catch(async (error) => { throw new Error(`${error.message}; the terminal has: ${await terminal()}`); });
+
+  await t.test('a task runs `takt` on the source at hand', limit, async () => {
+    await task('bound');
+    await said('period +38');
+    await shot(page, 'task');
+  });
+  await t.test('what a task complains of stands among the problems, at its place', limit, async () => {
+    // The language server is silent about a file that is not open: what is told is the task's.
+    await page.keyboard.press('Control+1');
+    await page.dblclick('.explorer-folders-view .monaco-list-row[aria-label="wrong.s"]');
+    await page.locator('.view-line', { hasText: 'fad' }).waitFor();
+    await page.waitForSelector('.squiggly-error');
+    await task('asm');
+    await said('there is no instruction');
+    // The server's stays; the matcher's has its own source.
+    await command(page, 'Problems: Focus on Problems View');
+    await page.locator('.markers-panel .monaco-list-row', { hasText: 'there is no instruction or macro `fad`' }).nth(1).waitFor();
+    await shot(page, 'problems');
+    await page.locator('.markers-panel .monaco-list-row', { hasText: 'there is no instruction or macro `fad`' }).nth(1).dblclick();
+    await page.locator('.statusbar-item', { hasText: 'Ln 2,' }).waitFor();
+  });
+  await t.test('a snippet writes a controller that assembles', limit, async () => {
+    writeFileSync(join(folder, 'project/new.s'), '');
+    await page.locator('.explorer-folders-view .monaco-list-row[aria-label="new.s"]').waitFor();
+    await page.dblclick('.explorer-folders-view .monaco-list-row[aria-label="new.s"]');
+    await page.locator('.tab.active', { hasText: 'new.s' }).waitFor();
+    await page.keyboard.press('Control+1');
+    await command(page, 'Snippets: Insert Snippet');
+    await page.locator('.quick-input-list .monaco-list-row', { hasText: 'controller' }).first().waitFor();
+    await page.keyboard.type('controller');
+    await page.keyboard.press('Enter');
+    await page.locator('.view-line', { hasText: 'wait' }).waitFor();
+    await page.keyboard.press('Escape');
+    await page.keyboard.press('Control+s');
+    const file = join(folder, 'project/new.s');
+    for (let looked = 0; looked < 40 && readFileSync(file, 'utf8') === ''; looked++) await page.waitForTimeout(500);
+    execFileSync(TAKT, ['asm', file], { stdio: 'pipe' });
+  });
+  await t.test('the walkthrough opens, and its steps do what they say', limit, async () => {
+    await command(page, 'Welcome: Open Walkthrough');
+    await page.locator('.quick-input-list .monaco-list-row', { hasText: 'Get started with Takt' }).first().waitFor();
+    await page.keyboard.type('Get started with Takt');
+    await page.keyboard.press('Enter');
+    const step = (title) => page.locator('.gettingStarted .getting-started-step', { hasText: title });
+    for (const title of ['Install `takt`', 'Write a controller', 'See where the cycles go', 'Debug, forward and back']) {
+      await step(title).waitFor();
+    }
+    await shot(page, 'walkthrough');
+    await step('Write a controller').click();
+    await page.locator('.gettingStarted .monaco-button', { hasText: 'New file' }).click();
+    await page.locator('.tab.active', { hasText: 'Untitled' }).waitFor();
+    await page.locator('.statusbar-item', { hasText: 'Takt' }).first().waitFor();
   });
 });
