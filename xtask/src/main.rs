@@ -159,6 +159,11 @@ const TOOLS: [(&str, &str, &str); 10] = [
 fn install() -> Result<()> {
     let missing = TOOLS.iter().filter(|(tool, ask, _)| !works(tool, ask));
     let mut packages: Vec<&str> = missing.map(|(_, _, package)| *package).collect();
+    // The debug adapter's third client is Emacs's.
+    let emacs = Command::new("emacs").args(["--batch", "--eval", "(require 'dap-mode)"]).output();
+    if !emacs.is_ok_and(|output| output.status.success()) {
+        packages.extend(["emacs-nox", "elpa-dap-mode"]);
+    }
     if packages.is_empty() {
         return Ok(());
     }

@@ -8,6 +8,8 @@
 (require 'takt)
 (require 'dap-mode)
 (require 'dap-overlays)
+;; Without it dap-mode has no filters of exceptions.
+(require 'dap-ui)
 
 (defvar takt-test--found (make-hash-table :test 'equal))
 (defvar takt-test--stops 0)

@@ -122,6 +122,15 @@ fn number(arguments: &Value, name: &str) -> Result<u64, String> {
     arguments[name].as_u64().ok_or_else(|| format!("`{name}` is a whole number, and not negative"))
 }
 
+/// The first line of a message, with the place that it is about: many a client shows nothing else.
+fn brief(text: &str) -> String {
+    let first = text.lines().next().unwrap_or("");
+    match text.lines().find_map(|line| line.trim_start().strip_prefix("┌─ ")) {
+        Some(place) => format!("{}: {first}", place.trim()),
+        None => first.to_owned(),
+    }
+}
+
 /// A text among the arguments.
 fn text<'a>(arguments: &'a Value, name: &str) -> Result<&'a str, String> {
     arguments[name].as_str().ok_or_else(|| format!("`{name}` is a text"))
@@ -162,7 +171,7 @@ impl Server<'_> {
         match answer {
             Ok(body) => response["body"] = body,
             Err(text) => {
-                response["message"] = text.lines().next().unwrap_or("").into();
+                response["message"] = brief(&text).into();
                 // The text as it is: nothing in it stands for a variable.
                 response["body"] = json!({ "error": { "id": 1, "format": "{text}", "variables": { "text": text }, "showUser": true } });
                 self.then = Then::Nothing;

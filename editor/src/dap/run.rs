@@ -133,8 +133,16 @@ impl Server<'_> {
             Then::Back => self.resume_back(),
             Then::Step(core, unit, over) => {
                 let depth = |target: &Target| target.session(core).emulator().stack().len();
+                let mut end = (core, Ok(Why::Done));
+                // What is shown is the bundle to come. If it is not about to issue, as before the first one, a step begins where it
+                // is: it would else end there, and seem to have gone nowhere.
+                if unit != Unit::Out && target.core_mut(core).session.next_issue().1 != Some(target.cycle()) {
+                    end = target.step(core, Unit::Bundle);
+                }
                 let begin = depth(target);
-                let mut end = target.step(core, unit);
+                if end.1 == Ok(Why::Done) {
+                    end = target.step(core, unit);
+                }
                 // A line that calls is over when what it calls has returned.
                 while over && end.1 == Ok(Why::Done) && depth(target) > begin {
                     end = target.step(core, Unit::Out);

@@ -123,7 +123,11 @@ mod tests {
         assert_eq!(there, Value::Null);
 
         // What has no place on a disk has a name.
-        notify(&mut server, "textDocument/didOpen", json!({ "textDocument": { "uri": "other.s", "languageId": "takt", "version": 1, "text": ".include <lib.s>\n.reg a\n li a, third\n halt\n" } }));
+        notify(
+            &mut server,
+            "textDocument/didOpen",
+            json!({ "textDocument": { "uri": "other.s", "languageId": "takt", "version": 1, "text": ".include <lib.s>\n.reg a\n li a, third\n halt\n" } }),
+        );
         server.check();
         for (line, character, wanted) in [(2, 9, 7), (0, 12, 0)] {
             let at = json!({ "textDocument": { "uri": "other.s" }, "position": { "line": line, "character": character } });
