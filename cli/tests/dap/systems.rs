@@ -3,7 +3,7 @@
 use super::common::Folder;
 use super::common::protocol::Client;
 use super::{end, launched, ok, start};
-use serde_json::{Value, json};
+use serde_json::json;
 
 /// The three cores of the system that comes with the repository.
 fn system(folder: &Folder) -> Client {
@@ -46,7 +46,7 @@ fn each_core_of_a_system_is_a_thread() {
 
     // A breakpoint in the source of any core stops all of them, and says which core it was.
     let breakpoints =
-        json!({ "source": { "path": sources[2] }, "breakpoints": [{ "line": 20 }, { "line": 1 }] });
+        json!({ "source": { "path": sources[2] }, "breakpoints": [{ "line": 19 }, { "line": 1 }] });
     let answer = ok(&mut client, "setBreakpoints", breakpoints);
     assert_eq!(answer["breakpoints"][0]["verified"], true, "{answer}");
     assert_eq!(answer["breakpoints"][1]["verified"], false, "{answer}");
@@ -55,7 +55,7 @@ fn each_core_of_a_system_is_a_thread() {
     assert_eq!((&stop["threadId"], &stop["allThreadsStopped"]), (&json!(3), &json!(true)), "{stop}");
     assert_eq!(stop["hitBreakpointIds"][0], answer["breakpoints"][0]["id"]);
     let frames = ok(&mut client, "stackTrace", json!({ "threadId": 3 }));
-    assert_eq!(frames["stackFrames"][0]["line"], 20);
+    assert_eq!(frames["stackFrames"][0]["line"], 19);
     // All are in the same cycle; each has names of its own.
     let cycle = of_core(&mut client, 1, "cycle");
     assert_eq!(of_core(&mut client, 3, "cycle"), cycle);
@@ -99,7 +99,7 @@ fn each_core_of_a_system_is_a_thread() {
         ok(&mut client, "setVariable", set);
         assert_eq!(of_core(&mut client, thread, &input), "1.25");
     }
-    assert_ne!(of_core(&mut client, 2, "w_ref"), "1.25", "`u` of the watch is set, not that of the servo");
+    assert_ne!(of_core(&mut client, 2, "u"), "1.25", "`u` of the watch is set, not that of the servo");
 
     // The addresses of one core's bundles are not those of another.
     let body = ok(&mut client, "stackTrace", json!({ "threadId": 3 }));
@@ -205,7 +205,7 @@ fn exceptions_of_a_core_stop_a_system() {
     folder.write("idle.s", ".reg n:int\n li n, 0\nagain: iadd n, n, 1\n jmp again\n");
     folder.write(
         "nan.s",
-        ".reg n:int t\n li n, 300\nturn: isub n, n, 1\n bnz n, turn\n fsqrt t, -4.0\n clrflags\n halt\n",
+        ".reg n:int _t\n li n, 300\nturn: isub n, n, 1\n bnz n, turn\n fsqrt _t, -4.0\n mov _t, _t\n clrflags\n halt\n",
     );
     folder.write("two.toml", "tick = 100\n[[core]]\nname = \"a\"\nprogram = \"idle.s\"\n[[core]]\nname = \"b\"\nprogram = \"nan.s\"\n");
     let mut client = launched(&folder, json!({ "program": "two.toml" }));
