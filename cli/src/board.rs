@@ -193,9 +193,12 @@ pub(crate) fn wired(
     color: bool,
 ) -> Result<(Board, Wiring)> {
     let (name, text) = text(path)?;
-    let own = Wiring::board(&name, &text);
-    let board = board.or(own.as_deref()).with_context(|| format!("{name} names no board: --board NAME"))?;
-    let board = find(board, color)?;
+    let board = match board {
+        Some(board) => board.to_owned(),
+        None => right(Wiring::board(&name, &text), color)?
+            .with_context(|| format!("{name} names no board: --board NAME"))?,
+    };
+    let board = find(&board, color)?;
     let wiring = right(Wiring::read(&name, &text, &board), color)?;
     right(wiring.check(&name, &text, program), color)?;
     Ok((board, wiring))

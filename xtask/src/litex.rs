@@ -95,7 +95,8 @@ pub(crate) fn test() -> Result<()> {
     }
     prepare(&folder)?;
     // As a user installs it; its dependencies are there.
-    let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps", "--force-reinstall"];
+    let install =
+        ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps", "--force-reinstall"];
     run(python().args(install).arg(root().join("python/litex")))?;
     run(python().arg("-I").arg(root().join("python/litex/tests/run.py")).arg(&folder))
 }
