@@ -182,7 +182,7 @@ name = "answers"
 from = "b"
 to = "host"
 ports = ["B1", "B0"]
-depth = 2
+depth = 40
 latency = 5
 push = "B1"
 "#;
@@ -235,7 +235,7 @@ const FAULTS: &[Fault] = &[
     ("takt_fifo", "pushed & free == next", "1'b0"),
     ("takt_fifo", "write[f] ? value[32*f +: 32] : working[32*f +: 32]", "working[32*f +: 32]"),
     // The gate: the last lane first, an older value that stays, a newer one that is lost.
-    ("takt_gate", "waits & (~waits + 1'b1)", "waits & ~((waits >> 1) | (waits >> 2) | (waits >> 3))"),
+    ("takt_gate", "next & (~next + 1'b1)", "next & ~((next >> 1) | (next >> 2) | (next >> 3))"),
     ("takt_gate", "arrives[k]", "arrives[k] & ~waits[k]"),
     ("takt_gate", "arrives | (waits & ~goes)", "(arrives & ~waits) | (waits & ~goes)"),
     // Ticks: before all cores have waited, no multiple of their distance, a wrong distance.

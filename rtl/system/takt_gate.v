@@ -14,15 +14,15 @@ module takt_gate #(
     input  wire                rst,
     input  wire [LANES-1:0]    arrives,
     input  wire [32*LANES-1:0] values,
-    output wire                input_write,
+    output reg                 input_write,
     output reg  [INDEX-1:0]    input_index,
     output reg  [31:0]         input_value
 );
 
-    reg  [LANES-1:0]    waits;
+    // Which lane goes in next is found before the registers, and the choice of its value is behind them.
+    reg  [LANES-1:0]    waits, goes;
     reg  [32*LANES-1:0] held;
-    wire [LANES-1:0]    goes = waits & (~waits + 1'b1);
-    assign input_write = |waits;
+    wire [LANES-1:0]    next = (arrives | (waits & ~goes)) & {LANES{~rst}};
 
     integer i;
     always @* begin
@@ -36,7 +36,9 @@ module takt_gate #(
 
     integer k;
     always @(posedge clk) begin
-        waits <= (arrives | (waits & ~goes)) & {LANES{~rst}};
+        waits       <= next;
+        goes        <= next & (~next + 1'b1);
+        input_write <= |next;
         for (k = 0; k < LANES; k = k + 1) if (arrives[k]) held[32*k +: 32] <= values[32*k +: 32];
     end
 

@@ -88,7 +88,9 @@ pub fn random_system(seed: u64, machines: &[&'static Machine]) -> (String, BTree
                 }
                 continue;
             }
-            let _ = writeln!(text, "depth = {}\npop = \"{}\"", 1 + random.below(6), own(&mut random));
+            // Some of them deeper than what the circuit keeps outside of block RAM.
+            let depth = [1, 2, 3, 4, 5, 6, 33, 40][random.below(8) as usize];
+            let _ = writeln!(text, "depth = {depth}\npop = \"{}\"", own(&mut random));
             if !host {
                 let _ = writeln!(text, "push = \"{}\"", output(&mut random));
             }
