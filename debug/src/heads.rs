@@ -2,7 +2,7 @@
 
 use crate::fault::line;
 use std::sync::Arc;
-use takt_asm::diag::{Diagnostic, Diagnostics};
+use takt_asm::diag::{Diagnostic, Diagnostics, Severity};
 use takt_asm::levels::{Level, Levels};
 use takt_asm::source::Sources;
 use takt_system::Description;
@@ -35,17 +35,14 @@ pub fn diagnose(
         ),
     };
     let place = |at| line(program, at, sources);
-    let found = read.read.and_then(place);
-    let (sources, mut warning) = match found {
+    let (sources, mut warning) = match read.read.and_then(place) {
         Some((sources, span)) => (sources, Diagnostic::warning(CODE, span, message)),
         None => {
-            let place = format!("core {}, bundle {}: {message}", core.name, read.read_at);
-            (Sources::default(), Diagnostic::warning(CODE, Default::default(), place))
+            let message = format!("bundle {}: {message}", read.read_at);
+            let placeless = Diagnostic::placeless(CODE, message);
+            (Sources::default(), Diagnostic { severity: Severity::Warning, ..placeless })
         }
     };
-    if warning.labels[0].span.is_empty() {
-        warning.labels.clear();
-    }
     if let (Some(popped), Some(read)) = (read.popped, read.read)
         && popped.file == read.file
         && let Some((_, span)) = place(popped)
@@ -53,7 +50,7 @@ pub fn diagnose(
         warning = warning.also(span, "the pop");
     }
     if level == Level::Error {
-        warning.severity = takt_asm::diag::Severity::Error;
+        warning.severity = Severity::Error;
     }
     let mend = match read.doubt {
         Doubt::Moved => format!("keep the read before the pop: `.order {field}, {pop}`"),

@@ -23,7 +23,7 @@ module takt_pace #(
     // From the cycle after `starts` to that of `tick`.
     localparam FIRST = LEAD + OFFSET - 2;
     localparam LAST  = PERIOD - 1;
-    localparam TAKE  = SNAPSHOTS + 2;   // the cycle before: take is a register, as it is in every lane of the core's snapshots
+    localparam TAKE  = SNAPSHOTS + 2;   // the cycle before: take is a register, as it is in every mailbox of the core's snapshots
     reg [BITS-1:0] left;
     reg            runs;
     assign tick = runs & left == {BITS{1'b0}};

@@ -1,7 +1,7 @@
 //! Reads of a FIFO's head that its own pop spoils: what a program reads of an entry after it has taken it out may be the
 //! next entry's. docs/system.md says exactly what is told.
 
-use crate::description::{Description, End, Lane, LinkKind, MIN_LATENCY, Source};
+use crate::description::{Description, End, LinkKind, MIN_LATENCY, Mailbox, Source};
 use std::collections::BTreeSet;
 use takt_analysis::{StraightIssue, straight};
 use takt_isa::program::Location;
@@ -63,12 +63,12 @@ pub fn doubtful(description: &Description) -> Vec<HeadRead> {
         if core.program.latched {
             continue;
         }
-        let lanes = description.lanes(number);
+        let mailboxes = description.mailboxes(number);
         let issues = straight(&core.program);
         for (link, known) in description.links.iter().enumerate() {
             let LinkKind::Fifo { pop: Some(pop), .. } = known.kind else { continue };
             if known.to == End::Core(number) {
-                let seek = Seek { core: number, link, pop, program: &core.program, lanes: &lanes };
+                let seek = Seek { core: number, link, pop, program: &core.program, mailboxes: &mailboxes };
                 for stretch in issues.chunk_by(|one, next| one.from == next.from) {
                     seek.stretch(stretch, &mut found);
                 }
@@ -89,13 +89,14 @@ struct Seek<'d> {
     link: usize,
     pop: Register,
     program: &'d Program,
-    lanes: &'d [Lane],
+    mailboxes: &'d [Mailbox],
 }
 
 impl Seek<'_> {
     fn is_field(&self, register: Register) -> bool {
-        self.lanes.iter().any(|lane| {
-            lane.register == register && matches!(lane.source, Source::Field { link, .. } if link == self.link)
+        self.mailboxes.iter().any(|mailbox| {
+            mailbox.register == register
+                && matches!(mailbox.source, Source::Field { link, .. } if link == self.link)
         })
     }
 
@@ -111,19 +112,24 @@ impl Seek<'_> {
                 let access = |register, cycle| Access { register, at: issue.address, line, cycle };
                 if instruction.writes(&machine.slots[slot]) == Some(self.pop) {
                     let latency = timing.writebacks().find(|(register, _)| *register == self.pop);
-                    pops.push(access(self.pop, issue.cycle + latency.map_or(0, |(_, cycles)| cycles as Cycle)));
+                    pops.push(access(
+                        self.pop,
+                        issue.cycle + latency.map_or(0, |(_, cycles)| cycles as Cycle),
+                    ));
                 }
                 let fields = instruction.reads().iter().filter(|register| self.is_field(**register));
                 reads.extend(fields.map(|register| access(*register, issue.cycle)));
             }
         }
         let above = issues.first().and_then(|issue| self.line_above(issue.address));
-        let complete = NEXT + self.lanes.len() as Cycle;
+        let complete = NEXT + self.mailboxes.len() as Cycle;
         for read in &reads {
             for pop in pops.iter().filter(|pop| read.cycle >= pop.cycle + NEXT) {
                 let after = read.cycle - pop.cycle;
                 let doubt = match () {
-                    () if self.stands_before(read, pop, above) && !repeated(read, pop, &reads) => Doubt::Moved,
+                    () if self.stands_before(read, pop, above) && !repeated(read, pop, &reads) => {
+                        Doubt::Moved
+                    }
                     () if after < complete => Doubt::Between,
                     () => continue,
                 };

@@ -17,8 +17,8 @@ pub mod testing;
 
 pub use check::{ProgramError, ReadError, Request, read};
 pub use description::{
-    Core, Description, End, Field, Lane, Link, LinkKind, MAX_CORES, MAX_DEPTH, MAX_LATENCY, MAX_TICK,
-    MIN_LATENCY, Side, Source, Status, SystemPort, TEXT_BYTES,
+    Core, Description, End, Field, Link, LinkKind, MAX_CORES, MAX_DEPTH, MAX_LATENCY, MAX_TICK, MIN_LATENCY,
+    Mailbox, Side, Source, Status, SystemPort, TEXT_BYTES,
 };
 pub use fifo::FifoCounts;
 pub use system::{

@@ -24,7 +24,8 @@ fn receiver(text: &str) -> Description {
     describe(system, &programs).unwrap_or_else(|error| panic!("{error}"))
 }
 
-const HEAD: &str = ".input x:int, y:int, z:int, n:int\n.output u:int, v:int, w:int, p:int\n.once\n wait q\n.period\nq:\n";
+const HEAD: &str =
+    ".input x:int, y:int, z:int, n:int\n.output u:int, v:int, w:int, p:int\n.once\n wait q\n.period\nq:\n";
 
 fn doubts(description: &Description) -> Vec<(String, Doubt)> {
     let name = |read: &HeadRead| description.cores[read.core].program.register_text(read.field);
@@ -38,7 +39,8 @@ fn what_is_told_is_what_is_read() {
     let (mut old, mut between, mut new) = (0, 0, 0);
     for distance in 0..24 {
         let nops = " nop\n".repeat(distance);
-        let description = receiver(&format!("{HEAD} mov p, zero\n{nops} mov u, x\n mov v, y\n mov w, z\n wait q\n"));
+        let description =
+            receiver(&format!("{HEAD} mov p, zero\n{nops} mov u, x\n mov v, y\n mov w, z\n wait q\n"));
         let mut system = System::new(&description).unwrap();
         for entry in [[1, 1, 1], [2, 2, 2]] {
             for (field, value) in ["q.x", "q.y", "q.z"].into_iter().zip(entry) {
@@ -96,6 +98,7 @@ fn what_is_repeated_is_right() {
     let entry = format!(" mov u, x\n mov v, y\n mov w, z\n mov p, zero\n{}", " nop\n".repeat(20));
     let rep = format!("{HEAD} .rep i, 1, 2\n{entry} .endr\n wait q\n");
     assert_eq!(doubts(&receiver(&rep)), []);
-    let used = format!(".macro take\n mov u, x\n.endm\n{HEAD} mov p, zero\n{} take\n wait q\n", " nop\n".repeat(20));
+    let used =
+        format!(".macro take\n mov u, x\n.endm\n{HEAD} mov p, zero\n{} take\n wait q\n", " nop\n".repeat(20));
     assert_eq!(doubts(&receiver(&used)), []);
 }
