@@ -6,6 +6,7 @@ mod clients;
 mod dist;
 mod docs;
 mod formal;
+mod litex;
 mod python;
 mod reach;
 mod share;
@@ -55,8 +56,13 @@ enum Task {
     Reach(reach::Arguments),
     /// Build the playground, a page for any file server, in target/playground (installs what it lacks); --test opens it in a browser.
     Web(web::Arguments),
-    /// Verify the core's bus slaves and a board's UART with clients that other projects wrote, in Icarus Verilog (a share of `test`).
-    Clients,
+    /// Verify the core's bus slaves and a board's UART with clients that other projects wrote, in Icarus Verilog, and the core in a
+    /// SoC of LiteX, in Verilator (a share of `test`; installs what it lacks).
+    Clients {
+        /// The SoC of LiteX alone.
+        #[arg(long)]
+        litex: bool,
+    },
     /// Write an archive for each machine, target/dist/takt-*.tar.gz: its Verilog, a FuseSoC core, headers, the data sheet as PDF.
     Dist(dist::Arguments),
     /// Write the documentation as a site, in target/book/site: docs/, the crates' documentation, the playground (installs mdbook).
@@ -92,9 +98,12 @@ fn main() -> Result<()> {
         Task::Synth(arguments) => synth::synth(&arguments),
         Task::Reach(arguments) => reach::reach(&arguments),
         Task::Web(arguments) => web::web(&arguments),
-        Task::Clients => {
+        Task::Clients { litex } => {
             install()?;
-            clients::test()
+            if !litex {
+                clients::test()?;
+            }
+            litex::test()
         }
         Task::Dist(arguments) => dist::dist(&arguments),
         Task::Book(arguments) => book::book(&arguments),
@@ -239,6 +248,7 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
         extension()?;
         formal::formal(&formal::Arguments::SHARE)?;
         clients::test()?;
+        litex::test()?;
         dist::test()?;
     }
     let mut tests = cargo();
