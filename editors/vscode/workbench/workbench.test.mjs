@@ -189,6 +189,8 @@ test('cycles, a mistake and its fix, the pipeline beside the source, the debugge
 test('tasks, the problem matcher, snippets, the walkthrough', limit, async (t) => {
   writeFileSync(join(folder, 'project/wrong.s'), '.reg a\n        fad     a, a\n        halt\n');
   const page = await open('tasks', TAKT);
+  // The extension is there when the cycles are.
+  await page.locator('.codelens-decoration', { hasText: 'period: 38 cycles' }).waitFor();
   const task = async (name) => {
     await page.keyboard.press('Control+p');
     // First the kind of task, then the task.
