@@ -72,7 +72,10 @@ struct Met {
 impl Met {
     fn now(session: &Session, filters: Filters) -> Met {
         let emulator = session.emulator();
-        let (flags, statistics) = (emulator.flags(), emulator.statistics());
+        let statistics = emulator.statistics();
+        // What is raised in the cycle to come counts: the operation that clears the flags may issue in that very cycle.
+        let raised = emulator.in_flight().filter(|retire| retire.cycle <= emulator.now());
+        let flags = raised.fold(emulator.flags(), |flags, retire| flags | retire.flags);
         Met {
             flags: filters.flags().into_iter().map(|(flag, name)| (name, flags.contains(flag))).collect(),
             missed: if filters.missed { statistics.missed } else { 0 },
