@@ -8,7 +8,7 @@ use takt_isa::{BundleAddress, Program, Register, Type};
 /// Bundles that are listed of those that write or read a register.
 const LISTED: usize = 6;
 
-/// What a name stands for: its registers, the bundles that write and read them, which of them is at hand.
+/// What a name stands for: its registers, the bundles that write and read them, which of them is the current line's.
 ///
 /// # Errors
 /// If nothing is named so.
@@ -37,8 +37,8 @@ pub(crate) fn info(session: &Session, name: &str) -> Result<String, String> {
             writeln!(text, "{name} is {}, {}: {}", kind(program, only.register), place, type_name(only.ty));
     } else {
         let at_hand = lives.iter().any(|life| life.at_hand);
-        let at_hand = if at_hand { "; > is this line's" } else { "; none is this line's" };
-        let _ = writeln!(text, "{name} stands for {} registers{at_hand}", lives.len());
+        let at_hand = if at_hand { "; > marks the current line's" } else { "; none is the current line's" };
+        let _ = writeln!(text, "{name} has {} values{at_hand}", lives.len());
     }
     for life in &lives {
         let mark = if life.at_hand { '>' } else { ' ' };

@@ -259,6 +259,6 @@ fn too_many_values_to_watch() {
     source.push_str(" fadd F, t, a\n.schedule off\n wait p\n");
     let mut console = Console::new(session(&assembled(&source, &T3), 1));
     let error = console.execute("watch t").unwrap_err();
-    assert!(error.contains("`t` stands for 71 registers") && error.contains("`info t`"), "{error}");
+    assert!(error.contains("`t` has 71 values") && error.contains("`info t`"), "{error}");
     assert!(console.execute("watch t.70").unwrap().starts_with("stop 1"));
 }

@@ -56,7 +56,7 @@ commands! {
     "delete" "d" "[N]" Completion::None, Console::delete, "Remove a breakpoint or watchpoint, or all.";
     "stops" "" "" Completion::None, |c, _| Ok(c.stops()), "List breakpoints and watchpoints.";
     "print" "p" "EXPR, …" Completion::Names, Console::print, "Print values: as float, hexadecimal float, integer, bits. `x:int` reads x as an integer.";
-    "info" "i" "NAME" Completion::Names, Console::info, "What a name stands for: its registers, the bundles that write and read them, and which is at hand (`>`).";
+    "info" "i" "NAME" Completion::Names, Console::info, "What a name stands for: its registers, the bundles that write and read them, and which is the current line's (`>`).";
     "accuracy" "a" "[NAME]" Completion::Names, |c, a| accuracy::accuracy(&mut c.session, a), "The error of a register, or of the outputs, against binary64 from reset to here, and the lines that it comes from.";
     "set" "" "PLACE = EXPR" Completion::Names, Console::set, "Set a register, port or data word (`table[3]`). What was run beyond this position is forgotten.";
     "ulp" "" "EXPR, EXPR" Completion::Names, Console::ulp, "The distance of two values in units in the last place of the second.";

@@ -253,7 +253,7 @@ impl Live {
             };
             if values.len() * variants.len() > VARIANTS {
                 return Err(format!(
-                    "`{written}` stands for {} registers, more than the {VARIANTS} that one watchpoint watches: name one (`info {written}` lists them)",
+                    "`{written}` has {} values, more than the {VARIANTS} that one watchpoint watches: name one (`info {written}` lists them)",
                     values.len()
                 ));
             }
