@@ -159,7 +159,7 @@ numbers! {
         Crc = 1, "a packet's checksum is wrong";
         /// The sequence number is not the last one's successor.
         Sequence = 2, "a packet is missing or out of order";
-        /// Magic, kind or length.
+        /// Magic, kind or length: it stops. Of a motion or a jog, a profile, a mode or flags that are not defined: refused.
         Header = 3, "a packet's header, kind or length is wrong";
         /// Begun, and its words did not come.
         Late = 4, "a packet was begun and did not arrive in time";
