@@ -86,7 +86,7 @@ which take a LUT4's place each (older rows have the total only). Multipliers hav
         let (clock, [luts, flip_flops, memory, multipliers]) = PAPER;
         let _ = writeln!(
             text,
-            "| the paper's FPGA3 | Stratix III EP3SL150 | | | {clock} | | | | {luts} ALUTs | {flip_flops} | {multipliers} | {memory} kB |"
+            "| the paper's FPGA3 | Stratix III EP3SL150 | | | {clock} | | | | {luts} ALUTs | {flip_flops} | {multipliers} | {memory} kB | |"
         );
         text += "\nThe last line is the processor of the founding paper (its tables 2 and 4). Longest paths, of the median seed:\n\n";
         for row in machines.iter().filter(|row| row.grade.is_some()) {
