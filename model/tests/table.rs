@@ -162,7 +162,7 @@ about.
   out, after `cse`.
 - *saved*: operations fewer than CasADi's.
 - *t3*, *t1*: cycles of a period, and the bound that no schedule can beat; or why it does not fit.
-- OTHERS: cycles of the same operations in binary32 on processors that one buys, and on
+- OTHERS: cycles of the same operations in binary32 on commercial processors, and on
   one of the class of soft cores: models of LLVM RELEASE (`llvm-mca`), not measurements, with perfect caches. Products
   are fused into sums; sine and cosine are polynomials in line (12 products and sums each). Rocket has no conditional
   move: both ways of a branch count.

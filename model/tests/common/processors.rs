@@ -1,4 +1,4 @@
-//! Cycles that a function takes on processors that one buys, by LLVM's models of them: the graph as LLVM's intermediate code,
+//! Cycles that a function takes on commercial processors, by LLVM's models of them: the graph as LLVM's intermediate code,
 //! through `opt`, `llc` and `llvm-mca`. Caches are taken to be perfect, and nothing else runs.
 
 use std::fmt::Write as _;
