@@ -61,7 +61,7 @@ pub const REGISTERS: [Register; 15] = [
         2,
         "status",
         "r",
-        "bit 0 waiting, 1 halted, 2 fault, 6:4 slot of the fault, sticky flags: 7 overflow, 8 divide by zero, 9 invalid;, 10 in reset, \
+        "bit 0 waiting, 1 halted, 2 fault, 6:4 slot of the fault, sticky flags: 7 overflow, 8 divide by zero, 9 invalid; 10 in reset, \
          11 drive, 17:12 what stopped the drive: fault, halt, deadline, host, stop, a NaN output",
     ),
     register(3, "fault", "r", "15:0 bundle, 18:16 kind, as of the Wishbone slave (docs/hardware.md)"),
@@ -78,7 +78,7 @@ pub const REGISTERS: [Register; 15] = [
         13,
         "stream",
         "rw",
-        "15:0 first address, 19:16 words (1 to 15), 31:20 every so many periods; 0: no stream",
+        "15:0 first address, 19:16 words (1 to 15), 31:20 N: sent every N periods; 0: no stream",
     ),
     register(14, "lost", "r", "frames of the stream that were not sent, since power-up"),
 ];
