@@ -194,7 +194,7 @@ class Program:
                 dimensions behind these: (periods, 6). Numbers are rounded to binary32 once.
             periods: How many, if no input says so. Without both, the program runs to its `halt`, and outputs and cycles
                 have shape ().
-            tick: The tick comes every so many cycles; without, when the program is ready for it.
+            tick: Cycles from tick to tick; without it, the tick comes when the program is ready.
             max_cycles: A period, or a run to `halt`, that takes more is ended by a fault.
 
         Returns:
@@ -249,7 +249,7 @@ class Program:
         """A machine with the program in it, to be stepped period by period.
 
         Args:
-            tick: The tick comes every so many cycles; without, when the program is ready for it.
+            tick: Cycles from tick to tick; without it, the tick comes when the program is ready.
             max_cycles: A period that takes more is ended by a fault.
         """
         return Sim(self, self._core.sim(count_of("tick", tick), count_of("max_cycles", max_cycles) or MAX_CYCLES))

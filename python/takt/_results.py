@@ -107,7 +107,7 @@ class Analysis:
 
     #: Everything, as `takt analyse --json` prints it.
     data: dict[str, Any]
-    #: The picture, as a page for a browser that needs nothing else.
+    #: The picture, as a self-contained page for a browser.
     html: str
 
     def __init__(self, text: str, data: str, html: str) -> None:

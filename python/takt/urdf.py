@@ -17,7 +17,7 @@ from pathlib import Path
 from takt import _takt
 from takt._program import DEFAULT_MACHINE, Program, modelled
 
-#: Angles this close to a multiple of a quarter turn are taken for it, rad.
+#: Angles this close to a multiple of a quarter turn are rounded to it, rad.
 SNAP = 1e-6
 
 
@@ -52,9 +52,9 @@ def program(
         machine: The machine's name.
         base: The link that stays where it is; without, the root.
         tip: Only the joints from the base to this link, whose pose and Jacobian are computed.
-        kp: Of computed torque: acceleration for an error of position, 1/s².
-        kd: And for an error of velocity, 1/s.
-        snap: Angles this close to a multiple of a quarter turn are taken for it, rad.
+        kp: For computed torque: gain of the position error, 1/s².
+        kd: And of the velocity error, 1/s.
+        snap: Angles this close to a multiple of a quarter turn are rounded to it, rad.
         exact: Only rewrites that keep every operation's rounding.
         without: Rewrites to switch off, as `factor`; docs/model.md lists them.
         effort: How long the scheduler searches; 0 is one pass.
@@ -70,7 +70,7 @@ def program(
         try:
             text = path.read_text("utf-8")
         except UnicodeDecodeError:
-            raise ValueError(f"{path} is no text in UTF-8") from None
+            raise ValueError(f"{path} is not UTF-8 text") from None
         name, table = path.name, path.suffix.lower() == ".csv"
     model = _takt.robot(
         text, name, table, function, base, tip, (float(kp), float(kd)), float(snap), exact, list(without), machine
