@@ -15,9 +15,9 @@ use takt_programs::accuracy::MaxError;
 /// Table 2 of the paper: platform, clock in MHz, time of one period in µs.
 const PLATFORMS: [(&str, f64, f64); 4] = [
     ("FPGA1: Nios II, vendor's FPU", 100.0, 218.0),
-    ("FPGA2: Nios II, own float instructions", 100.0, 82.0),
+    ("FPGA2: Nios II, custom FP instructions", 100.0, 82.0),
     ("DSP TMS320F28069", 80.0, 43.0),
-    ("FPGA3: own float ASIP", 125.0, 21.0),
+    ("FPGA3: custom FP ASIP", 125.0, 21.0),
 ];
 
 /// Table 1 of the paper: operation, count, our mnemonics for it.
