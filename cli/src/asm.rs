@@ -120,10 +120,10 @@ impl Asm {
         match &self.output {
             Some(path) => Ok(Some(path.clone())),
             None if others || self.check => Ok(None),
-            None if files::is_dash(&self.file) => {
-                Err(Failure::Usage("say with --output where the image of standard input is to go".to_owned())
-                    .into())
-            }
+            None if files::is_dash(&self.file) => Err(Failure::Usage(
+                "the source is standard input: give the image's name with --output".to_owned(),
+            )
+            .into()),
             None => Ok(Some(self.file.with_extension("takt"))),
         }
     }

@@ -42,7 +42,7 @@ const CHUNK: usize = 1 << 16;
 pub(crate) fn run(arguments: &Eval, out: &mut Out) -> Result<()> {
     let (row, machine) = (arguments.operation, arguments.machine.machine);
     if row.effect != Effect::Compute {
-        bail!("`{}` computes no value from its operands: {}", row.mnemonic, row.summary);
+        bail!("`{}` has no result that could be evaluated: {}", row.mnemonic, row.summary);
     }
     if machine.host(row.function).is_none() {
         bail!("machine {} has no unit for `{}`", machine.name, row.mnemonic);

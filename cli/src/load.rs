@@ -77,7 +77,9 @@ impl Load {
     fn bytes(path: &Path) -> Result<Vec<u8>> {
         if is_system(path) {
             let name = files::input_name(path);
-            bail!("{name} is a system, and one program is wanted; `takt run` and `takt bound` take systems");
+            bail!(
+                "{name} is a system, but this command needs a single program; `takt run` and `takt bound` accept systems"
+            );
         }
         files::read(path, IMAGE_BYTES)
     }

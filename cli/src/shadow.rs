@@ -72,7 +72,7 @@ fn compare<L: Line>(
         (None, Err(error)) => bail!("the board goes on; the emulator: {error}"),
     }
     if host.register("periods")? != before.wrapping_add(1) {
-        bail!("the board has not run it: is another host at work?");
+        bail!("the board did not run the period: is another host connected?");
     }
     for (port, bits) in outputs.iter().zip(live) {
         // What was never written may be anything.

@@ -272,5 +272,5 @@ fn the_way_from_pin_to_pin_has_a_bound() {
     }
     folder.write("broken.toml", "period = \n");
     refused("--wiring broken.toml", "broken.toml:1:10:");
-    refused("--wiring none.toml --board ulx3s-85f", "none.toml: no way from pin to pin");
+    refused("--wiring none.toml --board ulx3s-85f", "none.toml: no path from pin to pin");
 }

@@ -148,7 +148,7 @@ fn what_a_system_is_not() {
         ("run nowhere.toml --periods 1", "nowhere.toml"),
         ("bound missing.toml", "there is no program b.s"),
         ("bound right.toml --machine t1", "--machine with a system"),
-        ("asm right.toml", "is a system, and one program is wanted"),
+        ("asm right.toml", "is a system, but this command needs a single program"),
     ] {
         let done = folder.line(line);
         assert_ne!(done.status, Some(0), "{line}");

@@ -34,7 +34,7 @@ pub(super) fn run(
     let ways = ways(&wiring, (program_takes.best, program_takes.worst));
     if ways.inputs.is_empty() || ways.outputs.is_empty() {
         bail!(
-            "{name}: no way from pin to pin: it takes an input (quadrature, step, digital-in) and an output (pwm, sigma-delta, digital-out) with ports"
+            "{name}: no path from pin to pin: the wiring needs an input (quadrature, step, digital-in) and an output (pwm, sigma-delta, digital-out) that are connected to ports"
         );
     }
     let all = |edge: fn(&Part) -> u64, pick: fn(u64, u64) -> u64| {

@@ -92,7 +92,7 @@ pub(super) fn drive(
     let limit = arguments.max_cycles.unwrap_or(PERIOD_LIMIT);
     let stop = |system: &System| {
         let flag = "`--max-cycles` sets the limit";
-        anyhow::anyhow!("the system has run for {} cycles and does not come to an end ({flag})", system.now())
+        anyhow::anyhow!("the system has run for {} cycles without ending ({flag})", system.now())
     };
     let mut inputs = Inputs::open(arguments.inputs, &columns)?;
     let mut outputs = arguments.outputs.map(Out::create).transpose()?;

@@ -64,19 +64,19 @@ impl OnSystem {
         let encoders = INPUTS[..AXES].iter().map(|port| port.name);
         if let Some(none) = encoders.chain(fields.iter().map(String::as_str)).find(|name| !given(name)) {
             bail!(
-                "this is no system for the hybrid robot: it has no input `{none}` (see programs/hybrid/two.toml)"
+                "this system cannot control the hybrid robot: it has no input `{none}` (see programs/hybrid/two.toml)"
             );
         }
         let fifo = description.link_named(BLOCKS).context("its inputs have this link")?;
         let LinkKind::Fifo { depth, .. } = description.links[fifo].kind else {
-            bail!("this is no system for the hybrid robot: `{BLOCKS}` is no FIFO");
+            bail!("this system cannot control the hybrid robot: `{BLOCKS}` is no FIFO");
         };
         let known = description.outputs();
         let mut outputs = [(0, 0); OUTPUTS.len()];
         for (place, port) in outputs.iter_mut().zip(&OUTPUTS) {
             let found = known.iter().find(|output| output.name == port.name);
             let found = found.with_context(|| {
-                format!("this is no system for the hybrid robot: it has no output `{}`", port.name)
+                format!("this system cannot control the hybrid robot: it has no output `{}`", port.name)
             })?;
             *place = (found.link, found.field);
         }
