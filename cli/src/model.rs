@@ -24,7 +24,7 @@ use takt_model::{instructions, write};
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Model {
-    /// Description; what it is follows from its ending: .urdf or .xml, .csv, .json.
+    /// Description; the format is determined by the extension, which must be .urdf, .xml, .csv or .json.
     file: PathBuf,
     /// What to compute of a robot: forward-kinematics, jacobian, inverse-dynamics, gravity, mass-matrix, forward-dynamics or
     /// computed-torque.
@@ -36,13 +36,13 @@ pub(crate) struct Model {
     /// Only the joints from the base to this link; the others are held at 0. It is the link whose pose and Jacobian are computed.
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
-    /// Of computed-torque: acceleration for an error of position, 1/s².
+    /// For computed-torque: gain of the position error, 1/s².
     #[arg(long, value_name = "NUMBER", default_value_t = 100.0, value_parser = gain, allow_hyphen_values = true)]
     kp: f64,
-    /// Of computed-torque: acceleration for an error of velocity, 1/s.
+    /// For computed-torque: gain of the velocity error, 1/s.
     #[arg(long, value_name = "NUMBER", default_value_t = 20.0, value_parser = gain, allow_hyphen_values = true)]
     kd: f64,
-    /// Angles this close to a multiple of a quarter turn are taken for it, rad.
+    /// Round angles this close to a multiple of a quarter turn to it, rad.
     #[arg(long, value_name = "ANGLE", default_value_t = urdf::SNAP, value_parser = angle, allow_hyphen_values = true)]
     snap: f64,
     #[command(flatten)]
@@ -191,7 +191,7 @@ fn function(arguments: &Model, delays: &Delays) -> Result<Function> {
         None => anyhow!("{name}: {error}"),
     };
     let bytes = files::read(path, urdf::MAX_BYTES)?;
-    let text = String::from_utf8(bytes).map_err(|_| anyhow!("{name} is no text in UTF-8"))?;
+    let text = String::from_utf8(bytes).map_err(|_| anyhow!("{name} is not UTF-8 text"))?;
     let rewrites = arguments.rewrites.rewrites();
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
     let stem = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
@@ -204,7 +204,7 @@ fn function(arguments: &Model, delays: &Delays) -> Result<Function> {
             ];
             if let Some((option, _)) = unused.iter().find(|(_, given)| *given) {
                 return Err(Failure::Usage(format!(
-                    "{option} is about robots; {name} is a list of instructions"
+                    "{option} applies to robot descriptions, but {name} contains expressions"
                 ))
                 .into());
             }
@@ -212,7 +212,11 @@ fn function(arguments: &Model, delays: &Delays) -> Result<Function> {
         }
         Some("csv") => dh::read(&text, &stem, arguments.snap).map_err(told)?,
         Some("urdf" | "xml") => urdf::read(&text, arguments.snap).map_err(told)?,
-        _ => bail!("{name}: what it is follows from its ending: .urdf or .xml, .csv, .json"),
+        _ => {
+            bail!(
+                "{name}: the format is determined by the extension, which must be .urdf, .xml, .csv or .json"
+            )
+        }
     };
     let Some(what) = arguments.function else {
         let names: Vec<&str> = What::ALL.iter().map(|(_, name, _)| *name).collect();

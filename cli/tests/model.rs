@@ -131,10 +131,14 @@ fn mistakes_have_one_message() {
         (
             "model robot.txt -f gravity",
             1,
-            "robot.txt: what it is follows from its ending: .urdf or .xml, .csv, .json",
+            "robot.txt: the format is determined by the extension, which must be .urdf, .xml, .csv or .json",
         ),
         ("model none.urdf -f gravity", 1, "cannot open none.urdf"),
-        ("model f.json -f gravity", 2, "--function is about robots; f.json is a list of instructions"),
+        (
+            "model f.json -f gravity",
+            2,
+            "--function applies to robot descriptions, but f.json contains expressions",
+        ),
         ("model f.json", 1, "f.json:1: this is no list of instructions: EOF while parsing an object"),
         ("model ur5.urdf -f gravity --snap 1", 2, "between 0 and 0.01 rad"),
         ("model ur5.urdf -f computed-torque --kp -1", 2, "a gain is finite and not negative"),
