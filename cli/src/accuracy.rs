@@ -23,7 +23,7 @@ use takt_isa::program::Location;
 
 /// Measure the outputs' errors against binary64, or bound them for every run, and name the lines that they come from.
 ///
-/// With --inputs, runs the program on recorded inputs, and beside it the same operations in binary64. Without, follows every way through a
+/// With --inputs, runs the program on recorded inputs, and beside it the same operations in binary64. Without, follows every path through a
 /// period for all inputs and states within their `.range`: bounds each output's error, and shows that there is no NaN, no overflow and no
 /// division by zero, or names the operations where there may be (status 1).
 #[derive(Args)]

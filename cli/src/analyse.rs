@@ -25,8 +25,8 @@ use takt_isa::{Machine, Program};
 ///
 /// Of a system it shows where each core's cycles went, in all its periods.
 ///
-/// Runs the program and looks at its last period; at a program without periods from reset to `halt`. Input ports are 0
-/// unless --inputs says otherwise.
+/// Runs the program and analyses its last period; a program without periods is analysed from reset to `halt`. Input ports
+/// are 0 unless --inputs says otherwise.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Analyse {
@@ -39,10 +39,10 @@ pub(crate) struct Analyse {
     /// CSV with one named column for each input port and one row for each period; `-` is standard input.
     #[arg(long, value_name = "CSV")]
     inputs: Option<PathBuf>,
-    /// Run so many periods and look at the last; 0 is what runs once [default: the rows of --inputs, else 2].
+    /// Run N periods and analyse the last; 0 is what runs once [default: the rows of --inputs, else 2].
     #[arg(long, value_name = "N", value_parser = number::natural, allow_hyphen_values = true)]
     periods: Option<u64>,
-    /// Write the picture of the pipeline as a page for a browser, which needs nothing else; of a system, that of all cores and
+    /// Write the picture of the pipeline as a self-contained page for a browser; of a system, that of all cores and
     /// links in the last period of its slowest core. `-` is standard output.
     #[arg(long, value_name = "OUT")]
     html: Option<PathBuf>,

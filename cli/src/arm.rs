@@ -27,7 +27,8 @@ use takt_programs::arm::{
 /// Run the six-axis arm's kinematics: the second founding paper's examples, and random poses.
 ///
 /// Assembles `arm/forward.s` and `arm/inverse.s`, runs them on the emulator, and prints results, errors against binary64, and cycles
-/// beside the paper's fixed-point circuits. Every random pose goes back by all eight configurations, and forward again.
+/// beside the paper's fixed-point circuits. For each random pose, the inverse kinematics are computed in all eight
+/// configurations, and the forward kinematics from each result.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arm {

@@ -18,7 +18,7 @@ use takt_board::tools::{NEXTPNR, Venv, YOSYS};
 use takt_board::{Board, Mistake, Wiring};
 use takt_isa::Program;
 
-/// Boards: which there are, their pins, and a program on one.
+/// List boards and their pins; check, build and simulate a program on a board.
 #[derive(Args)]
 pub(crate) struct Boards {
     #[command(subcommand)]
@@ -70,7 +70,7 @@ struct Check {
 struct Build {
     #[command(flatten)]
     target: Target,
-    /// The folder; it is made if it is not there.
+    /// Output folder; created if it does not exist.
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
     /// Seed of the placement; another one may reach a higher clock.
@@ -86,7 +86,7 @@ Example:
   takt board build --board ulx3s-85f --wiring robot.toml --program robot.s -o out
   openFPGALoader --board ulx3s out/takt.bit";
 
-/// Run the complete top level in Verilator, with its UART at a pseudo-terminal, as a board at a serial port.
+/// Run the complete top level in Verilator, with its UART on a pseudo-terminal that replaces a board's serial port.
 ///
 /// `takt load` and `takt live` talk to the port that is printed. It runs slower than a board: a second of it takes minutes.
 #[derive(Args)]
@@ -106,10 +106,10 @@ struct Sim {
     /// With --robot: periods to drive, from the path's beginning.
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = number::count, requires = "robot", allow_hyphen_values = true)]
     periods: u64,
-    /// One in so many bits of the UART is flipped, in either direction.
+    /// Flip one in N bits on the UART, in either direction; 0 flips none.
     #[arg(long, default_value_t = 0, value_name = "N")]
     noise: u32,
-    /// End after so many cycles; without it, when it is interrupted.
+    /// End after N cycles; without it, when it is interrupted.
     #[arg(long, value_name = "N")]
     cycles: Option<u64>,
 }
@@ -334,8 +334,7 @@ struct Axis {
 
 impl Axis {
     fn new(text: &str, wiring: &Wiring, sim: &Simulation) -> Result<Axis> {
-        let wrong =
-            || anyhow!("--axis {text}: it is a PWM, a quadrature and a speed, as in motor,encoder,20000");
+        let wrong = || anyhow!("--axis {text}: expected PWM,QUADRATURE,SPEED, as in motor,encoder,20000");
         let [motor, encoder, speed] = text.split(',').collect::<Vec<_>>()[..] else { return Err(wrong()) };
         let find = |name: &str, kind: &str| {
             let mut all = wiring.peripherals.iter();

@@ -20,7 +20,7 @@ use takt_isa::timing::Cycle;
 
 /// Bound the cycles of each section, whatever the inputs.
 ///
-/// Follows every way through the program with the machine's exact timing. Loops need `.loop_bound N` before their first bundle, which
+/// Follows every path through the program with the machine's exact timing. Loops need `.loop_bound N` before their first bundle, which
 /// the emulator checks. What cannot be bounded for certain is an error.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]

@@ -22,8 +22,9 @@ use takt_rtl::{Design, Library, export};
 /// Run a program on the circuit, in Verilator, and on the emulator, and compare every cycle.
 ///
 /// Compared are the cycle and address of every bundle that issues, every register, flag, data word and output port that is
-/// written, missed deadlines, halts and faults. Each row of --inputs is one period. With --seed or --programs it is random
-/// programs that run. Of a system, that is compared of every core, and what happens on every link and on every pin. On a difference the waveform around it is written.
+/// written, missed deadlines, halts and faults. Each row of --inputs is one period. With --seed or --programs, random
+/// programs run. For a system, all of this is compared for every core, and so is what happens on every link and pin. On a
+/// difference the waveform around it is written.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Cosim {
@@ -43,7 +44,7 @@ pub(crate) struct Cosim {
     /// Run random programs, the first from this seed [default: 0].
     #[arg(long, value_name = "S", value_parser = number::natural, allow_hyphen_values = true)]
     seed: Option<u64>,
-    /// Run so many random programs [default: 1].
+    /// Run N random programs [default: 1].
     #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
     programs: Option<u64>,
     /// Random programs with latched ports. (A program from a file has what it says.)

@@ -19,8 +19,8 @@ use takt_editor::wire::{self, WireError};
 
 /// Serve an editor's debugger: breakpoints, steps forward and back, registers, ports, operations in flight.
 ///
-/// Speaks the debug adapter protocol on standard input and output, or on a socket. What is debugged, the editor's launch
-/// configuration says: docs/editors.md.
+/// Speaks the debug adapter protocol on standard input and output, or on a socket. The editor's launch
+/// configuration says what is debugged (docs/editors.md).
 #[derive(Args)]
 pub(crate) struct Dap {
     /// Serve clients on this address, one after the other, until it is killed: `127.0.0.1:4711`.

@@ -16,7 +16,7 @@ pub(crate) struct Isa {
     /// Show this instruction only, in full.
     #[arg(value_parser = select::instruction)]
     mnemonic: Option<&'static Row>,
-    /// In which form.
+    /// Output format.
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
     /// The same as --format json.

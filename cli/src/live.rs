@@ -20,7 +20,7 @@ use takt_isa::{Program, Type};
 struct Port {
     /// The serial port: /dev/ttyUSB0, or what `takt board sim` says.
     port: PathBuf,
-    /// Its baud rate: the wiring's.
+    /// Baud rate, as in the wiring file.
     #[arg(long, default_value_t = 115_200)]
     baud: u32,
 }
@@ -70,7 +70,7 @@ pub(crate) fn load(arguments: &LoadBoard, color: bool, out: &mut Out) -> Result<
     Ok(())
 }
 
-/// See and steer a program on a board while it runs, over its serial port.
+/// Monitor and control a running program on a board, over its serial port.
 #[derive(Args)]
 pub(crate) struct Live {
     #[command(flatten)]
@@ -123,12 +123,12 @@ enum Command {
         #[arg(long)]
         drive: bool,
     },
-    /// Print an output port every so many periods, with the period's number.
+    /// Print an output port every N periods, with the period's number.
     Stream {
         /// The port.
         name: String,
         /// Periods from one to the next.
-        #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..4096))]
+        #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..4096))]
         every: u32,
         /// Values to print.
         #[arg(long, default_value_t = 100)]
@@ -263,7 +263,7 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
             let lost = host.register("lost")?;
             if lost > 0 {
                 crate::output::warning(
-                    &format!("{lost} frames were lost since power-up: --every takes more periods"),
+                    &format!("{lost} frames were lost since power-up: use a larger --every"),
                     color,
                 );
             }

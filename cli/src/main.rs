@@ -77,7 +77,7 @@ struct Arguments {
     /// Colour of messages: auto (on a terminal, unless NO_COLOR is set), always or never.
     #[arg(long, global = true, value_enum, default_value_t = Color::Auto, value_name = "WHEN", hide_possible_values = true)]
     color: Color,
-    /// Do not compile what the emulator runs often: slower, and otherwise the same.
+    /// Switch off the emulator's just-in-time compiler: slower, with identical results.
     #[cfg(feature = "jit")]
     #[arg(long, global = true)]
     no_jit: bool,
@@ -85,8 +85,8 @@ struct Arguments {
 
 const AFTER_HELP: &str = "\
 Results go to standard output, messages to standard error. \
-Exit status: 0 success; 1 an error in a file or while running, or what was to be shown does not hold (`bound --deadline`, \
-`cosim`, a `check` of `debug`); 2 an error in the command line; 3 something that --deny names happened in a run.
+Exit status: 0 success; 1 an error in a file or while running, or a check failed (`bound --deadline`, `cosim`, a \
+`check` of `debug`); 2 an error in the command line; 3 something that --deny names happened in a run.
 
 Examples:
   takt track                         the main job: cycles, accuracy, tracking error

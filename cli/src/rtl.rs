@@ -29,7 +29,7 @@ pub(crate) struct Rtl {
     /// A system, a `.toml` file; without it, a machine's circuit is written.
     #[arg(value_name = "SYSTEM", conflicts_with_all = ["machine", "program", "inputs", "periods"])]
     system: Option<PathBuf>,
-    /// The folder; it is made if it is not there.
+    /// Output folder; created if it does not exist.
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
     #[command(flatten)]
@@ -88,7 +88,7 @@ pub(crate) fn run(arguments: &Rtl, color: bool, out: &mut Out) -> Result<()> {
     if stimuli > bench::STIMULI {
         let most = bench::STIMULI / (periods[0].len() + 1);
         bail!(
-            "{} periods are too many for the test bench, which takes {most}: --periods {most}",
+            "{} periods are too many for the test bench, which takes at most {most}: use --periods {most}",
             periods.len()
         );
     }

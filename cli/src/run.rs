@@ -58,7 +58,7 @@ pub(crate) struct Run {
     /// Stop with an error after this many cycles [default: 1000000000 in any one period].
     #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
     max_cycles: Option<u64>,
-    /// The tick comes every so many cycles, up to 100000000 [default: when the program is ready].
+    /// Cycles from tick to tick, up to 100000000 [default: the tick comes when the program is ready].
     #[arg(long, value_name = "CYCLES", value_parser = number::tick, allow_hyphen_values = true)]
     tick: Option<NonZeroU64>,
     #[command(flatten)]

@@ -38,8 +38,8 @@ pub(crate) enum When {
 /// `--contract`.
 #[derive(Args, Clone, Copy, Default)]
 pub(crate) struct ContractArgument {
-    /// Whether a product is fused into the sum that alone uses it, with one rounding, on machines that can: under `.contract on`,
-    /// everywhere, or nowhere. It changes results in their last places.
+    /// Fuse a product and the only sum that uses it into one operation (fused multiply-add), on machines that have it: where the
+    /// source says `.contract on`, everywhere, or nowhere. This changes the last bits of results.
     #[arg(long, value_enum, value_name = "WHEN", default_value_t = When::Source)]
     pub(crate) contract: When,
 }
@@ -59,10 +59,10 @@ impl From<ContractArgument> for Contract {
 pub(crate) struct SourceArguments {
     #[command(flatten)]
     pub(crate) contract: ContractArgument,
-    /// Look in this folder too for what a source includes; may be given several times.
+    /// Also search this folder for included files; may be given several times.
     #[arg(short = 'I', long = "include", value_name = "DIR", value_parser = folder)]
     pub(crate) folders: Vec<PathBuf>,
-    /// Make the assembler's warnings errors: `error`, or one by name, `error=NAME`; `allow=NAME` leaves it out.
+    /// Turn warnings into errors: `error` for all, `error=NAME` for one; `allow=NAME` suppresses one.
     #[arg(short = 'W', long = "warnings", value_name = "LEVEL")]
     pub(crate) warnings: Vec<Wish>,
 }

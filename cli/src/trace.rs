@@ -24,7 +24,7 @@ pub(crate) struct TraceArguments {
     /// `takt.stall.*`; `*` stands for any characters.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "trace")]
     trace_signals: Vec<String>,
-    /// End the trace when it has so many MiB.
+    /// End the trace when it reaches this size in MiB.
     #[arg(long, value_name = "MIB", default_value_t = 256, value_parser = number::count, requires = "trace", allow_hyphen_values = true)]
     trace_limit: u64,
 }

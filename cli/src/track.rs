@@ -29,7 +29,7 @@ use takt_programs::hybrid::{Identification, kinematics};
 use takt_programs::trajectory::Trajectory;
 use takt_programs::{SOURCES, gcode};
 
-/// Drive the hybrid robot along a tool path in closed loop, and count.
+/// Run the hybrid robot's controller along a tool path in closed loop, and measure cycles, accuracy and tracking error.
 ///
 /// Assembles the tracking program, runs it on the emulator once per sampling period (10 kHz) against a binary64 model of the
 /// robot, and prints its cycles, accuracy and tracking error beside the founding paper's.
@@ -69,7 +69,8 @@ pub(crate) struct Track {
     pub(crate) plot: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) robot: SpreadArguments,
-    /// Drive so many robots that differ, and print how their tracking errors spread; --plot draws a histogram.
+    /// Drive N robots with randomly drawn parameters, and print the distribution of their tracking errors; --plot draws a
+    /// histogram.
     #[arg(
         long,
         value_name = "N",

@@ -35,7 +35,8 @@ use takt_emu::Rows;
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Debug {
-    /// Source or image, or a system, a `.toml` file. With --track, `tracking` (as if nothing is said) or another that `takt track` knows, or a file.
+    /// Source or image, or a system, a `.toml` file. With --track, `tracking` (the default), another name that
+    /// `takt track --program` knows, or a file.
     #[arg(required_unless_present = "track")]
     pub(crate) file: Option<PathBuf>,
     #[command(flatten)]
@@ -45,7 +46,7 @@ pub(crate) struct Debug {
     /// CSV with one named column for each input port and one row for each period [default: the ports are 0].
     #[arg(long, value_name = "CSV", conflicts_with = "track")]
     inputs: Option<PathBuf>,
-    /// The tick comes every so many cycles, up to 100000000 [default: when the program is ready].
+    /// Cycles from tick to tick, up to 100000000 [default: the tick comes when the program is ready].
     #[arg(long, value_name = "CYCLES", value_parser = number::tick, allow_hyphen_values = true, conflicts_with = "track")]
     tick: Option<NonZeroU64>,
     /// Commands from a file; `-` is standard input.

@@ -22,7 +22,7 @@ use takt_robot::level::{Answer, Files, Message, Session};
 use takt_robot::limits;
 use takt_robot::plant::Plant;
 
-/// Move a six-joint robot: three cores control it, a command level leads them.
+/// Command a simulated six-joint robot that is controlled by three cores.
 ///
 /// The controller is the three-processor one of the founding papers (`programs/three`): a communication, a kinematic and a
 /// dynamic core in one clock, emulated cycle by cycle, and a plant in binary64. Commands come from a program in a file, from a script,
@@ -36,13 +36,13 @@ pub(crate) struct Robot {
     /// Commands as at the prompt, from a file; `-` is standard input.
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,
-    /// Only look whether FILE can run: it moves a copy of the robot, and signals are taken to come.
+    /// Only check that FILE can run, on a copy of the robot, assuming that signals arrive.
     #[arg(long, requires = "file")]
     check: bool,
     /// Faults of the link, each at a time in s: corrupt, order, late or silent, as `corrupt@2.5,silent@4`.
     #[arg(long, value_name = "FAULT@S,...", value_delimiter = ',', value_parser = fault)]
     faults: Vec<(LinkFault, f64)>,
-    /// Another controller: a system with the same ends for the host [default: the one that comes with takt].
+    /// Another controller: a system with the same host ports [default: the one that comes with takt].
     #[arg(long, value_name = "TOML")]
     system: Option<PathBuf>,
     /// Draw joint angles, velocities, tracking errors and the tool's path as SVG; `-` is standard output.
@@ -60,7 +60,7 @@ pub(crate) struct Robot {
 const EXAMPLES: &str = "\
 Examples:
   takt robot                                         at a prompt; `help` lists the commands
-  takt robot programs/three/demonstration.robot      a program, and tables of what it came to
+  takt robot programs/three/demonstration.robot      run a program, and print its results
   takt robot demonstration.robot --plot robot.svg    with a picture
   takt robot square.robot --check                    can it run?
   takt robot square.robot --record in.csv            and programs/three/controller.toml runs on it again:
