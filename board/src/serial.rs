@@ -38,14 +38,39 @@ impl Serial {
     }
 }
 
+impl Serial {
+    /// Whether the port is still there. Of one that is not, reads bring nothing, as of a silent one.
+    #[cfg(unix)]
+    fn is_there(&self) -> bool {
+        rustix::termios::tcgetattr(&self.0).is_ok()
+    }
+
+    #[cfg(not(unix))]
+    fn is_there(&self) -> bool {
+        true
+    }
+
+    /// An error of a port that is gone, in words.
+    fn named(&self, error: io::Error) -> io::Error {
+        if self.is_there() { error } else { gone() }
+    }
+}
+
+fn gone() -> io::Error {
+    io::Error::new(io::ErrorKind::NotConnected, "the port was unplugged, or the simulated board has ended")
+}
+
 impl Line for Serial {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.0.write_all(bytes)
+        self.0.write_all(bytes).map_err(|error| self.named(error))
     }
 
     fn receive(&mut self) -> io::Result<Vec<u8>> {
         let mut bytes = vec![0; 4096];
-        let count = self.0.read(&mut bytes)?;
+        let count = self.0.read(&mut bytes).map_err(|error| self.named(error))?;
+        if count == 0 && !self.is_there() {
+            return Err(gone());
+        }
         bytes.truncate(count);
         Ok(bytes)
     }

@@ -98,6 +98,18 @@ impl Peripheral {
     }
 }
 
+/// The keys of a wiring. Of a system there is one error, instead of one for each of its keys.
+fn keys<'a>(document: &'a Document<'a>) -> Option<Table<'a>> {
+    let top = document.top()?;
+    if let Some(place) = top.place_of("core") {
+        let text =
+            "this is a system of several cores, and a wiring is wanted, which says what is at a board's pins";
+        document.mistake(&place, text);
+        return None;
+    }
+    Some(top)
+}
+
 /// A register that the program writes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Write {
@@ -136,9 +148,13 @@ impl Wiring {
     }
 
     /// The board that a wiring is for, if its text says so.
-    pub fn board(file: &str, text: &str) -> Option<String> {
+    ///
+    /// # Errors
+    /// If the text is no wiring at all, or what it says of the board is no name.
+    pub fn board(file: &str, text: &str) -> Result<Option<String>, Vec<Mistake>> {
         let document = Document::new(file, text);
-        Some(document.top()?.string("board")?.value)
+        let board = keys(&document).map(|top| top.string("board").map(|board| board.value));
+        document.finish(board)
     }
 
     /// Reads a wiring for a board, from the text of a file.
@@ -147,15 +163,7 @@ impl Wiring {
     /// Everything that is wrong with it, in the order of the file.
     pub fn read(file: &str, text: &str, board: &Board) -> Result<Wiring, Vec<Mistake>> {
         let document = Document::new(file, text);
-        let wiring = document.top().and_then(|top| match top.place_of("core") {
-            // One error instead of one for each of its keys.
-            Some(place) => {
-                let text = "this is a system of several cores, and a wiring is wanted, which says what is at a board's pins";
-                document.mistake(&place, text);
-                None
-            }
-            None => Reader::new(&document, board).wiring(&top),
-        });
+        let wiring = keys(&document).and_then(|top| Reader::new(&document, board).wiring(&top));
         document.finish(wiring)
     }
 

@@ -193,9 +193,12 @@ pub(crate) fn wired(
     color: bool,
 ) -> Result<(Board, Wiring)> {
     let (name, text) = text(path)?;
-    let own = Wiring::board(&name, &text);
-    let board = board.or(own.as_deref()).with_context(|| format!("{name} names no board: --board NAME"))?;
-    let board = find(board, color)?;
+    let board = match board {
+        Some(board) => board.to_owned(),
+        None => right(Wiring::board(&name, &text), color)?
+            .with_context(|| format!("{name} names no board: --board NAME"))?,
+    };
+    let board = find(&board, color)?;
     let wiring = right(Wiring::read(&name, &text, &board), color)?;
     right(wiring.check(&name, &text, program), color)?;
     Ok((board, wiring))
@@ -301,7 +304,8 @@ fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
     let step = |what: &str| output::message(&format!("{what} …"));
     step("tools");
     let venv = Venv::with(&venv, &[YOSYS, NEXTPNR])?;
-    let report = takt_board::build::build(&venv, &board, &wiring, &program, arguments.seed, folder, &step)?;
+    let options = takt_board::build::Options { seed: arguments.seed, netlist: false };
+    let report = takt_board::build::build(&venv, &board, &wiring, &program, options, folder, &step)?;
     writeln!(out, "{}: {} bytes, for {}", folder.join("takt.bit").display(), report.bytes, board.text)?;
     for (net, reached, needed) in &report.clocks {
         writeln!(

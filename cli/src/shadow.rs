@@ -47,6 +47,53 @@ fn stopped<L: Line>(host: &mut Host<L>) -> Result<Option<&'static str>> {
     })
 }
 
+/// Compares the next period.
+fn compare<L: Line>(
+    host: &mut Host<L>,
+    emulator: &mut Emulator,
+    inputs: &[Watched<'_>],
+    outputs: &[Watched<'_>],
+) -> Result<()> {
+    // A port is read once the program waits: the step before this one is then over, too.
+    read(host, outputs)?;
+    let before = host.register("periods")?;
+    host.set("step", 1)?;
+    let live = read(host, outputs)?;
+    // Between two ticks nothing changes these: they are what the period had.
+    let given = read(host, inputs)?;
+    for (port, bits) in inputs.iter().zip(&given) {
+        emulator.set_input_bits(port.port.register, *bits)?;
+    }
+    let ran = emulator.run_period(&[]);
+    match (stopped(host)?, ran) {
+        (None, Ok(_)) => {}
+        (Some(what), Err(error)) => bail!("the board {what}; the emulator: {error}"),
+        (Some(what), Ok(_)) => bail!("the board {what}, the emulator goes on"),
+        (None, Err(error)) => bail!("the board goes on; the emulator: {error}"),
+    }
+    if host.register("periods")? != before.wrapping_add(1) {
+        bail!("the board has not run it: is another host at work?");
+    }
+    for (port, bits) in outputs.iter().zip(live) {
+        // What was never written may be anything.
+        let Some(expected) = emulator.output_bits(port.port.register) else { continue };
+        if expected != bits {
+            let mut text = String::new();
+            for (input, bits) in inputs.iter().zip(&given) {
+                let _ = write!(text, ", {} = {}", input.port.name, shown(*bits, input.ty));
+            }
+            bail!(
+                "output port `{}` is {} on the board, {} in the emulator{}",
+                port.port.name,
+                shown(bits, port.ty),
+                shown(expected, port.ty),
+                text.strip_prefix(", ").map_or_else(String::new, |text| format!("; inputs: {text}"))
+            );
+        }
+    }
+    Ok(())
+}
+
 /// Compares so many periods, from the program's beginning: it has been started anew and is held.
 ///
 /// # Errors
@@ -55,43 +102,7 @@ pub(crate) fn run<L: Line>(host: &mut Host<L>, program: &Program, periods: u32, 
     let mut emulator = Emulator::new(program)?;
     let (inputs, outputs) = (watched(program, &program.inputs)?, watched(program, &program.outputs)?);
     for period in 1..=periods {
-        // A port is read once the program waits: the step before this one is then over, too.
-        read(host, &outputs)?;
-        let before = host.register("periods")?;
-        host.set("step", 1)?;
-        let live = read(host, &outputs)?;
-        // Between two ticks nothing changes these: they are what the period had.
-        let given = read(host, &inputs)?;
-        for (port, bits) in inputs.iter().zip(&given) {
-            emulator.set_input_bits(port.port.register, *bits)?;
-        }
-        let ran = emulator.run_period(&[]);
-        match (stopped(host)?, ran) {
-            (None, Ok(_)) => {}
-            (Some(what), Err(error)) => bail!("period {period}: the board {what}; the emulator: {error}"),
-            (Some(what), Ok(_)) => bail!("period {period}: the board {what}, the emulator goes on"),
-            (None, Err(error)) => bail!("period {period}: the board goes on; the emulator: {error}"),
-        }
-        if host.register("periods")? != before.wrapping_add(1) {
-            bail!("period {period}: the board has not run it: is another host at work?");
-        }
-        for (port, bits) in outputs.iter().zip(live) {
-            // What was never written may be anything.
-            let Some(expected) = emulator.output_bits(port.port.register) else { continue };
-            if expected != bits {
-                let mut text = String::new();
-                for (input, bits) in inputs.iter().zip(&given) {
-                    let _ = write!(text, ", {} = {}", input.port.name, shown(*bits, input.ty));
-                }
-                bail!(
-                    "period {period}: output port `{}` is {} on the board, {} in the emulator{}",
-                    port.port.name,
-                    shown(bits, port.ty),
-                    shown(expected, port.ty),
-                    text.strip_prefix(", ").map_or_else(String::new, |text| format!("; inputs: {text}"))
-                );
-            }
-        }
+        compare(host, &mut emulator, &inputs, &outputs).with_context(|| format!("period {period}"))?;
     }
     writeln!(
         out,

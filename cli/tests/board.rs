@@ -5,7 +5,7 @@ mod common;
 
 use common::Folder;
 use std::io::{BufRead, BufReader};
-use std::process::Child;
+use std::process::{Child, Stdio};
 
 fn example(name: &str) -> String {
     format!("{}/../programs/examples/board/{name}", env!("CARGO_MANIFEST_DIR"))
@@ -104,7 +104,7 @@ fn the_loop_closes_through_the_pins_of_a_simulated_board() {
     let line = format!("board sim --board ulx3s-85f {} --axis motor,encoder,20000", position());
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_takt"));
     command.args(line.split_whitespace()).current_dir(folder.path());
-    command.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::null());
+    command.stdout(Stdio::piped()).stderr(Stdio::null());
     let mut board = Board(command.spawn().unwrap());
     let mut said = String::new();
     BufReader::new(board.0.stdout.take().unwrap()).read_line(&mut said).unwrap();
@@ -153,6 +153,27 @@ fn the_loop_closes_through_the_pins_of_a_simulated_board() {
     let broken = folder.line(&format!("live {port} --baud {baud} --program {program} set nothing=1"));
     assert_eq!(broken.status, Some(1));
     assert!(broken.stderr.contains("the program has no port `nothing`"), "{}", broken.stderr);
+
+    // Unplugged: the board ends while a host is at its port. (What the host has open is read from Linux' list.)
+    let mut host = std::process::Command::new(env!("CARGO_BIN_EXE_takt"));
+    let shadow =
+        format!("live {port} --baud {baud} --program {program} --machine t1 shadow --periods 1000000");
+    host.args(shadow.split_whitespace()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut host = host.spawn().unwrap();
+    let open = std::path::PathBuf::from(format!("/proc/{}/fd", host.id()));
+    let is_at_the_port = || {
+        let files = std::fs::read_dir(&open).into_iter().flatten().flatten();
+        files.filter_map(|file| std::fs::read_link(file.path()).ok()).any(|file| file.as_os_str() == port)
+    };
+    while host.try_wait().unwrap().is_none() && !is_at_the_port() {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    drop(board);
+    let done = host.wait_with_output().unwrap();
+    let stderr = String::from_utf8_lossy(&done.stderr);
+    let says = "the line is gone: the port was unplugged, or the simulated board has ended";
+    assert!(done.status.code() == Some(1) && stderr.contains(says), "{done:?}");
+    assert!(done.stdout.is_empty(), "{done:?}");
 }
 
 fn hybrid(name: &str) -> String {
@@ -241,5 +262,15 @@ fn the_way_from_pin_to_pin_has_a_bound() {
     refused(&format!("--wiring {wiring} --deadline 100us"), "--deadline is not for --pins");
     folder.write("none.toml", "period = 100\n");
     refused("--wiring none.toml", "none.toml names no board: --board NAME");
+    // One message, whether the board is named or would be the file's.
+    folder.write("system.toml", "[core.one]\nmachine = \"t1\"\n");
+    for board in ["", " --board ulx3s-85f"] {
+        refused(
+            &format!("--wiring system.toml{board}"),
+            "system.toml:1:2: this is a system of several cores, and a wiring is wanted",
+        );
+    }
+    folder.write("broken.toml", "period = \n");
+    refused("--wiring broken.toml", "broken.toml:1:10:");
     refused("--wiring none.toml --board ulx3s-85f", "none.toml: no way from pin to pin");
 }

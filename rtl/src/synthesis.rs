@@ -41,16 +41,17 @@ pub struct Part {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Resources {
-    /// Look-up tables, those of carry chains and of memories in logic included: LUT4 on ECP5, ALUTs on Cyclone V.
+    /// Look-up tables, those of carry chains and of memories in logic included: LUT4 on ECP5, GW2A and iCE40, ALUTs on Cyclone V,
+    /// LUT6 on 7 series.
     pub luts: u64,
-    /// How many of them are halves of carry chains' cells; on ECP5, where it was counted.
+    /// How many of them are those of carry chains: on ECP5 halves of their cells, where it was counted; on GW2A.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub carries: Option<u64>,
     /// Flip-flops.
     pub flip_flops: u64,
-    /// Multipliers of 18 x 18 bits (on Cyclone V up to 27 x 27).
+    /// Multipliers of 18 x 18 bits (on Cyclone V up to 27 x 27, on 7 series 25 x 18, on iCE40 16 x 16).
     pub multipliers: u64,
-    /// Block RAMs: 18 kbit on ECP5, 10 kbit on Cyclone V.
+    /// Block RAMs: 18 kbit on ECP5, GW2A and 7 series, 10 kbit on Cyclone V, 4 kbit on iCE40.
     pub block_rams: u64,
 }
 

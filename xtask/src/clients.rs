@@ -37,7 +37,7 @@ fn ports(program: &Program, inputs: u16, outputs: u16) -> Result<(Map<String, Va
     Ok((given, shown.collect()))
 }
 
-fn write(folder: &Path, name: &str, text: &str) -> Result<()> {
+pub(crate) fn write(folder: &Path, name: &str, text: &str) -> Result<()> {
     let path = folder.join(name);
     fs::create_dir_all(path.parent().unwrap_or(folder))?;
     fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))

@@ -72,7 +72,8 @@ fn data_sheet(folder: &Path) -> Result<PathBuf> {
     Ok(sheet)
 }
 
-fn program(machine: &'static Machine) -> Result<Program> {
+/// The tracking program.
+pub(crate) fn program(machine: &'static Machine) -> Result<Program> {
     let options = Options { machine, ..Options::default() };
     let (loader, name) =
         FileLoader::of_file(root().join(PROGRAM)).map_err(|error| anyhow!("{PROGRAM}: {error}"))?;
@@ -80,7 +81,7 @@ fn program(machine: &'static Machine) -> Result<Program> {
 }
 
 /// The inputs of the first periods of the letters' path, the robot standing where it begins, and what binary64 computes of them.
-fn periods() -> Result<Vec<(Inputs, Outputs<f64>)>> {
+pub(crate) fn periods() -> Result<Vec<(Inputs, Outputs<f64>)>> {
     let path = gcode::read(AGH).map_err(|error| anyhow!("the path: {error:?}"))?;
     let trajectory = Trajectory::plan(&path).map_err(|error| anyhow!("the path: {error}"))?;
     let counts = Plant::at_rest(&trajectory.start()).counts().context("it begins within reach")?;

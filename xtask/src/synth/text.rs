@@ -1,6 +1,7 @@
 //! What is written: for the terminal, and `docs/synthesis.md`.
 
 use super::TARGET_MHZ;
+use super::families::{COUNTED, Counted};
 use std::fmt::Write as _;
 use takt_board::tools::{MAPPING, OPTIONS};
 use takt_isa::spec::machines::MACHINES;
@@ -27,7 +28,7 @@ pub(super) fn in_words(row: &Synthesis, seeds: &[u32]) -> String {
         text,
         "\n  {luts} LUTs{}, {flip_flops} flip-flops, {multipliers} multipliers, {block_rams} block RAMs",
         carries.map_or_else(String::new, |carries| format!(
-            " ({} LUT4, {carries} halves of carry cells)",
+            " ({} LUT4, {carries} in carry chains)",
             luts - carries
         ))
     );
@@ -75,8 +76,9 @@ which take a LUT4's place each (older rows have the total only). Multipliers hav
 `--seed N` measures one seed, `--freq F` with another target than 200 MHz; neither is recorded.\n",
     );
     let is_machine = |row: &&Synthesis| MACHINES.iter().any(|machine| machine.name == row.design);
-    let (machines, others): (Vec<_>, Vec<_>) = rows.iter().partition(is_machine);
-    let (systems, units): (Vec<_>, Vec<_>) = others.into_iter().partition(|row| !row.parts.is_empty());
+    let (others, ecp5): (Vec<_>, Vec<_>) = rows.iter().partition(|row| counted(row).is_some());
+    let (machines, rest): (Vec<_>, Vec<_>) = ecp5.into_iter().partition(is_machine);
+    let (systems, units): (Vec<_>, Vec<_>) = rest.into_iter().partition(|row| !row.parts.is_empty());
     let placed = |rows: &[&Synthesis]| rows.iter().any(|row| row.grade.is_some());
     if placed(&machines) {
         text += "\n## Machines\n\nWith their memories, as a Wishbone slave between registers that are not counted (in rows before 2026-11-22: the core on a shift register).\n`cargo xtask synth --machine t3 --device 85k --grade 8`, and so on.\n";
@@ -122,20 +124,8 @@ which take a LUT4's place each (older rows have the total only). Multipliers hav
             }
         }
     }
-    let counted: Vec<_> = rows.iter().filter(|row| row.grade.is_none()).collect();
-    if !counted.is_empty() {
-        text += "\n## Intel Cyclone V\n
-The nearest open relative of the paper's Stratix III. Resources after synthesis only; there is no open place and route.
-Multipliers have up to 27 x 27 bits, block RAMs 10 kbit. `cargo xtask synth --device cyclonev`.\n
-| design | ALUTs | flip-flops | multipliers | block RAMs | date |\n|---|---|---|---|---|---|\n";
-        for row in counted {
-            let Resources { luts, flip_flops, multipliers, block_rams, .. } = row.resources;
-            let _ = writeln!(
-                text,
-                "| {} | {luts} | {flip_flops} | {multipliers} | {block_rams} | {} |",
-                row.design, row.date
-            );
-        }
+    if !others.is_empty() {
+        text += &other_families(&others);
     }
     let mut tools: Vec<_> = rows.iter().map(|row| row.tools.as_str()).collect();
     tools.sort_by_key(|tools| std::cmp::Reverse(tools.len()));
@@ -144,6 +134,52 @@ Multipliers have up to 27 x 27 bits, block RAMs 10 kbit. `cargo xtask synth --de
             text,
             "\nTools: {tools}. Synthesis: `{MAPPING}; synth_lattice -family ecp5 {OPTIONS}`; place and route aims at {TARGET_MHZ} MHz."
         );
+    }
+    text
+}
+
+/// How a row that is not of an ECP5 was counted.
+fn counted(row: &Synthesis) -> Option<&'static Counted> {
+    COUNTED.iter().find(|counted| counted.device == row.device)
+}
+
+/// What other families' devices take.
+fn other_families(rows: &[&Synthesis]) -> String {
+    let mut text = String::from(
+        "\n## Other families\n
+Resources after synthesis with yosys, of the same designs; clocks where a design was placed and routed. Intel's Cyclone V is the
+nearest open relative of the paper's Stratix III. `cargo xtask synth --family gowin|intel|xilinx|ice40`, with `--machine t1` or
+`--unit all`. A design that does not fit the device shows how far it is from it.\n
+| device | LUTs | multipliers | block RAMs | it has |\n|---|---|---|---|---|\n",
+    );
+    for Counted { device, terms: [luts, multipliers, block_rams], room, .. } in &COUNTED {
+        let has = room.map_or_else(String::new, |room| {
+            let Resources { luts, flip_flops, multipliers, block_rams, .. } = room;
+            format!(
+                "{luts} LUTs, {flip_flops} flip-flops, {multipliers} multipliers, {block_rams} block RAMs"
+            )
+        });
+        let _ = writeln!(text, "| {device} | {luts} | {multipliers} | {block_rams} | {has} |");
+    }
+    text += "\n| design | device and grade | LUTs | flip-flops | multipliers | block RAMs | MHz median | too few | date |\n|---|---|---|---|---|---|---|---|---|\n";
+    for counted in &COUNTED {
+        for row in rows.iter().filter(|row| row.device == counted.device) {
+            let Resources { luts, flip_flops, multipliers, block_rams, .. } = row.resources;
+            let grade = row.grade.map_or_else(String::new, |grade| format!("-{grade}"));
+            let median = row.median().map_or_else(String::new, |mhz| {
+                let seeds = row.mhz.len();
+                format!("{mhz:.1} ({seeds} seed{})", if seeds == 1 { "" } else { "s" })
+            });
+            let lacks = counted.lacks(&row.resources).join(", ");
+            let _ = writeln!(
+                text,
+                "| {} | {}{grade} | {luts} | {flip_flops} | {multipliers} | {block_rams} | {median} | {lacks} | {} |",
+                row.design, row.device, row.date
+            );
+        }
+    }
+    for row in rows.iter().filter(|row| row.grade.is_some()) {
+        let _ = writeln!(text, "\nLongest path of {} on {}: {}.", row.design, row.device, row.critical_path);
     }
     text
 }

