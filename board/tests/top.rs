@@ -194,7 +194,7 @@ fn the_routed_design_does_the_same() {
     // One table of the PWM's logic inverted.
     let faulty = simulated(&|cells| {
         let is_pwm = |(name, cell): &(&String, &mut serde_json::Value)| {
-            name.contains("u_motor") && cell["parameters"]["MODE"] == "LOGIC"
+            name.contains("u_motor") && cell["type"] == "TRELLIS_COMB" && cell["parameters"]["MODE"].is_null()
         };
         let (_, cell) = cells.iter_mut().find(is_pwm).expect("the PWM has logic");
         let table = cell["parameters"]["INITVAL"].as_str().expect("a table");
