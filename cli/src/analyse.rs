@@ -42,7 +42,8 @@ pub(crate) struct Analyse {
     /// Run so many periods and look at the last; 0 is what runs once [default: the rows of --inputs, else 2].
     #[arg(long, value_name = "N", value_parser = number::natural, allow_hyphen_values = true)]
     periods: Option<u64>,
-    /// Write the picture of the pipeline as a page for a browser, which needs nothing else; `-` is standard output.
+    /// Write the picture of the pipeline as a page for a browser, which needs nothing else; of a system, that of all cores and
+    /// links in the last period of its slowest core. `-` is standard output.
     #[arg(long, value_name = "OUT")]
     html: Option<PathBuf>,
     /// Print the result as JSON.
@@ -56,6 +57,7 @@ Examples:
   takt analyse prog.s --html prog.html    the pipeline as a picture
   takt analyse prog.s --periods 0         what runs once
   takt analyse system.toml --inputs in.csv   each core's cycles, over all rows
+  takt analyse system.toml --html all.html   all cores and links on one axis of time
   takt analyse prog.s --inputs in.csv     the last period of recorded inputs";
 
 pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()> {
@@ -67,20 +69,16 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
     }
     files::check(&reads, &writes)?;
     if load::is_system(&arguments.file) {
-        let refused = [
-            ("--machine", arguments.machine.machine.is_some(), "the system's file names each core's"),
-            ("--html", arguments.html.is_some(), "the picture is one program's"),
-        ];
-        for (option, given, why) in refused {
-            if given {
-                return Err(Failure::Usage(format!("{option} with a system: {why}")).into());
-            }
+        if arguments.machine.machine.is_some() {
+            let message = "--machine with a system: the system's file names each core's";
+            return Err(Failure::Usage(message.to_owned()).into());
         }
         let system = system::analyse::Arguments {
             file: &arguments.file,
             source: &arguments.source,
             inputs: arguments.inputs.as_deref(),
             periods: arguments.periods,
+            html: arguments.html.as_deref(),
             json: arguments.json,
         };
         return system::analyse::run(&system, color, out);

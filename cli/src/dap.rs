@@ -2,6 +2,7 @@
 
 use crate::debug::{self, Debug};
 use crate::files::Out;
+use crate::load;
 use crate::output::{describe, message};
 use crate::track;
 use anyhow::{Context, Result};
@@ -13,7 +14,7 @@ use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use takt_debug::session::Control;
-use takt_editor::dap::{self, Launched, Launcher};
+use takt_editor::dap::{self, Launched, Launcher, Target};
 use takt_editor::wire::{self, WireError};
 
 /// Serve an editor's debugger: breakpoints, steps forward and back, registers, ports, operations in flight.
@@ -214,11 +215,20 @@ impl Launcher for CommandLine {
                 text.lines().take_while(|line| !line.starts_with("Usage:")).collect::<Vec<_>>().join("\n");
             text.trim().trim_start_matches("error: ").to_owned()
         })?;
+        let folder = |file: &Path| {
+            // The folder of a file alone is the one at hand.
+            let folder =
+                file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned())
+        };
+        let file = parsed.debug.file.clone().unwrap_or_default();
+        if load::is_system(&file) {
+            let opened = debug::open_system(&parsed.debug, &file, control, false);
+            let (console, files) = opened.map_err(|error| describe(&error))?;
+            let folders = files.iter().map(|file| folder(file)).collect();
+            return Ok(Launched { target: Target::system(console), note: None, folders });
+        }
         let (session, note) = debug::open(&parsed.debug, control, false).map_err(|error| describe(&error))?;
-        let file = parsed.debug.file.unwrap_or_default();
-        // The folder of a file alone is the one at hand.
-        let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let folder = folder.to_owned();
-        Ok(Launched { session, note, folder: std::path::absolute(&folder).unwrap_or(folder) })
+        Ok(Launched { target: Target::program(session), note, folders: vec![folder(&file)] })
     }
 }

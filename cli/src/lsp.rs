@@ -50,6 +50,7 @@ pub(crate) fn run(arguments: &Lsp, _color: bool, _out: &mut Out) -> Result<()> {
         library: takt_programs::LIBRARY,
         beside: &[],
         library_folder: library_folder(),
+        library_by_name: false,
         deadline: arguments.deadline.as_ref().map(|deadline| deadline.cycles(arguments.clock)),
     };
     let (to_server, from_client) = crossbeam_channel::unbounded();

@@ -1,6 +1,8 @@
 //! `takt dap` as clients meet it: over standard input and output, on a socket, and with Microsoft's test client.
 
 mod common;
+#[path = "dap/systems.rs"]
+mod systems;
 
 use common::protocol::Client;
 use common::{Folder, SUM};
@@ -52,6 +54,11 @@ fn a_broken_configuration_is_told() {
     let folder = Folder::new();
     folder.write("wrong.s", "fad a, b\n");
     folder.write("sum.s", SUM);
+    let core = |name: &str, program: &str| format!("[[core]]\nname = \"{name}\"\nprogram = \"{program}\"\n");
+    folder.write("broken.toml", "tick = 100\n[[core]]\nname = \n");
+    for (file, program) in [("missing.toml", "sun.s"), ("wrong.toml", "wrong.s"), ("two.toml", "sum.s")] {
+        folder.write(file, &format!("tick = 100\n{}{}", core("a", "sum.s"), core("b", program)));
+    }
     let mut client = Client::start(&folder, "dap");
     client.command("initialize", json!({}));
     for (configuration, told) in [
@@ -72,12 +79,23 @@ fn a_broken_configuration_is_told() {
         (json!({ "track": "yes" }), "`true` or `false`"),
         (json!({ "track": true, "inputs": "a.csv" }), "cannot be used with"),
         (json!({ "program": "sum.s", "include": ["nowhere"] }), "there is no such folder"),
+        (json!({ "program": "none.toml" }), "cannot open none.toml"),
+        (json!({ "program": "broken.toml" }), "broken.toml:3"),
+        (json!({ "program": "missing.toml" }), "there is no program sun.s"),
+        (json!({ "program": "wrong.toml" }), "there is no instruction or macro `fad`"),
+        (json!({ "program": "two.toml", "machine": "t1" }), "the system's file names each core's"),
+        (json!({ "program": "two.toml", "tick": 7 }), "the system's file has it"),
+        (json!({ "program": "two.toml", "inputs": "none.csv" }), "none.csv"),
     ] {
         let answer = client.command("launch", configuration.clone());
         assert_eq!(answer["success"], false, "{configuration}");
         let text = answer["body"]["error"]["variables"]["text"].as_str().unwrap();
         assert!(text.contains(told), "{configuration}: {text}");
     }
+    // What many clients show of it is one line: it has the place.
+    let answer = client.command("launch", json!({ "program": "wrong.s" }));
+    let line = answer["message"].as_str().unwrap();
+    assert_eq!(line, "wrong.s:1:1: error[unknown-instruction]: there is no instruction or macro `fad`");
     // And after all that, it can be launched.
     assert_eq!(client.command("launch", json!({ "program": "sum.s" }))["success"], true);
     assert_eq!(client.command("launch", json!({ "program": "sum.s" }))["success"], false);
@@ -150,6 +168,8 @@ fn it_goes_forward_and_back() {
     let answer = ok(&mut client, "setBreakpoints", breakpoints);
     assert_eq!(answer["breakpoints"][0]["verified"], true);
     assert_eq!(start(&mut client)["reason"], "entry");
+    // The first step goes somewhere, although the first bundle is not about to issue yet.
+    assert_eq!(go(&mut client, "next", json!({ "threadId": 1 })), ("step".to_owned(), 4));
     assert_eq!(go(&mut client, "continue", json!({ "threadId": 1 })), ("breakpoint".to_owned(), 12));
     assert_eq!(value(&mut client, "i"), "1");
     let frames = ok(&mut client, "stackTrace", json!({ "threadId": 1 }));
@@ -318,6 +338,47 @@ fn it_listens_on_a_socket() {
     child.kill().unwrap();
     child.wait().unwrap();
     assert_eq!(folder.line("dap --listen nowhere").status, Some(1));
+}
+
+/// Emacs's client, dap-mode, with the configuration that comes with the repository.
+#[test]
+fn emacs_works_with_it() {
+    let folder = Folder::new();
+    folder.write("sum.s", SUM);
+    folder.write("wrong.s", "fad a, b\n");
+    folder.write("loop.s", ".reg n:int\n li n, 0\nagain: iadd n, n, 1\n jmp again\n");
+    let core = |name: &str, program: &str| format!("[[core]]\nname = \"{name}\"\nprogram = \"{program}\"\n");
+    folder.write("two.toml", &format!("tick = 100\n{}{}", core("adds", "sum.s"), core("loops", "loop.s")));
+    folder.write("broken.toml", "tick = 100\n[[core]]\nname = \n");
+    let clients = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/clients/emacs_dap.el");
+    let configuration = concat!(env!("CARGO_MANIFEST_DIR"), "/../editors/emacs");
+    let mut emacs = Command::new("emacs");
+    emacs.args(["--batch", "-L", configuration, "-l", clients, "-f", "takt-test"]);
+    emacs.arg(env!("CARGO_BIN_EXE_takt")).arg(folder.path()).env("HOME", folder.path());
+    let output = emacs.output().expect("emacs is there: `cargo xtask test` installs it");
+    let (stdout, stderr) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    let found: Value = serde_json::from_str(stdout.trim()).unwrap_or_else(|_| panic!("{stdout}{stderr}"));
+    assert_eq!(found.get("problem"), None, "{found:#}");
+    let refused = |file: usize, told: &str| {
+        let text = found["refused"][file].as_str().unwrap();
+        assert!(text.contains(told), "{text}");
+    };
+    refused(0, "cannot open none.s");
+    refused(1, "wrong.s:1:1: error[unknown-instruction]: there is no instruction or macro `fad`");
+    refused(2, "broken.toml:3");
+    assert_eq!(found["mode"], "takt-mode");
+    // The file that the editor shows, the line of the frame, that of the cursor, the thread.
+    assert_eq!(found["entry"], json!(["sum.s", 3, 3, 1]));
+    assert_eq!(found["breakpoint"], json!(["sum.s", 12, 12, 1]));
+    assert_eq!(found["i"], "0");
+    assert_eq!(found["out"], json!(["sum.s", 7, 7, 1]));
+    assert_eq!(found["next"], json!(["sum.s", 8, 8, 1]));
+    assert_eq!(found["back"], json!(["sum.s", 7, 7, 1]));
+    assert_eq!(found["reverse"], json!(["sum.s", 12, 12, 1]));
+    assert_eq!(found["threads"], json!(["adds", "loops"]));
+    assert_eq!((&found["first"][0], &found["second"][0]), (&json!("sum.s"), &json!("loop.s")));
+    assert_eq!(found["stepped"], json!(["loop.s", 3, 3, 2]));
+    assert_eq!(found["n"], "0");
 }
 
 /// Microsoft's test client, which VS Code's own debuggers are tested with.

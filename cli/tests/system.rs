@@ -82,8 +82,8 @@ fn analyse_tells_where_each_core_s_cycles_went() {
             core["stalls"].as_object().unwrap().values().map(|cycles| cycles.as_u64().unwrap()).sum();
         assert_eq!(core["bundles"].as_u64().unwrap() + stalls, core["cycles"].as_u64().unwrap());
     }
-    let wrong = folder.line(&format!("analyse {toml} --html x.html"));
-    assert!(wrong.stderr.contains("--html with a system"), "{}", wrong.stderr);
+    let wrong = folder.line(&format!("analyse {toml} --machine t1"));
+    assert!(wrong.stderr.contains("--machine with a system"), "{}", wrong.stderr);
 }
 
 #[test]
@@ -210,4 +210,28 @@ fn what_a_host_said_is_a_table() {
         let text = common::Done::of(command).ok();
         assert!(text.contains("no difference"), "{text}");
     }
+}
+
+/// A FIFO's head that is read too late: told at its line, and silent for all systems of the repository.
+#[test]
+fn a_head_that_is_read_after_its_pop() {
+    let folder = Folder::new();
+    for system in ["hybrid/two.toml", "three/controller.toml", "systems/speed.toml"] {
+        let done = folder.line(&format!("bound {}", speed(&format!("../{system}"))));
+        assert_eq!((done.status, done.stderr.as_str()), (Some(0), ""), "{system}");
+    }
+    // The mistake that the generation once had: nothing kept the reads before the pop.
+    for name in ["two.toml", "generation.s", "tracking.s", "robot.s"] {
+        let text = std::fs::read_to_string(speed(&format!("../hybrid/{name}"))).unwrap();
+        let without = text.lines().filter(|line| !line.starts_with(".order") || !line.ends_with(", pop"));
+        folder.write(name, without.map(|line| format!("{line}\n")).collect::<String>());
+    }
+    let done = folder.line("bound two.toml");
+    assert_eq!(done.status, Some(0));
+    insta::assert_snapshot!("head_after_pop", done.stderr);
+    let denied = folder.line("bound two.toml -W error=next-head");
+    assert_eq!(denied.status, Some(1));
+    assert!(denied.stderr.contains("error"), "{}", denied.stderr);
+    let allowed = folder.line("bound two.toml -W allow=next-head");
+    assert_eq!((allowed.status, allowed.stderr.as_str()), (Some(0), ""));
 }

@@ -4,10 +4,12 @@
 //! that can be seen, cycle by cycle: bundles that issue, registers, flags and memory that are written, output ports, deadlines,
 //! halts, faults. [`random`] makes programs and inputs for it. [`system`] does the same for systems of several cores.
 
+mod compare;
 mod lockstep;
 mod model;
 pub mod random;
 pub mod system;
 
-pub use lockstep::{Difference, Lockstep, LockstepError, circuit_stops};
+pub use compare::Difference;
+pub use lockstep::{Lockstep, LockstepError, circuit_stops};
 pub use model::{CircuitEvent, EventKind, Model, ModelError, Pin, Simulation, cache_folder};

@@ -1,5 +1,6 @@
 //! A program on both sides.
 
+use crate::compare::{Comparison, Difference};
 use crate::model::{CircuitEvent, EventKind, ModelError, Pin, Simulation};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -8,6 +9,7 @@ use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Program, Register, SlotIndex};
 use takt_rtl::export::{INPUT_DELAY, LATCHED_INPUT_DELAY, TICK_DELAY};
+use takt_system::HostError;
 use thiserror::Error;
 
 /// The circuit tells of an event at most so many cycles after it.
@@ -30,32 +32,13 @@ pub enum LockstepError {
         /// Those of the circuit.
         circuit: u16,
     },
+    /// The host of a system cannot do what it was to do.
+    #[error(transparent)]
+    Host(#[from] HostError),
     /// The two sides differ.
     #[error(transparent)]
     Difference(#[from] Box<Difference>),
 }
-
-/// The first thing in which the two sides differ.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Difference {
-    /// Its cycle.
-    pub cycle: Cycle,
-    /// What the emulator says, if it says anything that the circuit does not.
-    pub emulator: Option<CircuitEvent>,
-    /// What the circuit says.
-    pub circuit: Option<CircuitEvent>,
-    /// The instruction and its place in the source, as far as the event has them.
-    pub instruction: String,
-    text: String,
-}
-
-impl std::fmt::Display for Difference {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.text)
-    }
-}
-
-impl std::error::Error for Difference {}
 
 /// A program on the emulator and on the circuit.
 ///
@@ -64,13 +47,11 @@ impl std::error::Error for Difference {}
 pub struct Lockstep {
     emulator: Emulator,
     simulation: Simulation,
-    expected: Vec<CircuitEvent>,
-    found: Vec<CircuitEvent>,
+    events: Comparison<CircuitEvent>,
     pins: Vec<(Cycle, Pin)>,
     /// The first cycle whose input pin is free.
     free_pin: Cycle,
     simulated: Cycle,
-    compared: u64,
     stopped: Option<Fault>,
     /// What was written to output ports since the last `wait`, by number.
     written: BTreeMap<u16, u32>,
@@ -101,12 +82,10 @@ impl Lockstep {
         Ok(Lockstep {
             emulator,
             simulation,
-            expected: Vec::new(),
-            found: Vec::new(),
+            events: Comparison::default(),
             pins: Vec::new(),
             free_pin: 0,
             simulated: 0,
-            compared: 0,
             stopped: None,
             written: BTreeMap::new(),
             input_delay: if program.latched { LATCHED_INPUT_DELAY } else { INPUT_DELAY },
@@ -125,7 +104,7 @@ impl Lockstep {
 
     /// Events that were the same on both sides.
     pub fn compared(&self) -> u64 {
-        self.compared
+        self.events.compared
     }
 
     /// The simulation, to be used for another program.
@@ -182,7 +161,7 @@ impl Lockstep {
         run: impl FnOnce(&mut takt_emu::Observed<'_>) -> Result<Stop, Fault>,
     ) -> Option<Stop> {
         let machine = self.emulator.machine();
-        let (expected, written) = (&mut self.expected, &mut self.written);
+        let (expected, written) = (&mut self.events.expected, &mut self.written);
         let mut sink = |event: &Event| {
             expected.extend(expect(event));
             match *event {
@@ -239,12 +218,12 @@ impl Lockstep {
                 let cycle = fault.cycle;
                 let machine = self.emulator.machine();
                 for &retire in self.emulator.in_flight() {
-                    self.expected.extend(expect(&Event::Retire(retire)));
+                    self.events.expected.extend(expect(&Event::Retire(retire)));
                     if let Some(register) = retire.register.filter(|&register| machine.is_output(register)) {
                         let (cycle, slot, address, value) =
                             (retire.cycle, retire.slot, retire.address, retire.value);
                         let write = PortWrite { cycle, slot, address, register, value, nan: false };
-                        self.expected.extend(expect(&Event::PortWrite(write)));
+                        self.events.expected.extend(expect(&Event::PortWrite(write)));
                     }
                 }
                 self.check(|event| {
@@ -263,60 +242,42 @@ impl Lockstep {
         self.pins.sort_by_key(|&(cycle, _)| cycle);
         let due = self.pins.partition_point(|&(cycle, _)| cycle < until);
         let pins: Vec<_> = self.pins.drain(..due).collect();
-        self.found.extend(self.simulation.run(until, &pins)?);
+        self.events.found.extend(self.simulation.run(until, &pins)?);
         self.simulated = until;
         Ok(())
     }
 
     /// Compares the events of which the answer is known, in order.
     fn check(&mut self, known: impl Fn(&CircuitEvent) -> bool) -> Result<(), LockstepError> {
-        let take = |events: &mut Vec<CircuitEvent>| {
-            let (mut taken, left): (Vec<_>, Vec<_>) = events.drain(..).partition(|event| known(event));
-            *events = left;
-            taken.sort_unstable();
-            taken
-        };
-        let (expected, found) = (take(&mut self.expected), take(&mut self.found));
-        let same = expected.iter().zip(&found).take_while(|(a, b)| a == b).count();
-        self.compared += same as u64;
-        match (expected.get(same), found.get(same)) {
-            (None, None) => Ok(()),
-            (emulator, circuit) => Err(Box::new(self.difference(emulator, circuit)).into()),
-        }
-    }
-
-    fn difference(&self, emulator: Option<&CircuitEvent>, circuit: Option<&CircuitEvent>) -> Difference {
-        // Events of one place are shown side by side; else the earlier one is what the other side lacks.
         let place = |event: &CircuitEvent| (event.cycle, event.kind, event.slot);
-        let (emulator, circuit) = match (emulator, circuit) {
-            (Some(a), Some(b)) if place(a) < place(b) => (Some(a), None),
-            (Some(a), Some(b)) if place(a) > place(b) => (None, Some(b)),
-            pair => pair,
-        };
-        let event = emulator.or(circuit).copied();
-        let cycle = event.map_or(0, |event| event.cycle);
+        let Err(unequal) = self.events.check(known, |event| *event, place) else { return Ok(()) };
         let program = self.emulator.program();
-        let mut instruction = String::new();
-        if let Some(event) = event
-            && !matches!(
-                event.kind,
-                EventKind::Store | EventKind::Port | EventKind::Missed | EventKind::Lost | EventKind::Publish
-            )
-        {
+        let [emulator, circuit] = unequal.sides(|event| show(program, event));
+        let event = unequal.first();
+        let difference = Difference {
+            cycle: event.map_or(0, |event| event.cycle),
+            place: String::new(),
+            instruction: event.map_or(String::new(), |event| instruction(program, event)),
+            emulator,
+            circuit,
+        };
+        Err(Box::new(difference).into())
+    }
+}
+
+/// The instruction of an event that has one.
+pub(crate) fn instruction(program: &Program, event: &CircuitEvent) -> String {
+    match event.kind {
+        EventKind::Issue | EventKind::Fault | EventKind::Retire => {
             let slot = (event.kind == EventKind::Retire).then_some(event.slot);
-            instruction = describe(program, BundleAddress::new(event.address), slot);
+            describe(program, BundleAddress::new(event.address), slot)
         }
-        let side =
-            |event: Option<&CircuitEvent>| event.map_or("nothing".to_owned(), |event| show(program, event));
-        let at = if instruction.is_empty() { String::new() } else { format!(" at {instruction}") };
-        let text =
-            format!("cycle {cycle}{at}\n  emulator: {}\n  circuit:  {}", side(emulator), side(circuit));
-        Difference { cycle, emulator: emulator.copied(), circuit: circuit.copied(), instruction, text }
+        _ => String::new(),
     }
 }
 
 /// `bundle 12 (tracking.s:40): fadd a1, a2, a3`, with one slot's instruction or all.
-pub(crate) fn describe(program: &Program, address: BundleAddress, slot: Option<u8>) -> String {
+fn describe(program: &Program, address: BundleAddress, slot: Option<u8>) -> String {
     let mut text = program.bundle_text(address);
     let machine = program.machine;
     let words = SlotIndex::all().zip(program.words(address).unwrap_or_default());

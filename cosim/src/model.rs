@@ -17,6 +17,8 @@ use thiserror::Error;
 
 /// The other half of [`Simulation`].
 const DRIVER: &str = include_str!("driver.cpp");
+/// What it shares with that of a system.
+const SHARED: &str = include_str!("driver.h");
 
 /// Why the circuit cannot be simulated.
 #[derive(Debug, Error)]
@@ -88,8 +90,8 @@ fn run(tool: &'static str, package: &'static str, command: &mut Command) -> Resu
 fn ports(design: &Design) -> String {
     let slots = design.machine.slots;
     let mut text = format!(
-        "#define SLOTS {}\n#define RESET_CYCLES {RESET_CYCLES}\n#define OUTPUTS {}\n#define LATCHED {}\nextern Vcore *the_core();\n\
-         template <class F> static void outputs_of(Vcore *core, F f) {{\n",
+        "#define SLOTS {}\n#define RESET_CYCLES {RESET_CYCLES}\n#define OUTPUTS {}\n#define LATCHED {}\n\
+         template <class F> static void outputs(F f) {{\n",
         slots.len(),
         design.machine.outputs_per_bank,
         design.latched
@@ -97,10 +99,10 @@ fn ports(design: &Design) -> String {
     for (s, slot) in slots.iter().enumerate() {
         let (b, first) = (slot.bank.name, slot.bank.base + slot.bank.depth - design.machine.outputs_per_bank);
         text.push_str(&format!(
-            "    f({s}, core->output_{b}_write && !core->rst, {first} + core->output_{b}_index, core->output_{b}_value);\n"
+            "    f({s}, top->output_{b}_write && !top->rst, {first} + top->output_{b}_index, top->output_{b}_value);\n"
         ));
     }
-    text.push_str("}\n#define outputs(...) outputs_of(core, __VA_ARGS__)\n");
+    text.push_str("}\n");
     text
 }
 
@@ -128,7 +130,7 @@ impl Sources<'_> {
         let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
         let version = run("verilator", "verilator", Command::new("verilator").arg("--version"))?;
         let mut hasher = DefaultHasher::new();
-        (version, self.driver, &self.header, &self.arguments, trace).hash(&mut hasher);
+        (version, SHARED, self.driver, &self.header, &self.arguments, trace).hash(&mut hasher);
         self.files.hash(&mut hasher);
         let name = format!("{}-{:016x}", self.top, hasher.finish());
         let program = folder.join(&name);
@@ -156,6 +158,7 @@ impl Sources<'_> {
             sources.push(write(name, text)?);
         }
         let driver = write("driver.cpp", self.driver)?;
+        write("driver.h", SHARED)?;
         write(self.header.0, &self.header.1)?;
         // X becomes random: what the circuit does not initialise must not matter.
         let mut command = Command::new("verilator");

@@ -4,7 +4,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::OnceLock;
-use takt_cosim::system::{PROBE, SystemLockstepError, SystemModel, random};
+use takt_cosim::LockstepError;
+use takt_cosim::system::{PROBE, SystemModel, random};
 use takt_emu::testing::{Options, random_program};
 use takt_isa::spec::units::*;
 use takt_isa::{Bank, Machine, Program, Slot, T1};
@@ -86,9 +87,8 @@ fn random_systems() {
         for (number, system) in systems.iter().enumerate() {
             let image = design.image_of(system).expect("the circuit has room for the largest image");
             let simulation = model.start(&image, &[]).unwrap_or_else(|error| panic!("{error}"));
-            random::run(number as u64, system, &design.plan, simulation, &mut coverage).unwrap_or_else(
-                |error: SystemLockstepError| panic!("system {seed}, programs {number}: {error}"),
-            );
+            random::run(number as u64, system, &design.plan, simulation, &mut coverage)
+                .unwrap_or_else(|error: LockstepError| panic!("system {seed}, programs {number}: {error}"));
         }
     }
     println!("{coverage:?}\n{seen:?}");
@@ -182,7 +182,7 @@ name = "answers"
 from = "b"
 to = "host"
 ports = ["B1", "B0"]
-depth = 2
+depth = 40
 latency = 5
 push = "B1"
 "#;
@@ -217,12 +217,14 @@ const FAULTS: &[Fault] = &[
     // The way: a cycle too short, a cycle too long.
     ("takt_delay", "all[(LENGTH+1)*(WIDTH+1)-1 -: WIDTH+1]", "all[LENGTH*(WIDTH+1)-1 -: WIDTH+1]"),
     ("takt_delay", "ring[next]", "ring[at]"),
-    // A wire from latched ports: sent though nothing was written, sent twice.
+    // A wire: another value. From latched ports: sent though nothing was written, sent twice.
+    ("takt_wire", "{write, value}", "{write, value[30:0], 1'b0}"),
     ("takt_wire", "ended & changed", "ended"),
     ("takt_wire", "write | (changed & ~ended)", "write | changed"),
     // A snapshot: half old and half new, or what is on its way; taken a cycle early, or by a core that does not wait.
     ("takt_snapshot", "HOST ? arrived : working", "(working & {FIELDS{32'hffff0000}}) | (shown & {FIELDS{32'h0000ffff}})"),
     ("takt_snapshot", "HOST ? arrived : working", "arrived"),
+    ("takt_snapshot", "HOST ? arrived : working", "working"),
     ("takt_pace", "left == TAKE[BITS-1:0]", "left == TAKE[BITS-1:0] + 1'b1"),
     ("takt_system_links", "c_take & c_waiting", "c_take"),
     // A FIFO: flags that do not stick, room that a pop makes not used, a refusal not told of, and the like.
@@ -233,9 +235,14 @@ const FAULTS: &[Fault] = &[
     ("takt_fifo", "popped & count != ONE", "popped"),
     ("takt_fifo", "put | pop", "pushed | popped"),
     ("takt_fifo", "pushed & free == next", "1'b0"),
+    ("takt_fifo", "words[first]", "words[next]"),
+    ("takt_fifo", "{empty, full, count, overflow, underflow}", "{empty, full, count, 1'b0, underflow}"),
     ("takt_fifo", "write[f] ? value[32*f +: 32] : working[32*f +: 32]", "working[32*f +: 32]"),
-    // The gate: the last lane first, an older value that stays, a newer one that is lost.
-    ("takt_gate", "waits & (~waits + 1'b1)", "waits & ~((waits >> 1) | (waits >> 2) | (waits >> 3))"),
+    // The loader: a record that is left out, memories that are not cleared.
+    ("takt_loader", "state == 2'd1", "state == 2'd1 & next != 3"),
+    ("takt_loader", "clears ? cleared : record[63:48]", "record[63:48]"),
+    // The gate: the last mailbox first, an older value that stays, a newer one that is lost.
+    ("takt_gate", "next & (~next + 1'b1)", "next & ~((next >> 1) | (next >> 2) | (next >> 3))"),
     ("takt_gate", "arrives[k]", "arrives[k] & ~waits[k]"),
     ("takt_gate", "arrives | (waits & ~goes)", "(arrives & ~waits) | (waits & ~goes)"),
     // Ticks: before all cores have waited, no multiple of their distance, a wrong distance.
@@ -277,7 +284,7 @@ fn planted_faults_are_found() {
                 model.start(&image, &[argument.as_ref()]).unwrap_or_else(|error| panic!("{error}"));
             match random::run(set as u64, system, &whole.plan, simulation, &mut random::Coverage::default()) {
                 Ok(()) => {}
-                Err(SystemLockstepError::Difference(difference)) => {
+                Err(LockstepError::Difference(difference)) => {
                     found = Some((set, difference));
                     break;
                 }

@@ -41,8 +41,8 @@ fn mend(kind: &FaultKind, program: &Program) -> Option<String> {
     })
 }
 
-/// The statement of a source line, without its comment.
-fn line(program: &Program, location: Location, texts: &[(String, String)]) -> Option<(Sources, Span)> {
+/// The statement of a source line, without its comment; `texts` are sources, by the names that the program has for them.
+pub fn line(program: &Program, location: Location, texts: &[(String, String)]) -> Option<(Sources, Span)> {
     let name = program.files.get(location.file as usize)?;
     let (_, text) = texts.iter().find(|(known, _)| known == name)?;
     let lines = Lines::of(text);

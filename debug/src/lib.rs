@@ -3,6 +3,7 @@
 mod accuracy;
 pub mod console;
 pub mod fault;
+pub mod heads;
 mod info;
 pub mod inputs;
 pub mod panes;

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 use takt_debug::console::Commands;
-use takt_debug::session::{Options, Session};
-use takt_debug::system::{Step, SystemConsole, SystemOptions, SystemSession, SystemStop, SystemWhy};
+use takt_debug::session::{Options, Session, Unit};
+use takt_debug::system::{SystemConsole, SystemOptions, SystemSession, SystemStop, SystemWhy};
 use takt_emu::Event;
 use takt_emu::testing::Random;
 use takt_isa::{MACHINES, Register};
@@ -114,15 +114,24 @@ fn bundles_and_periods_of_each_core() {
             _ => None,
         });
         for cycle in issues.take(30) {
-            assert_eq!((session.step(Step::Bundle(core)), session.cycle()), (SystemWhy::Done, cycle));
+            assert_eq!(
+                (session.step(&mut [], core, Unit::Bundle), session.cycle()),
+                (SystemWhy::Done, cycle)
+            );
         }
         session.go_to(0);
         let waits: Vec<u64> = waits.take(5).collect();
         for &cycle in &waits {
-            assert_eq!((session.step(Step::Period(core)), session.cycle()), (SystemWhy::Done, cycle));
+            assert_eq!(
+                (session.step(&mut [], core, Unit::Period), session.cycle()),
+                (SystemWhy::Done, cycle)
+            );
         }
         for &cycle in waits.iter().rev().skip(1) {
-            assert_eq!((session.step_back(Step::Period(core)), session.cycle()), (SystemWhy::Done, cycle));
+            assert_eq!(
+                (session.step_back(&mut [], core, Unit::Period), session.cycle()),
+                (SystemWhy::Done, cycle)
+            );
         }
     }
 }
@@ -267,4 +276,137 @@ fn what_is_set_stays() {
     assert!(run("stops").contains("break cycle 690 of core c0"));
     run("delete 1");
     assert_eq!(run("stops"), "");
+}
+
+/// A program that calls and then halts, and one that goes on for ever.
+fn calling() -> (Description, [takt_asm::Assembled; 2]) {
+    const CALLING: &str = ".reg n:int m:int
+        li      n, 3
+turn:   call    twice
+        isub    n, n, 1
+        bnz     n, turn
+        halt
+twice:  li      m, 2
+inner:  call    once
+        isub    m, m, 1
+        bnz     m, inner
+        ret
+once:   iadd    n, n, 0
+        ret
+";
+    const FOREVER: &str = ".reg n:int\n li n, 0\nagain: iadd n, n, 1\n jmp again\n";
+    let assembled = |name: &str, text: &str| {
+        let machine = MACHINES.iter().find(|machine| machine.name == "t1").expect("there is one");
+        let options = takt_asm::Options { machine, ..takt_asm::Options::default() };
+        let files = takt_asm::MemoryLoader::new(&[(name, text)]);
+        takt_asm::assemble(name, &files, &options).expect("it assembles")
+    };
+    let programs = [assembled("calling.s", CALLING), assembled("forever.s", FOREVER)];
+    let text = "tick = 1000
+[[core]]
+name = \"calling\"
+program = \"calling.s\"
+machine = \"t1\"
+[[core]]
+name = \"forever\"
+program = \"forever.s\"
+machine = \"t1\"
+";
+    let program = |request: &takt_system::Request<'_>| -> Result<_, takt_system::ProgramError<()>> {
+        Ok(programs[usize::from(request.path == "forever.s")].program.clone())
+    };
+    let Ok(description) = takt_system::read("system.toml", text, program) else { panic!("it is one") };
+    (description, programs)
+}
+
+/// Steps of a core are those of its program alone, forward and back.
+#[test]
+fn steps_of_a_core_are_those_of_a_single_one() {
+    let (description, programs) = calling();
+    let view = |program: &takt_asm::Assembled| Session::new(&program.program, Options::default());
+    let [mut calling, mut forever] =
+        [&programs[0], &programs[1]].map(|program| view(program).expect("it loads"));
+    for unit in [Unit::Bundle, Unit::Line, Unit::Call, Unit::Out] {
+        for begin in [0, 15, 29, 47] {
+            let mut alone = view(&programs[0]).expect("it loads");
+            let mut system = session(&description);
+            let mut views = [&mut calling, &mut forever];
+            alone.go_to(begin);
+            system.go_to(begin);
+            let mut steps = 0;
+            loop {
+                let (expected, why) = (alone.step(unit), system.step(&mut views, 0, unit));
+                if expected == takt_debug::session::Why::Halted {
+                    assert_eq!(why, SystemWhy::Core(0, expected), "{unit:?} from {begin}");
+                    break;
+                }
+                assert_eq!(why, SystemWhy::Done, "{unit:?} from {begin}");
+                assert_eq!(system.cycle(), alone.cycle(), "{unit:?} from {begin}");
+                steps += 1;
+            }
+            assert!(steps > 2 || unit == Unit::Out, "{unit:?} from {begin}: {steps} steps");
+            while alone.cycle() > 0 {
+                system.go_to(alone.cycle());
+                alone.step_back(unit);
+                system.step_back(&mut views, 0, unit);
+                assert_eq!(system.cycle(), alone.cycle(), "{unit:?} back from {begin}");
+            }
+        }
+    }
+    // It has halted; the other one goes on, and so does time.
+    let mut system = session(&description);
+    let mut views = [&mut calling, &mut forever];
+    system.go_to(5000);
+    assert_eq!(system.step(&mut views, 0, Unit::Line), SystemWhy::Core(0, takt_debug::session::Why::Halted));
+    assert_eq!(system.cycle(), 5000);
+    assert_eq!(system.step(&mut views, 1, Unit::Line), SystemWhy::Done);
+}
+
+/// A search goes in stretches; what is about to issue where one ends is found like any other.
+#[test]
+fn stops_are_found_wherever_a_search_begins() {
+    let (description, programs) = calling();
+    let mut system = System::new(&description).expect("it loads");
+    system.keep_core_events();
+    system.run_until(9000).expect("no fault");
+    let events = system.take_core_events();
+    let issue = |(core, event): (usize, Event)| match event {
+        Event::Issue { cycle, address } if core == 1 && cycle > 8300 => Some((cycle, address)),
+        _ => None,
+    };
+    let (cycle, address) = events.into_iter().find_map(issue).expect("one issues");
+    for distance in [1, 4095, 4096, 4097, 8192] {
+        let views = programs.iter().map(|program| Session::new(&program.program, Options::default()));
+        let views = views.map(|view| view.expect("it loads")).collect();
+        let mut console = SystemConsole::new(session(&description), views);
+        let mut run = |line: &str| console.execute(line).unwrap_or_else(|error| panic!("{line}: {error}"));
+        run("core forever");
+        run(&format!("break bundle {} if cycle == {cycle}", address.get()));
+        run(&format!("goto cycle {}", cycle - distance));
+        assert!(run("continue").contains("stop 1"), "from {distance} cycles before");
+        run(&format!("check cycle == {cycle}"));
+        run(&format!("goto cycle {}", cycle + distance));
+        assert!(run("reverse").contains("stop 1"), "from {distance} cycles behind");
+        run(&format!("check cycle == {cycle}"));
+    }
+}
+
+/// Periods are counted from reset, for each core, whichever way the session comes to them.
+#[test]
+fn goes_to_a_period_of_a_core() {
+    let (_, description) = systems().next().expect("a system");
+    let mut session = session(&description);
+    for period in [3, 1, 2, 0] {
+        assert_eq!(session.go_to_period(0, period), SystemWhy::Done);
+        assert_eq!(session.system().periods(0).count, period);
+        let here = session.cycle();
+        if period > 0 {
+            session.go_to(here - 1);
+            assert_eq!(
+                session.system().periods(0).count,
+                period - 1,
+                "it is the first position behind its `wait`"
+            );
+        }
+    }
 }

@@ -40,13 +40,29 @@ pub(crate) type Ages = Box<[(BundleAddress, u8)]>;
 
 /// Whether a block is run by the host's own instructions.
 #[derive(Clone, Debug)]
-pub(crate) enum Compiled {
+pub(crate) enum Compiled<Code> {
     /// It has not run often enough.
     NotYet,
     /// By this code, which so many times left a run to the interpreter.
-    Code(jit::Code, u64),
+    Code(Code, u64),
     /// Never: there is no code for it, or it left too many runs to the interpreter.
     Never,
+}
+
+impl<Code> Compiled<Code> {
+    fn from_code(code: Option<Code>) -> Compiled<Code> {
+        code.map_or(Compiled::Never, |code| Compiled::Code(code, 0))
+    }
+
+    /// The code has left one of so many runs to the interpreter. Where that happens often, it costs more than it saves.
+    pub(crate) fn left(&mut self, runs: u64) {
+        if let Compiled::Code(_, times) = self {
+            *times += 1;
+            if *times > MAX_LEFT && *times > runs / 4 {
+                *self = Compiled::Never;
+            }
+        }
+    }
 }
 
 /// A straight line of bundles. Offsets are cycles from the entry, the first cycle in which the first bundle may issue.
@@ -80,7 +96,9 @@ pub(crate) struct Block {
 
     /// How often it ran.
     pub(crate) runs: u64,
-    pub(crate) compiled: Compiled,
+    pub(crate) compiled: Compiled<jit::Code>,
+    /// The same for the lanes of a batch.
+    pub(crate) compiled_lanes: Compiled<jit::LaneCode>,
     /// What each run adds to the statistics.
     stalls: Box<[(BundleAddress, Cause, u32)]>,
     operations: Box<[(Op, u32)]>,
@@ -110,21 +128,16 @@ impl Block {
     /// Compiles it, once it has run `after` times.
     #[inline]
     pub(crate) fn compile_after(&mut self, after: u64, depth: u32) {
-        if matches!(self.compiled, Compiled::NotYet) && self.runs >= after {
-            self.compiled = match jit::compile(self, depth) {
-                Some(code) => Compiled::Code(code, 0),
-                None => Compiled::Never,
-            };
+        if self.runs >= after && matches!(self.compiled, Compiled::NotYet) {
+            self.compiled = Compiled::from_code(jit::compile(self, depth));
         }
     }
 
-    /// Its code has left a run to the interpreter. Where that happens often, it costs more than it saves.
-    pub(crate) fn left(&mut self) {
-        if let Compiled::Code(_, times) = &mut self.compiled {
-            *times += 1;
-            if *times > MAX_LEFT && *times > self.runs / 4 {
-                self.compiled = Compiled::Never;
-            }
+    /// Compiles it for the lanes of a batch, once it has run `after` times.
+    #[inline]
+    pub(crate) fn compile_lanes_after(&mut self, after: u64, depth: u32) {
+        if self.runs >= after && matches!(self.compiled_lanes, Compiled::NotYet) {
+            self.compiled_lanes = Compiled::from_code(jit::compile_lanes(self, depth));
         }
     }
 
@@ -315,6 +328,7 @@ fn compile(code: &Code, pauses: &[BundleAddress], entry: BundleAddress, recent: 
         edges: Vec::new(),
         runs: 0,
         compiled: Compiled::NotYet,
+        compiled_lanes: Compiled::NotYet,
         stalls: stalls.into(),
         operations: ROWS
             .iter()

@@ -176,7 +176,7 @@ fn run(
             return true;
         }
         runs.left += 1;
-        block.left();
+        block.compiled.left(block.runs);
     }
     let mut context = Context {
         registers: &mut state.registers,

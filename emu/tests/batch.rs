@@ -1,10 +1,13 @@
 //! A batch does in each lane what an emulator of its own would do: random programs, random inputs, everything compared.
 
+mod common;
+
+use common::assert_lane;
 use std::num::NonZeroU64;
 use takt_emu::testing::{Options, Random, input_ports, random_program};
 use takt_emu::{Batch, Emulator};
 use takt_isa::fp::Flags;
-use takt_isa::{MACHINES, Program, Register};
+use takt_isa::{MACHINES, Program};
 
 /// Programs of each kind and machine.
 const PROGRAMS: u64 = 60;
@@ -22,18 +25,6 @@ struct Met {
     nan_writes: u64,
     flags: u64,
     missed: u64,
-}
-
-/// Everything that can be seen of a lane is as in its own emulator.
-fn assert_same(context: &str, batch: &Batch, lane: usize, single: &Emulator) {
-    assert_eq!(batch.now(lane), single.now(), "{context}: now");
-    assert_eq!(batch.flags(lane), single.flags(), "{context}: flags");
-    for register in Register::all() {
-        assert_eq!(batch.register(lane, register), single.register(register), "{context}: {register}");
-        let (found, expected) = (batch.output_bits(lane, register), single.output_bits(register));
-        assert_eq!(found, expected, "{context}: output at {register}");
-    }
-    assert_eq!(batch.memory(lane), single.memory(), "{context}: memory");
 }
 
 /// Runs a program with random inputs in a batch and in an emulator for each lane.
@@ -83,7 +74,7 @@ fn compare(seed: u64, program: &Program, met: &mut Met) {
                 met.missed += u64::from(report.missed);
             }
             assert_eq!(batch.outcome(lane), Some(expected), "{context}");
-            assert_same(&context, &batch, lane, single);
+            assert_lane(&context, &batch, lane, single);
         }
     }
 }

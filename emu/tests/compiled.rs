@@ -5,10 +5,10 @@
 
 mod common;
 
-use common::program;
+use common::{assert_lane, program};
 use std::fmt::Write as _;
 use takt_emu::testing::{Options, Random, input_ports, random_program};
-use takt_emu::{CompiledRuns, Emulator};
+use takt_emu::{Batch, CompiledRuns, Emulator};
 use takt_isa::{Effect, MACHINES, Machine, ROWS, Register};
 
 /// Operands of each kind for each operation.
@@ -23,8 +23,13 @@ fn tame(random: &mut Random) -> u32 {
         2 => 0x0000_0001 + random.below(0x00ff_ffff),
         3 => 0x7f7f_ffff - random.below(1000),
         4..8 => random.below(64),
-        _ => (120 + random.below(14)) << 23 | random.bits() as u32 & 0x007f_ffff,
+        _ => calm(random),
     }
+}
+
+/// An ordinary number.
+fn calm(random: &mut Random) -> u32 {
+    (120 + random.below(14)) << 23 | random.bits() as u32 & 0x007f_ffff
 }
 
 fn assert_same(context: &str, fast: &mut Emulator, step: &mut Emulator) {
@@ -72,6 +77,40 @@ fn compare(
     fast.compiled_runs()
 }
 
+/// Runs a program period by period in the lanes of a batch, compiled from the first, and each in an interpreter of its own. In
+/// half of the periods no lane has inputs that are out of the ordinary.
+fn compare_lanes(context: &str, program: &takt_isa::Program, seed: u64, periods: u32) -> CompiledRuns {
+    let mut random = Random::new(seed);
+    // A group that is full and one that is not.
+    let mut batch = Batch::new(program, Batch::WIDTH + 3).unwrap();
+    batch.set_compile_after(Some(0));
+    let mut singles: Vec<Emulator> = (0..batch.lanes()).map(|_| Emulator::new(program).unwrap()).collect();
+    singles.iter_mut().for_each(|single| single.set_compile_after(None));
+    for period in 0..periods {
+        let draw = if random.once_in(2) { calm } else { tame };
+        for port in input_ports(program.machine) {
+            let values: Vec<u32> = singles.iter().map(|_| draw(&mut random)).collect();
+            batch.set_input_bits(port, &values).unwrap();
+            for (single, value) in singles.iter_mut().zip(values) {
+                single.set_input_bits(port, value).unwrap();
+            }
+        }
+        batch.run_period();
+        let mut faulted = false;
+        for (lane, single) in singles.iter_mut().enumerate() {
+            let context = format!("{context}, period {period}, lane {lane}");
+            let end = single.run_period(&[]);
+            faulted |= end.is_err();
+            assert_eq!(batch.outcome(lane), Some(end), "{context}");
+            assert_lane(&context, &batch, lane, single);
+        }
+        if faulted {
+            break;
+        }
+    }
+    batch.compiled_runs()
+}
+
 /// Every operation that computes, each of its results also in a sum, whose code then looks at that alone.
 #[test]
 fn every_operation_agrees() {
@@ -101,13 +140,17 @@ fn every_operation_agrees() {
                 assert!(runs.done > 0, "{}: {runs:?}", row.mnemonic);
             }
         }
+        let runs = compare_lanes(row.mnemonic, &program, 3, PERIODS / 10);
+        if Emulator::compiles() {
+            assert!(runs.done > 0, "{} in lanes: {runs:?}", row.mnemonic);
+        }
     }
 }
 
 /// Random programs of every kind whose constants are numbers, so that their blocks' code is used.
 #[test]
 fn programs_of_numbers_agree() {
-    let mut all = CompiledRuns::default();
+    let mut all = [CompiledRuns::default(); 2];
     for machine in MACHINES {
         for seed in 0..PROGRAMS {
             let options = Options { control: seed % 4 != 0, ..Options::TAME };
@@ -122,11 +165,19 @@ fn programs_of_numbers_agree() {
             }
             program.data.iter_mut().for_each(|bits| *bits = tame(&mut random));
             let context = format!("{}, seed {seed}", machine.name);
-            let runs = compare(&context, &program, seed, 12, tame);
-            all = CompiledRuns { done: all.done + runs.done, left: all.left + runs.left };
+            let mut count = |kind: usize, runs: CompiledRuns| {
+                all[kind] =
+                    CompiledRuns { done: all[kind].done + runs.done, left: all[kind].left + runs.left };
+            };
+            count(0, compare(&context, &program, seed, 12, tame));
+            if seed % 3 == 0 {
+                count(1, compare_lanes(&context, &program, seed, 6));
+            }
         }
     }
     if Emulator::compiles() {
-        assert!(all.done > 1000 && all.left > 1000, "{all:?}");
+        let [one, lanes] = all;
+        assert!(one.done > 1000 && one.left > 1000, "{one:?}");
+        assert!(lanes.done > 100 && lanes.left > 100, "{lanes:?}");
     }
 }

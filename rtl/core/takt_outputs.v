@@ -3,15 +3,16 @@
 // Contract
 //   write, index, value: what goes to the ports of each bank, in the cycle of its writeback. Of two values for one port the later
 //   one stands; of the same cycle, that of the bank named last.
-//   shown: the value of the port `number`, in the same cycle: what was written to it before. If LATCHED, what was written to it
-//   before the last publish, from that cycle on.
+//   shown: the value of the port `number`, READ_DELAY cycles later (0 or 1): what was written to it before the number came. If
+//   LATCHED, what was written to it before the last publish, from that cycle on.
 //   rst: what the loader writes is shown at once; what was written and not yet published is forgotten.
 //   Left open, it costs nothing.
 
 module takt_outputs #(
     parameter LATCHED = 0,
     parameter BANKS   = 3,
-    parameter INDEX   = 5   // bits of a port's number
+    parameter INDEX   = 5,  // bits of a port's number
+    parameter READ_DELAY = 0
 ) (
     input  wire                   clk,
     input  wire                   rst,
@@ -51,23 +52,38 @@ module takt_outputs #(
     endgenerate
     wire unused = &{1'b0, read_at[INDEX]};
 
+    // What each bank holds, where the choice among them reads it.
+    wire [BANKS*32-1:0] stands;
+    generate
+        if (READ_DELAY == 0) begin : g_at_once
+            assign stands = held;
+        end else begin : g_later
+            reg [BANKS*32-1:0] q;
+            always @(posedge clk) q <= held;
+            assign stands = q;
+        end
+    endgenerate
+
     generate
         if (BANKS == 1) begin : g_one
-            always @* shown = held;
+            always @* shown = stands;
             wire unused_one = &{1'b0, write_at};
         end else begin : g_several
             // Which bank has what was written last.
             localparam OWNER = $clog2(BANKS);
             reg  [OWNER-1:0] owner [0:DEPTH-1];
-            wire [OWNER-1:0] of_number = owner[read_at[ADDRESS-1:0]];
+            wire [OWNER-1:0] read_owner = owner[read_at[ADDRESS-1:0]];
+            reg  [OWNER-1:0] read_owner_q;
+            always @(posedge clk) read_owner_q <= read_owner;
+            wire [OWNER-1:0] of_number = READ_DELAY == 0 ? read_owner : read_owner_q;
             integer k;
             always @(posedge clk) begin
                 for (k = 0; k < BANKS; k = k + 1) if (write[k]) owner[write_at[k*ADDRESS +: ADDRESS]] <= k[OWNER-1:0];
             end
             integer j;
             always @* begin
-                shown = held[31:0];
-                for (j = 1; j < BANKS; j = j + 1) if (of_number == j[OWNER-1:0]) shown = held[32*j +: 32];
+                shown = stands[31:0];
+                for (j = 1; j < BANKS; j = j + 1) if (of_number == j[OWNER-1:0]) shown = stands[32*j +: 32];
             end
         end
     endgenerate

@@ -168,8 +168,8 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
 //   adr_i counts words; addresses are hexadecimal:
 {table}//   {INPUTS:04x} + port  w  input port
 //   {OUTPUTS:04x} + port  r  output port: what was last written to it; if LATCHED, as of the last `wait`
-//   Accesses are acknowledged in the next cycle; reads of output ports two cycles later than that, for the choice among the banks
-//   takes a cycle of its own; load_low and, with RESTORE, input ports only when a reset in progress has lasted long enough. What is
+//   Accesses are acknowledged in the next cycle; reads of output ports three cycles later than that, for the banks' ports and the
+//   choice among them are read in cycles of their own; load_low and, with RESTORE, input ports only when a reset in progress has lasted long enough. What is
 //   written nowhere is lost, what is read nowhere is 0.
 //   rst_i: for a cycle at least, after power-up.
 //   waiting: the program waits for the tick: the outputs of the period stand. It can serve as an interrupt.
@@ -206,7 +206,7 @@ module {name} #(
     reg  [{input_high}:0]  input_index;
     reg  [{port_high}:0]  output_index;
     reg  [31:0] output_value;
-    reg  [1:0]  reading;      // an output port: its number is in output_index, its value in output_value
+    reg  [2:0]  reading;      // an output port: its number is in output_index, the banks have read it, its value is in output_value
     reg         waited;       // since reset
     reg         periodic;     // the period is not 0
 
@@ -221,7 +221,7 @@ module {name} #(
     wire held     = we_i & (adr_i == 16'd{low} | (to_input & RESTORE != 0));
     wire outputs  = ~we_i & adr_i[15:{port_bits}] == {output_page_bits}'d{output_page};
     wire request  = cyc_i & stb_i & ~ack_o;
-    wire access   = request & (settled | ~held) & (reading[1] | ~outputs);
+    wire access   = request & (settled | ~held) & (reading[2] | ~outputs);
     wire writes   = access & we_i;
     wire due      = waited & periodic & elapsed >= last;
 
@@ -234,7 +234,7 @@ module {name} #(
         // Under this condition it is no copy of input_index, with which synthesis would merge it.
         if (outputs) output_index <= adr_i[{port_high}:0];
         output_value <= read_value;
-        reading      <= request & outputs & ~access ? {{reading[0], 1'b1}} : 2'd0;
+        reading      <= request & outputs & ~access ? {{reading[1:0], 1'b1}} : 3'd0;
         value        <= dat_i;
         last         <= period - 32'd1;
         periodic     <= period != 32'd0;
@@ -326,7 +326,7 @@ module {name} #(
     wire [47:0] core_value   = replays ? {{16'd0, replay_value}} : {{high, low}};
     wire        core_input   = writes_input | (replays & replays_input);
 
-    {top} #(.LATCHED(LATCHED)) core (
+    {top} #(.LATCHED(LATCHED), .READ_DELAY(1)) core (
         .clk(clk_i), .rst(rst),
         .load(core_load), .load_space(core_space), .load_slot(slot), .load_address(core_address), .load_value(core_value),
         .input_write(core_input), .input_index(replays ? replay_address[{input_high}:0] : input_index),

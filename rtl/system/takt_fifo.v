@@ -71,10 +71,6 @@ module takt_fifo #(
 
     // ---- the queue
 
-    (* no_rw_check *)
-    reg  [WIDTH-1:0]   words [0:DEPTH-1];
-    reg  [WIDTH-1:0]   read, latest;
-    reg                is_latest;
     reg  [ADDRESS-1:0] first, free;
     assign empty   = count == NONE;
     assign full    = count == MOST;
@@ -84,14 +80,30 @@ module takt_fifo #(
     assign refused = put & full & ~popped;
     wire [ADDRESS-1:0] second = first == LAST[ADDRESS-1:0] ? {ADDRESS{1'b0}} : first + 1'b1;
     wire [ADDRESS-1:0] next   = popped ? second : first;
-    // An entry that is the head at once has not been in the memory yet.
-    assign head = is_latest ? latest : read;
+
+    generate
+        if (DEPTH <= 32) begin : g_logic
+            // Read behind the register of the address: before it, the pop would be on the way to every bit of the memory.
+            reg [WIDTH-1:0] words [0:DEPTH-1];
+            always @(posedge clk) if (pushed) words[free] <= entry;
+            assign head = words[first];
+        end else begin : g_block
+            (* no_rw_check *)
+            reg [WIDTH-1:0] words [0:DEPTH-1];
+            reg [WIDTH-1:0] read, latest;
+            reg             is_latest;
+            always @(posedge clk) begin
+                if (pushed) words[free] <= entry;
+                read      <= words[next];
+                latest    <= entry;
+                is_latest <= pushed & free == next;
+            end
+            // An entry that is the head at once has not been in the memory yet.
+            assign head = is_latest ? latest : read;
+        end
+    endgenerate
 
     always @(posedge clk) begin
-        if (pushed) words[free] <= entry;
-        read      <= words[next];
-        latest    <= entry;
-        is_latest <= pushed & free == next;
         first     <= next;
         if (pushed) free <= free == LAST[ADDRESS-1:0] ? {ADDRESS{1'b0}} : free + 1'b1;
         count     <= count + {{COUNT-1{1'b0}}, pushed} - {{COUNT-1{1'b0}}, popped};

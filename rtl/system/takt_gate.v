@@ -1,34 +1,34 @@
 // takt_gate: what stands before a core's input pins (docs/system.md, The gate).
 //
 // Contract
-//   arrives, values: for each lane, a value that arrives in cycle a. It waits from a + 1 on; of the lanes on which a value waits,
+//   arrives, values: for each mailbox, a value that arrives in cycle a. It waits from a + 1 on; of the mailboxes in which a value waits,
 //   the lowest goes in: its value is on the pins in that cycle. A value that arrives while an older one waits replaces it.
-//   NUMBERS: the number of each lane's input port, INDEX bits each.
+//   NUMBERS: the number of each mailbox's input port, INDEX bits each.
 
 module takt_gate #(
-    parameter LANES = 1,
+    parameter MAILBOXES = 1,
     parameter INDEX = 8,
-    parameter [LANES*INDEX-1:0] NUMBERS = 0
+    parameter [MAILBOXES*INDEX-1:0] NUMBERS = 0
 ) (
-    input  wire                clk,
-    input  wire                rst,
-    input  wire [LANES-1:0]    arrives,
-    input  wire [32*LANES-1:0] values,
-    output wire                input_write,
-    output reg  [INDEX-1:0]    input_index,
-    output reg  [31:0]         input_value
+    input  wire                    clk,
+    input  wire                    rst,
+    input  wire [MAILBOXES-1:0]    arrives,
+    input  wire [32*MAILBOXES-1:0] values,
+    output reg                     input_write,
+    output reg  [INDEX-1:0]        input_index,
+    output reg  [31:0]             input_value
 );
 
-    reg  [LANES-1:0]    waits;
-    reg  [32*LANES-1:0] held;
-    wire [LANES-1:0]    goes = waits & (~waits + 1'b1);
-    assign input_write = |waits;
+    // Which mailbox goes in next is found before the registers, and the choice of its value is behind them.
+    reg  [MAILBOXES-1:0]    waits, goes;
+    reg  [32*MAILBOXES-1:0] held;
+    wire [MAILBOXES-1:0]    next = (arrives | (waits & ~goes)) & {MAILBOXES{~rst}};
 
     integer i;
     always @* begin
         input_index = {INDEX{1'b0}};
         input_value = 32'd0;
-        for (i = 0; i < LANES; i = i + 1) begin
+        for (i = 0; i < MAILBOXES; i = i + 1) begin
             input_index = input_index | (NUMBERS[INDEX*i +: INDEX] & {INDEX{goes[i]}});
             input_value = input_value | (held[32*i +: 32] & {32{goes[i]}});
         end
@@ -36,8 +36,10 @@ module takt_gate #(
 
     integer k;
     always @(posedge clk) begin
-        waits <= (arrives | (waits & ~goes)) & {LANES{~rst}};
-        for (k = 0; k < LANES; k = k + 1) if (arrives[k]) held[32*k +: 32] <= values[32*k +: 32];
+        waits       <= next;
+        goes        <= next & (~next + 1'b1);
+        input_write <= |next;
+        for (k = 0; k < MAILBOXES; k = k + 1) if (arrives[k]) held[32*k +: 32] <= values[32*k +: 32];
     end
 
 endmodule

@@ -4,6 +4,7 @@
 // Contract
 //   rst: synchronous. Then reset is high until the cores' program and data memories have been written with zeros, all RECORDS have
 //   been written, and SETTLE cycles longer.
+//   All outputs are registers: the memory is many block RAMs with a choice between them, and what it feeds is in every core.
 //   A record is {core, space, slot, address, value}, as the core's loader takes them (docs/hardware.md); space 3 is an input port.
 
 module takt_loader #(
@@ -18,17 +19,18 @@ module takt_loader #(
     input  wire             clk,
     input  wire             rst,
     output reg              reset,
-    output wire [CORES-1:0] load,
-    output wire [1:0]       load_space,
-    output wire [2:0]       load_slot,
-    output wire [15:0]      load_address,
-    output wire [47:0]      load_value,
-    output wire [CORES-1:0] load_input
+    output reg  [CORES-1:0] load,
+    output reg  [1:0]       load_space,
+    output reg  [2:0]       load_slot,
+    output reg  [15:0]      load_address,
+    output reg  [47:0]      load_value,
+    output reg  [CORES-1:0] load_input
 );
 
     localparam BITS = RECORDS > 1 ? $clog2(RECORDS) : 1;
     localparam LAST_RECORD = RECORDS - 1;
-    localparam [15:0] LAST_CODE = (1 << CODE) - 1, LAST_DATA = (1 << DATA) - 1, LAST_SETTLE = SETTLE - 1;
+    localparam [15:0] LAST_CODE = (1 << CODE) - 1, LAST_DATA = (1 << DATA) - 1;
+    localparam [15:0] LAST_SETTLE = SETTLE + 1;   // the last record is two cycles on its way
     localparam [2:0]  DATA_SLOT = SLOTS;   // beyond the slots of program memory
 
     reg [72:0]     records [0:RECORDS-1];
@@ -44,29 +46,29 @@ module takt_loader #(
     reg [15:0]     address;
     reg [2:0]      slot;
     reg [BITS-1:0] next;
-    reg [72:0]     record;
-    reg            clears, valid;
+    // What the memory has read, and the register behind the choice between its block RAMs.
+    reg [72:0]     read, record;
+    reg            clears, reads, valid;
     reg [15:0]     cleared;
     reg [2:0]      cleared_slot;
 
     wire       clears_data = cleared_slot == DATA_SLOT;
     wire       is_input    = record[68:67] == 2'd3;
-    genvar c;
-    generate
-        for (c = 0; c < CORES; c = c + 1) begin : g_core
-            wire own = valid & record[72:69] == c[3:0];
-            assign load[c]       = clears | (own & ~is_input);
-            assign load_input[c] = own & is_input;
-        end
-    endgenerate
-    assign load_space   = clears ? {1'b0, clears_data} : record[68:67];
-    assign load_slot    = clears ? cleared_slot & {3{~clears_data}} : record[66:64];
-    assign load_address = clears ? cleared : record[63:48];
-    assign load_value   = clears ? 48'd0 : record[47:0];
+    integer c;
 
     always @(posedge clk) begin
-        record       <= records[next];
-        valid        <= state == 2'd1;
+        for (c = 0; c < CORES; c = c + 1) begin
+            load[c]       <= clears | (valid & ~is_input & record[72:69] == c[3:0]);
+            load_input[c] <= valid & is_input & record[72:69] == c[3:0];
+        end
+        load_space   <= clears ? {1'b0, clears_data} : record[68:67];
+        load_slot    <= clears ? cleared_slot & {3{~clears_data}} : record[66:64];
+        load_address <= clears ? cleared : record[63:48];
+        load_value   <= clears ? 48'd0 : record[47:0];
+        read         <= records[next];
+        record       <= read;
+        reads        <= state == 2'd1;
+        valid        <= reads;
         clears       <= state == 2'd0;
         cleared      <= address;
         cleared_slot <= slot;
@@ -91,9 +93,9 @@ module takt_loader #(
             address <= 16'd0;
             slot    <= 3'd0;
             next    <= {BITS{1'b0}};
-            valid   <= 1'b0;
-            clears  <= 1'b0;
             reset   <= 1'b1;
+            {clears, reads, valid} <= 3'b000;
+            {load, load_input}     <= {2 * CORES{1'b0}};
         end
     end
 

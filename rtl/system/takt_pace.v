@@ -17,20 +17,20 @@ module takt_pace #(
     input  wire starts,
     input  wire stop,
     output wire tick,
-    output wire take
+    output reg  take
 );
 
     // From the cycle after `starts` to that of `tick`.
     localparam FIRST = LEAD + OFFSET - 2;
     localparam LAST  = PERIOD - 1;
-    localparam TAKE  = SNAPSHOTS + 1;
+    localparam TAKE  = SNAPSHOTS + 2;   // the cycle before: take is a register, as it is in every mailbox of the core's snapshots
     reg [BITS-1:0] left;
     reg            runs;
     assign tick = runs & left == {BITS{1'b0}};
-    assign take = runs & left == TAKE[BITS-1:0];
 
     always @(posedge clk) begin
         runs <= ~rst & ~stop & (runs | starts);
+        take <= ~rst & ~stop & runs & left == TAKE[BITS-1:0];
         left <= starts ? FIRST[BITS-1:0] : left == {BITS{1'b0}} ? LAST[BITS-1:0] : left - 1'b1;
     end
 

@@ -190,7 +190,7 @@ impl Source {
 
 /// An input port of a core that a link drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Lane {
+pub struct Mailbox {
     /// The port.
     pub register: Register,
     /// What arrives there.
@@ -248,18 +248,18 @@ impl Description {
         self.cores.iter().position(|core| core.name == name)
     }
 
-    /// The lanes of a core, in the order in which they go in: fields of snapshots first.
-    pub fn lanes(&self, core: usize) -> Vec<Lane> {
+    /// The mailboxes of a core, in the order in which they go in: fields of snapshots first.
+    pub fn mailboxes(&self, core: usize) -> Vec<Mailbox> {
         let here = End::Core(core);
-        let mut lanes = Vec::new();
+        let mut mailboxes = Vec::new();
         for snapshots in [true, false] {
             for (number, link) in self.links.iter().enumerate().filter(|(_, l)| l.is_snapshot() == snapshots)
             {
                 if link.to == here {
                     let fields = link.fields.iter().enumerate();
-                    lanes.extend(fields.filter_map(|(field, names)| {
+                    mailboxes.extend(fields.filter_map(|(field, names)| {
                         let source = Source::Field { link: number, field };
-                        Some(Lane { register: names.input?, source })
+                        Some(Mailbox { register: names.input?, source })
                     }));
                 }
                 if let LinkKind::Fifo { sender, receiver, .. } = &link.kind {
@@ -267,39 +267,42 @@ impl Description {
                         [(link.to, Side::Receiver, receiver), (link.from, Side::Sender, sender)]
                     {
                         if end == here {
-                            lanes.extend(ports.iter().map(|&(status, register)| {
+                            mailboxes.extend(ports.iter().map(|&(status, register)| {
                                 let source = Source::Status { link: number, side, status };
-                                Lane { register, source }
+                                Mailbox { register, source }
                             }));
                         }
                     }
                 }
             }
         }
-        lanes
+        mailboxes
     }
 
-    /// Of a core's lanes, how many are fields of snapshots.
-    pub fn snapshot_lanes(&self, core: usize) -> u64 {
+    /// Of a core's mailboxes, how many are fields of snapshots.
+    pub fn snapshot_mailboxes(&self, core: usize) -> u64 {
         let snapshots = self.links.iter().filter(|link| link.is_snapshot() && link.to == End::Core(core));
         snapshots.map(|link| link.fields.len() as u64).sum()
     }
 
-    /// Cycles before the tick in which a core takes its snapshots: its lanes go in one a cycle, and the last is there when the
+    /// Cycles before the tick in which a core takes its snapshots: its mailboxes go in one a cycle, and the last is there when the
     /// first bundle issues.
     pub fn taking(&self, core: usize) -> Cycle {
-        self.snapshot_lanes(core) + ENDED_DELAY
+        self.snapshot_mailboxes(core) + ENDED_DELAY
     }
 
     /// Cycles before a base tick in which the host is to write what the periods that begin there are to read.
     pub fn lead(&self) -> Cycle {
-        let lanes = |core| {
-            let lanes = self.lanes(core);
-            let host = lanes.iter().filter(|lane| self.links[lane.source.link()].from == End::Host).count();
-            self.snapshot_lanes(core) + host as u64
+        let mailboxes = |core| {
+            let mailboxes = self.mailboxes(core);
+            let host = mailboxes
+                .iter()
+                .filter(|mailbox| self.links[mailbox.source.link()].from == End::Host)
+                .count();
+            self.snapshot_mailboxes(core) + host as u64
         };
         let transit = self.links.iter().filter(|link| link.from == End::Host).map(Link::transit);
-        (0..self.cores.len()).map(lanes).max().unwrap_or(0) + transit.max().unwrap_or(0) + MIN_LATENCY + 2
+        (0..self.cores.len()).map(mailboxes).max().unwrap_or(0) + transit.max().unwrap_or(0) + MIN_LATENCY + 2
     }
 
     /// The system's input ports: the host's ends of links that it drives.
@@ -329,7 +332,7 @@ impl Description {
         ports
     }
 
-    /// What a lane's port shows before anything has arrived.
+    /// What a mailbox's port shows before anything has arrived.
     pub fn initial(&self, source: Source) -> u32 {
         match source {
             Source::Field { link, field } => {

@@ -79,7 +79,7 @@ pub fn latencies(description: &Description, bounds: &[Bounds]) -> Result<Vec<Lat
         };
         let period = core.period(description.tick);
         // A core that takes snapshots waits a little before its tick.
-        let spare = match description.snapshot_lanes(number) {
+        let spare = match description.snapshot_mailboxes(number) {
             0 => 0,
             _ => description.taking(number) + ENDED_DELAY - 1,
         };
@@ -203,7 +203,7 @@ fn carry(description: &Description, link: &Link) -> i64 {
 fn contention(description: &Description, link: &Link) -> i64 {
     match link.to {
         // Those of snapshots go in at a fixed time.
-        End::Core(core) if !link.is_snapshot() => description.lanes(core).len() as i64 - 1,
+        End::Core(core) if !link.is_snapshot() => description.mailboxes(core).len() as i64 - 1,
         _ => 0,
     }
 }

@@ -2,13 +2,14 @@
 //!
 //! [`read`] makes a [`Description`] of a TOML file, or says what is wrong with it and at which line. [`System`] emulates
 //! one exactly, every core's cycle and every link's latency in one global time. [`latency`] bounds the way from a
-//! host's command to an output. `docs/system.md` defines in which cycle the other side sees what. Nothing here prints.
+//! host's command to an output, [`heads`] finds reads of a FIFO's head that its own pop spoils. `docs/system.md` defines in which cycle the other side sees what. Nothing here prints.
 
 mod check;
 mod description;
 mod fifo;
 mod file;
 mod gate;
+pub mod heads;
 pub mod latency;
 mod system;
 #[cfg(feature = "testing")]
@@ -16,8 +17,8 @@ pub mod testing;
 
 pub use check::{ProgramError, ReadError, Request, read};
 pub use description::{
-    Core, Description, End, Field, Lane, Link, LinkKind, MAX_CORES, MAX_DEPTH, MAX_LATENCY, MAX_TICK,
-    MIN_LATENCY, Side, Source, Status, SystemPort, TEXT_BYTES,
+    Core, Description, End, Field, Link, LinkKind, MAX_CORES, MAX_DEPTH, MAX_LATENCY, MAX_TICK, MIN_LATENCY,
+    Mailbox, Side, Source, Status, SystemPort, TEXT_BYTES,
 };
 pub use fifo::FifoCounts;
 pub use system::{

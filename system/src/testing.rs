@@ -88,7 +88,9 @@ pub fn random_system(seed: u64, machines: &[&'static Machine]) -> (String, BTree
                 }
                 continue;
             }
-            let _ = writeln!(text, "depth = {}\npop = \"{}\"", 1 + random.below(6), own(&mut random));
+            // Some of them deeper than what the circuit keeps outside of block RAM.
+            let depth = [1, 2, 3, 4, 5, 6, 33, 40][random.below(8) as usize];
+            let _ = writeln!(text, "depth = {depth}\npop = \"{}\"", own(&mut random));
             if !host {
                 let _ = writeln!(text, "push = \"{}\"", output(&mut random));
             }
@@ -179,8 +181,8 @@ impl<T> Line<T> {
 
 struct ReferenceCore {
     emulator: Emulator,
-    lanes: Vec<crate::Lane>,
-    /// Lanes with a value that waits before the pins.
+    mailboxes: Vec<crate::Mailbox>,
+    /// Mailboxes with a value that waits before the pins.
     gate: BTreeMap<usize, u32>,
     /// From the pins to where it counts.
     pins: Line<(Register, u32)>,
@@ -239,13 +241,13 @@ impl Reference {
         for (number, core) in description.cores.iter().enumerate() {
             let mut emulator = Emulator::new(&core.program)?;
             emulator.set_blocks(false);
-            let lanes = description.lanes(number);
-            for lane in &lanes {
-                let _ = emulator.set_input_bits(lane.register, description.initial(lane.source));
+            let mailboxes = description.mailboxes(number);
+            for mailbox in &mailboxes {
+                let _ = emulator.set_input_bits(mailbox.register, description.initial(mailbox.source));
             }
             cores.push(ReferenceCore {
                 emulator,
-                lanes,
+                mailboxes,
                 gate: BTreeMap::new(),
                 pins: Line::new(core.input_delay()),
                 writes: Vec::new(),
@@ -378,7 +380,7 @@ impl Reference {
     /// What goes in before the cores' cycle, and what stands on the pins in it.
     fn begin(&mut self) {
         for core in &mut self.cores {
-            let pin = core.gate.pop_first().map(|(lane, value)| (core.lanes[lane].register, value));
+            let pin = core.gate.pop_first().map(|(mailbox, value)| (core.mailboxes[mailbox].register, value));
             if let Some((register, value)) = core.pins.step(pin) {
                 let _ = core.emulator.set_input_bits(register, value);
             }
@@ -387,8 +389,8 @@ impl Reference {
 
     fn arrive(&mut self, core: usize, source: Source, value: u32) {
         let core = &mut self.cores[core];
-        if let Some(lane) = core.lanes.iter().position(|lane| lane.source == source) {
-            core.arrived.push((lane, value));
+        if let Some(mailbox) = core.mailboxes.iter().position(|mailbox| mailbox.source == source) {
+            core.arrived.push((mailbox, value));
         }
     }
 

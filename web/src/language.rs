@@ -11,6 +11,7 @@ pub(crate) fn server(machine: &'static Machine) -> Inline {
         machine,
         library: takt_programs::LIBRARY,
         beside: examples::beside(),
+        library_by_name: true,
         ..Settings::default()
     })
 }

@@ -168,6 +168,11 @@ const TOOLS: [(&str, &str, &str); 10] = [
 fn install() -> Result<()> {
     let missing = TOOLS.iter().filter(|(tool, ask, _)| !works(tool, ask));
     let mut packages: Vec<&str> = missing.map(|(_, _, package)| *package).collect();
+    // The debug adapter's third client is Emacs's.
+    let emacs = Command::new("emacs").args(["--batch", "--eval", "(require 'dap-mode)"]).output();
+    if !emacs.is_ok_and(|output| output.status.success()) {
+        packages.extend(["emacs-nox", "elpa-dap-mode"]);
+    }
     if packages.is_empty() {
         return Ok(());
     }
@@ -203,8 +208,8 @@ fn extension() -> Result<()> {
     Ok(())
 }
 
-/// Uses the extension in VS Code's workbench, as the package code-server has it. Its native modules are left out: what needs them,
-/// the terminal, is not used, and they would take minutes to compile.
+/// Uses the extension in VS Code's workbench, as the package code-server has it. Of its native modules only the terminal's is
+/// compiled, which tasks run in: the others would take minutes.
 fn workbench(screenshots: Option<&Path>) -> Result<()> {
     let folder = root().join("editors/vscode/workbench");
     npm_install(&folder)?;
@@ -213,6 +218,15 @@ fn workbench(screenshots: Option<&Path>) -> Result<()> {
         if !part.join("node_modules").is_dir() {
             let install = ["install", "--omit=dev", "--no-audit", "--no-fund", "--ignore-scripts"];
             run(Command::new("npm").args(install).current_dir(part))?;
+        }
+    }
+    let terminal = code.join("node_modules/node-pty/build/Release/pty.node");
+    if !terminal.is_file() {
+        // Its last step writes a file for C++ editors, which may fail: what counts is that there is a module.
+        let built = run(Command::new("npm").args(["rebuild", "node-pty"]).current_dir(&code));
+        if !terminal.is_file() {
+            built.context("the terminal's module could not be compiled")?;
+            bail!("npm compiled no {}", terminal.display());
         }
     }
     run(cargo().args(["build", "--release", "--package", "takt", "--features", EVERYTHING]))?;

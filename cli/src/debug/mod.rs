@@ -135,6 +135,16 @@ fn converse<C: Commands + Send + 'static>(
 
 /// A session on a system.
 fn of_system(arguments: &Debug, file: &Path, color: bool, out: &mut Out) -> Result<()> {
+    let control = Arc::new(Control::default());
+    // What was asked for wrongly, and a mistake in a script, is found before anything runs.
+    check_system(arguments)?;
+    let script = arguments.script.as_deref().map(script::<SystemConsole>).transpose()?;
+    let (console, _) = open_system(arguments, file, &control, color)?;
+    converse(console, script, &control, color, out)
+}
+
+/// Refuses what a system's session has not got.
+fn check_system(arguments: &Debug) -> Result<()> {
     let refused = [
         ("--machine", arguments.machine.machine.is_some(), "the system's file names each core's"),
         ("--tick", arguments.tick.is_some(), "the system's file has it"),
@@ -146,11 +156,20 @@ fn of_system(arguments: &Debug, file: &Path, color: bool, out: &mut Out) -> Resu
             return Err(Failure::Usage(format!("{option} with a system: {why}")).into());
         }
     }
-    let script = arguments.script.as_deref().map(script::<SystemConsole>).transpose()?;
-    let control = Arc::new(Control::default());
+    Ok(())
+}
+
+/// A system's session as the command line asks for it, and the file of each core's program.
+pub(crate) fn open_system(
+    arguments: &Debug,
+    file: &Path,
+    control: &Arc<Control>,
+    color: bool,
+) -> Result<(SystemConsole, Vec<PathBuf>)> {
+    check_system(arguments)?;
     let loaded = system::load(file, &arguments.source, color)?;
-    let console = system::debug::console(loaded, arguments.inputs.as_deref(), ROWS, &control)?;
-    converse(console, script, &control, color, out)
+    let files = loaded.files.clone();
+    Ok((system::debug::console(loaded, arguments.inputs.as_deref(), ROWS, control)?, files))
 }
 
 /// The session that the command line asks for, and why it begins where it does, if there is a reason.

@@ -11,6 +11,7 @@ use anyhow::Result;
 use serde_json::{Map, Value, json};
 use std::io::Write;
 use std::path::Path;
+use takt_debug::trace::{SystemTracer, Timeline};
 use takt_isa::timing::Cause;
 use takt_system::System;
 
@@ -25,6 +26,7 @@ pub(crate) struct Arguments<'a> {
     pub(crate) source: &'a SourceArguments,
     pub(crate) inputs: Option<&'a Path>,
     pub(crate) periods: Option<u64>,
+    pub(crate) html: Option<&'a Path>,
     pub(crate) json: bool,
 }
 
@@ -32,6 +34,9 @@ pub(crate) fn run(arguments: &Arguments<'_>, color: bool, out: &mut Out) -> Resu
     let loaded = load(arguments.file, arguments.source, color)?;
     let host = Host::new(&loaded.description);
     let mut system = System::new(&loaded.description)?;
+    if arguments.html.is_some() {
+        system.keep_host_actions();
+    }
     let periods = arguments.periods.or(arguments.inputs.is_none().then_some(TICKS));
     let driven = run::Arguments {
         file: arguments.file,
@@ -52,6 +57,14 @@ pub(crate) fn run(arguments: &Arguments<'_>, color: bool, out: &mut Out) -> Resu
     result?;
     let (_, ticks, _) = ran;
     let description = &loaded.description;
+    if let (Some(path), Some(start)) = (arguments.html, system.start()) {
+        let timeline = timeline(&system, ticks)?;
+        let page = timeline.html(description, start, &files::input_name(arguments.file));
+        files::write(path, page.as_bytes())?;
+        if files::is_dash(path) {
+            return Ok(());
+        }
+    }
     let mut cores = Map::new();
     let mut text = Vec::new();
     writeln!(text, "{ticks} base ticks, {} cycles", system.now())?;
@@ -108,4 +121,22 @@ pub(crate) fn run(arguments: &Arguments<'_>, color: bool, out: &mut Out) -> Resu
     }
     out.write_all(&text)?;
     Ok(())
+}
+
+/// What happened from the time at which the host wrote for the last period of the slowest core. The run is done once more, with
+/// the same host: it is the same.
+fn timeline(ran: &System, ticks: u64) -> Result<Timeline> {
+    let description = ran.description();
+    let slowest = description.cores.iter().map(|core| core.every).max().unwrap_or(1);
+    // Looked at from the cycle before on, so that what the host does then is seen.
+    let first = ran.now().saturating_sub(slowest.min(ticks) * description.tick + 1);
+    let mut system = System::new(description)?;
+    let mut tracer = SystemTracer::timeline(first..ran.now());
+    tracer.run_to_start(&mut system, ran.now())?;
+    for (cycle, action) in ran.host_actions() {
+        tracer.run_until(&mut system, *cycle)?;
+        system.act(action)?;
+    }
+    tracer.run_until(&mut system, ran.now())?;
+    Ok(tracer.finish_timeline().unwrap_or_default())
 }

@@ -11,10 +11,8 @@ use anyhow::{Result, bail};
 use serde_json::{Value, json};
 use std::io::Write;
 use std::path::Path;
-use takt_cosim::cache_folder;
-use takt_cosim::system::{
-    SystemDifference, SystemLockstep, SystemLockstepError, SystemModel, SystemSimulation,
-};
+use takt_cosim::system::{SystemLockstep, SystemModel, SystemSimulation};
+use takt_cosim::{Difference, LockstepError, cache_folder};
 use takt_emu::Row;
 use takt_isa::timing::Cycle;
 use takt_rtl::SystemDesign;
@@ -51,8 +49,8 @@ pub(crate) fn run(arguments: &Arguments<'_>, color: bool, out: &mut Out) -> Resu
     let simulation = model.start(&design.image.text, &[])?;
     let ran = match run_rows(&loaded, &design, &host, &rows, simulation) {
         Ok(ran) => ran,
-        Err(error) => match error.downcast::<SystemLockstepError>() {
-            Ok(SystemLockstepError::Difference(difference)) => {
+        Err(error) => match error.downcast::<LockstepError>() {
+            Ok(LockstepError::Difference(difference)) => {
                 return report(arguments, &loaded, &design, &host, &rows, &difference, out);
             }
             Ok(other) => return Err(other.into()),
@@ -145,7 +143,7 @@ fn report(
     design: &SystemDesign,
     host: &Host,
     rows: &[Row],
-    difference: &SystemDifference,
+    difference: &Difference,
     out: &mut Out,
 ) -> Result<()> {
     let model = SystemModel::build(design, &cache_folder(), true)?;
@@ -161,6 +159,7 @@ fn report(
             "difference": {
                 "cycle": difference.cycle,
                 "place": difference.place,
+                "instruction": difference.instruction,
                 "text": difference.to_string(),
                 "waveform": again.then(|| name.to_string()),
             },

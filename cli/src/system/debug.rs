@@ -18,7 +18,7 @@ pub(crate) fn console(
     most: usize,
     control: &Arc<Control>,
 ) -> Result<SystemConsole> {
-    let LoadedSystem { description, programs } = loaded;
+    let LoadedSystem { description, programs, .. } = loaded;
     let host = Host::new(&description);
     let columns = host.columns(&description);
     let mut turns = None;

@@ -12,18 +12,22 @@ pub(crate) mod track;
 use crate::fault;
 use crate::files;
 use crate::load::{Load, Loaded};
-use crate::output::Failure;
+use crate::output::{Failure, message};
 use crate::select::SourceArguments;
 use anyhow::{Result, anyhow};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use takt_asm::diag::Diagnostics;
+use takt_asm::levels::Levels;
 use takt_asm::nearest;
 use takt_rtl::{Library, SystemDesign, export_system};
-use takt_system::{Description, ProgramError, ReadError, Request, SystemFault, TEXT_BYTES};
+use takt_system::{Description, ProgramError, ReadError, Request, SystemFault, TEXT_BYTES, heads};
 
 /// A system and, for each core, its program with what is known of its source.
 pub(crate) struct LoadedSystem {
     pub(crate) description: Description,
     pub(crate) programs: Vec<Loaded>,
+    /// Their files.
+    pub(crate) files: Vec<PathBuf>,
 }
 
 /// Reads a system's file and its programs, which are looked for beside it.
@@ -33,7 +37,7 @@ pub(crate) fn load(path: &Path, source: &SourceArguments, color: bool) -> Result
         anyhow!("{name} is no text: byte {} is not UTF-8", error.utf8_error().valid_up_to())
     })?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut programs = Vec::new();
+    let (mut programs, mut files) = (Vec::new(), Vec::new());
     let read = takt_system::read(&name, &text, |request: &Request<'_>| {
         let file = folder.join(request.path);
         if !file.is_file() {
@@ -43,12 +47,36 @@ pub(crate) fn load(path: &Path, source: &SourceArguments, color: bool) -> Result
         let loaded = loaded.map_err(ProgramError::Invalid)?;
         let program = loaded.program.clone();
         programs.push(loaded);
+        files.push(file);
         Ok(program)
     });
     match read {
-        Ok(description) => Ok(LoadedSystem { description, programs }),
+        Ok(description) => {
+            let system = LoadedSystem { description, programs, files };
+            warn(&system, source, color)?;
+            Ok(system)
+        }
         Err(ReadError::Mistakes(mistakes)) => Err(Failure::Diagnostics(mistakes.render(color)).into()),
         Err(ReadError::Program(error)) => Err(error),
+    }
+}
+
+/// Shows what is doubtful about a system, as the assembler's warnings are shown.
+fn warn(system: &LoadedSystem, source: &SourceArguments, color: bool) -> Result<()> {
+    let levels: Levels = source.warnings.iter().copied().collect();
+    let reads = heads::doubtful(&system.description);
+    let told = reads.iter().filter_map(|read| {
+        let sources = &system.programs[read.core].sources;
+        takt_debug::heads::diagnose(read, &system.description, sources, &levels)
+    });
+    let told: Vec<Diagnostics> = told.collect();
+    let text: Vec<String> = told.iter().map(|diagnostics| diagnostics.render(color)).collect();
+    match told.iter().any(Diagnostics::has_errors) {
+        true => Err(Failure::Diagnostics(text.join("\n")).into()),
+        false => {
+            message(&text.join("\n"));
+            Ok(())
+        }
     }
 }
 

@@ -11,68 +11,10 @@
 // system.h, which is generated, gives PINS, set_pin, pin, clear_strobes, and observe, which calls what is below.
 
 #include "Vsystem.h"
-#include "verilated.h"
-#ifdef TRACE
-#include "verilated_vcd_c.h"
-#endif
-#include <cstdint>
-#include <cstdio>
-#include <cstdlib>
-#include <vector>
+#define MODEL Vsystem
+#include "driver.h"
 
-enum Kind { ISSUE, STORE, RETIRE, PORT, MISSED, LOST, HALT, FAULT, PUBLISH, INPUT, LINK };
 enum LinkKind { VALUE = LINK, PUBLISHED, TAKEN, SKIPPED, PUSHED, POPPED, OVERFLOWS, UNDERFLOWS };
-
-struct Event {
-    uint32_t kind, cycle, address, slot, reg, value, flags, place;
-};
-
-static VerilatedContext context;
-static Vsystem *top;
-static int64_t cycle;
-static std::vector<Event> events;
-
-static void event(uint32_t kind, int64_t at, uint32_t address, uint32_t slot, uint32_t reg, uint32_t value, uint32_t flags,
-                  uint32_t place) {
-    events.push_back({kind, uint32_t(at), address, slot, reg, value, flags, place});
-}
-
-static uint64_t bits(uint64_t value, unsigned low, unsigned width) {
-    return value >> low & ((uint64_t(1) << width) - 1);
-}
-
-template <std::size_t N> static uint64_t bits(const VlWide<N> &value, unsigned low, unsigned width) {
-    uint64_t result = 0;
-    for (unsigned i = 0; i < width; i++) {
-        result |= uint64_t(value.at((low + i) / 32) >> (low + i) % 32 & 1) << i;
-    }
-    return result;
-}
-
-// A core's nets of these names, after a prefix.
-#define OBSERVE_CORE(core, slots, p)                                                                                       \
-    do {                                                                                                                   \
-        static bool was_halted, was_fault;                                                                                 \
-        if (top->p##issued) event(ISSUE, cycle - 2, top->p##issued_address, 0, 0, 0, 0, core);                             \
-        if (top->p##stored) event(STORE, cycle - 2, top->p##stored_address, 0, 0, top->p##stored_value, 0, core);          \
-        for (unsigned s = 0; s < slots; s++) {                                                                             \
-            if (bits(top->p##retire, s, 1)) {                                                                              \
-                event(RETIRE, cycle, bits(top->p##retire_address, 16 * s, 16), s, bits(top->p##retire_register, 10 * s, 10), \
-                      bits(top->p##retire_value, 32 * s, 32), bits(top->p##retire_flags, 3 * s, 3) << 2, core);            \
-            }                                                                                                              \
-        }                                                                                                                  \
-        if (top->p##tick_missed) event(MISSED, cycle, 0, 0, 0, 0, 0, core);                                                \
-        if (top->p##tick_lost) event(LOST, cycle, 0, 0, 0, 0, 0, core);                                                    \
-        if (top->p##halted && !was_halted) event(HALT, cycle - 2, 0, 0, 0, 0, 0, core);                                    \
-        if (top->p##fault && !was_fault) {                                                                                 \
-            event(FAULT, cycle - 2, top->p##fault_address, top->p##fault_slot, top->p##fault_kind, 0, 0, core);            \
-        }                                                                                                                  \
-        was_halted = top->p##halted;                                                                                       \
-        was_fault = top->p##fault;                                                                                         \
-    } while (0)
-
-#define OBSERVE_PORT(core, slot, write, reg, value)                                                                        \
-    if (write) event(PORT, cycle, 0, slot, reg, value, 0, core)
 
 #define OBSERVE_INPUT(core, write, reg, value)                                                                             \
     if (write) event(INPUT, cycle, 0, 0, reg, value, 0, core)
@@ -82,105 +24,52 @@ template <std::size_t N> static uint64_t bits(const VlWide<N> &value, unsigned l
 
 #include "system.h"
 
-static uint32_t trace_first = 1, trace_last = 0;
-#ifdef TRACE
-static VerilatedVcdC *waveform;
-#endif
-
-static void dump(int edge) {
-#ifdef TRACE
-    if (cycle >= int64_t(trace_first) && cycle <= int64_t(trace_last)) waveform->dump(uint64_t(cycle) * 2 + edge);
-#else
-    (void)edge;
-#endif
-}
-
-static void clock(bool watch) {
-    top->clk = 0;
-    top->eval();
-    dump(0);
-    if (watch) observe();
-    top->clk = 1;
-    top->eval();
-    dump(1);
-    cycle++;
-}
-
-static uint32_t need() {
-    uint32_t value;
-    if (fread(&value, sizeof value, 1, stdin) != 1) {
-        fprintf(stderr, "a command is cut short\n");
-        exit(1);
-    }
-    return value;
+static void pass(bool watch) {
+    clock([watch] {
+        if (watch) observe();
+    });
 }
 
 static void run() {
     uint32_t until = need(), count = need();
-    std::vector<uint32_t> pins(3 * size_t(count));
-    if (fread(pins.data(), 4, pins.size(), stdin) != pins.size()) exit(1);
+    std::vector<uint32_t> pins = need(3 * size_t(count));
     size_t next = 0;
     while (cycle < int64_t(until)) {
         clear_strobes();
         for (; next < pins.size() && int64_t(pins[next]) <= cycle; next += 3) set_pin(pins[next + 1], pins[next + 2]);
-        clock(true);
+        pass(true);
     }
     clear_strobes();
     top->clk = 0;
     top->eval();
-    uint32_t size = events.size();
-    fwrite(&size, sizeof size, 1, stdout);
-    fwrite(events.data(), sizeof(Event), events.size(), stdout);
-    for (unsigned i = 0; i < PINS; i++) {
-        uint32_t value = pin(i);
-        fwrite(&value, sizeof value, 1, stdout);
-    }
+    put_events();
+    for (unsigned i = 0; i < PINS; i++) put(pin(i));
     fflush(stdout);
-    events.clear();
 }
 
 int main(int argc, char **argv) {
-    context.commandArgs(argc, argv);
-    // Registers start with random values: what reset does not clear must not matter.
-    context.randReset(2);
-    context.randSeed(1);
-#ifdef TRACE
-    context.traceEverOn(true);
-#endif
-    top = new Vsystem(&context);
-#ifdef TRACE
-    waveform = new VerilatedVcdC;
-    top->trace(waveform, 99);
-    waveform->open(argc > 1 ? argv[1] : "wave.vcd");
-#endif
+    start(argc, argv);
     cycle = INT64_MIN / 2;
     clear_strobes();
     for (unsigned i = 0; i < PINS; i++) set_pin(i, 0);
     clear_strobes();
     top->rst = 1;
-    for (unsigned i = 0; i < 4; i++) clock(false);
+    for (unsigned i = 0; i < 4; i++) pass(false);
     top->rst = 0;
     top->clk = 0;
     top->eval();
     while (!top->running) {
-        clock(false);
+        pass(false);
         top->clk = 0;
         top->eval();
     }
     cycle = 0;
-    uint32_t command;
-    while (fread(&command, sizeof command, 1, stdin) == 1) {
+    for (uint32_t command; word(command);) {
         switch (command) {
         case 1: run(); break;
-        case 2:
-            trace_first = need();
-            trace_last = need();
-            break;
-        default: fprintf(stderr, "unknown command %u\n", command); return 1;
+        case 2: need_trace(); break;
+        default: return unknown(command);
         }
     }
-#ifdef TRACE
-    waveform->close();
-#endif
-    return 0;
+    return finish();
 }

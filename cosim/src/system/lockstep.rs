@@ -1,51 +1,15 @@
 //! A system on both sides.
 
 use super::model::{PinAction, SystemEvent, SystemSimulation};
-use crate::lockstep::{REPORT_DELAY, bare, circuit_stops, describe, expect, show};
-use crate::model::{CircuitEvent, EventKind, ModelError};
+use crate::compare::{Comparison, Difference};
+use crate::lockstep::{LockstepError, REPORT_DELAY, bare, circuit_stops, expect, instruction, show};
+use crate::model::{CircuitEvent, EventKind};
 use std::collections::BTreeMap;
-use takt_emu::{LoadError, Status};
-use takt_isa::BundleAddress;
+use takt_emu::Status;
 use takt_isa::timing::{Cycle, INPUT_DELAY};
 use takt_rtl::system::{Pin, PinKind, SystemPlan};
 use takt_rtl::verilog::Direction;
 use takt_system::{Description, HostAction, HostError, LinkEventKind, LinkKind, System, SystemFault};
-use thiserror::Error;
-
-/// Why a lockstep run of a system came to no result.
-#[derive(Debug, Error)]
-pub enum SystemLockstepError {
-    /// The emulator does not take a program.
-    #[error(transparent)]
-    Load(#[from] LoadError),
-    /// The simulation does not run.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// The host cannot do what it was to do.
-    #[error(transparent)]
-    Host(#[from] HostError),
-    /// The two sides differ.
-    #[error(transparent)]
-    Difference(#[from] Box<SystemDifference>),
-}
-
-/// The first thing in which the two sides differ.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SystemDifference {
-    /// Its cycle.
-    pub cycle: Cycle,
-    /// The core or the link.
-    pub place: String,
-    text: String,
-}
-
-impl std::fmt::Display for SystemDifference {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.text)
-    }
-}
-
-impl std::error::Error for SystemDifference {}
 
 /// A system on the emulator and on the circuit.
 ///
@@ -55,11 +19,9 @@ pub struct SystemLockstep {
     system: System,
     simulation: SystemSimulation,
     pins: Vec<Pin>,
-    expected: Vec<SystemEvent>,
-    found: Vec<SystemEvent>,
+    events: Comparison<SystemEvent>,
     actions: Vec<PinAction>,
     simulated: Cycle,
-    compared: u64,
     /// Of each link, what the host has written to a FIFO's fields, by pin; and the first cycles in which its next entry goes in,
     /// and comes out.
     working: Vec<BTreeMap<usize, u32>>,
@@ -75,7 +37,7 @@ impl SystemLockstep {
         description: &Description,
         plan: &SystemPlan,
         simulation: SystemSimulation,
-    ) -> Result<SystemLockstep, SystemLockstepError> {
+    ) -> Result<SystemLockstep, LockstepError> {
         let mut system = System::new(description)?;
         system.keep_events();
         system.keep_core_events();
@@ -83,11 +45,9 @@ impl SystemLockstep {
             system,
             simulation,
             pins: plan.pins(),
-            expected: Vec::new(),
-            found: Vec::new(),
+            events: Comparison::default(),
             actions: Vec::new(),
             simulated: 0,
-            compared: 0,
             working: vec![BTreeMap::new(); description.links.len()],
             free: vec![[0; 2]; description.links.len()],
         })
@@ -100,7 +60,7 @@ impl SystemLockstep {
 
     /// Events and values on pins that were the same on both sides.
     pub fn compared(&self) -> u64 {
-        self.compared
+        self.events.compared
     }
 
     /// The simulation, when all is compared.
@@ -112,7 +72,7 @@ impl SystemLockstep {
     ///
     /// # Errors
     /// As there.
-    pub fn set_input(&mut self, name: &str, bits: u32) -> Result<(), SystemLockstepError> {
+    pub fn set_input(&mut self, name: &str, bits: u32) -> Result<(), LockstepError> {
         self.system.set_input(name, bits)?;
         let description = self.system.description();
         let own = |pin: &&Pin| {
@@ -146,7 +106,7 @@ impl SystemLockstep {
     ///
     /// # Errors
     /// As there.
-    pub fn publish(&mut self, link: usize) -> Result<(), SystemLockstepError> {
+    pub fn publish(&mut self, link: usize) -> Result<(), LockstepError> {
         self.system.publish(link)?;
         self.strobe(self.system.now(), link, PinKind::Send);
         Ok(())
@@ -156,7 +116,7 @@ impl SystemLockstep {
     ///
     /// # Errors
     /// As there.
-    pub fn push(&mut self, link: usize) -> Result<bool, SystemLockstepError> {
+    pub fn push(&mut self, link: usize) -> Result<bool, LockstepError> {
         let room = self.system.push(link)?;
         let cycle = self.turn(link, 0);
         self.actions.extend(self.working[link].iter().map(|(&pin, &bits)| (cycle, pin, bits)));
@@ -180,7 +140,7 @@ impl SystemLockstep {
     ///
     /// # Errors
     /// If the system is another one.
-    pub fn act(&mut self, action: &HostAction) -> Result<(), SystemLockstepError> {
+    pub fn act(&mut self, action: &HostAction) -> Result<(), LockstepError> {
         match action {
             HostAction::Input { name, bits } => self.set_input(name, *bits),
             HostAction::Publish(link) => self.publish(*link),
@@ -194,7 +154,7 @@ impl SystemLockstep {
     ///
     /// # Errors
     /// If it drives no such link.
-    pub fn write(&mut self, link: usize, values: &[u32]) -> Result<bool, SystemLockstepError> {
+    pub fn write(&mut self, link: usize, values: &[u32]) -> Result<bool, LockstepError> {
         let unknown = || HostError::Unknown { what: "link from the host", name: link.to_string() };
         let known = self.system.description().links.get(link).cloned().ok_or_else(unknown)?;
         for (field, &value) in known.fields.iter().zip(values) {
@@ -214,7 +174,7 @@ impl SystemLockstep {
     ///
     /// # Errors
     /// If there is no such FIFO.
-    pub fn pop(&mut self, link: usize) -> Result<Option<Vec<u32>>, SystemLockstepError> {
+    pub fn pop(&mut self, link: usize) -> Result<Option<Vec<u32>>, LockstepError> {
         let head = self.system.pop(link)?;
         if head.is_some() {
             let cycle = self.turn(link, 1);
@@ -228,7 +188,7 @@ impl SystemLockstep {
     ///
     /// # Errors
     /// A difference, or a simulation that ended.
-    pub fn run_to_start(&mut self, limit: Cycle) -> Result<Option<Cycle>, SystemLockstepError> {
+    pub fn run_to_start(&mut self, limit: Cycle) -> Result<Option<Cycle>, LockstepError> {
         let start = self.system.run_to_start(limit);
         self.follow()?;
         Ok(start.unwrap_or_default())
@@ -238,7 +198,7 @@ impl SystemLockstep {
     ///
     /// # Errors
     /// A difference, or a simulation that ended.
-    pub fn run_until(&mut self, cycle: Cycle) -> Result<bool, SystemLockstepError> {
+    pub fn run_until(&mut self, cycle: Cycle) -> Result<bool, LockstepError> {
         let result = self.system.run_until(cycle);
         self.follow()?;
         Ok(result.is_ok())
@@ -250,10 +210,10 @@ impl SystemLockstep {
     }
 
     /// Lets the circuit follow, and compares.
-    fn follow(&mut self) -> Result<(), SystemLockstepError> {
+    fn follow(&mut self) -> Result<(), LockstepError> {
         let now = self.system.now();
         let cores = self.system.take_core_events().into_iter();
-        self.expected.extend(
+        self.events.expected.extend(
             cores.filter_map(|(core, event)| Some(SystemEvent::Core { core, event: expect(&event)? })),
         );
         let inputs = self.system.take_input_events().into_iter().map(|input| {
@@ -261,14 +221,14 @@ impl SystemLockstep {
             let event = CircuitEvent { register, value: input.value, ..bare(EventKind::Input, input.cycle) };
             SystemEvent::Core { core: input.core, event }
         });
-        self.expected.extend(inputs);
-        self.expected.extend(self.system.take_events().into_iter().map(SystemEvent::Link));
+        self.events.expected.extend(inputs);
+        self.events.expected.extend(self.system.take_events().into_iter().map(SystemEvent::Link));
         if now > self.simulated {
             self.actions.sort_by_key(|&(cycle, ..)| cycle);
             let due = self.actions.partition_point(|&(cycle, ..)| cycle < now);
             let actions: Vec<_> = self.actions.drain(..due).collect();
             let (found, pins) = self.simulation.run(now, &actions)?;
-            self.found.extend(found);
+            self.events.found.extend(found);
             self.simulated = now;
             let known = now.saturating_sub(REPORT_DELAY);
             self.check(known)?;
@@ -283,10 +243,10 @@ impl SystemLockstep {
     ///
     /// # Errors
     /// A difference, or a simulation that ended.
-    pub fn finish(&mut self) -> Result<(), SystemLockstepError> {
+    pub fn finish(&mut self) -> Result<(), LockstepError> {
         let now = self.system.now();
         let (found, _) = self.simulation.run(now + REPORT_DELAY, &[])?;
-        self.found.extend(found);
+        self.events.found.extend(found);
         self.simulated = now + REPORT_DELAY;
         // A fault that the circuit does not look at is no event, and what it does in that cycle is another thing.
         let end = match self.system.fault() {
@@ -298,7 +258,7 @@ impl SystemLockstep {
     }
 
     /// What the host sees, on each of its pins.
-    fn check_pins(&mut self, now: Cycle, values: &[u32]) -> Result<(), SystemLockstepError> {
+    fn check_pins(&mut self, now: Cycle, values: &[u32]) -> Result<(), LockstepError> {
         for (pin, &found) in self.pins.iter().zip(values) {
             if pin.direction != Direction::Output {
                 continue;
@@ -320,20 +280,22 @@ impl SystemLockstep {
             };
             let Some(expected) = expected else { continue };
             if expected != found {
-                let text = format!(
-                    "cycle {now}, pin {}\n  emulator: 0x{expected:08x}\n  circuit:  0x{found:08x}",
-                    pin.net
-                );
-                let place = format!("pin {}", pin.net);
-                return Err(Box::new(SystemDifference { cycle: now, place, text }).into());
+                let difference = Difference {
+                    cycle: now,
+                    place: format!("pin {}", pin.net),
+                    instruction: String::new(),
+                    emulator: format!("0x{expected:08x}"),
+                    circuit: format!("0x{found:08x}"),
+                };
+                return Err(Box::new(difference).into());
             }
-            self.compared += 1;
+            self.events.compared += 1;
         }
         Ok(())
     }
 
     /// Compares the events before a cycle, in order.
-    fn check(&mut self, end: Cycle) -> Result<(), SystemLockstepError> {
+    fn check(&mut self, end: Cycle) -> Result<(), LockstepError> {
         // After its halt a core is still ticked, of which the emulator says nothing.
         let description = self.system.description();
         let halts: Vec<Option<Cycle>> = (0..description.cores.len())
@@ -362,60 +324,31 @@ impl SystemLockstep {
             }
             event => event.cycle() < end,
         };
-        let take = |events: &mut Vec<SystemEvent>| {
-            let (mut taken, left): (Vec<_>, Vec<_>) =
-                events.drain(..).filter(|event| !after_halt(event)).partition(|event| known(event));
-            *events = left;
-            taken.sort_by_key(key);
-            taken
-        };
-        let (expected, found) = (take(&mut self.expected), take(&mut self.found));
-        let same = expected.iter().zip(&found).take_while(|(a, b)| a == b).count();
-        self.compared += same as u64;
-        match (expected.get(same), found.get(same)) {
-            (None, None) => Ok(()),
-            (emulator, circuit) => Err(Box::new(self.difference(emulator, circuit)).into()),
+        for events in [&mut self.events.expected, &mut self.events.found] {
+            events.retain(|event| !after_halt(event));
         }
-    }
-
-    fn difference(&self, emulator: Option<&SystemEvent>, circuit: Option<&SystemEvent>) -> SystemDifference {
-        // Events of one place are shown side by side; else the earlier one is what the other side lacks.
         let place = |event: &SystemEvent| {
             let (cycle, kind, place, ..) = key(event);
             (cycle, kind, place)
         };
-        let (emulator, circuit) = match (emulator, circuit) {
-            (Some(a), Some(b)) if place(a) < place(b) => (Some(a), None),
-            (Some(a), Some(b)) if place(a) > place(b) => (None, Some(b)),
-            pair => pair,
-        };
-        let description = self.system.description();
-        let cycle = emulator.or(circuit).map_or(0, SystemEvent::cycle);
-        let mut instruction = String::new();
-        let name = match emulator.or(circuit) {
+        let Err(unequal) = self.events.check(known, key, place) else { return Ok(()) };
+        let program = |core: usize| &description.cores[core].program;
+        let [emulator, circuit] = unequal.sides(|event| match event {
+            SystemEvent::Core { core, event } => show(program(*core), event),
+            SystemEvent::Link(event) => event.kind.text(),
+        });
+        let first = unequal.first();
+        let (place, instruction) = match first {
             Some(SystemEvent::Core { core, event }) => {
-                let program = &description.cores[*core].program;
-                if matches!(event.kind, EventKind::Issue | EventKind::Retire | EventKind::Fault) {
-                    let slot = (event.kind == EventKind::Retire).then_some(event.slot);
-                    instruction = describe(program, BundleAddress::new(event.address), slot);
-                }
-                format!("core {}", description.cores[*core].name)
+                (format!("core {}", description.cores[*core].name), instruction(program(*core), event))
             }
-            Some(SystemEvent::Link(event)) => format!("link {}", description.links[event.link].name),
-            None => String::new(),
+            Some(SystemEvent::Link(event)) => {
+                (format!("link {}", description.links[event.link].name), String::new())
+            }
+            None => Default::default(),
         };
-        let side = |event: Option<&SystemEvent>| match event {
-            None => "nothing".to_owned(),
-            Some(SystemEvent::Core { core, event }) => show(&description.cores[*core].program, event),
-            Some(SystemEvent::Link(event)) => event.kind.text(),
-        };
-        let at = if instruction.is_empty() { String::new() } else { format!(" at {instruction}") };
-        let text = format!(
-            "cycle {cycle}, {name}{at}\n  emulator: {}\n  circuit:  {}",
-            side(emulator),
-            side(circuit)
-        );
-        SystemDifference { cycle, place: name, text }
+        let cycle = first.map_or(0, SystemEvent::cycle);
+        Err(Box::new(Difference { cycle, place, instruction, emulator, circuit }).into())
     }
 }
 

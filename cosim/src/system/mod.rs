@@ -8,6 +8,6 @@ mod model;
 mod probe;
 pub mod random;
 
-pub use lockstep::{SystemDifference, SystemLockstep, SystemLockstepError};
+pub use lockstep::SystemLockstep;
 pub use model::{SystemEvent, SystemModel, SystemSimulation};
 pub use probe::PROBE;

@@ -123,7 +123,8 @@ pub(super) fn module(design: &SystemDesign) -> String {
 /// The driver's header.
 pub(super) fn header(design: &SystemDesign) -> String {
     let pins = design.plan.pins();
-    let mut text = format!("#define PINS {}\n", pins.len());
+    let cores = design.plan.cores.len();
+    let mut text = format!("#define PINS {}\nstatic Was was[{cores}];\n", pins.len());
     let (mut set, mut get, mut clear) = (String::new(), String::new(), String::new());
     for (i, pin) in pins.iter().enumerate() {
         if pin.direction == Direction::Input {
@@ -142,7 +143,7 @@ pub(super) fn header(design: &SystemDesign) -> String {
     );
     for (core, plan) in design.plan.cores.iter().enumerate() {
         let machine = plan.machine;
-        let _ = writeln!(text, "    OBSERVE_CORE({core}, {}, c{core}_);", machine.slots.len());
+        let _ = writeln!(text, "    OBSERVE_CORE({core}, {}, c{core}_, was[{core}]);", machine.slots.len());
         let _ = writeln!(
             text,
             "    OBSERVE_INPUT({core}, top->c{core}_input_write && !top->c{core}_rst, {} + top->c{core}_input_index, \

@@ -1,7 +1,8 @@
 //! Random systems, their programs and what the host does.
 
-use super::lockstep::{SystemLockstep, SystemLockstepError};
+use super::lockstep::SystemLockstep;
 use super::model::SystemSimulation;
+use crate::LockstepError;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use takt_emu::testing::{Options, Random, random_program};
@@ -76,7 +77,7 @@ pub fn run(
     plan: &SystemPlan,
     simulation: SystemSimulation,
     coverage: &mut Coverage,
-) -> Result<(), SystemLockstepError> {
+) -> Result<(), LockstepError> {
     let mut random = Random::new(!seed);
     let mut lockstep = SystemLockstep::new(description, plan, simulation)?;
     let mut running = true;

@@ -100,20 +100,29 @@ fn find(name: &str) -> Result<&'static Command, String> {
     }
 }
 
+fn usage(command: &Command) -> String {
+    format!("{} {}", command.name, command.arguments)
+}
+
+/// A line for each command that is wanted.
+fn usages(wanted: &dyn Fn(&Command) -> bool) -> String {
+    let commands = || COMMANDS.iter().filter(|command| wanted(command));
+    let width = commands().map(|command| usage(command).len()).filter(|width| *width < 24).max().unwrap_or(0);
+    let mut text = String::new();
+    for command in commands() {
+        let _ = writeln!(text, "{:<2} {:<width$}  {}", command.short, usage(command), command.text);
+    }
+    text
+}
+
 fn help(name: &str) -> Result<String, String> {
-    let usage = |command: &Command| format!("{} {}", command.name, command.arguments);
     if !name.is_empty() {
         let command = find(name)?;
         let short =
             if command.short.is_empty() { String::new() } else { format!("  (short: {})", command.short) };
         return Ok(format!("{}{short}\n  {}\n", usage(command).trim_end(), command.text));
     }
-    let width =
-        COMMANDS.iter().map(|command| usage(command).len()).filter(|width| *width < 24).max().unwrap_or(0);
-    let mut text = String::new();
-    for command in COMMANDS {
-        let _ = writeln!(text, "{:<2} {:<width$}  {}", command.short, usage(command), command.text);
-    }
+    let mut text = usages(&|_| true);
     text.push_str("An empty line repeats a step. Expressions are the assembler's, over live values; also `cycle period address depth`.\n");
     Ok(text)
 }
@@ -146,6 +155,30 @@ pub fn complete(session: &Session, line: &str) -> (usize, Vec<String>) {
     (start, found)
 }
 
+/// What to step by, and how often.
+pub(crate) fn steps(arguments: &str) -> Result<(Unit, u64), String> {
+    let (mut unit, mut count) = (Unit::Bundle, 1u64);
+    for word in arguments.split_whitespace() {
+        unit = match word {
+            "cycle" => Unit::Cycle,
+            "bundle" => Unit::Bundle,
+            "line" => Unit::Line,
+            "period" => Unit::Period,
+            "call" => Unit::Call,
+            "out" => Unit::Out,
+            number => {
+                count = number.parse().ok().filter(|count| *count > 0).ok_or_else(|| {
+                    let near = nearest(number, UNITS.iter().copied());
+                    let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+                    format!("`{number}` is neither a count nor one of {}{near}", UNITS.join(" "))
+                })?;
+                continue;
+            }
+        };
+    }
+    Ok((unit, count))
+}
+
 /// A line's command and its arguments; `None` for a blank line or a comment.
 pub(crate) fn split(line: &str) -> Option<(&str, &str)> {
     let line = line.trim();
@@ -160,8 +193,9 @@ pub fn first_mistake<C: Commands>(script: &str) -> Option<(usize, String)> {
     script.lines().enumerate().find_map(|(i, line)| Some((i + 1, C::mistake(line)?)))
 }
 
-/// Commands that look at a machine and neither move nor change it: of a system, they are about the selected core.
-pub(crate) const INSPECTION: &[&str] = &[
+/// Commands that look at a machine and neither move nor change it: of a system, they are about the selected core; and an editor's
+/// console, whose editor moves the run, has these only.
+const INSPECTION: &[&str] = &[
     "print",
     "info",
     "ulp",
@@ -172,9 +206,21 @@ pub(crate) const INSPECTION: &[&str] = &[
     "flight",
     "stalls",
     "list",
+    "where",
     "display",
     "echo",
+    "help",
 ];
+
+/// Their names.
+pub(crate) fn inspection() -> impl Iterator<Item = &'static str> {
+    INSPECTION.iter().copied()
+}
+
+/// Refuses a command that does more than look.
+pub(crate) fn only_looks(name: &str) -> String {
+    format!("`{name}` is not for an editor's console, which only looks (`help` lists what it has)")
+}
 
 /// The name of the command that is meant.
 pub(crate) fn named(name: &str) -> Result<&'static str, String> {
@@ -188,6 +234,10 @@ pub trait Commands {
     /// # Errors
     /// What is wrong with it. The session is as it was.
     fn execute(&mut self, line: &str) -> Result<String, String>;
+
+    /// Executes a line if it is a command that only looks; `None` if it is no command. Names are not abbreviated but to their short
+    /// names, since the line may be something else.
+    fn look(&mut self, line: &str) -> Option<Result<String, String>>;
 
     /// Whether `quit` was said.
     fn quit(&self) -> bool;
@@ -207,6 +257,18 @@ pub trait Commands {
 impl Commands for Console {
     fn execute(&mut self, line: &str) -> Result<String, String> {
         Console::execute(self, line)
+    }
+
+    fn look(&mut self, line: &str) -> Option<Result<String, String>> {
+        let (name, arguments) = split(line)?;
+        let command = COMMANDS.iter().find(|command| command.name == name || command.short == name)?;
+        if !INSPECTION.contains(&command.name) {
+            return Some(Err(only_looks(command.name)));
+        }
+        if (command.name, arguments) == ("help", "") {
+            return Some(Ok(usages(&|command| INSPECTION.contains(&command.name))));
+        }
+        Some(self.execute(line))
     }
 
     fn quit(&self) -> bool {
@@ -320,25 +382,7 @@ impl Console {
     }
 
     fn step(&mut self, arguments: &str, back: bool) -> Result<String, String> {
-        let (mut unit, mut count) = (Unit::Bundle, 1u64);
-        for word in arguments.split_whitespace() {
-            unit = match word {
-                "cycle" => Unit::Cycle,
-                "bundle" => Unit::Bundle,
-                "line" => Unit::Line,
-                "period" => Unit::Period,
-                "call" => Unit::Call,
-                "out" => Unit::Out,
-                number => {
-                    count = number.parse().ok().filter(|count| *count > 0).ok_or_else(|| {
-                        let near = nearest(number, UNITS.iter().copied());
-                        let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-                        format!("`{number}` is neither a count nor one of {}{near}", UNITS.join(" "))
-                    })?;
-                    continue;
-                }
-            };
-        }
+        let (unit, count) = steps(arguments)?;
         if unit == Unit::Cycle {
             // At once, however many.
             let now = self.session.cycle();

@@ -287,7 +287,7 @@ impl Session {
     }
 
     /// Whether a step by `unit` that began `depth` calls deep ends here, where `issuing` is about to issue.
-    fn ends_step(&self, unit: Unit, depth: usize, issuing: Option<BundleAddress>) -> Option<Why> {
+    pub(super) fn ends_step(&self, unit: Unit, depth: usize, issuing: Option<BundleAddress>) -> Option<Why> {
         let address = issuing?;
         let now = self.core.emulator.stack().len();
         let ends = match unit {
@@ -312,7 +312,7 @@ impl Session {
     }
 
     /// Takes the line of the breakpoint that it stopped at for the line at hand.
-    fn stopped(&mut self, why: Why) -> Why {
+    pub(crate) fn stopped(&mut self, why: Why) -> Why {
         let stop = match &why {
             Why::Stop { id, .. } => self.stops.iter().find(|(known, _)| known == id),
             _ => None,

@@ -142,6 +142,7 @@ fn line_bundles(file: &str, line: u64, program: &Program) -> Result<Where, Strin
 }
 
 /// Sees from position to position whether there is a reason to stop.
+#[derive(Clone)]
 pub(super) struct Watcher {
     /// For each stop, what was there before: of a watched value in each of the ways in which its names can be read.
     before: Vec<Vec<(Live, Seen)>>,

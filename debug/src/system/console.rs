@@ -1,13 +1,14 @@
 //! Commands on a system's session: those that move all cores, and a single core's for what there is to see of the one selected.
 
-use super::{Step, SystemSession, SystemStop, SystemWhy};
-use crate::console::{Commands, Console, INSPECTION, named, told};
-use crate::session::{Session, Shown};
+use super::links::{link_named, link_text};
+use super::{SystemSession, SystemStop, SystemWhy};
+use crate::console::{Commands, Console, inspection, named, only_looks, steps, told};
+use crate::session::{Place, Session, Stop, Unit};
 use std::fmt::Write as _;
 use takt_asm::nearest;
 use takt_emu::Status;
 use takt_isa::timing::Cause;
-use takt_system::{End, LinkEventKind, LinkKind, System};
+use takt_system::{Link, System};
 
 type Run = fn(&mut SystemConsole, &str) -> Result<String, String>;
 
@@ -15,43 +16,43 @@ type Run = fn(&mut SystemConsole, &str) -> Result<String, String>;
 struct Row(&'static str, &'static str, &'static str, &'static str, Run);
 
 const COMMANDS: &[Row] = &[
-    Row("cores", "", "", "Where each core is; the selected one has a `>`.", |c, _| Ok(c.cores())),
+    Row("cores", "", "", "Where each core is; the selected one has a `>`.", |c, _| Ok(c.cores_text())),
     Row(
         "core",
         "",
         "NAME",
-        "Select a core: commands that look at something, and `step bundle`, are about it.",
+        "Select a core: commands that look at something, and steps, are about it.",
         SystemConsole::select,
     ),
     Row("links", "", "[NAME]", "What is on the links: values that arrived last, sets, entries.", |c, a| {
-        c.links(a)
+        c.links_text(a)
     }),
     Row(
         "step",
         "s",
         "[UNIT] [N]",
-        "Step by a cycle of all cores, or a bundle (if nothing is said) or period of the selected one.",
+        "Step by a cycle of all cores, or a bundle (if nothing is said), line, period or call of the selected one (calls passed over); `out` of its subroutine.",
         |c, a| c.step(a, false),
     ),
     Row("back", "b", "[UNIT] [N]", "Step back by the same units.", |c, a| c.step(a, true)),
     Row("continue", "c", "", "Run on to a stop.", |c, _| {
-        let why = c.session.resume(&mut sessions(&mut c.views));
+        let why = c.run(SystemSession::resume);
         Ok(c.arrive(&why))
     }),
     Row("reverse", "rc", "", "Run back to one.", |c, _| {
-        let why = c.session.resume_back(&mut sessions(&mut c.views));
+        let why = c.run(SystemSession::resume_back);
         Ok(c.arrive(&why))
     }),
     Row("until", "u", "EXPR", "Run on until an expression over the selected core is not zero.", |c, a| {
-        let live = c.views[c.selected].session.parse(a)?;
-        let why = c.session.run_until(&mut sessions(&mut c.views), c.selected, live);
+        let (core, live) = (c.selected, c.views[c.selected].session.parse(a)?);
+        let why = c.run(|session, views| session.run_until(views, core, live));
         Ok(c.arrive(&why))
     }),
     Row(
         "goto",
         "g",
         "PLACE",
-        "Go to `cycle N`, so many having passed, or to the `start`, whichever way that is.",
+        "Go to `cycle N`, or to `period N` of the selected core (so many have passed), or to the `start`, whichever way that is.",
         SystemConsole::go,
     ),
     Row(
@@ -85,23 +86,32 @@ const COMMANDS: &[Row] = &[
     }),
 ];
 
-const EVENTS: [LinkEventKind; 8] = [
-    LinkEventKind::Value(0),
-    LinkEventKind::Published,
-    LinkEventKind::Taken,
-    LinkEventKind::Skipped,
-    LinkEventKind::Pushed,
-    LinkEventKind::Popped,
-    LinkEventKind::Overflow,
-    LinkEventKind::Underflow,
-];
+/// A single core's commands that a system's session has too.
+fn of_one_core() -> impl Iterator<Item = &'static str> {
+    inspection().filter(|name| COMMANDS.iter().all(|row| row.0 != *name))
+}
+
+/// Commands of these that neither move nor change anything.
+const LOOKS: &[&str] = &["cores", "core", "links", "stops", "where"];
 
 fn help() -> String {
+    usages(|_| true)
+}
+
+fn looks_help() -> String {
+    usages(|name| LOOKS.contains(&name))
+}
+
+fn usages(wanted: impl Fn(&str) -> bool) -> String {
     let mut text = String::new();
-    for Row(name, short, arguments, what, _) in COMMANDS {
+    for Row(name, short, arguments, what, _) in COMMANDS.iter().filter(|row| wanted(row.0)) {
         let _ = writeln!(text, "{short:<2} {:<20}  {what}", format!("{name} {arguments}"));
     }
-    let _ = writeln!(text, "Of the selected core, as with a single one: {}.", INSPECTION.join(", "));
+    let _ = writeln!(
+        text,
+        "Of the selected core, as with a single one: {}.",
+        of_one_core().collect::<Vec<_>>().join(", ")
+    );
     text
 }
 
@@ -117,11 +127,6 @@ pub struct SystemConsole {
     last: String,
 }
 
-/// The cores' own sessions.
-fn sessions(views: &mut [Console]) -> Vec<&mut Session> {
-    views.iter_mut().map(|view| &mut view.session).collect()
-}
-
 /// What a line is.
 enum Meant {
     Own(Run, bool),
@@ -134,7 +139,7 @@ fn find(name: &str) -> Result<Meant, String> {
         return Ok(Meant::Own(row.4, moves(row)));
     }
     if let Ok(known) = named(name)
-        && INSPECTION.contains(&known)
+        && inspection().any(|name| name == known)
     {
         return Ok(Meant::Inspection(known));
     }
@@ -147,7 +152,7 @@ fn find(name: &str) -> Result<Meant, String> {
             "`{name}` is for a single core's session; a system's has not got it (`help` lists)"
         ));
     }
-    let near = nearest(name, COMMANDS.iter().map(|row| row.0).chain(INSPECTION.iter().copied()));
+    let near = nearest(name, COMMANDS.iter().map(|row| row.0).chain(of_one_core()));
     let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
     Err(format!("there is no command `{name}`{near} (`help` lists them)"))
 }
@@ -179,15 +184,81 @@ impl SystemConsole {
         format!("core {name}: {}", self.views[self.selected].place())
     }
 
-    fn arrive(&mut self, why: &SystemWhy) -> String {
+    /// The number of cores.
+    pub fn cores(&self) -> usize {
+        self.views.len()
+    }
+
+    /// What there is to see of a core.
+    pub fn core(&self, core: usize) -> Option<&Console> {
+        self.views.get(core)
+    }
+
+    /// What there is to see of a core, for what needs to change caches. Its session is moved by [`SystemConsole::run`].
+    pub fn core_mut(&mut self, core: usize) -> Option<&mut Console> {
+        self.views.get_mut(core)
+    }
+
+    /// The core that is looked at: the last one that stopped, or was selected.
+    pub fn selected(&self) -> usize {
+        self.selected
+    }
+
+    /// Looks at a core, if there is such a one.
+    pub fn select_core(&mut self, core: usize) {
+        if core < self.views.len() {
+            self.selected = core;
+        }
+    }
+
+    /// Moves the session, whose cores' own sessions are the second argument, and looks at where it is then.
+    pub fn run(
+        &mut self,
+        moves: impl FnOnce(&mut SystemSession, &mut [&mut Session]) -> SystemWhy,
+    ) -> SystemWhy {
+        let mut views: Vec<&mut Session> = self.views.iter_mut().map(|view| &mut view.session).collect();
+        let why = moves(&mut self.session, &mut views);
         self.look();
+        // What is looked at next is where it has stopped.
+        match &why {
+            SystemWhy::Core(core, _) => self.selected = *core,
+            SystemWhy::Fault(fault) => self.selected = fault.core,
+            _ => {}
+        }
+        why
+    }
+
+    /// Adds a stop of a core's own session; its number, which is that of no other stop of the system.
+    pub fn add_core_stop(&mut self, core: usize, stop: Stop) -> Option<u32> {
+        let view = &mut self.views.get_mut(core)?.session;
+        *view.next_stop() = *self.session.next_stop();
+        let id = view.add_stop(stop);
+        *self.session.next_stop() = *view.next_stop();
+        Some(id)
+    }
+
+    /// Removes a stop, of links or of a core; whether there was one.
+    pub fn remove_stop(&mut self, id: u32) -> bool {
+        self.session.remove_stop(id) || self.views.iter_mut().any(|view| view.session.remove_stop(id))
+    }
+
+    /// Sets a register or a data word of a core. What was recorded of the run after this position is forgotten.
+    ///
+    /// # Errors
+    /// If there is no such place.
+    pub fn set_place(&mut self, core: usize, place: Place, bits: u32) -> Result<(), String> {
+        let view = self.views.get_mut(core).ok_or("there is no such core")?;
+        // Whether there is such a place is known there.
+        view.session.set(place, bits)?;
+        self.session.set(core, place, bits);
+        self.look();
+        Ok(())
+    }
+
+    fn arrive(&mut self, why: &SystemWhy) -> String {
         let mut text = match why {
             SystemWhy::Done => String::new(),
-            SystemWhy::Core(core, why) => {
-                // What is looked at next is where it has stopped.
-                self.selected = *core;
-                told(why.clone(), &self.views[*core].session)
-            }
+            SystemWhy::Core(core, why) => told(why.clone(), &self.views[*core].session),
             SystemWhy::Stop(id) => {
                 let known = self.session.stops().find(|(known, _)| known == id);
                 format!("stop {id}: {}\n", known.map_or("", |(_, text)| text))
@@ -213,7 +284,16 @@ impl SystemConsole {
         text
     }
 
-    fn cores(&mut self) -> String {
+    fn links_text(&self, wanted: &str) -> Result<String, String> {
+        let system = self.system();
+        let description = system.description();
+        let wanted = (!wanted.is_empty()).then(|| link_named(wanted, description)).transpose()?;
+        let shown = |(link, _): &(usize, &Link)| wanted.is_none_or(|wanted| wanted == *link);
+        let links = description.links.iter().enumerate().filter(shown);
+        Ok(links.map(|(link, row)| format!("{}: {}\n", row.name, link_text(system, link))).collect())
+    }
+
+    fn cores_text(&mut self) -> String {
         let names: Vec<String> =
             self.system().description().cores.iter().map(|core| core.name.clone()).collect();
         let width = names.iter().map(String::len).max().unwrap_or(0);
@@ -249,96 +329,25 @@ impl SystemConsole {
         Ok(self.place())
     }
 
-    fn links(&self, wanted: &str) -> Result<String, String> {
-        let system = self.system();
-        let description = system.description();
-        if !wanted.is_empty() {
-            self.link(wanted)?;
-        }
-        let mut text = String::new();
-        for (number, link) in description.links.iter().enumerate() {
-            if !wanted.is_empty() && link.name != wanted {
-                continue;
-            }
-            let value = |bits: u32, field: usize| Shown::new(link.fields[field].ty, bits).text;
-            let values = |bits: &[u32]| {
-                let each = bits.iter().enumerate().map(|(field, &bits)| value(bits, field));
-                each.collect::<Vec<_>>().join(", ")
-            };
-            let state = match link.kind {
-                LinkKind::Fifo { depth, .. } => {
-                    let entries = system.fifo_entries(number);
-                    let shown: Vec<String> =
-                        entries.iter().map(|entry| format!("({})", values(entry))).collect();
-                    let counts = system.fifo_counts(number).unwrap_or_default();
-                    format!(
-                        "{} of {depth} entries {}; {} refused when full, {} asked for when empty",
-                        entries.len(),
-                        shown.join(" "),
-                        counts.overflows,
-                        counts.underflows
-                    )
-                }
-                _ => {
-                    // What the receiver has.
-                    let seen: Vec<u32> = link
-                        .fields
-                        .iter()
-                        .map(|field| match (link.to, field.input) {
-                            (End::Core(core), Some(register)) => {
-                                system.core(core).register(register).unwrap_or(0)
-                            }
-                            _ => {
-                                let name = match link.kind {
-                                    LinkKind::Wire => field.to.clone(),
-                                    _ => format!("{}.{}", link.name, field.to),
-                                };
-                                system.output(&name).unwrap_or(0)
-                            }
-                        })
-                        .collect();
-                    format!("the receiver has {}", values(&seen))
-                }
-            };
-            let _ = writeln!(text, "{}: {state}", link.name);
-        }
-        Ok(text)
-    }
-
-    fn link(&self, name: &str) -> Result<usize, String> {
-        let description = self.system().description();
-        description.link_named(name).ok_or_else(|| {
-            let names: Vec<&str> = description.links.iter().map(|link| link.name.as_str()).collect();
-            let near = nearest(name, names.iter().copied());
-            let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-            format!("there is no link `{name}`{near} (links: {})", names.join(", "))
-        })
-    }
-
     fn step(&mut self, arguments: &str, back: bool) -> Result<String, String> {
-        let (mut step, mut count) = (Step::Bundle(self.selected), 1u64);
-        for word in arguments.split_whitespace() {
-            step = match word {
-                "cycle" => Step::Cycle,
-                "bundle" => Step::Bundle(self.selected),
-                "period" => Step::Period(self.selected),
-                number => {
-                    count = number.parse().ok().filter(|count| *count > 0).ok_or_else(|| {
-                        format!("`{number}` is neither a count nor one of cycle bundle period")
-                    })?;
-                    continue;
-                }
-            };
-        }
-        if step == Step::Cycle {
+        let (unit, count) = steps(arguments)?;
+        if unit == Unit::Cycle {
+            // At once, however many.
             let now = self.session.cycle();
             let at = if back { now.saturating_sub(count) } else { now.saturating_add(count) };
-            let why = if back && now == 0 { SystemWhy::Start } else { self.session.go_to(at) };
+            let why = self.run(|session, _| match (back, now) {
+                (true, 0) => SystemWhy::Start,
+                _ => session.go_to(at),
+            });
             return Ok(self.arrive(&why));
         }
+        let core = self.selected;
         let mut why = SystemWhy::Done;
         for _ in 0..count {
-            why = if back { self.session.step_back(step) } else { self.session.step(step) };
+            why = self.run(|session, views| match back {
+                true => session.step_back(views, core, unit),
+                false => session.step(views, core, unit),
+            });
             if why != SystemWhy::Done {
                 break;
             }
@@ -347,39 +356,26 @@ impl SystemConsole {
     }
 
     fn go(&mut self, arguments: &str) -> Result<String, String> {
+        let core = self.selected;
         let why = match arguments.split_whitespace().collect::<Vec<_>>()[..] {
-            ["start"] => self.session.go_to(0),
-            ["cycle", number] => {
-                let number = number.parse().map_err(|_| format!("`{number}` is no number of a cycle"))?;
-                self.session.go_to(number)
+            ["start"] => self.run(|session, _| session.go_to(0)),
+            [unit @ ("cycle" | "period"), number] => {
+                let number = number.parse().map_err(|_| format!("`{number}` is no number of a {unit}"))?;
+                self.run(|session, _| match unit {
+                    "cycle" => session.go_to(number),
+                    _ => session.go_to_period(core, number),
+                })
             }
-            _ => return Err("goto takes `cycle N` or `start`".to_owned()),
+            _ => return Err("goto takes `cycle N`, `period N` or `start`".to_owned()),
         };
         Ok(self.arrive(&why))
     }
 
     fn add_break(&mut self, arguments: &str) -> Result<String, String> {
-        let stop = match arguments.strip_prefix("link ") {
-            Some(rest) => {
-                // Names of wires have blanks in them.
-                let event = rest.rsplit_once(' ').and_then(|(name, event)| {
-                    let kind = EVENTS.into_iter().find(|kind| kind.name() == event)?;
-                    Some((name.trim(), kind))
-                });
-                match event {
-                    Some((name, kind)) => SystemStop { link: self.link(name)?, kind: Some(kind) },
-                    None => {
-                        let link = self.link(rest.trim()).map_err(|error| {
-                            let kinds: Vec<&str> = EVENTS.iter().map(|kind| kind.name()).collect();
-                            format!("{error}; events: {}", kinds.join(" "))
-                        })?;
-                        SystemStop { link, kind: None }
-                    }
-                }
-            }
-            None => return self.add_stop("break", arguments),
+        let Some(link) = SystemStop::parse(arguments, self.system().description()) else {
+            return self.add_stop("break", arguments);
         };
-        let text = format!("break {arguments}");
+        let (stop, text) = (link?, format!("break {arguments}"));
         let id = self.session.add_stop(stop, text.clone());
         Ok(format!("stop {id}: {text}\n"))
     }
@@ -410,26 +406,19 @@ impl SystemConsole {
     }
 
     fn set(&mut self, arguments: &str) -> Result<String, String> {
-        let view = &mut self.views[self.selected];
-        let (place, bits, text) = view.setting(arguments)?;
-        // Whether there is such a place is known there.
-        view.session.set(place, bits)?;
-        self.session.set(self.selected, place, bits);
-        self.look();
+        let (place, bits, text) = self.views[self.selected].setting(arguments)?;
+        self.set_place(self.selected, place, bits)?;
         Ok(text)
     }
 
     fn delete(&mut self, arguments: &str) -> Result<String, String> {
         let all = self.all_stops();
-        let (session, views) = (&mut self.session, &mut self.views);
-        let mut remove =
-            |id: u32| session.remove_stop(id) || views.iter_mut().any(|view| view.session.remove_stop(id));
         if !arguments.is_empty() {
-            let id = arguments.parse().ok().filter(|id| remove(*id));
+            let id = arguments.parse().ok().filter(|id| self.remove_stop(*id));
             let unknown = || format!("there is no stop {arguments} (`stops` lists them)");
             return id.map(|_| String::new()).ok_or_else(unknown);
         }
-        let removed = all.into_iter().filter(|(id, _)| remove(*id)).count();
+        let removed = all.into_iter().filter(|(id, _)| self.remove_stop(*id)).count();
         Ok(format!("{removed} removed\n"))
     }
 }
@@ -451,6 +440,16 @@ impl Commands for SystemConsole {
         }
     }
 
+    fn look(&mut self, line: &str) -> Option<Result<String, String>> {
+        let (name, arguments) = crate::console::split(line)?;
+        match COMMANDS.iter().find(|row| row.0 == name || (row.1 == name && !name.is_empty())) {
+            Some(Row("help", ..)) => Some(Ok(looks_help())),
+            Some(row) if LOOKS.contains(&row.0) => Some(row.4(self, arguments)),
+            Some(row) => Some(Err(only_looks(row.0))),
+            None => self.views[self.selected].look(line),
+        }
+    }
+
     fn quit(&self) -> bool {
         self.quit
     }
@@ -464,7 +463,7 @@ impl Commands for SystemConsole {
             return self.views[self.selected].complete(line);
         }
         let start = line.len() - line.trim_start().len();
-        let names = COMMANDS.iter().map(|row| row.0).chain(INSPECTION.iter().copied());
+        let names = COMMANDS.iter().map(|row| row.0).chain(of_one_core());
         (start, names.filter(|name| name.starts_with(&line[start..])).map(str::to_owned).collect())
     }
 

@@ -11,11 +11,13 @@
 //! session, which looks at the core at each position that matters to it.
 
 mod console;
+mod links;
+mod seek;
 
 pub use console::SystemConsole;
+pub use links::link_text;
 
-use crate::session::{self, Control, Live, Place, RUN_LIMIT, Search, Session, Why};
-use std::collections::BTreeMap;
+use crate::session::{self, Control, Place, RUN_LIMIT, Why};
 use std::sync::Arc;
 use takt_emu::{Event, LoadError};
 use takt_isa::timing::Cycle;
@@ -88,17 +90,6 @@ pub struct SystemStop {
     pub kind: Option<LinkEventKind>,
 }
 
-/// What to step by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
-    /// A cycle of all cores.
-    Cycle,
-    /// To where a bundle of a core is about to issue.
-    Bundle(usize),
-    /// To where the `wait` of a core has issued.
-    Period(usize),
-}
-
 /// The run up to some position.
 #[derive(Clone)]
 struct Point {
@@ -126,12 +117,6 @@ struct Seen {
     cores: Vec<(usize, Event)>,
     inputs: Vec<InputEvent>,
 }
-
-/// What a core's session has found: where, which core, and what.
-type Found = (Cycle, usize, Why);
-
-/// What is looked for: positions at which to stop, with the stop's number if it is one.
-type Hits = Vec<(Cycle, Option<u32>)>;
 
 /// A debug session on a system.
 pub struct SystemSession {
@@ -230,56 +215,6 @@ impl SystemSession {
         }
     }
 
-    /// Goes on by a step.
-    pub fn step(&mut self, step: Step) -> SystemWhy {
-        match step {
-            Step::Cycle => self.go_to(self.cycle() + 1),
-            _ => self.seek(&mut [], Vec::new(), |cores, _| found(step, cores)),
-        }
-    }
-
-    /// Goes back by a step.
-    pub fn step_back(&mut self, step: Step) -> SystemWhy {
-        match (step, self.cycle()) {
-            (_, 0) => SystemWhy::Start,
-            (Step::Cycle, now) => self.go_to(now - 1),
-            _ => self.seek_back(&mut [], |cores, _| found(step, cores)),
-        }
-    }
-
-    /// Runs on to a stop: an event on a link, or one of a core's session. `views` has a session for each core, or none.
-    pub fn resume(&mut self, views: &mut [&mut Session]) -> SystemWhy {
-        self.show(views);
-        let stops = self.stops.clone();
-        let searches = views.iter().map(|view| Search::stops(view)).collect();
-        self.seek(views, searches, |_, links| stopped(&stops, links))
-    }
-
-    /// Runs back to one.
-    pub fn resume_back(&mut self, views: &mut [&mut Session]) -> SystemWhy {
-        let stops = self.stops.clone();
-        self.seek_back(views, |_, links| stopped(&stops, links))
-    }
-
-    /// Runs on to the next position at which an expression over a core holds.
-    pub fn run_until(&mut self, views: &mut [&mut Session], core: usize, live: Live) -> SystemWhy {
-        let Some(view) = views.get_mut(core) else { return SystemWhy::Done };
-        // As of a single core: what holds already may still hold in the next cycle.
-        if view.holds(&live) {
-            let why = self.go_to(self.cycle() + 1);
-            if why != SystemWhy::Done {
-                return why;
-            }
-            self.show_core(core, view, false);
-            if view.holds(&live) {
-                return SystemWhy::Core(core, Why::Holds);
-            }
-        }
-        let mut searches: Vec<Option<Search>> = views.iter().map(|_| None).collect();
-        searches[core] = Some(Search::value(live, views[core]));
-        self.seek(views, searches, |_, _| Hits::new())
-    }
-
     /// Sets a register or a data word of a core. What was recorded of the run after this position is forgotten.
     pub fn set(&mut self, core: usize, place: Place, bits: u32) {
         let now = self.cycle();
@@ -287,170 +222,6 @@ impl SystemSession {
         self.checkpoints.retain(|point| point.system.now() <= now);
         self.edits.push(Edit { cycle: now, core, place, bits });
         make_edits(&self.edits, &mut self.point);
-    }
-
-    /// Shows the cores to their sessions.
-    fn show(&self, views: &mut [&mut Session]) {
-        for (core, view) in views.iter_mut().enumerate() {
-            self.show_core(core, view, false);
-        }
-    }
-
-    fn show_core(&self, core: usize, view: &mut Session, boundary: bool) {
-        let system = self.system();
-        view.look(system.core(core).clone(), system.periods(core).count, boundary);
-    }
-
-    /// Goes on to the first position after this one that is looked for.
-    fn seek(
-        &mut self,
-        views: &mut [&mut Session],
-        mut searches: Vec<Option<Search>>,
-        wanted: impl Fn(&[(usize, Event)], &[LinkEvent]) -> Hits,
-    ) -> SystemWhy {
-        let origin = self.cycle();
-        let looks = searches.iter().any(Option::is_some);
-        loop {
-            let begin = looks.then(|| self.point.clone());
-            let mut seen = Seen::default();
-            let why = self.advance(self.cycle() + STRETCH, Some(&mut seen));
-            let now = self.cycle();
-            let hits = wanted(&seen.cores, &self.point.links).into_iter();
-            let first = hits.filter(|(cycle, _)| *cycle > origin && *cycle <= now).min();
-            if let Some(begin) = begin {
-                let end = first.map_or(now, |(cycle, _)| cycle);
-                let found = self.walk(begin, end, &seen, views, &mut searches, true).pop();
-                if let Some((cycle, core, why)) = found {
-                    self.go_to(cycle);
-                    return SystemWhy::Core(core, why);
-                }
-            }
-            if let Some((cycle, id)) = first {
-                self.go_to(cycle);
-                return id.map_or(SystemWhy::Done, SystemWhy::Stop);
-            }
-            if why != SystemWhy::Done {
-                return why;
-            }
-            if now - origin >= self.run_limit {
-                return SystemWhy::Limit(now - origin);
-            }
-            if self.interrupted() {
-                return SystemWhy::Interrupted;
-            }
-        }
-    }
-
-    /// Goes back to the last position before this one that is looked for: that `wanted` finds, or a session's stops.
-    fn seek_back(
-        &mut self,
-        views: &mut [&mut Session],
-        wanted: impl Fn(&[(usize, Event)], &[LinkEvent]) -> Hits,
-    ) -> SystemWhy {
-        // Looked for are positions before `end`, from a checkpoint before `before` on.
-        let (mut end, mut before) = (self.cycle(), self.cycle());
-        while before > 0 {
-            self.restore(before - 1);
-            let start = self.cycle();
-            self.show(views);
-            let mut searches: Vec<Option<Search>> = views.iter().map(|view| Search::stops(view)).collect();
-            let looks = searches.iter().any(Option::is_some);
-            let mut hits = Hits::new();
-            let mut found: Option<Found> = None;
-            // What is told of late, too.
-            while self.cycle() < end + LATE {
-                let begin = (looks && self.cycle() + 1 < end).then(|| self.point.clone());
-                let mut seen = Seen::default();
-                let why = self.advance((self.cycle() + STRETCH).min(end + LATE), Some(&mut seen));
-                hits.extend(wanted(&seen.cores, &self.point.links));
-                if let Some(begin) = begin {
-                    let last = self.cycle().min(end - 1);
-                    found = self.walk(begin, last, &seen, views, &mut searches, false).pop().or(found);
-                }
-                if why != SystemWhy::Done {
-                    break;
-                }
-            }
-            // What has just happened where a stretch begins is known of the one before.
-            let last =
-                hits.into_iter().filter(|(cycle, _)| *cycle < end && (*cycle > start || start == 0)).max();
-            match (last, found) {
-                (last, Some((cycle, core, why))) if last.is_none_or(|(other, _)| other < cycle) => {
-                    self.go_to(cycle);
-                    return SystemWhy::Core(core, why);
-                }
-                (Some((cycle, id)), _) => {
-                    self.go_to(cycle);
-                    return id.map_or(SystemWhy::Done, SystemWhy::Stop);
-                }
-                _ => {}
-            }
-            (end, before) = (start + 1, start);
-            if self.interrupted() {
-                return SystemWhy::Interrupted;
-            }
-        }
-        self.go_to(0);
-        SystemWhy::Start
-    }
-
-    /// Goes again from `begin` to `end`, over which the cores did what was seen, and shows each core to its session at each position
-    /// that matters to its search. What they have found, in order: the first, or all. The session is where it was.
-    fn walk(
-        &mut self,
-        begin: Point,
-        end: Cycle,
-        seen: &Seen,
-        views: &mut [&mut Session],
-        searches: &mut [Option<Search>],
-        first: bool,
-    ) -> Vec<Found> {
-        let here = std::mem::replace(&mut self.point, begin);
-        let start = self.cycle();
-        let mut positions: BTreeMap<Cycle, Vec<usize>> = BTreeMap::new();
-        let mut issues = BTreeMap::new();
-        let mut boundaries = Vec::new();
-        for (core, search) in searches.iter().enumerate() {
-            let Some(search) = search else { continue };
-            let events: Vec<&Event> =
-                seen.cores.iter().filter(|(own, _)| *own == core).map(|(_, event)| event).collect();
-            let inputs: Vec<&InputEvent> = seen.inputs.iter().filter(|input| input.core == core).collect();
-            for event in &events {
-                match event {
-                    Event::Issue { cycle, address } => drop(issues.insert((core, *cycle), *address)),
-                    Event::Wait { cycle, .. } => boundaries.push((core, cycle + 1)),
-                    _ => {}
-                }
-            }
-            let mut own = search.positions(&events, &inputs, start, end);
-            let edits = self.edits.iter().filter(|edit| edit.core == core).map(|edit| edit.cycle);
-            own.extend(edits.filter(|cycle| (start + 1..=end).contains(cycle)));
-            if start == 0 {
-                // The first values of input ports are there from the first cycle on.
-                own.insert(1);
-            }
-            for position in own {
-                positions.entry(position).or_default().push(core);
-            }
-        }
-        let mut found = Vec::new();
-        'positions: for (cycle, cores) in positions {
-            if self.advance(cycle, None) != SystemWhy::Done || self.cycle() != cycle {
-                break;
-            }
-            for core in cores {
-                let (Some(search), Some(view)) = (&mut searches[core], views.get_mut(core)) else { continue };
-                self.show_core(core, view, boundaries.contains(&(core, cycle)));
-                if let Some(why) = search.visit(view, issues.get(&(core, cycle)).copied()) {
-                    found.push((cycle, core, why));
-                    if first {
-                        break 'positions;
-                    }
-                }
-            }
-        }
-        self.point = here;
-        found
     }
 
     fn interrupted(&self) -> bool {
@@ -570,33 +341,4 @@ fn take_turn(options: &SystemOptions, point: &mut Point) -> Result<bool, HostErr
     }
     point.turns += 1;
     Ok(true)
-}
-
-fn found(step: Step, cores: &[(usize, Event)]) -> Hits {
-    let of = |wanted: usize, position: &dyn Fn(&Event) -> Option<Cycle>| -> Hits {
-        let own = cores.iter().filter(|(core, _)| *core == wanted);
-        own.filter_map(|(_, event)| Some((position(event)?, None))).collect()
-    };
-    match step {
-        Step::Cycle => Hits::new(),
-        Step::Bundle(core) => of(core, &|event| match event {
-            Event::Issue { cycle, .. } => Some(*cycle),
-            _ => None,
-        }),
-        Step::Period(core) => of(core, &|event| match event {
-            Event::Wait { cycle, .. } => Some(*cycle + 1),
-            _ => None,
-        }),
-    }
-}
-
-fn stopped(stops: &[(u32, SystemStop, String)], links: &[LinkEvent]) -> Hits {
-    let mut hits = Hits::new();
-    for (id, stop, _) in stops {
-        let same = |event: &&LinkEvent| {
-            event.link == stop.link && stop.kind.is_none_or(|kind| kind.name() == event.kind.name())
-        };
-        hits.extend(links.iter().filter(same).map(|event| (event.cycle + 1, Some(*id))));
-    }
-    hits
 }

@@ -7,6 +7,7 @@ mod jsonl;
 mod kanata;
 mod signal;
 mod system;
+mod timeline;
 mod wave;
 
 use std::cell::Cell;
@@ -19,6 +20,7 @@ use takt_isa::timing::{Cause, Cycle};
 
 pub use signal::SignalError;
 pub use system::SystemTracer;
+pub use timeline::Timeline;
 
 /// What a trace is written as.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

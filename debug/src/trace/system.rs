@@ -1,9 +1,10 @@
 //! Traces of a system: the signals of all cores, and what is on the links, on one axis of time.
 
 use super::signal::{self, Signal, SignalType, Source};
-use super::{Counted, Format, Options, Record, SignalError, Summary, wave};
+use super::{Counted, Format, Options, Record, SignalError, Summary, Timeline, wave};
 use std::cell::Cell;
 use std::io::{self, Write};
+use std::ops::Range;
 use std::rc::Rc;
 use std::sync::Arc;
 use takt_emu::Status;
@@ -58,6 +59,8 @@ pub struct SystemTracer<'w> {
     options: Options,
     bytes: Rc<Cell<u64>>,
     writer: Option<Box<dyn SystemWriter + 'w>>,
+    /// In the place of a writer.
+    timeline: Option<Timeline>,
     summary: Summary,
     /// The first error of writing; nothing is written after it.
     error: Option<io::Error>,
@@ -90,7 +93,28 @@ impl<'w> SystemTracer<'w> {
             Err(error) => (None, Some(error)),
         };
         let summary = Summary { cycles: start..start, cut: false };
-        Ok(SystemTracer { options, bytes, writer, summary, error, records: Vec::new() })
+        let records = Vec::new();
+        Ok(SystemTracer { options, bytes, writer, timeline: None, summary, error, records })
+    }
+
+    /// A picture of these cycles in the place of a trace: [`SystemTracer::finish_timeline`] gives it.
+    pub fn timeline(cycles: Range<Cycle>) -> SystemTracer<'static> {
+        let summary = Summary { cycles: cycles.start..cycles.start, cut: false };
+        let options = Options { format: Format::Vcd, cycles, signals: Vec::new(), limit: u64::MAX };
+        SystemTracer {
+            options,
+            bytes: Rc::default(),
+            writer: None,
+            timeline: Some(Timeline::default()),
+            summary,
+            error: None,
+            records: Vec::new(),
+        }
+    }
+
+    /// The picture, if it is one.
+    pub fn finish_timeline(self) -> Option<Timeline> {
+        self.timeline
     }
 
     /// As [`System::run_to_start`].
@@ -143,6 +167,12 @@ impl<'w> SystemTracer<'w> {
             system.drop_core_events();
             return run(system);
         }
+        if let Some(timeline) = &mut self.timeline
+            && self.summary.cycles.is_empty()
+        {
+            system.keep_events();
+            timeline.begin(system);
+        }
         system.keep_core_events();
         self.records.clear();
         for core in 0..system.description().cores.len() {
@@ -163,6 +193,10 @@ impl<'w> SystemTracer<'w> {
             self.records[core].events.push(event);
         }
         system.take_input_events();
+        if let Some(timeline) = &mut self.timeline {
+            timeline.add(now, &self.records, system.take_events());
+            self.summary = Summary { cycles: timeline.cycles(), cut: timeline.is_full() };
+        }
         self.record(system, now);
         result
     }

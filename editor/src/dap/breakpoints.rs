@@ -1,11 +1,13 @@
 //! Breakpoints: what the client asks for as stops of the session, and what the session does not know of: how often one must be
 //! met, and what it logs.
 
-use crate::dap::{Answer, Debugged, text};
+use crate::dap::target::Target;
+use crate::dap::{Answer, CORE, Debugged, text};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::path::{Component, Path};
+use std::path::{Component, Path, PathBuf};
 use takt_debug::session::{Session, Stop, Test, Where};
+use takt_debug::system::SystemStop;
 use takt_isa::BundleAddress;
 use takt_isa::Program;
 
@@ -20,8 +22,16 @@ pub(super) enum Hits {
     Every(u64),
 }
 
-/// What makes a stop of a request's entry, and what the answer says of it.
-type Make<'m> = &'m dyn Fn(&Session, &Value) -> Result<(Stop, Option<Value>), String>;
+/// A stop that a breakpoint asks for.
+enum Wanted {
+    /// Of a core's session.
+    Core(usize, Stop),
+    /// At an event on a link, with its text.
+    Link(SystemStop, String),
+}
+
+/// What makes stops of a request's entry, at least one, and what the answer says of it.
+type Make<'m> = &'m dyn Fn(&Target, &Value) -> Result<(Vec<Wanted>, Option<Value>), String>;
 
 impl Hits {
     fn parse(text: &str) -> Result<Hits, String> {
@@ -67,121 +77,229 @@ impl More {
     }
 }
 
-/// The breakpoints by number, and which of them were asked for together: those of one source, or of one kind.
+/// The breakpoints by number, that of their first stop, and which of them were asked for together: those of one source, or of one
+/// kind.
 #[derive(Debug, Default)]
 pub(super) struct Breakpoints {
+    /// The stops of each group.
     groups: BTreeMap<String, Vec<u32>>,
-    pub(super) more: BTreeMap<u32, More>,
+    /// The breakpoint of each stop: where several cores run a source, it has one in each.
+    stops: BTreeMap<u32, u32>,
+    more: BTreeMap<u32, More>,
+}
+
+impl Breakpoints {
+    /// The breakpoint that a stop is of.
+    pub(super) fn of(&self, stop: u32) -> u32 {
+        self.stops.get(&stop).copied().unwrap_or(stop)
+    }
+
+    pub(super) fn more_of(&mut self, stop: u32) -> Option<&mut More> {
+        self.more.get_mut(&self.stops.get(&stop).copied()?)
+    }
 }
 
 impl Debugged {
     /// Replaces the breakpoints of a group.
     fn replace(&mut self, group: String, reason: &'static str, wanted: &Value, make: Make<'_>) -> Answer {
         let wanted = wanted.as_array().cloned().unwrap_or_default();
-        for id in self.breakpoints.groups.remove(&group).unwrap_or_default() {
-            self.session().remove_stop(id);
-            self.breakpoints.more.remove(&id);
+        for stop in self.breakpoints.groups.remove(&group).unwrap_or_default() {
+            self.target.remove_stop(stop);
+            self.breakpoints.stops.remove(&stop);
+            self.breakpoints.more.remove(&stop);
         }
-        let mut ids = Vec::new();
+        let mut stops = Vec::new();
         let mut answers = Vec::new();
         for one in &wanted {
-            let string = |name: &str| one[name].as_str().map(str::trim).filter(|text| !text.is_empty());
-            let made = make(&self.console.session, one).and_then(|made| {
-                let hits = string("hitCondition").map(Hits::parse).transpose()?;
-                let log = string("logMessage").map(str::to_owned);
-                if let Some(log) = &log {
-                    check_log(&self.console.session, log)?;
-                }
-                Ok((made, hits, log))
-            });
-            answers.push(match made {
-                Ok(((stop, place), hits, log)) => {
-                    let condition = match &stop {
-                        Stop::Watch { .. } => {
-                            string("condition").filter(|text| test(&self.console.session, text).is_none())
-                        }
-                        Stop::Break { .. } => None,
-                    };
-                    let condition = condition.map(str::to_owned);
-                    let id = self.session().add_stop(stop);
-                    ids.push(id);
-                    self.breakpoints.more.insert(id, More { reason, hits, met: 0, log, condition });
+            answers.push(match self.add(reason, one, make) {
+                Ok((added, place)) => {
                     let mut answer = place.unwrap_or_else(|| json!({}));
-                    answer["id"] = id.into();
+                    answer["id"] = added.first().copied().into();
                     answer["verified"] = true.into();
+                    stops.extend(added);
                     answer
                 }
                 Err(message) => json!({ "verified": false, "message": message }),
             });
         }
-        self.breakpoints.groups.insert(group, ids);
+        self.breakpoints.groups.insert(group, stops);
         Ok(json!({ "breakpoints": answers }))
+    }
+
+    /// Adds a breakpoint: its stops, and what the answer says of it.
+    fn add(
+        &mut self,
+        reason: &'static str,
+        one: &Value,
+        make: Make<'_>,
+    ) -> Result<(Vec<u32>, Option<Value>), String> {
+        let string = |name: &str| one[name].as_str().map(str::trim).filter(|text| !text.is_empty());
+        let (wanted, place) = make(&self.target, one)?;
+        let hits = string("hitCondition").map(Hits::parse).transpose()?;
+        let log = string("logMessage").map(str::to_owned);
+        let mut condition = None;
+        for wanted in &wanted {
+            let Wanted::Core(core, stop) = wanted else { continue };
+            let session = self.target.session(*core);
+            if let Some(log) = &log {
+                check_log(session, log)?;
+            }
+            if let Stop::Watch { .. } = stop {
+                condition = string("condition").filter(|text| test(session, text).is_none());
+            }
+        }
+        let condition = condition.map(str::to_owned);
+        let mut stops = Vec::new();
+        for wanted in wanted {
+            stops.extend(match wanted {
+                Wanted::Core(core, stop) => Some(self.target.add_stop(core, stop)),
+                Wanted::Link(stop, text) => self.target.add_link_stop(stop, text),
+            });
+        }
+        if let Some(&first) = stops.first() {
+            self.breakpoints.stops.extend(stops.iter().map(|stop| (*stop, first)));
+            self.breakpoints.more.insert(first, More { reason, hits, met: 0, log, condition });
+        }
+        Ok((stops, place))
+    }
+
+    /// A source's number in the programs of the cores that have it.
+    fn files(&self, path: &str, reference: u64) -> Vec<(usize, String)> {
+        let target = &self.target;
+        let files = |core: usize| target.session(core).program().files.iter();
+        if reference > 0 {
+            // One that is on no disk: the same name and the same text.
+            let Some(core) = target.checked(reference / CORE) else { return Vec::new() };
+            let number = (reference % CORE).wrapping_sub(1);
+            let text = |core: usize, number: usize| target.session(core).source(number as u32);
+            let Some(name) = files(core).nth(number as usize) else { return Vec::new() };
+            let same = |other: usize| {
+                let at = files(other).position(|other| other == name)?;
+                (text(other, at) == text(core, number as usize)).then(|| (other, name.clone()))
+            };
+            return (0..target.cores()).filter_map(same).collect();
+        }
+        let path = Path::new(path);
+        let whole = |path: &Path| -> Option<PathBuf> { path.canonicalize().ok() };
+        let wanted = whole(path);
+        // On this disk it is one file; elsewhere, as of an image from another machine, names tell.
+        let on_disk = |core: usize| {
+            let is = |name: &&String| wanted.is_some() && whole(&self.folders[core].join(name)) == wanted;
+            Some((core, files(core).find(is)?.clone()))
+        };
+        let found: Vec<(usize, String)> = (0..target.cores()).filter_map(on_disk).collect();
+        if !found.is_empty() {
+            return found;
+        }
+        let named = |core: usize| Some((core, file_of(target.session(core).program(), path)?));
+        (0..target.cores()).filter_map(named).collect()
     }
 
     pub(super) fn set_lines(&mut self, arguments: &Value, from_one: bool) -> Answer {
         let source = &arguments["source"];
         let path =
             source["path"].as_str().or(source["name"].as_str()).ok_or("`source` has a `path`")?.to_owned();
-        let number = source["sourceReference"].as_u64().filter(|number| *number > 0);
-        let file = match number {
-            Some(number) => self.session().program().files.get(number as usize - 1).cloned(),
-            None => file_of(self.session().program(), Path::new(&path)),
-        };
-        let make = |session: &Session, one: &Value| {
-            let Some(file) = &file else {
-                let sources = session.program().files.join(" ");
-                return Err(format!("no code of the program comes from {path} (sources: {sources})"));
-            };
+        let files = self.files(&path, source["sourceReference"].as_u64().unwrap_or(0));
+        let make = |target: &Target, one: &Value| {
+            if files.is_empty() {
+                let mut sources: Vec<&str> = (0..target.cores())
+                    .flat_map(|core| target.session(core).program().files.iter().map(String::as_str))
+                    .collect();
+                sources.sort_unstable();
+                sources.dedup();
+                return Err(format!("no code comes from {path} (sources: {})", sources.join(" ")));
+            }
             let line = one["line"].as_u64().ok_or("a breakpoint has a `line`")? + u64::from(!from_one);
-            let at = Where::parse(&format!("{file}:{line}"), session.program())?;
-            let place = json!({ "line": line - u64::from(!from_one) });
-            Ok((break_at(session, at, one, format!("{file}:{line}"))?, Some(place)))
+            let stops = files.iter().map(|(core, file)| {
+                let session = target.session(*core);
+                let text = format!("{file}:{line}");
+                let at = Where::parse(&text, session.program())?;
+                Ok(Wanted::Core(*core, break_at(session, at, one, text)?))
+            });
+            Ok((any(stops)?, Some(json!({ "line": line - u64::from(!from_one) }))))
         };
         self.replace(format!("source {path}"), "breakpoint", &arguments["breakpoints"], &make)
     }
 
     pub(super) fn set_functions(&mut self, arguments: &Value) -> Answer {
-        let make = |session: &Session, one: &Value| {
+        let make = |target: &Target, one: &Value| {
             let name = text(one, "name")?;
-            Ok((break_at(session, Where::parse(name, session.program())?, one, name.to_owned())?, None))
+            if let Some(stop) = target.link_stop(name) {
+                return Ok((vec![no_condition(stop?, one, name)?], None));
+            }
+            // `servo.period` is that of a core, `period` that of each that has one.
+            let (cores, place) = match target.split(name, '.') {
+                Some((core, place)) => (core..core + 1, place),
+                None => (0..target.cores(), name),
+            };
+            let stops = cores.map(|core| {
+                let session = target.session(core);
+                let at = Where::parse(place, session.program())?;
+                Ok(Wanted::Core(core, break_at(session, at, one, name.to_owned())?))
+            });
+            Ok((any(stops)?, None))
         };
         self.replace("functions".to_owned(), "function breakpoint", &arguments["breakpoints"], &make)
     }
 
     pub(super) fn set_instructions(&mut self, arguments: &Value) -> Answer {
-        let make = |session: &Session, one: &Value| {
+        let make = |target: &Target, one: &Value| {
             let reference = text(one, "instructionReference")?;
-            let address =
-                address(reference).ok_or_else(|| format!("`{reference}` is no bundle's address"))?;
-            let address = i64::from(address.get()) + one["offset"].as_i64().unwrap_or(0);
+            let (core, address) = address(reference)
+                .and_then(|(core, address)| Some((target.checked(core)?, address)))
+                .ok_or_else(|| format!("`{reference}` is no bundle's address"))?;
+            let address = i64::from(address.get()).saturating_add(one["offset"].as_i64().unwrap_or(0));
+            let session = target.session(core);
             let at = Where::parse(&format!("bundle {address}"), session.program())?;
-            Ok((break_at(session, at, one, format!("bundle {address}"))?, None))
+            let stop = break_at(session, at, one, format!("bundle {address}"))?;
+            Ok((vec![Wanted::Core(core, stop)], None))
         };
         self.replace("instructions".to_owned(), "instruction breakpoint", &arguments["breakpoints"], &make)
     }
 
+    /// Whether something can be watched: an expression over a core, or a link.
     pub(super) fn data_info(&mut self, arguments: &Value) -> Answer {
         let name = text(arguments, "name")?;
-        let session = self.session();
-        match session
-            .parse(name)
-            .and_then(|live| session.evaluate(&live).map(|_| live).or_else(|_| session.parse(name)))
-        {
-            Ok(_) => Ok(json!({
-                "dataId": name,
-                "description": format!("{name} (conditions: `nan`, `subnormal`, `== e`, `> e`, or an expression)"),
+        if let Some(Ok(_)) = self.target.link_stop(&format!("link {name}")) {
+            return Ok(json!({
+                "dataId": format!("link {name}"),
+                "description": format!("{name} (condition: an event, as `pushed`; without one, any)"),
                 "accessTypes": ["write"],
                 "canPersist": true,
-            })),
-            Err(message) => Ok(json!({ "dataId": null, "description": message })),
+            }));
         }
+        let core = self.core_of(arguments)?;
+        // What has no value yet can be watched all the same.
+        if let Err(message) = self.target.session(core).parse(name) {
+            return Ok(json!({ "dataId": null, "description": message }));
+        }
+        let id = match &self.target {
+            Target::Program(_) => name.to_owned(),
+            Target::System(_) => format!("{}:{name}", self.target.name(core)),
+        };
+        Ok(json!({
+            "dataId": id,
+            "description": format!("{id} (conditions: `nan`, `subnormal`, `== e`, `> e`, or an expression)"),
+            "accessTypes": ["write"],
+            "canPersist": true,
+        }))
     }
 
     pub(super) fn set_data(&mut self, arguments: &Value) -> Answer {
-        let make = |session: &Session, one: &Value| {
+        let make = |target: &Target, one: &Value| {
             let name = text(one, "dataId")?;
-            let what = Box::new(session.parse(name)?);
             let condition = one["condition"].as_str().map(str::trim).filter(|text| !text.is_empty());
+            if name.starts_with("link ") {
+                let text = condition.map_or(name.to_owned(), |event| format!("{name} {event}"));
+                let stop = target.link_stop(&text).ok_or("a program alone has no links")??;
+                return Ok((vec![Wanted::Link(stop, text)], None));
+            }
+            let (core, name) = match target.split(name, ':') {
+                Some(found) => found,
+                None => (target.selected(), name),
+            };
+            let session = target.session(core);
+            let what = Box::new(session.parse(name)?);
             let test = match condition.map(|text| test(session, text)) {
                 None | Some(None) => Test::Changed,
                 Some(Some(test)) => test?,
@@ -190,9 +308,30 @@ impl Debugged {
                 session.parse(condition)?;
             }
             let condition = condition.map_or(String::new(), |condition| format!(" {condition}"));
-            Ok((Stop::Watch { what, test, text: format!("{name}{condition}") }, None))
+            let stop = Stop::Watch { what, test, text: format!("{name}{condition}") };
+            Ok((vec![Wanted::Core(core, stop)], None))
         };
         self.replace("data".to_owned(), "data breakpoint", &arguments["breakpoints"], &make)
+    }
+}
+
+/// The stops that can be made; if none can, why the first one cannot.
+fn any(stops: impl Iterator<Item = Result<Wanted, String>>) -> Result<Vec<Wanted>, String> {
+    let (made, refused): (Vec<_>, Vec<_>) = stops.partition(Result::is_ok);
+    match refused.into_iter().next() {
+        Some(Err(error)) if made.is_empty() => Err(error),
+        _ => Ok(made.into_iter().flatten().collect()),
+    }
+}
+
+/// A stop at a link's event, which no core's expressions can say more of.
+fn no_condition(stop: SystemStop, one: &Value, text: &str) -> Result<Wanted, String> {
+    match one["condition"].as_str().map(str::trim).filter(|condition| !condition.is_empty()) {
+        Some(_) => {
+            Err("a breakpoint on a link has no condition; it can say an event, as `link moves pushed`"
+                .to_owned())
+        }
+        None => Ok(Wanted::Link(stop, text.to_owned())),
     }
 }
 
@@ -228,14 +367,19 @@ fn file_of(program: &Program, path: &Path) -> Option<String> {
     program.files.iter().filter(ends).max_by_key(|name| name.len()).cloned()
 }
 
-/// A bundle's address as `instructionReference` has it: decimal or `0x15`.
-pub(super) fn address(text: &str) -> Option<BundleAddress> {
+/// A bundle's or a word's address as references have it, decimal or `0x15`, with its core: that of core *c* is *c* 2³² higher.
+pub(super) fn address(text: &str) -> Option<(u64, BundleAddress)> {
     let text = text.trim();
-    let number = match text.strip_prefix("0x") {
-        Some(digits) => u32::from_str_radix(digits, 16).ok(),
-        None => text.parse().ok(),
+    let number: u64 = match text.strip_prefix("0x") {
+        Some(digits) => u64::from_str_radix(digits, 16).ok()?,
+        None => text.parse().ok()?,
     };
-    number.map(BundleAddress::new)
+    Some((number >> 32, BundleAddress::new(number as u32)))
+}
+
+/// An address as references have it.
+pub(super) fn reference(core: usize, address: u64) -> String {
+    format!("0x{:x}", (core as u64) << 32 | address)
 }
 
 /// The pieces of a log message: text, and expressions in braces.

@@ -1,11 +1,15 @@
-//! The debug adapter: the protocol's requests on a [`Session`], which goes forward and back.
+//! The debug adapter: the protocol's requests on a session that goes forward and back, of a program or of a system, each of
+//! whose cores is a thread.
 //!
 //! One thread answers, one request after the other; whoever reads the stream hears a `pause` at once ([`interrupts`]). No crate of
 //! the protocol's types is used: those there are lag behind it, and it is JSON with a dozen fields.
 
 mod breakpoints;
 mod run;
+mod target;
 mod view;
+
+pub use target::{Launched, Target};
 
 use breakpoints::Breakpoints;
 use crossbeam_channel::{Receiver, Sender};
@@ -14,21 +18,10 @@ use serde_json::{Value, json};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use takt_debug::console::Console;
-use takt_debug::session::{Control, Session, Unit};
+use takt_debug::session::{Control, Unit};
 
-/// The one thread that there is: a program runs on one core.
-const THREAD: u64 = 1;
-
-/// A session that is launched.
-pub struct Launched {
-    /// The session, at its beginning or where there is something to see.
-    pub session: Session,
-    /// What to tell the user, if anything.
-    pub note: Option<String>,
-    /// The folder that the program's sources lie in.
-    pub folder: PathBuf,
-}
+/// Numbers of frames and of lists of variables that a core has; the core's number stands above them.
+const CORE: u64 = 1 << 16;
 
 /// Makes a session of the arguments of a `launch` or `attach` request.
 pub trait Launcher {
@@ -65,9 +58,10 @@ struct Server<'c> {
 
 /// What is being debugged.
 struct Debugged {
-    console: Console,
+    target: Target,
     breakpoints: Breakpoints,
-    folder: PathBuf,
+    /// For each core, where its sources are.
+    folders: Vec<PathBuf>,
     /// The last exception, for `exceptionInfo`.
     exception: Option<(String, String)>,
     /// It has halted, and the client knows.
@@ -82,9 +76,9 @@ enum Then {
     Enter,
     Continue,
     Back,
-    /// A step, and whether it passes over calls.
-    Step(Unit, bool),
-    StepBack(Unit),
+    /// A step of a core, and whether it passes over calls.
+    Step(usize, Unit, bool),
+    StepBack(usize, Unit),
     GoTo(Goal),
 }
 
@@ -92,7 +86,8 @@ enum Then {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Goal {
     Cycle(u64),
-    Period(u64),
+    /// So many periods of a core have ended.
+    Period(usize, u64),
 }
 
 /// Serves a client until it disconnects or goes. `control` is interrupted by whoever reads the client's stream.
@@ -125,6 +120,15 @@ pub fn serve(
 /// A number among the arguments.
 fn number(arguments: &Value, name: &str) -> Result<u64, String> {
     arguments[name].as_u64().ok_or_else(|| format!("`{name}` is a whole number, and not negative"))
+}
+
+/// The first line of a message, with the place that it is about: many a client shows nothing else.
+fn brief(text: &str) -> String {
+    let first = text.lines().next().unwrap_or("");
+    match text.lines().find_map(|line| line.trim_start().strip_prefix("┌─ ")) {
+        Some(place) => format!("{}: {first}", place.trim()),
+        None => first.to_owned(),
+    }
 }
 
 /// A text among the arguments.
@@ -167,7 +171,7 @@ impl Server<'_> {
         match answer {
             Ok(body) => response["body"] = body,
             Err(text) => {
-                response["message"] = text.lines().next().unwrap_or("").into();
+                response["message"] = brief(&text).into();
                 // The text as it is: nothing in it stands for a variable.
                 response["body"] = json!({ "error": { "id": 1, "format": "{text}", "variables": { "text": text }, "showUser": true } });
                 self.then = Then::Nothing;
@@ -191,13 +195,13 @@ impl Server<'_> {
                 if self.debugged.is_some() {
                     return Err("a program is being debugged already".to_owned());
                 }
-                let Launched { session, note, folder } = launcher.launch(arguments, &self.control)?;
+                let Launched { target, note, folders } = launcher.launch(arguments, &self.control)?;
                 self.no_debug = arguments["noDebug"].as_bool().unwrap_or(false);
                 self.stop_on_entry = !self.no_debug && arguments["stopOnEntry"].as_bool().unwrap_or(true);
                 self.debugged = Some(Debugged {
-                    console: Console::new(session),
+                    target,
                     breakpoints: Breakpoints::default(),
-                    folder,
+                    folders,
                     exception: None,
                     over: false,
                 });
@@ -231,13 +235,24 @@ impl Server<'_> {
                 return Ok(json!({ "allThreadsContinued": true }));
             }
             "reverseContinue" => self.then = Then::Back,
-            "next" => self.then = Then::Step(if by_instruction { Unit::Call } else { Unit::Line }, true),
-            "stepIn" => self.then = Then::Step(line, false),
-            "stepOut" => self.then = Then::Step(Unit::Out, false),
-            "stepBack" => self.then = Then::StepBack(line),
+            "next" => {
+                let unit = if by_instruction { Unit::Call } else { Unit::Line };
+                self.then = Then::Step(debugged.thread(arguments)?, unit, true);
+            }
+            "stepIn" => self.then = Then::Step(debugged.thread(arguments)?, line, false),
+            "stepOut" => self.then = Then::Step(debugged.thread(arguments)?, Unit::Out, false),
+            "stepBack" => self.then = Then::StepBack(debugged.thread(arguments)?, line),
             "takt/gotoCycle" => self.then = Then::GoTo(Goal::Cycle(number(arguments, "cycle")?)),
-            "takt/gotoPeriod" => self.then = Then::GoTo(Goal::Period(number(arguments, "period")?)),
-            "threads" => return Ok(json!({ "threads": [{ "id": THREAD, "name": "core 0" }] })),
+            "takt/gotoPeriod" => {
+                let goal = Goal::Period(debugged.thread(arguments)?, number(arguments, "period")?);
+                self.then = Then::GoTo(goal);
+            }
+            "threads" => {
+                let thread = |core| json!({ "id": core + 1, "name": debugged.target.name(core) });
+                return Ok(
+                    json!({ "threads": (0..debugged.target.cores()).map(thread).collect::<Vec<_>>() }),
+                );
+            }
             "setBreakpoints" => return debugged.set_lines(arguments, from_one.0),
             "setFunctionBreakpoints" => return debugged.set_functions(arguments),
             "setInstructionBreakpoints" => return debugged.set_instructions(arguments),
@@ -254,7 +269,7 @@ impl Server<'_> {
                 return Ok(json!({ "exceptionId": id, "description": description, "breakMode": "always" }));
             }
             "stackTrace" => return debugged.stack(arguments, from_one),
-            "scopes" => return Ok(debugged.scopes()),
+            "scopes" => return debugged.scopes(arguments),
             "variables" => return debugged.variables(arguments),
             "setVariable" => return debugged.set_variable(text(arguments, "name")?, arguments),
             "setExpression" => return debugged.set_variable(text(arguments, "expression")?, arguments),
@@ -264,8 +279,12 @@ impl Server<'_> {
             "readMemory" => return debugged.read_memory(arguments),
             "source" => return debugged.source_text(arguments),
             "loadedSources" => {
-                let count = debugged.console.session.program().files.len() as u32;
-                let sources: Vec<Value> = (0..count).map(|file| debugged.source(file)).collect();
+                let cores = 0..debugged.target.cores();
+                let files = |core: usize| 0..debugged.target.session(core).program().files.len() as u32;
+                let sources: Vec<Value> = cores
+                    .flat_map(|core| files(core).map(move |file| (core, file)))
+                    .map(|(core, file)| debugged.source(core, file))
+                    .collect();
                 return Ok(json!({ "sources": sources }));
             }
             _ => return Err(format!("Takt's debug adapter has no `{command}`")),
@@ -303,14 +322,34 @@ fn capabilities() -> Value {
 }
 
 impl Debugged {
-    fn session(&mut self) -> &mut Session {
-        &mut self.console.session
+    /// The core of a request's thread; if none is said, the one that stopped last.
+    fn thread(&self, arguments: &Value) -> Result<usize, String> {
+        let thread = &arguments["threadId"];
+        let core = if thread.is_null() {
+            Some(self.target.selected())
+        } else {
+            thread.as_u64().and_then(|thread| self.target.checked(thread.checked_sub(1)?))
+        };
+        core.ok_or_else(|| format!("there is no thread {thread} (threads: 1 to {})", self.target.cores()))
+    }
+
+    /// The core that a request's frame or list of variables is of; if neither is said, the one that stopped last.
+    fn core_of(&self, arguments: &Value) -> Result<usize, String> {
+        for name in ["frameId", "variablesReference"] {
+            if let Some(number) = arguments[name].as_u64() {
+                return self
+                    .target
+                    .checked(number / CORE)
+                    .ok_or_else(|| format!("there is no `{name}` {number}"));
+            }
+        }
+        Ok(self.target.selected())
     }
 
     /// The path of a source, if it lies on the disk.
-    fn path_of(&self, file: u32) -> Option<PathBuf> {
-        let name = self.console.session.program().files.get(file as usize)?;
-        let path = self.folder.join(name);
+    fn path_of(&self, core: usize, file: u32) -> Option<PathBuf> {
+        let name = self.target.session(core).program().files.get(file as usize)?;
+        let path = self.folders.get(core)?.join(name);
         (!name.starts_with('<') && Path::new(&path).is_file()).then_some(path)
     }
 }

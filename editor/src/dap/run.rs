@@ -1,7 +1,8 @@
 //! Running, forward and back, to what stops it.
 
 use crate::dap::breakpoints::logged;
-use crate::dap::{Debugged, Goal, Server, THREAD, Then};
+use crate::dap::target::{End, Target};
+use crate::dap::{Debugged, Goal, Server, Then};
 use serde_json::{Value, json};
 use takt_debug::session::{Session, Unit, Why};
 use takt_isa::fp::Flags;
@@ -60,7 +61,7 @@ impl Filters {
     }
 }
 
-/// What exceptions there were up to a position.
+/// What exceptions there were up to a position, in a core.
 #[derive(Clone, PartialEq, Debug)]
 struct Met {
     flags: Vec<(&'static str, bool)>,
@@ -71,7 +72,10 @@ struct Met {
 impl Met {
     fn now(session: &Session, filters: Filters) -> Met {
         let emulator = session.emulator();
-        let (flags, statistics) = (emulator.flags(), emulator.statistics());
+        let statistics = emulator.statistics();
+        // What is raised in the cycle to come counts: the operation that clears the flags may issue in that very cycle.
+        let raised = emulator.in_flight().filter(|retire| retire.cycle <= emulator.now());
+        let flags = raised.fold(emulator.flags(), |flags, retire| flags | retire.flags);
         Met {
             flags: filters.flags().into_iter().map(|(flag, name)| (name, flags.contains(flag))).collect(),
             missed: if filters.missed { statistics.missed } else { 0 },
@@ -94,6 +98,20 @@ impl Met {
     }
 }
 
+/// What exceptions there were, core by core.
+fn met(target: &Target, filters: Filters) -> Vec<Met> {
+    (0..target.cores()).map(|core| Met::now(target.session(core), filters)).collect()
+}
+
+/// The first core that has an exception which is new since.
+fn since(now: &[Met], before: &[Met]) -> Option<Exception> {
+    let mut cores = now.iter().zip(before).enumerate();
+    cores.find_map(|(core, (now, before))| now.since(before).map(|(id, text)| (core, id, text)))
+}
+
+/// An exception: the core, its name, and what it is.
+type Exception = (usize, String, String);
+
 impl Server<'_> {
     /// Does what a request asked for.
     pub(super) fn go(&mut self, then: Then) {
@@ -106,32 +124,44 @@ impl Server<'_> {
                 debugged.exception = None;
             }
         }
-        let session = &mut debugged.console.session;
+        let target = &mut debugged.target;
         match then {
             Then::Nothing => {}
             Then::Initialized => self.event("initialized", json!({})),
-            Then::Enter => self.stopped("entry", None, None),
+            Then::Enter => {
+                let core = target.selected();
+                self.stopped(core, "entry", None, None);
+            }
             Then::Continue => self.resume(),
             Then::Back => self.resume_back(),
-            Then::Step(unit, over) => {
-                let depth = session.emulator().stack().len();
-                let mut why = session.step(unit);
-                // A line that calls is over when what it calls has returned.
-                while over && why == Why::Done && session.emulator().stack().len() > depth {
-                    why = session.step(Unit::Out);
+            Then::Step(core, unit, over) => {
+                let depth = |target: &Target| target.session(core).emulator().stack().len();
+                let mut end = (core, Ok(Why::Done));
+                // What is shown is the bundle to come. If it is not about to issue, as before the first one, a step begins where it
+                // is: it would else end there, and seem to have gone nowhere.
+                if unit != Unit::Out && target.core_mut(core).session.next_issue().1 != Some(target.cycle()) {
+                    end = target.step(core, Unit::Bundle);
                 }
-                self.tell(why, "step");
+                let begin = depth(target);
+                if end.1 == Ok(Why::Done) {
+                    end = target.step(core, unit);
+                }
+                // A line that calls is over when what it calls has returned.
+                while over && end.1 == Ok(Why::Done) && depth(target) > begin {
+                    end = target.step(core, Unit::Out);
+                }
+                self.tell(end, "step");
             }
-            Then::StepBack(unit) => {
-                let why = session.step_back(unit);
-                self.tell(why, "step");
+            Then::StepBack(core, unit) => {
+                let end = target.step_back(core, unit);
+                self.tell(end, "step");
             }
             Then::GoTo(goal) => {
-                let why = match goal {
-                    Goal::Cycle(cycle) => session.go_to(cycle),
-                    Goal::Period(period) => session.go_to_period(period),
+                let end = match goal {
+                    Goal::Cycle(cycle) => target.go_to(cycle),
+                    Goal::Period(core, period) => target.go_to_period(core, period),
                 };
-                self.tell(why, "goto");
+                self.tell(end, "goto");
             }
         }
     }
@@ -141,18 +171,18 @@ impl Server<'_> {
         loop {
             let filters = if self.no_debug { Filters::default() } else { self.filters };
             let Some(debugged) = &mut self.debugged else { return };
-            let (why, exception) = debugged.run(filters);
-            if let Some((id, text)) = exception {
+            let ((core, why), exception) = debugged.run(filters);
+            if let Some((core, id, text)) = exception {
                 debugged.exception = Some((id, text.clone()));
-                return self.stopped("exception", Some(text), None);
+                return self.stopped(core, "exception", Some(text), None);
             }
             match why {
-                Why::Limit(_) => {}
-                Why::Stop { .. } if self.no_debug => {}
-                Why::Stop { id, .. } => {
-                    let session = &debugged.console.session;
-                    let Some(more) = debugged.breakpoints.more.get_mut(&id) else {
-                        return self.tell(why, "breakpoint");
+                Ok(Why::Limit(_)) => {}
+                Ok(Why::Stop { .. }) if self.no_debug => {}
+                Ok(Why::Stop { id, .. }) => {
+                    let session = debugged.target.session(core);
+                    let Some(more) = debugged.breakpoints.more_of(id) else {
+                        return self.tell((core, why), "breakpoint");
                     };
                     if !more.holds(session) {
                         continue;
@@ -166,10 +196,10 @@ impl Server<'_> {
                             let text = logged(session, log);
                             self.output(&text);
                         }
-                        None => return self.tell(why, "breakpoint"),
+                        None => return self.tell((core, why), "breakpoint"),
                     }
                 }
-                why => return self.tell(why, "breakpoint"),
+                why => return self.tell((core, why), "breakpoint"),
             }
         }
     }
@@ -178,62 +208,73 @@ impl Server<'_> {
     fn resume_back(&mut self) {
         loop {
             let Some(debugged) = &mut self.debugged else { return };
-            let session = &mut debugged.console.session;
-            let why = session.resume_back();
-            if let Why::Stop { id, .. } = why
-                && let Some(more) = debugged.breakpoints.more.get(&id)
-                && (more.log.is_some() || !more.holds(session))
+            let (core, why) = debugged.target.resume_back();
+            if let Ok(Why::Stop { id, .. }) = why
+                && let Some(more) = debugged.breakpoints.more_of(id)
+                && (more.log.is_some() || !more.holds(debugged.target.session(core)))
             {
                 continue;
             }
-            return self.tell(why, "breakpoint");
+            return self.tell((core, why), "breakpoint");
         }
     }
 
     /// Tells the client why the program stopped.
-    fn tell(&mut self, why: Why, reason: &str) {
+    fn tell(&mut self, (core, why): End, reason: &str) {
         let Some(debugged) = &mut self.debugged else { return };
         let over = std::mem::take(&mut debugged.over);
-        match why {
-            Why::Done | Why::Holds => self.stopped(reason, None, None),
-            Why::Stop { id, text, change } => {
-                let reason = debugged.breakpoints.more.get(&id).map_or("breakpoint", |more| more.reason);
-                let change = change.map_or(String::new(), |(before, now)| format!(": {before} → {now}"));
-                self.stopped(reason, Some(format!("{text}{change}")), Some(id));
+        let why = match why {
+            Ok(why) => why,
+            Err(text) => {
+                self.output(&text);
+                return self.stopped(core, "pause", Some(text), None);
             }
-            Why::Start => self.stopped("entry", Some("the beginning of the run".to_owned()), None),
+        };
+        match why {
+            Why::Done | Why::Holds => self.stopped(core, reason, None, None),
+            Why::Stop { id, text, change } => {
+                let breakpoint = debugged.breakpoints.of(id);
+                let reason = debugged.breakpoints.more_of(id).map_or("breakpoint", |more| more.reason);
+                let change = change.map_or(String::new(), |(before, now)| format!(": {before} → {now}"));
+                self.stopped(core, reason, Some(format!("{text}{change}")), Some(breakpoint));
+            }
+            Why::Start => self.stopped(core, "entry", Some("the beginning of the run".to_owned()), None),
             Why::Fault(fault) => {
-                let told = debugged.console.session.diagnose(&fault).render(false);
+                let told = debugged.target.session(core).diagnose(&fault).render(false);
                 let text = told.lines().next().unwrap_or("").to_owned();
                 debugged.exception = Some((fault.kind.name().to_owned(), told.clone()));
                 self.output(&told);
                 if self.no_debug {
                     return self.event("terminated", json!({}));
                 }
-                self.stopped("exception", Some(text), None);
+                self.stopped(core, "exception", Some(text), None);
             }
             // Where a run ends there is still a way back; the second time, it is over.
             Why::Halted | Why::InputsEnd if over => self.event("terminated", json!({})),
             Why::Halted | Why::InputsEnd => {
                 debugged.over = true;
-                let what = if why == Why::Halted {
-                    "the program has halted"
-                } else {
-                    "the recorded inputs end here"
+                let what = match (&why, debugged.target.cores()) {
+                    (Why::Halted, 1) => "the program has halted",
+                    (Why::Halted, _) => "every core has halted",
+                    _ => "the recorded inputs end here",
                 };
                 self.output(what);
                 if self.no_debug {
                     return self.event("terminated", json!({}));
                 }
-                self.stopped("pause", Some(what.to_owned()), None);
+                self.stopped(core, "pause", Some(what.to_owned()), None);
             }
-            Why::Limit(cycles) => self.stopped("pause", Some(format!("after {cycles} cycles")), None),
-            Why::Interrupted => self.stopped("pause", None, None),
+            Why::Limit(cycles) => self.stopped(core, "pause", Some(format!("after {cycles} cycles")), None),
+            Why::Interrupted => self.stopped(core, "pause", None, None),
         }
     }
 
-    fn stopped(&mut self, reason: &str, text: Option<String>, id: Option<u32>) {
-        let mut body = json!({ "reason": reason, "threadId": THREAD, "allThreadsStopped": true });
+    fn stopped(&mut self, core: usize, reason: &str, text: Option<String>, id: Option<u32>) {
+        let displayed = self.debugged.as_ref().map(|debugged| debugged.target.core(core).displayed());
+        for (name, value) in displayed.into_iter().flatten() {
+            self.output(&format!("{name} = {value}"));
+        }
+        let mut body = json!({ "reason": reason, "threadId": core + 1, "allThreadsStopped": true });
         if let Some(text) = text {
             body["description"] = text.clone().into();
             body["text"] = text.into();
@@ -247,57 +288,58 @@ impl Server<'_> {
 
 impl Debugged {
     /// Runs on to a stop, an exception or the end; or so far that somebody may want to say something.
-    fn run(&mut self, filters: Filters) -> (Why, Option<(String, String)>) {
+    fn run(&mut self, filters: Filters) -> (End, Option<Exception>) {
         let clears = self.clears_flags() && !filters.flags().is_empty();
-        let session = &mut self.console.session;
+        let target = &mut self.target;
         if !filters.any() {
-            return (session.resume(), None);
+            return (target.resume(), None);
         }
-        let limit = session.run_limit;
         loop {
-            let (start, before) = (session.cycle(), Met::now(session, filters));
-            // Flags that the program clears may be gone at the end of a slice.
-            session.run_limit = if clears { 1 } else { SLICE };
-            let why = session.resume();
-            session.run_limit = limit;
-            let end = session.cycle();
-            if Met::now(session, filters).since(&before).is_some() {
-                let found = first(session, filters, &before, start, end);
-                return (Why::Done, found);
+            let (start, before) = (target.cycle(), met(target, filters));
+            // Flags that a program clears may be gone at the end of a slice.
+            let limit = target.limit(if clears { 1 } else { SLICE });
+            let end = target.resume();
+            target.limit(limit);
+            if since(&met(target, filters), &before).is_some() {
+                let there = target.cycle();
+                let found = first(target, filters, &before, start, there);
+                return ((end.0, Ok(Why::Done)), found);
             }
-            if !matches!(why, Why::Limit(_)) {
-                return (why, None);
+            if !matches!(end.1, Ok(Why::Limit(_))) {
+                return (end, None);
             }
         }
     }
 
-    /// Whether an operation of the program clears the flags.
+    /// Whether an operation of a program clears the flags.
     fn clears_flags(&self) -> bool {
-        let words = self.console.session.program().code.iter();
-        words
+        let programs = (0..self.target.cores()).map(|core| self.target.session(core).program());
+        programs
+            .flat_map(|program| program.code.iter())
             .filter_map(|word| Instruction::decode(*word).ok())
             .any(|instruction| instruction.effect() == Effect::ClearFlags)
     }
 }
 
-/// Goes to the first position at which there is an exception that was not there before: it is there at `end`, not at `start`.
+/// Goes to the first position at which there is an exception that was not there before: it is there at `end`, not at `start`, and
+/// the run has come by both.
 fn first(
-    session: &mut Session,
+    target: &mut Target,
     filters: Filters,
-    before: &Met,
+    before: &[Met],
     start: Cycle,
     end: Cycle,
-) -> Option<(String, String)> {
+) -> Option<Exception> {
     let (mut none, mut there) = (start, end);
     while there - none > 1 {
         let middle = none + (there - none) / 2;
-        session.go_to(middle);
-        if Met::now(session, filters).since(before).is_some() {
+        let _ = target.go_to(middle);
+        if since(&met(target, filters), before).is_some() {
             there = middle;
         } else {
             none = middle;
         }
     }
-    session.go_to(there);
-    Met::now(session, filters).since(before)
+    let _ = target.go_to(there);
+    since(&met(target, filters), before)
 }

@@ -1,7 +1,7 @@
 //! What there is to see: frames, variables, values, bundles, memory.
 
-use crate::dap::breakpoints::address;
-use crate::dap::{Answer, Debugged, number, text};
+use crate::dap::breakpoints::{address, reference};
+use crate::dap::{Answer, CORE, Debugged, number, text};
 use serde_json::{Value as Json, json};
 use takt_debug::panes::{flight, stalls};
 use takt_debug::session::{Place, Shown};
@@ -16,13 +16,15 @@ const BUNDLES: u64 = 4096;
 /// Bytes of memory of one request at most.
 const BYTES: u64 = 1 << 20;
 
-/// The lists of variables, by number.
+/// The lists of variables of a core, by number.
 const INPUTS: u64 = 1;
 const OUTPUTS: u64 = 2;
 const NAMED: u64 = 3;
 const FLIGHT: u64 = 4;
 const STALLS: u64 = 5;
 const MACHINE: u64 = 6;
+/// Of a system, the same for each core.
+const LINKS: u64 = 7;
 /// From here on, the registers of each bank; then the ways to read each register.
 const BANKS: u64 = 16;
 const VIEWS: u64 = 64;
@@ -38,12 +40,13 @@ fn shown(ty: Type, bits: Option<u32>, hex: bool) -> String {
 
 impl Debugged {
     /// A source as the protocol has it: its path, or the number by which its text can be had.
-    pub(super) fn source(&self, file: u32) -> Json {
-        let name = self.console.session.program().files.get(file as usize).cloned().unwrap_or_default();
-        match self.path_of(file) {
+    pub(super) fn source(&self, core: usize, file: u32) -> Json {
+        let session = self.target.session(core);
+        let name = session.program().files.get(file as usize).cloned().unwrap_or_default();
+        match self.path_of(core, file) {
             Some(path) => json!({ "name": name, "path": path }),
-            None if self.console.session.source(file).is_some() => {
-                json!({ "name": name, "sourceReference": file + 1 })
+            None if session.source(file).is_some() => {
+                json!({ "name": name, "sourceReference": core as u64 * CORE + u64::from(file) + 1 })
             }
             None => json!({ "name": name }),
         }
@@ -52,16 +55,20 @@ impl Debugged {
     pub(super) fn source_text(&mut self, arguments: &Json) -> Answer {
         let reference = &arguments["source"]["sourceReference"];
         let number = reference.as_u64().or(arguments["sourceReference"].as_u64()).unwrap_or(0);
-        let file = u32::try_from(number).ok().and_then(|number| number.checked_sub(1));
-        let text = file.and_then(|file| self.console.session.source(file));
+        let file = (number % CORE).checked_sub(1);
+        let text = self
+            .target
+            .checked(number / CORE)
+            .zip(file)
+            .and_then(|(core, file)| self.target.session(core).source(file as u32));
         text.map(|text| json!({ "content": text })).ok_or_else(|| format!("there is no source {number}"))
     }
 
     pub(super) fn stack(&mut self, arguments: &Json, from_one: (bool, bool)) -> Answer {
-        let here = self.console.session.location();
-        let emulator = self.console.session.emulator();
-        let mut frames = vec![(emulator.next_address(), here)];
-        let program = self.console.session.program();
+        let core = self.thread(arguments)?;
+        let session = self.target.session(core);
+        let (emulator, program) = (session.emulator(), session.program());
+        let mut frames = vec![(emulator.next_address(), session.location())];
         let calls = emulator.stack().iter().rev().map(|back| back.previous());
         frames.extend(calls.map(|call| (call, program.location(call))));
         let total = frames.len();
@@ -77,14 +84,14 @@ impl Debugged {
                 None => format!("bundle {at}"),
             };
             let mut frame = json!({
-                "id": id,
+                "id": core as u64 * CORE + id as u64,
                 "name": name,
                 "line": location.map_or(0, |location| location.line.saturating_sub(u32::from(!from_one.0))),
                 "column": u32::from(from_one.1),
-                "instructionPointerReference": format!("0x{:x}", at.get()),
+                "instructionPointerReference": reference(core, at.get().into()),
             });
             if let Some(location) = location {
-                frame["source"] = self.source(location.file);
+                frame["source"] = self.source(core, location.file);
             }
             frame
         };
@@ -92,9 +99,10 @@ impl Debugged {
         Ok(json!({ "stackFrames": frames, "totalFrames": total }))
     }
 
-    pub(super) fn scopes(&self) -> Json {
-        let program = self.console.session.program();
-        let scope = |name: &str, reference: u64, count: usize, expensive: bool| json!({ "name": name, "variablesReference": reference, "namedVariables": count, "expensive": expensive });
+    pub(super) fn scopes(&self, arguments: &Json) -> Answer {
+        let core = self.core_of(arguments)?;
+        let program = self.target.session(core).program();
+        let scope = |name: &str, number: u64, count: usize, expensive: bool| json!({ "name": name, "variablesReference": core as u64 * CORE + number, "namedVariables": count, "expensive": expensive });
         let mut scopes = vec![
             scope("Registers", NAMED, program.registers.len(), false),
             scope("Inputs", INPUTS, program.inputs.len(), false),
@@ -103,33 +111,44 @@ impl Debugged {
             scope("Stalls", STALLS, 0, false),
             scope("Machine", MACHINE, 0, false),
         ];
+        let links = self.target.links().len();
+        if links > 0 {
+            scopes.insert(3, scope("Links", LINKS, links, false));
+        }
         for (number, bank) in (BANKS..VIEWS).zip(program.machine.banks()) {
             scopes.push(scope(&format!("Bank {}", bank.name), number, usize::from(bank.depth), true));
         }
-        json!({ "scopes": scopes })
+        Ok(json!({ "scopes": scopes }))
     }
 
-    fn register_row(&self, name: &str, register: Register, ty: Type, hex: bool) -> Json {
-        let bits = self.console.session.register(register);
-        let place = self.console.session.program().machine.register_name(register).unwrap_or_default();
+    fn register_row(&self, core: usize, name: &str, register: Register, ty: Type, hex: bool) -> Json {
+        let session = self.target.session(core);
+        let bits = session.register(register);
+        let place = session.program().machine.register_name(register).unwrap_or_default();
         json!({
             "name": name,
             "value": shown(ty, bits, hex),
             "type": format!("{} in {place}", takt_asm::type_name(ty)),
             "evaluateName": name,
-            "variablesReference": if bits.is_some() { VIEWS + u64::from(register.get()) } else { 0 },
+            "variablesReference": if bits.is_some() { views(core, register) } else { 0 },
         })
     }
 
     pub(super) fn variables(&mut self, arguments: &Json) -> Answer {
-        let reference = number(arguments, "variablesReference")?;
+        let all = number(arguments, "variablesReference")?;
+        let unknown = || format!("there is no list of variables {all}");
+        let core = self.target.checked(all / CORE).ok_or_else(unknown)?;
+        let reference = all % CORE;
         let hex = arguments["format"]["hex"].as_bool().unwrap_or(false);
-        let stall = self.console.session.stall();
+        let stall = self.target.core_mut(core).session.stall();
         let debugged = &*self;
-        let session = &debugged.console.session;
+        let session = debugged.target.session(core);
         let program = session.program();
         let ports = |ports: &[Port]| -> Vec<Json> {
-            ports.iter().map(|port| debugged.register_row(&port.name, port.register, port.ty, hex)).collect()
+            ports
+                .iter()
+                .map(|port| debugged.register_row(core, &port.name, port.register, port.ty, hex))
+                .collect()
         };
         let plain =
             |name: String, value: String| json!({ "name": name, "value": value, "variablesReference": 0 });
@@ -149,6 +168,7 @@ impl Debugged {
             STALLS => {
                 stalls(session).into_iter().map(|(cycles, what)| plain(what, cycles.to_string())).collect()
             }
+            LINKS => debugged.target.links().into_iter().map(|(name, value)| plain(name, value)).collect(),
             MACHINE => {
                 let emulator = session.emulator();
                 let flags: Vec<&str> = takt_isa::fp::Flags::NAMES
@@ -186,24 +206,22 @@ impl Debugged {
                 registers
                     .map(|register| {
                         let place = program.machine.register_name(register).unwrap_or_default();
-                        debugged.register_row(&format!("@{place}"), register, Type::B, hex)
+                        debugged.register_row(core, &format!("@{place}"), register, Type::B, hex)
                     })
                     .collect()
             }
             _ => {
                 let register = usize::try_from(reference - reference.min(VIEWS)).ok().and_then(Register::new);
                 let register = register.filter(|_| reference >= VIEWS);
-                let register =
-                    register.ok_or_else(|| format!("there is no list of variables {reference}"))?;
-                debugged.views(register)
+                debugged.views(core, register.ok_or_else(unknown)?)
             }
         };
         Ok(json!({ "variables": rows.into_iter().take(VARIABLES).collect::<Vec<_>>() }))
     }
 
     /// A register's bits in every way.
-    fn views(&self, register: Register) -> Vec<Json> {
-        let Some(bits) = self.console.session.register(register) else { return Vec::new() };
+    fn views(&self, core: usize, register: Register) -> Vec<Json> {
+        let Some(bits) = self.target.session(core).register(register) else { return Vec::new() };
         let views = Shown::new(Type::F, bits);
         let float = views.float;
         // The distance to the next number: what one unit in the last place is here.
@@ -222,16 +240,17 @@ impl Debugged {
     /// Sets what an expression names.
     pub(super) fn set_variable(&mut self, name: &str, arguments: &Json) -> Answer {
         let written = text(arguments, "value")?.to_owned();
-        let session = self.session();
+        let core = self.core_of(arguments)?;
+        let session = self.target.session(core);
         let live = session.parse(name)?;
         let Some((place, ty, _)) = session.place(&live)? else {
             return Err(format!("`{name}` is neither a register nor a word of memory"));
         };
         let value = session.parse(&written).and_then(|live| session.evaluate(&live))?;
         let bits = value.bits(ty).map_err(|fault| fault.to_string())?;
-        session.set(place, bits)?;
+        self.target.set(core, place, bits)?;
         let reference = match place {
-            Place::Register(register) => VIEWS + u64::from(register.get()),
+            Place::Register(register) => views(core, register),
             Place::Word(_) => 0,
         };
         Ok(
@@ -242,11 +261,12 @@ impl Debugged {
     pub(super) fn evaluate(&mut self, arguments: &Json) -> Answer {
         let written = text(arguments, "expression")?.to_owned();
         let hex = arguments["format"]["hex"].as_bool().unwrap_or(false);
-        let session = self.session();
+        let core = self.core_of(arguments)?;
+        let session = self.target.session(core);
         let result = session.parse(&written).and_then(|live| {
             let (reference, ty, value) = match session.place(&live)? {
                 Some((Place::Register(register), ty, bits)) => {
-                    (VIEWS + u64::from(register.get()), Some(ty), shown(ty, bits, hex))
+                    (views(core, register), Some(ty), shown(ty, bits, hex))
                 }
                 Some((Place::Word(_), ty, bits)) => (0, Some(ty), shown(ty, bits, hex)),
                 None => (0, None, session.evaluate(&live)?.to_string()),
@@ -261,24 +281,8 @@ impl Debugged {
             })),
             // In the console, the debugger's own commands that only look.
             Err(error) if arguments["context"] == "repl" => {
-                let looks = [
-                    "print",
-                    "info",
-                    "ulp",
-                    "registers",
-                    "ports",
-                    "memory",
-                    "flight",
-                    "stalls",
-                    "list",
-                    "where",
-                    "help",
-                ];
-                let word = written.split_whitespace().next().unwrap_or("");
-                if !looks.contains(&word) {
-                    return Err(error);
-                }
-                let text = self.console.execute(&written)?;
+                self.target.select(core);
+                let text = self.target.look(&written).unwrap_or(Err(error))?;
                 Ok(json!({ "result": text.trim_end(), "variablesReference": 0 }))
             }
             Err(error) => Err(error),
@@ -293,7 +297,8 @@ impl Debugged {
         let start = before
             .rfind(|c: char| !(c.is_ascii_alphanumeric() || c == '_' || c == '.'))
             .map_or(0, |at| at + 1);
-        let names = self.session().names(before.get(start..).unwrap_or(""));
+        let core = self.core_of(arguments)?;
+        let names = self.target.session(core).names(before.get(start..).unwrap_or(""));
         let targets: Vec<Json> = names
             .into_iter()
             .take(200)
@@ -303,12 +308,14 @@ impl Debugged {
     }
 
     pub(super) fn disassemble(&mut self, arguments: &Json, from_one: bool) -> Answer {
-        let reference = text(arguments, "memoryReference")?;
-        let first = address(reference).ok_or_else(|| format!("`{reference}` is no bundle's address"))?;
-        let offset =
-            arguments["instructionOffset"].as_i64().unwrap_or(0) + arguments["offset"].as_i64().unwrap_or(0);
+        let asked = text(arguments, "memoryReference")?;
+        let (core, first) = self.address(asked).ok_or_else(|| format!("`{asked}` is no bundle's address"))?;
+        let offset = arguments["instructionOffset"]
+            .as_i64()
+            .unwrap_or(0)
+            .saturating_add(arguments["offset"].as_i64().unwrap_or(0));
         let count = number(arguments, "instructionCount")?.min(BUNDLES);
-        let session = &self.console.session;
+        let session = self.target.session(core);
         let program = session.program();
         let mut rows = Vec::new();
         for number in
@@ -319,7 +326,7 @@ impl Debugged {
                 .filter(|number| *number < program.bundles())
                 .map(BundleAddress::new);
             let Some(at) = address else {
-                rows.push(json!({ "address": format!("0x{:x}", number.max(0)), "instruction": "(no bundle)", "presentationHint": "invalid" }));
+                rows.push(json!({ "address": reference(core, number.clamp(0, u32::MAX.into()) as u64), "instruction": "(no bundle)", "presentationHint": "invalid" }));
                 continue;
             };
             let slots = program.machine.slots.iter().zip(session.bundle(at));
@@ -328,7 +335,7 @@ impl Debugged {
             let words: Vec<String> =
                 program.words(at).unwrap_or_default().iter().map(|word| format!("{word:012x}")).collect();
             let mut row = json!({
-                "address": format!("0x{:x}", at.get()),
+                "address": reference(core, at.get().into()),
                 "instructionBytes": words.join(" "),
                 "instruction": if operations.is_empty() { "nop".to_owned() } else { operations.join(" | ") },
             });
@@ -336,7 +343,7 @@ impl Debugged {
                 row["symbol"] = label.into();
             }
             if let Some(location) = program.location(at) {
-                row["location"] = self.source(location.file);
+                row["location"] = self.source(core, location.file);
                 row["line"] = location.line.saturating_sub(u32::from(!from_one)).into();
             }
             rows.push(row);
@@ -344,22 +351,33 @@ impl Debugged {
         Ok(json!({ "instructions": rows }))
     }
 
+    /// An address with its core, if there is such a core.
+    fn address(&self, text: &str) -> Option<(usize, BundleAddress)> {
+        let (core, address) = address(text)?;
+        Some((self.target.checked(core)?, address))
+    }
+
     /// Data memory: `memoryReference` is a word's address, bytes are little-endian.
     pub(super) fn read_memory(&mut self, arguments: &Json) -> Answer {
-        let reference = text(arguments, "memoryReference")?;
-        let word = address(reference).ok_or_else(|| format!("`{reference}` is no word's address"))?;
-        let start = i64::from(word.get()) * 4 + arguments["offset"].as_i64().unwrap_or(0);
+        let asked = text(arguments, "memoryReference")?;
+        let (core, word) = self.address(asked).ok_or_else(|| format!("`{asked}` is no word's address"))?;
+        let start = (i64::from(word.get()) * 4).saturating_add(arguments["offset"].as_i64().unwrap_or(0));
         let count = number(arguments, "count")?.min(BYTES) as usize;
-        let memory = self.console.session.emulator().memory();
+        let memory = self.target.session(core).emulator().memory();
         let bytes: Vec<u8> = memory.iter().flat_map(|word| word.to_le_bytes()).collect();
         let from = usize::try_from(start).unwrap_or(usize::MAX).min(bytes.len());
         let found = &bytes[from..from.saturating_add(count).min(bytes.len())];
         Ok(json!({
-            "address": format!("0x{:x}", start.max(0) / 4),
+            "address": reference(core, start.max(0) as u64 / 4),
             "unreadableBytes": count - found.len(),
             "data": base64(found),
         }))
     }
+}
+
+/// The number of the list of ways to read a register.
+fn views(core: usize, register: Register) -> u64 {
+    core as u64 * CORE + VIEWS + u64::from(register.get())
 }
 
 /// Bytes in base 64, as the protocol has them.

@@ -64,7 +64,12 @@ mod tests {
     use serde_json::{Value, json};
 
     fn settings() -> Settings {
-        Settings { beside: &[("part.s", ".const half = 0.5\n")], ..Settings::default() }
+        Settings {
+            beside: &[("part.s", ".const half = 0.5\n")],
+            library: &[("lib.s", ".const third = 0.25\n")],
+            library_by_name: true,
+            ..Settings::default()
+        }
     }
 
     fn notify(server: &mut Inline, method: &str, params: Value) -> Vec<Message> {
@@ -116,6 +121,20 @@ mod tests {
         // `part.s` is no document of the client's: what is declared there keeps its name.
         let there = ask(&mut server, "textDocument/rename", rename("whole", 7, 15));
         assert_eq!(there, Value::Null);
+
+        // What has no place on a disk has a name.
+        notify(
+            &mut server,
+            "textDocument/didOpen",
+            json!({ "textDocument": { "uri": "other.s", "languageId": "takt", "version": 1, "text": ".include <lib.s>\n.reg a\n li a, third\n halt\n" } }),
+        );
+        server.check();
+        for (line, character, wanted) in [(2, 9, 7), (0, 12, 0)] {
+            let at = json!({ "textDocument": { "uri": "other.s" }, "position": { "line": line, "character": character } });
+            let found = ask(&mut server, "textDocument/definition", at);
+            assert_eq!(found[0]["uri"], "%3Clib.s%3E", "{found}");
+            assert_eq!(found[0]["range"]["start"]["character"], wanted, "{found}");
+        }
 
         let change = json!({ "textDocument": { "uri": "main.s", "version": 2 }, "contentChanges": [{ "text": "    fmull\n" }] });
         notify(&mut server, "textDocument/didChange", change);

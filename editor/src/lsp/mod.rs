@@ -59,6 +59,8 @@ pub struct Settings {
     pub beside: &'static [(&'static str, &'static str)],
     /// Where a copy of the library is put when an editor is to open it; it is not opened if there is none.
     pub library_folder: Option<PathBuf>,
+    /// Whether the client opens a library's file by its name: the address of `<math.s>` is `%3Cmath.s%3E`.
+    pub library_by_name: bool,
     /// Cycles that a period may take.
     pub deadline: Option<Cycle>,
 }
@@ -73,6 +75,7 @@ impl Default for Settings {
             library: &[],
             beside: &[],
             library_folder: None,
+            library_by_name: false,
             deadline: None,
         }
     }

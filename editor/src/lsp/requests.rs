@@ -160,11 +160,12 @@ impl Server {
     /// The place of a span, in a file that the client can open.
     fn location(&self, front: &Front, span: Span) -> Option<Location> {
         let (file, range) = front.files.range(span, self.client.encoding)?;
-        let path = match &file.path {
-            Some(path) => path.clone(),
-            None => self.library_copy(file)?,
+        let uri = match &file.path {
+            Some(path) => uri::of_path(path),
+            None if self.settings.library_by_name => uri::of_name(&file.name),
+            None => uri::of_path(&self.library_copy(file)?),
         };
-        Some(Location { uri: uri::of_path(&path)?, range })
+        Some(Location { uri: uri?, range })
     }
 
     /// A copy of a library's file, for an editor to open.

@@ -28,6 +28,17 @@ pub(crate) fn of_path(path: &Path) -> Option<Uri> {
     if !text.starts_with('/') {
         uri.push('/');
     }
+    uri.push_str(&encoded(&text));
+    Uri::from_str(&uri).ok()
+}
+
+/// The URI of a file that has a name and no place, relative to what the client takes names from.
+pub(crate) fn of_name(name: &str) -> Option<Uri> {
+    Uri::from_str(&encoded(name)).ok()
+}
+
+fn encoded(text: &str) -> String {
+    let mut uri = String::with_capacity(text.len());
     for byte in text.bytes() {
         if byte.is_ascii_alphanumeric() || b"/-._~:".contains(&byte) {
             uri.push(char::from(byte));
@@ -35,7 +46,7 @@ pub(crate) fn of_path(path: &Path) -> Option<Uri> {
             uri.push_str(&format!("%{byte:02X}"));
         }
     }
-    Uri::from_str(&uri).ok()
+    uri
 }
 
 fn decoded(text: &str) -> String {

@@ -7,8 +7,8 @@
 //! the tick it joins again, if it is then where the others are.
 
 use super::lanes::{InFlight, LANES, Lanes, Mask, Row};
-use crate::block::{Ages, ages};
-use crate::emulator::{Emulator, MAX_CYCLE, Recent, Status};
+use crate::block::{Ages, Compiled, ages};
+use crate::emulator::{CompiledRuns, Emulator, MAX_CYCLE, Recent, Status};
 use crate::event::{PortWrite, Retire};
 use crate::execute::stack_fault;
 use crate::fast::has_required;
@@ -18,6 +18,9 @@ use crate::system::{PeriodError, PeriodReport};
 use takt_isa::fp::{Flags, Value};
 use takt_isa::timing::{self, Cycle};
 use takt_isa::{BundleAddress, Flow, Program, Register};
+
+/// Runs of one emulator that take as long as a run of all lanes, about.
+const RUN: u64 = 4;
 
 /// Where a lane is.
 enum Place {
@@ -94,6 +97,11 @@ impl Group {
                 set(emulator);
             }
         }
+    }
+
+    /// How often compiled blocks ran.
+    pub(crate) fn compiled_runs(&self) -> CompiledRuns {
+        self.lead.compiled_runs
     }
 
     /// Cycles that a period may take.
@@ -280,9 +288,12 @@ impl Group {
             return self.leave_all();
         }
         self.take_inputs();
-        let block = &self.lead.cache.blocks[id as usize];
+        let block = &mut self.lead.cache.blocks[id as usize];
         if !block.verified && !has_required(&self.lead.state, block, last) {
             return self.leave_all();
+        }
+        if let Some(after) = self.lead.compile_after {
+            block.compile_lanes_after(after / RUN, self.lead.code.machine.data_depth);
         }
         while let Err(outside) = self.try_block(id, last) {
             (0..LANES).filter(|&lane| outside[lane]).for_each(|lane| self.leave(lane));
@@ -297,11 +308,19 @@ impl Group {
     /// Runs a block's operations; if that takes lanes out of their memory, they are the error, and nothing has happened.
     fn try_block(&mut self, id: u32, last: Cycle) -> Result<(), Mask> {
         let Group { lead, lanes, present, offsets, .. } = self;
-        let Emulator { cache, state, .. } = lead;
-        let block = &cache.blocks[id as usize];
+        let Emulator { cache, state, compiled_runs, .. } = lead;
+        let block = &mut cache.blocks[id as usize];
         lanes.begin(state, block, last);
         let before = block.restore.as_ref().map(|_| (state.pending.clone(), state.written));
         lanes.write_back_until(state, last, present, offsets);
+        if let Compiled::Code(code, _) = &block.compiled_lanes {
+            if lanes.run_code(block, code) {
+                compiled_runs.done += 1;
+                return Ok(());
+            }
+            compiled_runs.left += 1;
+            block.compiled_lanes.left(block.runs);
+        }
         lanes.run(block, present).inspect_err(|_| {
             lanes.undo();
             if let Some((pending, written)) = before {

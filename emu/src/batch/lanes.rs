@@ -3,12 +3,13 @@
 use crate::block::Block;
 use crate::event::PortWrite;
 use crate::execute::data_address;
+use crate::jit;
 use crate::machine::{NanWrites, State, WORDS, Word};
 use crate::micro::{Kind, Micro};
 use pulp::{Arch, NullaryFnOnce};
 use takt_isa::fp::{Flags, Host, Screened, Value, is_nan};
 use takt_isa::timing::Cycle;
-use takt_isa::{Register, compute, compute_lanes};
+use takt_isa::{Effect, Register, compute, compute_lanes};
 
 /// Lanes of a group: vectors as wide as the widest hosts', several of them, so that choosing what to do costs little beside
 /// doing it.
@@ -46,6 +47,7 @@ pub(crate) struct Lanes {
     pub(crate) nan_writes: Vec<NanWrites>,
     pub(crate) latches: Option<LatchedRows>,
     late: Vec<InFlight>,
+    rows: jit::Rows,
     nans: Vec<(u32, usize, u32)>,
     undo: Undo,
 }
@@ -99,6 +101,7 @@ impl Lanes {
             nan_writes: vec![NanWrites::default(); LANES],
             latches,
             late: Vec::new(),
+            rows: jit::Rows::default(),
             nans: Vec::new(),
             undo: Undo::default(),
         }
@@ -243,6 +246,23 @@ impl Lanes {
             writes.kept.truncate(kept);
             writes.count = count;
         }
+    }
+
+    /// Runs a block by the host's own instructions. If the answer is false, it is to be run by its micros: nothing that it reads
+    /// has changed.
+    pub(crate) fn run_code(&mut self, block: &Block, code: &jit::LaneCode) -> bool {
+        if !code.run(&mut self.registers, &mut self.memory, &mut self.flags, &mut self.rows) {
+            return false;
+        }
+        for (number, (late, from)) in self.late.iter_mut().zip(&block.late).enumerate() {
+            let is_load = from.operation.effect == Effect::Load;
+            *late = InFlight {
+                values: self.registers[Word::late(number).index()],
+                flags: [Flags::NONE; LANES],
+                memory: is_load.then(|| self.rows.late(code, number)),
+            };
+        }
+        true
     }
 
     /// Runs the micros of a block. If that takes a lane that is present out of its memory, those lanes are the error, and

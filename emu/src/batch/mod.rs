@@ -7,10 +7,11 @@
 mod group;
 mod lanes;
 
+use crate::emulator::CompiledRuns;
 use crate::fault::LoadError;
 use crate::system::{Number, PeriodError, PeriodReport, PortError, input_for, output_for};
 use group::Group;
-use lanes::LANES;
+pub(crate) use lanes::{LANES, Row};
 use rayon::prelude::*;
 use std::num::NonZeroU64;
 use std::sync::Arc;
@@ -80,6 +81,13 @@ impl Batch {
         self.groups
             .iter_mut()
             .for_each(|group| group.each_emulator(|emulator| emulator.set_tick_period(cycles)));
+    }
+
+    /// As [`crate::Emulator::set_compile_after`]; a run of all lanes of a group counts as one.
+    pub fn set_compile_after(&mut self, runs: Option<u64>) {
+        self.groups
+            .iter_mut()
+            .for_each(|group| group.each_emulator(|emulator| emulator.set_compile_after(runs)));
     }
 
     /// Stops a lane with [`crate::FaultKind::CycleLimit`] if a period takes so many cycles, waiting and what runs once
@@ -177,6 +185,15 @@ impl Batch {
     /// way than in most lanes, or to a fault. They are slower, and otherwise the same.
     pub fn periods_apart(&self) -> u64 {
         self.groups.iter().map(|group| group.apart).sum()
+    }
+
+    /// How often compiled blocks ran since loading, counted once for all lanes of a group.
+    pub fn compiled_runs(&self) -> CompiledRuns {
+        let runs = self.groups.iter().map(Group::compiled_runs);
+        runs.fold(CompiledRuns::default(), |sum, runs| CompiledRuns {
+            done: sum.done + runs.done,
+            left: sum.left + runs.left,
+        })
     }
 
     fn lane(&self, lane: usize) -> Option<(&Group, usize)> {

@@ -1,7 +1,8 @@
 //! Stands in for the compiler of blocks: there is no code for any.
 
+use crate::batch::{LANES, Row};
 use crate::block::Block;
-use crate::machine::State;
+use crate::machine::{State, WORDS};
 use takt_isa::fp::Flags;
 
 /// A block's code.
@@ -30,6 +31,35 @@ impl Code {
         _: &mut Words,
         _: &mut [(Flags, Option<u32>)],
         _: &mut Vec<(u32, u32)>,
+    ) -> bool {
+        match *self {}
+    }
+}
+
+/// A block's code for the lanes of a batch.
+#[derive(Clone, Debug)]
+pub(crate) enum LaneCode {}
+
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Rows;
+
+impl Rows {
+    pub(crate) fn late(&self, code: &LaneCode, _: usize) -> Row {
+        match *code {}
+    }
+}
+
+pub(crate) fn compile_lanes(_: &Block, _: u32) -> Option<LaneCode> {
+    None
+}
+
+impl LaneCode {
+    pub(crate) fn run(
+        &self,
+        _: &mut [Row; WORDS],
+        _: &mut [Row],
+        _: &mut [Flags; LANES],
+        _: &mut Rows,
     ) -> bool {
         match *self {}
     }

@@ -142,6 +142,11 @@ impl Graph {
         self.nodes.len() - 1
     }
 
+    /// Whether it reads or changes the flags.
+    pub(super) fn uses_flags(&self) -> bool {
+        self.flags.is_some() || self.nodes.contains(&Node::Flags)
+    }
+
     /// Which words get each value as soon as it is there, and which only at the end: those that the block also reads. (If it
     /// has to be run again it reads them again, and writes all others before it reads them.)
     pub(super) fn places(&self) -> (Vec<Vec<Word>>, Vec<(Word, Id)>) {

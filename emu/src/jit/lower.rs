@@ -4,6 +4,7 @@
 //! either nothing was out of the ordinary, and the registers that the block also reads are written, or the code says so: then
 //! these are as they were, and the words of memory that it has overwritten are among the scratch words.
 
+use super::emit::{Emit, Width};
 use super::graph::{Graph, Id, Node};
 use super::host::Host;
 use super::native::{Native, signature, target};
@@ -11,8 +12,7 @@ use crate::machine::Word;
 use cranelift::codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift::codegen::ir::{Function, SigRef, UserFuncName};
 use cranelift::prelude::{
-    AbiParam, FunctionBuilder, FunctionBuilderContext, Ieee32, InstBuilder, MemFlagsData, Signature, Value,
-    types,
+    AbiParam, FunctionBuilder, FunctionBuilderContext, InstBuilder, Signature, Value, types,
 };
 use takt_isa::{Op, ROWS, compute, fp};
 
@@ -47,7 +47,7 @@ extern "C" fn call(op: u32, a: u32, b: u32, c: u32) -> u64 {
 struct Forms {
     float: Option<Value>,
     integer: Option<Value>,
-    /// Not zero exactly if the value is not.
+    /// Whether the value is not zero.
     truth: Option<Value>,
 }
 
@@ -55,7 +55,7 @@ struct Forms {
 const SUMS: usize = 4;
 
 struct Lowering<'a, 'f> {
-    builder: FunctionBuilder<'f>,
+    emit: Emit<'f>,
     nodes: &'a [Node],
     forms: Vec<Forms>,
     depth: u32,
@@ -67,19 +67,23 @@ struct Lowering<'a, 'f> {
     fused: bool,
     sums: [Option<Value>; SUMS],
     looked: usize,
-    /// Marks of what went wrong: bytes, not zero if it did.
+    /// What went wrong, in any lane; and with the addresses, which lanes have in common.
     wrong: Option<Value>,
+    wrong_address: Option<Value>,
     /// Flags of calls, in their upper words.
     raised: Option<Value>,
     stores: usize,
     watches: usize,
 }
 
-const TRUSTED: MemFlagsData = MemFlagsData::trusted();
-
 /// The code of a block, for a data memory of `depth` words; `None` if there is none that is worth while.
-pub(super) fn lower(graph: &Graph, depth: u32, scratch: Scratch) -> Option<Native> {
+pub(super) fn lower(graph: &Graph, depth: u32, scratch: Scratch, width: Width) -> Option<Native> {
     let target = target()?;
+    let has =
+        |name: &str| target.isa_flags().iter().any(|flag| flag.name == name && flag.as_bool() == Some(true));
+    if width != Width::One && !has("has_sse41") {
+        return None;
+    }
     let looked_at = graph.looked_at()?;
     let mut function = Function::with_name_signature(UserFuncName::default(), signature(target));
     let mut context = FunctionBuilderContext::new();
@@ -94,7 +98,7 @@ pub(super) fn lower(graph: &Graph, depth: u32, scratch: Scratch) -> Option<Nativ
     called.returns.push(AbiParam::new(types::I64));
     let call = builder.import_signature(called);
     let mut lowering = Lowering {
-        builder,
+        emit: Emit { builder, width },
         nodes: &graph.nodes,
         forms: vec![Forms::default(); graph.nodes.len()],
         depth,
@@ -103,10 +107,11 @@ pub(super) fn lower(graph: &Graph, depth: u32, scratch: Scratch) -> Option<Nativ
         memory,
         words,
         call,
-        fused: target.isa_flags().iter().any(|flag| flag.name == "has_fma" && flag.as_bool() == Some(true)),
+        fused: has("has_fma"),
         sums: [None; SUMS],
         looked: 0,
         wrong: None,
+        wrong_address: None,
         raised: None,
         stores: 0,
         watches: 0,
@@ -122,11 +127,7 @@ pub(super) fn lower(graph: &Graph, depth: u32, scratch: Scratch) -> Option<Nativ
         }
     }
     lowering.finish(graph, &last);
-    Native::new(function, depth as usize, scratch.end)
-}
-
-fn offset(word: Word) -> i32 {
-    4 * word.index() as i32
+    Native::new(function, width, depth as usize, scratch.end)
 }
 
 impl Lowering<'_, '_> {
@@ -135,13 +136,11 @@ impl Lowering<'_, '_> {
             return value;
         }
         let value = match (self.nodes[id], self.forms[id].integer) {
-            (Node::Constant(bits), _) => self.builder.ins().f32const(Ieee32::with_bits(bits)),
-            (Node::Entry(word), _) => {
-                self.builder.ins().load(types::F32, TRUSTED, self.registers, offset(word))
-            }
+            (Node::Constant(bits), _) => self.emit.float_constant(f32::from_bits(bits)),
+            (Node::Entry(word), _) => self.emit.load_float(self.registers, word.index()),
             _ => {
                 let integer = self.integer(id);
-                self.builder.ins().bitcast(types::F32, MemFlagsData::new(), integer)
+                self.emit.as_float(integer)
             }
         };
         self.forms[id].float = Some(value);
@@ -154,14 +153,13 @@ impl Lowering<'_, '_> {
             return value;
         }
         let value = match self.nodes[id] {
-            Node::Constant(bits) => self.builder.ins().iconst(types::I32, i64::from(bits)),
-            Node::Entry(word) => self.builder.ins().load(types::I32, TRUSTED, self.registers, offset(word)),
+            Node::Constant(bits) => self.emit.constant(bits),
+            Node::Entry(word) => self.emit.load(self.registers, word.index()),
             _ => match (forms.float, forms.truth) {
-                (Some(float), _) => self.builder.ins().bitcast(types::I32, MemFlagsData::new(), float),
-                // A comparison's, 0 or 1.
-                (_, Some(truth)) => self.builder.ins().uextend(types::I32, truth),
+                (Some(float), _) => self.emit.as_integer(float),
+                (_, Some(truth)) => self.emit.truth_as_integer(truth),
                 // It has none: a store.
-                _ => self.builder.ins().iconst(types::I32, 0),
+                _ => self.emit.constant(0),
             },
         };
         self.forms[id].integer = Some(value);
@@ -173,57 +171,67 @@ impl Lowering<'_, '_> {
             return value;
         }
         let integer = self.integer(id);
-        let zero = self.builder.ins().iconst(types::I32, 0);
-        let value = self.builder.ins().icmp(IntCC::NotEqual, integer, zero);
+        let value = self.emit.is_not_zero(integer);
         self.forms[id].truth = Some(value);
         value
     }
 
-    fn mark(&mut self, wrong: Value) {
-        let all = match self.wrong {
-            Some(before) => self.builder.ins().bor(before, wrong),
+    /// Either of two marks, which may be missing.
+    fn either(&mut self, mark: Option<Value>, wrong: Value) -> Option<Value> {
+        Some(match mark {
+            Some(before) => self.emit.builder.ins().bor(before, wrong),
             None => wrong,
-        };
-        self.wrong = Some(all);
+        })
+    }
+
+    fn mark(&mut self, wrong: Value) {
+        self.wrong = self.either(self.wrong, wrong);
     }
 
     /// Times zero it is zero, or a NaN that no sum loses.
     fn look_at(&mut self, id: Id) {
         let value = self.float(id);
-        let zero = self.builder.ins().f32const(0.0);
+        let zero = self.emit.float_constant(0.0);
         let sum = &mut self.sums[self.looked % SUMS];
         self.looked += 1;
+        let builder = &mut self.emit.builder;
         *sum = Some(match *sum {
-            Some(before) if self.fused => self.builder.ins().fma(value, zero, before),
+            Some(before) if self.fused => builder.ins().fma(value, zero, before),
             Some(before) => {
-                let term = self.builder.ins().fmul(value, zero);
-                self.builder.ins().fadd(before, term)
+                let term = builder.ins().fmul(value, zero);
+                builder.ins().fadd(before, term)
             }
-            None => self.builder.ins().fmul(value, zero),
+            None => builder.ins().fmul(value, zero),
         });
     }
 
-    /// The address of a data word, and its number. Outside the memory: that of word 0, and a mark.
+    /// The address of a data word, and its number in every lane. Outside the memory, or if lanes differ: that of some word,
+    /// and a mark.
     fn address(&mut self, base: Id, offset: u32) -> (Value, Value) {
         let number = match self.nodes[base] {
             Node::Constant(base) if offset.wrapping_add(base) < self.depth => {
-                self.builder.ins().iconst(types::I32, i64::from(offset.wrapping_add(base)))
+                self.emit.builder.ins().iconst(types::I32, i64::from(offset.wrapping_add(base)))
             }
             _ => {
-                let base = self.integer(base);
-                let offset = self.builder.ins().iconst(types::I32, i64::from(offset));
-                let sum = self.builder.ins().iadd(base, offset);
-                let depth = self.builder.ins().iconst(types::I32, i64::from(self.depth));
-                let outside = self.builder.ins().icmp(IntCC::UnsignedGreaterThanOrEqual, sum, depth);
-                self.mark(outside);
-                let zero = self.builder.ins().iconst(types::I32, 0);
-                self.builder.ins().select(outside, zero, sum)
+                let bases = self.integer(base);
+                let base = self.emit.words(bases)[0];
+                if self.emit.width != Width::One {
+                    let first = self.emit.every(base);
+                    let differs = self.emit.builder.ins().icmp(IntCC::NotEqual, bases, first);
+                    self.mark(differs);
+                }
+                let builder = &mut self.emit.builder;
+                let offset = builder.ins().iconst(types::I32, i64::from(offset));
+                let sum = builder.ins().iadd(base, offset);
+                let depth = builder.ins().iconst(types::I32, i64::from(self.depth));
+                let outside = builder.ins().icmp(IntCC::UnsignedGreaterThanOrEqual, sum, depth);
+                let zero = builder.ins().iconst(types::I32, 0);
+                let number = builder.ins().select(outside, zero, sum);
+                self.wrong_address = self.either(self.wrong_address, outside);
+                number
             }
         };
-        let wide = self.builder.ins().uextend(types::I64, number);
-        let two = self.builder.ins().iconst(types::I64, 2);
-        let bytes = self.builder.ins().ishl(wide, two);
-        (self.builder.ins().iadd(self.memory, bytes), number)
+        (self.emit.address(self.memory, number), self.emit.every(number))
     }
 
     /// A value in the form in which it is there, to be stored.
@@ -236,11 +244,11 @@ impl Lowering<'_, '_> {
 
     fn write(&mut self, word: Word, id: Id) {
         let value = self.any(id);
-        self.builder.ins().store(TRUSTED, value, self.registers, offset(word));
+        self.emit.store(value, self.registers, word.index());
     }
 
     fn put(&mut self, value: Value, place: usize) {
-        self.builder.ins().store(TRUSTED, value, self.words, 4 * place as i32);
+        self.emit.store(value, self.words, place);
     }
 
     fn node(&mut self, id: Id) -> Option<()> {
@@ -248,12 +256,10 @@ impl Lowering<'_, '_> {
             // Where they are needed.
             Node::Entry(_) | Node::Constant(_) => {}
             Node::Flags => {
-                let flags = self.builder.ins().load(types::I32, TRUSTED, self.words, 0);
-                self.forms[id].integer = Some(flags);
+                self.forms[id].integer = Some(self.emit.load(self.words, 0));
             }
-            Node::Host(Host::Fused(..), sources) if !self.fused => {
+            Node::Host(host, sources) if !self.has(host) => {
                 // The operation is found by what it computes, from among those that are told by it.
-                let Node::Host(host, _) = self.nodes[id] else { return None };
                 let row = ROWS.iter().find(|row| Host::of(row.op) == Some(host))?;
                 self.call(id, row.op, sources);
             }
@@ -264,8 +270,7 @@ impl Lowering<'_, '_> {
                     return None;
                 }
                 let (address, number) = self.address(base, offset);
-                let word = self.builder.ins().load(types::I32, TRUSTED, address, 0);
-                self.forms[id].integer = Some(word);
+                self.forms[id].integer = Some(self.emit.load(address, 0));
                 if let Some(late) = late {
                     self.put(number, self.scratch.late + late);
                 }
@@ -275,12 +280,12 @@ impl Lowering<'_, '_> {
                     return None;
                 }
                 let (address, number) = self.address(base, offset);
-                let old = self.builder.ins().load(types::I32, TRUSTED, address, 0);
+                let old = self.emit.load(address, 0);
                 let place = self.scratch.stored + 2 * self.stores;
                 self.put(number, place);
                 self.put(old, place + 1);
                 let value = self.any(value);
-                self.builder.ins().store(TRUSTED, value, address, 0);
+                self.emit.store(value, address, 0);
                 self.stores += 1;
             }
             Node::Watched(value) => {
@@ -292,18 +297,30 @@ impl Lowering<'_, '_> {
         Some(())
     }
 
+    /// Whether there is an instruction for it: on vectors none shifts each lane by a number of its own.
+    fn has(&self, host: Host) -> bool {
+        match host {
+            Host::Fused(..) => self.fused,
+            Host::ShiftLeft | Host::ShiftRight | Host::ShiftSigned => self.emit.width == Width::One,
+            _ => true,
+        }
+    }
+
     fn call(&mut self, id: Id, op: Op, sources: [Id; 3]) {
-        let [a, b, c] = sources.map(|source| self.integer(source));
-        let op = self.builder.ins().iconst(types::I32, op as i64);
-        let function = call as extern "C" fn(u32, u32, u32, u32) -> u64;
-        let function = self.builder.ins().iconst(types::I64, function as usize as i64);
-        let inst = self.builder.ins().call_indirect(self.call, function, &[op, a, b, c]);
-        let both = self.builder.inst_results(inst)[0];
-        self.forms[id].integer = Some(self.builder.ins().ireduce(types::I32, both));
-        self.raised = Some(match self.raised {
-            Some(before) => self.builder.ins().bor(before, both),
-            None => both,
-        });
+        let sources = sources.map(|source| self.integer(source));
+        let [a, b, c] = sources.map(|source| self.emit.words(source));
+        let mut words = Vec::new();
+        for ((a, b), c) in a.into_iter().zip(b).zip(c) {
+            let builder = &mut self.emit.builder;
+            let op = builder.ins().iconst(types::I32, op as i64);
+            let function = call as extern "C" fn(u32, u32, u32, u32) -> u64;
+            let function = builder.ins().iconst(types::I64, function as usize as i64);
+            let inst = builder.ins().call_indirect(self.call, function, &[op, a, b, c]);
+            let both = builder.inst_results(inst)[0];
+            words.push(builder.ins().ireduce(types::I32, both));
+            self.raised = self.either(self.raised, both);
+        }
+        self.forms[id].integer = Some(self.emit.of_words(&words));
     }
 
     fn host(&mut self, id: Id, host: Host, sources: [Id; 3]) {
@@ -314,10 +331,10 @@ impl Lowering<'_, '_> {
                 let as_float = sources[1..].iter().any(|&source| self.forms[source].float.is_some());
                 if as_float {
                     let (yes, no) = (self.float(sources[1]), self.float(sources[2]));
-                    self.forms[id].float = Some(self.builder.ins().select(condition, yes, no));
+                    self.forms[id].float = Some(self.emit.choose_float(condition, yes, no));
                 } else {
                     let (yes, no) = (self.integer(sources[1]), self.integer(sources[2]));
-                    self.forms[id].integer = Some(self.builder.ins().select(condition, yes, no));
+                    self.forms[id].integer = Some(self.emit.choose(condition, yes, no));
                 }
             }
             Host::Sum
@@ -329,7 +346,7 @@ impl Lowering<'_, '_> {
             | Host::ShiftRight
             | Host::ShiftSigned => {
                 let (a, b) = (self.integer(sources[0]), self.integer(sources[1]));
-                let ins = self.builder.ins();
+                let ins = self.emit.builder.ins();
                 // Cranelift's shifts are by the low five bits too.
                 self.forms[id].integer = Some(match host {
                     Host::Sum => ins.iadd(a, b),
@@ -349,7 +366,7 @@ impl Lowering<'_, '_> {
                     Host::Below => IntCC::SignedLessThan,
                     _ => IntCC::UnsignedLessThan,
                 };
-                self.forms[id].truth = Some(self.builder.ins().icmp(condition, a, b));
+                self.forms[id].truth = Some(self.emit.builder.ins().icmp(condition, a, b));
             }
             Host::Equal | Host::Less | Host::LessOrEqual => {
                 let (a, b) = (self.float(sources[0]), self.float(sources[1]));
@@ -358,13 +375,18 @@ impl Lowering<'_, '_> {
                     Host::Less => FloatCC::LessThan,
                     _ => FloatCC::LessThanOrEqual,
                 };
-                self.forms[id].truth = Some(self.builder.ins().fcmp(condition, a, b));
+                self.forms[id].truth = Some(self.emit.builder.ins().fcmp(condition, a, b));
             }
             Host::FromInteger => {
                 let a = self.integer(sources[0]);
-                self.forms[id].float = Some(self.builder.ins().fcvt_from_sint(types::F32, a));
+                self.forms[id].float = Some(self.emit.from_signed(a));
             }
-            Host::ToInteger => self.nearest_integer(id, sources[0]),
+            Host::ToInteger => {
+                let a = self.float(sources[0]);
+                let (nearest, wrong) = self.emit.nearest(a);
+                self.mark(wrong);
+                self.forms[id].integer = Some(nearest);
+            }
             _ => {
                 let value = self.number(host, sources);
                 self.forms[id].float = Some(value);
@@ -372,98 +394,91 @@ impl Lowering<'_, '_> {
         }
     }
 
-    /// As `takt_isa::fp::Host` has it: a sum that rounds at the units' place, in its low word the integer.
-    fn nearest_integer(&mut self, id: Id, source: Id) {
-        let a = self.float(source);
-        let magnitude = self.builder.ins().fabs(a);
-        let limit = self.builder.ins().f32const(2_147_483_648.0);
-        let wrong = self.builder.ins().fcmp(FloatCC::UnorderedOrGreaterThanOrEqual, magnitude, limit);
-        self.mark(wrong);
-        let wide = self.builder.ins().fpromote(types::F64, a);
-        let units = self.builder.ins().f64const(6_755_399_441_055_744.0);
-        let rounded = self.builder.ins().fadd(wide, units);
-        let bits = self.builder.ins().bitcast(types::I64, MemFlagsData::new(), rounded);
-        self.forms[id].integer = Some(self.builder.ins().ireduce(types::I32, bits));
-    }
-
     /// Operations on binary32 that give one.
     fn number(&mut self, host: Host, sources: [Id; 3]) -> Value {
         let a = self.float(sources[0]);
         if matches!(host, Host::Magnitude | Host::Negation | Host::Root | Host::Sign) {
-            let ins = self.builder.ins();
+            let ins = self.emit.builder.ins();
             return match host {
                 Host::Magnitude => ins.fabs(a),
                 Host::Negation => ins.fneg(a),
                 Host::Root => ins.sqrt(a),
                 _ => {
-                    let one = self.builder.ins().f32const(1.0);
-                    let zero = self.builder.ins().f32const(0.0);
-                    let signed = self.builder.ins().fcopysign(one, a);
-                    let is_zero = self.builder.ins().fcmp(FloatCC::Equal, a, zero);
-                    self.builder.ins().select(is_zero, zero, signed)
+                    let one = self.emit.float_constant(1.0);
+                    let zero = self.emit.float_constant(0.0);
+                    let signed = self.emit.with_sign(one, a);
+                    let is_zero = self.emit.builder.ins().fcmp(FloatCC::Equal, a, zero);
+                    self.emit.choose_float(is_zero, zero, signed)
                 }
             };
         }
         let b = self.float(sources[1]);
         match host {
             Host::Saturation => {
-                let limit = self.builder.ins().fabs(b);
-                let magnitude = self.builder.ins().fabs(a);
-                let outside = self.builder.ins().fcmp(FloatCC::GreaterThan, magnitude, limit);
-                let limited = self.builder.ins().fcopysign(limit, a);
-                self.builder.ins().select(outside, limited, a)
+                let limit = self.emit.builder.ins().fabs(b);
+                let magnitude = self.emit.builder.ins().fabs(a);
+                let outside = self.emit.builder.ins().fcmp(FloatCC::GreaterThan, magnitude, limit);
+                let limited = self.emit.with_sign(limit, a);
+                self.emit.choose_float(outside, limited, a)
             }
             Host::Fused(product, addend) => {
                 let c = self.float(sources[2]);
-                let a = if product { self.builder.ins().fneg(a) } else { a };
-                let c = if addend { self.builder.ins().fneg(c) } else { c };
-                self.builder.ins().fma(a, b, c)
+                let a = if product { self.emit.builder.ins().fneg(a) } else { a };
+                let c = if addend { self.emit.builder.ins().fneg(c) } else { c };
+                self.emit.builder.ins().fma(a, b, c)
             }
-            Host::Add => self.builder.ins().fadd(a, b),
-            Host::Subtract => self.builder.ins().fsub(a, b),
-            Host::Multiply => self.builder.ins().fmul(a, b),
-            Host::Divide => self.builder.ins().fdiv(a, b),
-            Host::Minimum => self.builder.ins().fmin(a, b),
-            _ => self.builder.ins().fmax(a, b),
+            Host::Add => self.emit.builder.ins().fadd(a, b),
+            Host::Subtract => self.emit.builder.ins().fsub(a, b),
+            Host::Multiply => self.emit.builder.ins().fmul(a, b),
+            Host::Divide => self.emit.builder.ins().fdiv(a, b),
+            Host::Minimum => self.emit.builder.ins().fmin(a, b),
+            _ => self.emit.builder.ins().fmax(a, b),
         }
     }
 
     /// Writes the other registers, unless something was out of the ordinary.
     fn finish(mut self, graph: &Graph, last: &[(Word, Id)]) {
         let sums: Vec<Value> = self.sums.into_iter().flatten().collect();
-        if let Some(sum) = sums.into_iter().reduce(|a, b| self.builder.ins().fadd(a, b)) {
-            let wrong = self.builder.ins().fcmp(FloatCC::Unordered, sum, sum);
+        if let Some(sum) = sums.into_iter().reduce(|a, b| self.emit.builder.ins().fadd(a, b)) {
+            let wrong = self.emit.builder.ins().fcmp(FloatCC::Unordered, sum, sum);
             self.mark(wrong);
+        }
+        let mut wrong = self.wrong_address;
+        if let Some(marks) = self.wrong {
+            let any = self.emit.any(marks);
+            wrong = self.either(wrong, any);
         }
         if let Some(raised) = self.raised {
-            let upper = self.builder.ins().iconst(types::I64, 32);
-            let flags = self.builder.ins().ushr(raised, upper);
-            let zero = self.builder.ins().iconst(types::I64, 0);
-            let wrong = self.builder.ins().icmp(IntCC::NotEqual, flags, zero);
-            self.mark(wrong);
+            let builder = &mut self.emit.builder;
+            let upper = builder.ins().iconst(types::I64, 32);
+            let flags = builder.ins().ushr(raised, upper);
+            let zero = builder.ins().iconst(types::I64, 0);
+            let any = builder.ins().icmp(IntCC::NotEqual, flags, zero);
+            wrong = self.either(wrong, any);
         }
-        if let Some(wrong) = self.wrong {
-            let (right, left) = (self.builder.create_block(), self.builder.create_block());
-            self.builder.set_cold_block(left);
-            self.builder.ins().brif(wrong, left, &[], right, &[]);
-            self.builder.seal_block(left);
-            self.builder.seal_block(right);
-            self.builder.switch_to_block(left);
-            let one = self.builder.ins().iconst(types::I32, 1);
-            self.builder.ins().return_(&[one]);
-            self.builder.switch_to_block(right);
+        if let Some(wrong) = wrong {
+            let builder = &mut self.emit.builder;
+            let (right, left) = (builder.create_block(), builder.create_block());
+            builder.set_cold_block(left);
+            builder.ins().brif(wrong, left, &[], right, &[]);
+            builder.seal_block(left);
+            builder.seal_block(right);
+            builder.switch_to_block(left);
+            let one = builder.ins().iconst(types::I32, 1);
+            builder.ins().return_(&[one]);
+            builder.switch_to_block(right);
         }
         // All are read before one is written: some may be what another register held.
-        let values: Vec<(i32, Value)> = last.iter().map(|&(word, id)| (offset(word), self.any(id))).collect();
-        for (offset, value) in values {
-            self.builder.ins().store(TRUSTED, value, self.registers, offset);
+        let values: Vec<(Word, Value)> = last.iter().map(|&(word, id)| (word, self.any(id))).collect();
+        for (word, value) in values {
+            self.emit.store(value, self.registers, word.index());
         }
         if let Some(flags) = graph.flags {
             let flags = self.integer(flags);
             self.put(flags, 0);
         }
-        let zero = self.builder.ins().iconst(types::I32, 0);
-        self.builder.ins().return_(&[zero]);
-        self.builder.finalize(target().expect("compiling for it").frontend_config());
+        let zero = self.emit.builder.ins().iconst(types::I32, 0);
+        self.emit.builder.ins().return_(&[zero]);
+        self.emit.builder.finalize(target().expect("compiling for it").frontend_config());
     }
 }

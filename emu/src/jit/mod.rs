@@ -4,13 +4,17 @@
 //! else (`graph`), the interpreter runs the block again, from the state that it found. So both do the same, and blocks that
 //! meet such things often are left to the interpreter.
 
+mod emit;
 mod graph;
 mod host;
 mod lower;
 mod native;
 
+use crate::batch::{LANES, Row};
 use crate::block::Block;
-use crate::machine::State;
+use crate::machine::{State, WORDS, Word};
+use crate::micro::Kind;
+use emit::{VECTOR, Width};
 use graph::Graph;
 use lower::Scratch;
 use native::Native;
@@ -59,8 +63,95 @@ pub(crate) fn compile(block: &Block, depth: u32) -> Option<Code> {
     }
     let graph = Graph::new(&block.micros);
     let scratch = Scratch::new(&graph, block.late.len());
-    let native = lower::lower(&graph, depth, scratch)?;
+    let native = lower::lower(&graph, depth, scratch, Width::One)?;
     Some(Code(Arc::new(Parts { native, scratch, watches: graph.watches.into() })))
+}
+
+/// A block's code for the lanes of a batch.
+#[derive(Clone)]
+pub(crate) struct LaneCode(Arc<LaneParts>);
+
+struct LaneParts {
+    native: Native,
+    scratch: Scratch,
+    /// Registers that get their values at the code's end, and so have them after one vector and not yet after the next.
+    last: Box<[Word]>,
+    flags: bool,
+}
+
+impl std::fmt::Debug for LaneCode {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("LaneCode")
+    }
+}
+
+/// What the code for lanes leaves, and what it needs to be undone.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Rows {
+    rows: Vec<Row>,
+    last: Vec<Row>,
+}
+
+impl Rows {
+    /// The data words that a late result was loaded from.
+    pub(crate) fn late(&self, code: &LaneCode, number: usize) -> Row {
+        self.rows[code.0.scratch.late + number]
+    }
+}
+
+/// Compiles a block for the lanes of a batch; `None` if there is no code for it.
+pub(crate) fn compile_lanes(block: &Block, depth: u32) -> Option<LaneCode> {
+    if !is_available() {
+        return None;
+    }
+    // Nobody watches the ports of a batch.
+    let micros: Vec<_> = block.micros.iter().copied().filter(|micro| micro.kind != Kind::Watch).collect();
+    let graph = Graph::new(&micros);
+    let scratch = Scratch::new(&graph, block.late.len());
+    let native = lower::lower(&graph, depth, scratch, Width::Vector { row: LANES })?;
+    let last = graph.places().1.iter().map(|&(word, _)| word).collect();
+    Some(LaneCode(Arc::new(LaneParts { native, scratch, last, flags: graph.uses_flags() })))
+}
+
+impl LaneCode {
+    /// Runs the block in all lanes. If the answer is false, the interpreter is to run it: all that it reads is as it was.
+    pub(crate) fn run(
+        &self,
+        registers: &mut [Row; WORDS],
+        memory: &mut [Row],
+        flags: &mut [Flags; LANES],
+        kept: &mut Rows,
+    ) -> bool {
+        let LaneParts { native, scratch, last, flags: uses_flags } = &*self.0;
+        let Rows { rows, last: before } = kept;
+        if rows.len() < scratch.end {
+            rows.resize(scratch.end, [0; LANES]);
+        }
+        if *uses_flags {
+            rows[0] = flags.map(|flags| flags.bits().into());
+        }
+        before.clear();
+        before.extend(last.iter().map(|word| registers[word.index()]));
+        for lane in (0..LANES).step_by(VECTOR) {
+            let memory_words = memory.as_flattened_mut();
+            if native.call(registers.as_flattened_mut(), memory_words, rows.as_flattened_mut(), lane) {
+                continue;
+            }
+            for lane in (0..lane + VECTOR).rev() {
+                for stored in rows[scratch.stored..scratch.end].chunks_exact(2).rev() {
+                    memory[stored[0][lane] as usize][lane] = stored[1][lane];
+                }
+            }
+            for (word, row) in last.iter().zip(before) {
+                registers[word.index()] = *row;
+            }
+            return false;
+        }
+        if *uses_flags {
+            *flags = rows[0].map(|bits| Flags::from_bits(bits as u8));
+        }
+        true
+    }
 }
 
 impl Code {
@@ -79,7 +170,7 @@ impl Code {
             words.resize(scratch.end, 0);
         }
         words[0] = state.flags.bits().into();
-        if !native.call(&mut state.registers, &mut state.memory, words) {
+        if !native.call(&mut state.registers[..], &mut state.memory, words, 0) {
             for stored in words[scratch.stored..scratch.end].chunks_exact(2).rev() {
                 state.memory[stored[0] as usize] = stored[1];
             }

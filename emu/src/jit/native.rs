@@ -1,6 +1,7 @@
 //! The one place with `unsafe`: machine code is made executable and called.
 #![expect(unsafe_code, reason = "a call of machine code made at run time has no safe form")]
 
+use super::emit::Width;
 use crate::machine::WORDS;
 use cranelift::codegen::Context;
 use cranelift::codegen::control::ControlPlane;
@@ -16,6 +17,7 @@ type Entry = unsafe extern "C" fn(registers: *mut u32, memory: *mut u32, scratch
 /// A compiled block.
 pub(super) struct Native {
     code: Mmap,
+    width: Width,
     memory: usize,
     scratch: usize,
 }
@@ -44,8 +46,9 @@ pub(super) fn signature(target: &dyn TargetIsa) -> Signature {
 
 impl Native {
     /// Machine code for a function with [`signature`], which reads and writes no more than [`WORDS`] registers, `memory`
-    /// words of data memory and `scratch` words. `None` if there is no code for it, or no memory.
-    pub(super) fn new(function: Function, memory: usize, scratch: usize) -> Option<Native> {
+    /// words of data memory and `scratch` words, of each run that `width` takes together. `None` if there is no code for it, or
+    /// no memory.
+    pub(super) fn new(function: Function, width: Width, memory: usize, scratch: usize) -> Option<Native> {
         let target = target()?;
         let mut context = Context::for_function(function);
         let compiled = context.compile(target, &mut ControlPlane::default()).ok()?;
@@ -56,21 +59,40 @@ impl Native {
         let code = compiled.code_buffer();
         let mut pages = MmapMut::map_anon(code.len()).ok()?;
         pages.copy_from_slice(code);
-        Some(Native { code: pages.make_exec().ok()?, memory, scratch })
+        Some(Native { code: pages.make_exec().ok()?, width, memory, scratch })
     }
 
-    /// Runs the block. If something was out of the ordinary, the answer is false: then every register that the block reads
-    /// before it writes it is as it was.
-    pub(super) fn call(&self, registers: &mut [u32; WORDS], memory: &mut [u32], scratch: &mut [u32]) -> bool {
-        assert!(memory.len() >= self.memory && scratch.len() >= self.scratch, "the block needs more words");
+    /// Runs the block in the lanes from `lane` on that a call takes together; one run has lane 0 alone. If something was out of
+    /// the ordinary, the answer is false: then, in these lanes, every register that the block reads before it writes it is as it
+    /// was.
+    pub(super) fn call(
+        &self,
+        registers: &mut [u32],
+        memory: &mut [u32],
+        scratch: &mut [u32],
+        lane: usize,
+    ) -> bool {
+        let Native { width, memory: depth, scratch: places, .. } = *self;
+        let stride = width.stride();
+        assert!(lane + width.lanes() <= stride, "the batch has no such lanes");
+        assert!(registers.len() >= WORDS * stride, "the block needs more registers");
+        assert!(
+            memory.len() >= depth * stride && scratch.len() >= places * stride,
+            "the block needs more words"
+        );
         // SAFETY: the pages hold a whole function of this signature and calling convention, made by Cranelift; they are
-        // executable and stay where they are as long as `self` lives. `graph`, which alone makes such functions, addresses
+        // executable and stay where they are as long as `self` lives. `lower`, which alone makes such functions, addresses
         // the registers by `Word::index`, which is below `WORDS`, the memory by indices compared with `self.memory`, and
-        // the scratch words by numbers below `self.scratch`. The three are borrowed for the time of the call, and nothing
-        // of them is kept.
+        // the scratch words by numbers below `self.scratch`; the word of a number in lane `lane` is `lane` words after
+        // `number * stride`, and those of a vector's lanes follow it, fewer than `stride` in all. So all are within the
+        // lengths above. The three are borrowed for the time of the call, and nothing of them is kept.
         let status = unsafe {
             let entry = std::mem::transmute::<*const u8, Entry>(self.code.as_ptr());
-            entry(registers.as_mut_ptr(), memory.as_mut_ptr(), scratch.as_mut_ptr())
+            entry(
+                registers.as_mut_ptr().add(lane),
+                memory.as_mut_ptr().wrapping_add(lane),
+                scratch.as_mut_ptr().add(lane),
+            )
         };
         status == 0
     }

@@ -6,6 +6,7 @@
 #![allow(dead_code, reason = "each test file uses a part")]
 
 use std::collections::HashMap;
+use takt_emu::{Batch, Emulator};
 use takt_isa::program::{Location, Port};
 use takt_isa::{
     BundleAddress, Function, Instruction, Machine, Operand, Program, ROWS, Register, SlotIndex, Type,
@@ -135,4 +136,16 @@ fn value(text: &str) -> u32 {
     } else {
         text.parse::<i32>().unwrap() as u32
     }
+}
+
+/// Everything that can be seen of a lane is as in its own emulator.
+pub(crate) fn assert_lane(context: &str, batch: &Batch, lane: usize, single: &Emulator) {
+    assert_eq!(batch.now(lane), single.now(), "{context}: now");
+    assert_eq!(batch.flags(lane), single.flags(), "{context}: flags");
+    for register in Register::all() {
+        assert_eq!(batch.register(lane, register), single.register(register), "{context}: {register}");
+        let (found, expected) = (batch.output_bits(lane, register), single.output_bits(register));
+        assert_eq!(found, expected, "{context}: output at {register}");
+    }
+    assert_eq!(batch.memory(lane), single.memory(), "{context}: memory");
 }

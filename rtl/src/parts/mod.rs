@@ -33,6 +33,11 @@ pub(crate) fn core(plan: &Plan, latched: u16) -> Result<String, ModuleError> {
             "0, or how many input ports are latched, from port 0 on: a power of two; then outputs are, too"
                 .to_owned(),
     });
+    m.takes(Parameter {
+        net: net::READ_DELAY.clone(),
+        value: number(0),
+        heading: "0 or 1: cycles from read_output to read_value".to_owned(),
+    });
     control::parameters(plan, &mut m);
     loader::write(plan, &mut m);
     fetch::write(plan, &mut m);

@@ -26,6 +26,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
             .parameter_as("LATCHED", &net::LATCHED)
             .parameter("BANKS", plan.slots.len() as u32)
             .parameter("INDEX", plan.port_bits)
+            .parameter_as("READ_DELAY", &net::READ_DELAY)
             .same([net::CLK, net::RST])
             .port("publish", net::ENDED)
             .port("write", of_banks(&Plan::output_write))

@@ -21,20 +21,20 @@ pub(super) const STATUS: [Net; 8] = [
     net::FAULT_ADDRESS,
 ];
 
-/// Which lanes have a value that arrives.
-pub(super) fn arrives(lanes: usize) -> Net {
-    Net::bus("arrives", lanes as u32)
+/// Which mailboxes have a value that arrives.
+pub(super) fn arrives(mailboxes: usize) -> Net {
+    Net::bus("arrives", mailboxes as u32)
 }
 
 /// The values.
-pub(super) fn values(lanes: usize) -> Net {
-    Net::bus("values", 32 * lanes as u32)
+pub(super) fn values(mailboxes: usize) -> Net {
+    Net::bus("values", 32 * mailboxes as u32)
 }
 
 pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleError> {
     let known = &plan.description.cores[core];
     let own = &plan.cores[core];
-    let lanes = &plan.lanes[core];
+    let mailboxes = &plan.mailboxes[core];
     let outputs = plan.outputs(core);
     let input = |net| Port::new(Direction::Input, net);
     let output = |net| Port::new(Direction::Output, net);
@@ -49,9 +49,9 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
         input(net::LOAD_VALUE),
         input(net::TICK).heading("The tick: high for one cycle, seen in the next one."),
     ];
-    if !lanes.is_empty() {
-        ports.push(input(arrives(lanes.len())).heading("For each lane of the gate, what arrives."));
-        ports.push(input(values(lanes.len())));
+    if !mailboxes.is_empty() {
+        ports.push(input(arrives(mailboxes.len())).heading("For each mailbox of the gate, what arrives."));
+        ports.push(input(values(mailboxes.len())));
     }
     for (i, port) in outputs.iter().enumerate() {
         let write = output(Net::named(format!("{}_write", port_name(&port.name))));
@@ -78,35 +78,35 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
     m.banner("the gate");
     let (gate_write, gate_index, gate_value) =
         (Net::bit("gate_write"), Net::bus("gate_index", own.input_bits), Net::bus("gate_value", 32));
-    if lanes.is_empty() {
+    if mailboxes.is_empty() {
         m.comment("No link drives an input port of this core.");
         m.define(gate_write.clone(), decimal(1, 0_u32));
         m.define(gate_index.clone(), decimal(own.input_bits, 0_u32));
         m.define(gate_value.clone(), decimal(32, 0_u32));
     } else {
         m.comment(
-            "docs/system.md, The gate: of the lanes on which a value waits, the first goes in. Fields of snapshots are first, so that the \
+            "docs/system.md, The gate: of the mailboxes in which a value waits, the first goes in. Fields of snapshots are first, so that the \
              last of them is in when the period's first bundle reads.",
         );
         let name = |register: Register| {
             let port = known.program.inputs.iter().find(|port| port.register == register);
             port.map_or_else(|| known.program.register_text(register), |port| port.name.clone())
         };
-        for (i, lane) in lanes.iter().enumerate() {
-            let link = &plan.description.links[lane.source.link()].name;
-            m.comment(format!("Lane {i}: input port {}, from {link}.", name(lane.register)));
+        for (i, mailbox) in mailboxes.iter().enumerate() {
+            let link = &plan.description.links[mailbox.source.link()].name;
+            m.comment(format!("Mailbox {i}: input port {}, from {link}.", name(mailbox.register)));
         }
         m.wires([gate_write.clone()]);
         m.wires([gate_index.clone()]);
         m.wires([gate_value.clone()]);
         let number = |register: Register| own.machine.inputs.index(register).map_or(0, BankIndex::get);
-        let numbers = lanes.iter().map(|lane| decimal(own.input_bits, number(lane.register)));
+        let numbers = mailboxes.iter().map(|mailbox| decimal(own.input_bits, number(mailbox.register)));
         m.instance(
             Instance::new("takt_gate", "gate")
-                .parameter("LANES", lanes.len() as u32)
+                .parameter("MAILBOXES", mailboxes.len() as u32)
                 .parameter("INDEX", own.input_bits)
                 .parameter_is("NUMBERS", concat(numbers.collect::<Vec<_>>()))
-                .same([net::CLK, net::RST, arrives(lanes.len()), values(lanes.len())])
+                .same([net::CLK, net::RST, arrives(mailboxes.len()), values(mailboxes.len())])
                 .port("input_write", gate_write.clone())
                 .port("input_index", gate_index.clone())
                 .port("input_value", gate_value.clone()),

@@ -17,9 +17,9 @@ pub(super) fn records(plan: &SystemPlan) -> Vec<Record> {
         let loaded = load_records(&core.program).into_iter().filter(|record| !cleared(record));
         records.extend(loaded.map(|record| (number, record)));
         let machine = core.program.machine;
-        for lane in &plan.lanes[number] {
-            let Some(index) = machine.inputs.index(lane.register) else { continue };
-            let value = plan.description.initial(lane.source).into();
+        for mailbox in &plan.mailboxes[number] {
+            let Some(index) = machine.inputs.index(mailbox.register) else { continue };
+            let value = plan.description.initial(mailbox.source).into();
             records.push((number, LoadRecord { space: Space::Input, slot: 0, address: index.get(), value }));
         }
     }

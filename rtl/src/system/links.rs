@@ -203,7 +203,7 @@ fn status_net(plan: &SystemPlan, link: usize, prefix: &str, status: Status, coun
     if status == Status::Count { net.wide(count) } else { net }
 }
 
-/// What arrives on a lane of a core's gate: whether it does, and the value.
+/// What arrives in a mailbox of a core's gate: whether it does, and the value.
 pub(super) fn arrival(plan: &SystemPlan, core: usize, source: Source) -> (Expr, Expr) {
     let link = source.link();
     let known = &plan.description.links[link];

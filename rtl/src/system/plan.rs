@@ -6,7 +6,7 @@ use crate::plan::Plan;
 use crate::verilog::{Direction, Expr, Net, no};
 use takt_isa::Register;
 use takt_isa::timing::Cycle;
-use takt_system::{Description, End, Lane, LinkKind, Status};
+use takt_system::{Description, End, LinkKind, Mailbox, Status};
 
 /// The plan of a system's circuit.
 #[derive(Clone, Debug)]
@@ -17,8 +17,8 @@ pub struct SystemPlan {
     pub cores: Vec<Plan>,
     /// The top's module.
     pub top: String,
-    /// The lanes of each core's gate.
-    pub lanes: Vec<Vec<Lane>>,
+    /// The mailboxes of each core's gate.
+    pub mailboxes: Vec<Vec<Mailbox>>,
 }
 
 /// A pin of the top that is a host's end of a link.
@@ -58,8 +58,8 @@ pub(super) struct OutputPort {
 impl SystemPlan {
     pub(super) fn new(description: Description, cores: Vec<Plan>, name: &str) -> SystemPlan {
         let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
-        let lanes = (0..cores.len()).map(|core| description.lanes(core)).collect();
-        SystemPlan { description, cores, top: format!("takt_system_{plain}"), lanes }
+        let mailboxes = (0..cores.len()).map(|core| description.mailboxes(core)).collect();
+        SystemPlan { description, cores, top: format!("takt_system_{plain}"), mailboxes }
     }
 
     /// The module of a core with its gate.

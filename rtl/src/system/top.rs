@@ -208,7 +208,7 @@ fn ticks(plan: &SystemPlan, m: &mut Module) {
         ));
         let [tick, take, takes] = ["tick", "take", "takes"].map(|what| plan.of_core(number, what));
         m.wires([tick.clone()]);
-        let snapshots = plan.description.snapshot_lanes(number);
+        let snapshots = plan.description.snapshot_mailboxes(number);
         let period = core.period(plan.description.tick);
         let most = (period - 1).max(plan.lead() + core.offset).max(snapshots + 1);
         let pace = Instance::new("takt_pace", format!("pace_{}", core.name))
@@ -234,7 +234,7 @@ fn ticks(plan: &SystemPlan, m: &mut Module) {
 
 fn instance(plan: &SystemPlan, m: &mut Module, core: usize) {
     let known = &plan.description.cores[core];
-    let lanes = &plan.lanes[core];
+    let mailboxes = &plan.mailboxes[core];
     m.banner(&format!("core {core}, {}", known.name));
     let own = |port: &Net| Net::named(format!("{}_{port}", known.name)).wide(port.width());
     let mut instance = Instance::new(plan.core_module(core), plan.core_instance(core))
@@ -244,10 +244,10 @@ fn instance(plan: &SystemPlan, m: &mut Module, core: usize) {
         .port(LOAD_INPUT.name(), Net::bus("loads_input", plan.cores.len() as u32).at(core as u32))
         .same([net::LOAD_SPACE, net::LOAD_SLOT, net::LOAD_ADDRESS, net::LOAD_VALUE])
         .port("tick", plan.of_core(core, "tick"));
-    if !lanes.is_empty() {
+    if !mailboxes.is_empty() {
         let (valid, value): (Vec<Expr>, Vec<Expr>) =
-            lanes.iter().map(|lane| links::arrival(plan, core, lane.source)).unzip();
-        let (arrives, values) = (own(&arrives(lanes.len())), own(&values(lanes.len())));
+            mailboxes.iter().map(|mailbox| links::arrival(plan, core, mailbox.source)).unzip();
+        let (arrives, values) = (own(&arrives(mailboxes.len())), own(&values(mailboxes.len())));
         m.define(arrives.clone(), concat(valid));
         m.define(values.clone(), concat(value));
         instance = instance.port("arrives", arrives).port("values", values);

@@ -212,14 +212,14 @@ impl<'m> Checker<'m> {
         let Some(tick) = tick else { return Ok(None) };
         let description = Description { tick, cores: self.cores, links: self.links };
         for (number, core) in description.cores.iter().enumerate() {
-            let (lanes, period) = (description.snapshot_lanes(number), core.period(tick));
-            if self.mistakes.list.is_empty() && period < lanes + LEAST_PERIOD {
-                let least = lanes + LEAST_PERIOD;
+            let (mailboxes, period) = (description.snapshot_mailboxes(number), core.period(tick));
+            if self.mistakes.list.is_empty() && period < mailboxes + LEAST_PERIOD {
+                let least = mailboxes + LEAST_PERIOD;
                 let place =
                     file.core.get(number).and_then(|core| core.tick.as_ref()).unwrap_or(&file.tick).span();
                 let text = format!(
                     "core `{}` has a tick every {period} cycles and needs {least} at least: {LEAST_PERIOD}, and \
-                     one for each of its {lanes} values from snapshots",
+                     one for each of its {mailboxes} values from snapshots",
                     core.name
                 );
                 self.mistakes.add("tick", place, text).help = Some("a longer `tick`".to_owned());

@@ -119,6 +119,19 @@ impl System {
         }
     }
 
+    /// Does what a host did, as [`System::host_actions`] has it.
+    ///
+    /// # Errors
+    /// If the system is another one.
+    pub fn act(&mut self, action: &HostAction) -> Result<(), HostError> {
+        match action {
+            HostAction::Input { name, bits } => self.set_input(name, *bits),
+            HostAction::Publish(link) => self.publish(*link),
+            HostAction::Push(link) => self.push(*link).map(drop),
+            HostAction::Pop(link) => self.pop(*link).map(drop),
+        }
+    }
+
     /// What the host sees on an output of the system: of a FIFO its head, 0 while it is empty.
     ///
     /// # Errors

@@ -66,8 +66,8 @@ impl System {
     /// A value arrives at a core's gate.
     pub(super) fn arrive(&mut self, core: usize, cycle: Cycle, source: Source, value: u32) {
         let state = &mut self.cores[core];
-        if let Some(lane) = state.lanes.iter().position(|lane| lane.source == source) {
-            state.gate.arrive(cycle, lane, value);
+        if let Some(mailbox) = state.mailboxes.iter().position(|mailbox| mailbox.source == source) {
+            state.gate.arrive(cycle, mailbox, value);
         }
     }
 

@@ -8,7 +8,7 @@ mod host;
 mod links;
 mod run;
 
-use crate::description::{Description, End, Lane, Link, LinkKind, Source, Status};
+use crate::description::{Description, End, Link, LinkKind, Mailbox, Source, Status};
 use crate::fifo::{Fifo, FifoCounts};
 use crate::gate::Gate;
 use std::collections::{BTreeSet, VecDeque};
@@ -156,9 +156,9 @@ pub struct CorePeriods {
 #[derive(Clone)]
 struct CoreState {
     emulator: Emulator,
-    lanes: Arc<[Lane]>,
+    mailboxes: Arc<[Mailbox]>,
     gate: Gate,
-    /// Of links that drive its input ports at any time, one lane each.
+    /// Of links that drive its input ports at any time, one mailbox each.
     moving: Arc<[Source]>,
     /// Whether it has no tick to come, for good.
     halted: bool,
@@ -241,23 +241,25 @@ impl System {
         let mut cores = Vec::new();
         for (number, core) in description.cores.iter().enumerate() {
             let mut emulator = Emulator::new(&core.program)?;
-            let lanes: Arc<[Lane]> = description.lanes(number).into();
+            let mailboxes: Arc<[Mailbox]> = description.mailboxes(number).into();
             for port in &core.program.inputs {
-                let lane = lanes.iter().find(|lane| lane.register == port.register);
-                let initial = lane.map_or(0, |lane| description.initial(lane.source));
+                let mailbox = mailboxes.iter().find(|mailbox| mailbox.register == port.register);
+                let initial = mailbox.map_or(0, |mailbox| description.initial(mailbox.source));
                 // The port is the program's own.
                 let _ = emulator.set_input_bits(port.register, initial);
             }
             emulator.set_watched(watched(&description, number));
-            let moving: Vec<&Lane> =
-                lanes.iter().filter(|lane| !description.links[lane.source.link()].is_snapshot()).collect();
+            let moving: Vec<&Mailbox> = mailboxes
+                .iter()
+                .filter(|mailbox| !description.links[mailbox.source.link()].is_snapshot())
+                .collect();
             if !core.program.latched {
-                let ports = moving.iter().map(|lane| lane.register).collect();
+                let ports = moving.iter().map(|mailbox| mailbox.register).collect();
                 emulator.set_pauses(readers(&core.program, &ports));
             }
             let mut sources: Vec<Source> = Vec::new();
-            for lane in moving {
-                let same = |known: &Source| match (known, &lane.source) {
+            for mailbox in moving {
+                let same = |known: &Source| match (known, &mailbox.source) {
                     (Source::Status { link, side, .. }, Source::Status { link: l, side: s, .. }) => {
                         (link, side) == (l, s)
                     }
@@ -266,12 +268,12 @@ impl System {
                     }
                 };
                 if !sources.iter().any(same) {
-                    sources.push(lane.source);
+                    sources.push(mailbox.source);
                 }
             }
             cores.push(CoreState {
                 emulator,
-                lanes: Arc::clone(&lanes),
+                mailboxes: Arc::clone(&mailboxes),
                 gate: Gate::default(),
                 moving: sources.into(),
                 halted: false,

@@ -132,11 +132,11 @@ impl System {
     /// Lets values go in that count before or in cycle `now` of a core.
     fn enter(&mut self, core: usize, now: Cycle) {
         let delay = self.description.cores[core].input_delay();
-        let CoreState { emulator, gate, lanes, .. } = &mut self.cores[core];
+        let CoreState { emulator, gate, mailboxes, .. } = &mut self.cores[core];
         let inputs = &mut self.inputs;
-        gate.run((now + 1).saturating_sub(delay), |cycle, lane, value| {
-            let register = lanes[lane].register;
-            // A lane's port is an input.
+        gate.run((now + 1).saturating_sub(delay), |cycle, mailbox, value| {
+            let register = mailboxes[mailbox].register;
+            // A mailbox's port is an input.
             let _ = emulator.set_input_bits(register, value);
             if let Some(inputs) = inputs {
                 inputs.push(InputEvent { cycle, core, register, value });

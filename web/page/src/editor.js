@@ -252,7 +252,8 @@ export class Editor {
       ],
     });
     this.client = client;
-    client.workspace.displayFile = async (uri) => (uri === this.name ? this.view : this.showFile(uri));
+    // The address of another file is its name, encoded as addresses are: `%3Cmath.s%3E`.
+    client.workspace.displayFile = async (uri) => (uri === this.name ? this.view : this.showFile(decodeURIComponent(uri)));
     await this.ask("lsp.start", { machine: this.machine });
     if (this.client !== client) return;
     this.handlers = new Set();

@@ -222,6 +222,24 @@ test("sections fold, and a name leads to the file that declares it", limit, asyn
   assert.deepEqual(errors, []);
 });
 
+test("a name of the library leads to the library's file, and so does its include", limit, async () => {
+  const source = ".include <math.s>\n.input x\n.output y\n.reg a\n.period\nperiod: fmul a, x, math.inf\n    mov y, a\n    wait period\n";
+  const { page, errors } = await open(link({ name: "pi.s", machine: "t3", source }));
+  await done(page);
+  await page.waitForSelector(".tok-function");
+  for (const [line, column, shows] of [[6, 22, /math\.inf/], [1, 13, /^/]]) {
+    await page.evaluate(([line, column]) => takt.goTo(line, column), [line, column]);
+    await page.keyboard.press("F12");
+    await page.waitForSelector("#file-shown[open] .cm-content");
+    assert.equal(await page.textContent("#file-name"), "<math.s>");
+    assert.match(await page.locator("#file-text .cm-activeLine").textContent(), shows);
+    if (line > 1) await shot(page, "library");
+    await page.keyboard.press("Escape");
+    await page.waitForSelector("#file-shown", { state: "hidden" });
+  }
+  assert.deepEqual(errors, []);
+});
+
 test("a loop without end stops at a named limit, and the page answers meanwhile", limit, async () => {
   const { page, errors } = await open(link({ name: "loop.s", machine: "t3", source: "start:\n    jmp start\n" }));
   await done(page);

@@ -6,6 +6,10 @@ use std::str::FromStr;
 /// Every warning: its name, and what it is about.
 pub const WARNINGS: &[(&str, &str)] = &[
     ("never-written", "a register with a place is read, and nothing writes it"),
+    (
+        "next-head",
+        "in a system, a field of a FIFO's entry is read so late after its pop that it may be the next one's",
+    ),
     ("no-wait", "`.period` has code that never comes to a `wait` or `halt`"),
     ("table", "an address lies in another table than the one that it names"),
     ("target", "a jump leads past the program's end"),

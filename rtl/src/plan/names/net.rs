@@ -13,6 +13,9 @@ macro_rules! nets {
 /// Parameter: how many input ports are latched.
 pub static LATCHED: Net = Net::bit("LATCHED");
 
+/// Parameter: cycles from an output port's number to its value.
+pub static READ_DELAY: Net = Net::bit("READ_DELAY");
+
 nets! {
     // ---- ports
     /// The clock.

@@ -1,0 +1,116 @@
+//! What both sides did, side by side: the same for a core and for a system.
+
+use takt_isa::timing::Cycle;
+
+/// The first thing in which the two sides differ.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Difference {
+    /// Its cycle.
+    pub cycle: Cycle,
+    /// Of a system, the core, the link or the pin; of a single core empty.
+    pub place: String,
+    /// The instruction and its place in the source, as far as the event has them.
+    pub instruction: String,
+    /// What the emulator does.
+    pub emulator: String,
+    /// What the circuit does.
+    pub circuit: String,
+}
+
+impl std::fmt::Display for Difference {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "cycle {}", self.cycle)?;
+        if !self.place.is_empty() {
+            write!(f, ", {}", self.place)?;
+        }
+        if !self.instruction.is_empty() {
+            write!(f, " at {}", self.instruction)?;
+        }
+        write!(f, "\n  emulator: {}\n  circuit:  {}", self.emulator, self.circuit)
+    }
+}
+
+impl std::error::Error for Difference {}
+
+/// Events of both sides, until they are compared.
+pub(crate) struct Comparison<E> {
+    /// The emulator's.
+    pub(crate) expected: Vec<E>,
+    /// The circuit's.
+    pub(crate) found: Vec<E>,
+    /// How many were the same on both.
+    pub(crate) compared: u64,
+}
+
+impl<E> Default for Comparison<E> {
+    fn default() -> Comparison<E> {
+        Comparison { expected: Vec::new(), found: Vec::new(), compared: 0 }
+    }
+}
+
+/// Events of one place that differ, or one that the other side lacks.
+pub(crate) struct Unequal<E> {
+    pub(crate) emulator: Option<E>,
+    pub(crate) circuit: Option<E>,
+}
+
+impl<E: PartialEq + Copy> Comparison<E> {
+    /// Compares the events of which the answer is `known`, in the order of `key`. Events of one `place` are shown side by side;
+    /// else the earlier one is what the other side lacks.
+    pub(crate) fn check<K: Ord, P: Ord>(
+        &mut self,
+        known: impl Fn(&E) -> bool,
+        key: impl Fn(&E) -> K,
+        place: impl Fn(&E) -> P,
+    ) -> Result<(), Unequal<E>> {
+        let take = |events: &mut Vec<E>| {
+            let (mut taken, left): (Vec<_>, Vec<_>) = events.drain(..).partition(|event| known(event));
+            *events = left;
+            taken.sort_by_key(|event| key(event));
+            taken
+        };
+        let (expected, found) = (take(&mut self.expected), take(&mut self.found));
+        let same = expected.iter().zip(&found).take_while(|(a, b)| a == b).count();
+        self.compared += same as u64;
+        match (expected.get(same).copied(), found.get(same).copied()) {
+            (None, None) => Ok(()),
+            (Some(a), Some(b)) if place(&a) < place(&b) => Err(Unequal { emulator: Some(a), circuit: None }),
+            (Some(a), Some(b)) if place(&a) > place(&b) => Err(Unequal { emulator: None, circuit: Some(b) }),
+            (emulator, circuit) => Err(Unequal { emulator, circuit }),
+        }
+    }
+}
+
+impl<E> Unequal<E> {
+    /// Both sides in words.
+    pub(crate) fn sides(&self, text: impl Fn(&E) -> String) -> [String; 2] {
+        [&self.emulator, &self.circuit].map(|event| event.as_ref().map_or("nothing".to_owned(), &text))
+    }
+
+    /// The event that tells where it is.
+    pub(crate) fn first(&self) -> Option<&E> {
+        self.emulator.as_ref().or(self.circuit.as_ref())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A difference of each kind: in the value, and an event that a side lacks.
+    #[test]
+    fn the_first_difference_is_found() {
+        let check = |expected: &[(u64, char)], found: &[(u64, char)]| {
+            let mut comparison =
+                Comparison { expected: expected.to_vec(), found: found.to_vec(), ..Comparison::default() };
+            let unequal = comparison.check(|event| event.0 < 9, |event| *event, |event| event.0).err();
+            (comparison.compared, unequal.map(|unequal| unequal.sides(|event| event.1.to_string())))
+        };
+        let sides = |a: &str, b: &str| Some([a.to_owned(), b.to_owned()]);
+        assert_eq!(check(&[(2, 'b'), (1, 'a')], &[(1, 'a'), (2, 'b'), (9, 'x')]), (2, None));
+        assert_eq!(check(&[(1, 'a'), (2, 'b')], &[(1, 'a'), (2, 'c')]), (1, sides("b", "c")));
+        assert_eq!(check(&[(1, 'a'), (3, 'b')], &[(2, 'c'), (3, 'b')]), (0, sides("a", "nothing")));
+        assert_eq!(check(&[(3, 'b')], &[(2, 'c'), (3, 'b')]), (0, sides("nothing", "c")));
+        assert_eq!(check(&[(1, 'a'), (2, 'b')], &[(1, 'a')]), (1, sides("b", "nothing")));
+    }
+}

@@ -1,0 +1,338 @@
+//! Looking ahead and back for what a command waits for: events on links, steps of a core, stops of the cores' sessions.
+
+use super::{LATE, Point, STRETCH, Seen, SystemSession, SystemStop, SystemWhy};
+use crate::session::{Live, Search, Session, Unit, Why};
+use std::collections::BTreeMap;
+use takt_emu::{Event, Status};
+use takt_isa::timing::Cycle;
+use takt_system::{InputEvent, LinkEvent};
+
+/// What a core's session has found: where, which core, and what.
+type Found = (Cycle, usize, Why);
+
+/// What is looked for: positions at which to stop, with the stop's number if it is one.
+type Hits = Vec<(Cycle, Option<u32>)>;
+
+impl SystemSession {
+    /// Goes on by a step of a core; all others go on meanwhile. `views` has a session for each core, or, for steps by cycle,
+    /// bundle or period, none.
+    ///
+    /// # Returns
+    /// [`SystemWhy::Done`]; that this core has halted; or why the system stopped before.
+    pub fn step(&mut self, views: &mut [&mut Session], core: usize, unit: Unit) -> SystemWhy {
+        let why = match unit {
+            Unit::Cycle => return self.go_to(self.cycle() + 1),
+            _ if self.has_halted(core) => return SystemWhy::Core(core, Why::Halted),
+            Unit::Bundle | Unit::Period => self.seek(&mut [], Vec::new(), |cores, _| ends(unit, core, cores)),
+            Unit::Line | Unit::Call | Unit::Out => {
+                let searches = self.step_searches(views, core, unit);
+                // It may halt on the way.
+                self.seek(views, searches, |cores, _| ends(unit, core, cores))
+            }
+        };
+        match why {
+            SystemWhy::Core(_, Why::Done) => SystemWhy::Done,
+            SystemWhy::Done if self.has_halted(core) => SystemWhy::Core(core, Why::Halted),
+            why => why,
+        }
+    }
+
+    /// Goes back by a step.
+    pub fn step_back(&mut self, views: &mut [&mut Session], core: usize, unit: Unit) -> SystemWhy {
+        let why = match (unit, self.cycle()) {
+            (_, 0) => return SystemWhy::Start,
+            (Unit::Cycle, now) => return self.go_to(now - 1),
+            (Unit::Bundle | Unit::Period, _) => {
+                self.seek_back(&mut [], |_| Vec::new(), |cores, _| ends(unit, core, cores))
+            }
+            (Unit::Line | Unit::Call | Unit::Out, _) => {
+                // How deep it is now is what counts, not how deep it was where the search begins.
+                let wanted = self.step_searches(views, core, unit);
+                self.seek_back(views, |_| wanted.clone(), |_, _| Hits::new())
+            }
+        };
+        match why {
+            SystemWhy::Core(_, Why::Done) => SystemWhy::Done,
+            why => why,
+        }
+    }
+
+    /// For each core what is looked for: of one, the end of its step.
+    fn step_searches(&self, views: &mut [&mut Session], core: usize, unit: Unit) -> Vec<Option<Search>> {
+        self.show(views);
+        let search =
+            |(number, view): (usize, &&mut Session)| (number == core).then(|| Search::step(unit, view));
+        views.iter().enumerate().map(search).collect()
+    }
+
+    fn has_halted(&self, core: usize) -> bool {
+        matches!(self.system().core(core).status(), Status::Halted { .. })
+    }
+
+    /// Goes to where so many periods of a core have ended, forward or back.
+    pub fn go_to_period(&mut self, core: usize, period: u64) -> SystemWhy {
+        let ended = |system: &takt_system::System| system.periods(core).count;
+        if period == 0 {
+            return self.go_to(0);
+        }
+        while ended(self.system()) < period {
+            if self.has_halted(core) {
+                return SystemWhy::Core(core, Why::Halted);
+            }
+            let why = self.go_to(self.cycle() + STRETCH);
+            if why != SystemWhy::Done && ended(self.system()) < period {
+                return why;
+            }
+        }
+        let before = self.checkpoints.partition_point(|point| ended(&point.system) < period);
+        self.point = self.checkpoints[before.saturating_sub(1)].clone();
+        while ended(self.system()) < period {
+            let why = self.step(&mut [], core, Unit::Period);
+            if why != SystemWhy::Done {
+                return why;
+            }
+        }
+        SystemWhy::Done
+    }
+
+    /// Runs on to a stop: an event on a link, or one of a core's session. `views` has a session for each core, or none.
+    pub fn resume(&mut self, views: &mut [&mut Session]) -> SystemWhy {
+        self.show(views);
+        let stops = self.stops.clone();
+        let searches = views.iter().map(|view| Search::stops(view)).collect();
+        let why = self.seek(views, searches, |_, links| stopped(&stops, links));
+        self.arrived(views, why)
+    }
+
+    /// Runs back to one.
+    pub fn resume_back(&mut self, views: &mut [&mut Session]) -> SystemWhy {
+        let stops = self.stops.clone();
+        let searches = |views: &[&mut Session]| views.iter().map(|view| Search::stops(view)).collect();
+        let why = self.seek_back(views, searches, |_, links| stopped(&stops, links));
+        self.arrived(views, why)
+    }
+
+    /// Lets a core's session take the line of the breakpoint that it stopped at for the line at hand.
+    fn arrived(&self, views: &mut [&mut Session], why: SystemWhy) -> SystemWhy {
+        if let SystemWhy::Core(core, found) = &why
+            && let Some(view) = views.get_mut(*core)
+        {
+            self.show_core(*core, view, false);
+            view.stopped(found.clone());
+        }
+        why
+    }
+
+    /// Runs on to the next position at which an expression over a core holds.
+    pub fn run_until(&mut self, views: &mut [&mut Session], core: usize, live: Live) -> SystemWhy {
+        let Some(view) = views.get_mut(core) else { return SystemWhy::Done };
+        // As of a single core: what holds already may still hold in the next cycle.
+        if view.holds(&live) {
+            let why = self.go_to(self.cycle() + 1);
+            if why != SystemWhy::Done {
+                return why;
+            }
+            self.show_core(core, view, false);
+            if view.holds(&live) {
+                return SystemWhy::Core(core, Why::Holds);
+            }
+        }
+        let mut searches: Vec<Option<Search>> = views.iter().map(|_| None).collect();
+        searches[core] = Some(Search::value(live, views[core]));
+        self.seek(views, searches, |_, _| Hits::new())
+    }
+
+    /// Shows the cores to their sessions.
+    fn show(&self, views: &mut [&mut Session]) {
+        for (core, view) in views.iter_mut().enumerate() {
+            self.show_core(core, view, false);
+        }
+    }
+
+    fn show_core(&self, core: usize, view: &mut Session, boundary: bool) {
+        let system = self.system();
+        view.look(system.core(core).clone(), system.periods(core).count, boundary);
+    }
+
+    /// Goes on to the first position after this one that is looked for.
+    fn seek(
+        &mut self,
+        views: &mut [&mut Session],
+        mut searches: Vec<Option<Search>>,
+        wanted: impl Fn(&[(usize, Event)], &[LinkEvent]) -> Hits,
+    ) -> SystemWhy {
+        let origin = self.cycle();
+        let looks = searches.iter().any(Option::is_some);
+        loop {
+            let begin = looks.then(|| self.point.clone());
+            // What issues where a stretch ends is known of the next one.
+            let from = self.cycle().max(origin + 1);
+            let mut seen = Seen::default();
+            let left = self.run_limit.saturating_sub(self.cycle() - origin).max(1);
+            let why = self.advance(self.cycle() + STRETCH.min(left), Some(&mut seen));
+            let now = self.cycle();
+            let hits = wanted(&seen.cores, &self.point.links).into_iter();
+            let first = hits.filter(|(cycle, _)| *cycle > origin && *cycle <= now).min();
+            if let Some(begin) = begin {
+                let end = first.map_or(now, |(cycle, _)| cycle);
+                let found = self.walk(begin, (from, end), &seen, views, &mut searches, true).pop();
+                if let Some((cycle, core, why)) = found {
+                    self.go_to(cycle);
+                    return SystemWhy::Core(core, why);
+                }
+            }
+            if let Some((cycle, id)) = first {
+                self.go_to(cycle);
+                return id.map_or(SystemWhy::Done, SystemWhy::Stop);
+            }
+            if why != SystemWhy::Done {
+                return why;
+            }
+            if now - origin >= self.run_limit {
+                return SystemWhy::Limit(now - origin);
+            }
+            if self.interrupted() {
+                return SystemWhy::Interrupted;
+            }
+        }
+    }
+
+    /// Goes back to the last position before this one that is looked for: that `wanted` finds, or one of the searches that `begin`
+    /// makes where each stretch begins.
+    fn seek_back(
+        &mut self,
+        views: &mut [&mut Session],
+        begin: impl Fn(&[&mut Session]) -> Vec<Option<Search>>,
+        wanted: impl Fn(&[(usize, Event)], &[LinkEvent]) -> Hits,
+    ) -> SystemWhy {
+        // Looked for are positions before `end`, from a checkpoint before `before` on.
+        let (mut end, mut before) = (self.cycle(), self.cycle());
+        while before > 0 {
+            self.restore(before - 1);
+            let start = self.cycle();
+            self.show(views);
+            let mut searches = begin(views);
+            let looks = searches.iter().any(Option::is_some);
+            let mut hits = Hits::new();
+            let mut found: Option<Found> = None;
+            // What is told of late, too.
+            while self.cycle() < end + LATE {
+                let from = self.cycle().max(start + 1);
+                let begin = (looks && from < end).then(|| self.point.clone());
+                let mut seen = Seen::default();
+                let why = self.advance((self.cycle() + STRETCH).min(end + LATE), Some(&mut seen));
+                hits.extend(wanted(&seen.cores, &self.point.links));
+                if let Some(begin) = begin {
+                    let last = self.cycle().min(end - 1);
+                    found =
+                        self.walk(begin, (from, last), &seen, views, &mut searches, false).pop().or(found);
+                }
+                if why != SystemWhy::Done {
+                    break;
+                }
+            }
+            // What has just happened where a stretch begins is known of the one before.
+            let last =
+                hits.into_iter().filter(|(cycle, _)| *cycle < end && (*cycle > start || start == 0)).max();
+            match (last, found) {
+                (last, Some((cycle, core, why))) if last.is_none_or(|(other, _)| other < cycle) => {
+                    self.go_to(cycle);
+                    return SystemWhy::Core(core, why);
+                }
+                (Some((cycle, id)), _) => {
+                    self.go_to(cycle);
+                    return id.map_or(SystemWhy::Done, SystemWhy::Stop);
+                }
+                _ => {}
+            }
+            (end, before) = (start + 1, start);
+            if self.interrupted() {
+                return SystemWhy::Interrupted;
+            }
+        }
+        self.go_to(0);
+        SystemWhy::Start
+    }
+
+    /// Goes again over a stretch in which the cores did what was seen, and shows each core to its session at each position of a
+    /// range that matters to its search. What they have found, in order: the first, or all. The session is where it was.
+    fn walk(
+        &mut self,
+        begin: Point,
+        (from, end): (Cycle, Cycle),
+        seen: &Seen,
+        views: &mut [&mut Session],
+        searches: &mut [Option<Search>],
+        first: bool,
+    ) -> Vec<Found> {
+        let here = std::mem::replace(&mut self.point, begin);
+        let mut positions: BTreeMap<Cycle, Vec<usize>> = BTreeMap::new();
+        let mut issues = BTreeMap::new();
+        let mut boundaries = Vec::new();
+        for (core, search) in searches.iter().enumerate() {
+            let Some(search) = search else { continue };
+            let events: Vec<&Event> =
+                seen.cores.iter().filter(|(own, _)| *own == core).map(|(_, event)| event).collect();
+            let inputs: Vec<&InputEvent> = seen.inputs.iter().filter(|input| input.core == core).collect();
+            for event in &events {
+                match event {
+                    Event::Issue { cycle, address } => drop(issues.insert((core, *cycle), *address)),
+                    Event::Wait { cycle, .. } => boundaries.push((core, cycle + 1)),
+                    _ => {}
+                }
+            }
+            let mut own = search.positions(&events, &inputs, from, end);
+            let edits = self.edits.iter().filter(|edit| edit.core == core).map(|edit| edit.cycle);
+            own.extend(edits.filter(|cycle| (from..=end).contains(cycle)));
+            if from == 1 {
+                // The first values of input ports are there from the first cycle on.
+                own.insert(1);
+            }
+            for position in own {
+                positions.entry(position).or_default().push(core);
+            }
+        }
+        let mut found = Vec::new();
+        'positions: for (cycle, cores) in positions {
+            if self.advance(cycle, None) != SystemWhy::Done || self.cycle() != cycle {
+                break;
+            }
+            for core in cores {
+                let (Some(search), Some(view)) = (&mut searches[core], views.get_mut(core)) else { continue };
+                self.show_core(core, view, boundaries.contains(&(core, cycle)));
+                if let Some(why) = search.visit(view, issues.get(&(core, cycle)).copied()) {
+                    found.push((cycle, core, why));
+                    if first {
+                        break 'positions;
+                    }
+                }
+            }
+        }
+        self.point = here;
+        found
+    }
+}
+
+/// Where steps of a core end, of those that its own session need not be asked about: by bundles and periods; and all where it
+/// halts.
+fn ends(unit: Unit, core: usize, cores: &[(usize, Event)]) -> Hits {
+    let own = cores.iter().filter(|(own, _)| *own == core);
+    own.filter_map(|(_, event)| match event {
+        Event::Issue { cycle, .. } if unit == Unit::Bundle => Some((*cycle, None)),
+        Event::Wait { cycle, .. } if unit == Unit::Period => Some((cycle + 1, None)),
+        Event::Halt { cycle, .. } => Some((cycle + 1, None)),
+        _ => None,
+    })
+    .collect()
+}
+
+fn stopped(stops: &[(u32, SystemStop, String)], links: &[LinkEvent]) -> Hits {
+    let mut hits = Hits::new();
+    for (id, stop, _) in stops {
+        let same = |event: &&LinkEvent| {
+            event.link == stop.link && stop.kind.is_none_or(|kind| kind.name() == event.kind.name())
+        };
+        hits.extend(links.iter().filter(same).map(|event| (event.cycle + 1, Some(*id))));
+    }
+    hits
+}

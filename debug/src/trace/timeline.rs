@@ -1,0 +1,167 @@
+//! What all cores of a system do in a window of cycles, and what happens on its links, on one axis: as JSON, and as a page
+//! for a browser. [`SystemTracer`](super::SystemTracer) fills it.
+
+use super::Record;
+use crate::value;
+use serde_json::{Value, json};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+use takt_isa::BundleAddress;
+use takt_isa::timing::{Cause, Cycle};
+use takt_system::{Description, End, LinkEvent, LinkEventKind, LinkKind, System};
+
+/// Stretches and events that a timeline holds at most; it ends in the cycle in which it has more.
+const MOST: usize = 1 << 18;
+
+/// What a core does in a stretch of cycles: bundles issue, one a cycle, or one of them stalls.
+struct Stretch {
+    at: Cycle,
+    cycles: Cycle,
+    /// Why nothing issues; `None` where bundles do.
+    stall: Option<Cause>,
+    first: BundleAddress,
+    last: BundleAddress,
+}
+
+/// Cycles of a system, as [`SystemTracer`](super::SystemTracer) saw them.
+#[derive(Default)]
+pub struct Timeline {
+    cycles: Range<Cycle>,
+    /// Of each core.
+    cores: Vec<Vec<Stretch>>,
+    events: Vec<LinkEvent>,
+    /// Of each link, how many entries it had at the beginning.
+    entries: Vec<usize>,
+    size: usize,
+}
+
+impl Timeline {
+    /// Whether it holds as much as it may.
+    pub(super) fn is_full(&self) -> bool {
+        self.size > MOST
+    }
+
+    /// Before the first cycle.
+    pub(super) fn begin(&mut self, system: &System) {
+        let description = system.description();
+        self.cycles = system.now()..system.now();
+        self.cores.resize_with(description.cores.len(), Vec::new);
+        self.entries = (0..description.links.len()).map(|link| system.fifo_entries(link).len()).collect();
+    }
+
+    /// A cycle that has passed: a record for each core.
+    pub(super) fn add(&mut self, now: Cycle, records: &[Record], events: Vec<LinkEvent>) {
+        self.cycles.end = now + 1;
+        self.size += events.len();
+        self.events.extend(events);
+        for (stretches, record) in self.cores.iter_mut().zip(records) {
+            let (address, stall) = match (record.issued, record.stall) {
+                (Some(address), _) => (address, None),
+                (None, Some((_, Cause::Wait))) | (None, None) => continue,
+                (None, Some((address, cause))) => (address, Some(cause)),
+            };
+            match stretches.last_mut() {
+                Some(last) if last.stall == stall && last.at + last.cycles == now => {
+                    last.cycles += 1;
+                    last.last = address;
+                }
+                _ => {
+                    stretches.push(Stretch { at: now, cycles: 1, stall, first: address, last: address });
+                    self.size += 1;
+                }
+            }
+        }
+    }
+
+    /// The cycles that it covers.
+    pub fn cycles(&self) -> Range<Cycle> {
+        self.cycles.clone()
+    }
+
+    /// What the picture is drawn from. `start` is the cycle of the first base tick.
+    pub fn json(&self, description: &Description, start: Cycle, name: &str) -> Value {
+        let ticks = |first: Cycle, period: Cycle| -> Vec<Cycle> {
+            let skipped = self.cycles.start.saturating_sub(first).div_ceil(period);
+            (first + skipped * period..self.cycles.end).step_by(period as usize).collect()
+        };
+        let core = |(number, core): (usize, &takt_system::Core)| {
+            let program = &core.program;
+            let stretches = self.cores.get(number).map_or(&[][..], Vec::as_slice);
+            let used: BTreeSet<BundleAddress> =
+                stretches.iter().flat_map(|stretch| [stretch.first, stretch.last]).collect();
+            let places: BTreeMap<String, Option<String>> = used
+                .into_iter()
+                .map(|address| (address.get().to_string(), program.bundle_place(address)))
+                .collect();
+            let mut causes: Vec<String> = Vec::new();
+            let stretches: Vec<Value> = stretches
+                .iter()
+                .map(|stretch| {
+                    let cause = stretch.stall.map(|cause| {
+                        let text = program.cause_text(cause);
+                        let known = causes.iter().position(|known| *known == text);
+                        known.unwrap_or_else(|| {
+                            causes.push(text);
+                            causes.len() - 1
+                        })
+                    });
+                    let kind = stretch.stall.map_or("issue", Cause::name);
+                    json!([stretch.at, stretch.cycles, kind, stretch.first, stretch.last, cause])
+                })
+                .collect();
+            json!({
+                "name": core.name,
+                "machine": program.machine.name,
+                "program": core.path,
+                "ticks": ticks(start + core.offset, core.period(description.tick)),
+                "between_ticks": core.period(description.tick),
+                "stretches": stretches,
+                "places": places,
+                "causes": causes,
+            })
+        };
+        let mut events: Vec<Vec<Value>> = vec![Vec::new(); description.links.len()];
+        for event in self.events.iter().filter(|event| self.cycles.contains(&event.cycle)) {
+            let link = &description.links[event.link];
+            let shown = match event.kind {
+                LinkEventKind::Value(bits) => Some(value::text(link.fields[0].ty, bits)),
+                _ => None,
+            };
+            events[event.link].push(json!([event.cycle, event.kind.name(), shown]));
+        }
+        let end = |end: End| description.core(end).map_or("host", |core| core.name.as_str());
+        let link = |(number, events): (usize, Vec<Value>)| {
+            let link = &description.links[number];
+            let (kind, depth) = match link.kind {
+                LinkKind::Wire => ("wire", None),
+                LinkKind::Snapshot { .. } => ("snapshot", None),
+                LinkKind::Fifo { depth, .. } => ("fifo", Some(depth)),
+            };
+            json!({
+                "name": link.name,
+                "kind": kind,
+                "from": end(link.from),
+                "to": end(link.to),
+                "latency": link.latency,
+                "depth": depth,
+                "entries": self.entries.get(number),
+                "events": events,
+            })
+        };
+        json!({
+            "system": name,
+            "first": self.cycles.start,
+            "end": self.cycles.end,
+            "base_ticks": ticks(start, description.tick),
+            "cores": description.cores.iter().enumerate().map(core).collect::<Vec<_>>(),
+            "links": events.into_iter().enumerate().map(link).collect::<Vec<_>>(),
+        })
+    }
+
+    /// The picture as a page for a browser, which needs nothing else.
+    pub fn html(&self, description: &Description, start: Cycle, name: &str) -> String {
+        // `</` would end the script.
+        let data = self.json(description, start, name).to_string().replace("</", "<\\/");
+        include_str!("timeline.html").replace("/*DATA*/", &data)
+    }
+}

@@ -1,0 +1,85 @@
+;;; takt.el --- Takt in Emacs  -*- lexical-binding: t -*-
+
+;; Put this file into a folder of `load-path', and (require 'takt) into init.el. The language server is used by lsp-mode
+;; or Eglot (29 has it), the debugger by dap-mode: whichever is installed.
+
+;;; Code:
+
+(require 'prog-mode)
+
+(defgroup takt nil "Robot controllers on a processor whose every cycle is accounted for." :group 'languages)
+
+(defcustom takt-command "takt" "The program `takt'." :type 'string)
+
+(defcustom takt-lsp-arguments nil
+  "Options of `takt lsp': (\"-m\" \"t1\" \"--deadline\" \"100us\")."
+  :type '(repeat string))
+
+(defvar takt-mode-syntax-table
+  (let ((table (make-syntax-table)))
+    (modify-syntax-entry ?\; "<" table)
+    (modify-syntax-entry ?\n ">" table)
+    (modify-syntax-entry ?. "_" table)
+    (modify-syntax-entry ?_ "_" table)
+    table))
+
+;;;###autoload
+(define-derived-mode takt-mode prog-mode "Takt"
+  "Sources of Takt. Colours come from the language server, as semantic tokens."
+  (setq-local comment-start "; ")
+  (setq-local comment-start-skip ";+ *")
+  (setq-local tab-width 8)
+  (setq-local indent-tabs-mode nil)
+  (setq-local indent-line-function #'indent-relative-first-indent-point))
+
+;;;###autoload
+(add-to-list 'auto-mode-alist '("\\.s\\'" . takt-mode))
+
+(defun takt--server (&rest _)
+  "The command line of the language server."
+  (append (list takt-command "lsp") takt-lsp-arguments))
+
+(defvar lsp-language-id-configuration)
+(declare-function lsp-register-client "lsp-mode")
+(declare-function lsp-stdio-connection "lsp-mode")
+(declare-function make-lsp-client "lsp-mode")
+(with-eval-after-load 'lsp-mode
+  (add-to-list 'lsp-language-id-configuration '(takt-mode . "takt"))
+  (lsp-register-client
+   (make-lsp-client :new-connection (lsp-stdio-connection #'takt--server)
+                    :activation-fn (lambda (&rest _) (derived-mode-p 'takt-mode))
+                    :server-id 'takt)))
+
+(defvar eglot-server-programs)
+(with-eval-after-load 'eglot
+  (add-to-list 'eglot-server-programs '(takt-mode . takt--server)))
+
+;;; The debugger: `dap-debug' asks which of these.
+
+(declare-function dap-register-debug-provider "dap-mode")
+(declare-function dap-register-debug-template "dap-mode")
+(declare-function dap--cur-session-or-die "dap-mode")
+(declare-function dap--step "dap-mode")
+(with-eval-after-load 'dap-mode
+  (dap-register-debug-provider
+   "takt"
+   (lambda (configuration) (plist-put configuration :dap-server-path (list takt-command "dap"))))
+  (dap-register-debug-template
+   "Takt: this file" (list :type "takt" :request "launch" :name "Takt: this file" :program "${file}"))
+  (dap-register-debug-template
+   "Takt: closed loop" (list :type "takt" :request "launch" :name "Takt: closed loop" :track t))
+  ;; All output, since what the debugger tells is in none of the categories that are shown by default.
+  (setq dap-output-buffer-filter nil))
+
+(defun takt-step-back ()
+  "Step back by a line, in the thread that is selected."
+  (interactive)
+  (dap--step "stepBack" (dap--cur-session-or-die)))
+
+(defun takt-reverse-continue ()
+  "Run back to a breakpoint."
+  (interactive)
+  (dap--step "reverseContinue" (dap--cur-session-or-die)))
+
+(provide 'takt)
+;;; takt.el ends here
