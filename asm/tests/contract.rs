@@ -2,6 +2,7 @@
 
 mod common;
 mod random_source;
+mod rows;
 
 use common::{bad, bundles};
 use random_source::Random;
@@ -17,8 +18,9 @@ fn assembled(text: &str, machine: &'static Machine, schedule: Schedule, contract
     assembled.unwrap_or_else(|errors| panic!("{text}\n{}", errors.render(false)))
 }
 
-fn on_t4(text: &str) -> Assembled {
-    assembled(text, &T4, Schedule::AsWritten, Contract::AsWritten)
+/// On a machine with one slot that fuses.
+fn on_one(text: &str) -> Assembled {
+    assembled(text, rows::named("fused"), Schedule::AsWritten, Contract::AsWritten)
 }
 
 const HEAD: &str = ".input a, b, c, d\n.output F, G\n.reg t u v\n.state s\n.preset s = 1.0\n";
@@ -27,10 +29,10 @@ const HEAD: &str = ".input a, b, c, d\n.output F, G\n.reg t u v\n.state s\n.pres
 #[track_caller]
 fn becomes(period: &str, by_hand: &str) {
     let whole = |contract: &str, body: &str| format!("{HEAD}{contract}\n.period\np:\n{body}\n wait p\n");
-    let (fused, hand) = (on_t4(&whole(".contract on", period)), on_t4(&whole("", by_hand)));
+    let (fused, hand) = (on_one(&whole(".contract on", period)), on_one(&whole("", by_hand)));
     assert_eq!(bundles(&fused), bundles(&hand), "{period}");
     // Nothing is said of the names that are no more.
-    let plain = on_t4(&whole("", period)).warnings.render(false);
+    let plain = on_one(&whole("", period)).warnings.render(false);
     assert_eq!(fused.warnings.render(false), plain, "{period}");
     let lines = |text: &str| text.lines().filter(|line| !line.trim_end().ends_with(':')).count();
     assert_eq!(fused.contractions.len(), lines(period) - lines(by_hand), "{period}");
@@ -54,7 +56,7 @@ fn sums_and_differences() {
 #[test]
 fn equations() {
     let period = |contract: &str, body: &str| {
-        let assembled = on_t4(&format!("{HEAD}.contract {contract}\n.period\np:\n{body}\n wait p\n"));
+        let assembled = on_one(&format!("{HEAD}.contract {contract}\n.period\np:\n{body}\n wait p\n"));
         bundles(&assembled)[0].clone()
     };
     assert_eq!(period("on", " F = a*b + c"), "fma F, a, b, c");
@@ -159,7 +161,7 @@ fn where_it_is_on() {
 fn where_nothing_can_be_taken_out() {
     for last in [" wait 0\n", " .raw mul 0x020000000000\n wait p\n"] {
         let text = format!("{HEAD}.contract on\n.period\np: fmul t, a, b\n fadd F, t, c\n{last}");
-        assert_eq!(on_t4(&text).contractions, [], "{text}");
+        assert_eq!(on_one(&text).contractions, [], "{text}");
     }
 }
 
@@ -168,7 +170,7 @@ fn what_is_said_of_it() {
     let text = format!(
         "{HEAD}.contract on\n.period\np: fmul t, a, b\n fadd F, t, c\n fmul u, a, a\n fsub G, u, d\n wait p\n"
     );
-    let one = on_t4(&text);
+    let one = on_one(&text);
     let warnings = one.warnings.render(false);
     assert!(!warnings.contains("`t`") && !warnings.contains("`u`"), "{warnings}");
     let places = |at: Option<_>| at.map(|at| one.program.place_text(at)).unwrap_or_default();

@@ -602,7 +602,7 @@ fn placed_registers_are_written_by_their_slot() {
             });
             let Some(row) = some else { continue };
             let text = format!(
-                ".schedule on\n.input a:bits, b:bits\n.output y:bits\n.reg t:bits @ {}7\n.once\n wait p\n.period\np: t = {}\n y = t\n wait p\n",
+                ".schedule on\n.input a:bits, b:bits, c:bits\n.output y:bits\n.reg t:bits @ {}7\n.once\n wait p\n.period\np: t = {}\n y = t\n wait p\n",
                 slot.bank.name, row.forms[0]
             );
             if let Err(report) = assemble(&text, machine) {

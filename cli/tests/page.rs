@@ -45,6 +45,44 @@ fn the_page_opens_and_draws_every_operation() {
     assert!(!page.contains("data-rows=\"") && console.contains("missing is not defined"), "{console}");
 }
 
+/// The page of a system: every core's cycles are those of its period, and what happens on links is drawn.
+#[test]
+fn the_page_of_a_system_draws_all_cores_and_links() {
+    let folder = Folder::new();
+    let systems = format!("{}/../programs/systems", env!("CARGO_MANIFEST_DIR"));
+    let with = format!("{systems}/speed.toml --inputs {systems}/speed.csv");
+    folder.line(&format!("analyse {with} --html page.html")).ok();
+    let periods = folder.line(&format!("analyse {with} --json")).ok();
+    let periods: serde_json::Value = serde_json::from_str(&periods).unwrap();
+    let text = folder.read_text("page.html");
+    assert!(!text.contains("src=") && !text.contains("href="));
+    let data = text.split("id=\"data\">").nth(1).and_then(|rest| rest.split("</script>").next()).unwrap();
+    let data: serde_json::Value = serde_json::from_str(data).unwrap();
+    let cores = data["cores"].as_array().unwrap();
+    assert_eq!(cores.len(), 3);
+    for core in cores {
+        // From its last tick on.
+        let tick = core["ticks"].as_array().unwrap().last().unwrap().as_u64().unwrap();
+        let stretches = core["stretches"].as_array().unwrap().iter();
+        let own = stretches.filter(|stretch| stretch[0].as_u64().unwrap() > tick);
+        let cycles: u64 = own.map(|stretch| stretch[1].as_u64().unwrap()).sum();
+        let known = &periods["cores"][core["name"].as_str().unwrap()]["periods"];
+        let range = known["min"].as_u64().unwrap()..=known["max"].as_u64().unwrap();
+        assert!(range.contains(&cycles), "{}: {cycles}, {range:?}", core["name"]);
+    }
+    let links = data["links"].as_array().unwrap();
+    assert!(
+        links.iter().any(|link| link["kind"] == "wire" && !link["events"].as_array().unwrap().is_empty())
+    );
+
+    let (page, console) = open(&folder, "page.html");
+    assert_eq!(console, "");
+    assert!(page.contains("data-drawn=\"") && !page.contains("data-drawn=\"0\""));
+    for core in cores {
+        assert!(page.contains(&format!(">{}</text>", core["name"].as_str().unwrap())), "{}", core["name"]);
+    }
+}
+
 /// What the mouse finds over an operation is told beside it.
 #[test]
 fn hovering_shows_the_details() {

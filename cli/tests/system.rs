@@ -82,8 +82,8 @@ fn analyse_tells_where_each_core_s_cycles_went() {
             core["stalls"].as_object().unwrap().values().map(|cycles| cycles.as_u64().unwrap()).sum();
         assert_eq!(core["bundles"].as_u64().unwrap() + stalls, core["cycles"].as_u64().unwrap());
     }
-    let wrong = folder.line(&format!("analyse {toml} --html x.html"));
-    assert!(wrong.stderr.contains("--html with a system"), "{}", wrong.stderr);
+    let wrong = folder.line(&format!("analyse {toml} --machine t1"));
+    assert!(wrong.stderr.contains("--machine with a system"), "{}", wrong.stderr);
 }
 
 #[test]
@@ -221,7 +221,7 @@ fn a_head_that_is_read_after_its_pop() {
         assert_eq!((done.status, done.stderr.as_str()), (Some(0), ""), "{system}");
     }
     // The mistake that the generation once had: nothing kept the reads before the pop.
-    for name in ["two.toml", "generation.s", "tracking.s"] {
+    for name in ["two.toml", "generation.s", "tracking.s", "robot.s"] {
         let text = std::fs::read_to_string(speed(&format!("../hybrid/{name}"))).unwrap();
         let without = text.lines().filter(|line| !line.starts_with(".order") || !line.ends_with(", pop"));
         folder.write(name, without.map(|line| format!("{line}\n")).collect::<String>());

@@ -166,7 +166,8 @@ fn programs_of_numbers_agree() {
             program.data.iter_mut().for_each(|bits| *bits = tame(&mut random));
             let context = format!("{}, seed {seed}", machine.name);
             let mut count = |kind: usize, runs: CompiledRuns| {
-                all[kind] = CompiledRuns { done: all[kind].done + runs.done, left: all[kind].left + runs.left };
+                all[kind] =
+                    CompiledRuns { done: all[kind].done + runs.done, left: all[kind].left + runs.left };
             };
             count(0, compare(&context, &program, seed, 12, tame));
             if seed % 3 == 0 {

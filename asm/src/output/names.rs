@@ -171,6 +171,10 @@ fn values(ir: &Ir, placement: &Placement, emitted: &Emitted) -> Vec<NamedValue> 
     for (original, mut versions) in split {
         versions.push((original, None));
         let name = &ir.register(original).name;
+        // What an equation computes on its way has none.
+        if name.is_empty() {
+            continue;
+        }
         for (id, orders) in versions {
             let Some(register) = placement.addresses[id.index()] else { continue };
             let shared = placement.shared[id.index()];

@@ -3,7 +3,7 @@
 
 use std::sync::OnceLock;
 use takt_isa::spec::units::*;
-use takt_isa::{Bank, Machine, Slot, T3, Unit};
+use takt_isa::{Bank, Function, Machine, Slot, T3, Unit};
 
 const MUL: &[Unit] = &[MULTIPLY, DIVROOT, SINE, ARCTANGENT, ARCCOSINE];
 
@@ -28,6 +28,23 @@ const ROWS: &[(&str, &Slots)] = &[
             ("mul", &[ALU_LATE, MULTIPLY, DIVROOT, SINE, ARCTANGENT, ARCCOSINE]),
             ("add", &[ADD, CONVERT]),
             ("aux", &[ALU, MEMORY, SEQUENCER]),
+        ],
+    ),
+    // Products and sums fused in one slot alone.
+    (
+        "fused",
+        &[
+            (
+                "mul",
+                &[
+                    Unit { functions: &[Function::Multiply, Function::Fused], ..FUSED },
+                    SINE,
+                    ARCTANGENT,
+                    ARCCOSINE,
+                ],
+            ),
+            ("add", &[ADD, DIVROOT]),
+            ("aux", &[ALU, CONVERT, MEMORY, SEQUENCER]),
         ],
     ),
     (

@@ -128,7 +128,8 @@ pub(crate) fn run(arguments: &Arguments<'_>, color: bool, out: &mut Out) -> Resu
 fn timeline(ran: &System, ticks: u64) -> Result<Timeline> {
     let description = ran.description();
     let slowest = description.cores.iter().map(|core| core.every).max().unwrap_or(1);
-    let first = ran.now().saturating_sub(slowest.min(ticks) * description.tick);
+    // Looked at from the cycle before on, so that what the host does then is seen.
+    let first = ran.now().saturating_sub(slowest.min(ticks) * description.tick + 1);
     let mut system = System::new(description)?;
     let mut tracer = SystemTracer::timeline(first..ran.now());
     tracer.run_to_start(&mut system, ran.now())?;

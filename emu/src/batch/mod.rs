@@ -85,7 +85,9 @@ impl Batch {
 
     /// As [`crate::Emulator::set_compile_after`]; a run of all lanes of a group counts as one.
     pub fn set_compile_after(&mut self, runs: Option<u64>) {
-        self.groups.iter_mut().for_each(|group| group.each_emulator(|emulator| emulator.set_compile_after(runs)));
+        self.groups
+            .iter_mut()
+            .for_each(|group| group.each_emulator(|emulator| emulator.set_compile_after(runs)));
     }
 
     /// Stops a lane with [`crate::FaultKind::CycleLimit`] if a period takes so many cycles, waiting and what runs once

@@ -1,7 +1,7 @@
 //! Stands in for the compiler of blocks: there is no code for any.
 
-use crate::block::Block;
 use crate::batch::{LANES, Row};
+use crate::block::Block;
 use crate::machine::{State, WORDS};
 use takt_isa::fp::Flags;
 

@@ -11,7 +11,9 @@ use super::native::{Native, signature, target};
 use crate::machine::Word;
 use cranelift::codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift::codegen::ir::{Function, SigRef, UserFuncName};
-use cranelift::prelude::{AbiParam, FunctionBuilder, FunctionBuilderContext, InstBuilder, Signature, Value, types};
+use cranelift::prelude::{
+    AbiParam, FunctionBuilder, FunctionBuilderContext, InstBuilder, Signature, Value, types,
+};
 use takt_isa::{Op, ROWS, compute, fp};
 
 /// Where a block's code finds and leaves what is neither register nor memory: the flags, values of watched ports, data words
@@ -77,7 +79,8 @@ struct Lowering<'a, 'f> {
 /// The code of a block, for a data memory of `depth` words; `None` if there is none that is worth while.
 pub(super) fn lower(graph: &Graph, depth: u32, scratch: Scratch, width: Width) -> Option<Native> {
     let target = target()?;
-    let has = |name: &str| target.isa_flags().iter().any(|flag| flag.name == name && flag.as_bool() == Some(true));
+    let has =
+        |name: &str| target.isa_flags().iter().any(|flag| flag.name == name && flag.as_bool() == Some(true));
     if width != Width::One && !has("has_sse41") {
         return None;
     }

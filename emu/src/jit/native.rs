@@ -65,7 +65,13 @@ impl Native {
     /// Runs the block in the lanes from `lane` on that a call takes together; one run has lane 0 alone. If something was out of
     /// the ordinary, the answer is false: then, in these lanes, every register that the block reads before it writes it is as it
     /// was.
-    pub(super) fn call(&self, registers: &mut [u32], memory: &mut [u32], scratch: &mut [u32], lane: usize) -> bool {
+    pub(super) fn call(
+        &self,
+        registers: &mut [u32],
+        memory: &mut [u32],
+        scratch: &mut [u32],
+        lane: usize,
+    ) -> bool {
         let Native { width, memory: depth, scratch: places, .. } = *self;
         let stride = width.stride();
         assert!(lane + width.lanes() <= stride, "the batch has no such lanes");
@@ -82,7 +88,11 @@ impl Native {
         // lengths above. The three are borrowed for the time of the call, and nothing of them is kept.
         let status = unsafe {
             let entry = std::mem::transmute::<*const u8, Entry>(self.code.as_ptr());
-            entry(registers.as_mut_ptr().add(lane), memory.as_mut_ptr().wrapping_add(lane), scratch.as_mut_ptr().add(lane))
+            entry(
+                registers.as_mut_ptr().add(lane),
+                memory.as_mut_ptr().wrapping_add(lane),
+                scratch.as_mut_ptr().add(lane),
+            )
         };
         status == 0
     }

@@ -80,7 +80,7 @@ impl Arguments {
 
     /// The ECP5, if it is one.
     fn ecp5(&self) -> Device {
-        self.device.unwrap_or(Device::Ecp5Large)
+        self.device.unwrap_or(Device::Large)
     }
 
     /// The device, as a measurement's row names it.
@@ -120,20 +120,20 @@ impl Arguments {
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Device {
     #[value(name = "85k")]
-    Ecp5Large,
+    Large,
     #[value(name = "45k")]
-    Ecp5Middle,
+    Middle,
     #[value(name = "25k")]
-    Ecp5Small,
+    Small,
 }
 
 impl Device {
     /// Its maker's name for it, and nextpnr's.
     const fn names(self) -> (&'static str, &'static str) {
         match self {
-            Device::Ecp5Large => ("LFE5U-85F", "--85k"),
-            Device::Ecp5Middle => ("LFE5U-45F", "--45k"),
-            Device::Ecp5Small => ("LFE5U-25F", "--25k"),
+            Device::Large => ("LFE5U-85F", "--85k"),
+            Device::Middle => ("LFE5U-45F", "--45k"),
+            Device::Small => ("LFE5U-25F", "--25k"),
         }
     }
 }

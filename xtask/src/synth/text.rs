@@ -28,7 +28,7 @@ pub(super) fn in_words(row: &Synthesis, seeds: &[u32]) -> String {
         text,
         "\n  {luts} LUTs{}, {flip_flops} flip-flops, {multipliers} multipliers, {block_rams} block RAMs",
         carries.map_or_else(String::new, |carries| format!(
-            " ({} LUT4, {carries} halves of carry cells)",
+            " ({} LUT4, {carries} in carry chains)",
             luts - carries
         ))
     );
