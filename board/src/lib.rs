@@ -12,7 +12,6 @@ pub mod kind;
 pub mod latency;
 pub mod pll;
 pub mod protocol;
-pub mod routed;
 pub mod serial;
 pub mod simulation;
 #[cfg(unix)]

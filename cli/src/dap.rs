@@ -127,7 +127,7 @@ enum Kind {
 }
 
 /// Fields of a configuration that editors add, or that the adapter reads itself.
-const OTHERS: [&str; 16] = [
+const OTHERS: [&str; 17] = [
     "program",
     "cwd",
     "stopOnEntry",
@@ -140,7 +140,9 @@ const OTHERS: [&str; 16] = [
     "preLaunchTask",
     "postDebugTask",
     "internalConsoleOptions",
+    // Where an adapter on a socket is: VS Code's, and with the host Emacs's.
     "debugServer",
+    "host",
     "serverReadyAction",
     "trace",
     "suppressMultipleSessionWarning",

@@ -235,12 +235,11 @@ const FAULTS: &[Fault] = &[
     ("takt_fifo", "popped & count != ONE", "popped"),
     ("takt_fifo", "put | pop", "pushed | popped"),
     ("takt_fifo", "pushed & free == next", "1'b0"),
-    ("takt_fifo", "words[first]", "words[next]"),
+    ("takt_fifo", "words[first]", "words[free]"),
     ("takt_fifo", "{empty, full, count, overflow, underflow}", "{empty, full, count, 1'b0, underflow}"),
     ("takt_fifo", "write[f] ? value[32*f +: 32] : working[32*f +: 32]", "working[32*f +: 32]"),
-    // The loader: a record that is left out, memories that are not cleared.
+    // The loader: a record that is left out.
     ("takt_loader", "state == 2'd1", "state == 2'd1 & next != 3"),
-    ("takt_loader", "clears ? cleared : record[63:48]", "record[63:48]"),
     // The gate: the last mailbox first, an older value that stays, a newer one that is lost.
     ("takt_gate", "next & (~next + 1'b1)", "next & ~((next >> 1) | (next >> 2) | (next >> 3))"),
     ("takt_gate", "arrives[k]", "arrives[k] & ~waits[k]"),

@@ -41,7 +41,7 @@ impl Code {
 pub(crate) enum LaneCode {}
 
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Rows;
+pub(crate) struct Rows {}
 
 impl Rows {
     pub(crate) fn late(&self, code: &LaneCode, _: usize) -> Row {

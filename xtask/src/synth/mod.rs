@@ -52,6 +52,9 @@ pub(crate) struct Arguments {
     /// placed and routed, too.
     #[arg(long, value_enum, default_value_t = Family::Ecp5)]
     family: Family,
+    /// Resources only: no place and route, which a machine that fits the Gowin otherwise goes through.
+    #[arg(long)]
+    count: bool,
     /// The ECP5: of 24,000, 44,000 or 84,000 LUT4; the largest unless stated.
     #[arg(long, value_enum)]
     device: Option<Device>,
@@ -157,6 +160,7 @@ pub(crate) fn synth(arguments: &Arguments) -> Result<()> {
         arguments.family == Family::Ecp5 || (arguments.device, arguments.grade) == (None, None),
         "--device and --grade choose among ECP5s; of other families there is one device"
     );
+    ensure!(!arguments.count || arguments.family != Family::Ecp5, "--count is for other families than ECP5");
     let designs = designs::designs(arguments)?;
     let packages: Vec<&str> = [YOSYS].into_iter().chain(arguments.family.placer()).collect();
     let venv = Venv::with(&packages)?;

@@ -71,8 +71,8 @@ pub(super) fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Res
         if !lacks.is_empty() {
             progress.suspend(|| eprintln!("{device} has too few {} for it", lacks.join(", ")));
         }
-        let has_pins = !design.pins.is_empty();
-        if !lacks.is_empty() || !has_pins || arguments.family.placer().is_none() {
+        let places = arguments.family.placer().is_some() && !arguments.count && !design.pins.is_empty();
+        if !lacks.is_empty() || !places {
             progress.finish_and_clear();
             return Ok(row);
         }
