@@ -173,7 +173,7 @@ impl Emit<'_> {
         self.as_float(bits)
     }
 
-    pub(super) fn from_signed(&mut self, value: Value) -> Value {
+    pub(super) fn signed_as_float(&mut self, value: Value) -> Value {
         let ty = self.float_type();
         self.builder.ins().fcvt_from_sint(ty, value)
     }

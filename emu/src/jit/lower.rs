@@ -379,7 +379,7 @@ impl Lowering<'_, '_> {
             }
             Host::FromInteger => {
                 let a = self.integer(sources[0]);
-                self.forms[id].float = Some(self.emit.from_signed(a));
+                self.forms[id].float = Some(self.emit.signed_as_float(a));
             }
             Host::ToInteger => {
                 let a = self.float(sources[0]);
