@@ -601,8 +601,14 @@ fn placed_registers_are_written_by_their_slot() {
                         .any(|form| form.contains("a, b") || form.contains("a + b") || form.contains("a & b"))
             });
             let Some(row) = some else { continue };
+            let ty = |index: usize| match row.types.get(index) {
+                Some(Type::F) => "float",
+                Some(Type::I) => "int",
+                Some(Type::B) | None => "bits",
+            };
+            let [t, a, b, c] = [0, 1, 2, 3].map(ty);
             let text = format!(
-                ".schedule on\n.input a:bits, b:bits, c:bits\n.output y:bits\n.reg t:bits @ {}7\n.once\n wait p\n.period\np: t = {}\n y = t\n wait p\n",
+                ".schedule on\n.input a:{a}, b:{b}, c:{c}\n.output y:{t}\n.reg t:{t} @ {}7\n.once\n wait p\n.period\np: t = {}\n y = t\n wait p\n",
                 slot.bank.name, row.forms[0]
             );
             if let Err(report) = assemble(&text, machine) {

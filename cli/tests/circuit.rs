@@ -95,7 +95,7 @@ fn latched_ports_come_from_the_program() {
         assert!(text.lines().any(parameter), "{file}");
     }
     folder.line("rtl -o out --machine t1").ok();
-    assert!(folder.read_text("out/takt_t1.v").contains("parameter LATCHED = 0\n"));
+    assert!(folder.read_text("out/takt_t1.v").contains("parameter LATCHED = 0,\n"));
     let text = cosim(&folder, "cosim p.s --machine t1 --inputs in.csv").ok();
     assert!(text.contains("3 periods on t1") && text.contains("no difference"), "{text}");
 }
