@@ -57,7 +57,7 @@ fn a_broken_configuration_is_told() {
     let core = |name: &str, program: &str| format!("[[core]]\nname = \"{name}\"\nprogram = \"{program}\"\n");
     folder.write("broken.toml", "tick = 100\n[[core]]\nname = \n");
     for (file, program) in [("missing.toml", "sun.s"), ("wrong.toml", "wrong.s"), ("two.toml", "sum.s")] {
-        folder.write(file, &format!("tick = 100\n{}{}", core("a", "sum.s"), core("b", program)));
+        folder.write(file, format!("tick = 100\n{}{}", core("a", "sum.s"), core("b", program)));
     }
     let mut client = Client::start(&folder, "dap");
     client.command("initialize", json!({}));
@@ -349,7 +349,7 @@ fn emacs_works_with_it() {
     folder.write("wrong.s", "fad a, b\n");
     folder.write("loop.s", ".reg n:int\n li n, 0\nagain: iadd n, n, 1\n jmp again\n");
     let core = |name: &str, program: &str| format!("[[core]]\nname = \"{name}\"\nprogram = \"{program}\"\n");
-    folder.write("two.toml", &format!("tick = 100\n{}{}", core("adds", "sum.s"), core("loops", "loop.s")));
+    folder.write("two.toml", format!("tick = 100\n{}{}", core("adds", "sum.s"), core("loops", "loop.s")));
     folder.write("broken.toml", "tick = 100\n[[core]]\nname = \n");
     let clients = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/clients/emacs_dap.el");
     let configuration = concat!(env!("CARGO_MANIFEST_DIR"), "/../editors/emacs");
