@@ -233,11 +233,15 @@ fn watchpoints_and_conditions_see_every_position() {
         // A condition: of all bundles that issue, those in even cycles.
         let mut stepping = console();
         let mut expected = Vec::new();
-        let mut bundle = None;
-        while stepping.session.cycle() < END {
+        let (mut bundle, mut cycle) = (None, 0);
+        while cycle < END {
             stepping.execute("step bundle").expect("a bundle");
             let here = stepping.session.system().core(1).next_address();
-            let cycle = stepping.session.cycle();
+            let before = std::mem::replace(&mut cycle, stepping.session.cycle());
+            if cycle == before {
+                // It has halted, or waits for good.
+                break;
+            }
             if *bundle.get_or_insert(here) == here && cycle % 2 == 0 {
                 expected.push(cycle);
             }
