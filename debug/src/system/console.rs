@@ -172,10 +172,8 @@ impl SystemConsole {
 
     /// Shows each core's state in its view.
     fn look(&mut self) {
-        let system = self.session.system();
-        for (core, view) in self.views.iter_mut().enumerate() {
-            view.session.look(system.core(core).clone(), system.periods(core).count, false);
-        }
+        let mut views: Vec<&mut Session> = self.views.iter_mut().map(|view| &mut view.session).collect();
+        self.session.show(&mut views);
     }
 
     /// Where the session is: the selected core's bundle.
@@ -218,7 +216,7 @@ impl SystemConsole {
     ) -> SystemWhy {
         let mut views: Vec<&mut Session> = self.views.iter_mut().map(|view| &mut view.session).collect();
         let why = moves(&mut self.session, &mut views);
-        self.look();
+        self.session.show(&mut views);
         // What is looked at next is where it has stopped.
         match &why {
             SystemWhy::Core(core, _) => self.selected = *core,

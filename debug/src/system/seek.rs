@@ -143,7 +143,7 @@ impl SystemSession {
     }
 
     /// Shows the cores to their sessions.
-    fn show(&self, views: &mut [&mut Session]) {
+    pub(super) fn show(&self, views: &mut [&mut Session]) {
         for (core, view) in views.iter_mut().enumerate() {
             self.show_core(core, view, false);
         }
