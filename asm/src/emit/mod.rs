@@ -7,7 +7,8 @@ use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, numbered};
 use crate::limits::NAME_BYTES;
 use crate::report::diag::{Diagnostic, Sink};
 use crate::report::source::Span;
-use std::collections::{BTreeMap, HashSet};
+use foldhash::{HashSet, HashSetExt as _};
+use std::collections::BTreeMap;
 use takt_isa::program::{LoopBound, Port, Range, Section, Space, Symbol};
 use takt_isa::{BundleAddress, Instruction, Program, Register, SlotIndex, Type};
 

@@ -69,6 +69,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
     };
     let data_words = flat.data.iter().map(words).sum();
     let (pool, own_files) = (HashMap::default(), Vec::new());
+    let has_equations = context.asts.iter().any(|ast| !ast.equations.is_empty());
     let mut resolver = Resolver {
         context,
         loader,
@@ -84,6 +85,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         kinds: Vec::new(),
         sharing: Sharing::default(),
         turns: 0,
+        has_equations,
     };
     let once = std::mem::take(&mut resolver.flat.once);
     resolver.section(Section::Once, &once);
@@ -142,6 +144,8 @@ pub(crate) struct Resolver<'c> {
     sharing: Sharing,
     /// Turns of all sums.
     turns: usize,
+    /// Whether there are equations at all: what is above one counts for nothing else.
+    has_equations: bool,
 }
 
 impl Resolver<'_> {
@@ -259,11 +263,19 @@ impl Resolver<'_> {
 
     /// Adds a bundle to the program.
     fn push(&mut self, mut bundle: Bundle) {
-        let is_opaque = bundle.is_opaque();
         let order = self.ir.bundles.len() as u32;
         self.ir.scheduled |= bundle.scheduled;
-        for operation in &mut bundle.operations {
-            operation.order = order;
+        bundle.operations.iter_mut().for_each(|operation| operation.order = order);
+        if self.has_equations {
+            self.note_results(&bundle);
+        }
+        self.ir.bundles.push(bundle);
+    }
+
+    /// Notes for the equations below what a bundle writes.
+    fn note_results(&mut self, bundle: &Bundle) {
+        let is_opaque = bundle.is_opaque();
+        for operation in &bundle.operations {
             if let Some(dest) = operation.dest {
                 let kind = self.result_kind(operation);
                 self.set_kind(dest, kind);
@@ -273,7 +285,6 @@ impl Resolver<'_> {
                 self.sharing.cut();
             }
         }
-        self.ir.bundles.push(bundle);
     }
 
     /// Where an operation comes from: its own line, or what `.loc` says.
