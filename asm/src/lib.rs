@@ -257,7 +257,7 @@ impl Checked {
         }
         let adjustments = copies::report(&ir, homes);
         let placement = place::place(&ir, &mut sink);
-        let mut emitted = emit::emit(&ir, &placement, &mut sink);
+        let mut emitted = emit::emit(&mut ir, &placement, &mut sink);
         emitted.program.parts = names::parts(&sources, &emitted);
         let names = names::names(&mut context, &ir, &placement, &mut emitted);
         let report = sink.finish(Arc::clone(&sources));

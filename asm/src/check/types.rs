@@ -212,6 +212,12 @@ impl<'i, V: Known> Types<'i, V> {
                     let is_mistaken = |operation| self.is_mistaken(number, operation);
                     self.mistaken = bundle.operations.iter().any(is_mistaken);
                 }
+                if let [operation] = &bundle.operations[..] {
+                    let result = self.result(number, operation);
+                    self.store(number, operation);
+                    self.write(number, operation, result, context.as_deref_mut());
+                    continue;
+                }
                 // All operations of a bundle read before any writes.
                 let results: SmallVec<[V; 4]> =
                     bundle.operations.iter().map(|operation| self.result(number, operation)).collect();

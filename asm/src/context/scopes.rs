@@ -7,6 +7,7 @@ use crate::syntax::ast::{Ast, DirectiveKind};
 use crate::syntax::intern::Interner;
 use crate::syntax::name::NameId;
 use foldhash::HashMap;
+use std::fmt::Write as _;
 use std::rc::Rc;
 
 /// An expansion: what a use of a macro, or one turn of a repetition, adds to the names around it.
@@ -248,7 +249,15 @@ impl Scopes {
     pub(crate) fn scope_name(&self, scope: ScopeId) -> Option<String> {
         let owner = self.scope(scope).owner;
         match self.scope(owner).kind {
-            ScopeKind::Macro(of, number) => Some(format!("{}.{number}", self.text(of))),
+            ScopeKind::Macro(of, number) => {
+                let of = self.text(of);
+                // Room for any number: each use has such a name.
+                let mut name = String::with_capacity(of.len() + 11);
+                name.push_str(of);
+                // A string takes all that is written to it.
+                let _ = write!(name, ".{number}");
+                Some(name)
+            }
             _ => None,
         }
     }

@@ -22,8 +22,8 @@ pub(crate) struct Emitted {
     pub(crate) parts: Vec<(u32, Span)>,
 }
 
-/// Writes the program.
-pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
+/// Writes the program. The labels become its symbols.
+pub(crate) fn emit(ir: &mut Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
     let slots = ir.machine.slots.len();
     let filler = Instruction::NOP.encode().unwrap_or(0);
     let mut code = vec![filler; ir.bundles.len() * slots];
@@ -65,7 +65,7 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
         outputs: ports(ir, placement, |kind| kind == RegisterKind::Output),
         latched: ir.latched,
         registers: ports(ir, placement, |kind| matches!(kind, RegisterKind::Plain | RegisterKind::State)),
-        symbols: symbols(ir),
+        symbols: symbols(std::mem::take(&mut ir.labels)),
         sections: sections(ir),
         loop_bounds: loop_bounds(ir),
         ranges: ranges(ir, placement),
@@ -167,13 +167,10 @@ fn ports(ir: &Ir, placement: &Placement, wanted: impl Fn(RegisterKind) -> bool) 
         .collect()
 }
 
-fn symbols(ir: &Ir) -> Vec<Symbol> {
-    let symbol = |label: &crate::ir::Label| Symbol {
-        name: label.name.clone(),
-        space: label.space,
-        address: label.position,
-    };
-    let mut symbols: Vec<Symbol> = ir.labels.iter().map(symbol).collect();
+fn symbols(labels: Vec<crate::ir::Label>) -> Vec<Symbol> {
+    let symbol =
+        |label: crate::ir::Label| Symbol { name: label.name, space: label.space, address: label.position };
+    let mut symbols: Vec<Symbol> = labels.into_iter().map(symbol).collect();
     // Labels of one address stay in the order of the source.
     symbols.sort_by_key(|symbol| (symbol.space, symbol.address));
     symbols

@@ -200,13 +200,13 @@ fn ranges(ir: &Ir) -> Vec<Option<(u32, u32)>> {
         In { run: u32, first: u32, last: u32 },
         Wide,
     }
+    if ir.is_opaque() {
+        // A raw word may use anything.
+        return vec![None; ir.registers.len()];
+    }
     let mut seen = vec![Seen::Nowhere; ir.registers.len()];
     for (run, bounds) in (0..).zip(runs::runs(ir)) {
         for (at, bundle) in (bounds.start as u32..).zip(&ir.bundles[bounds.start..bounds.end]) {
-            if bundle.is_opaque() {
-                // A raw word may use anything.
-                return vec![None; ir.registers.len()];
-            }
             for source in bundle.operations.iter().flat_map(|operation| operation.reads()) {
                 let seen = &mut seen[source.index()];
                 *seen = match *seen {

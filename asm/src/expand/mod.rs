@@ -22,6 +22,7 @@ use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
 use crate::syntax::name::NameId;
+use smallvec::SmallVec;
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 use takt_isa::Type;
@@ -436,7 +437,7 @@ impl<'l> Expander<'l> {
     fn call(&mut self, at: At, name: NameId, operation: Operation) {
         let first = operation.first as usize;
         let operands = &self.context.asts[at.ast as usize].operands[first..first + operation.count as usize];
-        let given = operands.to_vec();
+        let given: SmallVec<[Operand; 6]> = operands.into();
         let Some(definition) = self.context.scopes.macros.get(&name) else { return };
         let (parameters, defined) = definition.parameters(&self.context.asts);
         if parameters != given.len() {

@@ -130,6 +130,9 @@ fn positions(context: &mut Context, ir: &Ir, emitted: &mut Emitted) -> (Vec<Opti
     // By owner; 0 for those that have none yet, as for the code outside of macros.
     let mut numbers = vec![0; context.scopes.count()];
     let mut position = |(order, expansion): (u32, u32)| {
+        if expansion == 0 {
+            return Position { order, scope: 0 };
+        }
         let owner = context.scopes.scope(ScopeId(expansion)).owner;
         let number = &mut numbers[owner.0 as usize];
         if *number == 0

@@ -196,6 +196,15 @@ impl Resolver<'_> {
             StatementKind::Empty | StatementKind::Directive(_) => return,
         };
         let written = &ast.operations[first as usize..(first + count) as usize];
+        if let [one] = written {
+            let location = self.location(item, (one.span, one.line), 0, 1);
+            // What goes wrong is in the report.
+            if let Ok(operation) = self.operation(item.at, &ast, first, 1, location) {
+                let operations = SmallVec::from_buf([operation]);
+                self.push(Bundle { operations, explicit: false, scheduled: item.scheduled });
+            }
+            return;
+        }
         let mut operations: SmallVec<[Operation; 1]> = SmallVec::with_capacity(written.len());
         for (index, (operation, number)) in written.iter().zip(first..).enumerate() {
             let location = self.location(item, (operation.span, operation.line), index, written.len());
@@ -207,10 +216,8 @@ impl Resolver<'_> {
         if operations.len() < written.len() {
             return;
         }
-        let explicit = written.len() > 1;
-        if !explicit {
-            self.push(Bundle { operations, explicit, scheduled: item.scheduled });
-        } else if self.ir.machine.slots.len() == 1 {
+        let explicit = true;
+        if self.ir.machine.slots.len() == 1 {
             match serialise::order(&operations) {
                 Ok(order) => {
                     for index in order {
