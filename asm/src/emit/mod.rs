@@ -5,6 +5,7 @@ pub(crate) mod place;
 use crate::emit::place::Placement;
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, numbered};
 use crate::limits::NAME_BYTES;
+use crate::output::names::Position;
 use crate::report::diag::{Diagnostic, Sink};
 use crate::report::source::Span;
 use foldhash::{HashSet, HashSetExt as _};
@@ -16,8 +17,8 @@ use takt_isa::{BundleAddress, Instruction, Program, Register, SlotIndex, Type};
 pub(crate) struct Emitted {
     pub(crate) program: Program,
     pub(crate) expanded: Vec<u32>,
-    /// For each word that has a source line, its operation's order and expansion.
-    pub(crate) origins: Vec<Option<(u32, u32)>>,
+    /// For each word that has a source line, its operation's order, and its expansion for the scope.
+    pub(crate) origins: Vec<Option<Position>>,
     /// Words that compute a part of an equation, and where that stands.
     pub(crate) parts: Vec<(u32, Span)>,
 }
@@ -41,7 +42,7 @@ pub(crate) fn emit(ir: &mut Ir, placement: &Placement, sink: &mut Sink) -> Emitt
             let index = words.start + slot.index();
             code[index] = word(ir, operation, slot, placement, sink);
             lines[index] = operation.location;
-            origins[index] = operation.location.map(|_| (operation.order, operation.expansion));
+            origins[index] = operation.location.map(|_| Position::new(operation.order, operation.expansion));
             columns.extend(
                 operation.columns.filter(|_| operation.location.is_some()).map(|part| (index as u32, part)),
             );

@@ -230,7 +230,13 @@ impl<'l> Expander<'l> {
             return (self.context, self.flat);
         };
         match self.load(&FileId { place: None, path: path.clone() }) {
-            Ok((ast, file)) => self.enter_file(ast, file),
+            Ok((ast, file)) => {
+                // Room for the bundles of a program in one file: memory that is not written to costs nothing.
+                let room = self.context.asts[ast as usize].operations.len();
+                self.flat.once.reserve(room);
+                self.flat.period.reserve(room);
+                self.enter_file(ast, file);
+            }
             Err(unread) => {
                 let message = format!("`{path}` cannot be read: {unread}");
                 self.context.reports.sink.push(Diagnostic::placeless("load", message));

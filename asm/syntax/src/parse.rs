@@ -36,6 +36,7 @@ fn parse_with(source: &Source, names: &mut Interner, sink: &mut Sink, shortcut: 
     ast.statements.reserve(lines);
     ast.operations.reserve(lines);
     ast.operands.reserve(3 * lines);
+    ast.nodes.reserve(lines);
     let mut lexer = Lexer::new(&source.text, source.base);
     let mut chunk = Chunk::default();
     while lexer.chunk(CHUNK, &mut chunk, names, sink) {
