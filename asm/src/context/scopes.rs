@@ -161,22 +161,32 @@ impl Scopes {
     }
 
     /// What a name is bound to in a scope, or in those around it.
-    #[inline]
-    pub(crate) fn lookup(&self, mut scope: ScopeId, name: NameId) -> Binding {
+    #[inline(always)]
+    pub(crate) fn lookup(&self, scope: ScopeId, name: NameId) -> Binding {
+        if scope != ScopeId::ROOT
+            && let Some(binding) = self.expanded(scope, name)
+        {
+            return binding;
+        }
+        self.globals.get(name.0 as usize).copied().unwrap_or(Binding::None)
+    }
+
+    /// What a name is bound to by an expansion, or by those around it.
+    fn expanded(&self, mut scope: ScopeId, name: NameId) -> Option<Binding> {
         while scope != ScopeId::ROOT {
             let here = self.scope(scope);
             match here.kind {
-                ScopeKind::Rep(variable, value) if variable == name => return Binding::Count(value),
+                ScopeKind::Rep(variable, value) if variable == name => return Some(Binding::Count(value)),
                 ScopeKind::Macro(..) => {
                     if let Some(binding) = self.local(scope, name) {
-                        return binding;
+                        return Some(binding);
                     }
                 }
                 _ => {}
             }
             scope = here.parent;
         }
-        self.globals.get(name.0 as usize).copied().unwrap_or(Binding::None)
+        None
     }
 
     /// What a name is bound to in one scope that takes declarations.

@@ -204,37 +204,46 @@ fn ranges(ir: &Ir) -> Vec<Option<(u32, u32)>> {
         // A raw word may use anything.
         return vec![None; ir.registers.len()];
     }
-    let mut seen = vec![Seen::Nowhere; ir.registers.len()];
+    let is_candidate = |register: &VirtualRegister| {
+        register.kind == RegisterKind::Plain && register.pinned.is_none() && register.preset.is_none()
+    };
+    let wide = |register| if is_candidate(register) { Seen::Nowhere } else { Seen::Wide };
+    let mut seen: Vec<Seen> = ir.registers.iter().map(wide).collect();
+    // Registers that may still be found to be short-lived: a program whose names are used throughout soon has none.
+    let mut left = ir.registers.iter().filter(|register| is_candidate(register)).count();
     for (run, bounds) in (0..).zip(runs::runs(ir)) {
+        if left == 0 {
+            break;
+        }
         for (at, bundle) in (bounds.start as u32..).zip(&ir.bundles[bounds.start..bounds.end]) {
             for source in bundle.operations.iter().flat_map(|operation| operation.reads()) {
-                let seen = &mut seen[source.index()];
-                *seen = match *seen {
-                    Seen::In { run: same, first, .. } if same == run => Seen::In { run, first, last: at },
-                    _ => Seen::Wide,
-                };
+                match &mut seen[source.index()] {
+                    Seen::Wide => {}
+                    Seen::In { run: same, last, .. } if *same == run => *last = at,
+                    seen => {
+                        *seen = Seen::Wide;
+                        left -= 1;
+                    }
+                }
             }
             for dest in bundle.operations.iter().filter_map(|operation| operation.dest) {
-                let seen = &mut seen[dest.index()];
-                *seen = match *seen {
-                    Seen::Nowhere => Seen::In { run, first: at, last: at },
-                    Seen::In { run: same, first, .. } if same == run => Seen::In { run, first, last: at },
-                    _ => Seen::Wide,
-                };
+                match &mut seen[dest.index()] {
+                    Seen::Wide => {}
+                    Seen::In { run: same, last, .. } if *same == run => *last = at,
+                    seen @ Seen::Nowhere => *seen = Seen::In { run, first: at, last: at },
+                    seen => {
+                        *seen = Seen::Wide;
+                        left -= 1;
+                    }
+                }
             }
         }
     }
-    let range = |(register, seen): (&VirtualRegister, &Seen)| match *seen {
-        Seen::In { first, last, .. }
-            if register.kind == RegisterKind::Plain
-                && register.pinned.is_none()
-                && register.preset.is_none() =>
-        {
-            Some((first, last))
-        }
+    let range = |seen: &Seen| match *seen {
+        Seen::In { first, last, .. } => Some((first, last)),
         _ => None,
     };
-    ir.registers.iter().zip(&seen).map(range).collect()
+    seen.iter().map(range).collect()
 }
 
 /// Places short-lived values, in the order of their first writes, in what room there is. A register is taken again only after

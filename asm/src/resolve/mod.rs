@@ -156,8 +156,11 @@ impl Resolver<'_> {
         let mut bounds = self.flat.loop_bounds.clone();
         bounds.retain(|bound| bound.section == section);
         let mut bounds = bounds.into_iter().peekable();
+        let mut next = self.place_labels(section, 0);
         for (index, item) in items.iter().enumerate() {
-            self.place_labels(section, index as u32);
+            if index as u32 >= next {
+                next = self.place_labels(section, index as u32);
+            }
             if let Some(expand::LoopBound { most, .. }) = bounds.next_if(|bound| bound.item == index as u32) {
                 self.ir.loop_bounds.push(LoopBound { position: self.ir.bundles.len() as u32, most });
                 self.sharing.cut();
@@ -168,12 +171,12 @@ impl Resolver<'_> {
         self.place_labels(section, u32::MAX);
     }
 
-    /// Sets the position of the section's labels that stand at or before a statement.
-    fn place_labels(&mut self, section: Section, statement: u32) {
+    /// Sets the position of the section's labels that stand at or before a statement. Returns where the next one stands.
+    fn place_labels(&mut self, section: Section, statement: u32) -> u32 {
         while let Some(label) = self.context.declared.labels.get_mut(self.label) {
             if self.context.declared.label_sections[self.label] == section {
                 if label.position > statement {
-                    return;
+                    return label.position;
                 }
                 label.position = self.ir.bundles.len() as u32;
                 if section != Section::Data {
@@ -182,6 +185,7 @@ impl Resolver<'_> {
             }
             self.label += 1;
         }
+        u32::MAX
     }
 
     fn item(&mut self, item: &Item) {

@@ -37,7 +37,10 @@ impl Resolver<'_> {
             }
             Place::Source(index) => {
                 let ty = row.source_type(index);
-                let source = self.source(at, operand, ty)?;
+                let source = match self.plain(at, operand) {
+                    Some(register) => register,
+                    None => self.other_source(at, operand, ty)?,
+                };
                 operation.sources[index] = source;
                 let is_constant = || {
                     let register = &self.context.declared.registers[source.index()];
@@ -97,7 +100,7 @@ impl Resolver<'_> {
     }
 
     /// The register that an operand names, if it does no more than that and nobody asks for the place.
-    #[inline]
+    #[inline(always)]
     fn plain(&self, at: At, operand: Operand) -> Option<RegisterId> {
         let OperandKind::Name(name) = operand.kind else { return None };
         match self.context.lookup(at.scope, name.resolve().ok()?) {
@@ -404,7 +407,6 @@ impl Resolver<'_> {
     }
 
     /// A register to read: a register as such, or the one that holds a constant.
-    #[inline]
     pub(crate) fn source(&mut self, at: At, operand: Operand, ty: Type) -> Result<RegisterId, Reported> {
         match self.plain(at, operand) {
             Some(register) => Ok(register),
