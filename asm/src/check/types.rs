@@ -8,7 +8,7 @@
 use crate::check::{dest_span, source_span, text};
 use crate::context::{Context, ScopeId, type_name, words};
 use crate::ir::given::{Given, GivenTypes, Kind, Part, What};
-use crate::ir::runs::{Run, runs};
+use crate::ir::runs::Run;
 use crate::ir::{Ir, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
@@ -90,17 +90,16 @@ impl Known for Typed {
 const PASSES: usize = 8;
 
 /// Warns of values that are read as, or go to a register of, another type than theirs.
-pub(crate) fn check(context: &mut Context, ir: &Ir) {
+pub(crate) fn check(context: &mut Context, ir: &Ir, runs: &[Run]) {
     // An operation with a mistake is not in the program, and what it would have written is unknown.
     if context.reports.sink.errors > 0 {
         return;
     }
     let given = std::mem::take(&mut context.declared.given);
-    let runs = runs(ir);
-    if Types::<Kind>::new(context, ir, &given).settle(&runs) {
+    if Types::<Kind>::new(context, ir, &given).settle(runs) {
         let mut types = Types::<Typed>::new(context, ir, &given);
-        types.settle(&runs);
-        types.walk(&runs, Some(context));
+        types.settle(runs);
+        types.walk(runs, Some(context));
     }
 }
 

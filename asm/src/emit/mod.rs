@@ -41,12 +41,11 @@ pub(crate) fn emit(ir: &mut Ir, placement: &Placement, sink: &mut Sink) -> Emitt
             let Some(slot) = operation.slot.or_else(|| free.next()) else { continue };
             let index = words.start + slot.index();
             code[index] = word(ir, operation, slot, placement, sink);
-            lines[index] = operation.location;
-            origins[index] = operation.location.map(|_| Position::new(operation.order, operation.expansion));
-            columns.extend(
-                operation.columns.filter(|_| operation.location.is_some()).map(|part| (index as u32, part)),
-            );
-            if operation.is_computed() && operation.columns.is_none() {
+            let (location, part) = (ir.location(operation), ir.columns(operation));
+            lines[index] = location;
+            origins[index] = location.map(|_| Position::new(operation.order, operation.expansion));
+            columns.extend(part.map(|part| (index as u32, part)));
+            if operation.is_computed() && part.is_none() {
                 parts.push((index as u32, operation.span));
             }
             if operation.expansion != 0 || operation.made || operation.is_computed() {

@@ -8,7 +8,7 @@
 //! A register that only one straight run of bundles uses, and writes before it reads, is needed from its first write to its
 //! last use: it takes a register that is free for so long. While there are enough, each gets one of its own.
 
-use crate::ir::runs;
+use crate::ir::runs::Run;
 use crate::ir::{Ir, RegisterId, RegisterKind, VirtualRegister};
 use crate::report::diag::{Diagnostic, Sink};
 use std::collections::{BTreeSet, HashMap, VecDeque};
@@ -61,7 +61,7 @@ impl Space {
 }
 
 /// Gives every register that is used a place.
-pub(crate) fn place(ir: &Ir, sink: &mut Sink) -> Placement {
+pub(crate) fn place(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Placement {
     let machine = ir.machine;
     // The slot that writes each register, and whether an operation uses it at all.
     let mut writer: Vec<Option<SlotIndex>> = vec![None; ir.registers.len()];
@@ -81,7 +81,7 @@ pub(crate) fn place(ir: &Ir, sink: &mut Sink) -> Placement {
         space.taken[address.index()] = true;
     }
     outputs(ir, &writer, &mut space, &mut addresses, sink);
-    let ranges = ranges(ir);
+    let ranges = ranges(ir, runs);
     let is_local = |index: usize| ranges[index].is_some() && addresses[index].is_none();
     // The most registers that short-lived values need in each bank: room that constants leave if they can.
     let mut wanted_by_locals = vec![0; machine.slots.len()];
@@ -192,7 +192,7 @@ fn outputs(
 
 /// For each register that one run of bundles writes before it reads, and no other uses: the bundles of its first write and
 /// its last use.
-fn ranges(ir: &Ir) -> Vec<Option<(u32, u32)>> {
+fn ranges(ir: &Ir, runs: &[Run]) -> Vec<Option<(u32, u32)>> {
     /// What is known of a register so far.
     #[derive(Clone, Copy)]
     enum Seen {
@@ -211,7 +211,7 @@ fn ranges(ir: &Ir) -> Vec<Option<(u32, u32)>> {
     let mut seen: Vec<Seen> = ir.registers.iter().map(wide).collect();
     // Registers that may still be found to be short-lived: a program whose names are used throughout soon has none.
     let mut left = ir.registers.iter().filter(|register| is_candidate(register)).count();
-    for (run, bounds) in (0..).zip(runs::runs(ir)) {
+    for (run, bounds) in (0..).zip(runs) {
         if left == 0 {
             break;
         }

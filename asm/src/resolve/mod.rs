@@ -14,9 +14,11 @@ mod slots;
 
 use crate::context::{Array, At, Binding, Context, Reported, ScopeId};
 use crate::expand::load::Loader;
-use crate::expand::{self, Data, Flat, Item, SourcePlace, Timing};
+use crate::expand::{self, Data, Flat, Item, Timing};
 use crate::ir::given::Kind;
-use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
+use crate::ir::{
+    Attribution, Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind,
+};
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::resolve::forms::Forms;
@@ -57,10 +59,12 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         latched: flat.ports.is_some_and(|(latched, _)| latched),
         numbers: BTreeMap::new(),
         scheduled: false,
+        has_choices: false,
         data: Vec::new(),
         raw: Vec::new(),
         contracted: Vec::new(),
         files: Vec::new(),
+        parts: Vec::new(),
         versions: Vec::new(),
     };
     let words = |data: &Data| match data {
@@ -276,7 +280,10 @@ impl Resolver<'_> {
     fn push(&mut self, mut bundle: Bundle) {
         let order = self.ir.bundles.len() as u32;
         self.ir.scheduled |= bundle.scheduled;
-        bundle.operations.iter_mut().for_each(|operation| operation.order = order);
+        for operation in &mut bundle.operations {
+            operation.order = order;
+            self.ir.has_choices |= operation.slots.len() > 1;
+        }
         if self.has_equations {
             self.note_results(&bundle);
         }
@@ -305,27 +312,27 @@ impl Resolver<'_> {
         (span, line): (Span, u32),
         index: usize,
         count: usize,
-    ) -> Option<SourcePlace> {
+    ) -> Attribution {
         if item.loc != 0 {
             let places = &self.flat.locs[item.loc as usize];
             if places.len() > 1 && places.len() != count {
                 let message = format!("a bundle of {count}, and `.loc` gives {} places", places.len());
                 self.context.error(item.at.scope, "loc", span, message);
-                return None;
+                return Attribution::NONE;
             }
             let place = places.get(if places.len() == 1 { 0 } else { index }).copied().flatten();
-            return place;
+            return place.map_or(Attribution::NONE, |(location, part)| self.ir.attribute(location, part));
         }
         let ast = item.at.ast as usize;
         if let Some(Some(file)) = self.own_files.get(ast) {
-            return Some((Location { file: *file, line }, None));
+            return Attribution::to(Location { file: *file, line });
         }
         let file = self.context.reports.sources.file_of(span.start);
         let name = std::sync::Arc::clone(&self.context.reports.sources.files()[file].name);
         let file = self.flat.file(&name);
         self.own_files.resize(self.own_files.len().max(ast + 1), None);
         self.own_files[ast] = Some(file);
-        Some((Location { file, line }, None))
+        Attribution::to(Location { file, line })
     }
 
     fn operation(
@@ -334,7 +341,7 @@ impl Resolver<'_> {
         ast: &Ast,
         number: u32,
         of: usize,
-        location: Option<SourcePlace>,
+        location: Attribution,
     ) -> Result<Operation, Reported> {
         let written = &ast.operations[number as usize];
         let name = self.context.spelled(at, written.mnemonic.name, written.mnemonic.span)?;
@@ -373,7 +380,7 @@ impl Resolver<'_> {
         number: u32,
         written: &crate::syntax::ast::Operation,
         operands: &[Operand],
-        location: Option<SourcePlace>,
+        location: Attribution,
     ) -> Result<Operation, Reported> {
         let [slot, word] = operands else { return Err(Reported) };
         let name = self.context.reports.sources.text(slot.span).to_owned();

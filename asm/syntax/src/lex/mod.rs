@@ -408,6 +408,18 @@ mod tests {
     }
 
     #[test]
+    fn blanks_before_a_line_do_not_count_to_its_length() {
+        let errors = |text: &str| {
+            let (mut names, mut sink, mut chunk) = (Interner::new(), Sink::default(), Chunk::default());
+            Lexer::new(text, 0).chunk(1 << 20, &mut chunk, &mut names, &mut sink);
+            sink.errors
+        };
+        let blanks = " ".repeat(limits::LINE_BYTES);
+        assert_eq!(errors(&format!("nop\n{blanks}fadd a, b, c\n")), 0);
+        assert_eq!(errors(&format!("nop\nfadd a,{blanks}b, c\n")), 1);
+    }
+
+    #[test]
     fn lines_continue_after_bars() {
         let mut names = Interner::new();
         let mut lexer = Lexer::new("a ||\n\n ; comment\n b\nc\n||", 0);
