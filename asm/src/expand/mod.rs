@@ -338,7 +338,7 @@ impl<'l> Expander<'l> {
         }
         match kind {
             StatementKind::Empty => {}
-            StatementKind::Bundle(first, count) => self.bundle(at, index, first, count),
+            StatementKind::Bundle(first, count) => self.bundle(at, index, first, count.into()),
             StatementKind::Equation(equation) => self.equation(at, index, equation),
             StatementKind::Directive(directive) => {
                 let ast = Rc::clone(&self.context.asts[at.ast as usize]);

@@ -195,7 +195,7 @@ impl Resolver<'_> {
     fn item(&mut self, item: &Item) {
         let ast = Rc::clone(&self.context.asts[item.at.ast as usize]);
         let (first, count) = match ast.statements[item.statement as usize].kind {
-            StatementKind::Bundle(first, count) => (first, count),
+            StatementKind::Bundle(first, count) => (first, u32::from(count)),
             StatementKind::Equation(equation) => {
                 // What goes wrong is in the report.
                 let _ = self.equation(item, &ast, equation);

@@ -156,7 +156,7 @@ fn add(
                 );
                 sink.push(Diagnostic::error("limit", span, message));
             }
-            StatementKind::Bundle(first, count.min(limits::BUNDLE_OPERATIONS as u32))
+            StatementKind::Bundle(first, count.min(limits::BUNDLE_OPERATIONS as u32) as u8)
         }
         Body::Directive(kind, span) => {
             ast.directives.push(DirectiveLine { kind, span });

@@ -104,12 +104,21 @@ impl<'s> Lexer<'s> {
             let raw = self.lexer.next();
             let range = self.lexer.span();
             let span = Span::new(self.base + range.start as u32, self.base + range.end as u32);
-            let token = match raw {
-                // What most tokens are, first.
-                Some(Ok(Raw::Name)) if !line.long && range.len() <= limits::NAME_BYTES => {
-                    Token::Name(names.intern(self.lexer.slice()))
+            // What most tokens are, first.
+            if !line.long && (span.end - line.from) as usize <= limits::LINE_BYTES {
+                match raw {
+                    Some(Ok(Raw::Name)) if range.len() <= limits::NAME_BYTES => {
+                        tokens.push((Token::Name(names.intern(self.lexer.slice())), span));
+                        continue;
+                    }
+                    Some(Ok(Raw::Comma)) => {
+                        tokens.push((Token::Comma, span));
+                        continue;
+                    }
+                    _ => {}
                 }
-                Some(Ok(Raw::Comma)) if !line.long => Token::Comma,
+            }
+            let token = match raw {
                 Some(Ok(Raw::Newline)) | None => {
                     let more = raw.is_some();
                     self.line += u32::from(more);
