@@ -160,7 +160,7 @@ pub fn assemble_bytes(
     loader: &dyn Loader,
     options: &Options,
 ) -> Result<Assembled, Diagnostics> {
-    assemble(name, &expand::load::First { name, bytes, rest: loader }, options)
+    assemble(name, &expand::load::First::new(name, bytes, loader), options)
 }
 
 /// Assembles the program that begins with the source at `path`.

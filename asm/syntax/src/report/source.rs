@@ -76,10 +76,15 @@ pub struct Sources {
 impl Sources {
     /// Adds a file; `None` if the space of offsets is full.
     pub fn add(&mut self, name: &str, text: String) -> Option<usize> {
+        self.add_shared(name, text.into())
+    }
+
+    /// The same, of a text that others have too.
+    pub fn add_shared(&mut self, name: &str, text: Arc<String>) -> Option<usize> {
         // One offset lies between two files: the end of one is not the start of the next.
         let base = self.files.last().map_or(0, |last| last.base as usize + last.text.len() + 1);
         u32::try_from(base + text.len() + 1).ok()?;
-        self.files.push(Source { name: name.into(), text: text.into(), base: base as u32 });
+        self.files.push(Source { name: name.into(), text, base: base as u32 });
         Some(self.files.len() - 1)
     }
 
