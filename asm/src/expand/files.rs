@@ -67,7 +67,7 @@ impl Expander<'_> {
             let column = offset - before.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1) + 1;
             Unread::NotText { byte: error.as_bytes()[offset], offset, line, column }
         })?;
-        let file = self.context.reports.sources.add(&name, text.into()).ok_or(Unread::TooMuch)?;
+        let file = self.context.reports.sources.add(&name, text).ok_or(Unread::TooMuch)?;
         let source = self.context.reports.sources.files()[file].clone();
         let ast = parse::parse(&source, self.context.scopes.names_mut(), &mut self.context.reports.sink);
         self.context.asts.push(Rc::new(ast));
