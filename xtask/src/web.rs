@@ -25,8 +25,6 @@ pub(crate) struct Arguments {
 pub(crate) const PAGE: &str = "target/playground";
 /// What is compiled on the way.
 const TARGET: &str = "target/web";
-/// What works once for a keystroke need not be as fast as the emulator: it is compiled in half the time, and smaller.
-const LEVELS: [(&str, u8); 3] = [("takt-editor", 1), ("takt-analysis", 1), ("takt-web", 1)];
 
 pub(crate) fn web(arguments: &Arguments) -> Result<()> {
     build()?;
@@ -40,9 +38,6 @@ pub(crate) fn web(arguments: &Arguments) -> Result<()> {
 pub(crate) fn build() -> Result<()> {
     let mut compile = Toolchain::find(&[WASM])?.cargo("build", WASM, TARGET);
     compile.args(["--release", "-p", "takt-web"]);
-    for (package, level) in LEVELS {
-        compile.args(["--config", &format!("profile.release.package.{package}.opt-level={level}")]);
-    }
     run(&mut compile)?;
     let page = packages()?;
     let mut bundle = Command::new("node");
