@@ -45,6 +45,15 @@ pub(crate) enum Line {
     ToPause,
 }
 
+/// What blocks are cut from, and how far they go.
+#[derive(Clone, Copy)]
+pub(crate) struct Stretch<'a> {
+    pub(crate) code: &'a Code,
+    /// Bundles at which runs may pause, ascending.
+    pub(crate) pauses: &'a [BundleAddress],
+    pub(crate) line: Line,
+}
+
 /// Bundles issued of late, in order, each with the number of cycles since.
 pub(crate) type Ages = Box<[(BundleAddress, u8)]>;
 
@@ -202,9 +211,7 @@ impl Cache {
     #[inline]
     pub(crate) fn successor(
         &mut self,
-        code: &Code,
-        pauses: &[BundleAddress],
-        line: Line,
+        of: Stretch<'_>,
         id: u32,
         last: Cycle,
         entry: BundleAddress,
@@ -213,16 +220,17 @@ impl Cache {
         // However much later, nothing is in flight any more.
         let distance = (at - last).min(Cycle::from(MAX_LATENCY)) as u8;
         let edges = &self.blocks[id as usize].edges;
-        let known =
-            edges.iter().find(|edge| edge.target == entry && edge.distance == distance && edge.line == line);
+        let known = edges
+            .iter()
+            .find(|edge| edge.target == entry && edge.distance == distance && edge.line == of.line);
         if let Some(edge) = known {
             return Some(edge.id);
         }
         let recent = self.recent(id).iter().map(|&(address, age)| (address, age.saturating_add(distance)));
-        let next = self.find(code, pauses, line, entry, ages(code, recent))?;
+        let next = self.find(of, entry, ages(of.code, recent))?;
         let edges = &mut self.blocks[id as usize].edges;
         if edges.len() < MAX_EDGES {
-            edges.push(Edge { target: entry, distance, line, id: next });
+            edges.push(Edge { target: entry, distance, line: of.line, id: next });
         }
         Some(next)
     }
@@ -230,34 +238,25 @@ impl Cache {
     /// The block from `entry` on, to be entered in cycle `at` after these bundles.
     pub(crate) fn after(
         &mut self,
-        code: &Code,
-        pauses: &[BundleAddress],
-        line: Line,
+        of: Stretch<'_>,
         recent: &[(BundleAddress, Cycle)],
         entry: BundleAddress,
         at: Cycle,
     ) -> Option<u32> {
         let recent = recent.iter().map(|&(address, cycle)| (address, (at - cycle).min(u8::MAX.into()) as u8));
-        self.find(code, pauses, line, entry, ages(code, recent))
+        self.find(of, entry, ages(of.code, recent))
     }
 
-    fn find(
-        &mut self,
-        code: &Code,
-        pauses: &[BundleAddress],
-        line: Line,
-        entry: BundleAddress,
-        recent: Ages,
-    ) -> Option<u32> {
+    fn find(&mut self, of: Stretch<'_>, entry: BundleAddress, recent: Ages) -> Option<u32> {
         // Before these bundles the stepper looks whether they issue.
-        if line == Line::ToPause && pauses.binary_search(&entry).is_ok() {
+        if of.line == Line::ToPause && of.pauses.binary_search(&entry).is_ok() {
             return None;
         }
-        let key = (entry, recent, line);
+        let key = (entry, recent, of.line);
         if let Some(&id) = self.ids.get(&key) {
             return Some(id);
         }
-        let block = compile(code, pauses, line, entry, &key.1)?;
+        let block = compile(of, entry, &key.1)?;
         let id = self.blocks.len() as u32;
         self.micros += block.micros.len() + block.bundles as usize;
         self.blocks.push(block);
@@ -281,13 +280,8 @@ struct Placed<'a> {
 }
 
 /// The block from `entry` on, entered after the bundles `recent`; `None` if the first bundle cannot execute.
-fn compile(
-    code: &Code,
-    pauses: &[BundleAddress],
-    line: Line,
-    entry: BundleAddress,
-    recent: &Ages,
-) -> Option<Block> {
+fn compile(of: Stretch<'_>, entry: BundleAddress, recent: &Ages) -> Option<Block> {
+    let Stretch { code, pauses, line } = of;
     // Offset 0 is this cycle of the scoreboard's.
     const BASE: Cycle = MAX_LATENCY as Cycle;
     let mut scoreboard = Scoreboard::new(code.machine);

@@ -1,7 +1,7 @@
 //! Running blocks. What is out of the ordinary is left to the stepper: before a block, if that can be seen; else the block
 //! is undone.
 
-use crate::block::{Block, Compiled, Line};
+use crate::block::{Block, Compiled, Line, Stretch};
 use crate::emulator::{CompiledRuns, Emulator, Recent, Status};
 use crate::execute::stack_fault;
 use crate::jit;
@@ -131,11 +131,10 @@ impl Emulator {
             self.drop_blocks();
         }
         let (entry, entered) = (self.front.next, self.front.delivered);
+        let stretch = Stretch { code: &self.code, pauses: &self.pauses, line };
         match &self.recent {
-            Recent::Block { id, cycle } => {
-                self.cache.successor(&self.code, &self.pauses, line, *id, *cycle, entry, entered)
-            }
-            Recent::List(recent) => self.cache.after(&self.code, &self.pauses, line, recent, entry, entered),
+            Recent::Block { id, cycle } => self.cache.successor(stretch, *id, *cycle, entry, entered),
+            Recent::List(recent) => self.cache.after(stretch, recent, entry, entered),
         }
     }
 
