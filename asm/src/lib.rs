@@ -160,7 +160,7 @@ pub fn assemble_bytes(
     loader: &dyn Loader,
     options: &Options,
 ) -> Result<Assembled, Diagnostics> {
-    assemble(name, &expand::load::First { name, bytes, rest: loader }, options)
+    assemble(name, &expand::load::First::new(name, bytes, loader), options)
 }
 
 /// Assembles the program that begins with the source at `path`.
@@ -179,6 +179,8 @@ pub struct Checked {
     homes: Option<(homes::Homes, Vec<Contraction>)>,
     effort: u32,
     index: index::Index,
+    /// The program's straight runs, if nothing was put in or taken out since they were found.
+    runs: Option<Vec<ir::runs::Run>>,
 }
 
 /// Reads and checks the program that begins with the source at `path`, and indexes its names. [`Checked::finish`] does the rest.
@@ -197,7 +199,9 @@ fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, op
         ir.scheduled = options.schedule == Schedule::All;
         ir.bundles.iter_mut().for_each(|bundle| bundle.scheduled = options.schedule == Schedule::All);
     }
-    check::types::check(&mut context, &ir);
+    // Of a program with mistakes they are not wanted.
+    let mut runs = (context.reports.sink.errors == 0).then(|| ir::runs::runs(&ir));
+    check::types::check(&mut context, &ir, runs.as_deref().unwrap_or_default());
     // Of a program that cannot fit nothing else is worth its time.
     let homes = if emit::is_too_long(&ir) {
         emit::limits(&ir, &mut context.reports.sink);
@@ -215,11 +219,15 @@ fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, op
         let mut homes = homes::choose(&mut ir);
         homes.quiet.extend(contracted.gone);
         let values = values::split(&mut ir, &mut homes);
-        copies::insert(&mut ir, &mut homes, &values);
+        // What a fused operation or a preset has taken the place of goes.
+        if !(values.is_empty() && contracted.contractions.is_empty() && homes.adjustments.is_empty()) {
+            copies::insert(&mut ir, &mut homes, &values);
+            runs = None;
+        }
         check::check(&mut context, &ir, &homes);
         Some((homes, contracted.contractions))
     };
-    Checked { context, ir, homes, effort: options.effort, index }
+    Checked { context, ir, homes, effort: options.effort, index, runs }
 }
 
 impl Checked {
@@ -244,7 +252,7 @@ impl Checked {
     /// # Errors
     /// Every error of the program, and its warnings.
     pub fn finish(self) -> Result<Assembled, Diagnostics> {
-        let Checked { mut context, mut ir, homes, effort, .. } = self;
+        let Checked { mut context, mut ir, homes, effort, runs, .. } = self;
         let mut sink = std::mem::take(&mut context.reports.sink);
         let sources = Arc::new(std::mem::take(&mut context.reports.sources));
         // What follows would only report what follows from the errors there are.
@@ -256,8 +264,9 @@ impl Checked {
             return Err(sink.finish(sources));
         }
         let adjustments = copies::report(&ir, homes);
-        let placement = place::place(&ir, &mut sink);
-        let mut emitted = emit::emit(&ir, &placement, &mut sink);
+        let runs = runs.filter(|_| blocks.is_empty()).unwrap_or_else(|| ir::runs::runs(&ir));
+        let placement = place::place(&ir, &runs, &mut sink);
+        let mut emitted = emit::emit(&mut ir, &placement, &mut sink);
         emitted.program.parts = names::parts(&sources, &emitted);
         let names = names::names(&mut context, &ir, &placement, &mut emitted);
         let report = sink.finish(Arc::clone(&sources));

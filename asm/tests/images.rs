@@ -148,7 +148,7 @@ fn what_a_debugger_knows_fits_the_program() {
         ("`` is not a name", |info| info.sources[0].0.clear()),
         ("two things are named `test.s`", |info| info.sources.extend(info.sources.clone())),
         ("1 positions for", |info| info.names.positions.truncate(1)),
-        ("there is no scope 7", |info| info.names.positions[0] = Some(Position { order: 0, scope: 7 })),
+        ("there is no scope 7", |info| info.names.positions[0] = Some(Position::new(0, 7))),
         ("the first scope is that outside of macros", |info| info.names.scopes[0].name = "m".to_owned()),
         ("`m 1` is not a name", |info| info.names.scopes[1].name = "m 1".to_owned()),
         ("`?` is not a name", |info| info.names.scopes[1].parameters[0].1 = "?".to_owned()),

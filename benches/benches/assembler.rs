@@ -6,17 +6,27 @@ use std::fmt::Write as _;
 use takt_asm::{MemoryLoader, Options};
 use takt_benches::{DEEP, Measured, source};
 
-/// A block of this many operations in straight line, with chains of dependence as a controller has them.
-fn block(operations: usize) -> String {
-    let mut text = String::from(".input x, y\n.output F\n.schedule on\n.period\nperiod:\n");
-    let names = 48;
+/// A block of this many operations in straight line, with chains of dependence as a controller has them; if it is to use
+/// `memory`, every third loads or stores, at addresses that are known only when it runs.
+fn block(operations: usize, memory: bool) -> String {
+    let mut text = String::from(
+        ".input x, y, n:int\n.output F\n.schedule on\n.data\ntable: .space 64\n.period\nperiod:\n",
+    );
+    let names = 24;
     for r in 0..names {
-        let _ = writeln!(text, ".reg r{r}\n fmul r{r}, x, {r}");
+        let _ = writeln!(text, ".reg r{r}, p{r}:int\n fmul r{r}, x, {r}\n iadd p{r}, n, {r}");
     }
-    for i in 0..operations.saturating_sub(names + 2) {
+    for i in 0..operations.saturating_sub(2 * names + 2) {
         let (d, a, b) = (i * 7 % names, i * 13 % names, i * 29 % names);
-        let mnemonic = ["fmul", "fadd", "fsub", "fmax", "fadd", "fmul"][i % 6];
-        let _ = writeln!(text, " {mnemonic} r{d}, r{a}, r{b}");
+        let _ = match (i % 6, memory) {
+            (0, true) => writeln!(text, " ld r{d}, {}[p{a}]", i % 50),
+            (3, true) => writeln!(text, " st {}[p{a}], r{b}", i % 50),
+            (5, true) => writeln!(text, " iadd p{d}, n, {}", i % 40),
+            (0 | 5, _) => writeln!(text, " fmul r{d}, r{a}, r{b}"),
+            (2, _) => writeln!(text, " fsub r{d}, r{a}, r{b}"),
+            (3, _) => writeln!(text, " fmax r{d}, r{a}, r{b}"),
+            _ => writeln!(text, " fadd r{d}, r{a}, r{b}"),
+        };
     }
     text.push_str(" mov F, r1\n wait period\n");
     text
@@ -37,19 +47,26 @@ fn main() {
     }
     let shortest = rows[0].1 / rows[0].0 as f64;
     let mut blocks = Vec::new();
-    for operations in [300, 1_000, 10_000] {
-        let loader = MemoryLoader::of("block.s", block(operations));
+    for (operations, memory) in
+        [1_000, 10_000, 100_000].into_iter().flat_map(|operations| [(operations, false), (operations, true)])
+    {
+        let loader = MemoryLoader::of("block.s", block(operations, memory));
         let options = Options { machine: &DEEP, ..Options::default() };
         let start = std::time::Instant::now();
         let assembled = takt_asm::assemble("block.s", &loader, &options).expect("the block is well formed");
         let seconds = start.elapsed().as_secs_f64();
         let block =
             assembled.blocks.into_iter().max_by_key(|block| block.operations).expect("there is a block");
-        blocks.push((block.operations, block.cycles, block.bound.cycles(), seconds));
+        blocks.push((memory, block.operations, block.cycles, block.bound.cycles(), seconds));
     }
-    println!("\n{:>12}{:>10}{:>10}{:>10}   scheduled, default effort", "operations", "cycles", "bound", "s");
-    for (operations, cycles, bound, seconds) in blocks {
-        println!("{operations:>12}{cycles:>10}{bound:>10}{seconds:>10.2}");
+    println!(
+        "\n{:>12}{:>10}{:>10}{:>10}{:>18}   scheduled, default effort",
+        "operations", "cycles", "bound", "s", "us per operation"
+    );
+    for (memory, operations, cycles, bound, seconds) in blocks {
+        let each = seconds * 1e6 / f64::from(operations);
+        let what = if memory { "a third loads and stores" } else { "registers only" };
+        println!("{operations:>12}{cycles:>10}{bound:>10}{seconds:>10.2}{each:>18.0}   {what}");
     }
     println!(
         "\n{:>12}{:>16}{:>14}{:>30}",

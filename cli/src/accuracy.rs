@@ -15,7 +15,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_analysis::accuracy::{
     Assumed, Decision, Enclosure, Hazard, Interval, Lost, OperationAccuracy, OutputAccuracy, OutputBound,
-    Part, Problem, Shadow, Worst, enclose,
+    Part, Shadow, Worst, enclose,
 };
 use takt_emu::Emulator;
 use takt_isa::Program;
@@ -351,18 +351,6 @@ struct Bounded<'a> {
     enclosure: &'a Enclosure,
 }
 
-/// What may go wrong, in words.
-fn problem(problem: Problem) -> &'static str {
-    match problem {
-        Problem::DivisionByZero => "the divisor may be zero",
-        Problem::Domain => "the operand may lie where the function has no value",
-        Problem::Overflow => "the result may be too large for binary32",
-        Problem::NotFinite => "an operand may be infinite or a NaN",
-        Problem::Bits => "an operand is bits that nothing encloses as a number",
-        Problem::Told => "an earlier problem",
-    }
-}
-
 fn interval(interval: Option<Interval>) -> String {
     interval
         .map_or_else(|| "anywhere".to_owned(), |Interval { low, high }| format!("[{low:.6e}, {high:.6e}]"))
@@ -400,7 +388,7 @@ impl Bounded<'_> {
             let operands = operands.map(|(name, range)| json!({ "name": name, "range": ends(range) }));
             json!({
                 "place": place(program, hazard.word),
-                "problem": problem(hazard.problem),
+                "problem": hazard.problem.to_string(),
                 "operands": operands.collect::<Vec<_>>(),
             })
         };
@@ -457,7 +445,7 @@ impl Bounded<'_> {
             let operands = self.operands(hazard).into_iter();
             let operands: Vec<String> =
                 operands.map(|(name, range)| format!("{name} in {}", interval(range))).collect();
-            let what = problem(hazard.problem);
+            let what = hazard.problem;
             writeln!(out, "  {}: {what}: {}", place(program, hazard.word), operands.join(", "))?;
         }
         if !enclosure.assumed.is_empty() {

@@ -32,7 +32,26 @@ const MAX_LEFT: u64 = 16;
 struct Edge {
     target: BundleAddress,
     distance: u8,
+    line: Line,
     id: u32,
+}
+
+/// How far a block goes where runs may pause.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Line {
+    /// Through the bundles at which they may, until one acts: up to a later cycle they don't.
+    Whole,
+    /// Up to the first of them.
+    ToPause,
+}
+
+/// What blocks are cut from, and how far they go.
+#[derive(Clone, Copy)]
+pub(crate) struct Stretch<'a> {
+    pub(crate) code: &'a Code,
+    /// Bundles at which runs may pause, ascending.
+    pub(crate) pauses: &'a [BundleAddress],
+    pub(crate) line: Line,
 }
 
 /// Bundles issued of late, in order, each with the number of cycles since.
@@ -74,8 +93,14 @@ pub(crate) struct Block {
     pub(crate) micros: Box<[Micro]>,
     /// The first micro from which on there are late results.
     pub(crate) split: usize,
+    /// Offset of the first bundle's issue.
+    pub(crate) first: u32,
     /// Offset of the last bundle's issue.
     pub(crate) last: u32,
+    /// Offset of the issue of its last bundle at which runs may pause; `None` if there is none.
+    pub(crate) pause: Option<u32>,
+    /// Whether runs may pause again after it.
+    pub(crate) acts: bool,
     /// What its last bundle does. ([`Flow::Next`] too where the line was cut, or the next bundle cannot execute.) What that
     /// bundle computes is late, so that a branch's register still has its old value when the micros have run.
     pub(crate) flow: Flow,
@@ -162,7 +187,7 @@ impl Block {
 #[derive(Clone, Default)]
 pub(crate) struct Cache {
     pub(crate) blocks: Vec<Block>,
-    ids: HashMap<(BundleAddress, Ages), u32>,
+    ids: HashMap<(BundleAddress, Ages, Line), u32>,
     micros: usize,
 }
 
@@ -186,8 +211,7 @@ impl Cache {
     #[inline]
     pub(crate) fn successor(
         &mut self,
-        code: &Code,
-        pauses: &[BundleAddress],
+        of: Stretch<'_>,
         id: u32,
         last: Cycle,
         entry: BundleAddress,
@@ -196,14 +220,17 @@ impl Cache {
         // However much later, nothing is in flight any more.
         let distance = (at - last).min(Cycle::from(MAX_LATENCY)) as u8;
         let edges = &self.blocks[id as usize].edges;
-        if let Some(edge) = edges.iter().find(|edge| edge.target == entry && edge.distance == distance) {
+        let known = edges
+            .iter()
+            .find(|edge| edge.target == entry && edge.distance == distance && edge.line == of.line);
+        if let Some(edge) = known {
             return Some(edge.id);
         }
         let recent = self.recent(id).iter().map(|&(address, age)| (address, age.saturating_add(distance)));
-        let next = self.find(code, pauses, entry, ages(code, recent))?;
+        let next = self.find(of, entry, ages(of.code, recent))?;
         let edges = &mut self.blocks[id as usize].edges;
         if edges.len() < MAX_EDGES {
-            edges.push(Edge { target: entry, distance, id: next });
+            edges.push(Edge { target: entry, distance, line: of.line, id: next });
         }
         Some(next)
     }
@@ -211,32 +238,25 @@ impl Cache {
     /// The block from `entry` on, to be entered in cycle `at` after these bundles.
     pub(crate) fn after(
         &mut self,
-        code: &Code,
-        pauses: &[BundleAddress],
+        of: Stretch<'_>,
         recent: &[(BundleAddress, Cycle)],
         entry: BundleAddress,
         at: Cycle,
     ) -> Option<u32> {
         let recent = recent.iter().map(|&(address, cycle)| (address, (at - cycle).min(u8::MAX.into()) as u8));
-        self.find(code, pauses, entry, ages(code, recent))
+        self.find(of, entry, ages(of.code, recent))
     }
 
-    fn find(
-        &mut self,
-        code: &Code,
-        pauses: &[BundleAddress],
-        entry: BundleAddress,
-        recent: Ages,
-    ) -> Option<u32> {
+    fn find(&mut self, of: Stretch<'_>, entry: BundleAddress, recent: Ages) -> Option<u32> {
         // Before these bundles the stepper looks whether they issue.
-        if pauses.binary_search(&entry).is_ok() {
+        if of.line == Line::ToPause && of.pauses.binary_search(&entry).is_ok() {
             return None;
         }
-        let key = (entry, recent);
+        let key = (entry, recent, of.line);
         if let Some(&id) = self.ids.get(&key) {
             return Some(id);
         }
-        let block = compile(code, pauses, entry, &key.1)?;
+        let block = compile(of, entry, &key.1)?;
         let id = self.blocks.len() as u32;
         self.micros += block.micros.len() + block.bundles as usize;
         self.blocks.push(block);
@@ -259,9 +279,9 @@ struct Placed<'a> {
     decoded: &'a Decoded,
 }
 
-/// The block from `entry` on, entered after the bundles `recent`, up to one of `pauses`; `None` if the first bundle cannot
-/// execute.
-fn compile(code: &Code, pauses: &[BundleAddress], entry: BundleAddress, recent: &Ages) -> Option<Block> {
+/// The block from `entry` on, entered after the bundles `recent`; `None` if the first bundle cannot execute.
+fn compile(of: Stretch<'_>, entry: BundleAddress, recent: &Ages) -> Option<Block> {
+    let Stretch { code, pauses, line } = of;
     // Offset 0 is this cycle of the scoreboard's.
     const BASE: Cycle = MAX_LATENCY as Cycle;
     let mut scoreboard = Scoreboard::new(code.machine);
@@ -272,13 +292,16 @@ fn compile(code: &Code, pauses: &[BundleAddress], entry: BundleAddress, recent: 
     let mut stalls = Vec::new();
     let mut earliest = BASE;
     let mut address = entry;
+    let may_pause = |address| pauses.binary_search(&address).is_ok();
     // A loop whose turns are counted is entered at a block's start.
-    let ends = |address, bundles| {
+    let ends = |address, bundles, acts| {
         bundles >= MAX_BUNDLES
-            || pauses.binary_search(&address).is_ok()
+            || ((acts || line == Line::ToPause) && may_pause(address))
             || (bundles > 0 && code.head(address).is_some())
     };
-    while let Some(decoded) = code.legal(address).filter(|_| !ends(address, placed.len())) {
+    let mut acts = false;
+    while let Some(decoded) = code.legal(address).filter(|_| !ends(address, placed.len(), acts)) {
+        acts |= decoded.acts;
         let issue = scoreboard.issue(&decoded.timing, address, earliest);
         stalls.extend(issue.stalls().iter().map(|&(cause, cycles)| (address, cause, cycles)));
         placed.push(Placed { address, offset: (issue.cycle - BASE) as u32, decoded });
@@ -288,7 +311,8 @@ fn compile(code: &Code, pauses: &[BundleAddress], entry: BundleAddress, recent: 
         earliest = timing::after_sequential(issue.cycle);
         address = address.next();
     }
-    let last = placed.last()?.offset;
+    let (first, last) = (placed.first()?.offset, placed.last()?.offset);
+    let pause = placed.iter().rev().find(|bundle| may_pause(bundle.address)).map(|bundle| bundle.offset);
 
     let mut required = RegisterSet::default();
     let mut defined = RegisterSet::default();
@@ -315,7 +339,10 @@ fn compile(code: &Code, pauses: &[BundleAddress], entry: BundleAddress, recent: 
         entry,
         bundles: placed.len() as u32,
         split: split.unwrap_or(micros.len()),
+        first,
         last,
+        pause,
+        acts,
         flow,
         required,
         restore: can_fault.then(|| Register::all().filter(|&r| writes.contains(r)).collect()),

@@ -38,6 +38,8 @@ pub(crate) struct Decoded {
     pub(crate) operations: Box<[Operation]>,
     pub(crate) flow: Flow,
     pub(crate) timing: Bundle,
+    /// Whether it writes a port after which runs may pause again.
+    pub(crate) acts: bool,
     /// For how many cycles from its issue it can hold others up: its longest latency or interval.
     pub(crate) reach: u32,
 }
@@ -48,6 +50,8 @@ pub(crate) struct Code {
     pub(crate) machine: &'static Machine,
     /// The machine's input ports.
     pub(crate) inputs: RegisterSet,
+    /// The output ports after whose writes runs may pause again.
+    pub(crate) acting: RegisterSet,
     bundles: Vec<Result<Decoded, (SlotIndex, IllegalWord)>>,
     /// Loops whose turns are counted, by ascending address of their heads.
     pub(crate) loops: Vec<LoopBound>,
@@ -84,11 +88,20 @@ impl Code {
                 });
             }
             let (flow, timing) = (Flow::of(&instructions), Bundle::new(machine, &instructions));
-            Ok(Decoded { operations: operations.into(), flow, timing, reach })
+            Ok(Decoded { operations: operations.into(), flow, timing, acts: false, reach })
         });
         let mut inputs = RegisterSet::default();
         Register::all().filter(|&register| machine.is_input(register)).for_each(|port| inputs.insert(port));
-        Ok(Code { machine, inputs, bundles: bundles.collect(), loops: program.loop_bounds.clone() })
+        let (bundles, loops) = (bundles.collect(), program.loop_bounds.clone());
+        Ok(Code { machine, inputs, acting: RegisterSet::default(), bundles, loops })
+    }
+
+    /// Marks the bundles that write these output ports.
+    pub(crate) fn pause_after(&mut self, ports: RegisterSet) {
+        for bundle in self.bundles.iter_mut().flatten() {
+            bundle.acts = bundle.operations.iter().filter_map(|o| o.dest).any(|dest| ports.contains(dest));
+        }
+        self.acting = ports;
     }
 
     /// Marks the operations that write these output ports.

@@ -119,6 +119,9 @@ impl Emulator {
         }
         emit(sink, || Event::Issue { cycle: now, address });
         let flow = decoded.flow;
+        if decoded.acts {
+            self.pause_from = 0;
+        }
         execute::issue(decoded, &mut self.state, address, now, |retire| {
             emit(sink, || Event::Retire(retire));
         });
@@ -222,11 +225,19 @@ impl Emulator {
 
     /// Makes the recent bundles a list.
     pub(crate) fn list_recent(&mut self) {
-        if let Recent::Block { id, cycle } = self.recent {
-            let recent = self.cache.recent(id);
-            self.recent = Recent::List(
-                recent.iter().map(|&(address, age)| (address, cycle - Cycle::from(age))).collect(),
-            );
+        if matches!(self.recent, Recent::Block { .. }) {
+            self.recent = Recent::List(self.recent_issues());
+        }
+    }
+
+    /// The recent bundles, each with its cycle of issue.
+    pub(crate) fn recent_issues(&self) -> Vec<(BundleAddress, Cycle)> {
+        match &self.recent {
+            Recent::List(recent) => recent.clone(),
+            Recent::Block { id, cycle } => {
+                let recent = self.cache.recent(*id).iter();
+                recent.map(|&(address, age)| (address, cycle - Cycle::from(age))).collect()
+            }
         }
     }
 }

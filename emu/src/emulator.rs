@@ -1,6 +1,6 @@
 //! The machine with a program in it: what the outside sees.
 
-use crate::block::Cache;
+use crate::block::{Cache, Line};
 use crate::code::Code;
 use crate::event::{Event, PortWrite, Retire};
 use crate::fast::{Fast, Journal};
@@ -158,8 +158,8 @@ pub(crate) enum Recent {
     Block { id: u32, cycle: Cycle },
 }
 
-/// A machine with a program in it.
-#[derive(Clone)]
+/// A machine with a program in it. A clone is one to come back to: what was found out to run fast is left out of it, and found
+/// again.
 pub struct Emulator {
     pub(crate) program: Arc<Program>,
     pub(crate) code: Arc<Code>,
@@ -189,6 +189,39 @@ pub struct Emulator {
     pub(crate) compiled_runs: CompiledRuns,
     /// Bundles before whose issue runs pause, ascending.
     pub(crate) pauses: Arc<[BundleAddress]>,
+    /// The first cycle before which they do.
+    pub(crate) pause_from: Cycle,
+}
+
+impl Clone for Emulator {
+    fn clone(&self) -> Emulator {
+        let mut tally = self.tally.clone();
+        self.cache.count(&mut tally);
+        Emulator {
+            program: Arc::clone(&self.program),
+            code: Arc::clone(&self.code),
+            state: self.state.clone(),
+            status: self.status.clone(),
+            now: self.now,
+            front: self.front,
+            turns: self.turns.clone(),
+            recent: Recent::List(self.recent_issues()),
+            scoreboard: self.scoreboard.clone(),
+            planned: self.planned,
+            ticks: self.ticks.clone(),
+            period: self.period,
+            report: self.report.clone(),
+            tally,
+            cache: Cache::default(),
+            journal: Journal::default(),
+            cycle_limit: self.cycle_limit,
+            blocks_enabled: self.blocks_enabled,
+            compile_after: self.compile_after,
+            compiled_runs: self.compiled_runs,
+            pauses: Arc::clone(&self.pauses),
+            pause_from: self.pause_from,
+        }
+    }
 }
 
 /// Where events go.
@@ -247,13 +280,14 @@ impl Emulator {
             compile_after: Some(COMPILE_AFTER),
             compiled_runs: CompiledRuns::default(),
             pauses: Arc::default(),
+            pause_from: 0,
             program: Arc::new(program.clone()),
             code: Arc::new(code),
         })
     }
 
     /// Reloads the program and resets the machine: everything is as [`Emulator::new`] made it, except the settings
-    /// (cycle limit, tick period, pauses).
+    /// (cycle limit, tick period, pauses and the cycle that they begin in).
     pub fn reset(&mut self) {
         self.state = State::new(&self.program);
         self.status = Status::Running;
@@ -268,16 +302,6 @@ impl Emulator {
         self.report = None;
         self.tally = Tally::new(self.code.len());
         self.cache = Cache::default();
-    }
-
-    /// A copy to come back to, smaller than a clone: what was found out to run fast is left out, and found again.
-    pub fn snapshot(&mut self) -> Emulator {
-        self.list_recent();
-        let cache = std::mem::take(&mut self.cache);
-        let mut copy = self.clone();
-        cache.count(&mut copy.tally);
-        self.cache = cache;
-        copy
     }
 
     /// Stops every run before cycle `limit` with [`FaultKind::CycleLimit`] (and never later than [`MAX_CYCLE`]). It is the
@@ -320,11 +344,28 @@ impl Emulator {
     /// issues. ([`Emulator::step_cycle`], [`Emulator::step_bundle`] and [`Emulator::run_period`] go on.)
     pub fn set_pauses(&mut self, bundles: impl IntoIterator<Item = BundleAddress>) {
         let bundles: BTreeSet<BundleAddress> = bundles.into_iter().collect();
+        self.pause_from = 0;
         if !self.pauses.iter().eq(&bundles) {
             self.pauses = bundles.into_iter().collect();
             // Blocks end before them.
             self.drop_blocks();
         }
+    }
+
+    /// Lets runs go through the bundles of [`Emulator::set_pauses`] that issue before cycle `from`, until one issues that
+    /// writes a port of [`Emulator::set_acting`]: whole blocks run there. [`Emulator::set_pauses`] takes it back.
+    pub fn set_pause_from(&mut self, from: Cycle) {
+        let acts = self.state.pending.iter().any(|pending| self.code.acting.contains(pending.register));
+        self.pause_from = if acts { 0 } else { from };
+    }
+
+    /// Says which output ports may change inputs: after a write to one of them, runs pause again
+    /// ([`Emulator::set_pause_from`]).
+    pub fn set_acting(&mut self, ports: impl IntoIterator<Item = Register>) {
+        let mut acting = RegisterSet::default();
+        ports.into_iter().for_each(|port| acting.insert(port));
+        Arc::make_mut(&mut self.code).pause_after(acting);
+        self.drop_blocks();
     }
 
     /// Keeps every write to these output ports, latched or not, until [`Emulator::take_port_writes`]. (Runs stay as fast as
@@ -353,9 +394,15 @@ impl Emulator {
     /// Whether the bundle of a pause issues in the cycle to come.
     fn pauses_here(&mut self) -> bool {
         let Front { next, delivered, .. } = self.front;
-        self.now >= delivered
-            && self.pauses.binary_search(&next).is_ok()
-            && self.upcoming().is_some_and(|upcoming| upcoming.issue.cycle == self.now)
+        if self.now < self.pause_from.max(delivered) || self.pauses.binary_search(&next).is_err() {
+            return false;
+        }
+        if let Some(issue) = self.planned {
+            return issue.cycle == self.now;
+        }
+        // As the stepper would find it, but found once.
+        let block = self.block_along(Line::Whole).map(|id| &self.cache.blocks[id as usize]);
+        block.is_some_and(|block| delivered + Cycle::from(block.first) == self.now)
     }
 
     // ---- Running.

@@ -1,7 +1,7 @@
 //! Running blocks. What is out of the ordinary is left to the stepper: before a block, if that can be seen; else the block
 //! is undone.
 
-use crate::block::{Block, Compiled};
+use crate::block::{Block, Compiled, Line, Stretch};
 use crate::emulator::{CompiledRuns, Emulator, Recent, Status};
 use crate::execute::stack_fault;
 use crate::jit;
@@ -116,15 +116,25 @@ impl Emulator {
     /// The block to run next; none if the next bundle cannot begin one.
     #[inline]
     pub(crate) fn next_block(&mut self) -> Option<u32> {
+        let whole = self.block_along(Line::Whole)?;
+        match self.cache.blocks[whole as usize].pause {
+            Some(pause) if self.front.delivered + Cycle::from(pause) >= self.pause_from => {
+                self.block_along(Line::ToPause)
+            }
+            _ => Some(whole),
+        }
+    }
+
+    /// The block from the next bundle on, so far along the line.
+    pub(crate) fn block_along(&mut self, line: Line) -> Option<u32> {
         if self.cache.is_full() {
             self.drop_blocks();
         }
         let (entry, entered) = (self.front.next, self.front.delivered);
+        let stretch = Stretch { code: &self.code, pauses: &self.pauses, line };
         match &self.recent {
-            Recent::Block { id, cycle } => {
-                self.cache.successor(&self.code, &self.pauses, *id, *cycle, entry, entered)
-            }
-            Recent::List(recent) => self.cache.after(&self.code, &self.pauses, recent, entry, entered),
+            Recent::Block { id, cycle } => self.cache.successor(stretch, *id, *cycle, entry, entered),
+            Recent::List(recent) => self.cache.after(stretch, recent, entry, entered),
         }
     }
 
@@ -138,6 +148,9 @@ impl Emulator {
         }
         block.enter(self.front.from, self.front.delivered - self.now);
         block.runs += 1;
+        if block.acts {
+            self.pause_from = 0;
+        }
         let address = block.end().previous();
         self.now = last + 1;
         self.recent = Recent::Block { id, cycle: last };

@@ -31,7 +31,7 @@ fn periods_in_slices() {
                     if random.once_in(3) {
                         sliced.upcoming();
                     } else if random.once_in(5) {
-                        sliced = sliced.snapshot();
+                        sliced = sliced.clone();
                     }
                     let until = sliced.now() + u64::from(random.below(60));
                     if let Some(report) = sliced.run_period_until(until).unwrap() {

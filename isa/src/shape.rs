@@ -80,16 +80,20 @@ pub enum Field {
 
 impl Field {
     /// Where the field stands in a word.
+    #[inline]
     pub const fn bits(self) -> Bits {
-        match self {
-            Field::Dest => Bits::new(40, 32),
-            Field::A => Bits::new(31, 22),
-            Field::B => Bits::new(21, 12),
-            Field::C => Bits::new(11, 2),
-            Field::Immediate => Bits::new(31, 0),
-            Field::Target => Bits::new(15, 0),
-            Field::Offset => Bits::new(11, 0),
-        }
+        const BITS: [Bits; 7] = {
+            let mut bits = [Bits::new(0, 0); 7];
+            bits[Field::Dest as usize] = Bits::new(40, 32);
+            bits[Field::A as usize] = Bits::new(31, 22);
+            bits[Field::B as usize] = Bits::new(21, 12);
+            bits[Field::C as usize] = Bits::new(11, 2);
+            bits[Field::Immediate as usize] = Bits::new(31, 0);
+            bits[Field::Target as usize] = Bits::new(15, 0);
+            bits[Field::Offset as usize] = Bits::new(11, 0);
+            bits
+        };
+        BITS[self as usize]
     }
 
     /// Its name in the manual.

@@ -1,14 +1,14 @@
-//! The errors of a run's outputs against binary64: `takt accuracy`.
+//! The errors of a run's outputs against binary64, and bounds of those of every run: `takt accuracy`.
 
 use crate::failure::{self, Failure};
 use crate::interrupt::Interrupt;
-use crate::program::Program;
+use crate::program::{NoBoundError, Program};
 use crate::run::{loaded, port_error};
 use numpy::{PyReadonlyArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::num::NonZeroU64;
-use takt_analysis::accuracy::{OutputAccuracy, Part, Shadow, Worst};
+use takt_analysis::accuracy::{Interval, OutputAccuracy, Part, Shadow, Worst};
 use takt_emu::{Emulator, Fault};
 
 /// An error, the period from 0, what the output was, and what it is in binary64.
@@ -31,10 +31,7 @@ impl Measured {
         let largest = |worst: Option<Worst>| {
             worst.map(|Worst { error, period, value, exact }| (error, period.saturating_sub(1), value, exact))
         };
-        let place = |part: &Part| {
-            let place = program.word_place(part.word as usize);
-            (place.unwrap_or_else(|| format!("word {}", part.word)), part.error)
-        };
+        let place = |part: &Part| (place(program, part.word), part.error);
         Measured {
             name: output.name.clone(),
             periods: output.periods,
@@ -44,6 +41,66 @@ impl Measured {
             operations: output.parts.iter().map(place).collect(),
         }
     }
+}
+
+fn place(program: &takt_isa::Program, word: u32) -> String {
+    program.word_place(word as usize).unwrap_or_else(|| format!("word {word}"))
+}
+
+/// The ends of an interval.
+type Ends = (f64, f64);
+
+fn ends(interval: Interval) -> Ends {
+    (interval.low, interval.high)
+}
+
+/// What is proved of an output.
+#[derive(IntoPyObject)]
+pub(crate) struct OutputBound {
+    name: String,
+    range: Option<Ends>,
+    error: Option<f64>,
+    ulp: Option<f64>,
+    /// Place of an operation, and what its rounding adds at most.
+    operations: Vec<(String, f64)>,
+}
+
+/// What may go wrong at a place, and the names and ranges of what the operation reads.
+type Hazard = (String, String, Vec<(String, Option<Ends>)>);
+
+/// A state's name, its range, and what a period may leave in it.
+type Assumed = (String, Ends, Option<Ends>);
+
+/// Encloses what every period computes.
+#[pyfunction]
+pub(crate) fn enclose(
+    py: Python<'_>,
+    program: &Program,
+) -> PyResult<(Vec<OutputBound>, Vec<Hazard>, Vec<Assumed>)> {
+    let program = &program.program;
+    let found = py
+        .detach(|| takt_analysis::accuracy::enclose(program))
+        .map_err(|error| NoBoundError::new_err(format!("no bound: {error}")))?;
+    let output = |output: &takt_analysis::accuracy::OutputBound| OutputBound {
+        name: output.name.clone(),
+        range: output.range.map(ends),
+        error: output.error,
+        ulp: output.ulps(),
+        operations: output.parts.iter().map(|(word, error)| (place(program, *word), *error)).collect(),
+    };
+    let hazard = |hazard: &takt_analysis::accuracy::Hazard| {
+        let operands = hazard.operands.iter();
+        let operands = operands.map(|(register, range)| (program.register_text(*register), range.map(ends)));
+        (place(program, hazard.word), hazard.problem.to_string(), operands.collect())
+    };
+    let assumed = |state: &takt_analysis::accuracy::Assumed| {
+        (program.register_text(state.range.register), state.range.ends(), state.found.map(ends))
+    };
+    Ok((
+        found.outputs.iter().map(output).collect(),
+        found.hazards.iter().map(hazard).collect(),
+        found.assumed.iter().map(assumed).collect(),
+    ))
 }
 
 /// Runs the program over words by period and input port, and beside it the same operations in binary64.

@@ -19,7 +19,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _takt {
     #[pymodule_export]
-    use crate::accuracy::accuracy;
+    use crate::accuracy::{accuracy, enclose};
     #[pymodule_export]
     use crate::failure::Failure;
     #[pymodule_export]

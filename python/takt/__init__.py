@@ -25,7 +25,20 @@ from takt._errors import (
 )
 from takt._ports import Array, Port
 from takt._program import DEFAULT_MACHINE, Program, assemble, load, machines
-from takt._results import Accuracy, Analysis, Bound, Largest, Model, Run, Section, Span
+from takt._results import (
+    Accuracy,
+    Analysis,
+    Assumed,
+    Bound,
+    Enclosure,
+    Hazard,
+    Largest,
+    Model,
+    OutputBound,
+    Run,
+    Section,
+    Span,
+)
 from takt._sim import Sim
 from takt._takt import Fault
 
@@ -36,14 +49,18 @@ __all__ = [
     "Array",
     "AssemblyError",
     "AssemblyWarning",
+    "Assumed",
     "Bound",
     "Diagnostic",
+    "Enclosure",
     "Fault",
     "FaultError",
+    "Hazard",
     "Largest",
     "Model",
     "ModelError",
     "NoBoundError",
+    "OutputBound",
     "Place",
     "Port",
     "Program",

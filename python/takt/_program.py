@@ -14,7 +14,20 @@ from numpy.typing import ArrayLike, NDArray
 from takt import _takt
 from takt._errors import AssemblyWarning, Diagnostic, FaultError, diagnostics
 from takt._ports import Array, Port, count_of, near, numbers, words_of
-from takt._results import Accuracy, Analysis, Bound, Largest, Model, Run, Section, Span
+from takt._results import (
+    Accuracy,
+    Analysis,
+    Assumed,
+    Bound,
+    Enclosure,
+    Hazard,
+    Largest,
+    Model,
+    OutputBound,
+    Run,
+    Section,
+    Span,
+)
 from takt._sim import Sim
 
 #: Cycles in which a period ends, or nobody expects it to any more.
@@ -174,6 +187,25 @@ class Program:
             )
             for one in outputs
         }
+
+    def enclose(self) -> Enclosure:
+        """What the outputs can be and how large their errors, in every period that begins with inputs and states in the ranges
+        that the source gives them (`.range`).
+
+        Raises:
+            NoBoundError: no such bound can be given: an input without a range, a loop without a bound.
+        """
+        outputs, hazards, assumed = _takt.enclose(self._core)
+        return Enclosure(
+            {
+                one["name"]: OutputBound(
+                    one["name"], one["range"], one["error"], one["ulp"], tuple(one["operations"])
+                )
+                for one in outputs
+            },
+            tuple(Hazard(place, problem, tuple(operands)) for place, problem, operands in hazards),
+            tuple(Assumed(*one) for one in assumed),
+        )
 
     # ---- Running it.
 

@@ -51,6 +51,54 @@ class Accuracy:
 
 
 @dataclass(frozen=True)
+class OutputBound:
+    """What is proved of an output, whatever the inputs and states in their ranges."""
+
+    name: str
+    #: What it may be, its ends included; None if a hazard leaves that open.
+    range: tuple[float, float] | None
+    #: The error at most, in the output's own unit, and in ulps of its largest value; None likewise.
+    error: float | None
+    ulp: float | None
+    #: What each operation's rounding adds to the error at most, the largest first: place (`law.s:12`) and error.
+    operations: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
+class Hazard:
+    """An operation that may have no number as its result."""
+
+    place: str
+    problem: str
+    #: What it reads: names, and what may be in them, where that is known.
+    operands: tuple[tuple[str, tuple[float, float] | None], ...]
+
+
+@dataclass(frozen=True)
+class Assumed:
+    """A state whose range the source promises, and that a period is not shown to stay in."""
+
+    name: str
+    range: tuple[float, float]
+    #: What a period may leave in it.
+    found: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class Enclosure:
+    """What holds for every period whose inputs and states begin it within their `.range`, the states free of error."""
+
+    outputs: dict[str, OutputBound]
+    hazards: tuple[Hazard, ...]
+    assumed: tuple[Assumed, ...]
+
+    @property
+    def safe(self) -> bool:
+        """Whether no NaN, no overflow and no division by zero is possible."""
+        return not self.hazards
+
+
+@dataclass(frozen=True)
 class Model:
     """What a program was made of."""
 

@@ -70,6 +70,13 @@ class Measured(TypedDict):
     relative: _Largest | None
     operations: list[tuple[str, float]]
 
+class OutputBound(TypedDict):
+    name: str
+    range: tuple[float, float] | None
+    error: float | None
+    ulp: float | None
+    operations: list[tuple[str, float]]
+
 _Span = tuple[int, int]
 
 @final
@@ -160,3 +167,10 @@ def expressions(text: str, name: str, exact: bool, without: list[str], machine: 
 def accuracy(
     program: Program, inputs: NDArray[np.uint32], each_period: bool, max_cycles: int
 ) -> tuple[list[Measured], Fault | None]: ...
+def enclose(
+    program: Program,
+) -> tuple[
+    list[OutputBound],
+    list[tuple[str, str, list[tuple[str, tuple[float, float] | None]]]],
+    list[tuple[str, tuple[float, float], tuple[float, float] | None]],
+]: ...

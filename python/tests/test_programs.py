@@ -290,6 +290,39 @@ def test_an_analysis_is_the_pages_picture():
         takt.assemble(TABLE).analyse({"i": [1, 5000]})
 
 
+def test_bounds_of_errors_hold_in_every_run():
+    source = """
+        .input a, b
+        .output y
+        .range a = -2, 2
+        .range b = 1, 8
+        .period
+    loop:
+        fdiv t, a, b
+        fmul t, t, t
+        fadd y, t, 0.1
+        wait loop
+    """
+    program = takt.assemble(source, name="law.s")
+    found = program.enclose()
+    bound = found.outputs["y"]
+    assert found.safe and found.assumed == ()
+    random = np.random.default_rng(5)
+    a, b = random.uniform(-2, 2, 10_000).astype(np.float32), random.uniform(1, 8, 10_000).astype(np.float32)
+    y = program.run({"a": a, "b": b}).outputs["y"]
+    exact = (a.astype(np.float64) / b) ** 2 + np.float64(0.1)
+    assert bound.range[0] <= y.min() and y.max() <= bound.range[1] < 4.2
+    error = np.abs(y - exact).max()
+    assert error <= bound.error < 20 * error
+    assert {place.split(":")[0] for place, _ in bound.operations} == {"law.s"}
+    assert sum(error for _, error in bound.operations) <= bound.error * (1 + 1e-12)
+
+    hazard = takt.assemble(source.replace("= 1, 8", "= -1, 8")).enclose().hazards[0]
+    assert hazard.problem == "the divisor may be zero" and ("b", (-1.0, 8.0)) in hazard.operands
+    with pytest.raises(takt.NoBoundError, match="`b`"):
+        takt.assemble(source.replace(".range b = 1, 8", "")).enclose()
+
+
 def test_the_accuracy_is_that_of_binary64():
     program = takt.assemble(LAW, name="law.s")
     inputs = states(100)

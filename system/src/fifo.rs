@@ -125,16 +125,21 @@ impl Fifo {
         self.pushes.len()
     }
 
+    /// The next cycle in which something happens, of what each side has done so far.
+    pub(crate) fn next_cycle(&self) -> Option<Cycle> {
+        let push = self.pushes.front().map(|(cycle, _)| *cycle);
+        push.into_iter().chain(self.pops.front().copied()).min()
+    }
+
     /// The next cycle before `end` in which something happens, with what does; the cycles before `end` are done when there is
     /// none.
     pub(crate) fn next(&mut self, end: Cycle) -> Option<(Cycle, Change)> {
-        let push = self.pushes.front().map(|(cycle, _)| *cycle);
-        let cycle = push.into_iter().chain(self.pops.front().copied()).min().filter(|cycle| *cycle < end);
-        let Some(cycle) = cycle else {
+        let Some(cycle) = self.next_cycle().filter(|cycle| *cycle < end) else {
             self.done = self.done.max(end);
             return None;
         };
-        let entry = if push == Some(cycle) { self.pushes.pop_front() } else { None };
+        let push = self.pushes.front().is_some_and(|(push, _)| *push == cycle);
+        let entry = if push { self.pushes.pop_front() } else { None };
         let pop = self.pops.front() == Some(&cycle) && self.pops.pop_front().is_some();
         Some((cycle, self.store.cycle(pop, entry.map(|(_, entry)| entry))))
     }

@@ -208,6 +208,19 @@ pub enum Problem {
     Told,
 }
 
+impl std::fmt::Display for Problem {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Problem::DivisionByZero => "the divisor may be zero",
+            Problem::Domain => "the operand may lie where the function has no value",
+            Problem::Overflow => "the result may be too large for binary32",
+            Problem::NotFinite => "an operand may be infinite or a NaN",
+            Problem::Bits => "an operand is bits that nothing encloses as a number",
+            Problem::Told => "an earlier problem",
+        })
+    }
+}
+
 /// What an instruction computes with: an operand, or what has become of it.
 #[derive(Clone, Debug)]
 pub(super) struct Operand(pub(super) Result<Value, Problem>);

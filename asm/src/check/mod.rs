@@ -36,7 +36,14 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
     let mut opaque = false;
     let end = ir.bundles.len() as u32;
     let mut beyond: Vec<Where> = Vec::new();
+    // Whether the bundle at hand follows the period's first whatever happens, and whether one that does ends the period.
+    let (mut follows, mut ends) = (false, false);
     for (index, bundle) in (0..).zip(&ir.bundles) {
+        follows |= index == ir.period;
+        if follows && !ends {
+            ends = bundle.operations.iter().any(ends_period);
+            follows = bundle.operations.iter().all(goes_on);
+        }
         for (number, operation) in (0..).zip(&bundle.operations) {
             for (which, source) in operation.reads().iter().enumerate() {
                 uses[source.index()].read.get_or_insert(((index, number), which));
@@ -83,7 +90,9 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
         return;
     }
     if !opaque {
-        no_wait(context, ir);
+        if !ends {
+            no_wait(context, ir);
+        }
         for array in context.declared.arrays.clone() {
             // Of an array it is enough that one element is used.
             let elements = array.elements().map(RegisterId::index);
@@ -295,9 +304,17 @@ fn leaves(context: &mut Context, operation: &Operation, end: u32) {
     context.report(ScopeId(operation.expansion), warning);
 }
 
+fn ends_period(operation: &Operation) -> bool {
+    matches!(operation.row().effect, Effect::Wait | Effect::Halt)
+}
+
+/// Whether the next bundle may follow. A call comes back.
+fn goes_on(operation: &Operation) -> bool {
+    operation.row().effect.falls_through() || operation.row().effect == Effect::Call
+}
+
 /// A period that never comes to a `wait` has no end.
 fn no_wait(context: &mut Context, ir: &Ir) {
-    let ends = |operation: &Operation| matches!(operation.row().effect, Effect::Wait | Effect::Halt);
     let mut seen = vec![false; ir.bundles.len()];
     let mut reached = vec![ir.period];
     while let Some(index) = reached.pop() {
@@ -305,13 +322,9 @@ fn no_wait(context: &mut Context, ir: &Ir) {
         if std::mem::replace(&mut seen[index as usize], true) {
             continue;
         }
-        if bundle.operations.iter().any(ends) {
+        if bundle.operations.iter().any(ends_period) {
             return;
         }
-        // A call comes back.
-        let goes_on = |operation: &Operation| {
-            operation.row().effect.falls_through() || operation.row().effect == Effect::Call
-        };
         if bundle.operations.iter().all(goes_on) {
             reached.push(index + 1);
         }

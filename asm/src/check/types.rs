@@ -8,7 +8,7 @@
 use crate::check::{dest_span, source_span, text};
 use crate::context::{Context, ScopeId, type_name, words};
 use crate::ir::given::{Given, GivenTypes, Kind, Part, What};
-use crate::ir::runs::{Run, runs};
+use crate::ir::runs::Run;
 use crate::ir::{Ir, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
@@ -27,14 +27,58 @@ struct Origin {
     scope: ScopeId,
 }
 
+/// What is known of a value: its [`Kind`], which is enough to find whether there is a mistake, or also where that comes from,
+/// for the report.
+trait Known: Copy {
+    /// A value of this kind from there.
+    fn new(kind: Kind, origin: Option<Origin>) -> Self;
+
+    fn kind(self) -> Kind;
+
+    fn typed(self) -> Typed;
+
+    fn join(self, other: Self) -> Self;
+}
+
+impl Known for Kind {
+    #[inline]
+    fn new(kind: Kind, _: Option<Origin>) -> Kind {
+        kind
+    }
+
+    #[inline]
+    fn kind(self) -> Kind {
+        self
+    }
+
+    fn typed(self) -> Typed {
+        Typed { kind: self, origin: None }
+    }
+
+    #[inline]
+    fn join(self, other: Kind) -> Kind {
+        Kind::join(self, other)
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Typed {
     kind: Kind,
     origin: Option<Origin>,
 }
 
-impl Typed {
-    const ANY: Typed = Typed { kind: Kind::Any, origin: None };
+impl Known for Typed {
+    fn new(kind: Kind, origin: Option<Origin>) -> Typed {
+        Typed { kind, origin }
+    }
+
+    fn kind(self) -> Kind {
+        self.kind
+    }
+
+    fn typed(self) -> Typed {
+        self
+    }
 
     fn join(self, other: Typed) -> Typed {
         Typed { kind: self.kind.join(other.kind), origin: self.origin.or(other.origin) }
@@ -46,42 +90,32 @@ impl Typed {
 const PASSES: usize = 8;
 
 /// Warns of values that are read as, or go to a register of, another type than theirs.
-pub(crate) fn check(context: &mut Context, ir: &Ir) {
+pub(crate) fn check(context: &mut Context, ir: &Ir, runs: &[Run]) {
     // An operation with a mistake is not in the program, and what it would have written is unknown.
     if context.reports.sink.errors > 0 {
         return;
     }
     let given = std::mem::take(&mut context.declared.given);
-    let mut types = Types::new(context, ir, &given);
-    let runs = runs(ir);
-    for pass in 0.. {
-        (types.changed, types.mistaken) = (false, false);
-        types.walk(&runs, None);
-        if !types.changed {
-            break;
-        }
-        if pass == PASSES {
-            types.forget();
-        }
-    }
-    if types.mistaken {
-        types.walk(&runs, Some(context));
+    if Types::<Kind>::new(context, ir, &given).settle(runs) {
+        let mut types = Types::<Typed>::new(context, ir, &given);
+        types.settle(runs);
+        types.walk(runs, Some(context));
     }
 }
 
-struct Types<'i> {
+struct Types<'i, V> {
     ir: &'i Ir,
     given: &'i GivenTypes,
     /// What each register has where a run begins.
-    entry: Vec<Typed>,
+    entry: Vec<V>,
     /// Whether that is said by its declaration.
     declared: Vec<bool>,
     /// What each register has now, and in which run that was written.
-    now: Vec<(usize, Typed)>,
+    now: Vec<(u32, V)>,
     /// The tables of data memory, by label.
-    tables: HashMap<LabelId, Typed>,
+    tables: HashMap<LabelId, V>,
     /// For each instruction, the sources whose bits its result is.
-    passed: Vec<Vec<usize>>,
+    passed: Vec<SmallVec<[usize; 2]>>,
     /// Registers whose type at the beginning of a run, as it was so far, has been read.
     read: Vec<Cell<bool>>,
     /// What was read has changed since.
@@ -90,8 +124,8 @@ struct Types<'i> {
     mistaken: bool,
 }
 
-impl<'i> Types<'i> {
-    fn new(context: &Context, ir: &'i Ir, given: &'i GivenTypes) -> Types<'i> {
+impl<'i, V: Known> Types<'i, V> {
+    fn new(context: &Context, ir: &'i Ir, given: &'i GivenTypes) -> Types<'i, V> {
         // A raw word may write anything.
         let opaque = ir.is_opaque();
         let mut declared = Vec::with_capacity(ir.registers.len());
@@ -106,43 +140,60 @@ impl<'i> Types<'i> {
                 _ => true,
             };
             declared.push(is_declared);
-            entry.push(match is_declared {
-                true => {
+            entry.push(match (is_declared, register.kind) {
+                (_, RegisterKind::Constant(_) | RegisterKind::Zero) => any(),
+                (true, _) => {
                     let origin = Origin { what: What::Declared, span: register.span, scope: ScopeId::ROOT };
-                    Typed { kind: Kind::of(register.ty), origin: Some(origin) }
+                    V::new(Kind::of(register.ty), Some(origin))
                 }
-                false if opaque => Typed::ANY,
-                false => Typed { kind: Kind::None, origin: None },
+                (false, _) if opaque => any(),
+                (false, _) => V::new(Kind::None, None),
             });
         }
-        let now = entry.iter().map(|typed| (usize::MAX, *typed)).collect();
-        let passed = ROWS.iter().map(passed).collect();
+        let now = entry.iter().map(|typed| (u32::MAX, *typed)).collect();
+        let passed = ROWS.iter().map(|row| passed(row).into()).collect();
         let tables = tables(ir, &context.declared.data_types);
         let read = vec![Cell::new(false); ir.registers.len()];
         Types { ir, given, entry, declared, now, tables, passed, read, changed: false, mistaken: false }
+    }
+
+    /// Follows the types until nothing changes. Returns whether there is a mistake.
+    fn settle(&mut self, runs: &[Run]) -> bool {
+        for pass in 0.. {
+            (self.changed, self.mistaken) = (false, false);
+            self.walk(runs, None);
+            if !self.changed {
+                break;
+            }
+            if pass == PASSES {
+                self.forget();
+            }
+        }
+        self.mistaken
     }
 
     /// Gives up on what is still changing.
     fn forget(&mut self) {
         for (entry, declared) in self.entry.iter_mut().zip(&self.declared) {
             if !declared {
-                *entry = Typed::ANY;
+                *entry = any();
             }
         }
-        self.tables.values_mut().for_each(|table| *table = Typed::ANY);
+        self.tables.values_mut().for_each(|table| *table = any());
     }
 
     /// Whether an operation reads what it follows now as another type than it is, or choose between two.
-    fn is_mistaken(&self, run: usize, operation: &Operation) -> bool {
+    #[inline]
+    fn is_mistaken(&self, run: u32, operation: &Operation) -> bool {
         let (mut int, mut float) = (false, false);
         for which in &self.passed[operation.op as usize] {
-            let kind = self.source(run, operation, *which).kind;
+            let kind = self.source(run, operation, *which).kind();
             (int, float) = (int | (kind == Kind::Int), float | (kind == Kind::Float));
         }
         let row = operation.row();
         let mistaken = |which| match row.source_type(which) {
             Type::B => false,
-            wanted => self.source(run, operation, which).kind.mistaken_for(wanted).is_some(),
+            wanted => self.source(run, operation, which).kind().mistaken_for(wanted).is_some(),
         };
         int && float || (0..operation.reads().len()).any(mistaken)
     }
@@ -150,7 +201,7 @@ impl<'i> Types<'i> {
     /// Follows the types through every run, and reports mistakes if there is a context to report to.
     fn walk(&mut self, runs: &[Run], mut context: Option<&mut Context>) {
         let ir = self.ir;
-        for (number, run) in runs.iter().enumerate() {
+        for (number, run) in (0..).zip(runs) {
             for bundle in &ir.bundles[run.start..run.end] {
                 if let Some(context) = &mut context {
                     for operation in &bundle.operations {
@@ -160,8 +211,14 @@ impl<'i> Types<'i> {
                     let is_mistaken = |operation| self.is_mistaken(number, operation);
                     self.mistaken = bundle.operations.iter().any(is_mistaken);
                 }
+                if let [operation] = &bundle.operations[..] {
+                    let result = self.result(number, operation);
+                    self.store(number, operation);
+                    self.write(number, operation, result, context.as_deref_mut());
+                    continue;
+                }
                 // All operations of a bundle read before any writes.
-                let results: SmallVec<[Typed; 3]> =
+                let results: SmallVec<[V; 4]> =
                     bundle.operations.iter().map(|operation| self.result(number, operation)).collect();
                 for (operation, result) in bundle.operations.iter().zip(results) {
                     self.store(number, operation);
@@ -172,15 +229,15 @@ impl<'i> Types<'i> {
     }
 
     /// What an operation reads as one of its sources.
-    fn source(&self, run: usize, operation: &Operation, which: usize) -> Typed {
+    #[inline]
+    fn source(&self, run: u32, operation: &Operation, which: usize) -> V {
         match self.given.get(operation, Part::Source(which as u8)) {
-            Some(Given::Cast(ty)) => Typed { kind: Kind::of(ty), origin: None },
+            Some(Given::Cast(ty)) => V::new(Kind::of(ty), None),
             Some(Given::Literal { kind, what, span }) => literal(operation, kind, what, span),
             _ => {
                 let index = operation.sources[which].index();
-                match (self.ir.registers[index].kind, self.now[index]) {
-                    (RegisterKind::Constant(_) | RegisterKind::Zero, _) => Typed::ANY,
-                    (_, (written, typed)) if written == run => typed,
+                match self.now[index] {
+                    (written, typed) if written == run => typed,
                     _ => {
                         self.read[index].set(true);
                         self.entry[index]
@@ -191,12 +248,13 @@ impl<'i> Types<'i> {
     }
 
     /// What an operation writes.
-    fn result(&self, run: usize, operation: &Operation) -> Typed {
+    #[inline]
+    fn result(&self, run: u32, operation: &Operation) -> V {
         let row = operation.row();
         let result = |ty| {
             let what = What::Result(row.mnemonic);
             let origin = Origin { what, span: operation.span, scope: ScopeId(operation.expansion) };
-            Typed { kind: Kind::of(ty), origin: Some(origin) }
+            V::new(Kind::of(ty), Some(origin))
         };
         if let Some(Given::Cast(ty)) = self.given.get(operation, Part::Dest) {
             return result(ty);
@@ -207,13 +265,13 @@ impl<'i> Types<'i> {
         match row.effect {
             Effect::Immediate => match self.given.get(operation, Part::Immediate) {
                 Some(Given::Literal { kind, what, span }) => literal(operation, kind, what, span),
-                _ => Typed::ANY,
+                _ => any(),
             },
-            Effect::Load => self.table(operation).map_or(Typed::ANY, |label| self.tables[&label]),
+            Effect::Load => self.table(operation).map_or(any(), |label| self.tables[&label]),
             _ => {
                 let passed = &self.passed[operation.op as usize];
                 let typed = passed.iter().map(|which| self.source(run, operation, *which));
-                typed.reduce(Typed::join).unwrap_or(Typed::ANY)
+                typed.reduce(V::join).unwrap_or(any())
             }
         }
     }
@@ -227,36 +285,36 @@ impl<'i> Types<'i> {
     }
 
     /// What a store leaves in its table.
-    fn store(&mut self, run: usize, operation: &Operation) {
+    fn store(&mut self, run: u32, operation: &Operation) {
         if operation.row().effect == Effect::Store
             && let Some(label) = self.table(operation)
         {
             let stored = self.source(run, operation, 1);
             if let Some(table) = self.tables.get_mut(&label) {
                 let joined = table.join(stored);
-                self.changed |= joined.kind != table.kind;
+                self.changed |= joined.kind() != table.kind();
                 *table = joined;
             }
         }
     }
 
-    fn write(&mut self, run: usize, operation: &Operation, result: Typed, context: Option<&mut Context>) {
+    fn write(&mut self, run: u32, operation: &Operation, result: V, context: Option<&mut Context>) {
         let Some(dest) = operation.dest else { return };
         let index = dest.index();
         let register = self.ir.register(dest);
         let value = if !self.declared[index] {
             let joined = self.entry[index].join(result);
-            self.changed |= joined.kind != self.entry[index].kind && self.read[index].get();
+            self.changed |= joined.kind() != self.entry[index].kind() && self.read[index].get();
             self.entry[index] = joined;
             result
-        } else if let Some(ty) = result.kind.mistaken_for(register.ty) {
+        } else if let Some(ty) = result.kind().mistaken_for(register.ty) {
             self.mistaken = true;
             if let Some(context) = context {
-                wrong_register(context, self.ir, operation, register, ty, result);
+                wrong_register(context, self.ir, operation, register, ty, result.typed());
             }
             // One mistake, one warning.
-            Typed::ANY
-        } else if matches!(result.kind, Kind::Any | Kind::None) || register.ty == Type::B {
+            any()
+        } else if matches!(result.kind(), Kind::Any | Kind::None) || register.ty == Type::B {
             self.entry[index]
         } else {
             result
@@ -265,34 +323,40 @@ impl<'i> Types<'i> {
     }
 
     /// Reports what an operation reads as another type than it is.
-    fn reads(&self, run: usize, operation: &Operation, context: &mut Context) {
+    fn reads(&self, run: u32, operation: &Operation, context: &mut Context) {
         for which in 0..operation.reads().len() {
             let wanted = operation.row().source_type(which);
             if wanted == Type::B {
                 continue;
             }
-            let source = self.source(run, operation, which);
+            let source = self.source(run, operation, which).typed();
             if let Some(ty) = source.kind.mistaken_for(wanted) {
                 wrong_source(context, self.ir, operation, which, (ty, wanted), source);
             }
         }
         // A choice between an integer and a float is neither.
         let passed = &self.passed[operation.op as usize];
-        let is = |kind| passed.iter().copied().find(|which| self.source(run, operation, *which).kind == kind);
+        let is =
+            |kind| passed.iter().copied().find(|which| self.source(run, operation, *which).kind() == kind);
         if let (Some(int), Some(float)) = (is(Kind::Int), is(Kind::Float)) {
-            let int = (int, self.source(run, operation, int));
-            let float = (float, self.source(run, operation, float));
+            let int = (int, self.source(run, operation, int).typed());
+            let float = (float, self.source(run, operation, float).typed());
             either(context, operation, int, float);
         }
     }
 }
 
-fn literal(operation: &Operation, kind: Kind, what: What, span: Span) -> Typed {
-    Typed { kind, origin: Some(Origin { what, span, scope: ScopeId(operation.expansion) }) }
+/// Nothing.
+fn any<V: Known>() -> V {
+    V::new(Kind::Any, None)
+}
+
+fn literal<V: Known>(operation: &Operation, kind: Kind, what: What, span: Span) -> V {
+    V::new(kind, Some(Origin { what, span, scope: ScopeId(operation.expansion) }))
 }
 
 /// The types of the tables of data memory: each goes from its label to the next.
-fn tables(ir: &Ir, types: &[Type]) -> HashMap<LabelId, Typed> {
+fn tables<V: Known>(ir: &Ir, types: &[Type]) -> HashMap<LabelId, V> {
     let labels = ir.labels.iter().enumerate().filter(|(_, label)| label.space == Space::Data);
     let mut starts: Vec<usize> = labels.clone().map(|(_, label)| label.position as usize).collect();
     starts.push(types.len());
@@ -303,7 +367,7 @@ fn tables(ir: &Ir, types: &[Type]) -> HashMap<LabelId, Typed> {
         let kinds = types.get(start..end).unwrap_or(&[]).iter().map(|ty| Kind::of(*ty));
         let kind = kinds.reduce(Kind::join).unwrap_or(Kind::Any);
         let origin = Origin { what: What::Table, span: label.span, scope: ScopeId::ROOT };
-        (LabelId(number as u32), Typed { kind, origin: Some(origin) })
+        (LabelId(number as u32), V::new(kind, Some(origin)))
     };
     labels.map(table).collect()
 }

@@ -80,14 +80,19 @@ impl Context {
     }
 
     /// What a name means in a scope.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn lookup(&self, scope: ScopeId, name: NameId) -> Binding {
         match self.scopes.lookup(scope, name) {
-            Binding::None => match name.builtin() {
-                Some(builtin) => Binding::Builtin(builtin as u32),
-                None => self.has(name).map_or(Binding::None, Binding::Has),
-            },
+            Binding::None => self.undeclared(name),
             binding => binding,
+        }
+    }
+
+    /// What a name means that is not declared.
+    fn undeclared(&self, name: NameId) -> Binding {
+        match name.builtin() {
+            Some(builtin) => Binding::Builtin(builtin as u32),
+            None => self.has(name).map_or(Binding::None, Binding::Has),
         }
     }
 

@@ -7,6 +7,7 @@ use crate::syntax::ast::{Ast, DirectiveKind};
 use crate::syntax::intern::Interner;
 use crate::syntax::name::NameId;
 use foldhash::HashMap;
+use std::fmt::Write as _;
 use std::rc::Rc;
 
 /// An expansion: what a use of a macro, or one turn of a repetition, adds to the names around it.
@@ -160,22 +161,32 @@ impl Scopes {
     }
 
     /// What a name is bound to in a scope, or in those around it.
-    #[inline]
-    pub(crate) fn lookup(&self, mut scope: ScopeId, name: NameId) -> Binding {
+    #[inline(always)]
+    pub(crate) fn lookup(&self, scope: ScopeId, name: NameId) -> Binding {
+        if scope != ScopeId::ROOT
+            && let Some(binding) = self.expanded(scope, name)
+        {
+            return binding;
+        }
+        self.globals.get(name.0 as usize).copied().unwrap_or(Binding::None)
+    }
+
+    /// What a name is bound to by an expansion, or by those around it.
+    fn expanded(&self, mut scope: ScopeId, name: NameId) -> Option<Binding> {
         while scope != ScopeId::ROOT {
             let here = self.scope(scope);
             match here.kind {
-                ScopeKind::Rep(variable, value) if variable == name => return Binding::Count(value),
+                ScopeKind::Rep(variable, value) if variable == name => return Some(Binding::Count(value)),
                 ScopeKind::Macro(..) => {
                     if let Some(binding) = self.local(scope, name) {
-                        return binding;
+                        return Some(binding);
                     }
                 }
                 _ => {}
             }
             scope = here.parent;
         }
-        self.globals.get(name.0 as usize).copied().unwrap_or(Binding::None)
+        None
     }
 
     /// What a name is bound to in one scope that takes declarations.
@@ -248,7 +259,15 @@ impl Scopes {
     pub(crate) fn scope_name(&self, scope: ScopeId) -> Option<String> {
         let owner = self.scope(scope).owner;
         match self.scope(owner).kind {
-            ScopeKind::Macro(of, number) => Some(format!("{}.{number}", self.text(of))),
+            ScopeKind::Macro(of, number) => {
+                let of = self.text(of);
+                // Room for any number: each use has such a name.
+                let mut name = String::with_capacity(of.len() + 11);
+                name.push_str(of);
+                // A string takes all that is written to it.
+                let _ = write!(name, ".{number}");
+                Some(name)
+            }
             _ => None,
         }
     }

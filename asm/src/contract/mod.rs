@@ -211,6 +211,7 @@ fn fuse(ir: &mut Ir, product: Where, sum: Where, fusion: Fusion) -> Contraction 
     let sources = [a, b, second.sources[1 - fusion.source]];
     // No operand of the tree is one of its own: messages point at the sum.
     let written = (u32::MAX, 0);
+    ir.has_choices |= slots.len() > 1;
     ir.bundles[sum.0].operations[sum.1] = Operation {
         op: fusion.fused,
         slots,
@@ -223,5 +224,9 @@ fn fuse(ir: &mut Ir, product: Where, sum: Where, fusion: Fusion) -> Contraction 
     };
     // Taken out of its bundle once nothing counts on its place.
     ir.bundles[product.0].operations[product.1] = Operation { made: true, ..first.idle() };
-    Contraction { mnemonic: fusion.fused.row().mnemonic, product: first.location, sum: second.location }
+    Contraction {
+        mnemonic: fusion.fused.row().mnemonic,
+        product: ir.location(&first),
+        sum: ir.location(&second),
+    }
 }

@@ -5,9 +5,11 @@ pub(crate) mod place;
 use crate::emit::place::Placement;
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, numbered};
 use crate::limits::NAME_BYTES;
+use crate::output::names::Position;
 use crate::report::diag::{Diagnostic, Sink};
 use crate::report::source::Span;
-use std::collections::{BTreeMap, HashSet};
+use foldhash::{HashSet, HashSetExt as _};
+use std::collections::BTreeMap;
 use takt_isa::program::{LoopBound, Port, Range, Section, Space, Symbol};
 use takt_isa::{BundleAddress, Instruction, Program, Register, SlotIndex, Type};
 
@@ -15,14 +17,14 @@ use takt_isa::{BundleAddress, Instruction, Program, Register, SlotIndex, Type};
 pub(crate) struct Emitted {
     pub(crate) program: Program,
     pub(crate) expanded: Vec<u32>,
-    /// For each word that has a source line, its operation's order and expansion.
-    pub(crate) origins: Vec<Option<(u32, u32)>>,
+    /// For each word that has a source line, its operation's order, and its expansion for the scope.
+    pub(crate) origins: Vec<Option<Position>>,
     /// Words that compute a part of an equation, and where that stands.
     pub(crate) parts: Vec<(u32, Span)>,
 }
 
-/// Writes the program.
-pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
+/// Writes the program. The labels become its symbols.
+pub(crate) fn emit(ir: &mut Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
     let slots = ir.machine.slots.len();
     let filler = Instruction::NOP.encode().unwrap_or(0);
     let mut code = vec![filler; ir.bundles.len() * slots];
@@ -39,12 +41,11 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
             let Some(slot) = operation.slot.or_else(|| free.next()) else { continue };
             let index = words.start + slot.index();
             code[index] = word(ir, operation, slot, placement, sink);
-            lines[index] = operation.location;
-            origins[index] = operation.location.map(|_| (operation.order, operation.expansion));
-            columns.extend(
-                operation.columns.filter(|_| operation.location.is_some()).map(|part| (index as u32, part)),
-            );
-            if operation.is_computed() && operation.columns.is_none() {
+            let (location, part) = (ir.location(operation), ir.columns(operation));
+            lines[index] = location;
+            origins[index] = location.map(|_| Position::new(operation.order, operation.expansion));
+            columns.extend(part.map(|part| (index as u32, part)));
+            if operation.is_computed() && part.is_none() {
                 parts.push((index as u32, operation.span));
             }
             if operation.expansion != 0 || operation.made || operation.is_computed() {
@@ -64,7 +65,7 @@ pub(crate) fn emit(ir: &Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
         outputs: ports(ir, placement, |kind| kind == RegisterKind::Output),
         latched: ir.latched,
         registers: ports(ir, placement, |kind| matches!(kind, RegisterKind::Plain | RegisterKind::State)),
-        symbols: symbols(ir),
+        symbols: symbols(std::mem::take(&mut ir.labels)),
         sections: sections(ir),
         loop_bounds: loop_bounds(ir),
         ranges: ranges(ir, placement),
@@ -166,13 +167,10 @@ fn ports(ir: &Ir, placement: &Placement, wanted: impl Fn(RegisterKind) -> bool) 
         .collect()
 }
 
-fn symbols(ir: &Ir) -> Vec<Symbol> {
-    let symbol = |label: &crate::ir::Label| Symbol {
-        name: label.name.clone(),
-        space: label.space,
-        address: label.position,
-    };
-    let mut symbols: Vec<Symbol> = ir.labels.iter().map(symbol).collect();
+fn symbols(labels: Vec<crate::ir::Label>) -> Vec<Symbol> {
+    let symbol =
+        |label: crate::ir::Label| Symbol { name: label.name, space: label.space, address: label.position };
+    let mut symbols: Vec<Symbol> = labels.into_iter().map(symbol).collect();
     // Labels of one address stay in the order of the source.
     symbols.sort_by_key(|symbol| (symbol.space, symbol.address));
     symbols

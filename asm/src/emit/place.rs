@@ -8,7 +8,7 @@
 //! A register that only one straight run of bundles uses, and writes before it reads, is needed from its first write to its
 //! last use: it takes a register that is free for so long. While there are enough, each gets one of its own.
 
-use crate::ir::runs;
+use crate::ir::runs::Run;
 use crate::ir::{Ir, RegisterId, RegisterKind, VirtualRegister};
 use crate::report::diag::{Diagnostic, Sink};
 use std::collections::{BTreeSet, HashMap, VecDeque};
@@ -61,7 +61,7 @@ impl Space {
 }
 
 /// Gives every register that is used a place.
-pub(crate) fn place(ir: &Ir, sink: &mut Sink) -> Placement {
+pub(crate) fn place(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Placement {
     let machine = ir.machine;
     // The slot that writes each register, and whether an operation uses it at all.
     let mut writer: Vec<Option<SlotIndex>> = vec![None; ir.registers.len()];
@@ -81,7 +81,7 @@ pub(crate) fn place(ir: &Ir, sink: &mut Sink) -> Placement {
         space.taken[address.index()] = true;
     }
     outputs(ir, &writer, &mut space, &mut addresses, sink);
-    let ranges = ranges(ir);
+    let ranges = ranges(ir, runs);
     let is_local = |index: usize| ranges[index].is_some() && addresses[index].is_none();
     // The most registers that short-lived values need in each bank: room that constants leave if they can.
     let mut wanted_by_locals = vec![0; machine.slots.len()];
@@ -192,7 +192,7 @@ fn outputs(
 
 /// For each register that one run of bundles writes before it reads, and no other uses: the bundles of its first write and
 /// its last use.
-fn ranges(ir: &Ir) -> Vec<Option<(u32, u32)>> {
+fn ranges(ir: &Ir, runs: &[Run]) -> Vec<Option<(u32, u32)>> {
     /// What is known of a register so far.
     #[derive(Clone, Copy)]
     enum Seen {
@@ -200,41 +200,50 @@ fn ranges(ir: &Ir) -> Vec<Option<(u32, u32)>> {
         In { run: u32, first: u32, last: u32 },
         Wide,
     }
-    let mut seen = vec![Seen::Nowhere; ir.registers.len()];
-    for (run, bounds) in (0..).zip(runs::runs(ir)) {
+    if ir.is_opaque() {
+        // A raw word may use anything.
+        return vec![None; ir.registers.len()];
+    }
+    let is_candidate = |register: &VirtualRegister| {
+        register.kind == RegisterKind::Plain && register.pinned.is_none() && register.preset.is_none()
+    };
+    let wide = |register| if is_candidate(register) { Seen::Nowhere } else { Seen::Wide };
+    let mut seen: Vec<Seen> = ir.registers.iter().map(wide).collect();
+    // Registers that may still be found to be short-lived: a program whose names are used throughout soon has none.
+    let mut left = ir.registers.iter().filter(|register| is_candidate(register)).count();
+    for (run, bounds) in (0..).zip(runs) {
+        if left == 0 {
+            break;
+        }
         for (at, bundle) in (bounds.start as u32..).zip(&ir.bundles[bounds.start..bounds.end]) {
-            if bundle.is_opaque() {
-                // A raw word may use anything.
-                return vec![None; ir.registers.len()];
-            }
             for source in bundle.operations.iter().flat_map(|operation| operation.reads()) {
-                let seen = &mut seen[source.index()];
-                *seen = match *seen {
-                    Seen::In { run: same, first, .. } if same == run => Seen::In { run, first, last: at },
-                    _ => Seen::Wide,
-                };
+                match &mut seen[source.index()] {
+                    Seen::Wide => {}
+                    Seen::In { run: same, last, .. } if *same == run => *last = at,
+                    seen => {
+                        *seen = Seen::Wide;
+                        left -= 1;
+                    }
+                }
             }
             for dest in bundle.operations.iter().filter_map(|operation| operation.dest) {
-                let seen = &mut seen[dest.index()];
-                *seen = match *seen {
-                    Seen::Nowhere => Seen::In { run, first: at, last: at },
-                    Seen::In { run: same, first, .. } if same == run => Seen::In { run, first, last: at },
-                    _ => Seen::Wide,
-                };
+                match &mut seen[dest.index()] {
+                    Seen::Wide => {}
+                    Seen::In { run: same, last, .. } if *same == run => *last = at,
+                    seen @ Seen::Nowhere => *seen = Seen::In { run, first: at, last: at },
+                    seen => {
+                        *seen = Seen::Wide;
+                        left -= 1;
+                    }
+                }
             }
         }
     }
-    let range = |(register, seen): (&VirtualRegister, &Seen)| match *seen {
-        Seen::In { first, last, .. }
-            if register.kind == RegisterKind::Plain
-                && register.pinned.is_none()
-                && register.preset.is_none() =>
-        {
-            Some((first, last))
-        }
+    let range = |seen: &Seen| match *seen {
+        Seen::In { first, last, .. } => Some((first, last)),
         _ => None,
     };
-    ir.registers.iter().zip(&seen).map(range).collect()
+    seen.iter().map(range).collect()
 }
 
 /// Places short-lived values, in the order of their first writes, in what room there is. A register is taken again only after

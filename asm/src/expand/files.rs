@@ -9,6 +9,7 @@ use crate::report::nearest;
 use crate::report::source::Span;
 use crate::syntax::parse;
 use std::rc::Rc;
+use std::sync::Arc;
 
 /// A source file: where it is, and its path there.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
@@ -34,6 +35,17 @@ pub(crate) enum Unread {
     NotText { byte: u8, offset: usize, line: usize, column: usize },
 }
 
+/// A file's bytes as text.
+fn text_of(bytes: Vec<u8>) -> Result<String, Unread> {
+    String::from_utf8(bytes).map_err(|error| {
+        let offset = error.utf8_error().valid_up_to();
+        let before = &error.as_bytes()[..offset];
+        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+        let column = offset - before.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1) + 1;
+        Unread::NotText { byte: error.as_bytes()[offset], offset, line, column }
+    })
+}
+
 impl Expander<'_> {
     /// Whether a tree is that of a file of the library in memory.
     pub(crate) fn is_in_library(&self, ast: u32) -> bool {
@@ -46,28 +58,25 @@ impl Expander<'_> {
         if let Some(known) = self.files.get(id) {
             return Ok(*known);
         }
-        let (name, bytes) = match id.place {
-            None => (id.path.clone(), self.loader.load(&id.path)?),
+        let (name, loader): (String, &dyn Loader) = match id.place {
+            None => (id.path.clone(), self.loader),
             Some(place) => {
                 let place = &self.loader.places()[place];
-                (place.name_of(&id.path), place.load(&id.path)?)
+                (place.name_of(&id.path), place)
             }
         };
-        if bytes.len() > limits::FILE_BYTES {
-            return Err(LoadError::TooLarge.into());
-        }
-        self.bytes += bytes.len();
-        if self.bytes > limits::SOURCE_BYTES {
-            return Err(Unread::TooMuch);
-        }
-        let text = String::from_utf8(bytes).map_err(|error| {
-            let offset = error.utf8_error().valid_up_to();
-            let before = &error.as_bytes()[..offset];
-            let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
-            let column = offset - before.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1) + 1;
-            Unread::NotText { byte: error.as_bytes()[offset], offset, line, column }
-        })?;
-        let file = self.context.reports.sources.add(&name, text.into()).ok_or(Unread::TooMuch)?;
+        let text = match loader.text(&id.path) {
+            Some(text) => {
+                self.count_bytes(text.len())?;
+                text
+            }
+            None => {
+                let bytes = loader.load(&id.path)?;
+                self.count_bytes(bytes.len())?;
+                Arc::new(text_of(bytes)?)
+            }
+        };
+        let file = self.context.reports.sources.add_shared(&name, text).ok_or(Unread::TooMuch)?;
         let source = self.context.reports.sources.files()[file].clone();
         let ast = parse::parse(&source, self.context.scopes.names_mut(), &mut self.context.reports.sink);
         self.context.asts.push(Rc::new(ast));
@@ -75,6 +84,15 @@ impl Expander<'_> {
         let known = (self.context.asts.len() as u32 - 1, file);
         self.files.insert(id.clone(), known);
         Ok(known)
+    }
+
+    /// Counts the bytes of a file that is read.
+    fn count_bytes(&mut self, bytes: usize) -> Result<(), Unread> {
+        if bytes > limits::FILE_BYTES {
+            return Err(LoadError::TooLarge.into());
+        }
+        self.bytes += bytes;
+        if self.bytes > limits::SOURCE_BYTES { Err(Unread::TooMuch) } else { Ok(()) }
     }
 
     /// `.include "path"`, or `.include <path>` of the library.

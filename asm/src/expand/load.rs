@@ -34,6 +34,12 @@ pub trait Loader {
     /// If it cannot be had.
     fn load(&self, path: &str) -> Result<Vec<u8>, LoadError>;
 
+    /// A source that is at hand as text, to be shared rather than copied; [`Loader::load`] gives the same.
+    fn text(&self, path: &str) -> Option<Arc<String>> {
+        let _ = path;
+        None
+    }
+
     /// Where `.include` looks beyond the project, in this order.
     fn places(&self) -> &[Place] {
         &[]
@@ -79,6 +85,13 @@ impl Loader for Place {
         match &self.0 {
             PlaceKind::Folder(_, folder) => folder.load(path),
             PlaceKind::Library(files) => files.load(path),
+        }
+    }
+
+    fn text(&self, path: &str) -> Option<Arc<String>> {
+        match &self.0 {
+            PlaceKind::Folder(_, folder) => folder.text(path),
+            PlaceKind::Library(files) => files.text(path),
         }
     }
 }
@@ -136,6 +149,10 @@ impl<L: Loader> Loader for Search<L> {
         self.project.load(path)
     }
 
+    fn text(&self, path: &str) -> Option<Arc<String>> {
+        self.project.text(path)
+    }
+
     fn places(&self) -> &[Place] {
         &self.places
     }
@@ -144,7 +161,37 @@ impl<L: Loader> Loader for Search<L> {
 /// Sources in memory, by path: embedded programs, editors, tests.
 #[derive(Clone, Debug, Default)]
 pub struct MemoryLoader {
-    files: BTreeMap<String, Vec<u8>>,
+    files: BTreeMap<String, InMemory>,
+}
+
+/// A source in memory: text, or bytes that are none.
+#[derive(Clone, Debug)]
+enum InMemory {
+    Text(Arc<String>),
+    Bytes(Vec<u8>),
+}
+
+impl InMemory {
+    fn of(bytes: Vec<u8>) -> InMemory {
+        match String::from_utf8(bytes) {
+            Ok(text) => InMemory::Text(Arc::new(text)),
+            Err(error) => InMemory::Bytes(error.into_bytes()),
+        }
+    }
+
+    fn bytes(&self) -> &[u8] {
+        match self {
+            InMemory::Text(text) => text.as_bytes(),
+            InMemory::Bytes(bytes) => bytes,
+        }
+    }
+
+    fn text(&self) -> Option<Arc<String>> {
+        match self {
+            InMemory::Text(text) => Some(Arc::clone(text)),
+            InMemory::Bytes(_) => None,
+        }
+    }
 }
 
 impl MemoryLoader {
@@ -166,26 +213,40 @@ impl MemoryLoader {
 
     /// Adds a source, or replaces it.
     pub fn add(&mut self, path: impl Into<String>, text: impl Into<Vec<u8>>) {
-        self.files.insert(path.into(), text.into());
+        self.files.insert(path.into(), InMemory::of(text.into()));
     }
 }
 
 impl Loader for MemoryLoader {
     fn load(&self, path: &str) -> Result<Vec<u8>, LoadError> {
-        self.files.get(path).cloned().ok_or(LoadError::NotFound)
+        self.files.get(path).map(|file| file.bytes().to_vec()).ok_or(LoadError::NotFound)
+    }
+
+    fn text(&self, path: &str) -> Option<Arc<String>> {
+        self.files.get(path)?.text()
     }
 }
 
 /// One source at hand, and another loader for the others.
 pub(crate) struct First<'l> {
-    pub(crate) name: &'l str,
-    pub(crate) bytes: Vec<u8>,
-    pub(crate) rest: &'l dyn Loader,
+    name: &'l str,
+    source: InMemory,
+    rest: &'l dyn Loader,
+}
+
+impl<'l> First<'l> {
+    pub(crate) fn new(name: &'l str, bytes: Vec<u8>, rest: &'l dyn Loader) -> First<'l> {
+        First { name, source: InMemory::of(bytes), rest }
+    }
 }
 
 impl Loader for First<'_> {
     fn load(&self, path: &str) -> Result<Vec<u8>, LoadError> {
-        if path == self.name { Ok(self.bytes.clone()) } else { self.rest.load(path) }
+        if path == self.name { Ok(self.source.bytes().to_vec()) } else { self.rest.load(path) }
+    }
+
+    fn text(&self, path: &str) -> Option<Arc<String>> {
+        if path == self.name { self.source.text() } else { self.rest.text(path) }
     }
 
     fn places(&self) -> &[Place] {
@@ -308,6 +369,19 @@ pub(crate) fn include_path(from: &str, path: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn text_in_memory_is_shared_and_bytes_that_are_none_are_not() {
+        let mut files = MemoryLoader::of("a.s", " nop\n");
+        files.add("b.s", [0x6e, 0xff]);
+        let (shared, again) = (files.text("a.s").expect("it is text"), files.text("a.s"));
+        assert!(again.is_some_and(|again| Arc::ptr_eq(&shared, &again)));
+        assert_eq!(files.load("a.s"), Ok(shared.as_bytes().to_vec()));
+        assert_eq!((files.text("b.s"), files.load("b.s")), (None, Ok(vec![0x6e, 0xff])));
+        assert_eq!((files.text("c.s"), files.load("c.s")), (None, Err(LoadError::NotFound)));
+        // What is asked through a search is shared too.
+        assert!(Search::new(files).text("a.s").is_some_and(|again| Arc::ptr_eq(&shared, &again)));
+    }
 
     #[test]
     fn include_paths_stay_in_the_project() {

@@ -22,6 +22,7 @@ use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
 use crate::syntax::name::NameId;
+use smallvec::SmallVec;
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 use takt_isa::Type;
@@ -229,7 +230,13 @@ impl<'l> Expander<'l> {
             return (self.context, self.flat);
         };
         match self.load(&FileId { place: None, path: path.clone() }) {
-            Ok((ast, file)) => self.enter_file(ast, file),
+            Ok((ast, file)) => {
+                // Room for the bundles of a program in one file: memory that is not written to costs nothing.
+                let room = self.context.asts[ast as usize].operations.len();
+                self.flat.once.reserve(room);
+                self.flat.period.reserve(room);
+                self.enter_file(ast, file);
+            }
             Err(unread) => {
                 let message = format!("`{path}` cannot be read: {unread}");
                 self.context.reports.sink.push(Diagnostic::placeless("load", message));
@@ -331,7 +338,7 @@ impl<'l> Expander<'l> {
         }
         match kind {
             StatementKind::Empty => {}
-            StatementKind::Bundle(first, count) => self.bundle(at, index, first, count),
+            StatementKind::Bundle(first, count) => self.bundle(at, index, first, count.into()),
             StatementKind::Equation(equation) => self.equation(at, index, equation),
             StatementKind::Directive(directive) => {
                 let ast = Rc::clone(&self.context.asts[at.ast as usize]);
@@ -436,7 +443,7 @@ impl<'l> Expander<'l> {
     fn call(&mut self, at: At, name: NameId, operation: Operation) {
         let first = operation.first as usize;
         let operands = &self.context.asts[at.ast as usize].operands[first..first + operation.count as usize];
-        let given = operands.to_vec();
+        let given: SmallVec<[Operand; 6]> = operands.into();
         let Some(definition) = self.context.scopes.macros.get(&name) else { return };
         let (parameters, defined) = definition.parameters(&self.context.asts);
         if parameters != given.len() {

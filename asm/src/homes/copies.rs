@@ -17,16 +17,13 @@ struct Place {
     origin: Option<usize>,
 }
 
-/// Whether a preset has taken the place of an operation.
+/// Whether a preset or a fused operation has taken the place of an operation.
 fn is_gone(operation: &Operation) -> bool {
     operation.made && operation.op == Op::nop
 }
 
-/// Inserts the copies, and takes out the operations that presets have replaced.
+/// Inserts the copies, and takes out the operations that presets and fused operations have replaced.
 pub(crate) fn insert(ir: &mut Ir, homes: &mut Homes, copies: &[Copy]) {
-    if copies.is_empty() && !ir.operations().any(is_gone) {
-        return;
-    }
     let count = ir.bundles.len();
     let mut bundles: Vec<Bundle> = Vec::with_capacity(count + copies.len());
     // New position of each bundle, by its old one.

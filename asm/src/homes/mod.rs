@@ -277,7 +277,7 @@ fn bring(ir: &mut Ir, id: RegisterId, slot: SlotIndex, write: &Write) -> Option<
         let (op, sources) = giving(ir.machine, slot, bits)?;
         let slots = able(ir, id, op);
         let mut new = Operation { op, slots, slot: Some(slot), dest: Some(id), made: true, ..old.idle() };
-        (new.location, new.expansion) = (old.location, old.expansion);
+        (new.attribution, new.expansion) = (old.attribution, old.expansion);
         match op.row().effect {
             Effect::Immediate => new.constant = Constant::Value(bits),
             _ => {
@@ -305,7 +305,7 @@ pub(crate) fn adjustment(
         register: ir.register(id).name.clone(),
         bank: ir.machine.slot(slot).bank.name,
         mnemonic: from.row().mnemonic,
-        location: from.location,
+        location: ir.location(from),
         made,
     }
 }

@@ -21,7 +21,7 @@ type At = (usize, usize);
 
 /// Chooses a slot for each operation.
 pub(crate) fn choose(ir: &mut Ir) {
-    if ir.operations().all(|operation| operation.slots.len() < 2) {
+    if !ir.has_choices || ir.operations().all(|operation| operation.slots.len() < 2) {
         return;
     }
     let mut choice = Choice::new(ir);

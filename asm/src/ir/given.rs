@@ -101,10 +101,12 @@ impl GivenTypes {
         parts.push((part, given));
     }
 
+    #[inline]
     pub(crate) fn get(&self, operation: &Operation, part: Part) -> Option<Given> {
-        if self.0.is_empty() {
-            return None;
-        }
+        if self.0.is_empty() { None } else { self.find(operation, part) }
+    }
+
+    fn find(&self, operation: &Operation, part: Part) -> Option<Given> {
         let (ast, number) = operation.written;
         let parts = self.0.get(&(ast, number, operation.expansion))?;
         parts.iter().find(|(known, _)| *known == part).map(|(_, given)| *given)

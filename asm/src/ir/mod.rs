@@ -106,6 +106,30 @@ pub enum Constant {
     Raw(u32),
 }
 
+/// The source line that an operation is attributed to, and the part of it where the source says it (`.loc`), in eight bytes: there
+/// is one for each operation of a program. [`Ir::location`] and [`Ir::columns`] read it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Attribution {
+    /// The file, or [`Attribution::NO_FILE`], or [`Attribution::PART`].
+    file: u32,
+    /// The line; of a part of one, an index into [`Ir::parts`].
+    line: u32,
+}
+
+impl Attribution {
+    const NO_FILE: u32 = u32::MAX;
+    const PART: u32 = u32::MAX - 1;
+
+    /// No line.
+    pub(crate) const NONE: Attribution = Attribution { file: Attribution::NO_FILE, line: 0 };
+
+    /// A line.
+    #[inline]
+    pub(crate) const fn to(Location { file, line }: Location) -> Attribution {
+        Attribution { file, line }
+    }
+}
+
 /// An operation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Operation {
@@ -122,9 +146,7 @@ pub struct Operation {
     /// Immediate, target or offset.
     pub constant: Constant,
     /// The source line that it is attributed to.
-    pub location: Option<Location>,
-    /// The part of that line, where the source says it (`.loc`).
-    pub columns: Option<Columns>,
+    pub(crate) attribution: Attribution,
     /// Its place in the source.
     pub span: Span,
     /// Which use of a macro, or turn of a repetition, made it; 0 if it stands in the source as it is.
@@ -147,7 +169,7 @@ impl Operation {
         op: Op,
         slots: Slots,
         span: Span,
-        location: Option<(Location, Option<Columns>)>,
+        attribution: Attribution,
         expansion: u32,
         written: (u32, u32),
     ) -> Operation {
@@ -158,8 +180,7 @@ impl Operation {
             dest: None,
             sources: [RegisterId::ZERO; 3],
             constant: Constant::None,
-            location: location.map(|(location, _)| location),
-            columns: location.and_then(|(_, columns)| columns),
+            attribution,
             span,
             expansion,
             made: false,
@@ -212,8 +233,7 @@ impl Operation {
             dest: None,
             sources: [RegisterId::ZERO; 3],
             constant: Constant::None,
-            location: None,
-            columns: None,
+            attribution: Attribution::NONE,
             expansion: 0,
             ..*self
         }
@@ -328,14 +348,18 @@ pub struct Ir {
     pub numbers: BTreeMap<u16, RegisterId>,
     /// Whether the scheduler may move any bundle.
     pub scheduled: bool,
+    /// Whether several slots may execute an operation; perhaps of one that has changed since.
+    pub(crate) has_choices: bool,
     /// Data memory.
     pub data: Vec<u32>,
     /// Words given bit by bit.
     pub raw: Vec<u64>,
     /// By bundle, as the source has them: whether `.contract on` is in force there; none where it has no effect.
     pub contracted: Vec<Option<bool>>,
-    /// Source files that [`Operation::location`] names.
+    /// Source files that [`Ir::location`] names.
     pub files: Vec<String>,
+    /// Parts of lines that operations are attributed to.
+    pub(crate) parts: Vec<(Location, Columns)>,
     /// Values with registers of their own, by [`Version::after`] for each name.
     pub(crate) versions: Vec<Version>,
 }
@@ -345,6 +369,31 @@ impl Ir {
     #[inline]
     pub fn register(&self, id: RegisterId) -> &VirtualRegister {
         &self.registers[id.index()]
+    }
+
+    /// The attribution to a line, or to a part of it.
+    pub(crate) fn attribute(&mut self, location: Location, columns: Option<Columns>) -> Attribution {
+        let Some(columns) = columns else { return Attribution::to(location) };
+        self.parts.push((location, columns));
+        Attribution { file: Attribution::PART, line: self.parts.len() as u32 - 1 }
+    }
+
+    /// The source line that an operation is attributed to.
+    #[inline]
+    pub fn location(&self, operation: &Operation) -> Option<Location> {
+        let Attribution { file, line } = operation.attribution;
+        match file {
+            Attribution::NO_FILE => None,
+            Attribution::PART => Some(self.parts[line as usize].0),
+            file => Some(Location { file, line }),
+        }
+    }
+
+    /// The part of that line, where the source says it (`.loc`).
+    #[inline]
+    pub fn columns(&self, operation: &Operation) -> Option<Columns> {
+        let Attribution { file, line } = operation.attribution;
+        (file == Attribution::PART).then(|| self.parts[line as usize].1)
     }
 
     /// Replaces the bundles, and moves what stands between them by `moved`: from a bundle's old number to its new one.

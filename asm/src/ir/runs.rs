@@ -30,9 +30,10 @@ pub(crate) fn runs(ir: &Ir) -> Vec<Run> {
         cut[bound.position as usize] = true;
     }
     let mut before = ir.bundles.first().is_some_and(|bundle| bundle.scheduled);
+    let has_raw = !ir.raw.is_empty();
     for (i, bundle) in ir.bundles.iter().enumerate() {
         // The status register sees every operation before and none after: a wall.
-        let (mut is_wall, mut redirects) = (bundle.is_opaque(), false);
+        let (mut is_wall, mut redirects) = (has_raw && bundle.is_opaque(), false);
         for operation in &bundle.operations {
             let effect = operation.row().effect;
             is_wall |= matches!(effect, Effect::ReadFlags | Effect::ClearFlags);

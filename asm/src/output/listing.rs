@@ -34,7 +34,7 @@ impl<'a> Lister<'a> {
         let program = &assembled.program;
         let source = |name: &String| {
             let file = assembled.sources.files().iter().find(|file| *file.name == **name)?;
-            Some((&*file.text, Lines::of(&file.text)))
+            Some((file.text.as_str(), Lines::of(&file.text)))
         };
         let files = program.files.iter().map(source).collect();
         let filler = Instruction::NOP.encode().unwrap_or(0);

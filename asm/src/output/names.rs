@@ -12,6 +12,7 @@ use crate::ir::{Ir, RegisterId};
 use crate::report::source::{Lines, Sources, Span};
 use crate::syntax::expr::Value;
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::num::NonZeroU32;
 use takt_isa::program::Columns;
 use takt_isa::{BundleAddress, Register, Type};
 
@@ -47,12 +48,30 @@ impl Names {
 }
 
 /// Where a line stands in the source written out.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Position {
     /// Its place in the order of the source, macros and repetitions written out.
     pub order: u32,
+    /// The number of the scope and 1: so a word without a position takes no more room than one with.
+    scope: NonZeroU32,
+}
+
+impl Position {
+    /// The position of a place in the order of the source, in a use of a macro: an index into [`Names::scopes`], below 2³² - 1.
+    pub const fn new(order: u32, scope: u32) -> Position {
+        Position { order, scope: NonZeroU32::MIN.saturating_add(scope) }
+    }
+
     /// The use of a macro that it is of: an index into [`Names::scopes`].
-    pub scope: u32,
+    pub const fn scope(self) -> u32 {
+        self.scope.get() - 1
+    }
+}
+
+impl Default for Position {
+    fn default() -> Position {
+        Position::new(0, 0)
+    }
 }
 
 /// A use of a macro.
@@ -126,10 +145,16 @@ fn positions(context: &mut Context, ir: &Ir, emitted: &mut Emitted) -> (Vec<Opti
         names.sort_unstable();
         names
     };
-    let mut scopes = vec![Scope::default()];
+    // Room for each to be a macro's use: memory that is not written to costs nothing.
+    let mut scopes = Vec::with_capacity(context.scopes.count());
+    scopes.push(Scope::default());
     // By owner; 0 for those that have none yet, as for the code outside of macros.
     let mut numbers = vec![0; context.scopes.count()];
-    let mut position = |(order, expansion): (u32, u32)| {
+    let mut position = |position: Position| {
+        let expansion = position.scope();
+        if expansion == 0 {
+            return position;
+        }
         let owner = context.scopes.scope(ScopeId(expansion)).owner;
         let number = &mut numbers[owner.0 as usize];
         if *number == 0
@@ -138,7 +163,7 @@ fn positions(context: &mut Context, ir: &Ir, emitted: &mut Emitted) -> (Vec<Opti
             *number = scopes.len() as u32;
             scopes.push(Scope { name, parameters: parameters(owner) });
         }
-        Position { order, scope: *number }
+        Position::new(position.order, *number)
     };
     // In the memory that the origins have.
     let origins = std::mem::take(&mut emitted.origins);

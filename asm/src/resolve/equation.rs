@@ -4,9 +4,9 @@
 
 use crate::context::{At, Reported, Wanted, type_name, words};
 use crate::expand::equation::Results;
-use crate::expand::{Fast, Item, SourcePlace};
+use crate::expand::{Fast, Item};
 use crate::ir::given::Kind;
-use crate::ir::{Bundle, Operation, RegisterId, RegisterKind, VirtualRegister};
+use crate::ir::{Attribution, Bundle, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
@@ -56,7 +56,7 @@ impl Term {
 
 /// The equation at hand.
 pub(super) struct Line {
-    location: Option<SourcePlace>,
+    location: Attribution,
     scheduled: bool,
     /// What its operations have computed so far: where the value is, the bundle, and the part.
     pub(super) computed: Vec<(RegisterId, usize, Key)>,

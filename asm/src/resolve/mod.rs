@@ -14,9 +14,11 @@ mod slots;
 
 use crate::context::{Array, At, Binding, Context, Reported, ScopeId};
 use crate::expand::load::Loader;
-use crate::expand::{self, Data, Flat, Item, SourcePlace, Timing};
+use crate::expand::{self, Data, Flat, Item, Timing};
 use crate::ir::given::Kind;
-use crate::ir::{Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind};
+use crate::ir::{
+    Attribution, Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind,
+};
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::resolve::forms::Forms;
@@ -57,10 +59,12 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         latched: flat.ports.is_some_and(|(latched, _)| latched),
         numbers: BTreeMap::new(),
         scheduled: false,
+        has_choices: false,
         data: Vec::new(),
         raw: Vec::new(),
         contracted: Vec::new(),
         files: Vec::new(),
+        parts: Vec::new(),
         versions: Vec::new(),
     };
     let words = |data: &Data| match data {
@@ -69,6 +73,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
     };
     let data_words = flat.data.iter().map(words).sum();
     let (pool, own_files) = (HashMap::default(), Vec::new());
+    let has_equations = context.asts.iter().any(|ast| !ast.equations.is_empty());
     let mut resolver = Resolver {
         context,
         loader,
@@ -84,6 +89,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         kinds: Vec::new(),
         sharing: Sharing::default(),
         turns: 0,
+        has_equations,
     };
     let once = std::mem::take(&mut resolver.flat.once);
     resolver.section(Section::Once, &once);
@@ -142,6 +148,8 @@ pub(crate) struct Resolver<'c> {
     sharing: Sharing,
     /// Turns of all sums.
     turns: usize,
+    /// Whether there are equations at all: what is above one counts for nothing else.
+    has_equations: bool,
 }
 
 impl Resolver<'_> {
@@ -152,8 +160,11 @@ impl Resolver<'_> {
         let mut bounds = self.flat.loop_bounds.clone();
         bounds.retain(|bound| bound.section == section);
         let mut bounds = bounds.into_iter().peekable();
+        let mut next = self.place_labels(section, 0);
         for (index, item) in items.iter().enumerate() {
-            self.place_labels(section, index as u32);
+            if index as u32 >= next {
+                next = self.place_labels(section, index as u32);
+            }
             if let Some(expand::LoopBound { most, .. }) = bounds.next_if(|bound| bound.item == index as u32) {
                 self.ir.loop_bounds.push(LoopBound { position: self.ir.bundles.len() as u32, most });
                 self.sharing.cut();
@@ -164,12 +175,12 @@ impl Resolver<'_> {
         self.place_labels(section, u32::MAX);
     }
 
-    /// Sets the position of the section's labels that stand at or before a statement.
-    fn place_labels(&mut self, section: Section, statement: u32) {
+    /// Sets the position of the section's labels that stand at or before a statement. Returns where the next one stands.
+    fn place_labels(&mut self, section: Section, statement: u32) -> u32 {
         while let Some(label) = self.context.declared.labels.get_mut(self.label) {
             if self.context.declared.label_sections[self.label] == section {
                 if label.position > statement {
-                    return;
+                    return label.position;
                 }
                 label.position = self.ir.bundles.len() as u32;
                 if section != Section::Data {
@@ -178,12 +189,13 @@ impl Resolver<'_> {
             }
             self.label += 1;
         }
+        u32::MAX
     }
 
     fn item(&mut self, item: &Item) {
         let ast = Rc::clone(&self.context.asts[item.at.ast as usize]);
         let (first, count) = match ast.statements[item.statement as usize].kind {
-            StatementKind::Bundle(first, count) => (first, count),
+            StatementKind::Bundle(first, count) => (first, u32::from(count)),
             StatementKind::Equation(equation) => {
                 // What goes wrong is in the report.
                 let _ = self.equation(item, &ast, equation);
@@ -192,6 +204,15 @@ impl Resolver<'_> {
             StatementKind::Empty | StatementKind::Directive(_) => return,
         };
         let written = &ast.operations[first as usize..(first + count) as usize];
+        if let [one] = written {
+            let location = self.location(item, (one.span, one.line), 0, 1);
+            // What goes wrong is in the report.
+            if let Ok(operation) = self.operation(item.at, &ast, first, 1, location) {
+                let operations = SmallVec::from_buf([operation]);
+                self.push(Bundle { operations, explicit: false, scheduled: item.scheduled });
+            }
+            return;
+        }
         let mut operations: SmallVec<[Operation; 1]> = SmallVec::with_capacity(written.len());
         for (index, (operation, number)) in written.iter().zip(first..).enumerate() {
             let location = self.location(item, (operation.span, operation.line), index, written.len());
@@ -203,10 +224,8 @@ impl Resolver<'_> {
         if operations.len() < written.len() {
             return;
         }
-        let explicit = written.len() > 1;
-        if !explicit {
-            self.push(Bundle { operations, explicit, scheduled: item.scheduled });
-        } else if self.ir.machine.slots.len() == 1 {
+        let explicit = true;
+        if self.ir.machine.slots.len() == 1 {
             match serialise::order(&operations) {
                 Ok(order) => {
                     for index in order {
@@ -259,11 +278,22 @@ impl Resolver<'_> {
 
     /// Adds a bundle to the program.
     fn push(&mut self, mut bundle: Bundle) {
-        let is_opaque = bundle.is_opaque();
         let order = self.ir.bundles.len() as u32;
         self.ir.scheduled |= bundle.scheduled;
         for operation in &mut bundle.operations {
             operation.order = order;
+            self.ir.has_choices |= operation.slots.len() > 1;
+        }
+        if self.has_equations {
+            self.note_results(&bundle);
+        }
+        self.ir.bundles.push(bundle);
+    }
+
+    /// Notes for the equations below what a bundle writes.
+    fn note_results(&mut self, bundle: &Bundle) {
+        let is_opaque = bundle.is_opaque();
+        for operation in &bundle.operations {
             if let Some(dest) = operation.dest {
                 let kind = self.result_kind(operation);
                 self.set_kind(dest, kind);
@@ -273,7 +303,6 @@ impl Resolver<'_> {
                 self.sharing.cut();
             }
         }
-        self.ir.bundles.push(bundle);
     }
 
     /// Where an operation comes from: its own line, or what `.loc` says.
@@ -283,27 +312,27 @@ impl Resolver<'_> {
         (span, line): (Span, u32),
         index: usize,
         count: usize,
-    ) -> Option<SourcePlace> {
+    ) -> Attribution {
         if item.loc != 0 {
             let places = &self.flat.locs[item.loc as usize];
             if places.len() > 1 && places.len() != count {
                 let message = format!("a bundle of {count}, and `.loc` gives {} places", places.len());
                 self.context.error(item.at.scope, "loc", span, message);
-                return None;
+                return Attribution::NONE;
             }
             let place = places.get(if places.len() == 1 { 0 } else { index }).copied().flatten();
-            return place;
+            return place.map_or(Attribution::NONE, |(location, part)| self.ir.attribute(location, part));
         }
         let ast = item.at.ast as usize;
         if let Some(Some(file)) = self.own_files.get(ast) {
-            return Some((Location { file: *file, line }, None));
+            return Attribution::to(Location { file: *file, line });
         }
         let file = self.context.reports.sources.file_of(span.start);
         let name = std::sync::Arc::clone(&self.context.reports.sources.files()[file].name);
         let file = self.flat.file(&name);
         self.own_files.resize(self.own_files.len().max(ast + 1), None);
         self.own_files[ast] = Some(file);
-        Some((Location { file, line }, None))
+        Attribution::to(Location { file, line })
     }
 
     fn operation(
@@ -312,7 +341,7 @@ impl Resolver<'_> {
         ast: &Ast,
         number: u32,
         of: usize,
-        location: Option<SourcePlace>,
+        location: Attribution,
     ) -> Result<Operation, Reported> {
         let written = &ast.operations[number as usize];
         let name = self.context.spelled(at, written.mnemonic.name, written.mnemonic.span)?;
@@ -351,7 +380,7 @@ impl Resolver<'_> {
         number: u32,
         written: &crate::syntax::ast::Operation,
         operands: &[Operand],
-        location: Option<SourcePlace>,
+        location: Attribution,
     ) -> Result<Operation, Reported> {
         let [slot, word] = operands else { return Err(Reported) };
         let name = self.context.reports.sources.text(slot.span).to_owned();

@@ -20,6 +20,7 @@ use takt_isa::{Operand as Place, Row, Type};
 type Meaning = (At, Operand, Option<(NameId, Binding)>);
 
 impl Resolver<'_> {
+    #[inline]
     pub(crate) fn operand(
         &mut self,
         at: At,
@@ -35,11 +36,17 @@ impl Resolver<'_> {
                 self.note_cast(operation, Part::Dest);
             }
             Place::Source(index) => {
-                let source = self.source(at, operand, row.source_type(index))?;
+                let ty = row.source_type(index);
+                let source = match self.plain(at, operand) {
+                    Some(register) => register,
+                    None => self.other_source(at, operand, ty)?,
+                };
                 operation.sources[index] = source;
-                let is_constant =
-                    matches!(self.context.declared.registers[source.index()].kind, RegisterKind::Constant(_));
-                if is_constant && row.source_type(index) == Type::B {
+                let is_constant = || {
+                    let register = &self.context.declared.registers[source.index()];
+                    matches!(register.kind, RegisterKind::Constant(_))
+                };
+                if ty == Type::B && is_constant() {
                     self.note_literal(at, operand, operation, Part::Source(index as u8));
                 }
                 self.note_cast(operation, Part::Source(index as u8));
@@ -77,6 +84,7 @@ impl Resolver<'_> {
     }
 
     /// Notes the type that the operand just read is taken as.
+    #[inline]
     fn note_cast(&mut self, operation: &Operation, part: Part) {
         if let Some(ty) = self.cast {
             self.context.declared.given.insert(operation, part, Given::Cast(ty));
@@ -89,6 +97,16 @@ impl Resolver<'_> {
         let is_address = self.table_of(at, operand.kind).is_some();
         let given = Given::literal(value, is_address, operand.span);
         self.context.declared.given.insert(operation, part, given);
+    }
+
+    /// The register that an operand names, if it does no more than that and nobody asks for the place.
+    #[inline(always)]
+    fn plain(&self, at: At, operand: Operand) -> Option<RegisterId> {
+        let OperandKind::Name(name) = operand.kind else { return None };
+        match self.context.lookup(at.scope, name.resolve().ok()?) {
+            Binding::Register(register) if self.context.notes.is_none() => Some(register),
+            _ => None,
+        }
     }
 
     /// Follows parameters to the operand that was given for them, and what its name means if it is a name.
@@ -105,7 +123,9 @@ impl Resolver<'_> {
                 self.cast.get_or_insert(ty);
                 operand = inner;
             }
-            if let Some((name, indices)) = self.indexed(at, operand) {
+            if let OperandKind::Element(_) | OperandKind::Memory(_) = operand.kind
+                && let Some((name, indices)) = self.indexed(at, operand)
+            {
                 let register = self.element(at, name, &indices, operand.span)?;
                 let id = self.context.name(at, name.name, name.span)?;
                 return Ok((at, operand, Some((id, Binding::Register(register)))));
@@ -133,6 +153,14 @@ impl Resolver<'_> {
 
     /// The register that an operand names, to be written: by an instruction, or an equation.
     pub(crate) fn dest(&mut self, at: At, operand: Operand, wanted: Wanted) -> Result<RegisterId, Reported> {
+        if let Some(register) = self.plain(at, operand) {
+            let VirtualRegister { kind, pinned, .. } = &self.context.declared.registers[register.index()];
+            if matches!(kind, RegisterKind::Plain | RegisterKind::State | RegisterKind::Output)
+                && pinned.is_none()
+            {
+                return Ok(register);
+            }
+        }
         let help = match wanted {
             Wanted::Left => "what stands left of `=` is the register to write",
             _ => "the first operand is the register to write",
@@ -380,6 +408,14 @@ impl Resolver<'_> {
 
     /// A register to read: a register as such, or the one that holds a constant.
     pub(crate) fn source(&mut self, at: At, operand: Operand, ty: Type) -> Result<RegisterId, Reported> {
+        match self.plain(at, operand) {
+            Some(register) => Ok(register),
+            None => self.other_source(at, operand, ty),
+        }
+    }
+
+    /// A register to read that is not named as such where it is read.
+    fn other_source(&mut self, at: At, operand: Operand, ty: Type) -> Result<RegisterId, Reported> {
         let (place, given, meaning) = self.meaning(at, operand)?;
         match (given.kind, meaning) {
             (_, Some((_, Binding::Register(register)))) => Ok(register),

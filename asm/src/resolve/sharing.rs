@@ -6,7 +6,7 @@
 //! shared within its equation only.
 
 use crate::ir::RegisterId;
-use std::collections::HashMap;
+use foldhash::HashMap;
 use takt_isa::Op;
 
 /// A part: an instruction and its sources, each with how often it was written; and the equation, if it matters.
@@ -28,7 +28,8 @@ struct Known {
 #[derive(Default)]
 pub(crate) struct Sharing {
     known: HashMap<Key, Known>,
-    writes: HashMap<RegisterId, u32>,
+    /// How often each register was written, by index.
+    writes: Vec<u32>,
     equation: u32,
     /// Stretches of bundles that control must not enter: from behind what computes a part to where another equation uses it.
     pub(crate) stretches: Vec<(u32, u32)>,
@@ -47,11 +48,15 @@ impl Sharing {
 
     /// A register is written.
     pub(crate) fn write(&mut self, register: RegisterId) {
-        *self.writes.entry(register).or_default() += 1;
+        let index = register.index();
+        if index >= self.writes.len() {
+            self.writes.resize(index + 1, 0);
+        }
+        self.writes[index] += 1;
     }
 
     fn writes(&self, register: RegisterId) -> u32 {
-        self.writes.get(&register).copied().unwrap_or(0)
+        self.writes.get(register.index()).copied().unwrap_or(0)
     }
 
     /// A part, and whether it is one of its equation only.

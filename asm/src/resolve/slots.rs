@@ -104,6 +104,16 @@ impl Resolver<'_> {
 
     /// Gives each operation of a bundle a slot. More of them than there are slots for them is a mistake.
     pub(super) fn assign_slots(&mut self, at: At, operations: &mut [Operation]) -> Result<(), Reported> {
+        // Most bundles leave no choice, and their operations have the slots that they are to have.
+        let mut taken = Slots::default();
+        let is_settled = |operation: &Operation| {
+            let is_free = operation.slots.len() == 1 && taken.and(operation.slots).is_empty();
+            taken = taken.or(operation.slots);
+            is_free
+        };
+        if operations.iter().all(is_settled) {
+            return Ok(());
+        }
         let mut result = Ok(());
         let mut claiming: Vec<usize> =
             (0..operations.len()).filter(|index| operations[*index].slot.is_some()).collect();

@@ -104,7 +104,7 @@ pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
         let packed = block.pack(old, &solution.plan);
         banks.settle(&packed);
         report.blocks.push(BlockReport {
-            location: old.first().and_then(|bundle| bundle.operations.first()?.location),
+            location: old.first().and_then(|bundle| ir.location(bundle.operations.first()?)),
             label: label_at(ir, run.start as u32),
             address: BundleAddress::new(address),
             operations: block.problem.tasks.iter().map(|task| task.operations as u32).sum(),

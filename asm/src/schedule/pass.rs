@@ -12,20 +12,49 @@ pub(super) struct Chains {
 
 /// Sets of cycles, one for each resource.
 pub(super) struct Reservations {
-    slots: Vec<Vec<bool>>,
-    units: Vec<Vec<bool>>,
-    ports: Vec<Vec<bool>>,
+    slots: Vec<Row>,
+    units: Vec<Row>,
+    ports: Vec<Row>,
 }
 
-fn is_set(row: &[bool], cycle: usize) -> bool {
-    row.get(cycle).copied().unwrap_or(false)
-}
+/// The cycles in which a resource is taken. For each cycle it has itself if that is free, else a later one that is not after the
+/// next free one: where a resource is taken for long, its next free cycle is still found in few steps. Beyond, all are free.
+#[derive(Clone, Default)]
+struct Row(Vec<u32>);
 
-fn set(row: &mut Vec<bool>, cycle: usize) {
-    if row.len() <= cycle {
-        row.resize((cycle + 1).next_power_of_two(), false);
+impl Row {
+    #[inline]
+    fn is_set(&self, cycle: usize) -> bool {
+        self.0.get(cycle).is_some_and(|next| *next as usize != cycle)
     }
-    row[cycle] = true;
+
+    fn set(&mut self, cycle: usize) {
+        if self.0.len() <= cycle {
+            self.0.extend(self.0.len() as u32..(cycle as u32 + 1).next_power_of_two());
+        }
+        self.0[cycle] = cycle as u32 + 1;
+    }
+
+    fn clear(&mut self) {
+        (0..).zip(&mut self.0).for_each(|(cycle, next)| *next = cycle);
+    }
+
+    /// The first free cycle from one on.
+    #[inline]
+    fn free_from(&mut self, cycle: usize) -> usize {
+        let mut free = cycle;
+        while let Some(next) = self.0.get(free).map(|next| *next as usize)
+            && next != free
+        {
+            free = next;
+        }
+        // Whoever comes this way again is there at once.
+        let mut at = cycle;
+        while at < free {
+            at = std::mem::replace(&mut self.0[at], free as u32) as usize;
+        }
+        free
+    }
 }
 
 /// Time runs backward in a backward pass: cycle `c` of the pass is cycle `-c` of the schedule, offset so that write ports,
@@ -41,15 +70,15 @@ const PORT_OFFSET: usize = takt_isa::spec::units::MAX_LATENCY as usize;
 impl Reservations {
     pub(super) fn new(problem: &Problem) -> Reservations {
         Reservations {
-            slots: vec![Vec::new(); problem.slots],
-            units: vec![Vec::new(); problem.units],
-            ports: vec![Vec::new(); problem.slots],
+            slots: vec![Row::default(); problem.slots],
+            units: vec![Row::default(); problem.units],
+            ports: vec![Row::default(); problem.slots],
         }
     }
 
     fn clear(&mut self) {
         for row in self.slots.iter_mut().chain(&mut self.units).chain(&mut self.ports) {
-            row.fill(false);
+            row.clear();
         }
     }
 
@@ -62,28 +91,55 @@ impl Reservations {
 
     fn fits(&self, parts: &[Part], cycle: usize, direction: Direction) -> bool {
         parts.iter().all(|part| {
-            !is_set(&self.slots[part.slot], cycle)
+            !self.slots[part.slot].is_set(cycle)
                 && part.unit.is_none_or(|unit| {
                     // A unit is held for `interval` cycles of the pass from the issue on. In a backward pass the hold
                     // runs the other way, which forbids the same pairs of cycles.
-                    (0..part.interval as usize).all(|k| !is_set(&self.units[unit], cycle + k))
+                    (0..part.interval as usize).all(|k| !self.units[unit].is_set(cycle + k))
                 })
                 && part.writes.is_none_or(|latency| {
-                    !is_set(&self.ports[part.slot], Self::port_cycle(direction, cycle, latency))
+                    !self.ports[part.slot].is_set(Self::port_cycle(direction, cycle, latency))
                 })
         })
     }
 
+    /// The first cycle from one on in which all parts fit.
+    fn first_fit(&mut self, parts: &[Part], mut cycle: usize, direction: Direction) -> usize {
+        loop {
+            let before = cycle;
+            for part in parts {
+                cycle = self.slots[part.slot].free_from(cycle);
+                if let Some(unit) = part.unit {
+                    for k in 0..part.interval as usize {
+                        // What is taken within the interval is behind it.
+                        let free = self.units[unit].free_from(cycle + k);
+                        if free != cycle + k {
+                            cycle = free;
+                            break;
+                        }
+                    }
+                }
+                if let Some(latency) = part.writes {
+                    let port = Self::port_cycle(direction, cycle, latency);
+                    cycle += self.ports[part.slot].free_from(port) - port;
+                }
+            }
+            if cycle == before {
+                return cycle;
+            }
+        }
+    }
+
     fn reserve(&mut self, parts: &[Part], cycle: usize, direction: Direction) {
         for part in parts {
-            set(&mut self.slots[part.slot], cycle);
+            self.slots[part.slot].set(cycle);
             if let Some(unit) = part.unit {
                 for k in 0..part.interval as usize {
-                    set(&mut self.units[unit], cycle + k);
+                    self.units[unit].set(cycle + k);
                 }
             }
             if let Some(latency) = part.writes {
-                set(&mut self.ports[part.slot], Self::port_cycle(direction, cycle, latency));
+                self.ports[part.slot].set(Self::port_cycle(direction, cycle, latency));
             }
         }
     }
@@ -254,10 +310,8 @@ impl<'p> Graph<'p> {
                     plan.start[other] + distance
                 };
                 let parts = task.choice(choice);
-                let mut cycle = preds[i].iter().map(after).fold(release(task), u32::max);
-                while !table.fits(parts, cycle as usize, direction) {
-                    cycle += 1;
-                }
+                let earliest = preds[i].iter().map(after).fold(release(task), u32::max);
+                let cycle = table.first_fit(parts, earliest as usize, direction) as u32;
                 // What is quicker may issue later. (Backward, the distances have seen to that.)
                 let written = match direction {
                     Direction::Forward => parts.iter().filter_map(|part| part.writes).max().unwrap_or(0),
@@ -314,5 +368,33 @@ impl<'p> Graph<'p> {
             cycle += 1;
         }
         cycle
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn part() -> impl Strategy<Value = Part> {
+        (0..2usize, prop::option::of(0..3usize), 1..5u32, prop::option::of(1..4u32))
+            .prop_map(|(slot, unit, interval, writes)| Part { slot, unit, interval, writes })
+    }
+
+    proptest! {
+        /// The first cycle that fits is the one that trying each finds, however the table was filled.
+        #[test]
+        fn the_first_fit_is_the_first(
+            tasks in prop::collection::vec((prop::collection::vec(part(), 1..3), 0..20usize), 1..60),
+            backward in any::<bool>(),
+        ) {
+            let direction = if backward { Direction::Backward } else { Direction::Forward };
+            let mut table = Reservations::new(&Problem { slots: 2, units: 3, ..Problem::default() });
+            for (parts, earliest) in &tasks {
+                let tried = (*earliest..).find(|cycle| table.fits(parts, *cycle, direction));
+                prop_assert_eq!(Some(table.first_fit(parts, *earliest, direction)), tried);
+                table.reserve(parts, tried.unwrap_or(0), direction);
+            }
+        }
     }
 }

@@ -182,8 +182,8 @@ pub struct Statement {
 pub enum StatementKind {
     /// Nothing: a label alone, or a line that could not be read.
     Empty,
-    /// Operations: their first in [`Ast::operations`] and their number.
-    Bundle(u32, u32),
+    /// Operations: their first in [`Ast::operations`] and their number, at most [`BUNDLE_OPERATIONS`](crate::limits::BUNDLE_OPERATIONS).
+    Bundle(u32, u8),
     /// A directive: its index in [`Ast::directives`].
     Directive(u32),
     /// An equation: its index in [`Ast::equations`].

@@ -193,7 +193,7 @@ pub fn evaluate(nodes: &[Node], id: ExprId, names: &mut dyn Names) -> Result<Val
             _ => {}
         }
     }
-    let mut stack: Vec<Value> = Vec::with_capacity(8);
+    let mut stack: SmallVec<[Value; 8]> = SmallVec::new();
     for node in nodes {
         let fault = |fault| EvalError { span: node.span, fault };
         // The parser writes complete trees: there is an operand for every operator.

@@ -11,6 +11,17 @@ use takt_isa::{Op, ROWS};
 
 const EMPTY: u32 = u32::MAX;
 
+/// An entry of the table.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    /// What [`key`] makes of the name: it tells short names apart without their text.
+    key: u64,
+    /// The name's number; [`EMPTY`] if the entry is free.
+    id: u32,
+}
+
+const FREE: Entry = Entry { key: 0, id: EMPTY };
+
 /// The set of all names.
 #[derive(Clone, Debug)]
 pub struct Interner {
@@ -18,8 +29,8 @@ pub struct Interner {
     text: String,
     /// Where each name ends in `text`; it begins where the one before ends.
     ends: Vec<u32>,
-    /// Open addressing: hash to number. A power of two of entries, at most half of them used.
-    table: Vec<u32>,
+    /// Open addressing, by the hash of the key. A power of two of entries, at most half of them used.
+    table: Vec<Entry>,
 }
 
 impl Default for Interner {
@@ -31,7 +42,7 @@ impl Default for Interner {
 impl Interner {
     /// An interner that knows the language's own names.
     pub fn new() -> Interner {
-        let mut interner = Interner { text: String::new(), ends: Vec::new(), table: vec![EMPTY; 1 << 12] };
+        let mut interner = Interner { text: String::new(), ends: Vec::new(), table: vec![FREE; 1 << 12] };
         let known = ROWS
             .iter()
             .map(|row| row.mnemonic)
@@ -44,17 +55,18 @@ impl Interner {
         interner
     }
 
-    /// The name's number, or the free entry of the table where it belongs.
-    fn find_or_slot(&self, name: &str) -> Result<NameId, usize> {
+    /// The number of a name with this key, or the free entry of the table where it belongs.
+    #[inline]
+    fn find_or_slot(&self, name: &str, key: u64) -> Result<NameId, usize> {
         let mask = self.table.len() - 1;
-        let mut slot = hash(name.as_bytes()) as usize & mask;
+        let mut slot = hash(key) as usize & mask;
         loop {
-            let id = self.table[slot];
-            if id == EMPTY {
+            let entry = self.table[slot];
+            if entry.id == EMPTY {
                 return Err(slot);
             }
-            if self.text(NameId(id)) == name {
-                return Ok(NameId(id));
+            if entry.key == key && (key & LONG == 0 || self.text(NameId(entry.id)) == name) {
+                return Ok(NameId(entry.id));
             }
             slot = (slot + 1) & mask;
         }
@@ -62,17 +74,23 @@ impl Interner {
 
     /// The name's number, if it has one.
     pub fn find(&self, name: &str) -> Option<NameId> {
-        self.find_or_slot(name).ok()
+        self.find_or_slot(name, key(name.as_bytes())).ok()
     }
 
     /// The name's number, new if the name is.
+    #[inline]
     pub fn intern(&mut self, name: &str) -> NameId {
-        let slot = match self.find_or_slot(name) {
-            Ok(id) => return id,
-            Err(slot) => slot,
-        };
+        let key = key(name.as_bytes());
+        match self.find_or_slot(name, key) {
+            Ok(id) => id,
+            Err(slot) => self.add(name, key, slot),
+        }
+    }
+
+    /// Adds a name at a free entry of the table.
+    fn add(&mut self, name: &str, key: u64, slot: usize) -> NameId {
         let id = self.ends.len() as u32;
-        self.table[slot] = id;
+        self.table[slot] = Entry { key, id };
         self.text.push_str(name);
         self.ends.push(self.text.len() as u32);
         if self.ends.len() * 2 > self.table.len() {
@@ -96,13 +114,13 @@ impl Interner {
 
     fn grow(&mut self) {
         let size = self.table.len() * 4;
-        let mut table = vec![EMPTY; size];
-        for id in 0..self.ends.len() as u32 {
-            let mut slot = hash(self.text(NameId(id)).as_bytes()) as usize & (size - 1);
-            while table[slot] != EMPTY {
+        let mut table = vec![FREE; size];
+        for entry in self.table.iter().filter(|entry| entry.id != EMPTY) {
+            let mut slot = hash(entry.key) as usize & (size - 1);
+            while table[slot].id != EMPTY {
                 slot = (slot + 1) & (size - 1);
             }
-            table[slot] = id;
+            table[slot] = *entry;
         }
         self.table = table;
     }
@@ -143,25 +161,43 @@ impl NameId {
     }
 }
 
-/// Multiply and fold, eight bytes at a time; the last eight overlap those before.
-fn hash(bytes: &[u8]) -> u64 {
-    const K: u64 = 0x9e37_79b9_7f4a_7c15;
-    let fold = |h: u64, word: u64| {
-        let product = u128::from(h ^ word) * u128::from(K);
-        (product as u64) ^ ((product >> 64) as u64)
-    };
+/// In the key of a name that has more bytes than a key holds.
+const LONG: u64 = 1 << 63;
+
+const K: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// Multiply and fold.
+#[inline]
+fn fold(h: u64, word: u64) -> u64 {
+    let product = u128::from(h ^ word) * u128::from(K);
+    (product as u64) ^ ((product >> 64) as u64)
+}
+
+/// Up to seven bytes are their own key, with their number in the eighth. A longer name's is a hash of its bytes, eight at a time;
+/// the last eight overlap those before.
+#[inline]
+fn key(bytes: &[u8]) -> u64 {
     let four = |bytes: &[u8; 4]| u64::from(u32::from_le_bytes(*bytes));
-    let mut h = K ^ bytes.len() as u64;
+    let length = bytes.len();
     if let Some(last) = bytes.last_chunk() {
-        for chunk in bytes[..bytes.len() - 1].as_chunks().0 {
+        let mut h = K ^ length as u64;
+        for chunk in bytes[..length - 1].as_chunks().0 {
             h = fold(h, u64::from_le_bytes(*chunk));
         }
-        h = fold(h, u64::from_le_bytes(*last));
-    } else if let (Some(first), Some(last)) = (bytes.first_chunk(), bytes.last_chunk()) {
-        h = fold(h, four(first) | four(last) << 32);
-    } else {
-        h = fold(h, bytes.iter().fold(0, |word, &byte| word << 8 | u64::from(byte)));
+        return fold(h, u64::from_le_bytes(*last)) | LONG;
     }
+    let word = match (bytes.first_chunk(), bytes.last_chunk()) {
+        // Where the two overlap they are the same.
+        (Some(first), Some(last)) => four(first) | four(last) << (8 * (length - 4)),
+        _ => bytes.iter().rev().fold(0, |word, &byte| word << 8 | u64::from(byte)),
+    };
+    word | (length as u64) << 56
+}
+
+/// Where a key's entry is.
+#[inline]
+fn hash(key: u64) -> u64 {
+    let h = fold(K, key);
     h ^ h >> 29
 }
 
@@ -185,6 +221,26 @@ mod tests {
         // One name in two lists would shift the numbers of all that follow.
         let count = NameId::BUILTINS as usize + BUILTINS.len();
         assert_eq!(Interner::new().count(), count);
+    }
+
+    #[test]
+    fn names_of_every_length_are_told_apart() {
+        let mut interner = Interner::new();
+        let texts: Vec<String> = (0..40)
+            .flat_map(|length| {
+                let whole = "abcdefghijklmnopqrstuvwxyzabcdefghijklmnopqrstuvwxyz"[..length].to_owned();
+                // Another in each place, and one that is longer by a byte that the key has too.
+                let others = (0..length).map({
+                    let whole = whole.clone();
+                    move |at| format!("{}_{}", &whole[..at], &whole[at + 1..])
+                });
+                [format!("{whole}\0"), whole].into_iter().chain(others).collect::<Vec<_>>()
+            })
+            .collect();
+        let first: Vec<NameId> = texts.iter().map(|text| interner.intern(text)).collect();
+        for (text, id) in texts.iter().zip(first) {
+            assert_eq!((interner.text(id), interner.find(text)), (text.as_str(), Some(id)));
+        }
     }
 
     #[test]

@@ -20,6 +20,9 @@ use std::cell::OnceCell;
 /// Tokens read at a time: enough that building the parser does not count, few enough to stay in the cache.
 const CHUNK: usize = 1 << 14;
 
+/// Bytes that a line has in most sources, or more.
+const LINE: usize = 24;
+
 /// Reads a source file.
 pub fn parse(source: &Source, names: &mut Interner, sink: &mut Sink) -> Ast {
     parse_with(source, names, sink, true)
@@ -28,11 +31,12 @@ pub fn parse(source: &Source, names: &mut Interner, sink: &mut Sink) -> Ast {
 /// Reads a source file, with or without the grammar's shortcut.
 fn parse_with(source: &Source, names: &mut Interner, sink: &mut Sink, shortcut: bool) -> Ast {
     let mut ast = Ast::default();
-    // Room for as many statements as there are lines: memory that is not written to costs nothing.
-    let lines = source.text.bytes().filter(|byte| *byte == b'\n').count() + 1;
+    // Room for the statements of a text of common lines: memory that is not written to costs nothing.
+    let lines = source.text.len() / LINE + 1;
     ast.statements.reserve(lines);
     ast.operations.reserve(lines);
     ast.operands.reserve(3 * lines);
+    ast.nodes.reserve(lines);
     let mut lexer = Lexer::new(&source.text, source.base);
     let mut chunk = Chunk::default();
     while lexer.chunk(CHUNK, &mut chunk, names, sink) {
@@ -152,7 +156,7 @@ fn add(
                 );
                 sink.push(Diagnostic::error("limit", span, message));
             }
-            StatementKind::Bundle(first, count.min(limits::BUNDLE_OPERATIONS as u32))
+            StatementKind::Bundle(first, count.min(limits::BUNDLE_OPERATIONS as u32) as u8)
         }
         Body::Directive(kind, span) => {
             ast.directives.push(DirectiveLine { kind, span });

@@ -218,7 +218,7 @@ fn assembler_in(folder: &Path, text: &mut String) -> Outcome<()> {
         text,
         "## Assembler\n\nLines a second beside {version}, which assembles as many lines of the same mix (comments, labels, \
          constants, expressions, a macro) of x86-64 code. Its start is measured on an empty file and taken off; Takt's \
-         assembler is called in this process.\n\n| lines | times GNU `as` | rounds | cost of a line, times that of the \
+         assembler is called in this process, its source in memory.\n\n| lines | times GNU `as` | rounds | cost of a line, times that of the \
          shortest source |\n|---|---|---|---|"
     )?;
     let empty = folder.join("empty.s");

@@ -164,7 +164,7 @@ impl Name {
     pub(super) fn at(&self, machine: &Machine<'_>) -> Result<At<'_>, String> {
         let names = machine.names;
         let position = machine.at_hand();
-        let scope = self.scoped.binary_search_by_key(&position.scope, |(number, _)| *number);
+        let scope = self.scoped.binary_search_by_key(&position.scope(), |(number, _)| *number);
         let meaning = scope.ok().map(|index| &self.scoped[index].1).or(self.global.as_ref());
         match meaning {
             Some(Meaning::Constant(value)) => Ok(At::Constant(*value)),

@@ -166,6 +166,7 @@ struct Edit {
 }
 
 /// The run up to some position, and what is needed to go on from there.
+#[derive(Clone)]
 struct Core {
     emulator: Emulator,
     /// Periods that have ended.
@@ -175,18 +176,6 @@ struct Core {
     report: Option<PeriodReport>,
     /// Edits that have been made.
     edits: usize,
-}
-
-impl Core {
-    fn checkpoint(&mut self) -> Core {
-        let emulator = self.emulator.snapshot();
-        Core { emulator, report: self.report.clone(), ..*self }
-    }
-
-    /// A copy to go on from; the checkpoint stays.
-    fn restore(&self) -> Core {
-        Core { emulator: self.emulator.clone(), report: self.report.clone(), ..*self }
-    }
 }
 
 /// A debug session.
@@ -234,7 +223,7 @@ impl Session {
             run_limit: RUN_LIMIT,
         };
         session.set_row();
-        session.checkpoints.push(session.core.checkpoint());
+        session.checkpoints.push(session.core.clone());
         Ok(session)
     }
 
@@ -415,7 +404,7 @@ impl Session {
         self.core = Core { emulator, periods, boundary, report: None, edits: 0 };
         self.checkpoints.clear();
         self.edits.clear();
-        self.checkpoints.push(self.core.checkpoint());
+        self.checkpoints.push(self.core.clone());
     }
 
     // ---- Changing.

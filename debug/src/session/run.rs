@@ -69,7 +69,7 @@ impl Session {
             });
             self.interval *= 2;
         }
-        let checkpoint = self.core.checkpoint();
+        let checkpoint = self.core.clone();
         self.checkpoints.push(checkpoint);
     }
 
@@ -80,7 +80,7 @@ impl Session {
     /// [`Why::Done`], or that it was interrupted.
     pub fn replay(&mut self, visit: &mut dyn FnMut(&Emulator, BundleAddress)) -> Why {
         let here = self.cycle();
-        let Some(beginning) = self.checkpoints.first().map(Core::restore) else { return Why::Start };
+        let Some(beginning) = self.checkpoints.first().cloned() else { return Why::Start };
         let core = std::mem::replace(&mut self.core, beginning);
         self.make_edits();
         let mut why = Why::Done;
@@ -118,7 +118,7 @@ impl Session {
         let index = self.checkpoints.partition_point(&is_before);
         let Some(checkpoint) = self.checkpoints.get(index.saturating_sub(1)) else { return };
         if checkpoint.emulator.now() > self.cycle() || !is_before(&self.core) {
-            self.core = checkpoint.restore();
+            self.core = checkpoint.clone();
         }
         self.make_edits();
     }

@@ -45,7 +45,7 @@ impl Files {
                 path,
                 name: Arc::clone(&source.name),
                 base: source.base,
-                text: Text::new(Arc::clone(&source.text)),
+                text: Text::new(source.text.as_str()),
             }
         };
         Files(sources.files().iter().map(file).collect())

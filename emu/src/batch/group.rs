@@ -401,7 +401,7 @@ impl Group {
         let by = self.offsets[lane];
         let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
         self.lead.list_recent();
-        let mut emulator = self.spare.pop().unwrap_or_else(|| Box::new(self.lead.snapshot()));
+        let mut emulator = self.spare.pop().unwrap_or_else(|| Box::new(self.lead.clone()));
         // It may have run for a lane that had written more.
         emulator.cache.blocks.iter_mut().for_each(|block| block.verified = false);
         let lead = &self.lead;

@@ -205,11 +205,13 @@ impl Form {
 
 impl Row {
     /// The type of the destination; `B` where there is none.
+    #[inline]
     pub fn result_type(&self) -> Type {
         if self.shape.has_dest() { self.types[0] } else { Type::B }
     }
 
     /// The type of source `index` (0 = a, 1 = b, 2 = c).
+    #[inline]
     pub fn source_type(&self, index: usize) -> Type {
         let skip = usize::from(self.shape.has_dest());
         self.types.get(skip + index).copied().unwrap_or(Type::B)

@@ -158,8 +158,10 @@ struct CoreState {
     emulator: Emulator,
     mailboxes: Arc<[Mailbox]>,
     gate: Gate,
-    /// Of links that drive its input ports at any time, one mailbox each.
+    /// Of links that drive its input ports at any time, a source of each kind of arrival.
     moving: Arc<[Source]>,
+    /// Cycles of which all is known that arrives ([`System::know`] finds more).
+    known: Cycle,
     /// Whether it has no tick to come, for good.
     halted: bool,
     /// The cycle of its first `wait`, or of its halt before that.
@@ -256,18 +258,11 @@ impl System {
             if !core.program.latched {
                 let ports = moving.iter().map(|mailbox| mailbox.register).collect();
                 emulator.set_pauses(readers(&core.program, &ports));
+                emulator.set_acting(acting(&description, number));
             }
             let mut sources: Vec<Source> = Vec::new();
             for mailbox in moving {
-                let same = |known: &Source| match (known, &mailbox.source) {
-                    (Source::Status { link, side, .. }, Source::Status { link: l, side: s, .. }) => {
-                        (link, side) == (l, s)
-                    }
-                    (known, source) => {
-                        known.link() == source.link() && matches!(source, Source::Field { .. })
-                    }
-                };
-                if !sources.iter().any(same) {
+                if !sources.iter().any(|known| come_together(&description, *known, mailbox.source)) {
                     sources.push(mailbox.source);
                 }
             }
@@ -276,6 +271,7 @@ impl System {
                 mailboxes: Arc::clone(&mailboxes),
                 gate: Gate::default(),
                 moving: sources.into(),
+                known: 0,
                 halted: false,
                 waited: None,
                 tick: 0,
@@ -423,6 +419,36 @@ impl System {
 
 pub(super) fn latched(description: &Description, end: End) -> bool {
     description.core(end).is_some_and(|core| core.program.latched)
+}
+
+/// Whether what arrives from two sources is known up to the same cycle.
+fn come_together(description: &Description, one: Source, other: Source) -> bool {
+    match (one, other) {
+        (Source::Status { link, side, .. }, Source::Status { link: l, side: s, .. }) => {
+            (link, side) == (l, s)
+        }
+        (Source::Field { link, .. }, Source::Field { link: l, .. }) => {
+            let (a, b) = (&description.links[link], &description.links[l]);
+            let wires = matches!((&a.kind, &b.kind), (LinkKind::Wire, LinkKind::Wire));
+            link == l || (wires && (a.from, a.transit()) == (b.from, b.transit()))
+        }
+        _ => false,
+    }
+}
+
+/// The output ports of a core that change what it sees of a FIFO itself.
+fn acting(description: &Description, core: usize) -> impl Iterator<Item = Register> {
+    let here = End::Core(core);
+    description
+        .links
+        .iter()
+        .flat_map(move |link| match link.kind {
+            LinkKind::Fifo { push, pop, .. } => {
+                [push.filter(|_| link.from == here), pop.filter(|_| link.to == here)]
+            }
+            _ => [None, None],
+        })
+        .flatten()
 }
 
 /// The output ports of a core whose every write counts.

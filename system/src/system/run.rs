@@ -2,7 +2,7 @@
 
 use super::{InputEvent, System, SystemFault, latched};
 use crate::description::{End, LinkKind, MIN_LATENCY, Side, Source};
-use crate::system::CoreState;
+use crate::system::{CoreState, LinkState};
 use std::sync::Arc;
 use takt_emu::{Event, Fault, Status, Stop};
 use takt_isa::timing::{Cycle, ENDED_DELAY};
@@ -110,8 +110,9 @@ impl System {
         }
     }
 
-    /// Cycles of which all is known that arrives at a core.
-    fn know(&mut self, core: usize) -> Cycle {
+    /// Finds out of which cycles all is known that arrives at a core, if it does nothing from now on that changes it: it pauses if
+    /// it does.
+    fn know(&mut self, core: usize) {
         let description = Arc::clone(&self.description);
         let moving = Arc::clone(&self.cores[core].moving);
         let arrivals = moving.iter().map(|source| {
@@ -120,13 +121,25 @@ impl System {
             let LinkKind::Fifo { .. } = link.kind else {
                 return if latched(&description, link.from) { known + ENDED_DELAY } else { known };
             };
-            let done = self.carry_out(source.link());
+            let done = self.carry_out(source.link()).max(self.undisturbed(source.link(), core));
             match source {
                 Source::Status { side: Side::Sender, .. } => done + 1 + link.transit(),
                 _ => done + 1,
             }
         });
-        arrivals.min().unwrap_or(Cycle::MAX / 2)
+        self.cores[core].known = arrivals.min().unwrap_or(Cycle::MAX / 2);
+    }
+
+    /// Cycles in which a FIFO stays as it is, if a core at one side of it does nothing more.
+    fn undisturbed(&self, number: usize, core: usize) -> Cycle {
+        let link = &self.description.links[number];
+        let LinkState::Fifo { fifo, .. } = &self.links[number] else { return 0 };
+        let other = if link.to == End::Core(core) {
+            self.known(link.from) + link.transit()
+        } else {
+            self.known(link.to)
+        };
+        other.min(fifo.next_cycle().unwrap_or(Cycle::MAX))
     }
 
     /// Lets values go in that count before or in cycle `now` of a core.
@@ -152,7 +165,11 @@ impl System {
             return Ok(false);
         }
         let delay = self.description.cores[core].input_delay();
-        if self.know(core) + delay < now {
+        if self.cores[core].known + delay < until {
+            self.know(core);
+        }
+        let known = self.cores[core].known + delay;
+        if known < now {
             return Ok(false);
         }
         let mut end = until;
@@ -182,6 +199,9 @@ impl System {
         }
         self.enter(core, now);
         let state = &mut self.cores[core];
+        // Until then its inputs stay as they are.
+        let change = state.gate.next_change().map_or(Cycle::MAX, |cycle| cycle + delay);
+        state.emulator.set_pause_from(change.min(known + 1));
         let stop = match &mut self.recorded {
             None => state.emulator.run_to_wait_until(end),
             Some(events) => {

@@ -85,7 +85,7 @@ pub(super) fn to_json(info: &DebugInfo) -> serde_json::Result<Vec<u8>> {
     let debug = Debug {
         sources: sources.iter().map(source).collect(),
         constants: constants.iter().map(constant).collect(),
-        positions: names.positions.iter().map(|at| at.map(|at| (at.order, at.scope))).collect(),
+        positions: names.positions.iter().map(|at| at.map(|at| (at.order, at.scope()))).collect(),
         scopes: names.scopes.iter().map(scope).collect(),
         values: names.values.iter().map(value).collect(),
     };
@@ -120,7 +120,7 @@ pub(super) fn from_json(bytes: &[u8], program: &Program) -> Result<DebugInfo, Im
         positions: debug
             .positions
             .iter()
-            .map(|position| position.map(|(order, scope)| Position { order, scope }))
+            .map(|position| position.map(|(order, scope)| Position::new(order, scope)))
             .collect(),
         scopes: debug.scopes.into_iter().map(|Use { name, parameters }| Scope { name, parameters }).collect(),
         values: debug
@@ -153,9 +153,9 @@ fn check(names: &Names, program: &Program) -> Result<(), ImageError> {
         return wrong(format!("{} positions for {} words", positions.len(), program.code.len()));
     }
     if let Some(position) =
-        positions.iter().flatten().find(|position| position.scope as usize >= scopes.len())
+        positions.iter().flatten().find(|position| position.scope() as usize >= scopes.len())
     {
-        return wrong(format!("there is no scope {}", position.scope));
+        return wrong(format!("there is no scope {}", position.scope()));
     }
     for (number, scope) in scopes.iter().enumerate() {
         if number == 0 {

@@ -46,6 +46,25 @@ fn common_operands<'t>(
         return Some((*end, behind));
     }
     loop {
+        // A name alone is what most operands are.
+        if let [
+            (Token::Name(name), span),
+            (end @ (Token::Comma | Token::Newline | Token::Bars), _),
+            behind @ ..,
+        ] = rest
+        {
+            builder
+                .ast
+                .operands
+                .push(Operand { kind: OperandKind::Name(NameRef::plain(*name)), span: *span });
+            (last, rest) = (*span, behind);
+            count += 1;
+            if *end == Token::Comma {
+                continue;
+            }
+            builder.push_operation(mnemonic, count, mnemonic.span.to(last));
+            return Some((*end, rest));
+        }
         let first = builder.ast.nodes.len() as u32;
         let mut span;
         (rest, span) = common_expression(rest, 0, builder)?;

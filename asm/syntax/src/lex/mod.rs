@@ -99,11 +99,25 @@ impl<'s> Lexer<'s> {
         if self.done {
             return false;
         }
-        let mut line = Line::new(0, self.line);
+        let mut line = Line::new(0, self.line, self.base + self.lexer.span().end as u32);
         loop {
             let raw = self.lexer.next();
             let range = self.lexer.span();
             let span = Span::new(self.base + range.start as u32, self.base + range.end as u32);
+            // What most tokens are, first.
+            if !line.long && (span.end - line.from) as usize <= limits::LINE_BYTES {
+                match raw {
+                    Some(Ok(Raw::Name)) if range.len() <= limits::NAME_BYTES => {
+                        tokens.push((Token::Name(names.intern(self.lexer.slice())), span));
+                        continue;
+                    }
+                    Some(Ok(Raw::Comma)) => {
+                        tokens.push((Token::Comma, span));
+                        continue;
+                    }
+                    _ => {}
+                }
+            }
             let token = match raw {
                 Some(Ok(Raw::Newline)) | None => {
                     let more = raw.is_some();
@@ -122,7 +136,7 @@ impl<'s> Lexer<'s> {
                     if self.done || tokens.len() >= size {
                         return true;
                     }
-                    line = Line::new(tokens.len(), self.line);
+                    line = Line::new(tokens.len(), self.line, span.end);
                     continue;
                 }
                 // Of a line that is too long nothing more is kept.
@@ -148,8 +162,11 @@ impl<'s> Lexer<'s> {
                 }
             };
             tokens.push((token, span));
-            let first = tokens[line.start].1;
-            if (span.end - first.start) as usize > limits::LINE_BYTES {
+            // Blanks before the first token do not count.
+            if (span.end - line.from) as usize > limits::LINE_BYTES
+                && let first = tokens[line.start].1
+                && (span.end - first.start) as usize > limits::LINE_BYTES
+            {
                 (line.long, line.bad) = (true, true);
                 let message = format!(
                     "this line is longer than the {} bytes that the assembler reads",
@@ -170,6 +187,8 @@ struct Line {
     /// Its first token.
     start: usize,
     number: u32,
+    /// Where it begins in the space of all files.
+    from: u32,
     bad: bool,
     continued: bool,
     /// Something in it was no token, and is reported.
@@ -180,8 +199,8 @@ struct Line {
 }
 
 impl Line {
-    fn new(start: usize, number: u32) -> Line {
-        Line { start, number, bad: false, continued: false, unknown: false, long: false, nesting: 0 }
+    fn new(start: usize, number: u32, from: u32) -> Line {
+        Line { start, number, from, bad: false, continued: false, unknown: false, long: false, nesting: 0 }
     }
 
     fn end(&self, end: usize) -> LineTokens {
@@ -395,6 +414,18 @@ mod tests {
         for text in ["5c", "0x", "0b2", "1.2.3", "9223372036854775808", "0xp3", "0x_", "1e"] {
             assert_eq!(number(text), Token::Bad, "{text}");
         }
+    }
+
+    #[test]
+    fn blanks_before_a_line_do_not_count_to_its_length() {
+        let errors = |text: &str| {
+            let (mut names, mut sink, mut chunk) = (Interner::new(), Sink::default(), Chunk::default());
+            Lexer::new(text, 0).chunk(1 << 20, &mut chunk, &mut names, &mut sink);
+            sink.errors
+        };
+        let blanks = " ".repeat(limits::LINE_BYTES);
+        assert_eq!(errors(&format!("nop\n{blanks}fadd a, b, c\n")), 0);
+        assert_eq!(errors(&format!("nop\nfadd a,{blanks}b, c\n")), 1);
     }
 
     #[test]

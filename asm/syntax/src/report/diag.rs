@@ -426,7 +426,7 @@ impl<'s> Files<'s> for View<'_> {
     }
 
     fn source(&'s self, id: usize) -> Result<&'s str, Error> {
-        self.sources.files().get(id).map(|file| &*file.text).ok_or(Error::FileMissing)
+        self.sources.files().get(id).map(|file| file.text.as_str()).ok_or(Error::FileMissing)
     }
 
     fn line_index(&'s self, id: usize, byte: usize) -> Result<usize, Error> {

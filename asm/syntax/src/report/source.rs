@@ -54,7 +54,7 @@ pub struct Source {
     /// Its path within the project, as diagnostics show it.
     pub name: Arc<str>,
     /// Its text.
-    pub text: Arc<str>,
+    pub text: Arc<String>,
     /// Offset of its first byte in the space of all files.
     pub base: u32,
 }
@@ -75,7 +75,12 @@ pub struct Sources {
 
 impl Sources {
     /// Adds a file; `None` if the space of offsets is full.
-    pub fn add(&mut self, name: &str, text: Arc<str>) -> Option<usize> {
+    pub fn add(&mut self, name: &str, text: String) -> Option<usize> {
+        self.add_shared(name, text.into())
+    }
+
+    /// The same, of a text that others have too.
+    pub fn add_shared(&mut self, name: &str, text: Arc<String>) -> Option<usize> {
         // One offset lies between two files: the end of one is not the start of the next.
         let base = self.files.last().map_or(0, |last| last.base as usize + last.text.len() + 1);
         u32::try_from(base + text.len() + 1).ok()?;
