@@ -4,7 +4,7 @@ use crate::code::{Decoded, Operation};
 use crate::event::Retire;
 use crate::fault::FaultKind;
 use crate::machine::{Pending, State};
-use takt_isa::fp::{Host, Value};
+use takt_isa::fp::{Flags, Host, Value};
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Effect, Flow, Machine, SlotIndex, compute};
 
@@ -64,7 +64,9 @@ pub(crate) fn issue(
     cycle: Cycle,
     mut retired: impl FnMut(Retire),
 ) {
-    // Results are written back later, so that reading and executing one operation after another reads old values only.
+    // Results are written back later, so that reading and executing one operation after another reads old values only. Flags
+    // are cleared when all have read them.
+    let mut flags = state.flags;
     for operation in &decoded.operations {
         let [a, b, c] = operation.sources.map(|register| state.get(register));
         let mut memory = None;
@@ -86,7 +88,7 @@ pub(crate) fn issue(
             }
             Effect::ReadFlags => Value::exact(state.flags.bits().into()),
             Effect::ClearFlags => {
-                state.flags = takt_isa::fp::Flags::NONE;
+                flags = Flags::NONE;
                 Value::exact(0)
             }
             // What these do is the bundle's flow.
@@ -113,4 +115,5 @@ pub(crate) fn issue(
             None => retired(retire),
         }
     }
+    state.flags = flags;
 }

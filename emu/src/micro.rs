@@ -195,12 +195,15 @@ impl Emitter {
     /// Appends the micros of a bundle in an order in which none writes what a later one reads. Where there is no such
     /// order, because the bundle exchanges registers, a scratch word makes one.
     fn order(&mut self, mut bundle: Vec<(&Operation, Micro)>) {
-        let on_flags = |micro: &Micro| matches!(micro.kind, Kind::ReadFlags | Kind::ClearFlags);
+        // The flags that operations raise now come after what is done to those of before, which are read, then cleared.
+        let turn = |micro: &Micro| match micro.kind {
+            Kind::ReadFlags => 0,
+            Kind::ClearFlags => 1,
+            _ => 2,
+        };
         let mut moves = Vec::new();
-        while !bundle.is_empty() {
-            // The flags that operations raise now come after what is done to those of before.
-            let flags_left = bundle.iter().any(|(_, micro)| on_flags(micro));
-            let candidates = || (0..bundle.len()).filter(|&i| !flags_left || on_flags(&bundle[i].1));
+        while let Some(first) = bundle.iter().map(|(_, micro)| turn(micro)).min() {
+            let candidates = || (0..bundle.len()).filter(|&i| turn(&bundle[i].1) == first);
             let is_read = |i: usize| {
                 let (operation, micro) = &bundle[i];
                 // A late result goes to a word that nobody reads.

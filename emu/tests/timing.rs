@@ -8,9 +8,11 @@ mod common;
 use common::{at, latency, program, unit};
 use std::collections::BTreeMap;
 use takt_emu::{Emulator, Event, Status, Step};
+use takt_isa::fp::Flags;
 use takt_isa::timing::Cause;
 use takt_isa::{
     BankIndex, BundleAddress, Function, Instruction, MACHINES, Machine, Op, Program, ROWS, Register, T1, T3,
+    T4,
 };
 
 /// Stalled cycles by the bundle that could not issue, and why.
@@ -392,6 +394,24 @@ fn a_bundle_reads_before_it_writes() {
         assert_eq!((value("a0"), value("m0")), (3.0, 0.0));
         // The branch saw the product that its own bundle overwrote.
         assert!(matches!(*emulator.status(), Status::Halted { address, .. } if address == at(3)));
+    }
+}
+
+/// So it is with the flags, where two slots work on them: they are read, then cleared.
+#[test]
+fn flags_are_read_before_they_are_cleared() {
+    let source = ".preset x1 1.0
+                  fdiv a0, x1, zero
+                  clrflags || rdflags p0
+                  rdflags x0
+                  halt";
+    let mut stepper = Emulator::new(&program(&T4, source)).unwrap();
+    let mut blocks = stepper.clone();
+    stepper.set_blocks(false);
+    for emulator in [&mut stepper, &mut blocks] {
+        emulator.run().unwrap();
+        let value = |name| emulator.register(register(&T4, name)).unwrap();
+        assert_eq!((value("p0"), value("x0")), (u32::from(Flags::DIVIDE_BY_ZERO.bits()), 0));
     }
 }
 

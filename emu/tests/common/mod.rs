@@ -99,12 +99,18 @@ pub(crate) fn latency(machine: &Machine, function: Function) -> u64 {
 fn parse(machine: &Machine, text: &str, labels: &HashMap<&str, u32>) -> (SlotIndex, Instruction) {
     let (mnemonic, operands) = text.split_once(' ').unwrap_or((text, ""));
     let row = ROWS.iter().find(|row| row.mnemonic == mnemonic).unwrap_or_else(|| panic!("no {mnemonic}"));
-    let slot = machine.host(row.function).map_or(SlotIndex::new(0).unwrap(), |(slot, _)| slot);
     let register = |name: &str| {
         machine.register_address(name.trim()).unwrap_or_else(|| panic!("no register {name} in {text}"))
     };
     let mut instruction = Instruction::bare(row.op);
     let operands: Vec<&str> = operands.split(',').map(str::trim).filter(|o| !o.is_empty()).collect();
+    // Of the slots that may execute it the one that writes the destination.
+    let dest = row.shape.operands().iter().position(|operand| *operand == Operand::Dest);
+    let writes = |slot: &SlotIndex| {
+        dest.is_none_or(|dest| machine.slot(*slot).bank.index(register(operands[dest])).is_some())
+    };
+    // Every slot takes those that do nothing.
+    let slot = machine.hosts(row.function).iter().find(writes).or(SlotIndex::new(0)).unwrap();
     assert_eq!(operands.len(), row.shape.operands().len(), "{text}");
     for (operand, text) in row.shape.operands().iter().zip(operands) {
         match *operand {
