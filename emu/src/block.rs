@@ -39,9 +39,10 @@ struct Edge {
 /// How far a block goes where runs may pause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Line {
-    /// Through the bundles at which they may, until one acts: up to a later cycle they don't.
+    /// Through bundles at which runs may pause, for stretches of time in which they do not; once a bundle acts
+    /// ([`Decoded::acts`]), up to the next of them.
     Whole,
-    /// Up to the first of them.
+    /// Up to the first bundle at which runs may pause.
     ToPause,
 }
 

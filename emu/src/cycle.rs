@@ -236,7 +236,13 @@ impl Emulator {
             Recent::List(recent) => recent.clone(),
             Recent::Block { id, cycle } => {
                 let recent = self.cache.recent(*id).iter();
-                recent.map(|&(address, age)| (address, cycle - Cycle::from(age))).collect()
+                let mut recent: Vec<_> =
+                    recent.map(|&(address, age)| (address, cycle - Cycle::from(age))).collect();
+                if recent.is_empty() {
+                    // It holds nothing up, but it is the last that has issued.
+                    recent.push((self.cache.blocks[*id as usize].end().previous(), *cycle));
+                }
+                recent
             }
         }
     }

@@ -189,7 +189,7 @@ pub struct Emulator {
     pub(crate) compiled_runs: CompiledRuns,
     /// Bundles before whose issue runs pause, ascending.
     pub(crate) pauses: Arc<[BundleAddress]>,
-    /// The first cycle before which they do.
+    /// They pause from this cycle on.
     pub(crate) pause_from: Cycle,
 }
 
@@ -287,13 +287,14 @@ impl Emulator {
     }
 
     /// Reloads the program and resets the machine: everything is as [`Emulator::new`] made it, except the settings
-    /// (cycle limit, tick period, pauses and the cycle that they begin in).
+    /// (cycle limit, tick period, pauses).
     pub fn reset(&mut self) {
         self.state = State::new(&self.program);
         self.status = Status::Running;
         self.now = 0;
         self.front = Front::after_reset(&self.program);
         self.turns = first_turns(&self.program);
+        self.pause_from = 0;
         self.recent = Recent::List(Vec::new());
         self.scoreboard = None;
         self.planned = None;
@@ -347,13 +348,14 @@ impl Emulator {
         self.pause_from = 0;
         if !self.pauses.iter().eq(&bundles) {
             self.pauses = bundles.into_iter().collect();
-            // Blocks end before them.
+            // Blocks end before them, where runs may pause.
             self.drop_blocks();
         }
     }
 
     /// Lets runs go through the bundles of [`Emulator::set_pauses`] that issue before cycle `from`, until one issues that
-    /// writes a port of [`Emulator::set_acting`]: whole blocks run there. [`Emulator::set_pauses`] takes it back.
+    /// writes a port of [`Emulator::set_acting`] or while such a write is in flight: whole blocks run there.
+    /// [`Emulator::set_pauses`] takes it back.
     pub fn set_pause_from(&mut self, from: Cycle) {
         let acts = self.state.pending.iter().any(|pending| self.code.acting.contains(pending.register));
         self.pause_from = if acts { 0 } else { from };

@@ -93,8 +93,17 @@ fn compare_runs(seed: u64, program: &Program, wild: bool) -> Result<Stop, Fault>
         if random.once_in(10) {
             let pauses: Vec<BundleAddress> =
                 (0..random.below(4)).map(|_| BundleAddress::new(random.below(program.bundles()))).collect();
+            let acting: Vec<Register> = program.outputs.iter().map(|port| port.register).collect();
+            let acting = &acting[..random.below(acting.len() as u32 + 1) as usize];
             for emulator in [&mut fast, &mut step] {
                 emulator.set_pauses(pauses.iter().copied());
+                emulator.set_acting(acting.iter().copied());
+            }
+        }
+        if random.once_in(3) {
+            let from = fast.now() + u64::from(random.below(400));
+            for emulator in [&mut fast, &mut step] {
+                emulator.set_pause_from(from);
             }
         }
         if random.once_in(4) {

@@ -346,7 +346,7 @@ impl<'i, V: Known> Types<'i, V> {
     }
 }
 
-/// Nothing.
+/// A value of any type, of which nothing is known.
 fn any<V: Known>() -> V {
     V::new(Kind::Any, None)
 }

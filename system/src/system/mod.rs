@@ -1,8 +1,9 @@
 //! The emulator of a system. Each core runs ahead on its own until it needs to know what another one did.
 //!
 //! A core's reads of linked inputs are where it can see others, and nothing arrives earlier than [`MIN_LATENCY`](crate::MIN_LATENCY) cycles
-//! after it was sent. So a core runs to the next bundle that reads such an input (or tick that takes one), and goes on once
-//! every sender has come within the link's latency of that cycle. The core that is behind all others can always go on.
+//! after it was sent. So a core runs to the next bundle that reads such an input whose value is not known yet (or tick that takes
+//! one), and goes on once every sender has come within the link's latency of that cycle. The core that is behind all others can
+//! always go on.
 
 mod host;
 mod links;
