@@ -132,10 +132,6 @@ fn location(program: &Program, word: u32) -> Option<Location> {
     *program.lines.get(word as usize)?
 }
 
-fn place(program: &Program, word: u32) -> String {
-    program.word_place(word as usize).unwrap_or_else(|| format!("word {word}"))
-}
-
 fn line_text(program: &Program, location: Option<Location>) -> String {
     location.map_or_else(|| "(no source line)".to_owned(), |location| program.place_text(location))
 }
@@ -171,7 +167,7 @@ impl<'a> Measured<'a> {
     }
 
     fn place(&self, word: u32) -> String {
-        place(self.program, word)
+        self.program.word_text(word as usize)
     }
 
     /// Lines by place, those that add most to an output's error first.
@@ -387,7 +383,7 @@ impl Bounded<'_> {
             let operands = self.operands(hazard).into_iter();
             let operands = operands.map(|(name, range)| json!({ "name": name, "range": ends(range) }));
             json!({
-                "place": place(program, hazard.word),
+                "place": program.word_text(hazard.word as usize),
                 "problem": hazard.problem.to_string(),
                 "operands": operands.collect::<Vec<_>>(),
             })
@@ -446,7 +442,7 @@ impl Bounded<'_> {
             let operands: Vec<String> =
                 operands.map(|(name, range)| format!("{name} in {}", interval(range))).collect();
             let what = hazard.problem;
-            writeln!(out, "  {}: {what}: {}", place(program, hazard.word), operands.join(", "))?;
+            writeln!(out, "  {}: {what}: {}", program.word_text(hazard.word as usize), operands.join(", "))?;
         }
         if !enclosure.assumed.is_empty() {
             writeln!(out, "\nranges that a period is not shown to keep; they are taken as promised")?;

@@ -243,6 +243,11 @@ impl Program {
         Some(place)
     }
 
+    /// As [`Program::word_place`], or the word's number where it has no place.
+    pub fn word_text(&self, word: usize) -> String {
+        self.word_place(word).unwrap_or_else(|| format!("word {word}"))
+    }
+
     /// The place of a bundle: that of its first operation that has one.
     pub fn bundle_place(&self, address: BundleAddress) -> Option<String> {
         let start = address.index().checked_mul(self.machine.slots.len())?;

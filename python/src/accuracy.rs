@@ -31,7 +31,7 @@ impl Measured {
         let largest = |worst: Option<Worst>| {
             worst.map(|Worst { error, period, value, exact }| (error, period.saturating_sub(1), value, exact))
         };
-        let place = |part: &Part| (place(program, part.word), part.error);
+        let place = |part: &Part| (program.word_text(part.word as usize), part.error);
         Measured {
             name: output.name.clone(),
             periods: output.periods,
@@ -41,10 +41,6 @@ impl Measured {
             operations: output.parts.iter().map(place).collect(),
         }
     }
-}
-
-fn place(program: &takt_isa::Program, word: u32) -> String {
-    program.word_place(word as usize).unwrap_or_else(|| format!("word {word}"))
 }
 
 /// The ends of an interval.
@@ -86,12 +82,12 @@ pub(crate) fn enclose(
         range: output.range.map(ends),
         error: output.error,
         ulp: output.ulps(),
-        operations: output.parts.iter().map(|(word, error)| (place(program, *word), *error)).collect(),
+        operations: output.parts.iter().map(|(word, error)| (program.word_text(*word as usize), *error)).collect(),
     };
     let hazard = |hazard: &takt_analysis::accuracy::Hazard| {
         let operands = hazard.operands.iter();
         let operands = operands.map(|(register, range)| (program.register_text(*register), range.map(ends)));
-        (place(program, hazard.word), hazard.problem.to_string(), operands.collect())
+        (program.word_text(hazard.word as usize), hazard.problem.to_string(), operands.collect())
     };
     let assumed = |state: &takt_analysis::accuracy::Assumed| {
         (program.register_text(state.range.register), state.range.ends(), state.found.map(ends))

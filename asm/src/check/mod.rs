@@ -36,14 +36,7 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
     let mut opaque = false;
     let end = ir.bundles.len() as u32;
     let mut beyond: Vec<Where> = Vec::new();
-    // Whether the bundle at hand follows the period's first whatever happens, and whether one that does ends the period.
-    let (mut follows, mut ends) = (false, false);
     for (index, bundle) in (0..).zip(&ir.bundles) {
-        follows |= index == ir.period;
-        if follows && !ends {
-            ends = bundle.operations.iter().any(ends_period);
-            follows = bundle.operations.iter().all(goes_on);
-        }
         for (number, operation) in (0..).zip(&bundle.operations) {
             for (which, source) in operation.reads().iter().enumerate() {
                 uses[source.index()].read.get_or_insert(((index, number), which));
@@ -90,9 +83,7 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
         return;
     }
     if !opaque {
-        if !ends {
-            no_wait(context, ir);
-        }
+        no_wait(context, ir);
         for array in context.declared.arrays.clone() {
             // Of an array it is enough that one element is used.
             let elements = array.elements().map(RegisterId::index);

@@ -224,13 +224,12 @@ impl Resolver<'_> {
         if operations.len() < written.len() {
             return;
         }
-        let explicit = true;
         if self.ir.machine.slots.len() == 1 {
             match serialise::order(&operations) {
                 Ok(order) => {
                     for index in order {
                         let operations = SmallVec::from_elem(operations[index], 1);
-                        self.push(Bundle { operations, explicit, scheduled: item.scheduled });
+                        self.push(Bundle { operations, explicit: true, scheduled: item.scheduled });
                     }
                 }
                 Err(diagnostic) => {
@@ -243,7 +242,7 @@ impl Resolver<'_> {
                 let diagnostic = diagnostic(&self.context.declared.registers, self.ir.machine);
                 self.context.report(item.at.scope, diagnostic);
             }
-            self.push(Bundle { operations, explicit, scheduled: item.scheduled });
+            self.push(Bundle { operations, explicit: true, scheduled: item.scheduled });
         }
     }
 
