@@ -82,7 +82,11 @@ pub(crate) fn enclose(
         range: output.range.map(ends),
         error: output.error,
         ulp: output.ulps(),
-        operations: output.parts.iter().map(|(word, error)| (program.word_text(*word as usize), *error)).collect(),
+        operations: output
+            .parts
+            .iter()
+            .map(|(word, error)| (program.word_text(*word as usize), *error))
+            .collect(),
     };
     let hazard = |hazard: &takt_analysis::accuracy::Hazard| {
         let operands = hazard.operands.iter();

@@ -294,6 +294,7 @@ def test_bounds_of_errors_hold_in_every_run():
     source = """
         .input a, b
         .output y
+        .reg t
         .range a = -2, 2
         .range b = 1, 8
         .period

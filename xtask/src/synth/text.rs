@@ -2,6 +2,7 @@
 
 use super::TARGET_MHZ;
 use super::families::{COUNTED, Counted};
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use takt_board::tools::{MAPPING, OPTIONS};
 use takt_isa::spec::machines::MACHINES;
@@ -127,12 +128,13 @@ which take a LUT4's place each (older rows have the total only). Multipliers hav
     if !others.is_empty() {
         text += &other_families(&others);
     }
-    let mut tools: Vec<_> = rows.iter().map(|row| row.tools.as_str()).collect();
-    tools.sort_by_key(|tools| std::cmp::Reverse(tools.len()));
-    if let Some(tools) = tools.first() {
+    let tools: BTreeSet<&str> = rows.iter().flat_map(|row| row.tools.split(", ")).collect();
+    if !tools.is_empty() {
+        let tools: Vec<&str> = tools.into_iter().rev().collect();
         let _ = writeln!(
             text,
-            "\nTools: {tools}. Synthesis: `{MAPPING}; synth_lattice -family ecp5 {OPTIONS}`; place and route aims at {TARGET_MHZ} MHz."
+            "\nTools: {}. Synthesis: `{MAPPING}; synth_lattice -family ecp5 {OPTIONS}`; place and route aims at {TARGET_MHZ} MHz.",
+            tools.join(", ")
         );
     }
     text
