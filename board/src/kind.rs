@@ -180,7 +180,7 @@ pub const KINDS: &[Kind] = &[
         reads: &[
             register("received", "what the last frame brought"),
             register("frames", "frames so far"),
-            register("lost", "starts during a frame, which are not made up for"),
+            register("lost", "starts that came during a frame and were dropped"),
         ],
         writes: &[scaled("send", "what the next frames send")],
         parameters: &[
