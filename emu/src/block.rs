@@ -59,7 +59,7 @@ pub(crate) struct Stretch<'a> {
 pub(crate) type Ages = Box<[(BundleAddress, u8)]>;
 
 /// Whether a block is run by the host's own instructions.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) enum Compiled<Code> {
     /// It has not run often enough.
     NotYet,
@@ -86,7 +86,7 @@ impl<Code> Compiled<Code> {
 }
 
 /// A straight line of bundles. Offsets are cycles from the entry, the first cycle in which the first bundle may issue.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Block {
     pub(crate) entry: BundleAddress,
     /// Its bundles follow each other from `entry` on.
@@ -185,7 +185,7 @@ impl Block {
 }
 
 /// The blocks compiled so far.
-#[derive(Clone, Default)]
+#[derive(Default)]
 pub(crate) struct Cache {
     pub(crate) blocks: Vec<Block>,
     ids: HashMap<(BundleAddress, Ages, Line), u32>,

@@ -23,7 +23,7 @@ pub(crate) enum Fast {
 }
 
 /// What is kept to undo a block, and buffers.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub(crate) struct Journal {
     registers: Vec<(Register, u32)>,
     pending: Vec<Pending>,

@@ -14,20 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from takt import _takt
 from takt._errors import AssemblyWarning, Diagnostic, FaultError, diagnostics
 from takt._ports import Array, Port, count_of, near, numbers, words_of
-from takt._results import (
-    Accuracy,
-    Analysis,
-    Assumed,
-    Bound,
-    Enclosure,
-    Hazard,
-    Largest,
-    Model,
-    OutputBound,
-    Run,
-    Section,
-    Span,
-)
+from takt._results import Accuracy, Analysis, Bound, Enclosure, Largest, Model, Run, Section, Span
 from takt._sim import Sim
 
 #: Cycles in which a period ends, or nobody expects it to any more.
@@ -195,17 +182,7 @@ class Program:
         Raises:
             NoBoundError: no such bound can be given: an input without a range, a loop without a bound.
         """
-        outputs, hazards, assumed = _takt.enclose(self._core)
-        return Enclosure(
-            {
-                one["name"]: OutputBound(
-                    one["name"], one["range"], one["error"], one["ulp"], tuple(one["operations"])
-                )
-                for one in outputs
-            },
-            tuple(Hazard(place, problem, tuple(operands)) for place, problem, operands in hazards),
-            tuple(Assumed(*one) for one in assumed),
-        )
+        return Enclosure.of(self._core)
 
     # ---- Running it.
 

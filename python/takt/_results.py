@@ -92,6 +92,20 @@ class Enclosure:
     hazards: tuple[Hazard, ...]
     assumed: tuple[Assumed, ...]
 
+    @staticmethod
+    def of(core: _takt.Program) -> Enclosure:
+        outputs, hazards, assumed = _takt.enclose(core)
+        return Enclosure(
+            {
+                one["name"]: OutputBound(
+                    one["name"], one["range"], one["error"], one["ulp"], tuple(one["operations"])
+                )
+                for one in outputs
+            },
+            tuple(Hazard(place, problem, tuple(operands)) for place, problem, operands in hazards),
+            tuple(Assumed(*one) for one in assumed),
+        )
+
     @property
     def safe(self) -> bool:
         """Whether no NaN, no overflow and no division by zero is possible."""

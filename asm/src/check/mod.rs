@@ -295,17 +295,9 @@ fn leaves(context: &mut Context, operation: &Operation, end: u32) {
     context.report(ScopeId(operation.expansion), warning);
 }
 
-fn ends_period(operation: &Operation) -> bool {
-    matches!(operation.row().effect, Effect::Wait | Effect::Halt)
-}
-
-/// Whether the next bundle may follow. A call comes back.
-fn goes_on(operation: &Operation) -> bool {
-    operation.row().effect.falls_through() || operation.row().effect == Effect::Call
-}
-
 /// A period that never comes to a `wait` has no end.
 fn no_wait(context: &mut Context, ir: &Ir) {
+    let ends = |operation: &Operation| matches!(operation.row().effect, Effect::Wait | Effect::Halt);
     let mut seen = vec![false; ir.bundles.len()];
     let mut reached = vec![ir.period];
     while let Some(index) = reached.pop() {
@@ -313,9 +305,13 @@ fn no_wait(context: &mut Context, ir: &Ir) {
         if std::mem::replace(&mut seen[index as usize], true) {
             continue;
         }
-        if bundle.operations.iter().any(ends_period) {
+        if bundle.operations.iter().any(ends) {
             return;
         }
+        // A call comes back.
+        let goes_on = |operation: &Operation| {
+            operation.row().effect.falls_through() || operation.row().effect == Effect::Call
+        };
         if bundle.operations.iter().all(goes_on) {
             reached.push(index + 1);
         }

@@ -263,7 +263,7 @@ pub struct FileLoader {
 }
 
 /// Sources that an editor has open, by the whole path of each: saved or not, they count in the place of what lies on the disk.
-pub type Open = Arc<BTreeMap<PathBuf, Arc<str>>>;
+pub type Open = Arc<BTreeMap<PathBuf, Arc<String>>>;
 
 impl FileLoader {
     /// The loader of a folder. Whether there is such a folder shows when it is asked for a file.

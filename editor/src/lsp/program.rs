@@ -45,7 +45,7 @@ impl Files {
                 path,
                 name: Arc::clone(&source.name),
                 base: source.base,
-                text: Text::new(source.text.as_str()),
+                text: Text::shared(Arc::clone(&source.text)),
             }
         };
         Files(sources.files().iter().map(file).collect())

@@ -15,13 +15,17 @@ pub(crate) enum Encoding {
 /// A text with its lines.
 #[derive(Clone, Debug)]
 pub(crate) struct Text {
-    pub(crate) text: Arc<str>,
+    pub(crate) text: Arc<String>,
     lines: Lines,
 }
 
 impl Text {
-    pub(crate) fn new(text: impl Into<Arc<str>>) -> Text {
-        let text = text.into();
+    pub(crate) fn new(text: impl Into<String>) -> Text {
+        Text::shared(Arc::new(text.into()))
+    }
+
+    /// A text that others have, too: an assembler's source.
+    pub(crate) fn shared(text: Arc<String>) -> Text {
         let lines = Lines::of(&text);
         Text { text, lines }
     }
