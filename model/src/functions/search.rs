@@ -1,6 +1,7 @@
 //! From a robot to a function: the equations are written down for several placements of the frames, and the shortest are
 //! taken.
 
+use super::kinematics::Third;
 use super::links::{Angles, Motion};
 use super::{Array, Function, Port, What, inverse, kinematics, mass};
 use crate::Error;
@@ -33,8 +34,11 @@ struct Attempt {
     layout: Layout,
     /// Use sums of angles of parallel axes.
     sums: bool,
-    /// Through how many joints of the way positions are computed backwards.
+    /// Through how many joints of the way positions are computed backwards; of a Jacobian, from how many joints the ways to the tip are
+    /// computed along the base's axes.
     split: usize,
+    /// Which row or column of the tip's rotation follows from the others.
+    third: Third,
     /// The unit of length, m.
     unit: f64,
 }
@@ -55,48 +59,40 @@ pub fn derive(robot: &Robot, what: What, options: &Options<'_>) -> Result<Functi
         }
         (function.count().total(), function.depth(&options.delays))
     };
-    let mut best = Attempt { layout: Layout::new(robot), sums: true, split: usize::MAX, unit: 1.0 };
-    let mut least = cost(&best);
-    let mut consider = |best: &mut Attempt, change: &dyn Fn(&mut Attempt)| {
-        let mut other = best.clone();
-        change(&mut other);
-        let cost = if other == *best { least } else { cost(&other) };
-        if cost < least {
-            (*best, least) = (other, cost);
+    let split = if what == What::Jacobian { 0 } else { usize::MAX };
+    let first = Attempt { layout: Layout::new(robot), sums: true, split, third: Third::Turned, unit: 1.0 };
+    let mut search = Search { robot, cost: &cost, least: cost(&first), best: first };
+    search.consider(&|attempt| attempt.sums = false);
+    if tip.is_some() {
+        // What is best at first need not be in the end.
+        let mut other = search.clone();
+        other.ways(what);
+        other.layouts();
+        search.layouts();
+        search.ways(what);
+        if other.least < search.least {
+            search = other;
         }
-    };
-    consider(&mut best, &|attempt| attempt.sums = false);
-    if what == What::ForwardKinematics {
-        for split in 0..robot.joints.len().min(TRIED) {
-            consider(&mut best, &|attempt| attempt.split = split);
-        }
+        search.ways(what);
     }
-    for joint in 0..robot.joints.len().min(TRIED) {
-        consider(&mut best, &|attempt| attempt.layout.incoming[joint] ^= true);
-    }
-    for joint in robot.leaves().into_iter().take(TRIED) {
-        consider(&mut best, &|attempt| attempt.layout.balanced[joint] ^= true);
-    }
-    for joint in 0..robot.joints.len().min(TRIED) {
-        for quarters in 1..4 {
-            consider(&mut best, &|attempt| attempt.layout.quarters[joint] = quarters);
-        }
-        for quarters in 0..4 {
-            consider(&mut best, &|attempt| {
-                attempt.layout.flipped[joint] ^= true;
-                attempt.layout.quarters[joint] = quarters;
-            });
+    search.layouts();
+    while tip.is_some() {
+        let before = search.least;
+        search.ways(what);
+        search.layouts();
+        if search.least == before {
+            break;
         }
     }
-    consider(&mut best, &|attempt| attempt.sums ^= true);
     let scales = options.rewrites.scale
         && matches!(what, What::InverseDynamics | What::ComputedTorque | What::Gravity | What::MassMatrix)
         && robot.joints.iter().all(|joint| joint.kind == Kind::Revolute);
     if scales {
-        for unit in units(&frames::place(robot, &best.layout)).into_iter().take(TRIED) {
-            consider(&mut best, &|attempt| attempt.unit = unit);
+        for unit in units(&frames::place(robot, &search.best.layout)).into_iter().take(TRIED) {
+            search.consider(&|attempt| attempt.unit = unit);
         }
     }
+    let best = search.best;
     let mut function = write(robot, what, options, tip, &best).optimised(&options.delays);
     function.title = match tip {
         Some((name, ..)) => format!("{} of {}, tip {name}: {}", what.name(), robot.name, what.text()),
@@ -104,6 +100,61 @@ pub fn derive(robot: &Robot, what: What, options: &Options<'_>) -> Result<Functi
     };
     function.notes = notes(robot, &best);
     Ok(function)
+}
+
+/// A search that changes one choice after the other and keeps what is shorter.
+#[derive(Clone)]
+struct Search<'a> {
+    robot: &'a Robot,
+    /// Operations, and cycles of the longest chain.
+    cost: &'a dyn Fn(&Attempt) -> (usize, u32),
+    best: Attempt,
+    least: (usize, u32),
+}
+
+impl Search<'_> {
+    fn consider(&mut self, change: &dyn Fn(&mut Attempt)) {
+        let mut other = self.best.clone();
+        change(&mut other);
+        let cost = if other == self.best { self.least } else { (self.cost)(&other) };
+        if cost < self.least {
+            (self.best, self.least) = (other, cost);
+        }
+    }
+
+    /// Ways to compute where the tip is.
+    fn ways(&mut self, what: What) {
+        let most = self.robot.joints.len().min(TRIED);
+        let thirds = if what == What::ForwardKinematics { &Third::ALL[..] } else { &[Third::Turned] };
+        for &third in thirds {
+            self.consider(&|attempt| attempt.third = third);
+            for split in 0..=most {
+                self.consider(&|attempt| (attempt.third, attempt.split) = (third, split));
+            }
+        }
+    }
+
+    /// Placements of the frames.
+    fn layouts(&mut self) {
+        for joint in 0..self.robot.joints.len().min(TRIED) {
+            self.consider(&|attempt| attempt.layout.incoming[joint] ^= true);
+        }
+        for joint in self.robot.leaves().into_iter().take(TRIED) {
+            self.consider(&|attempt| attempt.layout.balanced[joint] ^= true);
+        }
+        for joint in 0..self.robot.joints.len().min(TRIED) {
+            for quarters in 0..4 {
+                self.consider(&|attempt| attempt.layout.quarters[joint] = quarters);
+            }
+            for quarters in 0..4 {
+                self.consider(&|attempt| {
+                    attempt.layout.flipped[joint] ^= true;
+                    attempt.layout.quarters[joint] = quarters;
+                });
+            }
+        }
+        self.consider(&|attempt| attempt.sums ^= true);
+    }
 }
 
 /// Lengths that would be worth being 1.
@@ -337,11 +388,11 @@ fn equations(
             let pose = aligned(&mut links, joint, &pose);
             let angles = Angles::new(graph, &links, &q, attempt.sums);
             if what == What::Jacobian {
-                let columns = kinematics::jacobian(graph, &links, &angles, &q, joint, &pose);
+                let columns = kinematics::jacobian(graph, &links, &angles, &q, joint, &pose, attempt.split);
                 return Outputs::array("J", &[6, count], jacobian_ports(graph, robot, &columns));
             }
             let (rotation, position) =
-                kinematics::pose(graph, &links, &angles, &q, joint, &pose, attempt.split);
+                kinematics::pose(graph, &links, &angles, &q, joint, &pose, (attempt.split, attempt.third));
             let mut ports = Vec::new();
             for (i, row) in rotation.iter().enumerate() {
                 for (j, entry) in row.iter().enumerate() {

@@ -23,7 +23,7 @@ pub(super) fn settle(graph: &Graph, outputs: &[Id], thorough: bool) -> (Graph, V
     let live: Vec<Id> =
         (0..uses.len()).filter(|&index| uses[index] > 0).map(|index| Id(index as u32)).collect();
     let mut signs = Signs { graph, outputs, live, turned: vec![false; uses.len()] };
-    signs.search(if thorough { 10_000_000 } else { 50_000 });
+    signs.search(if thorough { 20_000_000 } else { 50_000 });
     signs.rebuilt()
 }
 
