@@ -1,8 +1,9 @@
 //! What is measured, against formulas in binary64; what is proved, against what is measured.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use takt_analysis::accuracy::{Enclosure, Problem, Shadow, enclose, ulp};
-use takt_asm::{MemoryLoader, Options, assemble};
+use takt_asm::{MemoryLoader, Options, Search, assemble};
 use takt_emu::Emulator;
 use takt_emu::testing::Random;
 use takt_isa::program::Range;
@@ -353,4 +354,96 @@ p:      fadd    y, s, x
     assert!(refused("z = 0, 1").contains('z'), "{}", refused("z = 0, 1"));
     let twice = refused("x = 0, 1\n.range x = 0, 2");
     assert!(twice.contains("this register has a range already"), "{twice}");
+}
+
+/// A macro of the library, in line or called as a subroutine, of an input with this range.
+fn of_library(function: &str, (low, high): (f64, f64), called: bool, machine: &'static Machine) -> Program {
+    let once = ".include <math.s>\n.input x\n.output y\n";
+    let text = match called {
+        false => format!("{once}.range x = {low}, {high}\n{HEAD} {function} y, x\n wait p\n"),
+        true => format!(
+            "{once}.range x = {low}, {high}\n.reg arg result\n.once\n wait p\n.period\np: mov arg, x\n call f\n mov y, result\n wait p\n\
+             f: {function} result, arg\n ret\n"
+        ),
+    };
+    let loader = Search::new(MemoryLoader::default()).library(takt_programs::LIBRARY);
+    let options = Options { machine, ..Options::default() };
+    let assembled = takt_asm::assemble_bytes("test.s", text.clone().into(), &loader, &options);
+    assembled.unwrap_or_else(|diagnostics| panic!("{}\n{text}", diagnostics.render(false))).program
+}
+
+/// Functions that take numbers apart: their bounds hold, and say something.
+#[test]
+fn functions_of_the_library_are_enclosed() {
+    type Case = (&'static str, (f64, f64), fn(f64) -> f64, f64);
+    // The bound in ulps of the largest value, at most.
+    let cases: [Case; 14] = [
+        ("exp", (-1.0, 1.0), f64::exp, 2.0),
+        ("exp", (-10.0, 3.0), f64::exp, 2.0),
+        ("exp", (-50.0, 50.0), f64::exp, 2.0),
+        ("log", (0.7, 1.3), f64::ln, 3.0),
+        ("log", (0.001, 500.0), f64::ln, 1.0),
+        ("tanh", (-0.5, 0.5), f64::tanh, 1.0),
+        ("tanh", (1.0, 1.5), f64::tanh, 60.0),
+        ("tan", (-0.7, 0.7), f64::tan, 8.0),
+        ("tan", (0.9, 1.0), f64::tan, 10.0),
+        ("asin", (-0.45, 0.45), f64::asin, 1.0),
+        ("asin", (0.55, 0.95), f64::asin, 5.0),
+        ("rint", (0.6, 900.0), f64::round_ties_even, 1.0),
+        ("trunc", (2.1, 3.9), f64::trunc, 1.0),
+        ("floor", (64.2, 100.0), f64::floor, 1.0),
+    ];
+    for (function, (low, high), exact, most) in cases {
+        for called in [false, true] {
+            for machine in [&T3, MACHINES[MACHINES.len() - 1]] {
+                let program = of_library(function, (low, high), called, machine);
+                let enclosure = enclose(&program).unwrap();
+                let about = format!("{function} of {low} to {high} on {}: {enclosure:#?}", machine.name);
+                assert!(enclosure.hazards.is_empty(), "{about}");
+                let output = &enclosure.outputs[0];
+                let range = output.range.unwrap();
+                let ends = [low, high].map(|end| exact(f64::from(end as f32)));
+                // The run's own error aside.
+                let slack = 4.0 * ulp(range.magnitude());
+                assert!(range.low <= ends[0] + slack && ends[1] - slack <= range.high, "{about}");
+                let ulps = output.ulps().unwrap();
+                assert!(ulps <= most, "{ulps} ulps, {about}");
+                // Not much wider than what there is.
+                assert!(range.high - range.low <= 3.0 * (ends[1] - ends[0]).abs() + 3.0, "{about}");
+                let mut random = Random::new(8);
+                check(&program, &enclosure, 60, &mut random);
+            }
+        }
+    }
+}
+
+/// Whatever the range: where a bound is given, no run exceeds it.
+#[test]
+fn no_run_of_a_function_exceeds_its_bound() {
+    let mut random = Random::new(99);
+    let functions = ["exp", "log", "tan", "asin", "atan", "tanh", "rint", "trunc", "floor", "ceil", "round"];
+    let mut bounded = BTreeMap::new();
+    for round in 0..330 {
+        let function = functions[round % functions.len()];
+        let machine = MACHINES[round / functions.len() % MACHINES.len()];
+        let size = [0.1, 1.0, 3.0, 20.0, 80.0][random.below(5) as usize];
+        let low = (f64::from(random.below(2000)) / 1000.0 - 1.0) * size;
+        let high = low + f64::from(random.below(1000)) / 1000.0 * size;
+        let range = if ["log"].contains(&function) {
+            (low.abs() + 0.01, low.abs() + 0.01 + high - low)
+        } else {
+            (low, high)
+        };
+        let program = of_library(function, range, round % 2 == 1, machine);
+        let enclosure = enclose(&program).unwrap();
+        let result = std::panic::catch_unwind(|| {
+            let mut random = Random::new(round as u64);
+            check(&program, &enclosure, 40, &mut random);
+        });
+        assert!(result.is_ok(), "{function} of {range:?} on {}: {enclosure:#?}", machine.name);
+        *bounded.entry(function).or_insert(0) += usize::from(enclosure.outputs[0].error.is_some());
+    }
+    let least =
+        [("exp", 30), ("log", 30), ("rint", 30), ("atan", 25), ("tanh", 20), ("floor", 20), ("trunc", 15)];
+    assert!(least.iter().all(|(function, least)| bounded[function] >= *least), "{bounded:?}");
 }

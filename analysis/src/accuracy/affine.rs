@@ -32,6 +32,11 @@ impl Affine {
         self.center == 0.0 && self.slack == 0.0 && self.terms.is_empty()
     }
 
+    /// Whether it may have several values, and has nothing in common with others.
+    pub(super) fn is_free(&self) -> bool {
+        self.slack > 0.0 && self.terms.is_empty()
+    }
+
     /// Any value of an interval, under a symbol of its own.
     pub(super) fn of(interval: Interval, symbol: u32) -> Affine {
         let radius = interval.radius();

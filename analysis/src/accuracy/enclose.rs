@@ -4,9 +4,11 @@
 //! What a register may hold is a [`Value`]; the rows' meaning gives the results, and their `ulp` what rounding adds.
 
 use super::affine::Affine;
+use super::bits;
 use super::interval::Interval;
-use super::ulp;
-use super::value::{MAX_PATTERNS, Number, Operand, Problem, Value};
+use super::probe::Probe;
+use super::value::{INTEGERS, MAX_PATTERNS, Number, Operand, Problem, Value};
+use super::{ROUNDERS, ulp};
 use crate::error::{BoundError, Refusal, place};
 use crate::graph::{Edge, Graph};
 use std::collections::{BTreeMap, BTreeSet};
@@ -462,28 +464,25 @@ impl Explorer<'_> {
         let (op, row) = (instruction.op, instruction.op.row());
         let sources = row.shape.sources();
         let integer = row.result_type() == Type::I;
-        if row.ulp.is_none() || integer {
-            if let Some(value) = patterns(operands, sources, |a, b, c| compute::<Host>(op, a, b, c).bits) {
-                return value;
-            }
-            if row.ulp.is_none() {
-                return Value::Any;
-            }
+        if (row.ulp.is_none() || integer)
+            && let Some(value) = patterns(operands, sources, |a, b, c| compute::<Host>(op, a, b, c).bits)
+        {
+            return value;
         }
         let operand = |i: usize| Operand(Ok(operands[i].clone()));
         let Some(Operand(result)) = real(op, operand(0), operand(1), operand(2)) else { return Value::Any };
         let value = match result {
-            Ok(Value::Float(number)) if integer => {
-                // A sum of integers wraps where it does not fit.
-                let whole = Interval::new(f64::from(i32::MIN), f64::from(i32::MAX));
-                return if number.actual.within(whole) { Value::Integer(number) } else { Value::Any };
+            // A sum of integers wraps where it does not fit.
+            Ok(Value::Integer(number)) if !number.actual.within(INTEGERS) => return Value::Any,
+            Ok(value) if row.result_type() != Type::F => return self.own(value),
+            Ok(Value::Whole(value)) => {
+                value.whole().and_then(|number| self.round(word, row, &number, instruction, operands))
             }
-            Ok(value) if row.result_type() != Type::F => return value,
             Ok(Value::Float(number)) => self.round(word, row, &number, instruction, operands),
             Ok(value) => Ok(value),
             Err(problem) => Err(problem),
         };
-        value.unwrap_or_else(|problem| {
+        value.map(|value| self.own(value)).unwrap_or_else(|problem| {
             if problem != Problem::Told {
                 let value = |value: &Value| value.float().ok().map(|number| number.actual);
                 let reads = instruction.reads().iter().zip(operands);
@@ -493,6 +492,21 @@ impl Explorer<'_> {
             // Whichever way a decision falls, it is followed.
             if integer { Value::patterns(BTreeSet::from([0, 1])) } else { Value::Broken }
         })
+    }
+
+    /// A value that depends on no other, as far as is known, is one that others may depend on.
+    fn own(&mut self, value: Value) -> Value {
+        match value {
+            Value::Float(number) if number.form.is_free() => {
+                let form = Affine::of(number.exact, self.symbol(None));
+                Value::Float(Rc::new(Number { form, ..Number::clone(&number) }))
+            }
+            Value::Integer(number) if number.form.is_free() => {
+                let form = Affine::of(number.exact, self.symbol(None));
+                Value::Integer(Rc::new(Number { form, ..Number::clone(&number) }))
+            }
+            value => value,
+        }
     }
 
     /// An operation's result in binary32, from its exact result on what the run has.
@@ -517,6 +531,10 @@ impl Explorer<'_> {
             } else {
                 Err(Problem::Overflow)
             };
+        }
+        if self.rounds_to_integer(instruction, operands, actual) {
+            let symbol = self.symbol(None);
+            return Ok(Value::Float(Rc::new(bits::nearest(&number, symbol))));
         }
         let local = bound * ulp(magnitude);
         // A NaN does not fit.
@@ -546,6 +564,26 @@ impl Explorer<'_> {
         };
         number.actual = number.actual.meet(number.exact + number.error.range());
         Ok(Value::Float(Rc::new(number)))
+    }
+
+    /// Whether an operation adds a number beyond which binary32 has no fraction: it is meant as a decision for the nearest integer.
+    fn rounds_to_integer(&self, instruction: &Instruction, operands: &[Value; 3], result: Interval) -> bool {
+        let magnitude = result.abs();
+        if magnitude.low < ROUNDERS[0] || magnitude.high >= 2.0 * ROUNDERS[0] {
+            return false;
+        }
+        let is_constant = |value: f64| {
+            let bits = (value as f32).to_bits();
+            operands.iter().any(|operand| *operand == Value::bits(bits))
+        };
+        let probe = |operand: &Value| {
+            let middle = operand.float().map_or(0.0, |number| number.actual.middle());
+            Probe::new(middle, (middle as f32).to_bits())
+        };
+        let [a, b, c] = operands.each_ref().map(probe);
+        let terms = real(instruction.op, a, b, c).and_then(|result| result.sum);
+        let rounder = |term: f64| ROUNDERS.contains(&term.abs()) && (is_constant(term) || is_constant(-term));
+        terms.is_some_and(|terms| terms.into_iter().any(rounder))
     }
 
     /// A period ends.

@@ -4,6 +4,7 @@
 //! give in binary64. `docs/accuracy.md` says what is counted as an error and what is not.
 
 mod affine;
+mod bits;
 mod enclose;
 mod interval;
 mod probe;
@@ -15,6 +16,8 @@ pub use interval::Interval;
 pub use shadow::{Decision, Lost, OperationAccuracy, OutputAccuracy, Part, Shadow, Worst};
 pub use value::Problem;
 
+/// Numbers that are added to round to integers: binary32 has no fraction there, and what is added is smaller.
+const ROUNDERS: [f64; 2] = [8_388_608.0, 12_582_912.0];
 /// Exponent of the smallest normal binary32.
 const LEAST_EXPONENT: i32 = -126;
 /// Digits of a binary32 after the first.

@@ -1,7 +1,7 @@
 //! The rows' meaning in binary64, with an eye on sums.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
-use takt_isa::fp::Real;
+use takt_isa::fp::{Bitwise, Real};
 
 /// An operand or a result: a value, the bits that decisions of the run look at, and the sum in it.
 #[derive(Clone, Copy, Debug)]
@@ -139,6 +139,11 @@ impl Real for Probe {
 
     fn choose(self, yes: Probe, no: Probe) -> Probe {
         if self.bits != 0 { yes } else { no }
+    }
+
+    /// Nothing: whoever asks sees from the row that it has no meaning.
+    fn bitwise(self, _: Bitwise, _: Probe) -> Probe {
+        Probe::of(f64::NAN)
     }
 }
 

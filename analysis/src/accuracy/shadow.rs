@@ -1,7 +1,7 @@
 //! Binary64 beside the bit-exact run.
 
 use super::probe::Probe;
-use super::ulp;
+use super::{ROUNDERS, ulp};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -141,9 +141,6 @@ impl Operand {
         if self.parts.is_empty() { 0.0 } else { self.value - self.real }
     }
 }
-
-/// Numbers that are added to round to integers: binary32 has no fraction there, and what is added is smaller.
-const ROUNDERS: [f64; 2] = [8_388_608.0, 12_582_912.0];
 
 impl Shadow {
     /// Beside a run from reset.

@@ -1,16 +1,17 @@
 //! What a register may hold, over every run: the domain in which the rows' meaning gives enclosures.
 
 use super::affine::Affine;
+use super::bits;
 use super::interval::Interval;
 use std::collections::BTreeSet;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::rc::Rc;
-use takt_isa::fp::{Real, SIN_LIMIT};
+use takt_isa::fp::{Bitwise, Real, SIN_LIMIT};
 
 /// Bit patterns that are told apart at most.
 pub(super) const MAX_PATTERNS: usize = 1024;
 /// All integers of 32 bits.
-const INTEGERS: Interval = Interval { low: -2_147_483_648.0, high: 2_147_483_647.0 };
+pub(super) const INTEGERS: Interval = Interval { low: -2_147_483_648.0, high: 2_147_483_647.0 };
 
 /// A number: what the run has, what exact arithmetic would have, and their difference.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,12 +37,27 @@ pub(super) enum Value {
     Float(Rc<Number>),
     /// A signed integer. It has no error.
     Integer(Rc<Number>),
+    /// The same, where it is known which float it was made from.
+    Offset(Rc<Offset>),
+    /// An operand whose bits an operation takes as an integer.
+    Whole(Rc<Value>),
     /// Any 32 bits.
     Any,
     /// What follows from a problem that has been told.
     Broken,
     /// Nothing that this period has written, and no range says what.
     Unknown,
+}
+
+/// The bits of a float less a base; `floored`, the multiple of the least exponent at or below that.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Offset {
+    /// The integer.
+    pub(super) number: Number,
+    /// The float.
+    pub(super) of: Rc<Number>,
+    pub(super) base: f64,
+    pub(super) floored: bool,
 }
 
 impl Number {
@@ -104,6 +120,7 @@ impl Value {
         match (self, other) {
             // What merely looks alike gets a place of its own: see the product.
             (Value::Float(a), Value::Float(b)) if Rc::ptr_eq(a, b) => self.clone(),
+            (Value::Offset(a), Value::Offset(b)) if Rc::ptr_eq(a, b) => self.clone(),
             (Value::Unknown, _) | (_, Value::Unknown) => Value::Unknown,
             (Value::Broken, _) | (_, Value::Broken) => Value::Broken,
             (Value::Any, _) | (_, Value::Any) => Value::Any,
@@ -121,7 +138,7 @@ impl Value {
                 (Ok(a), Ok(b)) => Value::Float(Rc::new(a.join(&b))),
                 _ => Value::Any,
             },
-            (Value::Integer(_), _) | (_, Value::Integer(_)) => match (self.integer(), other.integer()) {
+            _ => match (self.whole(), other.whole()) {
                 (Ok(a), Ok(b)) => Value::Integer(Rc::new(a.join(&b))),
                 _ => Value::Any,
             },
@@ -137,26 +154,38 @@ impl Value {
                 let number = hull(&mut values).ok_or(Problem::NotFinite)?;
                 Ok(Rc::new(number))
             }
-            Value::Integer(_) | Value::Any => Err(Problem::Bits),
+            Value::Integer(number) => Ok(Rc::new(bits::to_float(number)?)),
+            Value::Offset(offset) => Ok(Rc::new(bits::to_float(&offset.number)?)),
+            Value::Whole(value) => value.whole(),
+            Value::Any => Err(Problem::Bits),
             Value::Broken | Value::Unknown => Err(Problem::Told),
         }
     }
 
     /// As a signed integer.
-    fn integer(&self) -> Result<Rc<Number>, Problem> {
+    pub(super) fn whole(&self) -> Result<Rc<Number>, Problem> {
         match self {
             Value::Integer(number) => Ok(Rc::clone(number)),
+            Value::Offset(offset) => Ok(Rc::new(offset.number.clone())),
+            Value::Float(number) => Ok(Rc::new(bits::of_float(number))),
+            Value::Whole(value) => value.whole(),
             Value::Patterns(patterns) => {
                 let mut values = patterns.iter().map(|bits| f64::from(bits.cast_signed()));
                 Ok(Rc::new(hull(&mut values).ok_or(Problem::NotFinite)?))
             }
-            Value::Any | Value::Float(_) => {
-                let form = Affine::free(INTEGERS);
-                let error = Affine::constant(0.0);
-                Ok(Rc::new(Number { actual: INTEGERS, exact: INTEGERS, form, error, grid: Some(0) }))
-            }
+            Value::Any => Ok(Rc::new(bits::integer(INTEGERS, Affine::free(INTEGERS), 0))),
             Value::Broken | Value::Unknown => Err(Problem::Told),
         }
+    }
+
+    /// What it may be where it is compared, infinities included.
+    fn extent(&self) -> Result<Interval, Problem> {
+        let Value::Patterns(patterns) = self else { return Ok(self.float()?.actual) };
+        let values = patterns.iter().map(|bits| f64::from(f32::from_bits(*bits)));
+        values
+            .map(|value| if value.is_nan() { Err(Problem::NotFinite) } else { Ok(Interval::point(value)) })
+            .reduce(|all, value| Ok(all?.hull(value?)))
+            .unwrap_or(Err(Problem::NotFinite))
     }
 
     /// Whether the bits may be all zero, and whether one may be set.
@@ -164,7 +193,11 @@ impl Value {
         match self {
             Value::Patterns(patterns) => (patterns.contains(&0), patterns.iter().any(|bits| *bits != 0)),
             Value::Integer(number) => (number.actual.contains(0.0), number.actual != Interval::ZERO),
+            Value::Offset(offset) => {
+                (offset.number.actual.contains(0.0), offset.number.actual != Interval::ZERO)
+            }
             Value::Float(number) => (number.actual.contains(0.0), true),
+            Value::Whole(value) => value.tested(),
             Value::Any | Value::Broken | Value::Unknown => (true, true),
         }
     }
@@ -243,8 +276,17 @@ impl Operand {
         Operand(both.and_then(|(a, b)| of(&a, &b)).map(|number| Value::Float(Rc::new(number))))
     }
 
+    /// Both, if an operation takes them as integers.
+    fn wholes<'o>(&'o self, other: &'o Operand) -> Option<(&'o Value, &'o Value)> {
+        match (self.0.as_ref().ok()?, other.0.as_ref().ok()?) {
+            (Value::Whole(a), Value::Whole(b)) => Some((a, b)),
+            _ => None,
+        }
+    }
+
     fn decide(&self, other: &Operand, of: impl FnOnce(Interval, Interval) -> (bool, bool)) -> Operand {
-        let both = self.number().and_then(|a| Ok((a.actual, other.number()?.actual)));
+        let extent = |operand: &Operand| operand.0.as_ref().map_err(|problem| *problem)?.extent();
+        let both = extent(self).and_then(|a| Ok((a, extent(other)?)));
         Operand(both.map(|(a, b)| {
             let (yes, no) = of(a, b);
             let may = [(yes, 1), (no, 0)].into_iter().filter(|(may, _)| *may).map(|(_, bits)| bits);
@@ -294,6 +336,9 @@ impl Add for Operand {
     type Output = Operand;
 
     fn add(self, other: Operand) -> Operand {
+        if let Some((a, b)) = self.wholes(&other) {
+            return Operand(bits::sum(a, b));
+        }
         self.two(&other, |a, b| {
             let form = a.form.add(&b.form);
             Ok(Number {
@@ -327,6 +372,9 @@ impl Sub for Operand {
     type Output = Operand;
 
     fn sub(self, other: Operand) -> Operand {
+        if let Some((a, b)) = self.wholes(&other) {
+            return Operand(bits::difference(a, b));
+        }
         self + -other
     }
 }
@@ -509,8 +557,7 @@ impl Real for Operand {
     }
 
     fn integer(self) -> Operand {
-        let number = self.0.and_then(|value| value.integer());
-        Operand(number.map(Value::Float))
+        Operand(self.0.map(|value| Value::Whole(Rc::new(value))))
     }
 
     fn nearest(self) -> Operand {
@@ -544,6 +591,10 @@ impl Real for Operand {
             (_, false) => no,
             _ => Operand(yes.0.and_then(|yes| Ok(yes.join(&no.0?)))),
         }
+    }
+
+    fn bitwise(self, op: Bitwise, other: Operand) -> Operand {
+        Operand(self.0.and_then(|a| bits::bitwise(op, &a, &other.0?)))
     }
 }
 

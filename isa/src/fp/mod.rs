@@ -59,7 +59,7 @@ pub use acos::{ACOS_MAX_ULP, acos};
 pub use atan::{ATAN2_MAX_ULP, atan2};
 pub use host::Host;
 pub use kernels::{abs, maximum, minimum, neg, saturate, sign};
-pub use real::Real;
+pub use real::{Bitwise, Real};
 pub use screened::Screened;
 pub use sin::{COS_MAX_ULP, SIN_IDENTITY, SIN_LIMIT, SIN_MAX_ULP, cos, sin};
 pub use softfloat::*;

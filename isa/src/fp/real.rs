@@ -4,6 +4,29 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+/// An operation on 32 bits as such, which has no meaning in the real numbers: a domain says what its values may be after it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Bitwise {
+    /// Ones where both have ones.
+    And,
+    /// Ones where one has a one.
+    Or,
+    /// Ones where they differ.
+    Xor,
+    /// Shifted left by the other's low five bits.
+    Left,
+    /// Shifted right by those, zeros shifted in.
+    Right,
+    /// Likewise, the sign shifted in.
+    RightSigned,
+    /// Whether they are equal, as 1 or 0.
+    Equal,
+    /// Whether it is less, as signed integers.
+    Less,
+    /// Whether it is less, as unsigned ones.
+    LessUnsigned,
+}
+
 /// A domain in which rows are evaluated without binary32's rounding: numbers, intervals, whatever stands for them.
 ///
 /// Comparisons and conversions to integers are *decisions*: their value is an integer, 1 or 0 for a comparison.
@@ -58,4 +81,7 @@ pub trait Real:
     /// `yes` if any of self's bits is set, else `no`.
     #[must_use]
     fn choose(self, yes: Self, no: Self) -> Self;
+    /// What an operation on bits makes of self and another.
+    #[must_use]
+    fn bitwise(self, op: Bitwise, other: Self) -> Self;
 }

@@ -10,9 +10,10 @@
 //!
 //! Behind a semicolon stands what a floating-point operation, or one that moves any bits, means in the real numbers ([`Real`]), and
 //! by how many ulps at most its result differs from that: [`ROUNDED`], [`EXACT`], or the kernel's measured bound. Operations
-//! on bits as such have no meaning there; where a sum of integers wraps, its meaning does not.
+//! on bits as such have no meaning there: they name themselves ([`Bitwise`]), for domains that know what becomes of bits. Where a sum
+//! of integers wraps, its meaning does not.
 
-use crate::fp::{self, Arithmetic, Flags, Real, Value};
+use crate::fp::{self, Arithmetic, Bitwise, Flags, Real, Value};
 use crate::shape::Shape;
 
 macro_rules! functions {
@@ -247,7 +248,7 @@ const ROUNDED: f64 = 0.5;
 const EXACT: f64 = 0.0;
 
 macro_rules! effect {
-    (= $e:expr $(; $real:expr, $ulp:expr)?) => {
+    (= $e:expr $(; $real:expr $(, $ulp:expr)?)?) => {
         Effect::Compute
     };
     (do $effect:ident) => {
@@ -256,7 +257,7 @@ macro_rules! effect {
 }
 
 macro_rules! value {
-    (= $e:expr $(; $real:expr, $ulp:expr)?) => {
+    (= $e:expr $(; $real:expr $(, $ulp:expr)?)?) => {
         $e
     };
     (do $effect:ident) => {
@@ -265,7 +266,7 @@ macro_rules! value {
 }
 
 macro_rules! real {
-    (= $e:expr; $real:expr, $ulp:expr) => {
+    (= $e:expr; $real:expr $(, $ulp:expr)?) => {
         Some($real)
     };
     ($($other:tt)*) => {
@@ -320,8 +321,8 @@ macro_rules! instructions {
             }
         }
 
-        /// What `op` means in the real numbers, its result not rounded; `None` for operations on integers and bits as such, and for
-        /// those whose effect is not [`Effect::Compute`]. [`Row::ulp`] says how far its result may be from that.
+        /// What `op` means in the real numbers, its result not rounded; for operations on bits as such, what the domain makes of them.
+        /// `None` for those whose effect is not [`Effect::Compute`]. [`Row::ulp`] says how far its result may be from that.
         #[allow(unused_variables)]
         pub fn real<R: Real>(op: Op, $a: R, $b: R, $c: R) -> Option<R> {
             match op {
@@ -378,15 +379,15 @@ instructions! { [a b c]
     li       0x21 Alu      Dimm  [B]       { do Immediate }     "d = immediate"                           "32 bits; in the source an integer, a float or a label.";
     iadd     0x22 Alu      Dab   [I I I]   { = bits(a.wrapping_add(b)); a.integer() + b.integer(), EXACT }                         "d = a + b"  "Modulo 2^32." "a + b";
     isub     0x23 Alu      Dab   [I I I]   { = bits(a.wrapping_sub(b)); a.integer() - b.integer(), EXACT }                         "d = a - b"  "Modulo 2^32." "a - b" "-b";
-    iand     0x24 Alu      Dab   [B B B]   { = bits(a & b) }                                     "d = a ∧ b"  "Bit by bit." "a & b";
-    ior      0x25 Alu      Dab   [B B B]   { = bits(a | b) }                                     "d = a ∨ b"  "Bit by bit." "a | b";
-    ixor     0x26 Alu      Dab   [B B B]   { = bits(a ^ b) }                                     "d = a ⊕ b"  "Bit by bit." "xor(a, b)";
-    ishl     0x27 Alu      Dab   [B B I]   { = bits(a << (b & 31)) }                             "d = a << b" "By the low five bits of b." "a << b";
-    ishr     0x28 Alu      Dab   [B B I]   { = bits(a >> (b & 31)) }                             "d = a >> b, zeros shifted in" "By the low five bits of b.";
-    isar     0x29 Alu      Dab   [I I I]   { = bits(((a as i32) >> (b & 31)) as u32) }           "d = a >> b, sign shifted in"  "By the low five bits of b." "a >> b";
-    ieq      0x2a Alu      Dab   [I I I]   { = flag(a == b) }                                    "d = (a = b)" "1 or 0." "a == b" "!a";
-    ilt      0x2b Alu      Dab   [I I I]   { = flag((a as i32) < (b as i32)) }                   "d = (a < b), signed"   "1 or 0." "a < b" "b > a";
-    iltu     0x2c Alu      Dab   [I I I]   { = flag(a < b) }                                     "d = (a < b), unsigned" "1 or 0.";
+    iand     0x24 Alu      Dab   [B B B]   { = bits(a & b); a.bitwise(Bitwise::And, b) }                                     "d = a ∧ b"  "Bit by bit." "a & b";
+    ior      0x25 Alu      Dab   [B B B]   { = bits(a | b); a.bitwise(Bitwise::Or, b) }                                     "d = a ∨ b"  "Bit by bit." "a | b";
+    ixor     0x26 Alu      Dab   [B B B]   { = bits(a ^ b); a.bitwise(Bitwise::Xor, b) }                                     "d = a ⊕ b"  "Bit by bit." "xor(a, b)";
+    ishl     0x27 Alu      Dab   [B B I]   { = bits(a << (b & 31)); a.bitwise(Bitwise::Left, b) }                             "d = a << b" "By the low five bits of b." "a << b";
+    ishr     0x28 Alu      Dab   [B B I]   { = bits(a >> (b & 31)); a.bitwise(Bitwise::Right, b) }                             "d = a >> b, zeros shifted in" "By the low five bits of b.";
+    isar     0x29 Alu      Dab   [I I I]   { = bits(((a as i32) >> (b & 31)) as u32); a.bitwise(Bitwise::RightSigned, b) }           "d = a >> b, sign shifted in"  "By the low five bits of b." "a >> b";
+    ieq      0x2a Alu      Dab   [I I I]   { = flag(a == b); a.bitwise(Bitwise::Equal, b) }                                    "d = (a = b)" "1 or 0." "a == b" "!a";
+    ilt      0x2b Alu      Dab   [I I I]   { = flag((a as i32) < (b as i32)); a.bitwise(Bitwise::Less, b) }                   "d = (a < b), signed"   "1 or 0." "a < b" "b > a";
+    iltu     0x2c Alu      Dab   [I I I]   { = flag(a < b); a.bitwise(Bitwise::LessUnsigned, b) }                                     "d = (a < b), unsigned" "1 or 0.";
 
     // ---- 0x3_ selection and the status register.
     sel      0x30 Alu      Dabc  [B B B B] { = bits(if a != 0 { b } else { c }); a.choose(b, c), EXACT }                "d = a ≠ 0 ? b : c" "Tests all 32 bits of a as an integer." "a ? b : c";

@@ -1,0 +1,588 @@
+//! What operations on bits make of numbers: the integer that a float's bits are, the float that an integer's bits are, masks, shifts,
+//! and sums that move an exponent. So the functions of `<math.s>` take numbers apart and put them together.
+//!
+//! Integers have no error: they are what the run has, a decision like any other. A form says how they depend on other values.
+
+use super::affine::Affine;
+use super::interval::Interval;
+use super::value::{INTEGERS, Number, Offset, Problem, Value};
+use super::{FRACTION, LEAST_EXPONENT};
+use std::collections::BTreeSet;
+use std::rc::Rc;
+use takt_isa::fp::Bitwise;
+
+/// Bits of a float's exponent and sign begin here.
+const EXPONENT: i32 = FRACTION;
+const SIGN: u32 = 1 << 31;
+/// The bits of the largest float.
+const LARGEST: f64 = 0x7f7f_ffff as f64;
+/// The bits of the smallest normal one.
+const NORMAL: f64 = (1u32 << EXPONENT) as f64;
+/// What an exponent of zero is written as.
+const BIAS: i32 = 127;
+/// All words, in number.
+const WORDS: f64 = 4_294_967_296.0;
+
+/// Integers that are gone through one by one.
+const FEW: f64 = 64.0;
+
+fn power(exponent: i32) -> f64 {
+    2f64.powi(exponent)
+}
+
+/// An integer that is what the run has.
+pub(super) fn integer(range: Interval, form: Affine, grid: i32) -> Number {
+    let step = power(grid.min(31));
+    let whole =
+        |range: Interval| Interval::new((range.low / step).ceil() * step, (range.high / step).floor() * step);
+    let exact = whole(whole(range).meet(form.range()));
+    Number { actual: exact, exact, form, error: Affine::constant(0.0), grid: Some(grid) }
+}
+
+fn anything() -> Number {
+    integer(INTEGERS, Affine::free(INTEGERS), 0)
+}
+
+/// The value itself in the run: its exact value and its error.
+fn in_the_run(number: &Number) -> Affine {
+    number.form.add(&number.error)
+}
+
+/// A sum that is rounded to an integer, because binary32 has no fraction there: what the run has is meant. `symbol` stands for
+/// what rounding adds.
+pub(super) fn nearest(sum: &Number, symbol: u32) -> Number {
+    let actual = Interval::new(sum.actual.low.round_ties_even(), sum.actual.high.round_ties_even());
+    let form = in_the_run(sum).with(symbol, 0.5);
+    Number { actual, exact: actual.meet(form.range()), form, error: Affine::constant(0.0), grid: Some(0) }
+}
+
+/// The floats in an interval: the least and the largest.
+fn floats(range: Interval) -> (f32, f32) {
+    let (mut low, mut high) = (range.low as f32, range.high as f32);
+    if f64::from(low) < range.low {
+        low = low.next_up();
+    }
+    if f64::from(high) > range.high {
+        high = high.next_down();
+    }
+    (low, high)
+}
+
+/// The signed integer that the bits of a float are.
+pub(super) fn of_float(number: &Number) -> Number {
+    let (low, high) = floats(number.actual);
+    let bits = |value: f32| f64::from(value.to_bits().cast_signed());
+    if low > 0.0 && low <= high {
+        let range = Interval::new(bits(low), bits(high));
+        let exponent = |value: f32| (value.to_bits() >> EXPONENT) as i32 - BIAS;
+        let at = exponent(low);
+        if at < LEAST_EXPONENT || exponent(high) != at {
+            return integer(range, Affine::free(range), 0);
+        }
+        // Within a binade the bits count units in the last place.
+        let unit = FRACTION - at;
+        let first = bits(low) - f64::from(low) * power(unit);
+        let form = in_the_run(number).scale(Interval::point(power(unit))).add(&Affine::constant(first));
+        return integer(range, form, number.grid.map_or(0, |grid| (grid + unit).clamp(0, EXPONENT)));
+    }
+    if high < 0.0 && low <= high {
+        let range = Interval::new(bits(high), bits(low));
+        return integer(range, Affine::free(range), 0);
+    }
+    if low > high {
+        return anything();
+    }
+    // Negative numbers, and zero of either sign, which has the least bits if it is negative.
+    let range = Interval::new(INTEGERS.low, bits(high).max(0.0));
+    integer(range, Affine::free(range), 0)
+}
+
+/// The float that the bits of a signed integer are.
+pub(super) fn to_float(number: &Number) -> Result<Number, Problem> {
+    let float = |bits: f64| f64::from(f32::from_bits((bits as i64 as u32) & !SIGN));
+    let (low, high) = (number.actual.low.ceil(), number.actual.high.floor());
+    let range = if low >= 0.0 {
+        Interval::new(float(low), float(high))
+    } else if high < 0.0 {
+        Interval::new(-float(high), -float(low))
+    } else {
+        return Err(Problem::Bits);
+    };
+    let largest = if low >= 0.0 { high } else { high - INTEGERS.low };
+    if largest > LARGEST {
+        return Err(Problem::NotFinite);
+    }
+    let least = if low >= 0.0 { low } else { low - INTEGERS.low };
+    // Nothing but an exponent: a power of two.
+    let power = number.grid.is_some_and(|grid| grid >= EXPONENT) && least >= NORMAL;
+    let grid = power.then(|| (least / NORMAL) as i32 - BIAS);
+    let form = if range.low == range.high { Affine::constant(range.low) } else { Affine::free(range) };
+    Ok(Number { actual: range, exact: range, form, error: Affine::constant(0.0), grid })
+}
+
+/// What the exponent of a float becomes if an integer is added to its bits that has none of the fraction's: the float times a
+/// power of two, exactly. Of floats that have no exponent to add to, something of that size at most.
+fn scaled(float: &Number, by: &Number) -> Option<Number> {
+    if by.grid? < EXPONENT {
+        return None;
+    }
+    let (least, most) = ((by.actual.low / NORMAL).ceil() as i32, (by.actual.high / NORMAL).floor() as i32);
+    if least < -254 || most > 254 {
+        return None;
+    }
+    let smallest = match float.actual.contains(0.0) {
+        true => 0.0,
+        false => float.actual.low.abs().min(float.actual.high.abs()),
+    };
+    let tiny = smallest < power(LEAST_EXPONENT);
+    if tiny && least < 0 || !tiny && smallest * power(least) < power(LEAST_EXPONENT) {
+        return None;
+    }
+    if float.actual.magnitude() * power(most) > f64::from(f32::MAX) {
+        return None;
+    }
+    let factor = Interval::new(power(least), power(most));
+    let slack = if tiny { power(most + LEAST_EXPONENT + 1) } else { 0.0 };
+    let widened = |affine: Affine| if tiny { affine.widened(slack) } else { affine };
+    let exact = float.exact * factor;
+    let form = if least == most { float.form.scale(factor) } else { Affine::free(exact) };
+    let actual = float.actual * factor;
+    Some(Number {
+        actual: if tiny { actual.widened(slack) } else { actual },
+        exact,
+        form,
+        error: widened(float.error.scale(factor)),
+        grid: if tiny { None } else { float.grid.map(|grid| grid + least) },
+    })
+}
+
+/// The sum of two values as integers. Of a float's bits it may be a float.
+pub(super) fn sum(a: &Value, b: &Value) -> Result<Value, Problem> {
+    for (one, other) in [(a, b), (b, a)] {
+        if let Value::Float(float) = one
+            && !matches!(other, Value::Float(_))
+            && let Some(number) = scaled(float, &*other.whole()?)
+        {
+            return Ok(Value::Float(Rc::new(number)));
+        }
+    }
+    Ok(Value::Integer(Rc::new(added(&*a.whole()?, &*b.whole()?))))
+}
+
+/// Their difference.
+pub(super) fn difference(a: &Value, b: &Value) -> Result<Value, Problem> {
+    let other = b.whole()?;
+    if let Value::Float(float) = a {
+        match b {
+            // A float's bits less what is above their fraction, counted from a base: between that and twice it.
+            Value::Offset(offset) if offset.floored && Rc::ptr_eq(&offset.of, float) => {
+                return Ok(Value::Float(Rc::new(fraction(float, offset)?)));
+            }
+            Value::Float(_) => {}
+            _ => {
+                if let Some(number) = scaled(float, &negated(&other)) {
+                    return Ok(Value::Float(Rc::new(number)));
+                }
+                if other.actual.low == other.actual.high {
+                    let number = added(&of_float(float), &negated(&other));
+                    let base = other.actual.low;
+                    return Ok(Value::Offset(Rc::new(Offset {
+                        number,
+                        of: Rc::clone(float),
+                        base,
+                        floored: false,
+                    })));
+                }
+            }
+        }
+    }
+    Ok(Value::Integer(Rc::new(added(&*a.whole()?, &negated(&other)))))
+}
+
+/// What remains of a float whose exponent, counted from a base, is taken off: from the base to the next float of its fraction.
+fn fraction(float: &Number, offset: &Offset) -> Result<Number, Problem> {
+    let (least, most) = (offset.number.actual.low / NORMAL, offset.number.actual.high / NORMAL);
+    let (least, most) = (least.ceil() as i32, most.floor() as i32);
+    let ends = Interval::new(offset.base, offset.base + NORMAL - 1.0);
+    let ends = to_float(&integer(ends, Affine::free(ends), 0))?.actual;
+    let scaled = scaled(float, &negated(&offset.number)).map(|number| number.actual);
+    let actual = scaled.map_or(ends, |scaled| ends.meet(scaled));
+    let error = float.error.scale(Interval::new(power(-most), power(-least)));
+    let exact = if error.is_zero() { actual } else { actual - error.range() };
+    Ok(Number { actual, exact, form: Affine::free(exact), error, grid: None })
+}
+
+fn negated(number: &Number) -> Number {
+    let range = -number.actual;
+    Number { actual: range, exact: range, form: number.form.neg(), ..number.clone() }
+}
+
+fn added(a: &Number, b: &Number) -> Number {
+    let grid = a.grid.unwrap_or(0).min(b.grid.unwrap_or(0));
+    integer(a.actual + b.actual, a.form.add(&b.form), grid)
+}
+
+/// What an operation on bits makes of two operands.
+pub(super) fn bitwise(op: Bitwise, a: &Value, b: &Value) -> Result<Value, Problem> {
+    // What there are few of is gone through.
+    let alone = |value: &Value| match value {
+        Value::Patterns(patterns) => Some(Rc::clone(patterns)),
+        Value::Integer(number) => few(number),
+        _ => None,
+    };
+    match op {
+        Bitwise::And | Bitwise::Or | Bitwise::Xor => {
+            let (value, masks) = match (alone(a), alone(b)) {
+                (_, Some(masks)) => (a, masks),
+                (Some(masks), _) => (b, masks),
+                _ => return both(op, a, b),
+            };
+            joined(masks.iter().map(|mask| masked(op, value, *mask)))
+        }
+        Bitwise::Left | Bitwise::Right | Bitwise::RightSigned => {
+            let amounts: BTreeSet<u32> = match alone(b) {
+                Some(amounts) => amounts.iter().map(|amount| amount & 31).collect(),
+                None => {
+                    let range = b.whole()?.actual;
+                    let most = if range.high - range.low < 32.0 { range.high } else { range.low + 31.0 };
+                    (range.low as i64..=most as i64).map(|amount| (amount & 31) as u32).collect()
+                }
+            };
+            let number = a.whole()?;
+            let shift = |amount: &u32| Ok(Value::Integer(Rc::new(shifted(op, &number, *amount))));
+            joined(amounts.iter().map(shift))
+        }
+        Bitwise::Equal | Bitwise::Less | Bitwise::LessUnsigned => {
+            let (a, b) = (a.whole()?.actual, b.whole()?.actual);
+            let (yes, no) = match op {
+                Bitwise::Equal => {
+                    let apart = a.high < b.low || b.high < a.low;
+                    (!apart, !(a == b && a.low == a.high))
+                }
+                Bitwise::Less => (a.low < b.high, a.high >= b.low),
+                _ => match (unsigned(a), unsigned(b)) {
+                    (Some(a), Some(b)) => (a.low < b.high, a.high >= b.low),
+                    _ => (true, true),
+                },
+            };
+            let may = [(yes, 1), (no, 0)].into_iter().filter(|(may, _)| *may).map(|(_, bits)| bits);
+            Ok(Value::patterns(may.collect()))
+        }
+    }
+}
+
+/// The bits of integers that are few.
+fn few(number: &Number) -> Option<Rc<BTreeSet<u32>>> {
+    let step = power(number.grid.unwrap_or(0).min(31));
+    let Interval { low, high } = number.actual;
+    let count = (high - low) / step + 1.0;
+    let bits = |at: u32| (low + f64::from(at) * step) as i64 as u32;
+    (count <= FEW).then(|| Rc::new((0..count as u32).map(bits).collect()))
+}
+
+fn joined(mut values: impl Iterator<Item = Result<Value, Problem>>) -> Result<Value, Problem> {
+    let first = values.next().unwrap_or(Ok(Value::Any))?;
+    values.try_fold(first, |all, value| Ok(all.join(&value?)))
+}
+
+/// A range of signed integers as unsigned ones, if it has no gap there.
+fn unsigned(range: Interval) -> Option<Interval> {
+    let words = Interval::point(WORDS);
+    if range.low >= 0.0 { Some(range) } else { (range.high < 0.0).then(|| range + words) }
+}
+
+/// Operands of which neither is known to the bit.
+fn both(op: Bitwise, a: &Value, b: &Value) -> Result<Value, Problem> {
+    let (a, b) = (a.whole()?, b.whole()?);
+    if a.actual.low < 0.0 || b.actual.low < 0.0 {
+        return Ok(Value::Integer(Rc::new(anything())));
+    }
+    // Digits apart: no carry.
+    let below = |number: &Number, other: &Number| number.actual.high < power(other.grid.unwrap_or(0));
+    if op != Bitwise::And && (below(&a, &b) || below(&b, &a)) {
+        return Ok(Value::Integer(Rc::new(added(&a, &b))));
+    }
+    let most = match op {
+        Bitwise::And => a.actual.high.min(b.actual.high),
+        _ => power((a.actual.high.max(b.actual.high) + 1.0).log2().ceil() as i32) - 1.0,
+    };
+    let range = Interval::new(0.0, most);
+    let grid = a.grid.unwrap_or(0).min(b.grid.unwrap_or(0));
+    Ok(Value::Integer(Rc::new(integer(range, Affine::free(range), grid))))
+}
+
+/// A value and a mask that is known.
+fn masked(op: Bitwise, value: &Value, mask: u32) -> Result<Value, Problem> {
+    let leading = mask.leading_ones() + mask.trailing_zeros().min(32) == 32 && mask != 0;
+    match (op, value) {
+        (Bitwise::And, _) if mask == u32::MAX => return Ok(value.clone()),
+        (Bitwise::And, _) if mask == 0 => return Ok(Value::bits(0)),
+        (Bitwise::Or | Bitwise::Xor, _) if mask == 0 => return Ok(value.clone()),
+        (Bitwise::And, Value::Float(float)) if mask == !SIGN => return Ok(magnitude(value, float)),
+        (Bitwise::And, Value::Float(float)) if mask == SIGN => {
+            let may = [(float.actual.high >= 0.0, 0), (float.actual.low <= 0.0, SIGN)];
+            return Ok(Value::patterns(
+                may.into_iter().filter(|(may, _)| *may).map(|(_, bits)| bits).collect(),
+            ));
+        }
+        (Bitwise::And, Value::Float(float)) if leading && mask.trailing_zeros() <= FRACTION as u32 => {
+            return Ok(Value::Float(Rc::new(truncated(float, mask.trailing_zeros()))));
+        }
+        (Bitwise::Xor, Value::Float(float)) if mask == SIGN => {
+            return Ok(Value::Float(Rc::new(opposite(float))));
+        }
+        (Bitwise::Or, Value::Float(float)) if mask == SIGN => {
+            return Ok(match magnitude(value, float) {
+                Value::Float(float) => Value::Float(Rc::new(opposite(&float))),
+                other => other,
+            });
+        }
+        _ => {}
+    }
+    let number = value.whole()?;
+    let Number { actual, .. } = *number;
+    let grid = number.grid.unwrap_or(0);
+    if op == Bitwise::And && leading {
+        let floored = floored(&number, mask.trailing_zeros() as i32);
+        return Ok(match value {
+            Value::Offset(offset) if mask.trailing_zeros() == EXPONENT as u32 && !offset.floored => {
+                Value::Offset(Rc::new(Offset { number: floored, floored: true, ..Offset::clone(offset) }))
+            }
+            _ => Value::Integer(Rc::new(floored)),
+        });
+    }
+    if op == Bitwise::And && mask & mask.wrapping_add(1) == 0 {
+        // Below a power of two: what remains of the division by it.
+        let size = f64::from(mask) + 1.0;
+        let (low, high) = ((actual.low / size).floor(), (actual.high / size).floor());
+        if low == high {
+            let rest = added(&number, &negated(&Number::point(low * size)));
+            return Ok(Value::Integer(Rc::new(Number { grid: Some(grid), ..rest })));
+        }
+        let range = Interval::new(0.0, size - 1.0);
+        return Ok(Value::Integer(Rc::new(integer(range, Affine::free(range), grid.min(31)))));
+    }
+    let mask = Value::Integer(Rc::new(Number {
+        grid: Some(mask.trailing_zeros().min(31) as i32),
+        ..Number::point(f64::from(mask.cast_signed()))
+    }));
+    both(op, &Value::Integer(number), &mask)
+}
+
+fn opposite(float: &Number) -> Number {
+    Number {
+        actual: -float.actual,
+        exact: -float.exact,
+        form: float.form.neg(),
+        error: float.error.neg(),
+        grid: float.grid,
+    }
+}
+
+/// A float without its sign.
+fn magnitude(value: &Value, float: &Rc<Number>) -> Value {
+    if float.actual.low > 0.0 && float.exact.low >= 0.0 {
+        value.clone()
+    } else if float.actual.high < 0.0 && float.exact.high <= 0.0 {
+        Value::Float(Rc::new(opposite(float)))
+    } else {
+        let exact = float.exact.abs();
+        let error = float.error.join(&float.error.neg());
+        Value::Float(Rc::new(Number {
+            actual: float.actual.abs(),
+            exact,
+            form: Affine::free(exact),
+            error,
+            grid: float.grid,
+        }))
+    }
+}
+
+/// A float whose last digits are cleared: nearer to zero. It is what the run has.
+fn truncated(float: &Number, digits: u32) -> Number {
+    let (low, high) = floats(float.actual);
+    let of = |value: f32| f64::from(f32::from_bits(value.to_bits() >> digits << digits));
+    let actual = Interval::new(of(low), of(high));
+    let cleared = super::ulp(float.actual.magnitude()) * (power(digits as i32) - 1.0);
+    let between = Interval::new(
+        if float.actual.high > 0.0 { -cleared } else { 0.0 },
+        if float.actual.low < 0.0 { cleared } else { 0.0 },
+    );
+    let form = in_the_run(float).add(&Affine::free(between));
+    // It may have been cleared already.
+    Number { actual, exact: actual.meet(form.range()), form, error: Affine::constant(0.0), grid: float.grid }
+}
+
+/// The multiple of a power of two at or below an integer.
+fn floored(number: &Number, digits: i32) -> Number {
+    let grid = number.grid.unwrap_or(0);
+    if grid >= digits {
+        return number.clone();
+    }
+    let size = power(digits);
+    let range =
+        Interval::new((number.actual.low / size).floor() * size, (number.actual.high / size).floor() * size);
+    let cut = Affine::free(Interval::new(power(grid) - size, 0.0));
+    integer(range, number.form.add(&cut), digits)
+}
+
+/// An integer shifted by so many digits.
+fn shifted(op: Bitwise, number: &Number, by: u32) -> Number {
+    let by = by as i32;
+    let size = power(by);
+    let grid = number.grid.unwrap_or(0);
+    if op == Bitwise::Left {
+        let range = number.actual * Interval::point(size);
+        let turns = |at: f64| ((at - INTEGERS.low) / WORDS).floor();
+        let turn = turns(range.low);
+        if turn != turns(range.high) {
+            return Number { grid: Some((grid + by).min(31)), ..anything() };
+        }
+        let back = Interval::point(-turn * WORDS);
+        let form = number.form.scale(Interval::point(size)).add(&Affine::constant(back.low));
+        return integer(range + back, form, (grid + by).min(31));
+    }
+    let (range, form) = match (op, unsigned(number.actual)) {
+        (Bitwise::RightSigned, _) => (number.actual, number.form.clone()),
+        (_, Some(range)) => (range, number.form.add(&Affine::constant(range.low - number.actual.low))),
+        (_, None) => {
+            let range = Interval::new(0.0, WORDS - 1.0);
+            (range, Affine::free(range))
+        }
+    };
+    let shifted = Interval::new((range.low / size).floor(), (range.high / size).floor());
+    let cut = if grid >= by { 0.0 } else { power(grid) / size - 1.0 };
+    let form = form.scale(Interval::point(1.0 / size));
+    let form = if cut == 0.0 { form } else { form.add(&Affine::free(Interval::new(cut, 0.0))) };
+    integer(shifted, form, (grid - by).max(0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use takt_emu::testing::Random;
+
+    /// Whether bits are among those that a value stands for.
+    fn holds(value: &Value, bits: u32) -> bool {
+        let within = |number: &Number, x: f64| {
+            let step = power(number.grid.unwrap_or(-200).min(31));
+            number.actual.contains(x)
+                && number.form.range().contains(x)
+                && (x == 0.0 || number.grid.is_none() || (x / step).fract() == 0.0)
+        };
+        match value {
+            Value::Patterns(patterns) => patterns.contains(&bits),
+            Value::Float(number) => within(number, f64::from(f32::from_bits(bits))),
+            Value::Integer(number) => within(number, f64::from(bits.cast_signed())),
+            Value::Offset(offset) => within(&offset.number, f64::from(bits.cast_signed())),
+            other => *other == Value::Any,
+        }
+    }
+
+    /// A value, and bits that it stands for.
+    fn value(random: &mut Random, symbol: u32) -> (Value, Vec<u32>) {
+        let size = [0.01, 1.0, 20.0, 3e6, 1e20][random.below(5) as usize];
+        let mut unit = || f64::from(random.below(1 << 20)) / f64::from(1 << 19) - 1.0;
+        let (one, other) = (unit() * size, unit() * size);
+        let ends = Interval::new(one.min(other), one.max(other));
+        let parts: Vec<f64> = (0..8).map(|_| unit() / 2.0 + 0.5).collect();
+        let kind = random.below(4);
+        let shift = random.below(24);
+        match kind {
+            0 => {
+                let (low, high) = floats(ends);
+                let at = |part: f64| {
+                    let x = f64::from(low) + part * (f64::from(high) - f64::from(low));
+                    (x as f32).clamp(low, high).to_bits()
+                };
+                let range = Interval::new(low.into(), high.into());
+                (Value::Float(Rc::new(Number::of(range, symbol, None))), parts.into_iter().map(at).collect())
+            }
+            1 | 2 => {
+                let size = power(shift as i32);
+                let limit = |x: f64| (x.clamp(-2e9, 2e9) / size).trunc() * size;
+                let range = Interval::new(limit(ends.low), limit(ends.high));
+                let number = integer(range, Affine::of(range, symbol), shift as i32);
+                let at = |part: f64| {
+                    let x = range.low + (part * (range.high - range.low) / size).floor() * size;
+                    (x as i64 as i32).cast_unsigned()
+                };
+                (Value::Integer(Rc::new(number)), parts.into_iter().map(at).collect())
+            }
+            _ => {
+                let masks = [0, SIGN, !SIGN, 0xff80_0000, 0xffff_f000, 1, 3, 23, 0x3f80_0000, u32::MAX];
+                let bits = masks[random.below(masks.len() as u32) as usize];
+                (Value::bits(bits), vec![bits])
+            }
+        }
+    }
+
+    /// Whatever bits the operands have: those of the result are among what it is said to stand for.
+    #[test]
+    fn results_hold_what_the_operations_give() {
+        let mut random = Random::new(3);
+        let (mut known, mut all) = (0, 0);
+        for round in 0..60_000 {
+            let ((a, some_a), (b, some_b)) = (value(&mut random, 0), value(&mut random, 1));
+            let (name, result, of): (_, _, fn(u32, u32) -> u32) = match round % 11 {
+                0 => ("and", bitwise(Bitwise::And, &a, &b), |a, b| a & b),
+                1 => ("or", bitwise(Bitwise::Or, &a, &b), |a, b| a | b),
+                2 => ("xor", bitwise(Bitwise::Xor, &a, &b), |a, b| a ^ b),
+                3 => ("left", bitwise(Bitwise::Left, &a, &b), |a, b| a << (b & 31)),
+                4 => ("right", bitwise(Bitwise::Right, &a, &b), |a, b| a >> (b & 31)),
+                5 => ("signed", bitwise(Bitwise::RightSigned, &a, &b), |a, b| {
+                    (a.cast_signed() >> (b & 31)).cast_unsigned()
+                }),
+                6 => ("equal", bitwise(Bitwise::Equal, &a, &b), |a, b| u32::from(a == b)),
+                7 => ("less", bitwise(Bitwise::Less, &a, &b), |a, b| {
+                    u32::from(a.cast_signed() < b.cast_signed())
+                }),
+                8 => ("below", bitwise(Bitwise::LessUnsigned, &a, &b), |a, b| u32::from(a < b)),
+                9 => ("sum", sum(&a, &b), u32::wrapping_add),
+                _ => ("difference", difference(&a, &b), u32::wrapping_sub),
+            };
+            let Ok(result) = result else { continue };
+            // As where they are used: a sum that does not fit wraps.
+            if matches!(&result, Value::Integer(number) if !number.actual.within(INTEGERS))
+                || matches!(&result, Value::Offset(offset) if !offset.number.actual.within(INTEGERS))
+            {
+                continue;
+            }
+            all += 1;
+            known += usize::from(!matches!(&result, Value::Integer(number) if number.actual == INTEGERS));
+            for a_bits in &some_a {
+                for b_bits in &some_b {
+                    let bits = of(*a_bits, *b_bits);
+                    assert!(
+                        holds(&result, bits),
+                        "{name} of {a_bits:08x} in {a:?} and {b_bits:08x} in {b:?} is {bits:08x}, not in {result:?}"
+                    );
+                }
+            }
+        }
+        assert!(2 * known > all, "{known} of {all}");
+    }
+
+    /// A float's exponent taken off its bits leaves its fraction.
+    #[test]
+    fn exponents_are_taken_off() {
+        let mut random = Random::new(4);
+        for _ in 0..2000 {
+            let (low, high) = (random.below(1000) as f32 + 0.01, random.below(100_000) as f32);
+            let (low, high) = (low.min(high + 0.001), low.max(high));
+            let range = Interval::new(low.into(), high.into());
+            let float = Value::Float(Rc::new(Number::of(range, 0, None)));
+            let base = 0x3f2a_aaab;
+            let offset = difference(&float, &Value::bits(base)).unwrap();
+            let exponent = bitwise(Bitwise::And, &offset, &Value::bits(0xff80_0000)).unwrap();
+            let fraction = difference(&float, &exponent).unwrap();
+            assert!(matches!(&fraction, Value::Float(number) if number.actual.magnitude() < 4.0 / 3.0));
+            for part in 0..=8 {
+                let x = (low + (high - low) * part as f32 / 8.0).clamp(low, high).to_bits();
+                let off = x.wrapping_sub(base);
+                assert!(holds(&offset, off) && holds(&exponent, off & 0xff80_0000));
+                assert!(holds(&fraction, x.wrapping_sub(off & 0xff80_0000)), "{x:08x} {fraction:?}");
+            }
+        }
+    }
+}
