@@ -21,7 +21,7 @@ fn cycles(folder: &str, name: &str, machine: &'static Machine) -> u32 {
 fn programs_take_no_longer() {
     let figures = [
         ("hybrid", "tracking.s", &T3, 124),
-        ("hybrid", "tracking_literal.s", &T3, 341),
+        ("hybrid", "tracking_literal.s", &T3, 338),
         ("hybrid", "tracking.s", &T1, 304),
         ("hybrid", "tracking_friction.s", &T3, 270),
         ("hybrid", "tracking_friction.s", &T1, 651),

@@ -315,7 +315,11 @@ fn bounds_text(block: &BlockReport, program: &Program) -> String {
         |of| matches!(of, Resources::Slots(slots) if slots.len() > 1),
         |of| matches!(of, Resources::Units(units) if units.len() > 1),
     ];
-    format!("chain {}{}", block.bound.critical_path, kinds.map(most).concat())
+    let together = match block.bound.windows {
+        0 => String::new(),
+        windows => format!(", together {windows}"),
+    };
+    format!("chain {}{}{together}", block.bound.critical_path, kinds.map(most).concat())
 }
 
 /// What each resource bounds a block by: slots, units, then several together.
@@ -335,7 +339,7 @@ fn bound_text(block: &BlockReport, program: &Program) -> String {
         return "the chain of dependent operations".to_owned();
     }
     let found = resources(block).into_iter().find(|(_, cycles)| *cycles == bound);
-    found.map_or(String::new(), |(of, _)| of.text(program.machine))
+    found.map_or("chains and slots together".to_owned(), |(of, _)| of.text(program.machine))
 }
 
 fn messages(diagnostics: &Diagnostics) -> Result<Value> {
@@ -359,6 +363,7 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
                 "slots": block.bound.slots,
                 "units": block.bound.units,
                 "shared": block.bound.shared.iter().map(shared).collect::<Vec<_>>(),
+                "together": block.bound.windows,
             },
         })
     };

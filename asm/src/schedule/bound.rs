@@ -23,6 +23,9 @@ pub struct Bound {
     pub units: Vec<u32>,
     /// Likewise for slots and for units that can take one another's operations: those that only they can take, together.
     pub shared: Vec<SharedBound>,
+    /// For all slots and chains together: a shorter schedule leaves some operation no cycle. 0 if that says no
+    /// more than the rest.
+    pub windows: u32,
 }
 
 /// A [`Bound`] of several slots or units together.
@@ -80,7 +83,12 @@ impl Bound {
     /// The largest of the bounds.
     pub fn cycles(&self) -> u32 {
         let shared = self.shared.iter().map(|shared| shared.cycles);
-        self.slots.iter().chain(&self.units).copied().chain(shared).fold(self.critical_path, u32::max)
+        self.slots
+            .iter()
+            .chain(&self.units)
+            .copied()
+            .chain(shared)
+            .fold(self.critical_path.max(self.windows), u32::max)
     }
 
     /// The operations that the slots or units of a shared bound have to issue.
@@ -164,6 +172,7 @@ pub(super) fn bound(problem: &Problem, chains: &Chains) -> Bound {
     });
     Bound {
         critical_path,
+        windows: 0,
         shared: shared_slots.chain(shared_units).collect(),
         slots: (0..problem.slots).map(|slot| slots(&BTreeSet::from([slot]))).collect(),
         units: (0..problem.units).map(|unit| units(&BTreeSet::from([unit]))).collect(),

@@ -11,6 +11,8 @@ mod memory;
 mod pass;
 mod problem;
 mod solve;
+mod squeeze;
+mod windows;
 
 pub use crate::ir::DemandKind;
 pub use bound::{Bound, Resources, SharedBound};

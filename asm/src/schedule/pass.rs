@@ -89,7 +89,7 @@ impl Reservations {
         }
     }
 
-    fn fits(&self, parts: &[Part], cycle: usize, direction: Direction) -> bool {
+    pub(super) fn fits(&self, parts: &[Part], cycle: usize, direction: Direction) -> bool {
         parts.iter().all(|part| {
             !self.slots[part.slot].is_set(cycle)
                 && part.unit.is_none_or(|unit| {
@@ -130,7 +130,7 @@ impl Reservations {
         }
     }
 
-    fn reserve(&mut self, parts: &[Part], cycle: usize, direction: Direction) {
+    pub(super) fn reserve(&mut self, parts: &[Part], cycle: usize, direction: Direction) {
         for part in parts {
             self.slots[part.slot].set(cycle);
             if let Some(unit) = part.unit {

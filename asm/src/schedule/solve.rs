@@ -10,6 +10,7 @@
 use super::bound::{self, Bound};
 use super::pass::{Direction, Graph, Lean, Plan, Reservations};
 use super::problem::{Problem, Task};
+use super::squeeze::{self, Squeezed};
 
 /// A schedule.
 #[derive(Clone, Debug)]
@@ -37,10 +38,14 @@ struct Cost {
 }
 
 /// A small generator with a fixed seed (xorshift64*), so that the search is the same on every machine.
-struct Random(u64);
+pub(super) struct Random(u64);
 
 impl Random {
-    fn next(&mut self, below: u64) -> u64 {
+    pub(super) fn new() -> Random {
+        Random(0x9e37_79b9_7f4a_7c15)
+    }
+
+    pub(super) fn next(&mut self, below: u64) -> u64 {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
         self.0 ^= self.0 >> 27;
@@ -209,6 +214,26 @@ impl Search<'_> {
         lean
     }
 
+    /// Looks for what priorities have not found, and for a proof that there is nothing.
+    fn squeeze(&mut self, effort: u32) {
+        let Some((cost, _)) = self.best.as_ref().filter(|(cost, _)| cost.tardy == 0) else { return };
+        let squeezed = squeeze::squeeze(&self.graph, self.bound.cycles(), cost.length, effort);
+        let Some(Squeezed { bound, start }) = squeezed else { return };
+        if bound > self.bound.cycles() {
+            self.bound.windows = bound;
+        }
+        if let Some(start) = start {
+            let choice = vec![0; start.len()];
+            let mut issued = vec![0; start.len()];
+            let length =
+                self.graph.issue(&Plan { start, choice: choice.clone() }, &mut self.table, &mut issued);
+            let cost = self.cost(length, &issued);
+            if self.best.as_ref().is_none_or(|(best, _)| cost < *best) {
+                self.best = Some((cost, Plan { start: issued, choice }));
+            }
+        }
+    }
+
     /// Lets late tasks begin later and later, within the length that is allowed for it.
     fn delay(&mut self, effort: u32) {
         self.budget = u64::from(effort) * TASKS_PER_EFFORT;
@@ -241,7 +266,7 @@ pub(super) fn solve(problem: &Problem, effort: u32) -> Solution {
         bound: bound::bound(problem, &chains),
         window: problem.watched(),
         table: Reservations::new(problem),
-        random: Random(0x9e37_79b9_7f4a_7c15),
+        random: Random::new(),
         budget: u64::from(effort) * TASKS_PER_EFFORT,
         allowed: 0,
         best: None,
@@ -259,6 +284,7 @@ pub(super) fn solve(problem: &Problem, effort: u32) -> Solution {
             break;
         }
     }
+    search.squeeze(effort);
     if !search.window.late.is_empty() {
         search.delay(effort);
     }
