@@ -41,7 +41,7 @@ mod output;
 mod resolve;
 pub mod schedule;
 
-use emit::place;
+use emit::{place, spill};
 use homes::{copies, values};
 use report::source::Sources;
 use std::sync::Arc;
@@ -51,6 +51,7 @@ use takt_syntax::report;
 
 pub use context::type_name;
 pub use contract::Contraction;
+pub use emit::spill::{Spilled, Spills};
 pub use expand::load::{FileLoader, LoadError, Loader, MemoryLoader, Open, Search};
 pub use homes::{Adjustment, Made};
 pub use output::{disasm, format, image, listing, names};
@@ -131,6 +132,8 @@ pub struct Assembled {
     pub contractions: Vec<Contraction>,
     /// What was done about registers that operations of several slots write.
     pub adjustments: Vec<Adjustment>,
+    /// What it cost that blocks have more values at a time than registers.
+    pub spills: Vec<Spills>,
     /// Words that a macro, a repetition or the assembler itself made: indices into the program's code, ascending.
     pub expanded: Vec<u32>,
     /// What the source's names stand for, bundle by bundle.
@@ -259,13 +262,24 @@ impl Checked {
         let Some((homes, contractions)) = homes.filter(|_| sink.errors == 0) else {
             return Err(sink.finish(sources));
         };
-        let schedule::Report { blocks, timing } = schedule::schedule(&mut ir, effort, &mut sink);
+        let source = ir.clone();
+        let mut report = schedule::schedule(&mut ir, effort, None, &mut sink);
         if sink.errors > 0 {
+            return Err(sink.finish(sources));
+        }
+        let (spills, why) = match spill::relieve(&mut ir, &mut report, || source, effort) {
+            Ok(spills) => (spills, None),
+            Err(why) => (Vec::new(), why),
+        };
+        let schedule::Report { blocks, timing } = report;
+        // Of a program that is too long, registers are not worth counting.
+        if ir.bundles.len() > ir.machine.code_depth as usize {
+            emit::limits(&ir, &mut sink);
             return Err(sink.finish(sources));
         }
         let adjustments = copies::report(&ir, homes);
         let runs = runs.filter(|_| blocks.is_empty()).unwrap_or_else(|| ir::runs::runs(&ir));
-        let placement = place::place(&ir, &runs, &mut sink);
+        let placement = place::place(&ir, &runs, why.as_deref(), &mut sink);
         let mut emitted = emit::emit(&mut ir, &placement, &mut sink);
         emitted.program.parts = names::parts(&sources, &emitted);
         let names = names::names(&mut context, &ir, &placement, &mut emitted);
@@ -288,6 +302,7 @@ impl Checked {
             timing,
             contractions,
             adjustments,
+            spills,
             expanded: emitted.expanded,
             names,
         })

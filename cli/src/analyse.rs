@@ -99,9 +99,14 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
         files::write(path, picture.html().as_bytes())?;
     }
     if arguments.json {
-        output::json(&picture.json(), out)?;
+        let mut json = picture.json();
+        json["spilled"] = loaded.spilled.clone().into();
+        output::json(&json, out)?;
     } else if !arguments.html.as_deref().is_some_and(files::is_dash) {
         out.write_all(picture.text().as_bytes())?;
+        for line in &loaded.spilled {
+            writeln!(out, "{line}")?;
+        }
     }
     Ok(())
 }

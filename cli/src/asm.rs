@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
 use takt_asm::schedule::DemandKind;
 use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, Resources, SharedBound, TimingReport};
-use takt_asm::{Adjustment, Assembled, Contraction, Made, Schedule, image, listing};
+use takt_asm::{Adjustment, Assembled, Contraction, Made, Schedule, Spilled, Spills, image, listing};
 use takt_isa::{Program, SlotIndex, Slots};
 use takt_rtl::header::{Header, Language};
 
@@ -200,6 +200,9 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         write_timing(&assembled, out)?;
         write_contractions(&assembled, out)?;
         write_adjustments(&assembled, out)?;
+        for line in spilled(&assembled) {
+            writeln!(out, "{line}")?;
+        }
     }
     Ok(())
 }
@@ -282,6 +285,19 @@ fn write_adjustments(assembled: &Assembled, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
+/// What it cost that blocks have more values at a time than registers, by lines.
+pub(crate) fn spilled(assembled: &Assembled) -> Vec<String> {
+    let lines = assembled.spills.iter().flat_map(|spills| {
+        let block = block_name(&assembled.program, &assembled.blocks[spills.block]);
+        let value = |value: &Spilled| {
+            let place = value.location.map(|at| format!("{}: ", assembled.program.place_text(at)));
+            format!("  {}{value}", place.unwrap_or_default())
+        };
+        std::iter::once(format!("spilled: {block}: {spills}")).chain(spills.values.iter().map(value))
+    });
+    lines.collect()
+}
+
 /// A demand, and that it is met or how far.
 fn timing_text(report: &TimingReport) -> (String, String) {
     match (report.kind, report.window) {
@@ -340,6 +356,25 @@ fn bound_text(block: &BlockReport, program: &Program) -> String {
     }
     let found = resources(block).into_iter().find(|(_, cycles)| *cycles == bound);
     found.map_or("chains and slots together".to_owned(), |(of, _)| of.text(program.machine))
+}
+
+/// What it cost a block that it has more values at a time than registers.
+fn spills_json(assembled: &Assembled, spills: &Spills) -> Value {
+    let value = |value: &Spilled| {
+        json!({
+            "name": value.name,
+            "bank": value.bank,
+            "place": value.location.map(|at| assembled.program.place_text(at)),
+            "word": value.word,
+            "loads": value.loads,
+        })
+    };
+    json!({
+        "block": block_name(&assembled.program, &assembled.blocks[spills.block]),
+        "values": spills.values.iter().map(value).collect::<Vec<_>>(),
+        "operations": spills.operations(),
+        "cycles": spills.cycles,
+    })
 }
 
 fn messages(diagnostics: &Diagnostics) -> Result<Value> {
@@ -415,6 +450,7 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
         "contractions": assembled.contractions.iter().map(contraction).collect::<Vec<_>>(),
         "timing": assembled.timing.iter().map(timing).collect::<Vec<_>>(),
         "adjustments": assembled.adjustments.iter().map(adjustment).collect::<Vec<_>>(),
+        "spills": assembled.spills.iter().map(|one| spills_json(assembled, one)).collect::<Vec<_>>(),
         "messages": messages(&assembled.warnings)?,
     }))
 }

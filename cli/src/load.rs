@@ -36,12 +36,15 @@ pub(crate) struct Loaded {
     pub(crate) sources: Vec<(String, String)>,
     /// What names stand for.
     pub(crate) names: Names,
+    /// What it cost that there are too few registers, by lines; of an image nothing is known of that.
+    pub(crate) spilled: Vec<String>,
 }
 
 impl From<Assembled> for Loaded {
     fn from(assembled: Assembled) -> Loaded {
         let DebugInfo { sources, constants, names } = assembled.debug_info();
-        Loaded { program: assembled.program, constants, sources, names }
+        let spilled = crate::asm::spilled(&assembled);
+        Loaded { program: assembled.program, constants, sources, names, spilled }
     }
 }
 
@@ -106,7 +109,7 @@ impl Load {
             let (program, debug) =
                 image::read_with(&bytes).with_context(|| format!("{name} is not an image that can run"))?;
             let DebugInfo { sources, constants, names } = debug.unwrap_or_default();
-            Loaded { program, constants, sources, names }
+            Loaded { program, constants, sources, names, spilled: Vec::new() }
         } else {
             self.finish(self.assemble(path, bytes))?.into()
         };

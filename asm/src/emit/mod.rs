@@ -1,6 +1,7 @@
 //! Placed registers to words: the last stage, where the program becomes what the machine loads.
 
 pub(crate) mod place;
+pub(crate) mod spill;
 
 use crate::emit::place::Placement;
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, numbered};

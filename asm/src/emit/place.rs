@@ -11,7 +11,7 @@
 use crate::ir::runs::Run;
 use crate::ir::{Ir, RegisterId, RegisterKind, VirtualRegister};
 use crate::report::diag::{Diagnostic, Sink};
-use std::collections::{BTreeSet, HashMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use takt_isa::{Bank, Register, SlotIndex};
 
 /// Where each register of a program lies, by index; `None` for those that nothing uses.
@@ -60,8 +60,62 @@ impl Space {
     }
 }
 
-/// Gives every register that is used a place.
-pub(crate) fn place(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Placement {
+/// What registers need when those that only one run uses ([`Room::ranges`]) have no place yet.
+pub(crate) struct Room {
+    /// The slot that writes each register.
+    pub(crate) writer: Vec<Option<SlotIndex>>,
+    /// For registers that one run of bundles writes before it reads, and no other uses: the bundles of the first write and the last
+    /// use, if they are still without a place.
+    pub(crate) ranges: Vec<Option<(u32, u32)>>,
+    /// By slot, the registers of its bank that are left for these.
+    pub(crate) free: Vec<usize>,
+    space: Space,
+    addresses: Vec<Option<Register>>,
+    missing: Vec<(usize, Option<SlotIndex>)>,
+    homeless: Vec<usize>,
+}
+
+impl Room {
+    /// By slot, how many values its bank must hold at a time at most.
+    pub(crate) fn needed(&self) -> Vec<usize> {
+        let mut changes: Vec<BTreeMap<u32, i64>> = vec![BTreeMap::new(); self.free.len()];
+        for (range, writer) in self.ranges.iter().zip(&self.writer) {
+            if let (Some((first, last)), Some(slot)) = (*range, *writer) {
+                // What is never read needs its register for a moment.
+                let last = last.max(first + 1);
+                *changes[slot.index()].entry(first).or_default() += 1;
+                *changes[slot.index()].entry(last).or_default() -= 1;
+            }
+        }
+        let most = |changes: &BTreeMap<u32, i64>| {
+            let counts = changes.values().scan(0, |count, change| {
+                *count += change;
+                Some(*count)
+            });
+            counts.max().unwrap_or(0) as usize
+        };
+        changes.iter().map(most).collect()
+    }
+
+    /// Whether a bank has too few registers for values that are needed at the same time, and all else has its place.
+    pub(crate) fn is_short(&self) -> bool {
+        let enough = self.needed().iter().zip(&self.free).all(|(needed, free)| needed <= free);
+        !enough && self.missing.is_empty() && self.homeless.is_empty()
+    }
+}
+
+/// Gives every register that is used a place. `why` is what has been found of values that find none: why they cannot be kept
+/// elsewhere.
+pub(crate) fn place(ir: &Ir, runs: &[Run], why: Option<&str>, sink: &mut Sink) -> Placement {
+    let mut room = room(ir, runs, sink);
+    let at_a_time = room.needed();
+    let shared = share(ir, &mut room);
+    report(ir, &room, &at_a_time, why, sink);
+    Placement { addresses: room.addresses, shared }
+}
+
+/// Places all registers but those of short-lived values.
+pub(crate) fn room(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Room {
     let machine = ir.machine;
     // The slot that writes each register, and whether an operation uses it at all.
     let mut writer: Vec<Option<SlotIndex>> = vec![None; ir.registers.len()];
@@ -81,14 +135,13 @@ pub(crate) fn place(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Placement {
         space.taken[address.index()] = true;
     }
     outputs(ir, &writer, &mut space, &mut addresses, sink);
-    let ranges = ranges(ir, runs);
+    let mut ranges = ranges(ir, runs);
     let is_local = |index: usize| ranges[index].is_some() && addresses[index].is_none();
     // The most registers that short-lived values need in each bank: room that constants leave if they can.
     let mut wanted_by_locals = vec![0; machine.slots.len()];
     for index in (0..ir.registers.len()).filter(|index| is_local(*index)) {
         wanted_by_locals[writer[index].unwrap_or(SlotIndex::FIRST).index()] += 1;
     }
-    let locals: Vec<usize> = (0..ir.registers.len()).filter(|index| is_local(*index)).collect();
     // Constants come after what has its bank: they go wherever there is room.
     let is_constant = |index: &usize| {
         let register: &VirtualRegister = &ir.registers[*index];
@@ -128,9 +181,13 @@ pub(crate) fn place(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Placement {
             None => homeless.push(index),
         }
     }
-    let shared = share(ir, &locals, &ranges, &writer, &mut space, &mut addresses, &mut missing);
-    report(ir, &writer, &missing, &homeless, &addresses, sink);
-    Placement { addresses, shared }
+    let windows = machine.slots.iter();
+    let windows = windows.map(|slot| Window::of(&slot.bank, RegisterKind::Plain, machine.outputs_per_bank));
+    let free = windows.map(|window| space.room(window)).collect();
+    for (index, range) in ranges.iter_mut().enumerate() {
+        *range = range.filter(|_| addresses[index].is_none());
+    }
+    Room { writer, ranges, free, space, addresses, missing, homeless }
 }
 
 /// Gives every output its place.
@@ -248,18 +305,12 @@ fn ranges(ir: &Ir, runs: &[Run]) -> Vec<Option<(u32, u32)>> {
 
 /// Places short-lived values, in the order of their first writes, in what room there is. A register is taken again only after
 /// all others of its bank have been; the bundle of a value's last read may write the next one, for it reads first.
-fn share(
-    ir: &Ir,
-    locals: &[usize],
-    ranges: &[Option<(u32, u32)>],
-    writer: &[Option<SlotIndex>],
-    space: &mut Space,
-    addresses: &mut [Option<Register>],
-    missing: &mut Vec<(usize, Option<SlotIndex>)>,
-) -> Vec<bool> {
+fn share(ir: &Ir, room: &mut Room) -> Vec<bool> {
+    let Room { writer, ranges, space, addresses, missing, .. } = room;
     let mut shared = vec![false; ir.registers.len()];
+    let ranges = ranges.iter().enumerate();
     let mut starting: Vec<(u32, u32, usize)> =
-        locals.iter().filter_map(|&index| ranges[index].map(|(first, last)| (first, last, index))).collect();
+        ranges.filter_map(|(index, range)| range.map(|(first, last)| (first, last, index))).collect();
     starting.sort_unstable_by_key(|&(first, _, index)| (first, index));
     for (number, slot) in ir.machine.numbered_slots() {
         let window = Window::of(&slot.bank, RegisterKind::Plain, ir.machine.outputs_per_bank);
@@ -290,15 +341,9 @@ fn share(
 }
 
 /// One error for each bank that is full.
-fn report(
-    ir: &Ir,
-    writer: &[Option<SlotIndex>],
-    missing: &[(usize, Option<SlotIndex>)],
-    homeless: &[usize],
-    addresses: &[Option<Register>],
-    sink: &mut Sink,
-) {
+fn report(ir: &Ir, room: &Room, at_a_time: &[usize], why: Option<&str>, sink: &mut Sink) {
     let machine = ir.machine;
+    let Room { writer, missing, homeless, .. } = room;
     let mut rest: Vec<&(usize, Option<SlotIndex>)> = missing.iter().collect();
     while let Some(&&(first, slot)) = rest.first() {
         let kind = ir.registers[first].kind;
@@ -314,10 +359,14 @@ fn report(
         let bank = slot.map_or(&machine.inputs, |slot| &machine.slot(slot).bank);
         let window = Window::of(bank, kind, machine.outputs_per_bank);
         let available = usize::from(window.end - window.first);
+        // Short-lived values count as often as they are needed at a time.
+        let lasts = |index: usize| room.ranges[index].is_none();
         let inside = |address: &Option<Register>| {
             address.is_some_and(|address| (window.first..window.end).contains(&address.get()))
         };
-        let needed = addresses.iter().filter(|address| inside(address)).count() + names.len();
+        let placed = (0..).zip(&room.addresses).filter(|(index, address)| lasts(*index) && inside(address));
+        let lasting = placed.count() + rest.iter().filter(|entry| same(entry) && lasts(entry.0)).count();
+        let needed = lasting + slot.map_or(0, |slot| at_a_time[slot.index()]);
         let what = match kind {
             RegisterKind::Input => "input ports".to_owned(),
             _ => format!("registers in bank {}", bank.name),
@@ -333,6 +382,9 @@ fn report(
             let slot = machine.slot(slot);
             error =
                 error.note(format!("bank {} is the one that slot `{}` writes", slot.bank.name, slot.name));
+        }
+        if let Some(why) = why {
+            error = error.note(why);
         }
         if matches!(kind, RegisterKind::Plain | RegisterKind::State) {
             error = error.help("use a register again once its value is no longer needed");

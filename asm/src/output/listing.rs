@@ -66,6 +66,14 @@ impl<'a> Lister<'a> {
             1 => self.line(format_args!("; 1 product fused into a sum")),
             count => self.line(format_args!("; {count} products fused into sums")),
         }
+        for spills in &self.assembled.spills {
+            self.line(format_args!("; {spills}"));
+            for value in &spills.values {
+                let place =
+                    value.location.map_or(String::new(), |at| format!("{}: ", program.place_text(at)));
+                self.line(format_args!(";   {place}{value}"));
+            }
+        }
         self.line(format_args!("; addr  {heads}line            source"));
         let mut labels = program.symbols.iter().filter(|symbol| symbol.space == Space::Code).peekable();
         for address in program.addresses() {

@@ -4,7 +4,7 @@
 //! before the program runs, it is known whether they are the same; of any others, that they may be.
 
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use takt_isa::Effect;
 
 /// The value of a register at some place of a block.
@@ -156,4 +156,19 @@ pub(super) fn fixed(ir: &Ir) -> Vec<Option<u32>> {
         fixed[dest.index()] = None;
     }
     fixed
+}
+
+/// The data words that loads and stores of a program touch; `None` if one goes where a register says, which may be any word.
+pub(crate) fn touched(ir: &Ir) -> Option<BTreeSet<u32>> {
+    if ir.is_opaque() {
+        return None;
+    }
+    let fixed = fixed(ir);
+    let accesses =
+        ir.operations().filter(|operation| matches!(operation.row().effect, Effect::Load | Effect::Store));
+    let word = |operation: &Operation| {
+        let Constant::Value(offset) = operation.constant else { return None };
+        Some(fixed[operation.sources[0].index()]?.wrapping_add(offset))
+    };
+    accesses.map(word).collect()
 }

@@ -17,6 +17,7 @@ mod windows;
 pub use crate::ir::DemandKind;
 pub use bound::{Bound, Resources, SharedBound};
 pub use demand::TimingReport;
+pub(crate) use memory::touched;
 
 use crate::ir::matching;
 use crate::ir::runs;
@@ -63,8 +64,10 @@ pub struct Report {
     pub timing: Vec<TimingReport>,
 }
 
-/// Schedules every block of bundles that ask for it ([`Bundle::scheduled`]), and checks what is demanded of ports.
-pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
+/// Schedules every block of bundles that ask for it ([`Bundle::scheduled`]), and checks what is demanded of ports. With a `reach`, no
+/// operation issues before one that stands so many bundles or more before it in the source: fewer values are then needed at
+/// a time, and the schedule may be longer.
+pub fn schedule(ir: &mut Ir, effort: u32, reach: Option<usize>, sink: &mut Sink) -> Report {
     if ir.demands.is_empty() && !ir.scheduled {
         return Report::default();
     }
@@ -101,6 +104,7 @@ pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
             bundles.extend_from_slice(old);
             continue;
         }
+        let bound = reach.map(|reach| block.problem.keep_near(reach));
         let solution = solve::solve(&block.problem, effort);
         report.timing.extend(demands.check(&block, &solution.plan.start, solution.window, scheduled, sink));
         let packed = block.pack(old, &solution.plan);
@@ -112,7 +116,7 @@ pub fn schedule(ir: &mut Ir, effort: u32, sink: &mut Sink) -> Report {
             operations: block.problem.tasks.iter().map(|task| task.operations as u32).sum(),
             bundles: packed.len() as u32,
             cycles: solution.length,
-            bound: solution.bound,
+            bound: bound.unwrap_or(solution.bound),
         });
         bundles.extend(packed);
     }

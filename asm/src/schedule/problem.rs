@@ -104,6 +104,14 @@ impl Problem {
         super::bound::bound(self, &graph.chains())
     }
 
+    /// Lets no task issue before one that stands `reach` tasks or more before it. Returns the bound without that.
+    pub(super) fn keep_near(&mut self, reach: usize) -> Bound {
+        let bound = self.bound();
+        let edge = |to: usize| Edge { from: to - reach, to, distance: 0, latency_of: None, demanded: false };
+        self.edges.extend((reach..self.tasks.len()).map(edge));
+        bound
+    }
+
     /// The tasks from which a task of `from` can be reached, and those themselves.
     pub(super) fn before(&self, from: impl Fn(usize) -> bool) -> Vec<bool> {
         let graph = Graph::new(self);

@@ -189,7 +189,7 @@ pub(crate) fn open(
     let loaded = load.with_source(path)?;
     let inputs = arguments.inputs.as_deref().map(|path| rows(path, &loaded)).transpose()?;
     changed_sources(path, &loaded, color);
-    let Loaded { program, constants, sources, names } = loaded;
+    let Loaded { program, constants, sources, names, .. } = loaded;
     let (tick, control) = (arguments.tick, Arc::clone(control));
     Ok((Session::new(&program, Options { inputs, tick, constants, sources, names, control })?, None))
 }
@@ -232,7 +232,7 @@ fn rows(path: &Path, loaded: &Loaded) -> Result<Arc<Rows>> {
 /// A session on what a program did in a closed loop, at the period that is worth a look.
 fn in_recording(recording: Recording, control: &Arc<Control>) -> Result<(Session, String)> {
     let Recording { loaded, inputs, tick, period, why: reason } = recording;
-    let Loaded { program, constants, sources, names } = loaded;
+    let Loaded { program, constants, sources, names, .. } = loaded;
     let (inputs, control) = (Some(Arc::new(inputs)), Arc::clone(control));
     let mut session = Session::new(&program, Options { inputs, tick, constants, sources, names, control })?;
     // To where the period's first bundle is about to issue.

@@ -37,7 +37,7 @@ pub(crate) fn console(
     let options = SystemOptions { turns, idle, pops: host.pops.clone(), control: Arc::clone(control) };
     let session = SystemSession::new(&description, options)?;
     let mut views = Vec::new();
-    for Loaded { program, constants, sources, names } in programs {
+    for Loaded { program, constants, sources, names, .. } in programs {
         let options = Options { constants, sources, names, ..Options::default() };
         views.push(Session::new(&program, options)?);
     }

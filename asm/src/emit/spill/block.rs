@@ -1,0 +1,296 @@
+//! Loads and stores into one scheduled block, whose bundles stay in their order.
+//!
+//! From the first bundle to the last: where a bank holds too many values, the one that is used again latest makes room (Belady, 1966).
+//! It is stored once, behind its computation, and loaded as late as its next use allows, in slots that are free if there
+//! are any. What is loaded is a value of its own from there on, and may be the next to make room.
+
+use super::super::place::Room;
+use super::Spilled;
+use crate::ir::runs::Run;
+use crate::ir::{Bundle, Constant, Ir, Operation, RegisterId, VirtualRegister};
+use crate::schedule;
+use smallvec::smallvec;
+use takt_isa::{Effect, Op, ROWS, SlotIndex};
+
+/// What is missing.
+pub(super) enum Short {
+    /// Data words: so many are needed at least.
+    Words(usize),
+    /// Values that may be kept elsewhere.
+    Values,
+}
+
+/// A value of the block that has a register for a time.
+struct Value {
+    id: RegisterId,
+    slot: SlotIndex,
+    /// The bundle that writes it, counted from the block's first.
+    first: usize,
+    /// The bundles that read it, ascending.
+    uses: Vec<usize>,
+    /// Whether it may make room.
+    spillable: bool,
+    /// Which of the spilled values it is, once it is in data memory.
+    stored: Option<usize>,
+}
+
+impl Value {
+    /// The bundle after which its register is free.
+    fn end(&self) -> usize {
+        self.uses.last().copied().unwrap_or(0).max(self.first + usize::from(self.uses.is_empty()))
+    }
+
+    /// Whether it needs its register between a bundle and the next.
+    fn spans(&self, gap: usize) -> bool {
+        self.first <= gap && gap < self.end()
+    }
+}
+
+/// Where an operation can be added: in a bundle, or in one of its own behind it.
+#[derive(Clone, Copy)]
+enum Place {
+    In(usize),
+    Behind(usize),
+}
+
+impl Place {
+    fn bundle(self) -> usize {
+        match self {
+            Place::In(bundle) | Place::Behind(bundle) => bundle,
+        }
+    }
+}
+
+struct Block<'a> {
+    ir: &'a mut Ir,
+    bundles: Vec<Bundle>,
+    /// Operations in bundles of their own, by the bundle that they follow.
+    behind: Vec<Vec<Operation>>,
+    /// When the bundles issue, before any is added to.
+    start: Vec<u32>,
+    values: Vec<Value>,
+    spilled: Vec<Spilled>,
+    /// The operation that computes each of these.
+    computed: Vec<Operation>,
+    load: Op,
+    store: Op,
+    slot: SlotIndex,
+}
+
+/// The bundles of a run whose values have room, and which of these are kept in data memory, in `words`.
+pub(super) fn spill(
+    ir: &mut Ir,
+    run: Run,
+    room: &Room,
+    words: &mut impl Iterator<Item = u32>,
+) -> Result<(Vec<Bundle>, Vec<Spilled>), Short> {
+    let of = |effect: Effect| ROWS.iter().find(|row| row.effect == effect);
+    let (Some(load), Some(store)) = (of(Effect::Load), of(Effect::Store)) else { return Err(Short::Values) };
+    let Some((slot, _)) = ir.machine.host(load.function) else { return Err(Short::Values) };
+    let bundles = ir.bundles[run.start..run.end].to_vec();
+    let start = schedule::as_written(ir, &bundles);
+    let values = values(&bundles, run, room);
+    let behind = vec![Vec::new(); bundles.len()];
+    let (load, store) = (load.op, store.op);
+    let (spilled, computed) = (Vec::new(), Vec::new());
+    let mut block = Block { ir, bundles, behind, start, values, spilled, computed, load, store, slot };
+    for gap in 0..block.bundles.len() {
+        for (number, free) in SlotIndex::all().zip(&room.free) {
+            loop {
+                let held = (0..block.values.len())
+                    .filter(|&value| block.values[value].slot == number && block.values[value].spans(gap));
+                let held: Vec<usize> = held.collect();
+                if held.len() <= *free {
+                    break;
+                }
+                block.make_room(&held, gap, words)?;
+            }
+        }
+    }
+    Ok(block.finish())
+}
+
+/// The values of a run that one operation writes and only the run uses.
+fn values(bundles: &[Bundle], run: Run, room: &Room) -> Vec<Value> {
+    let mut values: Vec<Value> = Vec::new();
+    let mut index = std::collections::HashMap::new();
+    for (at, bundle) in bundles.iter().enumerate() {
+        for operation in &bundle.operations {
+            for source in operation.reads() {
+                if let Some(&value) = index.get(source) {
+                    let value: &mut Value = &mut values[value];
+                    if value.uses.last() != Some(&at) {
+                        value.uses.push(at);
+                    }
+                    // It is known by its register where it is copied, and where the source packs the bundle.
+                    value.spillable &= !operation.made && !bundle.explicit;
+                }
+            }
+        }
+        for operation in &bundle.operations {
+            let (Some(dest), Some(slot)) = (operation.dest, operation.slot) else { continue };
+            let range = room.ranges[dest.index()].filter(|(first, _)| *first as usize >= run.start);
+            if range.is_none() {
+                continue;
+            }
+            if let Some(&value) = index.get(&dest) {
+                let value: &mut Value = &mut values[value];
+                // Another write of the same name.
+                value.spillable = false;
+                value.uses.push(at);
+                continue;
+            }
+            index.insert(dest, values.len());
+            let spillable = operation.is_computed() && !bundle.explicit;
+            values.push(Value { id: dest, slot, first: at, uses: Vec::new(), spillable, stored: None });
+        }
+    }
+    values
+}
+
+impl Block<'_> {
+    /// Takes one of the values that a bank holds between a bundle and the next out of it: that which is used again latest.
+    fn make_room(
+        &mut self,
+        held: &[usize],
+        gap: usize,
+        words: &mut impl Iterator<Item = u32>,
+    ) -> Result<(), Short> {
+        let next = |value: &Value| value.uses.iter().copied().find(|at| *at > gap);
+        // There must be a bundle between, to load in; and one before, to store in.
+        let candidates = held.iter().filter_map(|&value| {
+            let of = &self.values[value];
+            let next = next(of).filter(|next| of.spillable && *next > gap + 1)?;
+            (of.first < gap).then_some((next, of.stored.is_some(), value))
+        });
+        let (next, _, value) = candidates.max().ok_or(Short::Values)?;
+        let stored = match self.values[value].stored {
+            Some(stored) => stored,
+            None => self.store(value, gap, words)?,
+        };
+        self.reload(value, stored, gap, next);
+        Ok(())
+    }
+
+    /// Whether an operation can be added to a bundle.
+    fn has_room(&self, at: usize) -> bool {
+        let Bundle { operations, explicit, .. } = &self.bundles[at];
+        let taken = |operation: &Operation| operation.slot.is_none_or(|slot| slot == self.slot);
+        !explicit
+            && operations.len() < self.ir.machine.slots.len()
+            && !operations.iter().any(|operation| taken(operation) || operation.redirects())
+    }
+
+    fn add(&mut self, place: Place, operation: Operation) {
+        match place {
+            Place::In(bundle) => self.bundles[bundle].operations.push(operation),
+            Place::Behind(bundle) => self.behind[bundle].push(operation),
+        }
+    }
+
+    /// Stores a value behind its computation, so that its register is free before a gap or after its last use until then.
+    fn store(
+        &mut self,
+        value: usize,
+        gap: usize,
+        words: &mut impl Iterator<Item = u32>,
+    ) -> Result<usize, Short> {
+        let Value { id, first, .. } = self.values[value];
+        let computing = self.bundles[first].operations.iter().find(|operation| operation.dest == Some(id));
+        let computing = *computing.ok_or(Short::Values)?;
+        let ready = self.start[first] + schedule::latency(self.ir.machine, &computing);
+        let word = words.next().ok_or(Short::Words(self.spilled.len() + 1))?;
+        let free = (first + 1..=gap).find(|&at| self.start[at] >= ready && self.has_room(at));
+        let behind = || (first..gap).find(|&at| self.start[at + 1] >= ready).unwrap_or(gap - 1);
+        let place = free.map_or_else(|| Place::Behind(behind()), Place::In);
+        let operation = Operation {
+            sources: [RegisterId::ZERO, id, RegisterId::ZERO],
+            ..self.operation(&computing, self.store, word)
+        };
+        self.add(place, operation);
+        let uses = &mut self.values[value].uses;
+        let at = match place {
+            Place::In(bundle) => bundle,
+            // It needs its register to the bundle behind.
+            Place::Behind(bundle) => bundle + 1,
+        };
+        if let Err(place) = uses.binary_search(&at) {
+            uses.insert(place, at);
+        }
+        let register = self.ir.register(id);
+        self.spilled.push(Spilled {
+            name: register.name.clone(),
+            bank: self.ir.machine.slot(self.values[value].slot).bank.name,
+            location: self.ir.location(&computing),
+            word,
+            loads: 0,
+        });
+        self.computed.push(computing);
+        Ok(self.spilled.len() - 1)
+    }
+
+    /// Loads a value for its `next` use, behind a gap; all further uses read what is loaded.
+    fn reload(&mut self, value: usize, stored: usize, gap: usize, next: usize) {
+        let computing = self.computed[stored];
+        let old = self.values[value].id;
+        let new = RegisterId::new(self.ir.registers.len());
+        // It has no name: what the source calls so is the register that was computed, as long as it is there.
+        let register = VirtualRegister { name: String::new(), ..self.ir.register(old).clone() };
+        self.ir.registers.push(register);
+        let word = self.spilled[stored].word;
+        let load = Operation { dest: Some(new), ..self.operation(&computing, self.load, word) };
+        let latency = schedule::latency(self.ir.machine, &load);
+        let in_time = |&at: &usize| self.start[at] + latency <= self.start[next];
+        let within = || (gap + 1..next).rev();
+        let free = within().filter(|&at| self.has_room(at)).find(in_time);
+        let behind = || within().find(in_time).unwrap_or(gap + 1);
+        let place = free.map_or_else(|| Place::Behind(behind()), Place::In);
+        self.add(place, load);
+        self.spilled[stored].loads += 1;
+        let uses = &mut self.values[value].uses;
+        let later = uses.split_off(uses.partition_point(|at| *at <= gap));
+        for &at in &later {
+            for operation in &mut self.bundles[at].operations {
+                let count = operation.row().shape.sources();
+                operation.sources[..count]
+                    .iter_mut()
+                    .filter(|source| **source == old)
+                    .for_each(|source| *source = new);
+            }
+        }
+        self.values.push(Value {
+            id: new,
+            slot: self.slot,
+            first: place.bundle(),
+            uses: later,
+            spillable: true,
+            stored: Some(stored),
+        });
+    }
+
+    /// A load or store of a word, for what an operation computes.
+    fn operation(&self, computing: &Operation, op: Op, word: u32) -> Operation {
+        Operation {
+            op,
+            slots: takt_isa::Slots::of(self.slot),
+            slot: Some(self.slot),
+            dest: None,
+            sources: [RegisterId::ZERO; 3],
+            constant: Constant::Value(word),
+            made: true,
+            ..*computing
+        }
+    }
+
+    fn finish(self) -> (Vec<Bundle>, Vec<Spilled>) {
+        let mut bundles = Vec::with_capacity(self.bundles.len());
+        for (mut bundle, behind) in self.bundles.into_iter().zip(self.behind) {
+            bundle.operations.sort_by_key(|operation| operation.slot);
+            bundles.push(bundle);
+            let alone =
+                |operation| Bundle { operations: smallvec![operation], explicit: false, scheduled: true };
+            bundles.extend(behind.into_iter().map(alone));
+        }
+        (bundles, self.spilled)
+    }
+}

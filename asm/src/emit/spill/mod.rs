@@ -1,0 +1,208 @@
+//! Values that find no register: kept in data memory while they are not needed.
+//!
+//! Where a block of equations has more values at a time than a bank has registers, first an order is tried in which fewer are
+//! needed at a time ([`schedule()`](schedule::schedule)'s reach); then values whose next use is farthest are stored in words that nothing else
+//! touches, and loaded before that use ([`block`]). The shorter program is taken. What hand-written operations write
+//! stays in its register.
+
+mod block;
+
+use super::place::{self, Room};
+use crate::ir::runs::{self, Run};
+use crate::ir::{Bundle, Ir};
+use crate::report::diag::Sink;
+use crate::schedule::{self, Report};
+use takt_isa::BundleAddress;
+use takt_isa::program::Location;
+
+/// A value that is kept in data memory for a time.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Spilled {
+    /// Its name; empty if it is a part of an equation.
+    pub name: String,
+    /// The bank that had no room for it.
+    pub bank: &'static str,
+    /// The line that computes it.
+    pub location: Option<Location>,
+    /// The data word that keeps it.
+    pub word: u32,
+    /// How often it is loaded.
+    pub loads: u32,
+}
+
+/// What it cost a block that its values have not enough registers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Spills {
+    /// The block: an index into the assembled program's blocks.
+    pub block: usize,
+    /// The values; none if another order was enough.
+    pub values: Vec<Spilled>,
+    /// Cycles more than the block would take with as many registers as it needs.
+    pub cycles: u32,
+}
+
+impl Spills {
+    /// Loads and stores added.
+    pub fn operations(&self) -> u32 {
+        self.values.iter().map(|value| 1 + value.loads).sum()
+    }
+}
+
+impl std::fmt::Display for Spills {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let cycles = self.cycles;
+        if self.values.is_empty() {
+            return write!(f, "order nearer to the source's, for want of registers: {cycles} cycles");
+        }
+        let (count, operations) = (self.values.len(), self.operations());
+        write!(f, "{count} values kept in data memory: {operations} loads and stores, {cycles} cycles")
+    }
+}
+
+impl std::fmt::Display for Spilled {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Spilled { name, bank, word, loads, .. } = self;
+        let name = if name.is_empty() { "a part of the equation" } else { name };
+        let times = if *loads == 1 { "once".to_owned() } else { format!("{loads} times") };
+        write!(f, "{name}: from bank {bank} to word {word}, loaded {times}")
+    }
+}
+
+/// Shares of a block's operations within which the order of the source is kept, to need fewer registers: a half, a quarter …
+const REACHES: u32 = 5;
+
+/// A program in which all values have a register.
+struct Relieved {
+    ir: Ir,
+    report: Report,
+    spills: Vec<Spills>,
+}
+
+impl Relieved {
+    fn cycles(&self) -> u64 {
+        self.report.blocks.iter().map(|block| u64::from(block.cycles)).sum()
+    }
+
+    fn fits(&self) -> bool {
+        self.ir.bundles.len() <= self.ir.machine.code_depth as usize
+    }
+}
+
+/// Makes a scheduled program need no more registers than there are, if that is short of them. `source` is the program before it
+/// was scheduled.
+///
+/// # Errors
+/// Why it cannot be done; the program is as it was.
+pub(crate) fn relieve(
+    ir: &mut Ir,
+    report: &mut Report,
+    source: impl FnOnce() -> Ir,
+    effort: u32,
+) -> Result<Vec<Spills>, Option<String>> {
+    let runs = runs::runs(ir);
+    let room = place::room(ir, &runs, &mut Sink::default());
+    if report.blocks.is_empty() || !room.is_short() || ir.bundles.len() > ir.machine.code_depth as usize {
+        return Ok(Vec::new());
+    }
+    let spilled = by_memory(ir, &runs, &room, report);
+    let ordered = by_order(&source(), report, effort);
+    let (spilled, why) = match spilled {
+        Ok(relieved) => (Some(relieved), None),
+        Err(why) => (None, Some(why)),
+    };
+    let best = ordered.into_iter().chain(spilled).min_by_key(Relieved::cycles).ok_or(why)?;
+    *ir = best.ir;
+    *report = best.report;
+    Ok(best.spills)
+}
+
+/// By an order near to that of the source: as near as need be.
+fn by_order(source: &Ir, before: &Report, effort: u32) -> Option<Relieved> {
+    let longest = before.blocks.iter().map(|block| block.operations).max()?;
+    (1..=REACHES).find_map(|shift| {
+        let reach = (longest >> shift).max(1) as usize;
+        let mut ir = source.clone();
+        let mut sink = Sink::default();
+        let mut report = schedule::schedule(&mut ir, effort, Some(reach), &mut sink);
+        let room = place::room(&ir, &runs::runs(&ir), &mut Sink::default());
+        if sink.errors > 0 || room.is_short() {
+            return None;
+        }
+        for (block, free) in report.blocks.iter_mut().zip(&before.blocks) {
+            block.bound = free.bound.clone();
+        }
+        let longer = report.blocks.iter().zip(&before.blocks).enumerate();
+        let longer = longer.filter(|(_, (after, free))| after.cycles > free.cycles);
+        let spills = longer.map(|(block, (after, free))| Spills {
+            block,
+            values: Vec::new(),
+            cycles: after.cycles - free.cycles,
+        });
+        let spills = spills.collect();
+        Some(Relieved { ir, report, spills }).filter(Relieved::fits)
+    })
+}
+
+/// By loads and stores.
+fn by_memory(ir: &Ir, runs: &[Run], room: &Room, before: &Report) -> Result<Relieved, String> {
+    let name = ir.machine.name;
+    let touched = schedule::touched(ir)
+        .ok_or("values are not kept in data memory: a load or store may touch any word of it")?;
+    let declared = ir.data.len() as u32;
+    let mut words = (declared..ir.machine.data_depth).filter(|word| !touched.contains(word));
+    let mut relieved = Relieved { ir: ir.clone(), report: before.clone(), spills: Vec::new() };
+    let mut bundles: Vec<Bundle> = Vec::with_capacity(ir.bundles.len());
+    let mut moved = std::collections::BTreeMap::new();
+    for run in runs {
+        let address = BundleAddress::new(run.start as u32);
+        moved.insert(run.start as u32, bundles.len() as u32);
+        let index = before.blocks.iter().position(|block| block.address == address);
+        let Some(index) = index.filter(|_| run.scheduled) else {
+            bundles.extend_from_slice(&ir.bundles[run.start..run.end]);
+            continue;
+        };
+        let spilled = block::spill(&mut relieved.ir, *run, room, &mut words);
+        let (new, values) = spilled.map_err(|short| match short {
+            block::Short::Words(needed) => {
+                let free = ir.machine.data_depth - declared.min(ir.machine.data_depth);
+                format!("{needed} data words are needed for values that find no register, and {free} of {name} are free")
+            }
+            block::Short::Values => {
+                "values are not kept in data memory: too few of those that find no register are computed by equations"
+                    .to_owned()
+            }
+        })?;
+        let block = &mut relieved.report.blocks[index];
+        if !values.is_empty() {
+            let start = schedule::as_written(&relieved.ir, &new);
+            let cycles = start.last().map_or(0, |last| last + 1);
+            let spills = Spills { block: index, values, cycles: cycles.saturating_sub(block.cycles) };
+            block.operations += spills.operations();
+            block.cycles = cycles;
+            relieved.spills.push(spills);
+        }
+        block.address = BundleAddress::new(bundles.len() as u32);
+        block.bundles = new.len() as u32;
+        bundles.extend(new);
+    }
+    let end = bundles.len() as u32;
+    relieved.ir.replace_bundles(bundles, |position| moved.get(&position).copied().unwrap_or(end));
+    if !relieved.fits() {
+        let (bundles, depth) = (relieved.ir.bundles.len(), ir.machine.code_depth);
+        return Err(format!(
+            "with loads and stores of values that find no register there are {bundles} bundles, and {name}'s program memory \
+             holds {depth}"
+        ));
+    }
+    // The demands are to be met as it stands now.
+    if !ir.demands.is_empty() {
+        let mut stands = relieved.ir.clone();
+        stands.bundles.iter_mut().for_each(|bundle| bundle.scheduled = false);
+        let mut sink = Sink::default();
+        relieved.report.timing = schedule::schedule(&mut stands, 0, None, &mut sink).timing;
+        if sink.errors > 0 {
+            return Err("with values kept in data memory, what is demanded of ports is not met".to_owned());
+        }
+    }
+    Ok(relieved)
+}

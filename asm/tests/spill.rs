@@ -1,0 +1,165 @@
+//! Blocks of equations with more values at a time than a bank has registers.
+
+use takt_asm::{Assembled, Diagnostics, MemoryLoader, Options, assemble};
+use takt_emu::{Emulator, Number};
+use takt_isa::{Function, MACHINES, Machine, T3};
+
+/// A chain of so many values, all of which are read again, the last first: in any order they are all needed at a time.
+fn source(values: usize) -> String {
+    let mut text = ".schedule on\n.input a, b\n.output y, z\n".to_owned();
+    for i in 0..values {
+        text += &format!(".reg v{i} s{i}\n");
+    }
+    text += ".once\n wait p\n.period\np:\n v0 = a*b\n";
+    for i in 1..values {
+        text += &format!(" v{i} = v{} + b\n", i - 1);
+    }
+    text += &format!(" s{} = v{}*a\n", values - 1, values - 1);
+    for i in (0..values - 1).rev() {
+        text += &format!(" s{i} = v{i} - s{}\n", i + 1);
+    }
+    text + " y = s0\n z = v1*s1\n wait p\n"
+}
+
+/// The same in binary32.
+fn expected(values: usize, a: f32, b: f32) -> [u32; 2] {
+    let mut v = vec![a * b];
+    for i in 1..values {
+        v.push(v[i - 1] + b);
+    }
+    let mut s = vec![v[values - 1] * a; values];
+    for i in (0..values - 1).rev() {
+        s[i] = v[i] - s[i + 1];
+    }
+    [s[0], v[1] * s[1]].map(f32::to_bits)
+}
+
+/// The registers that a machine has for sums.
+fn registers(machine: &Machine) -> usize {
+    let (slot, _) = machine.host(Function::Add).unwrap();
+    usize::from(machine.slot(slot).bank.depth - machine.outputs_per_bank)
+}
+
+fn assembled(text: &str, machine: &'static Machine) -> Result<Assembled, Diagnostics> {
+    let options = Options { machine, effort: 1, ..Options::default() };
+    assemble("spill.s", &MemoryLoader::of("spill.s", text), &options)
+}
+
+fn run(assembled: &Assembled, a: f32, b: f32) -> ([u32; 2], u64) {
+    let mut emulator = Emulator::new(&assembled.program).unwrap();
+    emulator.set_input("a", Number::Float(a)).unwrap();
+    emulator.set_input("b", Number::Float(b)).unwrap();
+    emulator.run_period(&[]).unwrap();
+    let cycles = emulator.run_period(&[]).unwrap().cycles;
+    let bits = |name: &str| match emulator.output(name).unwrap() {
+        Some(Number::Float(value)) => value.to_bits(),
+        other => panic!("{other:?}"),
+    };
+    ([bits("y"), bits("z")], cycles)
+}
+
+#[test]
+fn values_without_a_register_keep_every_bit() {
+    for machine in MACHINES {
+        let mut seen = 0;
+        let registers = registers(machine);
+        for values in [20, registers - 60, registers + 10, registers + 140] {
+            let text = source(values);
+            let assembled = match assembled(&text, machine) {
+                Ok(assembled) => assembled,
+                Err(errors) => panic!("{values} on {}: {}", machine.name, errors.render(false)),
+            };
+            for (a, b) in [(0.99, 0.31), (-0.97, 0.5), (1.01, -0.99)] {
+                let (found, cycles) = run(&assembled, a, b);
+                assert_eq!(found, expected(values, a, b), "{values} values on {}", machine.name);
+                let block =
+                    assembled.blocks.iter().find(|block| block.label.as_deref() == Some("p")).unwrap();
+                assert_eq!(cycles, u64::from(block.cycles), "{values} values on {}", machine.name);
+                assert!(block.bound.cycles() <= block.cycles);
+            }
+            let spilled: usize = assembled.spills.iter().map(|spills| spills.values.len()).sum();
+            seen += spilled;
+            assert!(values > registers || assembled.spills.is_empty(), "{:?}", assembled.spills);
+            let mut words: Vec<u32> = assembled
+                .spills
+                .iter()
+                .flat_map(|spills| spills.values.iter().map(|value| value.word))
+                .collect();
+            words.sort_unstable();
+            words.dedup();
+            assert_eq!(words.len(), spilled, "each in a word of its own");
+        }
+        assert!(seen > 100, "{seen} on {}", machine.name);
+    }
+}
+
+/// Words that the program uses are left alone; where it is not known which these are, nothing is kept there.
+#[test]
+fn words_of_the_program_are_left_alone() {
+    let declared = source(300).replace(".once\n", ".data\ntable: .float 1, 2, 3\n.once\n");
+    let touched = declared.replace(" v0 = a*b\n", " st 5[zero], a\n v0 = a*b\n");
+    let assembled = assembled(&touched, &T3).unwrap_or_else(|errors| panic!("{}", errors.render(false)));
+    let words: Vec<u32> = assembled.spills[0].values.iter().map(|value| value.word).collect();
+    assert!(!words.is_empty() && words.iter().all(|word| *word >= 3 && *word != 5), "{words:?}");
+    let anywhere = touched.replace("5[zero]", "5[n]").replace(".once\n", ".state n:int\n.once\n li n, 0\n");
+    let errors = self::assembled(&anywhere, &T3).unwrap_err().render(false);
+    assert!(
+        errors.contains("are needed, and t3 has 224") && errors.contains("may touch any word"),
+        "{errors}"
+    );
+}
+
+/// What is written by hand stays in its registers.
+#[test]
+fn registers_that_the_source_names_are_left_alone() {
+    let names: Vec<String> = (0..300).map(|i| format!("v{i}")).collect();
+    let mut text = ".schedule on\n.input a, b\n.output y\n".to_owned();
+    for names in names.chunks(20) {
+        text += &format!(".reg {}\n", names.join(" "));
+    }
+    text += ".reg s\n.once\n wait p\n.period\np:\n fadd v0, a, b\n";
+    for i in 1..300 {
+        text += &format!(" fadd v{i}, v{}, b\n", i - 1);
+    }
+    text += " mov s, v299\n";
+    for i in (0..299).rev() {
+        text += &format!(" fsub s, s, v{i}\n");
+    }
+    text += " mov y, s\n wait p\n";
+    let errors = assembled(&text, &T3).unwrap_err().render(false);
+    assert!(errors.contains("registers in bank a are needed, and t3 has 224"), "{errors}");
+    assert!(errors.contains("too few of those that find no register are computed by equations"), "{errors}");
+}
+
+#[test]
+fn what_is_too_large_is_refused_with_the_numbers() {
+    let errors = assembled(&source(900), &T3).unwrap_err().render(false);
+    assert!(errors.contains("and t3's program memory holds 1024"), "{errors}");
+}
+
+/// Values of which few are needed at a time in the source's order, and many in the order in which they are ready.
+#[test]
+fn an_order_near_to_the_source_may_be_enough() {
+    let (mut text, mut names) = (".schedule on\n.output y\n.reg s0\n".to_owned(), String::new());
+    for i in 0..20 {
+        text += &format!(".input x{i}, y{i}\n");
+    }
+    // Products that wait for nothing, and a chain that reads them one after the other.
+    for i in 0..400 {
+        text += &format!(".reg p{i} s{}\n", i + 1);
+        names += &format!(" p{i} = x{}*y{}\n s{} = s{i} - p{i}\n", i / 20, i % 20, i + 1);
+    }
+    text += &format!(".once\n wait p\n.period\np:\n s0 = x0\n{names} y = s400\n wait p\n");
+    let assembled = assembled(&text, &T3).unwrap_or_else(|errors| panic!("{}", errors.render(false)));
+    assert!(assembled.spills.iter().all(|spills| spills.values.is_empty()), "{:?}", assembled.spills);
+    let mut emulator = Emulator::new(&assembled.program).unwrap();
+    for i in 0..20u8 {
+        let value = f32::from(i) * 0.37 + 0.1;
+        emulator.set_input(&format!("x{i}"), Number::Float(value)).unwrap();
+        emulator.set_input(&format!("y{i}"), Number::Float(1.0 - value)).unwrap();
+    }
+    emulator.run_period(&[]).unwrap();
+    let value = |i: usize| f32::from(i as u8) * 0.37 + 0.1;
+    let expected = (0..400).fold(value(0), |s, i| s - value(i / 20) * (1.0 - value(i % 20)));
+    assert_eq!(emulator.output("y").unwrap(), Some(Number::Float(expected)));
+}
