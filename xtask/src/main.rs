@@ -262,6 +262,10 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
 /// Measures, prints, writes docs/speed.md.
 fn speed() -> Result<()> {
     install()?;
+    if !works("customasm", "--version") {
+        eprintln!("customasm is missing: installing it");
+        run(cargo().args(["install", "customasm", "--locked", "--version", "0.14.2"]))?;
+    }
     let mut measure = cargo();
     measure.args(["run", "--release", "--package", "takt-benches", "--features", "jit", "--bin", "speed"]);
     let output = measure.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
