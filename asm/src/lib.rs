@@ -262,15 +262,19 @@ impl Checked {
         let Some((homes, contractions)) = homes.filter(|_| sink.errors == 0) else {
             return Err(sink.finish(sources));
         };
-        let source = ir.clone();
+        // Nobody asks any more how it was written: what follows has this memory.
+        context.asts = Vec::new();
+        // For another order, should registers run out.
+        let source = ir.scheduled.then(|| ir.clone());
         let mut report = schedule::schedule(&mut ir, effort, None, &mut sink);
         if sink.errors > 0 {
             return Err(sink.finish(sources));
         }
-        let (spills, why) = match spill::relieve(&mut ir, &mut report, || source, effort) {
+        let (spills, why) = match spill::relieve(&mut ir, &mut report, source.as_ref(), effort) {
             Ok(spills) => (spills, None),
             Err(why) => (Vec::new(), why),
         };
+        drop(source);
         let schedule::Report { blocks, timing } = report;
         // Of a program that is too long, registers are not worth counting.
         if ir.bundles.len() > ir.machine.code_depth as usize {

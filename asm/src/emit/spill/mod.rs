@@ -96,7 +96,7 @@ impl Relieved {
 pub(crate) fn relieve(
     ir: &mut Ir,
     report: &mut Report,
-    source: impl FnOnce() -> Ir,
+    source: Option<&Ir>,
     effort: u32,
 ) -> Result<Vec<Spills>, Option<String>> {
     let runs = runs::runs(ir);
@@ -105,7 +105,7 @@ pub(crate) fn relieve(
         return Ok(Vec::new());
     }
     let spilled = by_memory(ir, &runs, &room, report);
-    let ordered = by_order(&source(), report, effort);
+    let ordered = source.and_then(|source| by_order(source, report, effort));
     let (spilled, why) = match spilled {
         Ok(relieved) => (Some(relieved), None),
         Err(why) => (None, Some(why)),
