@@ -116,3 +116,26 @@ fn warnings_are_errors_if_asked_for() {
     assert_eq!(done.status, Some(2));
     assert!(done.stderr.contains("there is no warning `type`; did you mean `types`?"), "{}", done.stderr);
 }
+
+/// More values at a time than a bank has registers: every command that shows what a program costs says what becomes of them.
+#[test]
+fn values_without_a_register_are_told() {
+    let folder = Folder::new();
+    let count = 236;
+    let mut text = ".schedule on\n.input a, b\n.output y\n".to_owned();
+    (0..count).for_each(|i| text += &format!(".reg v{i} s{i}\n"));
+    text += ".once\n wait p\n.period\np: v0 = a*b\n";
+    (1..count).for_each(|i| text += &format!(" v{i} = v{} + b\n", i - 1));
+    text += &format!(" s{} = v{}*a\n", count - 1, count - 1);
+    (0..count - 1).rev().for_each(|i| text += &format!(" s{i} = v{i} - s{}\n", i + 1));
+    folder.write("many.s", text + " y = s0\n wait p\n");
+    for line in ["asm many.s --check", "asm many.s --listing -", "analyse many.s", "analyse many.s --json"] {
+        let out = folder.line(line).ok();
+        assert!(
+            out.contains("values kept in data memory") && out.contains("from bank a to word 0"),
+            "{line}: {out}"
+        );
+    }
+    let json = folder.line("asm many.s --check --json").ok();
+    assert!(json.contains("\"spills\"") && json.contains("\"loads\": 1"), "{json}");
+}
