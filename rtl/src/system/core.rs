@@ -1,6 +1,7 @@
 //! A core of a system with its gate, and the writes to its output ports told apart.
 
 use super::SystemPlan;
+use super::plan::Driver;
 use super::plan::OutputPort;
 use crate::plan::names::net;
 use crate::verilog::{Direction, Expr, Instance, Module, ModuleError, Net, Port, choose, concat, decimal};
@@ -20,6 +21,15 @@ pub(super) const STATUS: [Net; 8] = [
     net::FAULT_SLOT,
     net::FAULT_ADDRESS,
 ];
+
+/// Ports of a core's module that a board looks at, in whose top they have the names of [`SystemPlan::board_port`]: first the one that it
+/// drives, then those that it reads.
+pub(super) fn watched(plan: &SystemPlan, core: usize) -> (Net, [Net; 6]) {
+    let own = &plan.cores[core];
+    let pins = [net::INPUT_WRITE, own.input_index(), net::INPUT_VALUE];
+    let [write, index, value] = pins;
+    (own.read_output(), [net::READ_VALUE, write, index, value, net::TICK_MISSED, net::STATUS])
+}
 
 /// Which mailboxes have a value that arrives.
 pub(super) fn arrives(mailboxes: usize) -> Net {
@@ -68,6 +78,13 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
     for (i, status) in STATUS.into_iter().enumerate() {
         let port = output(status);
         ports.push(if i == 0 { port.heading("As the core has them (docs/hardware.md).") } else { port });
+    }
+    let is_watched = plan.driver == Driver::Board;
+    if is_watched {
+        let (asked, shown) = watched(plan, core);
+        ports
+            .push(input(asked).heading("For a board: ports of the core, and what goes into its input pins."));
+        ports.extend(shown.map(output));
     }
     let heading = vec![
         format!("{}: the core {} of the system, {}, with its gate.", plan.core_module(core), known.name, own.machine.name),
@@ -136,8 +153,6 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
         }
     }
     open.extend([
-        net::READ_VALUE,
-        net::TICK_MISSED,
         net::TICK_LOST,
         net::ISSUED,
         net::ISSUED_ADDRESS,
@@ -149,10 +164,27 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
         own.retire_register(),
         own.retire_value(),
         own.retire_flags(),
-        net::STATUS,
     ]);
+    let seen = [net::READ_VALUE, net::TICK_MISSED, net::STATUS];
+    let (write, index, value) = (
+        LOAD_INPUT | gate_write,
+        choose(net::RST, net::LOAD_ADDRESS.low(own.input_bits), gate_index),
+        choose(net::RST, net::LOAD_VALUE.low(32), gate_value),
+    );
+    let core_of = Instance::new(own.top(), "core");
+    let core_of = if is_watched {
+        m.assign(net::INPUT_WRITE, write);
+        m.assign(own.input_index(), index);
+        m.assign(net::INPUT_VALUE, value);
+        let pins = [net::INPUT_WRITE, own.input_index(), net::INPUT_VALUE, own.read_output()];
+        core_of.same(pins).same(seen)
+    } else {
+        let read = decimal(own.port_bits, 0_u32);
+        let pins = core_of.port("input_write", write).port("input_index", index).port("input_value", value);
+        pins.port("read_output", read).open(seen.iter().map(Net::name))
+    };
     m.instance(
-        Instance::new(own.top(), "core")
+        core_of
             .parameter("LATCHED", known.program.latched_inputs().into())
             .same([
                 net::CLK,
@@ -163,11 +195,7 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
                 net::LOAD_ADDRESS,
                 net::LOAD_VALUE,
             ])
-            .port("input_write", LOAD_INPUT | gate_write)
-            .port("input_index", choose(net::RST, net::LOAD_ADDRESS.low(own.input_bits), gate_index))
-            .port("input_value", choose(net::RST, net::LOAD_VALUE.low(32), gate_value))
             .same(bus)
-            .port("read_output", decimal(own.port_bits, 0_u32))
             .same([net::TICK])
             .same(STATUS)
             .open(open.iter().map(Net::name)),
