@@ -281,6 +281,7 @@ impl<'a> Around<'a> {
                 ("input_index", format!("in_index{k}")),
                 ("input_value", format!("in_value{k}")),
                 ("tick_missed", format!("tick_missed[{k}]")),
+                ("tick_lost", format!("tick_lost[{k}]")),
                 ("status", format!("flags{k}")),
             ];
             for (port, net) in own {

@@ -24,11 +24,12 @@ pub(super) const STATUS: [Net; 8] = [
 
 /// Ports of a core's module that a board looks at, in whose top they have the names of [`SystemPlan::board_port`]: first the one that it
 /// drives, then those that it reads.
-pub(super) fn watched(plan: &SystemPlan, core: usize) -> (Net, [Net; 6]) {
+pub(super) fn watched(plan: &SystemPlan, core: usize) -> (Net, [Net; 7]) {
     let own = &plan.cores[core];
     let pins = [net::INPUT_WRITE, own.input_index(), net::INPUT_VALUE];
     let [write, index, value] = pins;
-    (own.read_output(), [net::READ_VALUE, write, index, value, net::TICK_MISSED, net::STATUS])
+    let told = [net::READ_VALUE, write, index, value, net::TICK_MISSED, net::TICK_LOST, net::STATUS];
+    (own.read_output(), told)
 }
 
 /// Which mailboxes have a value that arrives.
@@ -153,7 +154,6 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
         }
     }
     open.extend([
-        net::TICK_LOST,
         net::ISSUED,
         net::ISSUED_ADDRESS,
         net::STORED,
@@ -165,7 +165,7 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
         own.retire_value(),
         own.retire_flags(),
     ]);
-    let seen = [net::READ_VALUE, net::TICK_MISSED, net::STATUS];
+    let seen = [net::READ_VALUE, net::TICK_MISSED, net::TICK_LOST, net::STATUS];
     let (write, index, value) = (
         LOAD_INPUT | gate_write,
         choose(net::RST, net::LOAD_ADDRESS.low(own.input_bits), gate_index),
