@@ -132,21 +132,19 @@ impl Ends {
     /// In words, what is wrong with the name.
     pub fn fifo(&self, name: &str, to_host: bool) -> Result<&Fifo, String> {
         let found = self.fifos.iter().find(|fifo| fifo.name == name);
-        let way = |to_host| if to_host { "to" } else { "from" };
+        let way = if to_host { "to" } else { "from" };
         match found {
             Some(fifo) if fifo.to_host == to_host => Ok(fifo),
-            Some(fifo) => Err(format!(
-                "`{name}` is a FIFO {} the host: `{}` is for those {} it",
-                way(fifo.to_host),
-                if to_host { "pop" } else { "push" },
-                way(to_host)
-            )),
+            Some(fifo) if fifo.to_host => {
+                Err(format!("`{name}` is a FIFO to the host, whose entries `pop` takes out"))
+            }
+            Some(_) => Err(format!("`{name}` is a FIFO from the host, into which `push` puts entries")),
             None => {
                 let names =
                     self.fifos.iter().filter(|fifo| fifo.to_host == to_host).map(|fifo| fifo.name.as_str());
                 let names: Vec<&str> = names.collect();
                 let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-                Err(format!("the system has no FIFO `{name}` {} the host; there are {names}", way(to_host)))
+                Err(format!("the system has no FIFO `{name}` {way} the host; there are {names}"))
             }
         }
     }

@@ -2,13 +2,15 @@
 
 use super::Contents;
 use crate::boards::Board;
+use takt_isa::Machine;
+use takt_rtl::synthesis;
 use takt_system::Description;
 use thiserror::Error;
 
 /// A device has too little block RAM.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error(
-    "the system needs {needed} block RAMs at least, {image} of them for the image of {records} records and {cores} for the cores' programs and data; the {device} has {has}"
+    "the system needs {needed} block RAMs at least, {image} of them for the image of {records} records and {cores} for its cores; the {device} has {has}"
 )]
 pub struct TooMuch {
     needed: u64,
@@ -25,16 +27,19 @@ fn blocks(words: u64, width: u64) -> u64 {
     forms.map(|(deep, wide)| words.div_ceil(deep) * width.div_ceil(wide)).into_iter().min().unwrap_or(0)
 }
 
-/// Bits of a word of program, of a data word and of a record.
-const BITS: (u64, u64, u64) = (48, 32, 73);
+/// Bits of a record of the image.
+const RECORD: u64 = 73;
+
+/// Block RAMs of a core: what synthesis counted; of a machine that was not measured, its program and data.
+fn core(machine: &Machine) -> u64 {
+    let programs = machine.slots.len() as u64 * blocks(machine.code_depth.into(), 48);
+    let least = programs + blocks(machine.data_depth.into(), 32);
+    synthesis::of_machine(machine.name).map_or(least, |measured| measured.resources.block_rams)
+}
 
 pub(super) fn check(board: &Board, description: &Description, contents: &Contents) -> Result<(), TooMuch> {
-    let cores = description.cores.iter().map(|core| {
-        let machine = core.program.machine;
-        machine.slots.len() as u64 * blocks(machine.code_depth.into(), BITS.0)
-            + blocks(machine.data_depth.into(), BITS.1)
-    });
-    let (cores, image) = (cores.sum(), blocks(contents.room as u64, BITS.2));
+    let cores = description.cores.iter().map(|known| core(known.program.machine)).sum();
+    let image = blocks(contents.room as u64, RECORD);
     let (needed, has) = (cores + image, board.device.blocks);
     if needed <= has {
         return Ok(());

@@ -152,7 +152,12 @@ pub fn circuit<'a>(
         let own = if own.starts_with("takt_") { own.to_owned() } else { format!("takt_{own}") };
         put(&format!("units/{own}"), library.text(name).unwrap_or_default().to_owned());
     }
-    for (name, text) in VERILOG {
+    // What goes between peripherals and cores is one thing for a program, and another for a system.
+    let others: &[&str] = match application {
+        Application::Program(_) => &["takt_follow.v", "takt_turn.v"],
+        Application::System(_) => &["takt_exchange.v"],
+    };
+    for (name, text) in VERILOG.iter().filter(|(name, _)| !others.contains(name)) {
         put(&format!("board/{name}"), (*text).to_owned());
     }
     put(&format!("{AROUND}.v"), around);

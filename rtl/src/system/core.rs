@@ -154,6 +154,9 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
         }
     }
     open.extend([
+        net::READ_VALUE,
+        net::TICK_MISSED,
+        net::TICK_LOST,
         net::ISSUED,
         net::ISSUED_ADDRESS,
         net::STORED,
@@ -164,27 +167,27 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
         own.retire_register(),
         own.retire_value(),
         own.retire_flags(),
+        net::STATUS,
     ]);
-    let seen = [net::READ_VALUE, net::TICK_MISSED, net::TICK_LOST, net::STATUS];
-    let (write, index, value) = (
-        LOAD_INPUT | gate_write,
-        choose(net::RST, net::LOAD_ADDRESS.low(own.input_bits), gate_index),
-        choose(net::RST, net::LOAD_VALUE.low(32), gate_value),
-    );
-    let core_of = Instance::new(own.top(), "core");
-    let core_of = if is_watched {
-        m.assign(net::INPUT_WRITE, write);
-        m.assign(own.input_index(), index);
-        m.assign(net::INPUT_VALUE, value);
-        let pins = [net::INPUT_WRITE, own.input_index(), net::INPUT_VALUE, own.read_output()];
-        core_of.same(pins).same(seen)
-    } else {
-        let read = decimal(own.port_bits, 0_u32);
-        let pins = core_of.port("input_write", write).port("input_index", index).port("input_value", value);
-        pins.port("read_output", read).open(seen.iter().map(Net::name))
+    let seen: Vec<Net> = match is_watched {
+        true => open.extract_if(.., |net| watched(plan, core).1.contains(net)).collect(),
+        false => Vec::new(),
     };
+    let mut pins: [(Net, Expr); 4] = [
+        (net::INPUT_WRITE, LOAD_INPUT | gate_write),
+        (own.input_index(), choose(net::RST, net::LOAD_ADDRESS.low(own.input_bits), gate_index)),
+        (net::INPUT_VALUE, choose(net::RST, net::LOAD_VALUE.low(32), gate_value)),
+        (own.read_output(), decimal(own.port_bits, 0_u32)),
+    ];
+    if is_watched {
+        for (pin, value) in &mut pins[..3] {
+            m.assign(pin.clone(), std::mem::replace(value, pin.clone().into()));
+        }
+        pins[3].1 = own.read_output().into();
+    }
+    let [write, index, value, read] = pins.map(|(_, value)| value);
     m.instance(
-        core_of
+        Instance::new(own.top(), "core")
             .parameter("LATCHED", known.program.latched_inputs().into())
             .same([
                 net::CLK,
@@ -195,9 +198,14 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
                 net::LOAD_ADDRESS,
                 net::LOAD_VALUE,
             ])
+            .port("input_write", write)
+            .port("input_index", index)
+            .port("input_value", value)
             .same(bus)
+            .port("read_output", read)
             .same([net::TICK])
             .same(STATUS)
+            .same(seen)
             .open(open.iter().map(Net::name)),
     );
 
