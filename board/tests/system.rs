@@ -1,5 +1,6 @@
 //! A system of three cores on a board, complete in Verilator: the example `programs/examples/board/axis`, with the real host at its UART.
 
+use std::panic::AssertUnwindSafe;
 use std::path::Path;
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::ends::{Ends, Fifo};
@@ -321,17 +322,16 @@ fn a_system_runs_talks_and_fails_safe() {
     assert!(matches!(host.fits(&**single), Err(LinkError::IsSystem(3))));
 }
 
-/// A period at a time, with the same inputs: every output port of every core, what the host sees and what it pops have the same words
-/// as in the emulator.
-#[test]
-fn circuit_and_emulator_have_the_same_words() {
-    let description = unchanged();
-    let names = Names::of(&description);
-    let mut host = connect(board(&description, "system-words"));
+/// A base tick at a time, with the same inputs and noise on the UART: every output port of every core, what the host sees and what it pops
+/// have the same words as in the emulator, and the PWM has the pulse that belongs to them.
+fn compare(description: &Description, sim: Simulation, ticks: u32) {
+    let names = Names::of(description);
+    let mut host = connect(sim);
+    host.line.noise = 1000;
     let encoder = ["encoder_a", "encoder_b"].map(|pin| host.line.input(pin).expect("a pin"));
     // Held from the beginning on.
     host.set("control", 0x107).expect("control");
-    let mut system = System::new(&description).expect("it can be emulated");
+    let mut system = System::new(description).expect("it can be emulated");
     let start = system.run_to_start(1 << 20).expect("no fault").expect("it starts");
     let mut next = start - description.lead();
     let (moves, reached) = (names.fifo("moves", false), names.fifo("reached", true));
@@ -341,7 +341,7 @@ fn circuit_and_emulator_have_the_same_words() {
         (seed >> 8) % most
     };
     let mut compared = 0;
-    for tick in 0..60 {
+    for tick in 0..ticks {
         let by = chance(25) as i32 - 12;
         host.line.turns.push(Turn { pins: encoder, from: position, by });
         host.line.run(3000, &[]).expect("it runs");
@@ -375,6 +375,12 @@ fn circuit_and_emulator_have_the_same_words() {
                 }
             }
         }
+        let error = f32::from_bits(names.read(&mut host, "servo.error"));
+        // The PWM takes the new duty with its next period.
+        pulse(&mut host.line);
+        let pulse = pulse(&mut host.line);
+        // Outputs drive with the end of the first periods, and take on what comes after it.
+        assert!(tick == 0 || pulse == expected(error), "tick {tick}: error {error}: {pulse}");
         for end in &names.ends.outputs {
             let emulated = system.output(&end.name).expect("an output");
             assert_eq!(names.read(&mut host, &end.name), emulated, "tick {tick}: {}", end.name);
@@ -384,9 +390,42 @@ fn circuit_and_emulator_have_the_same_words() {
             assert_eq!(host.pop(&reached).expect("a FIFO"), emulated, "tick {tick}");
         }
     }
-    assert!(compared > 400, "{compared}");
+    assert!(compared > 6 * ticks, "{compared}");
+    assert!(host.retries > 0, "there was no noise");
     for (core, name) in description.cores.iter().enumerate().map(|(number, core)| (number, &core.name)) {
         let periods = host.register_of(core, "periods").expect("a register");
         assert_eq!(u64::from(periods), system.periods(core).count, "{name}");
+    }
+}
+
+#[test]
+fn circuit_and_emulator_have_the_same_words() {
+    let description = unchanged();
+    compare(&description, board(&description, "system-words"), 60);
+}
+
+/// What is around the system, with one thing wrong.
+#[test]
+fn planted_faults_are_noticed() {
+    let description = unchanged();
+    let wiring = wiring(&description);
+    let circuit = top::circuit(&ulx3s(), &wiring, &description).expect("there is a circuit");
+    let faults = [
+        // A repeated request is made twice; a core has every base tick, or no offset; a float is not scaled.
+        ("board/takt_bridge.v", "repeats = has_data & known", "repeats = has_data & ~known"),
+        ("board/takt_follow.v", "turns == LAST ? 32'd0", "turns == 32'd0 ? 32'd0"),
+        ("board/takt_follow.v", "FIRST = LEAD + OFFSET - 2", "FIRST = LEAD - 2"),
+        ("board/takt_turn.v", ".exponent(EXPONENTS[10*which1 +: 10])", ".exponent(10'd0)"),
+    ];
+    for (at, from, to) in faults {
+        let mut files = circuit.files.clone();
+        let file = files.iter_mut().find(|file| file.name == at).expect("a file");
+        assert_eq!(file.text.matches(from).count(), 1, "{from}");
+        file.text = file.text.replace(from, to);
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("system-faults");
+        let sim =
+            Simulation::of(&files, &ulx3s(), &wiring, &folder).unwrap_or_else(|error| panic!("{error}"));
+        let noticed = std::panic::catch_unwind(AssertUnwindSafe(|| compare(&description, sim, 60)));
+        assert!(noticed.is_err(), "nobody noticed {to}");
     }
 }
