@@ -306,6 +306,18 @@ fn a_system_runs_talks_and_fails_safe() {
         assert_eq!(misses[core] > 1, ["missed deadline", "halt"].contains(&cause), "{cause}: {misses:?}");
     }
 
+    // A core that waits for an entry before its first period: the host can push, and then base ticks begin.
+    let first = "        mov     wanted, zero\n";
+    let waits = in_place("profile.s", first, format!("{first}boot:   bnz     empty, boot\n"));
+    host.load(&top::image(&waits).expect("it fits").records).expect("it is loaded");
+    host.set("control", 5).expect("control");
+    periods(&mut host.line, 6);
+    assert_eq!(all(&mut host, "periods"), [0; 3]);
+    assert!(host.push(&moves, &[float(4.0), float(4.0)]).expect("a FIFO"));
+    periods(&mut host.line, 6);
+    assert!(host.status().expect("status").drives());
+    assert_eq!(host.pop(&reached).expect("a FIFO"), Some(vec![float(4.0)]));
+
     // Back to the first ones; and another system's are refused before anything happens.
     host.load(&top::image(&description).expect("it fits").records).expect("it is loaded");
     host.set("control", 5).expect("control");
