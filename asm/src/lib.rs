@@ -259,6 +259,8 @@ impl Checked {
         let Some((homes, contractions)) = homes.filter(|_| sink.errors == 0) else {
             return Err(sink.finish(sources));
         };
+        // Nobody asks any more how it was written: what follows has this memory.
+        context.asts = Vec::new();
         let schedule::Report { blocks, timing } = schedule::schedule(&mut ir, effort, &mut sink);
         if sink.errors > 0 {
             return Err(sink.finish(sources));

@@ -11,13 +11,14 @@ mod python;
 mod reach;
 mod share;
 mod synth;
+mod times;
 mod venv;
 mod web;
 
 use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitCode, Stdio};
 use takt_isa::MACHINES;
 
 /// Project automation for Takt.
@@ -87,10 +88,13 @@ enum Task {
         #[arg(long, default_value_t = 10)]
         minutes: u32,
     },
+    /// Run the tests of a target for cargo, and write down how long they take.
+    #[command(hide = true)]
+    Timed(times::Arguments),
 }
 
-fn main() -> Result<()> {
-    match Arguments::parse().task {
+fn main() -> Result<ExitCode> {
+    let done = match Arguments::parse().task {
         Task::Test { full, rest } => test(full, &rest),
         Task::Docs { check } => docs::run(&root(), check),
         Task::Lint => lint(),
@@ -114,7 +118,9 @@ fn main() -> Result<()> {
             if workbench { self::workbench(screenshots.as_deref()) } else { Ok(()) }
         }
         Task::Fuzz { minutes } => fuzz(minutes),
-    }
+        Task::Timed(arguments) => return times::timed(&arguments),
+    };
+    done.map(|()| ExitCode::SUCCESS)
 }
 
 /// The project's folder.
@@ -250,18 +256,25 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
         dist::test()?;
     }
     let mut tests = cargo();
-    tests.args(["test", "--workspace", "--features", EVERYTHING, "--no-fail-fast", "--release"]).args(rest);
+    tests.arg("test").args(times::watch()?);
+    tests.args(["--workspace", "--features", EVERYTHING, "--no-fail-fast", "--release"]).args(rest);
     tests.env("TAKT_ROUTED", "1");
     if full {
         tests.env("TAKT_FULL", "1");
     }
-    run(&mut tests)?;
+    let tested = run(&mut tests);
+    eprint!("{}", times::slowest()?);
+    tested?;
     if rest.is_empty() { python::test() } else { Ok(()) }
 }
 
 /// Measures, prints, writes docs/speed.md.
 fn speed() -> Result<()> {
     install()?;
+    if !works("customasm", "--version") {
+        eprintln!("customasm is missing: installing it");
+        run(cargo().args(["install", "customasm", "--locked", "--version", "0.14.2"]))?;
+    }
     let mut measure = cargo();
     measure.args(["run", "--release", "--package", "takt-benches", "--features", "jit", "--bin", "speed"]);
     let output = measure.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
