@@ -19,13 +19,15 @@ pub struct Device {
     pub part: &'static str,
     /// nextpnr's option for it.
     pub option: &'static str,
+    /// Its block RAMs, of 18 Kbit each.
+    pub blocks: u64,
 }
 
 /// The devices: Lattice's ECP5 without transceivers.
 pub const DEVICES: &[Device] = &[
-    Device { part: "LFE5U-25F", option: "--25k" },
-    Device { part: "LFE5U-45F", option: "--45k" },
-    Device { part: "LFE5U-85F", option: "--85k" },
+    Device { part: "LFE5U-25F", option: "--25k", blocks: 56 },
+    Device { part: "LFE5U-45F", option: "--45k", blocks: 108 },
+    Device { part: "LFE5U-85F", option: "--85k", blocks: 208 },
 ];
 
 const PACKAGES: [&str; 5] = ["CABGA256", "CSFBGA285", "CABGA381", "CABGA554", "CABGA756"];

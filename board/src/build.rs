@@ -1,5 +1,6 @@
 //! From a circuit to a bitstream: yosys, nextpnr, ecppack.
 
+use crate::application::Application;
 use crate::boards::Board;
 use crate::routed::ROUTED;
 use crate::tools::{MAPPING, NEXTPNR, OPTIONS, ToolError, Venv, YOSYS};
@@ -10,7 +11,6 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::Path;
-use takt_isa::Program;
 use thiserror::Error;
 
 /// Why there is no bitstream.
@@ -62,19 +62,21 @@ pub struct Report {
     pub bytes: u64,
     /// Records of the program in block RAM.
     pub records: usize,
+    /// Records that there is room for.
+    pub room: usize,
 }
 
 /// Writes the circuit into a folder.
 ///
 /// # Errors
 /// If there is none, or a file cannot be written.
-pub fn write(
+pub fn write<'a>(
     board: &Board,
     wiring: &Wiring,
-    program: &Program,
+    application: impl Into<Application<'a>>,
     folder: &Path,
 ) -> Result<top::Circuit, BuildError> {
-    let mut circuit = top::circuit(board, wiring, program)?;
+    let mut circuit = top::circuit(board, wiring, application)?;
     let base = |name: &str| name.rsplit('/').next().unwrap_or(name).to_owned();
     let replaced: Vec<String> = circuit.ecp5.iter().map(|file| base(&file.name)).collect();
     circuit.files.retain(|file| !replaced.contains(&base(&file.name)));
@@ -95,16 +97,17 @@ pub fn write(
 ///
 /// # Errors
 /// If a tool fails, or the clock is not met: there is then no bitstream.
-pub fn build(
+pub fn build<'a>(
     venv: &Venv,
     board: &Board,
     wiring: &Wiring,
-    program: &Program,
+    application: impl Into<Application<'a>>,
     options: Options,
     folder: &Path,
     step: &dyn Fn(&str),
 ) -> Result<Report, BuildError> {
-    let circuit = write(board, wiring, program, folder)?;
+    let application = application.into();
+    let circuit = write(board, wiring, application, folder)?;
     let path = |name: &str| folder.join(name).display().to_string();
     // What an earlier run left must not be taken for this one's.
     for old in ["takt.bit", "takt.config", "report.json", "manifest.json"] {
@@ -170,15 +173,16 @@ pub fn build(
     let used = used(&report);
     let manifest = json!({
         "board": board.name, "device": board.device.part, "grade": board.grade, "package": board.package,
-        "machine": program.machine.name, "clock_mhz": wiring.clock, "period_cycles": wiring.period, "baud": wiring.baud,
-        "seed": options.seed, "records": circuit.records, "bytes": bytes,
+        "cores": application.machines().into_iter().map(|(name, machine)| json!({ "name": name, "machine": machine })).collect::<Vec<_>>(),
+        "system": matches!(application, Application::System(_)), "clock_mhz": wiring.clock, "period_cycles": wiring.period, "baud": wiring.baud,
+        "seed": options.seed, "records": circuit.records, "room": circuit.room, "bytes": bytes,
         "clocks": clocks.iter().map(|(net, reached, wanted)| json!({ "net": net, "reached_mhz": reached, "needed_mhz": wanted })).collect::<Vec<_>>(),
         "pins": top::own_pins(wiring).into_iter().map(|(name, _, pin)| json!({ "signal": name, "site": board.site(&pin), "pin": pin })).collect::<Vec<_>>(),
         "tools": [YOSYS, NEXTPNR],
     });
     fs::write(folder.join("manifest.json"), format!("{manifest:#}\n"))
         .map_err(|error| BuildError::File(path("manifest.json"), error))?;
-    Ok(Report { clocks, used, bytes, records: circuit.records })
+    Ok(Report { clocks, used, bytes, records: circuit.records, room: circuit.room })
 }
 
 /// What nextpnr says of clocks.

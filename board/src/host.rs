@@ -1,8 +1,10 @@
 //! The host's side of the protocol: requests with retries, over any line.
 
-use crate::protocol::{self, Frame, Line, LinkError, Receiver, WORDS, record_words};
+use crate::application::{Application, CORE};
+use crate::ends::Fifo;
+use crate::protocol::{self, Frame, Line, LinkError, PAGE, Receiver, WORDS, address};
+use crate::top::{self, RECORDS};
 use std::collections::VecDeque;
-use takt_rtl::bench::LoadRecord;
 
 /// Times that a request is made.
 const ATTEMPTS: u32 = 8;
@@ -20,6 +22,10 @@ pub struct Host<L> {
     stream: VecDeque<Frame>,
     /// Requests that had to be made again.
     pub retries: u64,
+    /// Cores of the system that the board carries; 0: it carries a single program.
+    pub cores: usize,
+    /// Records that its image has room for.
+    room: usize,
 }
 
 /// Times in a row that a stream may bring nothing until it is given up.
@@ -35,6 +41,37 @@ pub struct Fed {
     pub used: Vec<u32>,
     /// Periods that had the row of the period before once more, or of which nobody knows.
     pub late: u32,
+}
+
+/// What the first word of a FIFO says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FifoStatus(pub u32);
+
+impl FifoStatus {
+    /// Entries in it.
+    pub fn count(self) -> u32 {
+        self.0 >> 16
+    }
+
+    /// There is none.
+    pub fn empty(self) -> bool {
+        self.0 & 1 != 0
+    }
+
+    /// There is no room.
+    pub fn full(self) -> bool {
+        self.0 & 2 != 0
+    }
+
+    /// An entry was refused because it was full.
+    pub fn overflow(self) -> bool {
+        self.0 & 4 != 0
+    }
+
+    /// One was asked for while it was empty.
+    pub fn underflow(self) -> bool {
+        self.0 & 8 != 0
+    }
 }
 
 /// What the register `status` says.
@@ -80,11 +117,33 @@ impl<L: Line> Host<L> {
     /// # Errors
     /// If nobody answers, or a stranger does.
     pub fn connect(line: L, number: u8) -> Result<Host<L>, LinkError> {
+        let receiver = Receiver::default();
         let mut host =
-            Host { line, receiver: Receiver::default(), number, stream: VecDeque::new(), retries: 0 };
+            Host { line, receiver, number, stream: VecDeque::new(), retries: 0, cores: 0, room: RECORDS };
         match host.register("id")? {
-            protocol::ID => Ok(host),
-            other => Err(LinkError::Stranger(other)),
+            protocol::ID => {}
+            protocol::SYSTEM_ID => {
+                let system = host.register("system")?;
+                (host.cores, host.room) = ((system & 0xffff) as usize, (system >> 16) as usize);
+            }
+            other => return Err(LinkError::Stranger(other)),
+        }
+        Ok(host)
+    }
+
+    /// Whether the board's circuit is one for this program, or system: then it can be loaded, and its names have the right addresses.
+    ///
+    /// # Errors
+    /// If it is not, or the board does not answer.
+    pub fn fits<'a>(&mut self, application: impl Into<Application<'a>>) -> Result<(), LinkError> {
+        match application.into() {
+            Application::Program(_) if self.cores > 0 => Err(LinkError::IsSystem(self.cores)),
+            Application::Program(_) => Ok(()),
+            Application::System(_) if self.cores == 0 => Err(LinkError::IsProgram),
+            Application::System(description) => {
+                let wanted = top::circuit_number(description).map_err(Box::new)?;
+                if self.register("circuit")? == wanted { Ok(()) } else { Err(LinkError::OtherCircuit) }
+            }
         }
     }
 
@@ -151,7 +210,16 @@ impl<L: Line> Host<L> {
     /// # Errors
     /// If the board does not answer.
     pub fn register(&mut self, name: &str) -> Result<u32, LinkError> {
-        Ok(self.read(address(name), 1)?.first().copied().unwrap_or(0))
+        self.register_of(0, name)
+    }
+
+    /// A register of a core: `status`, `fault`, `misses`, `periods`, `cycles`, `most_cycles`. A single program's is core 0.
+    ///
+    /// # Errors
+    /// If the board does not answer.
+    pub fn register_of(&mut self, core: usize, name: &str) -> Result<u32, LinkError> {
+        let at = address(name) + CORE * core as u16;
+        Ok(self.read(at, 1)?.first().copied().unwrap_or(0))
     }
 
     /// Sets a register, by its name.
@@ -162,31 +230,86 @@ impl<L: Line> Host<L> {
         self.write(address(name), &[value])
     }
 
-    /// What the program does.
+    /// What the program does, or core 0 of a system.
     ///
     /// # Errors
     /// If the board does not answer.
     pub fn status(&mut self) -> Result<Status, LinkError> {
-        Ok(Status(self.register("status")?))
+        self.status_of(0)
+    }
+
+    /// What a core does.
+    ///
+    /// # Errors
+    /// If the board does not answer.
+    pub fn status_of(&mut self, core: usize) -> Result<Status, LinkError> {
+        Ok(Status(self.register_of(core, "status")?))
+    }
+
+    /// What a FIFO tells about itself.
+    ///
+    /// # Errors
+    /// If the board does not answer.
+    pub fn fifo(&mut self, fifo: &Fifo) -> Result<FifoStatus, LinkError> {
+        Ok(FifoStatus(self.read(fifo.address, 1)?.first().copied().unwrap_or(0)))
+    }
+
+    fn needs_running(&mut self) -> Result<(), LinkError> {
+        if self.register("control")? & protocol::RUN == 0 { Err(LinkError::Stopped) } else { Ok(()) }
+    }
+
+    /// Puts an entry into a FIFO from the host; false if it is full. A request that is repeated does not push twice.
+    ///
+    /// # Errors
+    /// If the system is stopped, or the board does not answer.
+    pub fn push(&mut self, fifo: &Fifo, entry: &[u32]) -> Result<bool, LinkError> {
+        self.needs_running()?;
+        if self.fifo(fifo)?.full() {
+            return Ok(false);
+        }
+        // The entry goes in with the last word.
+        let words: Vec<u32> = entry.iter().copied().chain([1]).collect();
+        self.write(fifo.field(0), &words)?;
+        Ok(true)
+    }
+
+    /// Takes the head of a FIFO to the host; none if it is empty. It is read first, and then taken out: nothing is lost with an answer.
+    ///
+    /// # Errors
+    /// If the system is stopped, or the board does not answer.
+    pub fn pop(&mut self, fifo: &Fifo) -> Result<Option<Vec<u32>>, LinkError> {
+        self.needs_running()?;
+        let mut words = self.read(fifo.address, 1 + fifo.fields.len())?;
+        let entry = words.split_off(1);
+        if FifoStatus(words[0]).empty() {
+            return Ok(None);
+        }
+        self.write(fifo.act(), &[1])?;
+        Ok(Some(entry))
     }
 
     /// Stops the program, and loads another one, which is read back. It does not start.
     ///
     /// # Errors
     /// If the image is too big or comes back different, or the board does not answer: it is then stopped.
-    pub fn load(&mut self, records: &[LoadRecord], room: usize) -> Result<(), LinkError> {
-        if records.len() > room {
-            return Err(LinkError::TooBig(records.len(), room));
+    pub fn load(&mut self, records: &[[u32; 3]]) -> Result<(), LinkError> {
+        if records.len() > self.room {
+            return Err(LinkError::TooBig(records.len(), self.room));
         }
         self.set("control", 0)?;
         self.set("records", 0)?;
-        // Four words of address for each record, of which the last is not there.
-        let words: Vec<u32> =
-            records.iter().flat_map(|record| record_words(record).into_iter().chain([0])).collect();
-        self.write(protocol::IMAGE, &words)?;
-        let back = self.read(protocol::IMAGE, words.len())?;
-        if let Some(at) = words.iter().zip(&back).position(|(a, b)| a != b) {
-            return Err(LinkError::Image(at / 4));
+        for (page, some) in records.chunks(PAGE).enumerate() {
+            if self.cores > 0 {
+                self.set("page", page as u32)?;
+            }
+            // Four words of address for each record, of which the last is not there.
+            let words: Vec<u32> =
+                some.iter().flat_map(|[low, high, place]| [*low, *high, *place, 0]).collect();
+            self.write(protocol::IMAGE, &words)?;
+            let back = self.read(protocol::IMAGE, words.len())?;
+            if let Some(at) = words.iter().zip(&back).position(|(a, b)| a != b) {
+                return Err(LinkError::Image(PAGE * page + at / 4));
+            }
         }
         self.set("records", records.len() as u32)
     }
@@ -251,11 +374,6 @@ impl<L: Line> Host<L> {
         }
         Ok(self.stream.pop_front())
     }
-}
-
-/// The address of a register.
-fn address(name: &str) -> u16 {
-    protocol::REGISTERS.iter().find(|register| register.name == name).map_or(0, |register| register.address)
 }
 
 #[cfg(test)]

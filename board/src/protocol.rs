@@ -5,12 +5,18 @@ use thiserror::Error;
 
 /// What the register `id` says: "TAKT".
 pub const ID: u32 = 0x5441_4b54;
+/// What it says of a system: "TAKS".
+pub const SYSTEM_ID: u32 = 0x5441_4b53;
 /// Address of input port 0.
 pub const INPUTS: u16 = 0x1000;
 /// Address of output port 0.
 pub const OUTPUTS: u16 = 0x2000;
 /// Address of the first part of the image's first record.
 pub const IMAGE: u16 = 0x4000;
+/// Records of the image that have addresses at a time.
+pub const PAGE: usize = 0x1000;
+/// Pages of a system's image, at most.
+pub const PAGES: usize = 4;
 /// Words of a request, at most.
 pub const WORDS: usize = 16;
 
@@ -48,8 +54,8 @@ const fn register(address: u16, name: &'static str, access: &'static str, text: 
 }
 
 /// The host's registers. Generator, host and docs/protocol.md take them from here.
-pub const REGISTERS: [Register; 15] = [
-    register(0, "id", "r", "0x54414b54"),
+pub const REGISTERS: [Register; 18] = [
+    register(0, "id", "r", "0x54414b54; on a board with a system 0x54414b53"),
     register(
         1,
         "control",
@@ -81,12 +87,25 @@ pub const REGISTERS: [Register; 15] = [
         "15:0 first address, 19:16 words (1 to 15), 31:20 N: sent every N periods; 0: no stream",
     ),
     register(14, "lost", "r", "frames of the stream that were not sent, since power-up"),
+    register(15, "system", "r", "of a system, 31:16 records that the image has room for, 15:0 cores"),
+    register(16, "circuit", "r", "of a system, a number for cores, links and ports, without the programs"),
+    register(
+        17,
+        "page",
+        "rw",
+        "of a system, which 4096 records of the image have addresses: 0 for the first",
+    ),
 ];
 
 /// The registers as rows of the table in docs/protocol.md.
 pub fn markdown() -> String {
     let row = |r: &Register| format!("| {} | {} | {} | {} |\n", r.address, r.name, r.access, r.text);
     REGISTERS.iter().map(row).collect()
+}
+
+/// The address of a register.
+pub(crate) fn address(name: &str) -> u16 {
+    REGISTERS.iter().find(|register| register.name == name).map_or(0, |register| register.address)
 }
 
 /// CRC-16/CCITT-FALSE: polynomial 0x1021, initially 0xffff, highest bit first.
@@ -101,9 +120,12 @@ pub fn checksum(bytes: &[u8]) -> u16 {
     })
 }
 
-/// A record of the image as it lies in its three words: low, high, place.
-pub fn record_words(record: &LoadRecord) -> [u32; 3] {
-    let place = u32::from(record.slot) << 18 | (record.space as u32) << 16 | u32::from(record.address);
+/// A record of a core's image as it lies in its three words: low, high, place. A single core is core 0.
+pub fn record_words(core: usize, record: &LoadRecord) -> [u32; 3] {
+    let place = (core as u32) << 21
+        | u32::from(record.slot) << 18
+        | (record.space as u32) << 16
+        | u32::from(record.address);
     [record.value as u32, (record.value >> 32) as u32, place]
 }
 
@@ -255,6 +277,23 @@ pub enum LinkError {
         "record {0} of the program came back different from what was written: the board stays stopped; try again"
     )]
     Image(usize),
+    /// A system is there, and a program is given.
+    #[error("the board carries a system of {0} cores, so a system's file is wanted, not a single program's")]
+    IsSystem(usize),
+    /// A program is there, and a system is given.
+    #[error("the board carries a single program's circuit; `takt board build` makes one for the system")]
+    IsProgram,
+    /// Another system is there.
+    #[error(
+        "the board's circuit is that of another system: machines, ticks, links or ports differ; `takt board build` makes one for this system"
+    )]
+    OtherCircuit,
+    /// The system has no circuit.
+    #[error(transparent)]
+    Top(#[from] Box<crate::top::TopError>),
+    /// Entries would be lost.
+    #[error("the system is stopped, and its FIFOs are empty; `takt live PORT start` starts it")]
+    Stopped,
     /// The image is too big.
     #[error("the program takes {0} records; the board has room for {1}")]
     TooBig(usize, usize),

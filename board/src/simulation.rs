@@ -1,5 +1,6 @@
 //! A board in simulation: the complete top level in Verilator, with pins that a plant moves and a UART that a host talks to.
 
+use crate::application::Application;
 use crate::boards::Board;
 use crate::kind::Direction;
 use crate::protocol::{self, Line};
@@ -10,7 +11,6 @@ use std::fs;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
-use takt_isa::Program;
 use takt_rtl::export::DesignFile;
 use thiserror::Error;
 
@@ -67,17 +67,17 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// Builds a board with a program in a folder, and starts it.
+    /// Builds a board with a program, or a system, in a folder, and starts it.
     ///
     /// # Errors
     /// If there is no circuit for it, or Verilator is missing or fails.
-    pub fn new(
+    pub fn new<'a>(
         board: &Board,
         wiring: &Wiring,
-        program: &Program,
+        application: impl Into<Application<'a>>,
         folder: &Path,
     ) -> Result<Simulation, SimulationError> {
-        Simulation::of(&top::circuit(board, wiring, program)?.files, board, wiring, folder)
+        Simulation::of(&top::circuit(board, wiring, application)?.files, board, wiring, folder)
     }
 
     /// Builds a board from files, of which the top level is [`TOP`] with the wiring's pins, in a folder, and starts it.

@@ -2,13 +2,15 @@
 //!
 //! The form of the file: docs/board.md.
 
+use crate::application::Application;
 use crate::boards::Board;
 use crate::document::{At, Document, Mistake, Table};
+use crate::ends::Ends;
 use crate::kind::{Direction, KINDS, Kind};
 use std::collections::BTreeMap;
 use std::ops::Range;
-use takt_isa::program::Port;
-use takt_isa::{Program, Type};
+use takt_isa::Type;
+use takt_system::Description;
 
 /// Peripherals of a wiring.
 pub const PERIPHERALS: usize = 64;
@@ -16,6 +18,8 @@ pub const PERIPHERALS: usize = 64;
 const PERIOD: f64 = 100.0;
 /// Bits per second of the UART where no file says them.
 const BAUD: u32 = 115_200;
+/// Cycles between a tick of a core in a system and the next base tick: the pulse and the next one's beginning.
+const ROOM: u64 = 8;
 /// Cycles of a period, at most.
 pub const MOST_PERIOD: u32 = 1 << 30;
 
@@ -120,11 +124,14 @@ pub struct Write {
 }
 
 impl Wiring {
-    /// No peripherals: the host has all ports. The program waits for it.
-    pub fn none(board: &Board) -> Wiring {
+    /// No peripherals: the host has all ports. The program, or system, waits for it.
+    pub fn none<'a>(board: &Board, application: impl Into<Application<'a>>) -> Wiring {
         Wiring {
             clock: board.clock.1,
-            period: (PERIOD * board.clock.1) as u32,
+            period: match application.into() {
+                Application::Program(_) => (PERIOD * board.clock.1) as u32,
+                Application::System(description) => description.tick.min(MOST_PERIOD.into()) as u32,
+            },
             lead: 0,
             baud: BAUD,
             autostart: false,
@@ -167,70 +174,101 @@ impl Wiring {
         document.finish(wiring)
     }
 
-    /// Whether the program has the ports that the wiring names, with types that fit. `text` is what the wiring was read from.
+    /// Whether a program, or a system, has the ports that the wiring names, with types that fit. `text` is what the wiring was read
+    /// from.
     ///
     /// # Errors
-    /// Every port that the program does not have, or that does not fit.
-    pub fn check(&self, file: &str, text: &str, program: &Program) -> Result<(), Vec<Mistake>> {
-        let document = Document::new(file, text);
-        let mut driven: BTreeMap<&str, &str> = BTreeMap::new();
+    /// Every port that it does not have, or that does not fit; of a system, what else a board cannot do.
+    pub fn check<'a>(
+        &self,
+        file: &str,
+        text: &str,
+        application: impl Into<Application<'a>>,
+    ) -> Result<(), Vec<Mistake>> {
+        let (document, application) = (Document::new(file, text), application.into());
+        let mut driven: BTreeMap<usize, &str> = BTreeMap::new();
         for peripheral in &self.peripherals {
             for (port, direction, place) in &peripheral.ports {
-                let (ports, what) = match direction {
-                    Direction::Input => (&program.inputs, "input"),
-                    Direction::Output => (&program.outputs, "output"),
-                };
-                let Some(found) = ports.iter().find(|other| other.name == *port) else {
-                    let names: Vec<&str> = ports.iter().map(|port| port.name.as_str()).take(40).collect();
-                    let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-                    let text = format!("the program has no {what} port `{port}`; there are {names}");
-                    document.mistake(place, text);
-                    continue;
+                let found = match application.connect(*direction, port) {
+                    Ok(found) => found,
+                    Err(text) => {
+                        document.mistake(place, text);
+                        continue;
+                    }
                 };
                 if *direction == Direction::Input
-                    && let Some(other) = driven.insert(port, &peripheral.name)
+                    && let Some(other) = driven.insert(found.number, &peripheral.name)
                 {
                     let text = format!("input port `{port}` is driven twice: `{other}` drives it, too");
                     document.mistake(place, text);
                 }
-                self.check_type(&document, peripheral, found, *direction, place);
+                self.check_type(&document, peripheral, (port.as_str(), found.ty), *direction, place);
+            }
+        }
+        if let Application::System(description) = application {
+            let place = document.top().and_then(|top| top.place_of("period")).unwrap_or(0..0);
+            for text in self.unfit(description) {
+                document.mistake(&place, text);
             }
         }
         document.finish(Some(()))
+    }
+
+    /// What of a system does not fit this wiring's period, or any board.
+    pub fn unfit(&self, description: &Description) -> Vec<String> {
+        let mut unfit: Vec<String> = Ends::of(description).too_many().into_iter().collect();
+        let (tick, period) = (description.tick, u64::from(self.period));
+        if tick != period {
+            unfit.push(format!(
+                "the system's `tick` is {tick} cycles, which at {} MHz are {} µs; `period` is {period} cycles",
+                self.clock,
+                tick as f64 / self.clock
+            ));
+        }
+        for core in &description.cores {
+            let most = core.period(tick).saturating_sub(description.lead() + ROOM);
+            if core.offset > most {
+                unfit.push(format!(
+                    "core `{}` has the offset {}; on a board its tick must be given before its next base tick: an offset of {most} cycles at most",
+                    core.name, core.offset
+                ));
+            }
+        }
+        unfit
     }
 
     fn check_type(
         &self,
         document: &Document<'_>,
         peripheral: &Peripheral,
-        port: &Port,
+        (port, ty): (&str, Type),
         direction: Direction,
         place: &Range<usize>,
     ) {
+        let name = port.rsplit('.').next().unwrap_or(port);
         if direction == Direction::Input {
-            if port.ty == Type::F {
+            if ty == Type::F {
                 let text = format!(
-                    "input port `{}` is a float; a register is an integer: declare it `{}:int`",
-                    port.name, port.name
+                    "input port `{port}` is a float; a register is an integer: declare it `{name}:int`"
                 );
                 document.mistake(place, text);
             }
             return;
         }
         let writes = peripheral.writes.iter().flatten();
-        let Some(write) = writes.into_iter().find(|write| write.port == port.name) else { return };
-        match (port.ty, write.scale) {
+        let Some(write) = writes.into_iter().find(|write| write.port == port) else { return };
+        match (ty, write.scale) {
             (Type::F, None) => document.mistake(
                 place,
                 format!(
-                    "output port `{}` is a float: `scale` says how many steps of the register 1.0 is, as in \
+                    "output port `{port}` is a float: `scale` says how many steps of the register 1.0 is, as in \
                      `scale = {{ {} = 16 }}`",
-                    port.name, peripheral.kind.writes[0].name
+                    peripheral.kind.writes[0].name
                 ),
             ),
             (Type::I, Some(_)) => document.mistake(
                 place,
-                format!("output port `{}` is an integer, which is not scaled: leave out `scale`", port.name),
+                format!("output port `{port}` is an integer, which is not scaled: leave out `scale`"),
             ),
             _ => {}
         }

@@ -333,8 +333,8 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     for (source, cause) in
         [(instead(SLOW), "missed deadline"), (instead("        halt\n"), "halt"), (nan, "NaN output")]
     {
-        let records = top::image(&program(&source)).expect("it fits");
-        host.load(&records, top::RECORDS).expect("it is loaded");
+        let records = top::image(&program(&source)).expect("it fits").records;
+        host.load(&records).expect("it is loaded");
         assert!(safe(&mut host.line), "while it is loaded");
         host.set("control", 5).expect("control");
         periods(&mut host.line, 8);
@@ -348,12 +348,12 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     }
     assert!(host.register("misses").expect("a register") == 0, "of this program, none");
     // And back to the first one.
-    host.load(&top::image(first).expect("it fits"), top::RECORDS).expect("it is loaded");
+    host.load(&top::image(first).expect("it fits").records).expect("it is loaded");
     host.set("control", 5).expect("control");
     periods(&mut host.line, 6);
     assert!(host.status().expect("status").drives());
     // A broken image: one that does not fit is refused before anything happens.
-    let record = top::image(first).expect("it fits")[0];
-    let error = host.load(&vec![record; top::RECORDS + 1], top::RECORDS).expect_err("too big");
+    let record = top::image(first).expect("it fits").records[0];
+    let error = host.load(&vec![record; top::RECORDS + 1]).expect_err("too big");
     assert_eq!(error.to_string(), "the program takes 2049 records; the board has room for 2048");
 }

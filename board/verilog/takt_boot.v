@@ -1,32 +1,36 @@
-// takt_boot: what a program needs at its start, in block RAM, and what writes it into the core.
+// takt_boot: what programs need at their start, in block RAM, and what writes it into the cores.
 //
 // Contract
-//   The memory holds records {space, slot, address, value}, as the core's loader takes them; space 3 is an input port. Its contents
-//   at power-up are those of the file IMAGE. count of them are valid.
-//   boot: high for a cycle starts it, at any time: reset is high from the next cycle on, until program and data memory have been
-//   written with zeros, input ports too, and all records have been written, and 128 cycles longer. A boot during a boot begins it again.
-//   The host writes a record in parts of 32 bits; the part 2 completes it: 0 low and 1 high bits of the value, 2 place = {slot,
+//   The memory holds records {core, slot, space, address, value}, as a core's loader takes them; space 3 is an input port. A single
+//   core has no number. Its contents at power-up are those of the file IMAGE. count of them are valid.
+//   boot: high for a cycle starts it, at any time: reset is high from the next cycle on, until program and data memories have been
+//   written with zeros, input ports too, and all records have been written, and SETTLE cycles longer. A boot during a boot begins it
+//   again. load and input_write have a bit for each core; zeros go to all cores at once.
+//   The host writes a record in parts of 32 bits; the part 2 completes it: 0 low and 1 high bits of the value, 2 place = {core, slot,
 //   space, address}. part_read: of the record `at`, a cycle after it stands.
 
 module takt_boot #(
     parameter IMAGE   = "image.hex",
+    parameter CORES   = 1,
+    parameter ROOM    = 2048, // records
     parameter BITS    = 11,   // of a record's number
-    parameter SLOTS   = 3,
+    parameter SLOTS   = 3,    // of the core with the most, like the following
     parameter CODE    = 10,   // bits of a bundle's address
     parameter DATA    = 10,   // bits of a data word's address
-    parameter INPUTS  = 8     // bits of an input port's number; the last is not one
+    parameter INPUTS  = 8,    // bits of an input port's number; the last is not one
+    parameter SETTLE  = 128
 ) (
     input  wire            clk,
     input  wire            rst,
     input  wire            boot,
     input  wire [BITS:0]   count,
     output reg             reset,
-    output wire            load,
+    output wire [CORES-1:0] load,
     output wire [1:0]      load_space,
     output wire [2:0]      load_slot,
     output wire [15:0]     load_address,
     output wire [47:0]     load_value,
-    output wire            input_write,
+    output wire [CORES-1:0] input_write,
     // The host's side.
     input  wire            write,
     input  wire [1:0]      part,
@@ -35,16 +39,17 @@ module takt_boot #(
     output reg  [31:0]     part_read
 );
 
-    reg  [68:0] records [0:(1<<BITS)-1];
+    localparam WIDTH = CORES > 1 ? 73 : 69;
+    reg  [WIDTH-1:0] records [0:ROOM-1];
     initial $readmemh(IMAGE, records);
 
-    reg  [68:0]     record;
+    reg  [WIDTH-1:0] record;
+    wire [72:0]     whole = record;
     reg  [31:0]     low;
     reg  [15:0]     high;
     reg  [BITS:0]   next;
     reg  [15:0]     clears;     // program words of each slot, then data, then input ports
     reg  [2:0]      slot;
-    reg  [6:0]      settles;
     reg  [1:0]      state;      // 0: at rest, 1: zeros, 2: records, 3: settles
     reg             valid, clearing, clears_data, clears_input;
     reg  [15:0]     cleared;
@@ -54,6 +59,7 @@ module takt_boot #(
     localparam [15:0] LAST_CODE = (1 << CODE) - 1;
     localparam [15:0] LAST_DATA = (1 << DATA) - 1;
     localparam [15:0] LAST_PORT = (1 << INPUTS) - 2;
+    localparam [15:0] LAST_SETTLE = SETTLE - 1;
     // Beyond the slots of program memory.
     localparam [2:0]  DATA_SLOT = SLOTS, PORT_SLOT = SLOTS + 1;
     wire [15:0] last_clear = slot == PORT_SLOT ? LAST_PORT : slot == DATA_SLOT ? LAST_DATA : LAST_CODE;
@@ -63,21 +69,29 @@ module takt_boot #(
         if (write & part == 2'd0) low <= value;
         if (write & part == 2'd1) high <= value[15:0];
     end
+    wire [72:0]     written = {value[24:0], high, low};
     always @(posedge clk) begin
-        if (write & part == 2'd2 & state == 2'd0) records[at] <= {value[20:0], high, low};
+        if (write & part == 2'd2 & state == 2'd0) records[at] <= written[WIDTH-1:0];
     end
 
     always @* begin
         case (part)
             2'd0: part_read = record[31:0];
             2'd1: part_read = {16'd0, record[47:32]};
-            2'd2: part_read = {11'd0, record[68:48]};
+            2'd2: part_read = {7'd0, whole[72:48]};
             default: part_read = 32'd0;
         endcase
     end
 
-    assign load         = clearing | (valid & record[65:64] != 2'd3);
-    assign input_write  = clears_input | (valid & record[65:64] == 2'd3);
+    wire [CORES-1:0] mine;
+    genvar c;
+    generate
+        for (c = 0; c < CORES; c = c + 1) begin : g_core
+            assign mine[c] = whole[72:69] == c;
+        end
+    endgenerate
+    assign load         = {CORES{clearing}} | (mine & {CORES{valid & record[65:64] != 2'd3}});
+    assign input_write  = {CORES{clears_input}} | (mine & {CORES{valid & record[65:64] == 2'd3}});
     assign load_space   = clearing ? {1'b0, clears_data} : record[65:64];
     assign load_slot    = clearing ? cleared_slot : record[68:66];
     assign load_address = clearing | clears_input ? cleared : record[63:48];
@@ -104,8 +118,8 @@ module takt_boot #(
                 else next <= next + 1'b1;
             end
             2'd3: begin
-                settles <= settles + 7'd1;
-                if (&settles) begin
+                clears <= clears + 16'd1;
+                if (clears == LAST_SETTLE) begin
                     state <= 2'd0;
                     reset <= 1'b0;
                 end
@@ -118,7 +132,6 @@ module takt_boot #(
             next    <= 0;
             clears  <= 16'd0;
             slot    <= 3'd0;
-            settles <= 7'd0;
         end
     end
 

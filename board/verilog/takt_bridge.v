@@ -6,14 +6,13 @@
 //   of 20 bytes within a frame ends it.
 //   A write whose number is that of the request before is answered, not made again.
 //   Bus: address and bus_value, or bus_write, stand for a cycle; what is read is on bus_read READ cycles later. Accesses to addresses
-//   {1000 to 3fff} (hexadecimal) wait for grant, but not longer than 2^PATIENCE cycles: then they are refused (status 2).
-//   due, for a cycle: what stands at `stream` words (1 to 15) from stream_at on is sent, after the word at PERIODS, unless the line is busy: then
+//   {1000 to 3fff} (hexadecimal) wait for grant, which may depend on address, but not longer than 2^PATIENCE cycles: then they are refused (status 2).
+//   due, for a cycle: what stands at `stream` words (1 to 15) from stream_at on is sent, after the word at periods_at, unless the line is busy: then
 //   lost goes up by one. heard: for a cycle at each request.
 
 module takt_bridge #(
     parameter DIVIDE   = 434,
-    parameter PATIENCE = 22,
-    parameter PERIODS  = 9
+    parameter PATIENCE = 22
 ) (
     input  wire        clk,
     input  wire        rst,
@@ -25,6 +24,7 @@ module takt_bridge #(
     input  wire [31:0] bus_read,
     input  wire        grant,
     input  wire        due,
+    input  wire [15:0] periods_at,
     input  wire [15:0] stream_at,
     input  wire [3:0]  stream,
     output reg         heard,
@@ -165,11 +165,12 @@ module takt_bridge #(
                 number   <= request;
                 words    <= has_data ? 5'd0 : count;
                 if (whole & ~answered) begin
+                    address <= at;
                     heard <= 1'b1;
                     state <= repeats ? 3'd4 : 3'd1;
                     sends <= repeats;
                 end else if (due) begin
-                    address       <= PERIODS;
+                    address       <= periods_at;
                     streams       <= 1'b1;
                     kind          <= STREAM;
                     number        <= stream_number;
@@ -179,7 +180,6 @@ module takt_bridge #(
                 end
             end
             3'd1: begin
-                address  <= at;
                 cycles   <= 3'd0;
                 patience <= patience + 1'b1;
                 if (grant | ~port) state <= has_data ? 3'd2 : 3'd3;

@@ -1,24 +1,25 @@
-//! `takt board`: boards, their pins, and wirings that are to run on them.
+//! `takt board`: boards, their pins, and what is to run on them.
 
+pub(crate) mod carried;
 #[cfg(unix)]
 mod robot;
 
 use crate::files::{self, Out};
-use crate::load::Load;
 use crate::number;
 use crate::output::{self, Failure};
 use crate::select::{OptionalMachine, SourceArguments};
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use carried::Carried;
 use clap::{Args, Subcommand};
 use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_board::simulation::{Simulation, Turn};
 use takt_board::tools::{NEXTPNR, Venv, YOSYS};
-use takt_board::{Board, Mistake, Wiring};
+use takt_board::{Application, Board, Mistake, Wiring};
 use takt_isa::Program;
 
-/// List boards and their pins; check, build and simulate a program on a board.
+/// List boards and their pins; check, build and simulate a program, or a system of several cores, on a board.
 #[derive(Args)]
 pub(crate) struct Boards {
     #[command(subcommand)]
@@ -55,14 +56,14 @@ struct Pins {
     json: bool,
 }
 
-/// Check that a wiring fits a board and a program.
+/// Check that a wiring fits a board and a program, or a system.
 #[derive(Args)]
 struct Check {
     #[command(flatten)]
     target: Target,
 }
 
-/// Build the bitstream of a program on a board: synthesis, place and route, packing.
+/// Build the bitstream of a program, or of a system, on a board: synthesis, place and route, packing.
 ///
 /// The tools are installed at the first time (400 MB), in the folder that TAKT_VENV names or in the user's cache.
 #[derive(Args)]
@@ -84,6 +85,7 @@ struct Build {
 const BUILD: &str = "\
 Example:
   takt board build --board ulx3s-85f --wiring robot.toml --program robot.s -o out
+  takt board build --board ulx3s-85f --wiring axis.toml --program system.toml -o out   several cores
   openFPGALoader --board ulx3s out/takt.bit";
 
 /// Run the complete top level in Verilator, with its UART on a pseudo-terminal that replaces a board's serial port.
@@ -114,7 +116,7 @@ struct Sim {
     cycles: Option<u64>,
 }
 
-/// A program, a wiring and a board.
+/// A program or a system, a wiring and a board.
 #[derive(Args)]
 pub(crate) struct Target {
     /// A name from `takt board list`, or a file of the same form (docs/board.md).
@@ -124,7 +126,7 @@ pub(crate) struct Target {
     /// host reads and writes ports, the clock is the board's own, and a period takes 100 µs.
     #[arg(long, value_name = "TOML")]
     pub(crate) wiring: Option<PathBuf>,
-    /// Source or image of the program.
+    /// Source or image of the program; or a system of several cores, a `.toml` file.
     #[arg(long, value_name = "FILE")]
     pub(crate) program: PathBuf,
     #[command(flatten)]
@@ -167,21 +169,26 @@ pub(crate) fn find(name: &str, color: bool) -> Result<Board> {
 
 impl Target {
     /// All three, which fit each other.
-    pub(crate) fn read(&self, color: bool) -> Result<(Board, Wiring, Program)> {
+    pub(crate) fn read(&self, color: bool) -> Result<(Board, Wiring, Carried)> {
         let mut reads: Vec<(&str, &Path)> = vec![("--program", &self.program)];
         reads.extend(self.wiring.as_deref().map(|path| ("--wiring", path)));
         files::check(&reads, &[])?;
         let board = find(&self.board, color)?;
-        let load = || Load::new(self.machine.machine, color).with(&self.source).program(&self.program);
+        let load = || Carried::load(&self.program, &self.machine, &self.source, color);
         let Some(path) = &self.wiring else {
-            let wiring = Wiring::none(&board);
-            return Ok((board, wiring, load()?));
+            let carried = load()?;
+            let wiring = Wiring::none(&board, carried.application());
+            if let Application::System(description) = carried.application() {
+                let unfit = wiring.unfit(description);
+                ensure!(unfit.is_empty(), "{}", unfit.join("; "));
+            }
+            return Ok((board, wiring, carried));
         };
         let (name, text) = text(path)?;
         let wiring = right(Wiring::read(&name, &text, &board), color)?;
-        let program = load()?;
-        right(wiring.check(&name, &text, &program), color)?;
-        Ok((board, wiring, program))
+        let carried = load()?;
+        right(wiring.check(&name, &text, carried.application()), color)?;
+        Ok((board, wiring, carried))
     }
 }
 
@@ -211,18 +218,19 @@ pub(crate) fn run(arguments: &Boards, color: bool, out: &mut Out) -> Result<()> 
         Command::Sim(sim) => self::sim(sim, color, out),
         Command::Pins(pins) => self::pins(pins, color, out),
         Command::Check(check) => {
-            let (board, wiring, program) = check.target.read(color)?;
+            let (board, wiring, carried) = check.target.read(color)?;
             let ports = wiring
                 .peripherals
                 .iter()
                 .map(|p| p.reads.iter().flatten().count() + p.writes.iter().flatten().count());
             writeln!(
                 out,
-                "{}, {}: {} peripherals, {} of the program's ports on pins, a period of {} cycles at {} MHz",
+                "{}, {}: {} peripherals, {} of the {}'s ports on pins, a period of {} cycles at {} MHz",
                 board.name,
-                program.machine.name,
+                carried.application().cores(),
                 wiring.peripherals.len(),
                 ports.sum::<usize>(),
+                if matches!(carried, Carried::System(_)) { "system" } else { "program" },
                 wiring.period,
                 wiring.clock
             )?;
@@ -286,10 +294,10 @@ fn pins(arguments: &Pins, color: bool, out: &mut Out) -> Result<()> {
 }
 
 fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
-    let (board, wiring, program) = arguments.target.read(color)?;
-    let folder = &arguments.output;
+    let (board, wiring, carried) = arguments.target.read(color)?;
+    let (application, folder) = (carried.application(), &arguments.output);
     if arguments.sources {
-        let circuit = takt_board::build::write(&board, &wiring, &program, folder)?;
+        let circuit = takt_board::build::write(&board, &wiring, application, folder)?;
         writeln!(
             out,
             "{} files in {}; the top level is {}.v",
@@ -305,7 +313,7 @@ fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
     step("tools");
     let venv = Venv::with(&venv, &[YOSYS, NEXTPNR])?;
     let options = takt_board::build::Options { seed: arguments.seed, netlist: false };
-    let report = takt_board::build::build(&venv, &board, &wiring, &program, options, folder, &step)?;
+    let report = takt_board::build::build(&venv, &board, &wiring, application, options, folder, &step)?;
     writeln!(out, "{}: {} bytes, for {}", folder.join("takt.bit").display(), report.bytes, board.text)?;
     for (net, reached, needed) in &report.clocks {
         writeln!(
@@ -317,7 +325,7 @@ fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
     for (name, (used, there)) in &report.used {
         writeln!(out, "{name:<16} {used:>7} of {there}")?;
     }
-    writeln!(out, "program: {} records of {} in block RAM", report.records, takt_board::top::RECORDS)?;
+    writeln!(out, "programs: {} records of {} in block RAM", report.records, report.room)?;
     Ok(())
 }
 
@@ -364,15 +372,16 @@ impl Axis {
 
 #[cfg(unix)]
 fn sim(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
-    let (board, wiring, program) = arguments.target.read(color)?;
+    let (board, wiring, carried) = arguments.target.read(color)?;
     let folder = takt_cosim::cache_folder().join(format!("board-{}", std::process::id()));
     let simulation = || {
         output::message("compiling the circuit …");
-        Simulation::new(&board, &wiring, &program, &folder)
+        Simulation::new(&board, &wiring, carried.application(), &folder)
     };
     let mut run = || -> Result<()> {
         if arguments.robot {
-            let drive = robot::Drive::new(&program, &wiring, arguments.gcode.as_deref(), arguments.periods)?;
+            let program = carried.program("--robot")?;
+            let drive = robot::Drive::new(program, &wiring, arguments.gcode.as_deref(), arguments.periods)?;
             let mut sim = simulation()?;
             sim.noise = arguments.noise;
             return drive.run(&board.name, sim, out);

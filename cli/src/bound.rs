@@ -80,7 +80,10 @@ pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
     if load::is_system(&arguments.file) {
         #[cfg(feature = "board")]
         if arguments.pins {
-            bail!("--pins: a board has one core, and {} is a system", files::input_name(&arguments.file));
+            bail!(
+                "--pins follows the way through a single program, and {} is a system: `takt bound` without it bounds the way from the host's inputs to its outputs, between which a board puts what docs/board.md says",
+                files::input_name(&arguments.file)
+            );
         }
         return system::bound::run(arguments, color, out);
     }

@@ -81,7 +81,7 @@ impl Load {
         if is_system(path) {
             let name = files::input_name(path);
             bail!(
-                "{name} is a system, but this command needs a single program; `takt run`, `bound`, `analyse`, `debug`, `rtl` and `cosim` accept systems"
+                "{name} is a system, but this command needs a single program; `takt run`, `bound`, `analyse`, `debug`, `rtl`, `cosim`, `board`, `live` and `load` accept systems"
             );
         }
         files::read(path, IMAGE_BYTES)

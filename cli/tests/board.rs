@@ -3,9 +3,8 @@
 
 mod common;
 
-use common::Folder;
-use std::io::{BufRead, BufReader};
-use std::process::{Child, Stdio};
+use common::{Folder, SimulatedBoard};
+use std::process::Stdio;
 
 fn example(name: &str) -> String {
     format!("{}/../programs/examples/board/{name}", env!("CARGO_MANIFEST_DIR"))
@@ -88,27 +87,12 @@ fn wrong_boards_wirings_and_ports_are_refused() {
     refused(&format!("load /dev/nothing {}", example("position.s")), "cannot open /dev/nothing");
 }
 
-/// Ended with the test.
-struct Board(Child);
-
-impl Drop for Board {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
 #[test]
 fn the_loop_closes_through_the_pins_of_a_simulated_board() {
     let folder = Folder::new();
     let line = format!("board sim --board ulx3s-85f {} --axis motor,encoder,20000", position());
-    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_takt"));
-    command.args(line.split_whitespace()).current_dir(folder.path());
-    command.stdout(Stdio::piped()).stderr(Stdio::null());
-    let mut board = Board(command.spawn().unwrap());
-    let mut said = String::new();
-    BufReader::new(board.0.stdout.take().unwrap()).read_line(&mut said).unwrap();
-    let (port, baud) = said.trim().split_once(' ').unwrap_or_else(|| panic!("`{said}`"));
+    let board = SimulatedBoard::start(&line, folder.path());
+    let (port, baud) = (board.port.clone(), board.baud.clone());
     let program = example("position.s");
     let live = |what: &str| {
         folder.line(&format!("live {port} --baud {baud} --program {program} --machine t1 {what}")).ok()
@@ -163,7 +147,9 @@ fn the_loop_closes_through_the_pins_of_a_simulated_board() {
     let open = std::path::PathBuf::from(format!("/proc/{}/fd", host.id()));
     let is_at_the_port = || {
         let files = std::fs::read_dir(&open).into_iter().flatten().flatten();
-        files.filter_map(|file| std::fs::read_link(file.path()).ok()).any(|file| file.as_os_str() == port)
+        files
+            .filter_map(|file| std::fs::read_link(file.path()).ok())
+            .any(|file| file.as_os_str() == port.as_str())
     };
     while host.try_wait().unwrap().is_none() && !is_at_the_port() {
         std::thread::sleep(std::time::Duration::from_millis(20));

@@ -22,4 +22,6 @@ pub mod wishbone;
 pub use circuit::{Circuit, CircuitError, Library, Operation};
 pub use export::{Design, ExportError, export};
 pub use plan::{Plan, PlanError};
-pub use system::{SystemDesign, SystemError, SystemPlan, export_system};
+pub use system::{
+    Driver, SystemDesign, SystemError, SystemPlan, export_driven, export_system, system_records,
+};

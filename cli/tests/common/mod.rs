@@ -154,3 +154,35 @@ impl From<std::process::Output> for Done {
         }
     }
 }
+
+/// `takt board sim`, ended with the test.
+#[cfg(unix)]
+pub struct SimulatedBoard {
+    process: std::process::Child,
+    /// The name of its pseudo-terminal.
+    pub port: String,
+    pub baud: String,
+}
+
+#[cfg(unix)]
+impl SimulatedBoard {
+    /// Starts it, and reads where its UART is.
+    pub fn start(line: &str, folder: &Path) -> SimulatedBoard {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_takt"));
+        command.args(line.split_whitespace()).current_dir(folder);
+        let mut process = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+        let mut said = String::new();
+        let stdout = process.stdout.take().unwrap();
+        std::io::BufRead::read_line(&mut std::io::BufReader::new(stdout), &mut said).unwrap();
+        let (port, baud) = said.trim().split_once(' ').unwrap_or_else(|| panic!("`{said}`"));
+        SimulatedBoard { process, port: port.to_owned(), baud: baud.to_owned() }
+    }
+}
+
+#[cfg(unix)]
+impl Drop for SimulatedBoard {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}

@@ -1,6 +1,7 @@
 //! A core of a system with its gate, and the writes to its output ports told apart.
 
 use super::SystemPlan;
+use super::plan::Driver;
 use super::plan::OutputPort;
 use crate::plan::names::net;
 use crate::verilog::{Direction, Expr, Instance, Module, ModuleError, Net, Port, choose, concat, decimal};
@@ -20,6 +21,16 @@ pub(super) const STATUS: [Net; 8] = [
     net::FAULT_SLOT,
     net::FAULT_ADDRESS,
 ];
+
+/// Ports of a core's module that a board looks at, in whose top they have the names of [`SystemPlan::board_port`]: first the one that it
+/// drives, then those that it reads.
+pub(super) fn watched(plan: &SystemPlan, core: usize) -> (Net, [Net; 7]) {
+    let own = &plan.cores[core];
+    let pins = [net::INPUT_WRITE, own.input_index(), net::INPUT_VALUE];
+    let [write, index, value] = pins;
+    let told = [net::READ_VALUE, write, index, value, net::TICK_MISSED, net::TICK_LOST, net::STATUS];
+    (own.read_output(), told)
+}
 
 /// Which mailboxes have a value that arrives.
 pub(super) fn arrives(mailboxes: usize) -> Net {
@@ -68,6 +79,13 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
     for (i, status) in STATUS.into_iter().enumerate() {
         let port = output(status);
         ports.push(if i == 0 { port.heading("As the core has them (docs/hardware.md).") } else { port });
+    }
+    let is_watched = plan.driver == Driver::Board;
+    if is_watched {
+        let (asked, shown) = watched(plan, core);
+        ports
+            .push(input(asked).heading("For a board: ports of the core, and what goes into its input pins."));
+        ports.extend(shown.map(output));
     }
     let heading = vec![
         format!("{}: the core {} of the system, {}, with its gate.", plan.core_module(core), known.name, own.machine.name),
@@ -151,6 +169,23 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
         own.retire_flags(),
         net::STATUS,
     ]);
+    let seen: Vec<Net> = match is_watched {
+        true => open.extract_if(.., |net| watched(plan, core).1.contains(net)).collect(),
+        false => Vec::new(),
+    };
+    let mut pins: [(Net, Expr); 4] = [
+        (net::INPUT_WRITE, LOAD_INPUT | gate_write),
+        (own.input_index(), choose(net::RST, net::LOAD_ADDRESS.low(own.input_bits), gate_index)),
+        (net::INPUT_VALUE, choose(net::RST, net::LOAD_VALUE.low(32), gate_value)),
+        (own.read_output(), decimal(own.port_bits, 0_u32)),
+    ];
+    if is_watched {
+        for (pin, value) in &mut pins[..3] {
+            m.assign(pin.clone(), std::mem::replace(value, pin.clone().into()));
+        }
+        pins[3].1 = own.read_output().into();
+    }
+    let [write, index, value, read] = pins.map(|(_, value)| value);
     m.instance(
         Instance::new(own.top(), "core")
             .parameter("LATCHED", known.program.latched_inputs().into())
@@ -163,13 +198,14 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
                 net::LOAD_ADDRESS,
                 net::LOAD_VALUE,
             ])
-            .port("input_write", LOAD_INPUT | gate_write)
-            .port("input_index", choose(net::RST, net::LOAD_ADDRESS.low(own.input_bits), gate_index))
-            .port("input_value", choose(net::RST, net::LOAD_VALUE.low(32), gate_value))
+            .port("input_write", write)
+            .port("input_index", index)
+            .port("input_value", value)
             .same(bus)
-            .port("read_output", decimal(own.port_bits, 0_u32))
+            .port("read_output", read)
             .same([net::TICK])
             .same(STATUS)
+            .same(seen)
             .open(open.iter().map(Net::name)),
     );
 

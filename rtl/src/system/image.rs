@@ -4,22 +4,23 @@ use super::SystemPlan;
 use crate::bench::{LoadRecord, Space, load_records};
 use crate::export::DesignFile;
 use std::fmt::Write as _;
+use takt_system::{Description, Mailbox};
 
 /// A record, with the core that it is for.
 pub(super) type Record = (usize, LoadRecord);
 
 /// Programs, data, presets, and what input ports show before anything has arrived. Zeros of memories are there already.
-pub(super) fn records(plan: &SystemPlan) -> Vec<Record> {
+pub(super) fn records(description: &Description, mailboxes: &[Vec<Mailbox>]) -> Vec<Record> {
     let mut records = Vec::new();
-    for (number, core) in plan.description.cores.iter().enumerate() {
+    for (number, core) in description.cores.iter().enumerate() {
         let cleared =
             |record: &LoadRecord| matches!(record.space, Space::Program | Space::Data) && record.value == 0;
         let loaded = load_records(&core.program).into_iter().filter(|record| !cleared(record));
         records.extend(loaded.map(|record| (number, record)));
         let machine = core.program.machine;
-        for mailbox in &plan.mailboxes[number] {
+        for mailbox in mailboxes.get(number).into_iter().flatten() {
             let Some(index) = machine.inputs.index(mailbox.register) else { continue };
-            let value = plan.description.initial(mailbox.source).into();
+            let value = description.initial(mailbox.source).into();
             records.push((number, LoadRecord { space: Space::Input, slot: 0, address: index.get(), value }));
         }
     }

@@ -10,8 +10,9 @@ mod links;
 mod plan;
 mod top;
 
-pub use plan::{Pin, PinKind, SystemPlan};
+pub use plan::{Driver, Pin, PinKind, SystemPlan};
 
+use crate::bench::LoadRecord;
 use crate::circuit::Library;
 use crate::export::{Design, DesignFile, ExportError, export};
 use crate::files::SYSTEM;
@@ -52,6 +53,12 @@ impl From<ModuleError> for SystemError {
     }
 }
 
+/// What is written into the cores in reset, once their memories have been cleared: each record with the number of its core.
+pub fn system_records(description: &Description) -> Vec<(usize, LoadRecord)> {
+    let mailboxes: Vec<_> = (0..description.cores.len()).map(|core| description.mailboxes(core)).collect();
+    image::records(description, &mailboxes)
+}
+
 /// The circuit of a system.
 #[derive(Clone, Debug)]
 pub struct SystemDesign {
@@ -78,6 +85,19 @@ pub fn export_system(
     name: &str,
     library: &Library,
 ) -> Result<SystemDesign, SystemError> {
+    export_driven(description, name, library, Driver::Itself)
+}
+
+/// As [`export_system`], with what loads the cores and gives them their ticks inside of the top, or outside.
+///
+/// # Errors
+/// As there.
+pub fn export_driven(
+    description: &Description,
+    name: &str,
+    library: &Library,
+    driver: Driver,
+) -> Result<SystemDesign, SystemError> {
     let mut designs: Vec<Design> = Vec::new();
     let mut cores = Vec::new();
     for core in &description.cores {
@@ -93,8 +113,8 @@ pub fn export_system(
         };
         cores.push(design.plan.clone());
     }
-    let plan = SystemPlan::new(description.clone(), cores, name);
-    let records = image::records(&plan);
+    let plan = SystemPlan::new(description.clone(), cores, name, driver);
+    let records = image::records(&plan.description, &plan.mailboxes);
     let image = image::file(&plan, &records, records.len());
     let mut files = vec![DesignFile { name: format!("{}.v", plan.top), text: top::module(&plan, &records)? }];
     for core in 0..plan.cores.len() {
@@ -124,7 +144,7 @@ impl SystemDesign {
     /// one's.
     pub fn image_of(&self, description: &Description) -> Option<String> {
         let plan = SystemPlan { description: description.clone(), ..self.plan.clone() };
-        let records = image::records(&plan);
+        let records = image::records(&plan.description, &plan.mailboxes);
         (records.len() <= self.records).then(|| image::file(&plan, &records, self.records).text)
     }
 

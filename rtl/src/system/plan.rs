@@ -8,9 +8,20 @@ use takt_isa::Register;
 use takt_isa::timing::Cycle;
 use takt_system::{Description, End, LinkKind, Mailbox, Status};
 
+/// What loads a system's cores, and gives them their ticks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Driver {
+    /// The top itself: its loader, and base ticks that start by themselves.
+    Itself,
+    /// What is around it, as on a board: the top has ports for that, and shows the cores' ports.
+    Board,
+}
+
 /// The plan of a system's circuit.
 #[derive(Clone, Debug)]
 pub struct SystemPlan {
+    /// What loads and drives it.
+    pub driver: Driver,
     /// Cores and links.
     pub description: Description,
     /// The plan of each core.
@@ -56,10 +67,10 @@ pub(super) struct OutputPort {
 }
 
 impl SystemPlan {
-    pub(super) fn new(description: Description, cores: Vec<Plan>, name: &str) -> SystemPlan {
+    pub(super) fn new(description: Description, cores: Vec<Plan>, name: &str, driver: Driver) -> SystemPlan {
         let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
         let mailboxes = (0..cores.len()).map(|core| description.mailboxes(core)).collect();
-        SystemPlan { description, cores, top: format!("takt_system_{plain}"), mailboxes }
+        SystemPlan { driver, description, cores, top: format!("takt_system_{plain}"), mailboxes }
     }
 
     /// The module of a core with its gate.
@@ -93,7 +104,7 @@ impl SystemPlan {
     }
 
     /// Bits of the number of a FIFO's entries.
-    pub(super) fn count_bits(depth: u32) -> u32 {
+    pub fn count_bits(depth: u32) -> u32 {
         (u32::BITS - depth.leading_zeros()).max(2)
     }
 
@@ -217,6 +228,12 @@ impl SystemPlan {
         let told =
             STATUS.into_iter().skip(1).map(|net| Net::named(net.name().to_owned()).wide(net.width() * cores));
         [DUE].into_iter().chain(told).collect()
+    }
+
+    /// Of a top that a board drives, how its ports for a core's own are called.
+    pub fn board_port(&self, core: usize, port: &Net) -> Net {
+        let net = Net::named(format!("board{core}_{}", port.name()));
+        if port.width() > 1 { net.wide(port.width()) } else { net }
     }
 
     /// The pin of a host's end.

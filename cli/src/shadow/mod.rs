@@ -1,5 +1,7 @@
 //! `takt live … shadow`: what a board computes, beside the emulator with the same inputs.
 
+pub(crate) mod system;
+
 use crate::files::Out;
 use crate::live::{find, shown};
 use anyhow::{Context, Result, bail};
@@ -20,7 +22,7 @@ struct Watched<'a> {
 
 fn watched<'a>(program: &'a Program, ports: &'a [Port]) -> Result<Vec<Watched<'a>>> {
     let watch = |port: &'a Port| {
-        let (address, ty) = find(program, &port.name)?;
+        let (address, ty) = find(program.into(), &port.name)?;
         Ok(Watched { port, address, ty })
     };
     let mut ports = ports.iter().map(watch).collect::<Result<Vec<_>>>()?;

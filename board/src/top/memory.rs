@@ -1,0 +1,60 @@
+//! Whether a system's memories fit into a device, before the tools say so after minutes.
+
+use super::Contents;
+use crate::boards::Board;
+use takt_isa::Machine;
+use takt_rtl::synthesis;
+use takt_system::Description;
+use thiserror::Error;
+
+/// A device has too little block RAM.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error(
+    "the system needs {needed} block RAMs at least, {image} of them for the image of {records} records and {cores} for its cores; the {device} has {has}"
+)]
+pub struct TooMuch {
+    needed: u64,
+    image: u64,
+    records: usize,
+    cores: u64,
+    device: &'static str,
+    has: u64,
+}
+
+/// Block RAMs of ECP5 for a memory with one port that writes and one that reads: words and bits of each of their forms.
+fn blocks(words: u64, width: u64) -> u64 {
+    let forms = [(512, 36), (1024, 18), (2048, 9), (4096, 4), (8192, 2), (16384, 1)];
+    forms.map(|(deep, wide)| words.div_ceil(deep) * width.div_ceil(wide)).into_iter().min().unwrap_or(0)
+}
+
+/// Bits of a record of the image.
+const RECORD: u64 = 73;
+
+/// Block RAMs of a core: what synthesis counted; of a machine that was not measured, its program and data.
+fn core(machine: &Machine) -> u64 {
+    let programs = machine.slots.len() as u64 * blocks(machine.code_depth.into(), 48);
+    let least = programs + blocks(machine.data_depth.into(), 32);
+    synthesis::of_machine(machine.name).map_or(least, |measured| measured.resources.block_rams)
+}
+
+pub(super) fn check(board: &Board, description: &Description, contents: &Contents) -> Result<(), TooMuch> {
+    let cores = description.cores.iter().map(|known| core(known.program.machine)).sum();
+    let image = blocks(contents.room as u64, RECORD);
+    let (needed, has) = (cores + image, board.device.blocks);
+    if needed <= has {
+        return Ok(());
+    }
+    let (device, records) = (board.device.part, contents.records.len());
+    Err(TooMuch { needed, image, records, cores, device, has })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_memory_takes_the_fewest_blocks_of_its_forms() {
+        assert_eq!([blocks(1024, 18), blocks(1024, 48), blocks(1024, 32), blocks(512, 32)], [1, 3, 2, 1]);
+        assert_eq!([blocks(2048, 73), blocks(16384, 1), blocks(16385, 1)], [9, 1, 2]);
+    }
+}

@@ -1,0 +1,391 @@
+//! `takt load` and `takt live`: a board, over its serial port.
+
+mod system;
+
+use crate::board::carried::Carried;
+use crate::files::{self, Out};
+use crate::select::{OptionalMachine, SourceArguments};
+use crate::shadow;
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use clap::{Args, Subcommand};
+use std::io::Write;
+use std::path::PathBuf;
+use std::time::{SystemTime, UNIX_EPOCH};
+use takt_board::ends::{Ends, Fifo};
+use takt_board::protocol::{ENABLE, HOLD, RESTART, RUN};
+use takt_board::serial::Serial;
+use takt_board::top::image;
+use takt_board::{Application, CORE, Host};
+use takt_isa::Type;
+
+/// A board's serial port.
+#[derive(Args)]
+struct Port {
+    /// The serial port: /dev/ttyUSB0, or what `takt board sim` says.
+    port: PathBuf,
+    /// Baud rate, as in the wiring file.
+    #[arg(long, default_value_t = 115_200)]
+    baud: u32,
+}
+
+impl Port {
+    fn open(&self) -> Result<Host<Serial>> {
+        let name = self.port.display();
+        let line = Serial::open(&self.port, self.baud).with_context(|| {
+            format!("cannot open {name}: is the board plugged in, and may you use the port?")
+        })?;
+        // Not the number of the last request of an earlier command.
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.subsec_micros());
+        Host::connect(line, now as u8).with_context(|| format!("{name} at {} baud", self.baud))
+    }
+}
+
+/// Load a program, or the programs of a system, into a board over its serial port, and start it.
+///
+/// The program that ran is stopped first, and outputs are safe. What was loaded is read back and compared. It stays until power-off.
+#[derive(Args)]
+pub(crate) struct LoadBoard {
+    #[command(flatten)]
+    port: Port,
+    /// Source or image; or a system, a `.toml` file, if the board carries its circuit.
+    program: PathBuf,
+    /// Load only; `takt live PORT start` starts it.
+    #[arg(long)]
+    stopped: bool,
+    #[command(flatten)]
+    machine: OptionalMachine,
+    #[command(flatten)]
+    source: SourceArguments,
+}
+
+pub(crate) fn load(arguments: &LoadBoard, color: bool, out: &mut Out) -> Result<()> {
+    files::check(&[("the program", &arguments.program)], &[])?;
+    let carried = Carried::load(&arguments.program, &arguments.machine, &arguments.source, color)?;
+    let records = image(carried.application())?.records;
+    let mut host = arguments.port.open()?;
+    host.fits(carried.application())?;
+    host.load(&records)?;
+    if !arguments.stopped {
+        host.set("control", RUN | ENABLE)?;
+    }
+    let state = if arguments.stopped { "stopped" } else { "started" };
+    writeln!(out, "{} records loaded and compared; {state}", records.len())?;
+    Ok(())
+}
+
+/// Monitor and control a running program, or system, on a board, over its serial port.
+#[derive(Args)]
+pub(crate) struct Live {
+    #[command(flatten)]
+    port: Port,
+    /// The program, or the system, that runs there, for the names of its ports. A port of a system's core is `core.port`.
+    #[arg(long, value_name = "FILE")]
+    program: Option<PathBuf>,
+    #[command(flatten)]
+    machine: OptionalMachine,
+    #[command(flatten)]
+    source: SourceArguments,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// What the program does, and the counters.
+    Status,
+    /// Start the program from its beginning; outputs drive.
+    Start,
+    /// Stop the program; outputs are safe.
+    Stop,
+    /// Hold at the end of a period: no more ticks.
+    Hold,
+    /// One period, while it is held.
+    Step,
+    /// Go on after `hold`.
+    Go,
+    /// Read ports; all of them unless named.
+    Read {
+        /// Ports.
+        names: Vec<String>,
+    },
+    /// Set input ports, between two periods.
+    Set {
+        /// `name=value`, each.
+        #[arg(required = true)]
+        values: Vec<String>,
+    },
+    /// Run the program from its beginning, a period at a time, beside the emulator with the same inputs, and name the first output
+    /// that differs. Outputs stay safe unless --drive is given; afterwards the board is held.
+    Shadow {
+        /// `name=value`: input ports that the host sets, before the first period.
+        values: Vec<String>,
+        /// Periods to compare; of a system, base ticks.
+        #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
+        periods: u32,
+        /// Let outputs drive. Periods take as long as the line does: nothing may hang on them.
+        #[arg(long)]
+        drive: bool,
+    },
+    /// Put an entry into a FIFO of a system, from the host.
+    Push {
+        /// The FIFO.
+        name: String,
+        /// `field=value`, for each field of an entry.
+        #[arg(required = true)]
+        values: Vec<String>,
+    },
+    /// Take an entry out of a FIFO of a system, to the host.
+    Pop {
+        /// The FIFO.
+        name: String,
+    },
+    /// Print ports every N periods, with the period's number.
+    Stream {
+        /// Ports: of one core, with numbers that are close to each other.
+        #[arg(required = true)]
+        names: Vec<String>,
+        /// Periods from one to the next.
+        #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..4096))]
+        every: u32,
+        /// Values to print.
+        #[arg(long, default_value_t = 100)]
+        count: u32,
+    },
+}
+
+/// A port's address and type.
+pub(crate) fn find(application: Application<'_>, name: &str) -> Result<(u16, Type)> {
+    let place = application.find(name).map_err(|text| anyhow!("{text}"))?;
+    Ok((place.read, place.ty))
+}
+
+pub(crate) fn shown(bits: u32, ty: Type) -> String {
+    match ty {
+        Type::F => f32::from_bits(bits).to_string(),
+        Type::I => (bits as i32).to_string(),
+        Type::B => format!("{bits:#x}"),
+    }
+}
+
+fn bits(text: &str, ty: Type) -> Option<u32> {
+    match ty {
+        Type::F => text.parse::<f32>().ok().map(f32::to_bits),
+        Type::I => text.parse::<i32>().ok().map(|n| n as u32),
+        Type::B => {
+            text.strip_prefix("0x").map_or_else(|| text.parse().ok(), |hex| u32::from_str_radix(hex, 16).ok())
+        }
+    }
+}
+
+/// What a command needs, from the command line alone: it is checked before the line is opened.
+enum Prepared {
+    Nothing,
+    /// Addresses and values.
+    Settings(Vec<(u16, u32)>),
+    /// An entry to push.
+    Entry(Fifo, Vec<u32>),
+    /// A FIFO to pop.
+    Pop(Fifo),
+    Stream(Stream),
+}
+
+/// Ports that one frame has.
+struct Stream {
+    first: u16,
+    words: u32,
+    /// Of each port, its place among the words, and its type.
+    ports: Vec<(usize, Type)>,
+}
+
+impl Stream {
+    fn new(application: Application<'_>, names: &[String]) -> Result<Stream> {
+        let found = names.iter().map(|name| find(application, name)).collect::<Result<Vec<_>>>()?;
+        let first = found.iter().map(|(address, _)| *address).min().unwrap_or(0);
+        let last = found.iter().map(|(address, _)| *address).max().unwrap_or(0);
+        ensure!(
+            first / CORE == last / CORE && last - first < STREAMED,
+            "one stream has {STREAMED} ports whose numbers follow each other: inputs or outputs of one core"
+        );
+        let ports = found.iter().map(|(address, ty)| (usize::from(address - first), *ty)).collect();
+        Ok(Stream { first, words: u32::from(last - first) + 1, ports })
+    }
+}
+
+/// Words of a frame of the stream, at most.
+const STREAMED: u16 = 15;
+
+fn prepare(command: &Command, carried: Option<&Carried>) -> Result<Prepared> {
+    let named = || carried.context("ports have names in the program: --program FILE");
+    Ok(match command {
+        Command::Set { values } | Command::Shadow { values, .. } => {
+            if matches!(command, Command::Shadow { .. }) {
+                named()?;
+            }
+            let mut settings = Vec::new();
+            for value in values {
+                let (name, text) =
+                    value.split_once('=').with_context(|| format!("`{value}` is not `name=value`"))?;
+                let settable = named()?.application().settable(name);
+                let (address, ty) = settable.map_err(|text| anyhow!("{text}"))?;
+                let bits = bits(text, ty).with_context(|| format!("`{text}` is no value of `{name}`"))?;
+                settings.push((address, bits));
+            }
+            settings.sort_unstable();
+            Prepared::Settings(settings)
+        }
+        Command::Push { name, values } => {
+            let description = &named()?.system("`push`")?.description;
+            let (fifo, entry) = system::entry(description, name, values)?;
+            Prepared::Entry(fifo, entry)
+        }
+        Command::Pop { name } => {
+            let ends = Ends::of(&named()?.system("`pop`")?.description);
+            Prepared::Pop(ends.fifo(name, true).map_err(|text| anyhow!("{text}"))?.clone())
+        }
+        Command::Stream { names, .. } => Prepared::Stream(Stream::new(named()?.application(), names)?),
+        _ => Prepared::Nothing,
+    })
+}
+
+pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
+    let carried = arguments.program.as_deref();
+    let carried =
+        carried.map(|path| Carried::load(path, &arguments.machine, &arguments.source, color)).transpose()?;
+    let named = || carried.as_ref().context("ports have names in the program: --program FILE");
+    let prepared = prepare(&arguments.command, carried.as_ref())?;
+    let mut host = arguments.port.open()?;
+    if let Some(carried) = &carried {
+        host.fits(carried.application())?;
+    }
+    let control = host.register("control")?;
+    match &arguments.command {
+        Command::Status if host.cores > 0 => {
+            let description = match &carried {
+                Some(Carried::System(system)) => Some(&system.description),
+                _ => None,
+            };
+            system::status(&mut host, description, out)?;
+        }
+        Command::Status => {
+            let status = host.status()?;
+            let state = match status {
+                s if s.fault() => "stopped with a fault",
+                s if s.halted() => "halted",
+                s if s.in_reset() => "stopped",
+                _ if control & HOLD != 0 => "held",
+                _ => "runs",
+            };
+            let drive = if status.drives() { "drive" } else { "are safe" };
+            writeln!(out, "the program {state}; outputs {drive}")?;
+            let causes: Vec<&str> = status.causes().collect();
+            if !causes.is_empty() {
+                writeln!(out, "stopped the drive: {}", causes.join(", "))?;
+            }
+            if status.fault() {
+                writeln!(out, "fault at bundle {}", host.register("fault")? & 0xffff)?;
+            }
+            for name in ["periods", "misses", "cycles", "most_cycles", "errors", "lost"] {
+                writeln!(out, "{name:<12} {}", host.register(name)?)?;
+            }
+        }
+        Command::Start => host.set("control", RUN | ENABLE | RESTART)?,
+        Command::Stop => host.set("control", 0)?,
+        Command::Hold => host.set("control", control | HOLD)?,
+        Command::Go => host.set("control", control & !HOLD)?,
+        Command::Step => {
+            ensure!(control & HOLD != 0, "the program is not held: `takt live PORT hold` first");
+            host.set("step", 1)?;
+        }
+        Command::Read { names } => {
+            let application = named()?.application();
+            let all = application.names();
+            for name in if names.is_empty() { &all } else { names } {
+                let (address, ty) = find(application, name)?;
+                let value = host.read(address, 1)?.first().copied().unwrap_or(0);
+                writeln!(out, "{name} = {}", shown(value, ty))?;
+            }
+        }
+        Command::Set { .. } => {
+            if let Prepared::Settings(settings) = &prepared {
+                set(&mut host, settings)?;
+            }
+        }
+        Command::Shadow { periods, drive, .. } => {
+            let enable = if *drive { ENABLE } else { 0 };
+            // Held from its beginning on, so that no period goes by unseen.
+            host.set("control", RUN | HOLD | enable | RESTART)?;
+            if let Prepared::Settings(settings) = &prepared {
+                set(&mut host, settings)?;
+            }
+            match named()? {
+                Carried::Program(program) => shadow::run(&mut host, program, *periods, out)?,
+                Carried::System(system) => {
+                    shadow::system::run(&mut host, &system.description, *periods, out)?;
+                }
+            }
+        }
+        Command::Push { .. } => {
+            if let Prepared::Entry(fifo, entry) = &prepared {
+                system::push(&mut host, &named()?.system("`push`")?.description, fifo, entry)?;
+            }
+        }
+        Command::Pop { .. } => {
+            if let Prepared::Pop(fifo) = &prepared {
+                system::pop(&mut host, fifo, out)?;
+            }
+        }
+        Command::Stream { every, count, .. } => {
+            if let Prepared::Stream(stream) = &prepared {
+                streamed(&mut host, stream, *every, *count, color, out)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Prints ports of so many frames of the stream.
+fn streamed(
+    host: &mut Host<Serial>,
+    stream: &Stream,
+    every: u32,
+    count: u32,
+    color: bool,
+    out: &mut Out,
+) -> Result<()> {
+    host.set("stream", every << 20 | stream.words << 16 | u32::from(stream.first))?;
+    let (mut printed, mut silent) = (0, 0);
+    while printed < count && silent < SILENCE {
+        match host.streamed()? {
+            Some(frame) if frame.words.len() == stream.words as usize + 1 => {
+                let values = stream.ports.iter().map(|(at, ty)| shown(frame.words[1 + at], *ty));
+                writeln!(out, "{} {}", frame.words[0], values.collect::<Vec<_>>().join(" "))?;
+                (printed, silent) = (printed + 1, 0);
+            }
+            _ => silent += 1,
+        }
+    }
+    host.set("stream", 0)?;
+    if printed < count {
+        bail!("the stream ended after {printed} values: the program has no periods any more");
+    }
+    let lost = host.register("lost")?;
+    if lost > 0 {
+        crate::output::warning(
+            &format!("{lost} frames were lost since power-up: use a larger --every"),
+            color,
+        );
+    }
+    Ok(())
+}
+
+/// Sets input ports, in ascending order; those whose numbers follow each other change together.
+fn set(host: &mut Host<Serial>, settings: &[(u16, u32)]) -> Result<()> {
+    for together in settings.chunk_by(|a, b| a.0 + 1 == b.0) {
+        let values: Vec<u32> = together.iter().map(|(_, bits)| *bits).collect();
+        host.write(together[0].0, &values)?;
+    }
+    Ok(())
+}
+
+/// Tenths of a second without a frame, until a stream has ended.
+const SILENCE: u32 = 50;

@@ -1,0 +1,18 @@
+; An axis: an encoder's counts in, a PWM's duty out, proportional to the error.
+
+.schedule on
+.const  gain = 0.02                     ; of full duty, per count
+
+.input  wanted                          ; counts, from the ramp
+.input  n:int                           ; counts, from the encoder
+.output duty                            ; -1 to 1
+.output error                           ; counts
+
+.once
+        duty, error = 0, 0
+        wait    period
+
+.period
+period: error = wanted - itof(n)
+        duty = max(min(error*gain, 1), -1)
+        wait    period

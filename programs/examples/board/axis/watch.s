@@ -1,0 +1,23 @@
+; Watches an error: the largest magnitude so far, how many were seen, and a lamp while it is above a limit.
+
+.schedule on
+
+.input  error, limit                    ; counts
+.output peak                            ; counts
+.output values:int
+.output lit:int                         ; 0 or 1
+
+.once
+        mov     peak, zero
+        mov     values, zero
+        mov     lit, zero
+        wait    period
+
+.period
+period:
+.reg    a
+        fabs    a, error
+        fmax    peak, peak, a
+        iadd    values, values, 1
+        flt     lit, limit, a
+        wait    period
