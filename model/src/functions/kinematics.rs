@@ -8,7 +8,7 @@ use crate::robot::frames::Link;
 use crate::robot::space::{self, Pose};
 
 /// The joints that carry `tip`, from the base.
-fn path(links: &[Link], tip: usize) -> Vec<usize> {
+pub(super) fn path(links: &[Link], tip: usize) -> Vec<usize> {
     let mut path: Vec<usize> = std::iter::successors(Some(tip), |&joint| links[joint].parent).collect();
     path.reverse();
     path

@@ -52,16 +52,20 @@ pub fn derive(robot: &Robot, what: What, options: &Options<'_>) -> Result<Functi
         What::ForwardKinematics | What::Jacobian => Some(tip(robot, options.tip)?),
         _ => None,
     };
+    let joints: Vec<usize> = match tip {
+        Some((_, last, _)) => kinematics::path(&frames::place(robot, &Layout::new(robot)), last),
+        None => (0..robot.joints.len()).collect(),
+    };
     let cost = |attempt: &Attempt| {
         let mut function = write(robot, what, options, tip, attempt);
-        if robot.joints.len() <= TRIED {
+        if joints.len() <= TRIED {
             function = function.improved(&options.delays, false);
         }
         (function.count().total(), function.depth(&options.delays))
     };
     let split = if what == What::Jacobian { 0 } else { usize::MAX };
     let first = Attempt { layout: Layout::new(robot), sums: true, split, third: Third::Turned, unit: 1.0 };
-    let mut search = Search { robot, cost: &cost, least: cost(&first), best: first };
+    let mut search = Search { robot, joints: &joints, cost: &cost, least: cost(&first), best: first };
     search.consider(&|attempt| attempt.sums = false);
     if tip.is_some() {
         // What is best at first need not be in the end.
@@ -106,6 +110,8 @@ pub fn derive(robot: &Robot, what: What, options: &Options<'_>) -> Result<Functi
 #[derive(Clone)]
 struct Search<'a> {
     robot: &'a Robot,
+    /// The joints that the function depends on.
+    joints: &'a [usize],
     /// Operations, and cycles of the longest chain.
     cost: &'a dyn Fn(&Attempt) -> (usize, u32),
     best: Attempt,
@@ -124,7 +130,7 @@ impl Search<'_> {
 
     /// Ways to compute where the tip is.
     fn ways(&mut self, what: What) {
-        let most = self.robot.joints.len().min(TRIED);
+        let most = self.joints.len().min(TRIED);
         let thirds = if what == What::ForwardKinematics { &Third::ALL[..] } else { &[Third::Turned] };
         for &third in thirds {
             self.consider(&|attempt| attempt.third = third);
@@ -136,13 +142,14 @@ impl Search<'_> {
 
     /// Placements of the frames.
     fn layouts(&mut self) {
-        for joint in 0..self.robot.joints.len().min(TRIED) {
+        let joints = self.joints;
+        for &joint in joints.iter().take(TRIED) {
             self.consider(&|attempt| attempt.layout.incoming[joint] ^= true);
         }
         for joint in self.robot.leaves().into_iter().take(TRIED) {
             self.consider(&|attempt| attempt.layout.balanced[joint] ^= true);
         }
-        for joint in 0..self.robot.joints.len().min(TRIED) {
+        for &joint in joints.iter().take(TRIED) {
             for quarters in 0..4 {
                 self.consider(&|attempt| attempt.layout.quarters[joint] = quarters);
             }

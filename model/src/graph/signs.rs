@@ -23,36 +23,66 @@ pub(super) fn settle(graph: &Graph, outputs: &[Id], thorough: bool) -> (Graph, V
     let live: Vec<Id> =
         (0..uses.len()).filter(|&index| uses[index] > 0).map(|index| Id(index as u32)).collect();
     let mut signs = Signs { graph, outputs, live, turned: vec![false; uses.len()] };
-    signs.search(if thorough { 20_000_000 } else { 50_000 });
+    signs.search(if thorough { 20_000_000 } else { 50_000 }, if thorough { SWEEPS } else { 0 });
     signs.rebuilt()
 }
 
-impl Signs<'_> {
-    /// Turns one difference, then two at a time, as long as that leaves fewer negations, and looks at `effort` nodes in all.
-    fn search(&mut self, effort: usize) {
-        let choices: Vec<usize> =
-            self.live.iter().rev().filter(|id| self.may_turn(**id)).map(|id| id.index()).collect();
-        let singles = choices.iter().map(|&one| (one, one));
-        let pairs = choices.iter().flat_map(|&one| choices.iter().map(move |&other| (one, other)));
-        let mut least = self.negations();
-        let mut steps = 0;
-        for (one, other) in singles.chain(pairs) {
-            steps += self.live.len();
-            if least == 0 || steps > effort {
+/// How often each difference is turned where that leaves as many negations.
+const SWEEPS: usize = 12;
+
+/// A search for few negations.
+struct Turns {
+    least: usize,
+    /// Nodes that it may still look at.
+    left: usize,
+}
+
+impl Turns {
+    /// Turns two differences, or one, at a time, where that leaves fewer negations, or as many if that is `enough`.
+    fn go_through(
+        &mut self,
+        signs: &mut Signs<'_>,
+        turns: impl Iterator<Item = (usize, usize)>,
+        enough: bool,
+    ) {
+        for (one, other) in turns {
+            if self.least == 0 || self.left < signs.live.len() {
                 return;
             }
+            self.left -= signs.live.len();
             let turn = |turned: &mut Vec<bool>| {
                 turned[one] ^= true;
                 turned[other] ^= other != one;
             };
-            turn(&mut self.turned);
-            let after = self.negations();
-            if after < least {
-                least = after;
+            turn(&mut signs.turned);
+            let after = signs.negations();
+            if after < self.least || (enough && after == self.least) {
+                self.least = after;
             } else {
-                turn(&mut self.turned);
+                turn(&mut signs.turned);
             }
         }
+    }
+}
+
+impl Signs<'_> {
+    /// Turns one difference, then two at a time, as long as that leaves fewer negations; before that also where it leaves as
+    /// many, `sweeps` times, if that leads to fewer. Looks at `effort` nodes in all.
+    fn search(&mut self, effort: usize, sweeps: usize) {
+        let choices: Vec<usize> =
+            self.live.iter().rev().filter(|id| self.may_turn(**id)).map(|id| id.index()).collect();
+        let singles: Vec<(usize, usize)> = choices.iter().map(|&one| (one, one)).collect();
+        let pairs = choices.iter().flat_map(|&one| choices.iter().map(move |&other| (one, other)));
+        let mut search = Turns { least: self.negations(), left: effort };
+        search.go_through(self, singles.iter().copied(), false);
+        let (before, least) = (self.turned.clone(), search.least);
+        for _ in 0..sweeps {
+            search.go_through(self, singles.iter().copied(), true);
+        }
+        if search.least == least {
+            self.turned = before;
+        }
+        search.go_through(self, pairs, false);
     }
 
     fn base(&self, mut id: Id) -> Signed {
