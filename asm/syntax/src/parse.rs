@@ -16,35 +16,20 @@ use crate::report::source::{Source, Span};
 use chumsky::Parser as _;
 use chumsky::input::Input as _;
 use std::cell::OnceCell;
-use std::sync::mpsc;
 
 /// Tokens read at a time: enough that building the parser does not count, few enough to stay in the cache.
-const CHUNK: usize = 1 << 13;
-
-/// Chunks that the lexer's thread may be ahead of the parser.
-const AHEAD: usize = 4;
-
-/// Bytes from which on a text's tokens are read in a thread of their own: a text that takes many times as long as to start one.
-const LONG: usize = 1 << 16;
+const CHUNK: usize = 1 << 14;
 
 /// Bytes that a line has in most sources, or more.
 const LINE: usize = 24;
 
 /// Reads a source file.
 pub fn parse(source: &Source, names: &mut Interner, sink: &mut Sink) -> Ast {
-    parse_with(source, names, sink, Way { shortcut: true, ahead: source.text.len() >= LONG })
+    parse_with(source, names, sink, true)
 }
 
-/// How a file is read: what it says is the same.
-#[derive(Clone, Copy)]
-struct Way {
-    /// With the grammar's shortcut.
-    shortcut: bool,
-    /// With the tokens read by a thread of their own.
-    ahead: bool,
-}
-
-fn parse_with(source: &Source, names: &mut Interner, sink: &mut Sink, way: Way) -> Ast {
+/// Reads a source file, with or without the grammar's shortcut.
+fn parse_with(source: &Source, names: &mut Interner, sink: &mut Sink, shortcut: bool) -> Ast {
     let mut ast = Ast::default();
     // Room for the statements of a text of common lines: memory that is not written to costs nothing.
     let lines = source.text.len() / LINE + 1;
@@ -53,47 +38,12 @@ fn parse_with(source: &Source, names: &mut Interner, sink: &mut Sink, way: Way) 
     ast.operands.reserve(3 * lines);
     ast.nodes.reserve(lines);
     let mut lexer = Lexer::new(&source.text, source.base);
-    let mut take = |chunk: &Chunk, sink: &mut Sink| parse_chunk(chunk, source, &mut ast, sink, way.shortcut);
-    let threads = || std::thread::available_parallelism().map_or(1, usize::from);
-    if !(way.ahead && threads() > 1 && read_ahead(&mut lexer, names, sink, &mut take)) {
-        let mut chunk = Chunk::default();
-        while lexer.chunk(CHUNK, &mut chunk, names, sink) {
-            take(&chunk, sink);
-        }
+    let mut chunk = Chunk::default();
+    while lexer.chunk(CHUNK, &mut chunk, names, sink) {
+        parse_chunk(&chunk, source, &mut ast, sink, shortcut);
     }
     blocks::close(&mut ast, sink);
     ast
-}
-
-/// Reads the tokens in a thread of their own, and gives them to `take` in order. False if there can be no thread: then nothing
-/// is read.
-fn read_ahead(
-    lexer: &mut Lexer<'_>,
-    names: &mut Interner,
-    sink: &mut Sink,
-    take: &mut impl FnMut(&Chunk, &mut Sink),
-) -> bool {
-    let (filled, chunks) = mpsc::sync_channel(AHEAD);
-    let (emptied, spare) = mpsc::channel();
-    let read = move || {
-        loop {
-            let (mut chunk, mut found): (Chunk, _) = (spare.try_recv().unwrap_or_default(), Sink::default());
-            let more = lexer.chunk(CHUNK, &mut chunk, names, &mut found);
-            if !more || filled.send((chunk, found)).is_err() {
-                return;
-            }
-        }
-    };
-    std::thread::scope(|scope| {
-        let reader = std::thread::Builder::new().spawn_scoped(scope, read);
-        for (chunk, found) in chunks {
-            sink.append(found);
-            take(&chunk, sink);
-            // At the end nobody takes it back.
-            let _ = emptied.send(chunk);
-        }
-        reader.is_ok()
-    })
 }
 
 /// An expression alone, for whoever evaluates text: its nodes, or what is wrong with it.
@@ -346,13 +296,9 @@ mod tests {
 
     /// The tree and the errors of a text, as text.
     fn read(text: &str, shortcut: bool) -> String {
-        read_with(text, Way { shortcut, ahead: false })
-    }
-
-    fn read_with(text: &str, way: Way) -> String {
         let (mut sources, mut names, mut sink) = (Sources::default(), Interner::new(), Sink::default());
         sources.add("test.s", text.into());
-        let ast = parse_with(&sources.files()[0].clone(), &mut names, &mut sink, way);
+        let ast = parse_with(&sources.files()[0].clone(), &mut names, &mut sink, shortcut);
         format!("{ast:#?}\n{}", sink.finish(sources.into()).render(false))
     }
 
@@ -398,23 +344,6 @@ mod tests {
                 text.extend([*before, *atom, *after, operator]);
             }
             prop_assert_eq!(read(&text, true), read(&text, false));
-        }
-    }
-
-    #[test]
-    fn a_thread_of_its_own_reads_the_same_tokens() {
-        // Several chunks, with mistakes in more of them than are shown.
-        let line = |n: usize| match n % 97 {
-            0 => format!("l{n}: fadd a{n}, b, $ ; c\n"),
-            1 => format!(" fmul a, 0x, {n}\n"),
-            2 => " fadd a ||\n fmul b\n".to_owned(),
-            _ => format!(" fadd a, b, {n}\n"),
-        };
-        let text: String = (0..4 * CHUNK / 5).map(line).collect();
-        assert!(text.len() > LONG);
-        for text in [&text, &text.replace('$', "c").replace("0x,", "c,"), ""] {
-            let [alone, ahead] = [false, true].map(|ahead| read_with(text, Way { shortcut: true, ahead }));
-            assert!(alone == ahead, "the trees differ");
         }
     }
 

@@ -193,15 +193,6 @@ impl Sink {
         self.add(diagnostic.severity, diagnostic.code, diagnostic.span(), || diagnostic);
     }
 
-    /// Adds what another one gathered.
-    pub fn append(&mut self, other: Sink) {
-        let kept = |severity| other.kept.iter().filter(|diagnostic| diagnostic.severity == severity).count();
-        let (errors, warnings) = (kept(Severity::Error), kept(Severity::Warning));
-        other.kept.into_iter().for_each(|diagnostic| self.push(diagnostic));
-        self.errors += other.errors - errors;
-        self.warnings += other.warnings - warnings;
-    }
-
     /// The report, in the order of the sources.
     pub fn finish(mut self, sources: Arc<Sources>) -> Diagnostics {
         self.kept.sort_by_key(Diagnostic::span);

@@ -52,7 +52,7 @@ const OTHERS: [Other; 2] = [
     Other {
         command: "customasm",
         name: "customasm",
-        language: "a machine with such instructions, described in its language,",
+        language: "a machine with such instructions, described in its language",
         arguments: &["-q", "-f", "binary", "-o"],
         head: "#subruledef reg {\n a => 0`8\n b => 1`8\n c => 2`8\n d => 3`8\n t => 4`8\n x => 5`8\n y => 6`8\n n => 7`8\n \
                F => 8`8\n}\n#ruledef {\n fmul {d: reg}, {s: reg}, {v: i16} => 0x01 @ d @ s @ v\n \
