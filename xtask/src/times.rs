@@ -27,12 +27,9 @@ fn list() -> PathBuf {
 
 /// Forgets the times of the last run. What cargo must be told to start tests through this program.
 pub(crate) fn watch() -> Result<[String; 2]> {
-    match fs::remove_file(list()) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-            Err(error).context("cannot remove target/test-times")?
-        }
-        _ => {}
-    }
+    // Cargo may build elsewhere.
+    fs::create_dir_all(root().join("target")).context("cannot make target")?;
+    fs::write(list(), "").context("cannot write target/test-times")?;
     let this = std::env::current_exe().context("xtask does not know where it lies")?;
     let this = this.to_str().context("xtask's path is not Unicode")?;
     // A text in TOML as in Rust.
@@ -49,11 +46,8 @@ pub(crate) fn timed(Arguments { program, arguments }: &Arguments) -> Result<Exit
     // Without the hash that cargo appends.
     let target = program.file_stem().and_then(|name| name.to_str()).unwrap_or_default();
     let target = target.rsplit_once('-').map_or(target, |(name, _)| name);
-    let mut list = OpenOptions::new()
-        .create(true)
-        .append(true)
-        .open(list())
-        .context("cannot write target/test-times")?;
+    let list = OpenOptions::new().append(true).open(list());
+    let mut list = list.context("cannot write target/test-times")?;
     writeln!(list, "{seconds:.1} {package} {target}")?;
     Ok(status.code().and_then(|code| u8::try_from(code).ok()).map_or(ExitCode::FAILURE, ExitCode::from))
 }
