@@ -3,6 +3,7 @@
 use crate::export::{Design, RESET_CYCLES, synthesis_top};
 use crate::synthesis::Resources;
 use std::fmt::Write as _;
+use takt_isa::Machine;
 
 /// A register of the slave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -131,6 +132,15 @@ fn status() -> String {
     format!("{{{}}}", parts.join(", "))
 }
 
+/// The core's pins that tell of each write of an output port, connected to nothing: for who reads the ports.
+pub fn open_streams(machine: &Machine) -> String {
+    let streams = machine.slots.iter().map(|slot| {
+        let b = slot.bank.name;
+        format!(".output_{b}_write(), .output_{b}_index(), .output_{b}_value(),")
+    });
+    streams.collect::<Vec<_>>().join(" ")
+}
+
 /// The slave, for a core whose ports are latched as [`Program::latched_inputs`](takt_isa::Program::latched_inputs) says, unless
 /// its parameter says otherwise.
 pub fn wrapper(design: &Design, latched: u16) -> String {
@@ -143,14 +153,7 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
     let inputs_page = format!("{}'d{}", register_bits - input_bits, machine.inputs.base >> input_bits);
     // What is kept to be loaded again: data, then registers.
     let half = data_bits.max(register_bits);
-    let streams: String = machine
-        .slots
-        .iter()
-        .map(|slot| {
-            let b = slot.bank.name;
-            format!(".output_{b}_write(), .output_{b}_index(), .output_{b}_value(), ")
-        })
-        .collect();
+    let streams = open_streams(machine);
     let mut table = String::new();
     for Register { address, name, access, text, fields } in REGISTERS {
         let _ = writeln!(table, "//   {address:04x} {access:<2} {name}: {text}");
@@ -362,7 +365,6 @@ endmodule
         register_at = padded(half, register_bits, &format!("load_address[{}:0]", register_bits - 1)),
         none = 3 + half + 32,
         address_pad = 16 - half,
-        streams = streams.trim_end(),
         top = design.top,
         inputs_page = inputs_page,
     )

@@ -9,6 +9,7 @@ use crate::wiring::Wiring;
 use std::fmt::Write as _;
 use takt_isa::Program;
 use takt_rtl::Library;
+use takt_rtl::wishbone::open_streams;
 
 /// Core, peripherals and what is between them.
 pub(super) fn around(
@@ -61,14 +62,6 @@ pub(super) fn around(
         }
         parts += &instance(peripheral, "put", &|register| connected.contains(&register));
     }
-    let streams: String = machine
-        .slots
-        .iter()
-        .map(|slot| {
-            let b = slot.bank.name;
-            format!(".output_{b}_write(), .output_{b}_index(), .output_{b}_value(), ")
-        })
-        .collect();
     let mut all = common(wiring, ["fault", "|misses"]);
     all.extend(values([
         ("ID", format!("{:08x}", protocol::ID)),
@@ -94,7 +87,7 @@ pub(super) fn around(
         ("TAKEN", taken),
         ("PARTS", parts),
         ("CORE", core.to_owned()),
-        ("STREAMS", streams.trim_end().to_owned()),
+        ("STREAMS", open_streams(machine)),
         ("FTOI", to_integer(library)),
     ]));
     fill(include_str!("program.v.in"), &all)
