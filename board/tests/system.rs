@@ -130,6 +130,23 @@ fn float(value: f32) -> u32 {
     value.to_bits()
 }
 
+/// Cycles from an edge of the encoder, so many cycles before a tick, to the first one in which the PWM's pulse is not that of before.
+fn measured_of_pulse(ticks: &Ticks, board: &mut Simulation, before: u64, turn: Turn) -> u64 {
+    let period = 2 * PWM.0 as u32;
+    ticks.run_to(board, before, period);
+    let is_high = |board: &mut Simulation| {
+        board.run(1, &[]).expect("it runs");
+        board.output("motor_high").expect("a pin").1 == 1
+    };
+    let mut levels: Vec<bool> = (0..period).map(|_| is_high(board)).collect();
+    board.turns.push(turn);
+    let differs = |cycle: &usize| {
+        levels.push(is_high(board));
+        levels[cycle + period as usize] != levels[*cycle]
+    };
+    (0..4 * PERIOD as usize).find(differs).expect("the motor follows") as u64
+}
+
 /// From an edge of the encoder, which stands at 0, to the motor's and the lamp's, in many phases to the ticks.
 fn pins_follow_as_the_bound_says(host: &mut Host<Simulation>, description: &Description, pins: [usize; 2]) {
     let bound = |core: &takt_system::Core| takt_analysis::bound(&core.program).expect("it can be bounded");
@@ -163,9 +180,8 @@ fn pins_follow_as_the_bound_says(host: &mut Host<Simulation>, description: &Desc
     assert_eq!(found, (total.best, total.worst));
     // Base ticks are a whole number of the PWM's periods apart, so that values always come at the same place of one.
     let (fixed, pwm) = (Part::sum("", motor.inputs[0].parts.iter().chain(&motor.between)), motor.total());
-    let (least, most) = all(&[edge, edge - 1], &|sim, before, turn| {
-        ticks.measured_of_waves(sim, before, |sim| sim.turns.push(turn), ("motor_high", 2 * PWM.0 as u32))
-    });
+    let (least, most) =
+        all(&[edge, edge - 1], &|sim, before, turn| measured_of_pulse(&ticks, sim, before, turn));
     assert!(least >= pwm.best && most <= pwm.worst, "{least} to {most}, and not {pwm:?}");
     assert_eq!(most - least, fixed.worst - fixed.best, "{least} to {most}");
 }

@@ -145,7 +145,7 @@ fn between(
     for ((core, under_way), stage) in cores.iter().zip(&under_way).zip(&stages) {
         parts.push(stage.part(match under_way {
             false => format!("to the tick of {}", name(*core)),
-            true => format!("to the tick of {}, or under way", name(*core)),
+            true => format!("into a period of {}", name(*core)),
         }));
     }
     let program = match under_way.last() {

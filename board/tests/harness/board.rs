@@ -48,30 +48,8 @@ impl Ticks {
         panic!("{output} does not follow");
     }
 
-    /// The same of an output that repeats itself every so many cycles, to the first cycle in which it does not.
-    pub(crate) fn measured_of_waves(
-        &self,
-        board: &mut Simulation,
-        before: u64,
-        change: impl FnOnce(&mut Simulation),
-        (output, wave): (&str, u32),
-    ) -> u64 {
-        self.run_to(board, before, wave);
-        let is_high = |board: &mut Simulation| {
-            board.run(1, &[]).expect("it runs");
-            board.output(output).expect("a pin").1 == 1
-        };
-        let mut levels: Vec<bool> = (0..wave).map(|_| is_high(board)).collect();
-        change(board);
-        let differs = |cycle: &usize| {
-            levels.push(is_high(board));
-            levels[cycle + wave as usize] != levels[*cycle]
-        };
-        (0..20 * self.period as usize).find(differs).expect("the output follows") as u64
-    }
-
     /// Runs until a tick comes in so many cycles and so many more.
-    fn run_to(&self, board: &mut Simulation, before: u64, more: u32) {
+    pub(crate) fn run_to(&self, board: &mut Simulation, before: u64, more: u32) {
         let period = u64::from(self.period);
         let past = (board.cycles + before + u64::from(more) - self.first) % period;
         board.run((period - past) as u32, &[]).expect("it runs");
