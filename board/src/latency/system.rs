@@ -140,19 +140,16 @@ fn between(
             *under_way |= pass.under_way;
         }
     }
-    let name = |core: usize| &description.cores[core].name;
     let mut parts = vec![Part::new("until the board's tick", 0, tick as u64 - 1)];
+    let mut from = "registers".to_owned();
     for ((core, under_way), stage) in cores.iter().zip(&under_way).zip(&stages) {
-        parts.push(stage.part(match under_way {
-            false => format!("to the tick of {}", name(*core)),
-            true => format!("into a period of {}", name(*core)),
-        }));
+        let name = &description.cores[*core].name;
+        let to =
+            if *under_way { format!("into a period of {name}") } else { format!("to the tick of {name}") };
+        parts.push(stage.part(format!("{from} {to}")));
+        from = format!("{name}, from {}", if *under_way { "there" } else { "tick" });
     }
-    let program = match under_way.last() {
-        Some(true) => format!("{}, from there to `wait`", name(*last)),
-        _ => format!("{}, from tick to `wait`", name(*last)),
-    };
-    parts.push(stages[cores.len()].part(program));
+    parts.push(stages[cores.len()].part(format!("{from} to `wait`")));
     let mut after = vec![puts.cycles.part(format!("output ports to registers ({})", taken[*last].len()))];
     if puts.late > 0 {
         after.insert(0, Range(0, puts.late).part("if written with `wait`: to the next"));

@@ -15,6 +15,18 @@ use takt_isa::Program;
 use takt_system::Description;
 use takt_system::latency::Passages;
 
+/// Characters of a part's text, at least.
+const WIDTH: usize = 36;
+
+/// How parts are written.
+#[derive(Clone, Copy)]
+struct Table {
+    /// In MHz.
+    clock: f64,
+    /// Characters of a part's text.
+    width: usize,
+}
+
 /// What there is to say about the ways.
 struct Found<'a> {
     application: Application<'a>,
@@ -110,8 +122,10 @@ impl Found<'_> {
             self.application.cores(),
             self.wiring.clock
         )?;
+        let parts = self.ways.ways.iter().flat_map(|way| &way.between);
+        let width = parts.map(|part| part.text.chars().count()).max().unwrap_or(0).max(WIDTH);
         for group in Group::all(&self.ways.ways) {
-            group.write(self.wiring.clock, out)?;
+            group.write(Table { clock: self.wiring.clock, width }, out)?;
         }
         for late in &self.late {
             writeln!(out, "a deadline can be missed: {late}; then a period or more is added")?;
@@ -208,7 +222,7 @@ impl Group {
         )
     }
 
-    fn write(&self, clock: f64, out: &mut Out) -> Result<()> {
+    fn write(&self, table: Table, out: &mut Out) -> Result<()> {
         let Way { cores, links, between, .. } = &self.way;
         if !cores.is_empty() {
             writeln!(out, "\nthrough {}", cores.join(", "))?;
@@ -216,27 +230,27 @@ impl Group {
             let over = std::iter::once(listed(&self.first)).chain(inner).chain([listed(&self.last)]);
             writeln!(out, "over {}", over.collect::<Vec<_>>().join("; "))?;
         }
-        ends(&self.way.inputs, clock, out)?;
+        ends(&self.way.inputs, table, out)?;
         writeln!(out, "{}", if cores.is_empty() { "every period" } else { "between" })?;
-        between.iter().try_for_each(|part| line(part, clock, out))?;
-        ends(&self.way.outputs, clock, out)?;
+        between.iter().try_for_each(|part| line(part, table, out))?;
+        ends(&self.way.outputs, table, out)?;
         writeln!(out, "in all")?;
-        line(&self.way.total(), clock, out)
+        line(&self.way.total(), table, out)
     }
 }
 
-fn ends(ends: &[End], clock: f64, out: &mut Out) -> Result<()> {
+fn ends(ends: &[End], table: Table, out: &mut Out) -> Result<()> {
     for same in ends.chunk_by(|a, b| a.parts == b.parts) {
         let names: Vec<String> =
             same.iter().map(|end| format!("{} ({})", end.peripheral, end.port)).collect();
         writeln!(out, "{}", names.join(", "))?;
-        same[0].parts.iter().try_for_each(|part| line(part, clock, out))?;
+        same[0].parts.iter().try_for_each(|part| line(part, table, out))?;
     }
     Ok(())
 }
 
-fn line(part: &Part, clock: f64, out: &mut Out) -> Result<()> {
+fn line(part: &Part, Table { clock, width }: Table, out: &mut Out) -> Result<()> {
     let Part { text, best, worst } = part;
     let cycles = if best == worst { best.to_string() } else { format!("{best} to {worst}") };
-    Ok(writeln!(out, "  {text:<36} {cycles:>14} {:>14}", microseconds(*worst, clock))?)
+    Ok(writeln!(out, "  {text:<width$} {cycles:>14} {:>14}", microseconds(*worst, clock))?)
 }
