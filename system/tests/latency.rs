@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 use takt_asm::{MemoryLoader, Options, assemble};
-use takt_isa::T1;
-use takt_system::latency::latencies;
+use takt_isa::{Program, T1};
+use takt_system::latency::{LatencyError, MAX_PHASES, MAX_STEPS, latencies};
 use takt_system::testing::describe;
 use takt_system::{Description, System};
 
@@ -17,6 +17,11 @@ const AT_END: &str = ".input i:int\n.output o:int\n.reg x\n.once\n mov o, zero\n
 const SHOW: &str =
     ".input i:int\n.output o:int\n.once\n mov o, zero\n wait p\n.period\np: mov o, i\n wait p\n";
 
+fn program(text: &str) -> Program {
+    let options = Options { machine: &T1, ..Options::default() };
+    assemble("p.s", &MemoryLoader::of("p.s", text), &options).unwrap_or_else(|e| panic!("{e:?}")).program
+}
+
 /// A command goes over a wire to one core and over a link to another, whose tick is `offset` cycles later.
 fn pair(first: &str, link: &str, every: u64, offset: u64) -> Description {
     let text = format!(
@@ -24,10 +29,6 @@ fn pair(first: &str, link: &str, every: u64, offset: u64) -> Description {
          machine = \"t1\"\ntick = {every}\noffset = {offset}\n{link}\n[[wire]]\nfrom = \"host.i\"\nto = \"a.i\"\n\
          [[wire]]\nfrom = \"b.o\"\nto = \"host.o\"\n"
     );
-    let program = |text: &str| {
-        let options = Options { machine: &T1, ..Options::default() };
-        assemble("p.s", &MemoryLoader::of("p.s", text), &options).unwrap_or_else(|e| panic!("{e:?}")).program
-    };
     let programs = BTreeMap::from([("a".to_owned(), program(first)), ("b".to_owned(), program(SHOW))]);
     describe(&text, &programs).unwrap_or_else(|error| panic!("{error}"))
 }
@@ -80,4 +81,42 @@ fn no_command_takes_fewer_cycles_or_more() {
             assert!(way.worst <= most + 12, "{most}, and not {}", way.worst);
         }
     }
+}
+
+/// Cores each of which has a wire to each other one, and none to the host; with ticks of these numbers of base ticks.
+fn meshed(every: &[u64], out: &str) -> Description {
+    let (mut text, mut programs) = (format!("tick = {TICK}\n"), BTreeMap::new());
+    for (core, every) in every.iter().enumerate() {
+        text += &format!(
+            "[[core]]\nname = \"c{core}\"\nprogram = \"c{core}\"\nmachine = \"t1\"\ntick = {every}\n"
+        );
+    }
+    for to in 0..every.len() {
+        let senders = (0..every.len()).filter(|from| *from != to);
+        let wires =
+            senders.clone().map(|from| format!("[[wire]]\nfrom = \"c{from}.o\"\nto = \"c{to}.i{from}\"\n"));
+        text += &wires.collect::<String>();
+        text += &format!("[[wire]]\nfrom = \"host.h\"\nto = \"c{to}.h\"\n");
+        let inputs: String = senders.map(|from| format!(".input i{from}:int\n")).collect();
+        let rest =
+            ".input h:int\n.output o:int\n.once\n mov o, zero\n wait p\n.period\np: mov o, h\n wait p\n";
+        programs.insert(format!("c{to}"), program(&(inputs + rest)));
+    }
+    describe(&(text + out), &programs).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn too_many_ways_or_phases_end() {
+    let limit = |description: Description| {
+        let bound =
+            |core: &takt_system::Core| takt_analysis::bound(&core.program).expect("it can be bounded");
+        let bounds: Vec<_> = description.cores.iter().map(bound).collect();
+        match latencies(&description, &bounds) {
+            Err(LatencyError::Limit { limit, what }) => (limit, what),
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(limit(meshed(&[1; 16], "")), (MAX_STEPS, "links to follow"));
+    let out = "[[wire]]\nfrom = \"c1.o\"\nto = \"host.o\"\n";
+    assert_eq!(limit(meshed(&[499, 997], out)), (MAX_PHASES, "phases of the ticks to each other"));
 }

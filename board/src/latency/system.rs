@@ -9,7 +9,7 @@ use crate::taken::{Taken, taken, transit};
 use crate::wiring::Wiring;
 use std::collections::{BTreeMap, BTreeSet};
 use takt_isa::timing::ENDED_DELAY;
-use takt_system::latency::{LatencyError, Pass, Passages};
+use takt_system::latency::{LatencyError, Pass, Passages, Route};
 use takt_system::{Description, LinkKind};
 
 /// From the board's tick, in which peripherals capture, to the cycle in which that is written to links.
@@ -48,21 +48,23 @@ pub fn system_ways(wiring: &Wiring, passages: &Passages<'_>) -> Result<Ways, Lat
     let description = passages.description();
     let taken = taken(description, wiring);
     let (heads, tails) = (heads(description, wiring), tails(wiring, &taken));
-    let links = |way: &[usize]| way.iter().map(|link| description.links[*link].name.clone()).collect();
     let is_fifo = |link: &&usize| matches!(description.links[**link].kind, LinkKind::Fifo { .. });
     let (mut ways, mut queues) = (Vec::new(), BTreeSet::new());
-    for way in passages.ways(|link| heads.contains_key(&link), |link| tails.contains_key(&link))? {
-        let fifos: Vec<_> = way.iter().filter(is_fifo).collect();
+    for route in passages.routes(|link| heads.contains_key(&link), |link| tails.contains_key(&link))? {
+        let fifos: Vec<_> = route.links.iter().filter(is_fifo).collect();
         if !fifos.is_empty() {
             queues.extend(fifos.into_iter().map(|link| description.links[*link].name.clone()));
             continue;
         }
-        let [Some(first), Some(last)] = [way.first(), way.last()] else { continue };
-        let cores = passages.cores(&way);
-        let (between, periods) = between(passages, &way, &cores, &taken)?;
+        let [Some(first), Some(last), Some(core)] =
+            [route.links.first(), route.links.last(), route.cores.last()]
+        else {
+            continue;
+        };
+        let (between, periods) = between(passages, &route, *core, &taken[*core]);
         ways.push(Way {
-            cores: cores.iter().map(|core| description.cores[*core].name.clone()).collect(),
-            links: links(&way),
+            cores: route.cores.iter().map(|core| description.cores[*core].name.clone()).collect(),
+            links: route.links.iter().map(|link| description.links[*link].name.clone()).collect(),
             inputs: heads[first].clone(),
             between,
             periods,
@@ -109,23 +111,17 @@ fn tails(wiring: &Wiring, taken: &[Vec<Taken<'_>>]) -> ByLink {
     tails
 }
 
-/// The parts between the registers of peripherals at both ends of a way, and all of them.
-fn between(
-    passages: &Passages<'_>,
-    way: &[usize],
-    cores: &[usize],
-    taken: &[Vec<Taken<'_>>],
-) -> Result<(Vec<Part>, Part), LatencyError> {
-    let description = passages.description();
+/// The parts between the registers of peripherals at both ends of a way, and all of them; `taken` is what peripherals take from the last core.
+fn between(passages: &Passages<'_>, route: &Route, last: usize, taken: &[Taken<'_>]) -> (Vec<Part>, Part) {
+    let (description, cores) = (passages.description(), &route.cores);
     let (tick, lead) = (description.tick as i64, description.lead() as i64);
-    let Some(last) = cores.last() else { return Ok((Vec::new(), Part::sum("", &[]))) };
-    let puts = puts(passages, *last, &taken[*last], way);
+    let puts = puts(passages, last, taken, &route.links);
     // Cycles from one stage to the next: the board's tick, where each core reads, the last one's `wait`.
     let mut stages = vec![Range::NONE; cores.len() + 1];
     let (mut all, mut under_way) = (Range::NONE, vec![false; cores.len()]);
-    for phase in 0..passages.phases(cores)? as i64 {
+    for phase in 0..route.phases as i64 {
         let due = phase * tick - lead;
-        let [fastest, slowest] = [passages.fastest(way, due), passages.slowest(way, due)];
+        let [fastest, slowest] = [passages.fastest(&route.links, due), passages.slowest(&route.links, due)];
         for (passes, is_fastest) in [(&fastest, true), (&slowest, false)] {
             let waits = |pass: &Pass| if is_fastest && puts.early { pass.reads } else { pass.waits };
             let reached = passes.iter().map(|pass| pass.reads).chain(passes.last().map(waits));
@@ -150,13 +146,13 @@ fn between(
         from = format!("{name}, from {}", if *under_way { "there" } else { "tick" });
     }
     parts.push(stages[cores.len()].part(format!("{from} to `wait`")));
-    let mut after = vec![puts.cycles.part(format!("output ports to registers ({})", taken[*last].len()))];
+    let mut after = vec![puts.cycles.part(format!("output ports to registers ({})", taken.len()))];
     if puts.late > 0 {
         after.insert(0, Range(0, puts.late).part("if written with `wait`: to the next"));
     }
     let total = Part::sum("", [&parts[0], &all.part("")].into_iter().chain(&after));
     parts.extend(after);
-    Ok((parts, total))
+    (parts, total)
 }
 
 /// From a core's `wait` to the cycle in which the peripherals take on what it has written.
@@ -171,8 +167,7 @@ struct Puts {
 fn puts(passages: &Passages<'_>, core: usize, taken: &[Taken<'_>], way: &[usize]) -> Puts {
     let description = passages.description();
     let period = description.cores[core].period(description.tick) as i64;
-    // No deadline is missed.
-    let (best, worst) = passages.span(core).map_or((0, 0), |(best, worst)| (best, worst.min(period - 1)));
+    let (best, worst) = passages.span(core).unwrap_or((0, 0));
     let (registers, ended) = (taken.len() as i64, ENDED_DELAY as i64);
     let most = transit(description, taken) as i64;
     let own = way.last().map_or(0, |link| description.links[*link].transit() as i64);

@@ -6,7 +6,7 @@
 
 mod pass;
 
-pub use pass::{Pass, Passages};
+pub use pass::{Pass, Passages, Route};
 
 use crate::description::Description;
 use pass::{at_once, carry, contention};
@@ -17,8 +17,8 @@ use takt_isa::timing::Cycle;
 pub const MAX_WAYS: u64 = 4096;
 /// Links that are followed at most, to find them.
 pub const MAX_STEPS: u64 = 1 << 18;
-/// Phases of the ticks to each other that are gone through at most.
-pub const MAX_PHASES: u64 = 1 << 20;
+/// Phases of the ticks to each other that are gone through at most, over all ways.
+pub const MAX_PHASES: u64 = 1 << 18;
 /// Ends that the least time is looked for among, at most, for one phase.
 const MAX_ENDS: u32 = 64;
 
@@ -73,19 +73,18 @@ pub fn latencies(description: &Description, bounds: &[Bounds]) -> Result<Vec<Lat
     if let Some(error) = (0..description.cores.len()).find_map(|core| passages.deadline(core)) {
         return Err(error);
     }
-    let ways = passages.ways(|_| true, |_| true)?;
-    ways.into_iter().map(|way| measure(&passages, way)).collect()
+    let routes = passages.routes(|_| true, |_| true)?;
+    Ok(routes.into_iter().map(|route| measure(&passages, route)).collect())
 }
 
-fn measure(passages: &Passages<'_>, way: Vec<usize>) -> Result<Latency, LatencyError> {
+fn measure(passages: &Passages<'_>, Route { links: way, cores, phases }: Route) -> Latency {
     let description = passages.description();
-    let cores = passages.cores(&way);
     let (head, tail) = (way.first().map_or(0, |link| *link), way.last().map_or(0, |link| *link));
     let (mut best, mut worst) = (i64::MAX, 0);
     if let Some(&first) = cores.first() {
         let grid = passages.grid(first);
         let link = &description.links[head];
-        for phase in 0..passages.phases(&cores)? / description.cores[first].every {
+        for phase in 0..phases / description.cores[first].every {
             let tick = grid.offset + phase as i64 * grid.period;
             // As late as it can be for this tick, or for the period that it begins, and just too late for it.
             let start = tick - carry(description, link);
@@ -105,7 +104,7 @@ fn measure(passages: &Passages<'_>, way: Vec<usize>) -> Result<Latency, LatencyE
         inputs.extend(description.links[head].fields.first().map(|field| field.from.clone()));
     }
     let outputs = names(tail, description.outputs());
-    Ok(Latency { inputs, outputs, links: way, cores, best: best.max(0) as u64, worst: worst as u64 })
+    Latency { inputs, outputs, links: way, cores, best: best.max(0) as u64, worst: worst as u64 }
 }
 
 /// The cycle in which the host sees what these passages lead to.

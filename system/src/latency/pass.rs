@@ -9,9 +9,9 @@ use takt_isa::{BundleAddress, Machine, Program};
 /// What is known of a core's periods.
 #[derive(Clone, Copy, Debug)]
 struct Span {
-    /// Cycles from a tick to the `wait`, at least.
+    /// Cycles from a tick to the `wait`, at least, if no tick is missed.
     best: i64,
-    /// At most.
+    /// At most, likewise.
     worst: i64,
     /// Cycles after the `wait` in which what issues together with it is written to outputs; 0: nothing is.
     late: i64,
@@ -32,6 +32,17 @@ pub struct Pass {
     pub waits: i64,
     /// The cycle in which what follows from the value goes onto the next link: that of its writeback, or of the `wait` that publishes it.
     pub leaves: i64,
+}
+
+/// A way from the host to the host.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Route {
+    /// Its links, in order.
+    pub links: Vec<usize>,
+    /// The cores between them.
+    pub cores: Vec<usize>,
+    /// Base ticks after which the ticks of these cores come again as they came.
+    pub phases: u64,
 }
 
 /// The cores' periods, and how values pass through them.
@@ -75,11 +86,14 @@ impl<'a> Passages<'a> {
             let refilled = in_time.saturating_add(core.program.machine.refill.into()) <= period;
             let worst = periods().map(|section| section.cycles.worst).max().filter(|_| refilled);
             let ends = periods().flat_map(|section| &section.ends);
+            let below = period.saturating_sub(spare);
+            // A period that takes more misses its tick, and is told of by itself.
+            let kept = |cycles: Cycle| cycles.min(below.saturating_sub(1)) as i64;
             Some(Span {
-                best: periods().map(|section| section.cycles.best).min().unwrap_or(0) as i64,
-                worst: worst.unwrap_or(in_time) as i64,
+                best: kept(periods().map(|section| section.cycles.best).min().unwrap_or(0)),
+                worst: kept(worst.unwrap_or(in_time)),
                 late: ends.map(|&end| late(&core.program, end)).max().unwrap_or(0).into(),
-                in_time: (in_time, period.saturating_sub(spare)),
+                in_time: (in_time, below),
             })
         };
         let spans = bounds.iter().enumerate().map(|(number, bounds)| span(number, bounds)).collect();
@@ -103,21 +117,21 @@ impl<'a> Passages<'a> {
         self.spans[core].map_or(0, |span| span.late)
     }
 
-    /// Cycles from a tick of a core to its `wait`, at least and at most; none if it never waits for a tick.
+    /// Cycles from a tick of a core to its `wait`, at least and at most, if it misses none; none if it never waits for a tick.
     pub fn span(&self, core: usize) -> Option<(i64, i64)> {
         self.spans[core].map(|span| (span.best, span.worst))
     }
 
-    /// The links of every way that begins with one of these links from the host, and ends with one of those to the host. None goes through a
-    /// core twice, or through one that never waits for a tick.
+    /// Every way that begins with one of these links from the host, and ends with one of those to the host. None goes through a core twice,
+    /// or through one that never waits for a tick.
     ///
     /// # Errors
-    /// If there are too many.
-    pub fn ways(
+    /// If there are too many, or too many phases of ticks to go through.
+    pub fn routes(
         &self,
         from: impl Fn(usize) -> bool,
         to: impl Fn(usize) -> bool,
-    ) -> Result<Vec<Vec<usize>>, LatencyError> {
+    ) -> Result<Vec<Route>, LatencyError> {
         let links = &self.description.links;
         let mut leaving = vec![Vec::new(); self.spans.len()];
         for (number, link) in links.iter().enumerate().rev() {
@@ -125,7 +139,7 @@ impl<'a> Passages<'a> {
                 leaving[core].push(number);
             }
         }
-        let (mut found, mut steps) = (Vec::new(), 0);
+        let (mut found, mut steps, mut phases) = (Vec::new(), 0, 0_u64);
         // Last in, first out: the next way goes on from where this one branched off last.
         let starts = (0..links.len()).filter(|&link| links[link].from == End::Host && from(link));
         let mut left: Vec<Vec<usize>> = starts.rev().map(|link| vec![link]).collect();
@@ -143,7 +157,12 @@ impl<'a> Passages<'a> {
                             what: "ways from inputs to outputs",
                         });
                     }
-                    found.push(way);
+                    let route = self.route(way).filter(|route| {
+                        phases = phases.saturating_add(route.phases);
+                        phases <= MAX_PHASES
+                    });
+                    let what = "phases of the ticks to each other";
+                    found.push(route.ok_or(LatencyError::Limit { limit: MAX_PHASES, what })?);
                 }
                 End::Host => {}
                 End::Core(core) => {
@@ -157,23 +176,14 @@ impl<'a> Passages<'a> {
         Ok(found)
     }
 
-    /// The cores that a way's links lead to.
-    pub fn cores(&self, way: &[usize]) -> Vec<usize> {
+    fn route(&self, links: Vec<usize>) -> Option<Route> {
         let core = |link: &usize| match self.description.links[*link].to {
             End::Core(core) => Some(core),
             End::Host => None,
         };
-        way.iter().filter_map(core).collect()
-    }
-
-    /// Base ticks after which the ticks of these cores come again as they came.
-    ///
-    /// # Errors
-    /// If there are too many to go through.
-    pub fn phases(&self, cores: &[usize]) -> Result<u64, LatencyError> {
-        let all = cores.iter().try_fold(1, |all, core| lcm(all, self.description.cores[*core].every));
-        let all = all.filter(|all| *all <= MAX_PHASES);
-        all.ok_or(LatencyError::Limit { limit: MAX_PHASES, what: "phases of the ticks to each other" })
+        let cores: Vec<usize> = links.iter().filter_map(core).collect();
+        let phases = cores.iter().try_fold(1, |all, core| lcm(all, self.description.cores[*core].every))?;
+        Some(Route { links, cores, phases })
     }
 
     pub(super) fn grid(&self, core: usize) -> Grid {
