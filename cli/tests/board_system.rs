@@ -109,7 +109,7 @@ fn wrong_systems_and_ports_are_refused() {
     folder.write("axis.toml", format!("{system}{many}"));
     refused(
         "board build --board ulx3s-85f --wiring wiring.toml --program axis.toml --sources -o out",
-        "the system needs 228 block RAMs at least, 9 of them for the image of ",
+        "the system needs 252 block RAMs at least, 9 of them for the image of ",
     );
     refused(&format!("board check {} --machine t1", axis()), "--machine is for a program");
     refused(
@@ -133,7 +133,7 @@ fn wrong_systems_and_ports_are_refused() {
         "entries of `moves` have no field `speed`; there are target, rate",
     );
     refused(&live("pop moves"), "`moves` is a FIFO from the host, into which `push` puts entries");
-    refused(&live("stream servo.duty watch.peak"), "one stream has 15 ports whose numbers follow each other");
+    refused(&live("stream servo.duty watch.peak"), "one stream has 15 numbers that follow each other");
     refused("live /dev/nothing push moves target=1", "ports have names in the program: --program FILE");
 }
 
