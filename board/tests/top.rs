@@ -123,7 +123,7 @@ fn a_duty_shows_as_late_as_the_bound_says() {
     let board = Board::from_name("ulx3s-85f").expect("a board").expect("a right one");
     let wiring = Wiring::read("w.toml", &text, &board).expect("a right wiring");
     let bound = Part::sum("", &latency::ways(&wiring, (0, 0)).ways[0].outputs[0].parts);
-    let pwm = &wiring.peripherals[0];
+    let pwm = &wiring.peripherals[1];
     let (mut least, mut most) = (u64::MAX, 0);
     for (old, new) in (-half..=half).flat_map(|old| (-half..=half).map(move |new| (old, new))) {
         for phase in 0..2 * half {
