@@ -117,12 +117,16 @@ fn end(passages: &Passages<'_>, way: &[usize], passes: &[Pass]) -> i64 {
 /// The least that a command takes which is given in one of these cycles.
 fn least(passages: &Passages<'_>, way: &[usize], first: i64, last: i64) -> i64 {
     let end = |start| end(passages, way, &passages.fastest(way, start));
+    // What links take, and a cycle in each core between them, no start can save.
+    let description = passages.description();
+    let carries = way.iter().map(|link| carry(description, &description.links[*link]) + 1);
+    let floor = carries.sum::<i64>() - 1;
     // A later start never ends earlier, so that of all starts with one end the last is the best.
     let (mut start, mut best, earliest) = (last, i64::MAX, end(first));
     for _ in 0..MAX_ENDS {
         let at = end(start);
         best = best.min(at - start);
-        if at == earliest {
+        if at == earliest || best <= floor {
             return best;
         }
         let (mut before, mut from) = (first, start);
@@ -132,5 +136,5 @@ fn least(passages: &Passages<'_>, way: &[usize], first: i64, last: i64) -> i64 {
         }
         start = before;
     }
-    best.min(earliest - start)
+    best.min(floor.max(earliest - start))
 }

@@ -202,7 +202,8 @@ impl<'a> Passages<'a> {
                 true => (cycle, cycle.max(tick + span.best)),
                 false => (grid.from(cycle), grid.from(cycle) + span.best),
             };
-            let leaves = if at_wait(self.description, next) { waits } else { reads + 1 };
+            // A `wait` publishes what was written by then.
+            let leaves = if at_wait(self.description, next) { waits.max(reads + 1) } else { reads + 1 };
             Pass { core, reads, under_way, waits, leaves }
         })
     }
