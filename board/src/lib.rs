@@ -17,6 +17,7 @@ pub mod protocol;
 pub mod routed;
 pub mod serial;
 pub mod simulation;
+mod taken;
 #[cfg(unix)]
 pub mod terminal;
 pub mod tools;

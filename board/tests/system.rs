@@ -1,13 +1,19 @@
 //! A system of three cores on a board, complete in Verilator: the example `programs/examples/board/axis`, with the real host at its UART.
 
+#[path = "harness/board.rs"]
+mod harness;
+
+use harness::Ticks;
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::ends::{Ends, Fifo};
+use takt_board::latency::{Part, system_ways};
 use takt_board::protocol::LinkError;
 use takt_board::simulation::{Simulation, Turn};
 use takt_board::{Application, Board, Host, Wiring, top};
 use takt_isa::Program;
+use takt_system::latency::Passages;
 use takt_system::{Description, LinkKind, ProgramError, Request, System};
 
 const SYSTEM: &str = include_str!("../../programs/examples/board/axis/axis.toml");
@@ -22,7 +28,7 @@ fn wiring_text() -> String {
     let text = include_str!("../../programs/examples/board/axis/wiring.toml");
     text.replace("baud = 1_000_000", "baud = 5_000_000\ndeadlines = 2")
         .replace("host = 0 ", "host = 60 ")
-        .replace("[signals]", "[signals]\ndeadline = \"gp12\"\nstop = \"gn10\"")
+        .replace("[signals]", "[signals]\ndeadline = \"gp12\"\ntick = \"gp13\"\nstop = \"gn10\"")
 }
 
 /// Cycles of a base tick.
@@ -124,6 +130,62 @@ fn float(value: f32) -> u32 {
     value.to_bits()
 }
 
+/// Cycles from an edge of the encoder, so many cycles before a tick, to the first one in which the PWM's pulse is not that of before.
+fn measured_of_pulse(ticks: &Ticks, board: &mut Simulation, before: u64, turn: Turn) -> u64 {
+    let period = 2 * PWM.0 as u32;
+    ticks.run_to(board, before, period);
+    let is_high = |board: &mut Simulation| {
+        board.run(1, &[]).expect("it runs");
+        board.output("motor_high").expect("a pin").1 == 1
+    };
+    let mut levels: Vec<bool> = (0..period).map(|_| is_high(board)).collect();
+    board.turns.push(turn);
+    let differs = |cycle: &usize| {
+        levels.push(is_high(board));
+        levels[cycle + period as usize] != levels[*cycle]
+    };
+    (0..4 * PERIOD as usize).find(differs).expect("the motor follows") as u64
+}
+
+/// From an edge of the encoder, which stands at 0, to the motor's and the lamp's, in many phases to the ticks.
+fn pins_follow_as_the_bound_says(host: &mut Host<Simulation>, description: &Description, pins: [usize; 2]) {
+    let bound = |core: &takt_system::Core| takt_analysis::bound(&core.program).expect("it can be bounded");
+    let bounds: Vec<_> = description.cores.iter().map(bound).collect();
+    let ways = system_ways(&wiring(description), &Passages::new(description, &bounds)).expect("few ways");
+    let [motor, lamp] = &ways.ways[..] else { panic!("{:?}", ways.ways) };
+    assert_eq!((motor.cores.join(" "), lamp.cores.join(" ")), ("servo".into(), "servo watch".into()));
+    let edge = lamp.inputs[0].parts[0].best;
+    let (ticks, mut count) = (Ticks::of(&mut host.line, PERIOD), 0);
+    // Both of the base ticks that one tick of the watch follows.
+    let mut all = |before: &[u64], measured: &dyn Fn(&mut Simulation, u64, Turn) -> u64| {
+        let phases = before.iter().flat_map(|&before| [(before, 0), (before, 1)]);
+        let cycles = phases.map(|(before, more)| {
+            // The host is there, so that outputs drive.
+            assert!(host.status().expect("status").drives());
+            periods(&mut host.line, more);
+            let by = if count == 0 { 1 } else { -1 };
+            let cycles = measured(&mut host.line, before, Turn { pins, from: count, by });
+            count += by;
+            periods(&mut host.line, 2);
+            cycles
+        });
+        let cycles: Vec<u64> = cycles.collect();
+        (*cycles.iter().min().expect("some"), *cycles.iter().max().expect("some"))
+    };
+    // Just in time for a tick, just too late, and between.
+    let total = lamp.total();
+    let found = all(&[edge, edge - 1, 4999, 4000, 2600, 2500, 1234, 400, 20], &|sim, before, turn| {
+        ticks.measured(sim, before, |sim| sim.turns.push(turn), "lamp_out")
+    });
+    assert_eq!(found, (total.best, total.worst));
+    // Base ticks are a whole number of the PWM's periods apart, so that values always come at the same place of one.
+    let (fixed, pwm) = (Part::sum("", motor.inputs[0].parts.iter().chain(&motor.between)), motor.total());
+    let (least, most) =
+        all(&[edge, edge - 1], &|sim, before, turn| measured_of_pulse(&ticks, sim, before, turn));
+    assert!(least >= pwm.best && most <= pwm.worst, "{least} to {most}, and not {pwm:?}");
+    assert_eq!(most - least, fixed.worst - fixed.best, "{least} to {most}");
+}
+
 #[test]
 fn a_system_runs_talks_and_fails_safe() {
     let description = unchanged();
@@ -138,15 +200,17 @@ fn a_system_runs_talks_and_fails_safe() {
     assert_eq!(sim.output("signal_drive").map(|(level, _)| level), Some(true), "it drives");
     assert_eq!(pulse(&mut sim), expected(0.0));
 
+    let mut host = connect(sim);
+    pins_follow_as_the_bound_says(&mut host, &description, encoder);
+
     // The loop through the pins: the servo reads the encoder, the watch lights the lamp.
-    sim.turns.push(Turn { pins: encoder, from: 0, by: 20 });
-    periods(&mut sim, 3);
-    periods(&mut sim, 3);
-    assert_eq!(pulse(&mut sim), expected(-20.0));
-    assert_eq!(sim.output("lamp_out").map(|(level, _)| level), Some(true));
+    host.line.turns.push(Turn { pins: encoder, from: 0, by: 20 });
+    periods(&mut host.line, 3);
+    periods(&mut host.line, 3);
+    assert_eq!(pulse(&mut host.line), expected(-20.0));
+    assert_eq!(host.line.output("lamp_out").map(|(level, _)| level), Some(true));
 
     // Ports of each core, and what the host drives.
-    let mut host = connect(sim);
     assert_eq!(host.cores, 3);
     host.fits(&description).expect("it is this system's circuit");
     assert!((0..3).all(|core| host.status_of(core).expect("status").drives()));

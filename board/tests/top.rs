@@ -1,5 +1,9 @@
 //! The complete top level of a board in Verilator, with a plant behind its pins and the real host at its UART.
 
+#[path = "harness/board.rs"]
+mod harness;
+
+use harness::Ticks;
 use std::panic::AssertUnwindSafe;
 use std::path::{Path, PathBuf};
 use takt_asm::{MemoryLoader, Options, assemble};
@@ -109,30 +113,17 @@ fn pulse(board: &mut Simulation) -> u32 {
     board.output("motor_high").expect("a pin").1
 }
 
-/// Cycles from an edge of the encoder, which stands at a count and goes on by one so many cycles before a tick, to that of the lamp.
-fn measured(board: &mut Simulation, before: u64, encoder: [usize; 2], count: i32) -> u64 {
-    let is_high = |board: &mut Simulation, pin: &str| {
-        board.run(1, &[]).expect("it runs");
-        board.output(pin).expect("a pin").1 == 1
-    };
-    assert!((0..PERIOD).any(|_| is_high(board, "signal_tick")), "no tick");
-    board.run(PERIOD - 1 - before as u32, &[]).expect("it runs");
-    let was = board.output("lamp_out").expect("a pin").0;
-    board.turns.push(Turn { pins: encoder, from: count, by: 1 });
-    (0..2 * u64::from(PERIOD)).find(|_| is_high(board, "lamp_out") != was).expect("the lamp follows")
-}
-
 /// Of a PWM, in every phase, the first cycle in which a new duty shows.
 #[test]
 fn a_duty_shows_as_late_as_the_bound_says() {
     let (half, dead) = (13, 3);
     let text = format!(
-        "period = 40\n[peripheral.motor]\nkind = \"pwm\"\npins = {{ high = \"gp2\", low = \"gn2\" }}\nhalf = {half}\ndead = {dead}\nports = {{ duty = \"force\" }}\n"
+        "period = 40\n[peripheral.encoder]\nkind = \"quadrature\"\npins = {{ a = \"gp0\", b = \"gn0\" }}\nports = {{ count = \"n\" }}\n[peripheral.motor]\nkind = \"pwm\"\npins = {{ high = \"gp2\", low = \"gn2\" }}\nhalf = {half}\ndead = {dead}\nports = {{ duty = \"force\" }}\n"
     );
     let board = Board::from_name("ulx3s-85f").expect("a board").expect("a right one");
     let wiring = Wiring::read("w.toml", &text, &board).expect("a right wiring");
-    let bound = Part::sum("", &latency::ways(&wiring, (0, 0)).outputs[0].parts);
-    let pwm = &wiring.peripherals[0];
+    let bound = Part::sum("", &latency::ways(&wiring, (0, 0)).ways[0].outputs[0].parts);
+    let pwm = &wiring.peripherals[1];
     let (mut least, mut most) = (u64::MAX, 0);
     for (old, new) in (-half..=half).flat_map(|old| (-half..=half).map(move |new| (old, new))) {
         for phase in 0..2 * half {
@@ -229,10 +220,14 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     let bounds = takt_analysis::bound(first).expect("it can be bounded");
     let period = bounds.sections.iter().find(|section| !section.once).expect("it has a period").cycles;
     let ways = latency::ways(wiring, (period.best, period.worst));
-    let [edge, lamp] = [&ways.inputs[0].parts, &ways.outputs[1].parts];
-    let bound = Part::sum("", edge.iter().chain(&ways.between).chain(lamp));
-    assert_eq!(measured(&mut sim, edge[0].best, encoder, 40), bound.best);
-    assert_eq!(measured(&mut sim, edge[0].best - 1, encoder, 41), bound.worst);
+    let way = &ways.ways[0];
+    let [edge, lamp] = [&way.inputs[0].parts, &way.outputs[1].parts];
+    let bound = Part::sum("", edge.iter().chain(&way.between).chain(lamp));
+    let ticks = Ticks::of(&mut sim, PERIOD);
+    for (before, from, cycles) in [(edge[0].best, 40, bound.best), (edge[0].best - 1, 41, bound.worst)] {
+        let turn = |sim: &mut Simulation| sim.turns.push(Turn { pins: encoder, from, by: 1 });
+        assert_eq!(ticks.measured(&mut sim, before, turn, "lamp_out"), cycles);
+    }
     sim.turns.push(Turn { pins: encoder, from: 42, by: -2 });
     periods(&mut sim, 2);
 
@@ -255,7 +250,7 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     assert_eq!(pulse(&mut host.line), 250 + 48 - 5);
     let cycles = host.register("cycles").expect("a register");
     // Of them the first part, the wait for the tick, is not counted.
-    let exact = Part::sum("", &ways.between[1..]);
+    let exact = Part::sum("", &way.between[1..]);
     assert_eq!((exact.best, exact.worst), (cycles.into(), cycles.into()), "cycles from tick to outputs");
     assert_eq!(host.register("misses").expect("a register"), 0);
 

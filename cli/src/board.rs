@@ -17,7 +17,6 @@ use std::path::{Path, PathBuf};
 use takt_board::simulation::{Simulation, Turn};
 use takt_board::tools::{NEXTPNR, Venv, YOSYS};
 use takt_board::{Application, Board, Mistake, Wiring};
-use takt_isa::Program;
 
 /// List boards and their pins; check, build and simulate a program, or a system of several cores, on a board.
 #[derive(Args)]
@@ -192,11 +191,11 @@ impl Target {
     }
 }
 
-/// The wiring of a file for a program, and its board: the one that is named, else the one that it names itself.
+/// The wiring of a file for a program or a system, and its board: the one that is named, else the one that it names itself.
 pub(crate) fn wired(
     path: &Path,
     board: Option<&str>,
-    program: &Program,
+    application: Application<'_>,
     color: bool,
 ) -> Result<(Board, Wiring)> {
     let (name, text) = text(path)?;
@@ -207,7 +206,7 @@ pub(crate) fn wired(
     };
     let board = find(&board, color)?;
     let wiring = right(Wiring::read(&name, &text, &board), color)?;
-    right(wiring.check(&name, &text, program), color)?;
+    right(wiring.check(&name, &text, application), color)?;
     Ok((board, wiring))
 }
 

@@ -1,7 +1,7 @@
 //! `takt bound`: the best and the worst that each section can take, from the program alone.
 
 #[cfg(feature = "board")]
-mod pins;
+pub(crate) mod pins;
 
 use crate::files::{self, Out};
 use crate::load::{self, Load};
@@ -45,7 +45,7 @@ pub(crate) struct Bound {
     /// With --pins: which peripherals are at which pins (docs/board.md).
     #[cfg(feature = "board")]
     #[arg(long, value_name = "TOML", requires = "pins")]
-    wiring: Option<PathBuf>,
+    pub(crate) wiring: Option<PathBuf>,
     /// With --pins: the board, where the wiring does not name it.
     #[cfg(feature = "board")]
     #[arg(long, value_name = "BOARD", requires = "pins")]
@@ -60,7 +60,43 @@ Examples:
   takt bound prog.s                                  best and worst of every section
   takt bound prog.s --deadline 100us --clock 125MHz  for CI: status 1 if a period can take longer
   takt bound robot.s --pins --wiring robot.toml      from an encoder's edge to a PWM's, on a board
-  takt bound system.toml                             of each core, and from the host's inputs to outputs";
+  takt bound system.toml                             of each core, and from the host's inputs to outputs
+  takt bound axis.toml --pins --wiring wiring.toml   over a system's cores and links, from pin to pin";
+
+/// Names that are shown of a list with many.
+const SHOWN: usize = 3;
+
+/// Names one after the other, of many the first ones.
+pub(crate) fn listed(names: &[String]) -> String {
+    match names {
+        many if many.len() > SHOWN => format!("{}, … ({})", many[..SHOWN].join(", "), many.len()),
+        few => few.join(", "),
+    }
+}
+
+/// The name of one end, or the merging of another group's ends of that side into one's own.
+type Side<G> = (fn(&G) -> &Vec<String>, fn(&mut G, G));
+
+/// Groups of ways that are alike but for the names of their ends: each of one group's heads leads to each of its tails.
+pub(crate) fn grouped<G>(
+    ways: impl Iterator<Item = G>,
+    alike: impl Fn(&G, &G) -> bool,
+    (heads, with_heads): Side<G>,
+    (tails, with_tails): Side<G>,
+) -> Vec<G> {
+    let merged = |groups: Vec<G>, same: fn(&G) -> &Vec<String>, with: fn(&mut G, G)| {
+        let mut merged: Vec<G> = Vec::new();
+        for group in groups {
+            match merged.iter_mut().find(|other| alike(other, &group) && same(other) == same(&group)) {
+                Some(other) => with(other, group),
+                None => merged.push(group),
+            }
+        }
+        merged
+    };
+    // First the tails of the same heads, then the heads of the same tails.
+    merged(merged(ways.collect(), heads, with_tails), tails, with_heads)
+}
 
 /// The deadline against the worst period.
 struct Verdict {
@@ -78,13 +114,6 @@ impl Verdict {
 pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
     files::check(&[("FILE", &arguments.file)], &[])?;
     if load::is_system(&arguments.file) {
-        #[cfg(feature = "board")]
-        if arguments.pins {
-            bail!(
-                "--pins follows the way through a single program, and {} is a system: `takt bound` without it bounds the way from the host's inputs to its outputs, between which a board puts what docs/board.md says",
-                files::input_name(&arguments.file)
-            );
-        }
         return system::bound::run(arguments, color, out);
     }
     let program =
@@ -92,7 +121,7 @@ pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
     let bounds = takt_analysis::bound(&program).map_err(|error| anyhow!("no bound: {error}"))?;
     #[cfg(feature = "board")]
     if let Some(wiring) = &arguments.wiring {
-        return pins::run(arguments, wiring, &program, &bounds, color, out);
+        return pins::program(arguments, wiring, &program, &bounds, color, out);
     }
     let verdict = match (arguments.deadline, bounds.worst_period()) {
         (None, _) => None,

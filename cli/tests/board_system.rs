@@ -135,10 +135,111 @@ fn wrong_systems_and_ports_are_refused() {
     refused(&live("pop moves"), "`moves` is a FIFO from the host, into which `push` puts entries");
     refused(&live("stream servo.duty watch.peak"), "one stream has 15 numbers that follow each other");
     refused("live /dev/nothing push moves target=1", "ports have names in the program: --program FILE");
-    refused(
-        &format!("bound {} --pins --wiring {}", example("axis.toml"), example("wiring.toml")),
-        "--pins follows the way through a single program",
+}
+
+/// The example's files, some of them with a text replaced.
+fn copied(folder: &Folder, changes: &[(&str, &str, &str)]) {
+    for name in ["axis.toml", "wiring.toml", "profile.s", "servo.s", "watch.s"] {
+        let mut text = std::fs::read_to_string(example(name)).unwrap();
+        for (_, from, to) in changes.iter().filter(|(at, ..)| *at == name) {
+            assert!(text.contains(from), "{name}: {from}");
+            text = text.replace(from, to);
+        }
+        folder.write(name, text);
+    }
+}
+
+#[test]
+fn the_ways_from_pin_to_pin_over_cores_have_bounds() {
+    let folder = Folder::new();
+    let bound = "bound axis.toml --pins --wiring wiring.toml";
+    copied(&folder, &[]);
+    insta::assert_snapshot!("pins", folder.line(bound).ok());
+    let json: serde_json::Value =
+        serde_json::from_str(&folder.line(&format!("{bound} --json")).ok()).unwrap();
+    let way = &json["ways"][1];
+    assert_eq!(way["cores"], serde_json::json!(["servo", "watch"]));
+    assert_eq!(way["links"][1], "servo.error -> watch.error");
+    let parts = [&way["inputs"][0]["parts"], &way["between"], &way["outputs"][0]["parts"]];
+    for edge in ["best", "worst"] {
+        let parts = parts.iter().flat_map(|parts| parts.as_array().unwrap());
+        assert_eq!(way["total"][edge], parts.map(|part| part[edge].as_u64().unwrap()).sum::<u64>());
+    }
+
+    // Encoders that differ in their wires only are told of together; a converter has no edge; a queue no time.
+    let more = "[peripheral.second]\nkind = \"quadrature\"\npins = { a = \"gp4\", b = \"gn4\" }\nports = { count = \"servo.n2\" }\n\
+                [peripheral.converter]\nkind = \"spi\"\npins = { clock = \"gp5\", select = \"gn5\", in = \"gp6\" }\n\
+                ports = { received = \"servo.n3\" }\n[peripheral.lamp]";
+    let links = "[[wire]]\nfrom = \"host.n2\"\nto = \"servo.n2\"\n[[wire]]\nfrom = \"host.n3\"\nto = \"servo.n3\"\n\
+                 [[fifo]]\nname = \"errors\"\nfrom = \"servo\"\nto = \"watch\"\nports = [\"error -> late\"]\npush = \"error\"\n\
+                 pop = \"next\"\ndepth = 2\n[[wire]]\nfrom = \"host.limit\"";
+    let several = [
+        ("wiring.toml", "[peripheral.lamp]", more),
+        ("axis.toml", "[[wire]]\nfrom = \"host.limit\"", links),
+        ("servo.s", ".input  n:int ", ".input  n2:int, n3:int\n.input  n:int "),
+        ("watch.s", ".output peak ", ".input  late\n.output next\n.output peak "),
+    ];
+    copied(&folder, &several);
+    let text = folder.line(&format!("{bound} -W allow=unused")).ok();
+    for says in [
+        "over host.n -> servo.n, host.n2 -> servo.n2; servo.duty -> host.duty\nencoder (servo.n), second (servo.n2)\n",
+        "no edge to count from or to: converter\n",
+        "left out, because the latency depends on what is queued: paths over errors\n",
+    ] {
+        assert!(text.contains(says), "{says}: {text}");
+    }
+
+    // A deadline that can be missed is no part of a bound.
+    let slow = "        .loop_bound 2000\nagain:  isub    k, k, 1\n        bnz     k, again\n        fabs    a, error\n";
+    copied(
+        &folder,
+        &[
+            ("watch.s", ".reg    a\n", ".reg    a k:int\n        mov     k, 2000\n"),
+            ("watch.s", "        fabs    a, error\n", slow),
+        ],
     );
+    let text = folder.line(bound).ok();
+    assert!(text.contains("\na deadline can be missed: core watch: a period can take "), "{text}");
+
+    let refused = |changes: &[(&str, &str, &str)], more: &str, says: &str| {
+        copied(&folder, changes);
+        let done = folder.line(&format!("{bound}{more}"));
+        assert!(done.status == Some(1) && done.stdout.is_empty(), "{done:?}");
+        assert!(done.stderr.contains(says), "{says}: {}", done.stderr);
+    };
+    refused(&[], " --deadline 100us", "--deadline is not for --pins");
+    refused(&[("wiring.toml", "servo.n", "axle.n")], "", "wiring.toml:17:19: the system has no core `axle`");
+    refused(&[("wiring.toml", "period = 100 ", "period = 50 ")], "", "the system's `tick` is 5000 cycles");
+    // An encoder at a core that leads to no pin; a lamp behind a queue.
+    let wiring = std::fs::read_to_string(example("wiring.toml")).unwrap();
+    let [motor, lamp] = ["[peripheral.motor]", "[peripheral.lamp]"].map(|table| wiring.find(table).unwrap());
+    let apart = [
+        ("wiring.toml", "servo.n", "watch.count"),
+        ("wiring.toml", &wiring[lamp..], ""),
+        ("watch.s", ".output peak ", ".input  count:int\n.output peak "),
+        (
+            "axis.toml",
+            "[[wire]]\nfrom = \"host.limit\"",
+            "[[wire]]\nfrom = \"host.count\"\nto = \"watch.count\"\n[[wire]]\nfrom = \"host.limit\"",
+        ),
+    ];
+    refused(
+        &apart,
+        " -W allow=unused",
+        "wiring.toml: no path from pin to pin: the links of axis.toml lead from no input",
+    );
+    let queued = [
+        ("wiring.toml", &wiring[motor..lamp], ""),
+        ("watch.s", ".output peak ", ".output next\n.output peak "),
+        (
+            "axis.toml",
+            "[[wire]]\nfrom = \"servo.error\"\nto = \"watch.error\"",
+            "[[fifo]]\nname = \"errors\"\nfrom = \"servo\"\nto = \"watch\"\nports = [\"error\"]\npush = \"error\"\npop = \"next\"\ndepth = 2",
+        ),
+    ];
+    refused(&queued, " -W allow=unused", "no bound from pin to pin: every path goes over a FIFO (errors)");
+    let usage = folder.line("bound axis.toml --pins");
+    assert!(usage.status == Some(2) && usage.stderr.contains("--wiring <TOML>"), "{usage:?}");
 }
 
 #[test]

@@ -6,22 +6,15 @@ use crate::application::{Application, CORE};
 use crate::ends::{Ends, INPUT_ENDS};
 use crate::kind::Direction;
 use crate::protocol;
-use crate::wiring::{Wiring, Write as Written};
+use crate::taken::{Taken, taken, transit};
+use crate::wiring::Wiring;
 use std::fmt::Write as _;
 use takt_rtl::system::{Pin, PinKind, SystemPlan};
 use takt_rtl::{Library, verilog};
-use takt_system::{Description, End, Link, LinkKind, Status};
+use takt_system::{Description, Link, LinkKind, Status};
 
 /// Cycles of reset after the last record: as long as anything can be under way in a core, or on a link.
 const SETTLE: u64 = 128;
-
-/// A register of a peripheral that a core writes.
-struct Output<'a> {
-    net: String,
-    written: &'a Written,
-    /// The host's end that it takes.
-    end: usize,
-}
 
 /// What is known before anything is written.
 struct Around<'a> {
@@ -31,7 +24,7 @@ struct Around<'a> {
     /// Of each value that the host drives, the peripheral's net that does instead.
     driven: Vec<Option<String>>,
     /// Of each core, what peripherals take at its `wait`.
-    outputs: Vec<Vec<Output<'a>>>,
+    taken: Vec<Vec<Taken<'a>>>,
 }
 
 /// The system, peripherals and what is between them; `circuit` is the number by which the host knows it again.
@@ -46,8 +39,7 @@ pub(super) fn around(
     let ends = Ends::of(description);
     let cores = description.cores.len();
     let driven = vec![None; ends.inputs.len()];
-    let mut around = Around { plan, description, driven, ends, outputs: Vec::new() };
-    around.outputs.resize_with(cores, Vec::new);
+    let mut around = Around { plan, description, driven, ends, taken: taken(description, wiring) };
     let (nets, parts) = around.peripherals(wiring);
     let all_misses = (0..cores).map(|core| format!("misses{core}")).collect::<Vec<_>>().join(", ");
     let deadline = format!("|{{{all_misses}}}");
@@ -85,7 +77,7 @@ pub(super) fn around(
 
 impl<'a> Around<'a> {
     /// Nets and instances of the peripherals.
-    fn peripherals(&mut self, wiring: &'a Wiring) -> (String, String) {
+    fn peripherals(&mut self, wiring: &Wiring) -> (String, String) {
         let system = Application::System(self.description);
         let (mut nets, mut parts) = (String::new(), String::new());
         for peripheral in &wiring.peripherals {
@@ -98,16 +90,12 @@ impl<'a> Around<'a> {
                 self.driven[found.number] = Some(net);
                 connected.push(register.name);
             }
-            for (register, written) in kind.writes.iter().zip(&peripheral.writes) {
-                let Some(written) = written else { continue };
-                let Ok(found) = system.connect(Direction::Output, &written.port) else { continue };
-                let link = &self.description.links[self.ends.outputs[found.number].link];
-                let End::Core(core) = link.from else { continue };
-                let net = net(peripheral, register.name);
-                let _ = writeln!(nets, "    wire [31:0] {net};");
-                put = format!("puts[{core}]");
-                self.outputs[core].push(Output { net, written, end: found.number });
-                connected.push(register.name);
+            for (core, taken) in self.taken.iter().enumerate() {
+                for taken in taken.iter().filter(|taken| taken.peripheral.name == peripheral.name) {
+                    let _ = writeln!(nets, "    wire [31:0] {};", net(peripheral, taken.register));
+                    put = format!("puts[{core}]");
+                    connected.push(taken.register);
+                }
             }
             parts += &instance(peripheral, &put, &|register| connected.contains(&register));
         }
@@ -243,19 +231,18 @@ impl<'a> Around<'a> {
 
     /// A core's periods, and what peripherals take from it.
     fn turn(&self, core: usize, to_integer: &str) -> String {
-        let outputs = &self.outputs[core];
-        let link = |output: &Output<'_>| &self.description.links[self.ends.outputs[output.end].link];
-        let delay = 1 + outputs.iter().map(|output| link(output).transit()).max().unwrap_or(0);
+        let taken = &self.taken[core];
+        let delay = 1 + transit(self.description, taken);
         // The first is the lowest.
-        let vector = |of: &dyn Fn(&Output<'_>) -> String, extra: &str| {
-            let each = outputs.iter().rev().map(of);
+        let vector = |of: &dyn Fn(&Taken<'_>) -> String, extra: &str| {
+            let each = taken.iter().rev().map(of);
             format!("{{{}}}", std::iter::once(extra.to_owned()).chain(each).collect::<Vec<_>>().join(", "))
         };
-        let floats = vector(&|output| format!("1'b{}", u8::from(output.written.scale.is_some())), "1'b0");
+        let floats = vector(&|taken| format!("1'b{}", u8::from(taken.written.scale.is_some())), "1'b0");
         let exponents =
-            vector(&|output| format!("10'd{}", output.written.scale.unwrap_or(0).rem_euclid(1024)), "10'd0");
-        let values = vector(&|output| format!("shows{}", output.end), "32'd0");
-        let n = outputs.len();
+            vector(&|taken| format!("10'd{}", taken.written.scale.unwrap_or(0).rem_euclid(1024)), "10'd0");
+        let values = vector(&|taken| format!("shows{}", taken.end), "32'd0");
+        let n = taken.len();
         let mut text = format!(
             "    wire [{}:0] held{core};
     takt_turn #(.OUTPUTS({n}), .DELAY({delay}), .FLOATS({floats}), .EXPONENTS({exponents}), .FTOI({to_integer})) turn{core} (
@@ -266,8 +253,13 @@ impl<'a> Around<'a> {
 ",
             32 * n + 31
         );
-        for (i, output) in outputs.iter().enumerate() {
-            let _ = writeln!(text, "    assign {} = held{core}[{} +: 32];", output.net, 32 * i);
+        for (i, taken) in taken.iter().enumerate() {
+            let _ = writeln!(
+                text,
+                "    assign {} = held{core}[{} +: 32];",
+                net(taken.peripheral, taken.register),
+                32 * i
+            );
         }
         text
     }

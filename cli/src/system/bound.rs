@@ -1,7 +1,7 @@
 //! `takt bound SYSTEM.toml`: each core's sections, and the way from the host's inputs to its outputs.
 
 use super::{LoadedSystem, load};
-use crate::bound::{Bound, microseconds, sections_json, write_sections};
+use crate::bound::{Bound, grouped, listed, microseconds, sections_json, write_sections};
 use crate::files::{self, Out};
 use crate::output::{self, Failure};
 use anyhow::{Result, anyhow};
@@ -18,6 +18,10 @@ pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
     }
     let LoadedSystem { description, .. } = load(&arguments.file, &arguments.source, color)?;
     let bounds = bounds(&description)?;
+    #[cfg(feature = "board")]
+    if let Some(wiring) = &arguments.wiring {
+        return crate::bound::pins::system(arguments, wiring, &description, &bounds, color, out);
+    }
     let deadline = arguments.deadline.map(|deadline| deadline.cycles(arguments.clock));
     let ways = latencies(&description, &bounds).map_err(|error| anyhow!("no end-to-end bound: {error}"));
     let late =
@@ -97,30 +101,6 @@ fn write_text(arguments: &Bound, description: &Description, bounds: &[Bounds], o
     Ok(())
 }
 
-/// Names that are shown of a link with many.
-const SHOWN: usize = 3;
-
-/// Ways through the same cores in the same time as one, of all their inputs to all their outputs.
-fn grouped(ways: &[Latency]) -> Vec<Latency> {
-    let mut groups: Vec<Latency> = Vec::new();
-    let alike = |a: &Latency, b: &Latency| (&a.cores, a.best, a.worst) == (&b.cores, b.best, b.worst);
-    // First the outputs of the same inputs, then the inputs of the same outputs: so each of one group leads to each of the other.
-    for way in ways {
-        match groups.iter_mut().find(|group| alike(group, way) && group.inputs == way.inputs) {
-            Some(group) => group.outputs.extend(way.outputs.iter().cloned()),
-            None => groups.push(way.clone()),
-        }
-    }
-    let mut merged: Vec<Latency> = Vec::new();
-    for group in groups {
-        match merged.iter_mut().find(|other| alike(other, &group) && other.outputs == group.outputs) {
-            Some(other) => other.inputs.extend(group.inputs),
-            None => merged.push(group),
-        }
-    }
-    merged
-}
-
 pub(super) fn write_ways(
     description: &Description,
     ways: &[Latency],
@@ -133,13 +113,16 @@ pub(super) fn write_ways(
         return Ok(());
     }
     writeln!(out, "\nfrom a command of the host to an output that follows from it")?;
-    let names = |names: &[String]| match names {
-        many if many.len() > SHOWN => format!("{}, … ({})", many[..SHOWN].join(", "), many.len()),
-        few => few.join(", "),
-    };
-    for way in grouped(ways) {
+    let alike = |a: &Latency, b: &Latency| (&a.cores, a.best, a.worst) == (&b.cores, b.best, b.worst);
+    let groups = grouped(
+        ways.iter().cloned(),
+        alike,
+        (|way| &way.inputs, |way, other| way.inputs.extend(other.inputs)),
+        (|way| &way.outputs, |way, other| way.outputs.extend(other.outputs)),
+    );
+    for way in groups {
         let cores: Vec<&str> = way.cores.iter().map(|core| description.cores[*core].name.as_str()).collect();
-        writeln!(out, "  {} -> {}, through {}", names(&way.inputs), names(&way.outputs), cores.join(", "))?;
+        writeln!(out, "  {} -> {}, through {}", listed(&way.inputs), listed(&way.outputs), cores.join(", "))?;
         let late = deadline.map_or("", |deadline| if way.worst > deadline { ": too late" } else { ": kept" });
         let (best, worst) = (microseconds(way.best, clock), microseconds(way.worst, clock));
         writeln!(out, "    {} to {} cycles ({best} to {worst}){late}", way.best, way.worst)?;

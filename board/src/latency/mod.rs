@@ -1,6 +1,10 @@
 //! From an edge at a pin to an edge at a pin, in cycles: the contracts of the modules on the way, added up.
 //!
-//! `board/tests/top.rs` measures them in the complete top level.
+//! `board/tests/top.rs` and `board/tests/system.rs` measure them in the complete top level.
+
+mod system;
+
+pub use system::system_ways;
 
 use crate::wiring::{Peripheral, Wiring};
 
@@ -36,23 +40,52 @@ impl Part {
 pub struct End {
     /// The peripheral.
     pub peripheral: String,
-    /// The program's port that is its register.
+    /// The port that is its register, as the wiring names it.
     pub port: String,
     /// What happens between.
     pub parts: Vec<Part>,
 }
 
+/// A way from pins to pins: from each of its inputs to each of its outputs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Way {
+    /// Of a system, the cores that it leads through.
+    pub cores: Vec<String>,
+    /// Of a system, the links before, between and after them.
+    pub links: Vec<String>,
+    /// From an edge at a pin to the register that a program reads.
+    pub inputs: Vec<End>,
+    /// From there to the registers that a program writes, if no deadline is missed.
+    pub between: Vec<Part>,
+    /// All of `between`. Over several cores, the worst of one part may exclude the worst of another: then this is less than their sum.
+    pub periods: Part,
+    /// From there to an edge at a pin.
+    pub outputs: Vec<End>,
+}
+
+impl Way {
+    /// From pin to pin, over all inputs and outputs.
+    pub fn total(&self) -> Part {
+        let all = |edge: fn(&Part) -> u64, pick: fn(u64, u64) -> u64| {
+            let ends = [&self.inputs, &self.outputs].map(|ends| {
+                ends.iter().map(|end| edge(&Part::sum("", &end.parts))).reduce(pick).unwrap_or(0)
+            });
+            ends.iter().sum::<u64>() + edge(&self.periods)
+        };
+        Part::new("from pin to pin", all(|part| part.best, u64::min), all(|part| part.worst, u64::max))
+    }
+}
+
 /// The ways through a board.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Ways {
-    /// From an edge at a pin to the register that the program reads.
-    pub inputs: Vec<End>,
-    /// From there to the registers that it writes, if no deadline is missed.
-    pub between: Vec<Part>,
-    /// From there to an edge at a pin.
-    pub outputs: Vec<End>,
+    /// The ways; of a program, one at most.
+    pub ways: Vec<Way>,
     /// Peripherals with ports that have no edge to count from or to, as a converter's.
     pub others: Vec<String>,
+    /// FIFOs of a system that values would go over, from a pin to a pin. How long that takes depends on what is queued: these ways are not
+    /// among `ways`.
+    pub queues: Vec<String>,
 }
 
 /// `takt_exchange`: from the board's tick to the core's, with no input.
@@ -94,37 +127,48 @@ fn edge_out(peripheral: &Peripheral) -> Option<Vec<Part>> {
     }
 }
 
+/// What peripherals have at one side of a program: ends of ways, and those without an edge.
+fn inputs(peripheral: &Peripheral) -> impl Iterator<Item = (&str, Option<End>)> {
+    let registers = peripheral.kind.reads.iter().zip(&peripheral.reads);
+    registers.filter_map(|(register, port)| {
+        let port = port.as_deref()?;
+        Some((port, edge_in(peripheral, register.name).map(|parts| end(peripheral, port, parts))))
+    })
+}
+
+fn outputs(peripheral: &Peripheral) -> impl Iterator<Item = (&str, Option<End>)> {
+    peripheral.writes.iter().flatten().map(|write| {
+        (write.port.as_str(), edge_out(peripheral).map(|parts| end(peripheral, &write.port, parts)))
+    })
+}
+
+fn end(peripheral: &Peripheral, port: &str, parts: Vec<Part>) -> End {
+    End { peripheral: peripheral.name.clone(), port: port.to_owned(), parts }
+}
+
+/// Peripherals of a wiring of which no port is an end of a way.
+fn others(wiring: &Wiring) -> Vec<String> {
+    let is_other = |peripheral: &&Peripheral| {
+        !inputs(peripheral).chain(outputs(peripheral)).any(|(_, end)| end.is_some())
+    };
+    wiring.peripherals.iter().filter(is_other).map(|peripheral| peripheral.name.clone()).collect()
+}
+
 /// The ways of a program whose periods, from its tick to its `wait`, take so many cycles, with the tick after the `wait`.
 pub fn ways(wiring: &Wiring, (best, worst): (u64, u64)) -> Ways {
-    let (mut inputs, mut outputs, mut others) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut reads, mut writes) = (0, 0);
-    for peripheral in &wiring.peripherals {
-        let name = || peripheral.name.clone();
-        let mut is_way = false;
-        for (register, port) in peripheral.kind.reads.iter().zip(&peripheral.reads) {
-            let Some(port) = port else { continue };
-            reads += 1;
-            if let Some(parts) = edge_in(peripheral, register.name) {
-                is_way = true;
-                inputs.push(End { peripheral: name(), port: port.clone(), parts });
-            }
-        }
-        for write in peripheral.writes.iter().flatten() {
-            writes += 1;
-            if let Some(parts) = edge_out(peripheral) {
-                is_way = true;
-                outputs.push(End { peripheral: name(), port: write.port.clone(), parts });
-            }
-        }
-        if !is_way {
-            others.push(name());
-        }
-    }
+    let inputs: Vec<_> = wiring.peripherals.iter().flat_map(inputs).collect();
+    let outputs: Vec<_> = wiring.peripherals.iter().flat_map(outputs).collect();
+    let (reads, writes) = (inputs.len() as u64, outputs.len() as u64);
     let between = vec![
         Part::new("until the tick", 0, u64::from(wiring.period) - 1),
         Part::new(format!("registers to input ports ({reads})"), reads + BEGIN, reads + BEGIN),
         Part::new("the program, from tick to `wait`", best, worst),
         Part::new(format!("output ports to registers ({writes})"), writes + END, writes + END),
     ];
-    Ways { inputs, between, outputs, others }
+    let [inputs, outputs] =
+        [inputs, outputs].map(|ends| ends.into_iter().filter_map(|(_, end)| end).collect::<Vec<_>>());
+    let periods = Part::sum("", &between);
+    let way = Way { cores: Vec::new(), links: Vec::new(), inputs, between, periods, outputs };
+    let is_way = !way.inputs.is_empty() && !way.outputs.is_empty();
+    Ways { ways: is_way.then_some(way).into_iter().collect(), others: others(wiring), queues: Vec::new() }
 }

@@ -1,0 +1,182 @@
+//! The ways through a system of several cores: which cores and links, and when each core reads and waits, is `takt_system`'s to say
+//! (docs/system.md); here is what a board puts before and behind (docs/board.md).
+
+use super::{End, Part, Way, Ways, inputs, others, outputs};
+use crate::application::Application;
+use crate::ends::Ends;
+use crate::kind::Direction;
+use crate::taken::{Taken, taken, transit};
+use crate::wiring::Wiring;
+use std::collections::{BTreeMap, BTreeSet};
+use takt_isa::timing::ENDED_DELAY;
+use takt_system::latency::{LatencyError, Pass, Passages, Route};
+use takt_system::{Description, LinkKind};
+
+/// From the board's tick, in which peripherals capture, to the cycle in which that is written to links.
+const DUE: i64 = 1;
+/// `takt_turn`: from `ended`, two cycles after a `wait`, to the cycle in which `put` is high, with no output and no register on a link.
+const TURN: i64 = 8;
+/// Its part from the cycle in which it looks at links' values to `put`, with no output.
+const PUT: i64 = 7;
+
+/// The least and the most of something.
+#[derive(Clone, Copy)]
+struct Range(i64, i64);
+
+impl Range {
+    const NONE: Range = Range(i64::MAX, 0);
+
+    fn with(&mut self, value: i64) {
+        *self = Range(self.0.min(value), self.1.max(value));
+    }
+
+    fn part(self, text: impl Into<String>) -> Part {
+        let [best, worst] = [self.0, self.1].map(|cycles| u64::try_from(cycles).unwrap_or(0));
+        Part::new(text, best, worst)
+    }
+}
+
+/// Ends of ways, by the link that begins or ends there.
+type ByLink = BTreeMap<usize, Vec<End>>;
+
+/// The ways through a system's cores, each at most once, if no deadline is missed. A core is taken to read a value in the first period with
+/// it, and to write what follows from it by that period's `wait`.
+///
+/// # Errors
+/// If there are too many ways to find, or too many phases of ticks to go through.
+pub fn system_ways(wiring: &Wiring, passages: &Passages<'_>) -> Result<Ways, LatencyError> {
+    let description = passages.description();
+    let taken = taken(description, wiring);
+    let (heads, tails) = (heads(description, wiring), tails(wiring, &taken));
+    let is_fifo = |link: &&usize| matches!(description.links[**link].kind, LinkKind::Fifo { .. });
+    let (mut ways, mut queues) = (Vec::new(), BTreeSet::new());
+    for route in passages.routes(|link| heads.contains_key(&link), |link| tails.contains_key(&link))? {
+        let fifos: Vec<_> = route.links.iter().filter(is_fifo).collect();
+        if !fifos.is_empty() {
+            queues.extend(fifos.into_iter().map(|link| description.links[*link].name.clone()));
+            continue;
+        }
+        let [Some(first), Some(last), Some(core)] =
+            [route.links.first(), route.links.last(), route.cores.last()]
+        else {
+            continue;
+        };
+        let (between, periods) = between(passages, &route, *core, &taken[*core]);
+        ways.push(Way {
+            cores: route.cores.iter().map(|core| description.cores[*core].name.clone()).collect(),
+            links: route.links.iter().map(|link| description.links[*link].name.clone()).collect(),
+            inputs: heads[first].clone(),
+            between,
+            periods,
+            outputs: tails[last].clone(),
+        });
+    }
+    Ok(Ways { ways, others: others(wiring), queues: queues.into_iter().collect() })
+}
+
+/// The links that carry what a peripheral captures.
+fn heads(description: &Description, wiring: &Wiring) -> ByLink {
+    let (ends, mut heads) = (Ends::of(description), ByLink::new());
+    for (port, end) in wiring.peripherals.iter().flat_map(inputs) {
+        let found = Application::System(description).connect(Direction::Input, port);
+        let (Ok(found), Some(end)) = (found, end) else { continue };
+        let driven = &ends.inputs[found.number];
+        for (number, link) in description.links.iter().enumerate() {
+            // One value of the host's may go on several wires.
+            let same = matches!(link.kind, LinkKind::Wire)
+                && link.from == takt_system::End::Host
+                && link.fields.iter().any(|field| field.from == driven.name);
+            if same || number == driven.link {
+                heads.entry(number).or_default().push(end.clone());
+            }
+        }
+    }
+    heads
+}
+
+/// The links from which a peripheral takes values.
+fn tails(wiring: &Wiring, taken: &[Vec<Taken<'_>>]) -> ByLink {
+    let mut tails = ByLink::new();
+    for peripheral in &wiring.peripherals {
+        for (port, end) in outputs(peripheral) {
+            let Some(end) = end else { continue };
+            let mut all = taken.iter().flatten();
+            let found =
+                all.find(|taken| taken.peripheral.name == peripheral.name && taken.written.port == port);
+            if let Some(taken) = found {
+                tails.entry(taken.link).or_default().push(end);
+            }
+        }
+    }
+    tails
+}
+
+/// The parts between the registers of peripherals at both ends of a way, and all of them; `taken` is what peripherals take from the last core.
+fn between(passages: &Passages<'_>, route: &Route, last: usize, taken: &[Taken<'_>]) -> (Vec<Part>, Part) {
+    let (description, cores) = (passages.description(), &route.cores);
+    let (tick, lead) = (description.tick as i64, description.lead() as i64);
+    let puts = puts(passages, last, taken, &route.links);
+    // Cycles from one stage to the next: the board's tick, where each core reads, the last one's `wait`.
+    let mut stages = vec![Range::NONE; cores.len() + 1];
+    let (mut all, mut under_way) = (Range::NONE, vec![false; cores.len()]);
+    for phase in 0..route.phases as i64 {
+        let due = phase * tick - lead;
+        let [fastest, slowest] = [passages.fastest(&route.links, due), passages.slowest(&route.links, due)];
+        for (passes, is_fastest) in [(&fastest, true), (&slowest, false)] {
+            let waits = |pass: &Pass| if is_fastest && puts.early { pass.reads } else { pass.waits };
+            let reached = passes.iter().map(|pass| pass.reads).chain(passes.last().map(waits));
+            let mut before = due - DUE;
+            for (stage, cycle) in stages.iter_mut().zip(reached) {
+                stage.with(cycle - before);
+                before = cycle;
+            }
+            all.with(before - (due - DUE));
+        }
+        for (pass, under_way) in fastest.iter().zip(&mut under_way) {
+            *under_way |= pass.under_way;
+        }
+    }
+    let mut parts = vec![Part::new("until the board's tick", 0, tick as u64 - 1)];
+    let mut from = "registers".to_owned();
+    for ((core, under_way), stage) in cores.iter().zip(&under_way).zip(&stages) {
+        let name = &description.cores[*core].name;
+        let to =
+            if *under_way { format!("into a period of {name}") } else { format!("to the tick of {name}") };
+        parts.push(stage.part(format!("{from} {to}")));
+        from = format!("{name}, from {}", if *under_way { "there" } else { "tick" });
+    }
+    parts.push(stages[cores.len()].part(format!("{from} to `wait`")));
+    let mut after = vec![puts.cycles.part(format!("output ports to registers ({})", taken.len()))];
+    if puts.late > 0 {
+        after.insert(0, Range(0, puts.late).part("if written with `wait`: to the next"));
+    }
+    let total = Part::sum("", [&parts[0], &all.part("")].into_iter().chain(&after));
+    parts.extend(after);
+    (parts, total)
+}
+
+/// From a core's `wait` to the cycle in which the peripherals take on what it has written.
+struct Puts {
+    cycles: Range,
+    /// Cycles that are added if the `wait`'s own bundle writes outputs: they go with the next `wait`.
+    late: i64,
+    /// Whether values can be taken with the `wait` before their own, as they are written.
+    early: bool,
+}
+
+fn puts(passages: &Passages<'_>, core: usize, taken: &[Taken<'_>], way: &[usize]) -> Puts {
+    let description = passages.description();
+    let period = description.cores[core].period(description.tick) as i64;
+    let (best, worst) = passages.span(core).unwrap_or((0, 0));
+    let (registers, ended) = (taken.len() as i64, ENDED_DELAY as i64);
+    let most = transit(description, taken) as i64;
+    let own = way.last().map_or(0, |link| description.links[*link].transit() as i64);
+    let turn = most + registers + TURN;
+    // A `wait` that comes before the registers were put after the one before has its turn then.
+    let again = (turn - (period - (worst - best))).clamp(0, turn - 1);
+    // Values are looked at when those of the slowest link are there.
+    let early = worst + most - own + again >= period;
+    let least = if early { own + 1 + registers + PUT } else { ended + turn };
+    let late = if passages.late(core) > ended { period } else { 0 };
+    Puts { cycles: Range(least, ended + turn + again), late, early }
+}

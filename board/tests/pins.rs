@@ -1,0 +1,244 @@
+//! From pin to pin over several cores, measured in a complete board: links of every kind, ticks that differ, a period under way.
+
+#[path = "harness/board.rs"]
+mod harness;
+
+use harness::Ticks;
+use std::path::Path;
+use takt_asm::{MemoryLoader, Options, assemble};
+use takt_board::latency::{Way, system_ways};
+use takt_board::simulation::Simulation;
+use takt_board::{Board, Wiring};
+use takt_isa::T1;
+use takt_system::latency::Passages;
+use takt_system::{Description, ProgramError, Request};
+
+/// Cycles of a base tick.
+const TICK: u32 = 1000;
+
+const WIRING: &str = r#"
+clock = 50
+period = 20
+autostart = true
+
+[signals]
+drive = "gp10"
+tick = "gp13"
+
+[peripheral.switch]
+kind = "digital-in"
+pins = { in = "gp0" }
+ports = { level = "first.i" }
+
+[peripheral.direct]
+kind = "digital-out"
+pins = { out = "gp1" }
+ports = { level = "first.o" }
+
+[peripheral.slow]
+kind = "digital-out"
+pins = { out = "gp2" }
+ports = { level = "second.o" }
+
+[peripheral.far]
+kind = "digital-out"
+pins = { out = "gp3" }
+ports = { level = "third.o" }
+
+[peripheral.other]
+kind = "digital-out"
+pins = { out = "gp4" }
+ports = { level = "third.p" }
+"#;
+
+/// The first has every base tick; the second every second one, with latched ports; the third every third one. The third's period is longer than
+/// two base ticks and reads its input first and last, so that a value can arrive while it is under way. What is queued has no bound.
+const SYSTEM: &str = r#"
+tick = 1000
+[[core]]
+name = "first"
+program = "first.s"
+machine = "t1"
+[[core]]
+name = "second"
+program = "second.s"
+machine = "t1"
+tick = 2
+offset = 700
+[[core]]
+name = "third"
+program = "third.s"
+machine = "t1"
+tick = 3
+offset = 100
+[[snapshot]]
+name = "both"
+from = "first"
+to = "second"
+ports = ["o -> i", "n"]
+latency = 30
+[[wire]]
+from = "host.i"
+to = "first.i"
+latency = 9
+[[wire]]
+from = "second.o"
+to = "third.i"
+latency = 6
+[[wire]]
+from = "first.o"
+to = "host.o"
+[[wire]]
+from = "second.o"
+to = "host.s"
+latency = 40
+[[wire]]
+from = "third.o"
+to = "host.t"
+latency = 20
+[[snapshot]]
+name = "last"
+from = "third"
+to = "host"
+ports = ["p"]
+latency = 7
+[[fifo]]
+name = "queue"
+from = "first"
+to = "third"
+ports = ["n -> q"]
+push = "n"
+pop = "pop"
+depth = 4
+"#;
+
+/// A wire over which a value takes nearly a base tick, to one more output of the first core.
+const DELAYED: [&str; 2] = [
+    "[[wire]]\nfrom = \"first.n\"\nto = \"host.m\"\nlatency = 990\n",
+    "[peripheral.delayed]\nkind = \"digital-out\"\npins = { out = \"gp5\" }\nports = { level = \"first.n\" }\n",
+];
+
+/// A switch that is on makes the period longer.
+const FIRST: &str = "
+.schedule on
+.input i:int
+.output o:int n:int
+.once
+        mov     o, zero
+        mov     n, zero
+        wait    period
+.period
+.reg k:int
+period: mov     o, i
+        mov     n, i
+        bz      i, done
+        mov     k, 20
+again:  .loop_bound 20
+        isub    k, k, 1
+        bnz     k, again
+done:   wait    period
+";
+
+const SECOND: &str = "
+.schedule on
+.ports latched
+.input i:int n:int
+.output o:int
+.once
+        mov     o, zero
+        wait    period
+.period
+period: iand    o, i, n
+        wait    period
+";
+
+const THIRD: &str = "
+.input i:int q:int
+.output o:int p:int pop:int
+.reg first:int x
+.once
+        mov     o, zero
+        mov     p, zero
+        mov     pop, zero
+        mov     x, zero
+        wait    period
+.period
+period: mov     first, i
+.rep n, 1, 120
+        fdiv    x, x, 1.0
+.endr
+        mov     p, first
+        mov     o, i
+        wait    period
+";
+
+fn system(text: &str) -> Description {
+    let sources = [("first.s", FIRST), ("second.s", SECOND), ("third.s", THIRD)];
+    let read = takt_system::read("chain.toml", text, |request: &Request<'_>| {
+        let options = Options { machine: &T1, ..Options::default() };
+        let assembled = assemble(request.path, &MemoryLoader::new(&sources), &options);
+        Ok::<_, ProgramError<()>>(assembled.unwrap_or_else(|error| panic!("{error:?}")).program)
+    });
+    read.unwrap_or_else(|_| panic!("the system is right"))
+}
+
+/// The bound of the way to each of these outputs, and the least and the most that were measured, in cycles.
+fn bound_and_measured<const N: usize>(
+    [system_text, wiring_text]: [&str; 2],
+    folder: &str,
+    outputs: [&str; N],
+) -> [[(u64, u64); 2]; N] {
+    let description = system(system_text);
+    let board = Board::from_name("ulx3s-85f").expect("a board").expect("a right one");
+    let wiring = Wiring::read("w.toml", wiring_text, &board).expect("a right wiring");
+    wiring.check("w.toml", wiring_text, &description).expect("ports fit");
+    let bound = |core: &takt_system::Core| takt_analysis::bound(&core.program).expect("it can be bounded");
+    let bounds: Vec<_> = description.cores.iter().map(bound).collect();
+    let ways = system_ways(&wiring, &Passages::new(&description, &bounds)).expect("few ways");
+    assert_eq!((ways.ways.len(), &ways.queues[..]), (N, &["queue".to_owned()][..]));
+
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(folder);
+    let mut sim = Simulation::new(&board, &wiring, &description, &folder).unwrap_or_else(|e| panic!("{e}"));
+    sim.run(20 * TICK, &[]).expect("it runs");
+    assert_eq!(sim.output("signal_drive").map(|(level, _)| level), Some(true), "it drives");
+    let (ticks, mut on) = (Ticks::of(&mut sim, TICK), false);
+    outputs.map(|output| {
+        let ends = |way: &&Way| way.outputs.iter().any(|end| end.peripheral == output);
+        let way = ways.ways.iter().find(ends).expect("a way");
+        let edge = way.inputs[0].parts[0].best;
+        let mut cycles = Vec::new();
+        // After six base ticks, all ticks come again. Just in time for one, just too late, and between; on and off.
+        for (more, before) in (0..6).flat_map(|more| [edge, edge - 1, 600].map(|before| (more, before))) {
+            for _ in 0..2 {
+                sim.run((1 + more) * TICK, &[]).expect("it runs");
+                on = !on;
+                let switch = |sim: &mut Simulation| sim.set("switch_in", on);
+                cycles.push(ticks.measured(&mut sim, before, switch, &format!("{output}_out")));
+            }
+        }
+        let total = way.total();
+        let found = (*cycles.iter().min().expect("some"), *cycles.iter().max().expect("some"));
+        assert!(found.0 >= total.best && found.1 <= total.worst, "{output}: {found:?}, and not {total:?}");
+        [(total.best, total.worst), found]
+    })
+}
+
+#[test]
+fn ways_over_links_of_every_kind_take_what_the_bound_says() {
+    let outputs = ["direct", "slow", "far", "other"];
+    let [direct, slow, last, first] = bound_and_measured([SYSTEM, WIRING], "board-pins", outputs);
+    assert_eq!((direct[0], slow[0]), (direct[1], slow[1]));
+    // The third core writes to one output what it reads last, the best that there can be, and to the other what it reads first, the worst.
+    assert_eq!((last[0], last[0].0, first[0].1), (first[0], last[1].0, first[1].1));
+}
+
+/// Where one output of a core comes over a much longer way than another, the other's values can be taken before their own `wait`, and one
+/// `wait` while what came with the one before is being put.
+#[test]
+fn a_slow_link_beside_a_fast_one_is_within_the_bound() {
+    let text = [SYSTEM, WIRING].iter().zip(DELAYED).map(|(text, more)| format!("{text}{more}"));
+    let [system, wiring] = &text.collect::<Vec<_>>()[..] else { panic!("two") };
+    let outputs = ["direct", "slow", "far", "other", "delayed"];
+    let [direct, .., delayed] = bound_and_measured([system, wiring], "board-pins-slow", outputs);
+    assert!(direct[1].0 < delayed[0].0, "{direct:?} {delayed:?}");
+}

@@ -1,0 +1,310 @@
+//! When a value passes through the cores on its way, from the bounds of their periods and the rules of `docs/system.md`.
+
+use super::{LatencyError, MAX_PHASES, MAX_STEPS, MAX_WAYS};
+use crate::description::{Description, End, Link, LinkKind, MIN_LATENCY};
+use takt_analysis::Bounds;
+use takt_isa::timing::{Cycle, ENDED_DELAY};
+use takt_isa::{BundleAddress, Machine, Program};
+
+/// What is known of a core's periods.
+#[derive(Clone, Copy, Debug)]
+struct Span {
+    /// Cycles from a tick to the `wait`, at least, if no tick is missed.
+    best: i64,
+    /// At most, likewise.
+    worst: i64,
+    /// Cycles after the `wait` in which what issues together with it is written to outputs; 0: nothing is.
+    late: i64,
+    /// What a period can take if a tick comes right after the `wait` before, and must stay below.
+    in_time: (Cycle, Cycle),
+}
+
+/// A value's passage through a core. Cycles count from the first base tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pass {
+    /// The core.
+    pub core: usize,
+    /// The tick of the period that reads the value; if that is under way when it arrives, the cycle in which it can be read.
+    pub reads: i64,
+    /// Whether the period is under way when the value arrives.
+    pub under_way: bool,
+    /// The cycle in which the period's `wait` issues.
+    pub waits: i64,
+    /// The cycle in which what follows from the value goes onto the next link: that of its writeback, or of the `wait` that publishes it.
+    pub leaves: i64,
+}
+
+/// A way from the host to the host.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Route {
+    /// Its links, in order.
+    pub links: Vec<usize>,
+    /// The cores between them.
+    pub cores: Vec<usize>,
+    /// Base ticks after which the ticks of these cores come again as they came.
+    pub phases: u64,
+}
+
+/// The cores' periods, and how values pass through them.
+#[derive(Clone, Debug)]
+pub struct Passages<'a> {
+    description: &'a Description,
+    spans: Vec<Option<Span>>,
+}
+
+/// A tick of a core.
+#[derive(Clone, Copy)]
+pub(super) struct Grid {
+    pub(super) period: i64,
+    pub(super) offset: i64,
+}
+
+impl Grid {
+    /// The first tick in a cycle or after it.
+    fn from(self, cycle: i64) -> i64 {
+        let past = cycle - self.offset;
+        self.offset
+            + past.div_euclid(self.period) * self.period
+            + if past.rem_euclid(self.period) > 0 { self.period } else { 0 }
+    }
+}
+
+impl<'a> Passages<'a> {
+    /// Of a system whose cores' sections are bounded by `bounds`, core by core.
+    pub fn new(description: &'a Description, bounds: &[Bounds]) -> Passages<'a> {
+        let span = |number: usize, bounds: &Bounds| {
+            let in_time = bounds.worst_period()?;
+            let core = &description.cores[number];
+            let period = core.period(description.tick);
+            // A core that takes snapshots waits a little before its tick.
+            let spare = match description.snapshot_mailboxes(number) {
+                0 => 0,
+                _ => description.taking(number) + ENDED_DELAY - 1,
+            };
+            let periods = || bounds.sections.iter().filter(|section| !section.once);
+            // A tick that always comes when the front end has refilled finds it so.
+            let refilled = in_time.saturating_add(core.program.machine.refill.into()) <= period;
+            let worst = periods().map(|section| section.cycles.worst).max().filter(|_| refilled);
+            let ends = periods().flat_map(|section| &section.ends);
+            let below = period.saturating_sub(spare);
+            // A period that takes more misses its tick, and is told of by itself.
+            let kept = |cycles: Cycle| cycles.min(below.saturating_sub(1)) as i64;
+            Some(Span {
+                best: kept(periods().map(|section| section.cycles.best).min().unwrap_or(0)),
+                worst: kept(worst.unwrap_or(in_time)),
+                late: ends.map(|&end| late(&core.program, end)).max().unwrap_or(0).into(),
+                in_time: (in_time, below),
+            })
+        };
+        let spans = bounds.iter().enumerate().map(|(number, bounds)| span(number, bounds)).collect();
+        Passages { description, spans }
+    }
+
+    /// The system.
+    pub fn description(&self) -> &'a Description {
+        self.description
+    }
+
+    /// That a core can miss its tick, if it can.
+    pub fn deadline(&self, core: usize) -> Option<LatencyError> {
+        let (worst, period) = self.spans[core]?.in_time;
+        let core = self.description.cores[core].name.clone();
+        (worst >= period).then_some(LatencyError::Deadline { core, worst, period })
+    }
+
+    /// Cycles after a core's `wait` in which what issues together with it is written to outputs; 0 if nothing is.
+    pub fn late(&self, core: usize) -> i64 {
+        self.spans[core].map_or(0, |span| span.late)
+    }
+
+    /// Cycles from a tick of a core to its `wait`, at least and at most, if it misses none; none if it never waits for a tick.
+    pub fn span(&self, core: usize) -> Option<(i64, i64)> {
+        self.spans[core].map(|span| (span.best, span.worst))
+    }
+
+    /// Every way that begins with one of these links from the host, and ends with one of those to the host. None goes through a core twice,
+    /// or through one that never waits for a tick.
+    ///
+    /// # Errors
+    /// If there are too many, or too many phases of ticks to go through.
+    pub fn routes(
+        &self,
+        from: impl Fn(usize) -> bool,
+        to: impl Fn(usize) -> bool,
+    ) -> Result<Vec<Route>, LatencyError> {
+        let links = &self.description.links;
+        let mut leaving = vec![Vec::new(); self.spans.len()];
+        for (number, link) in links.iter().enumerate().rev() {
+            if let End::Core(core) = link.from {
+                leaving[core].push(number);
+            }
+        }
+        let (mut found, mut steps, mut phases) = (Vec::new(), 0, 0_u64);
+        // Last in, first out: the next way goes on from where this one branched off last.
+        let starts = (0..links.len()).filter(|&link| links[link].from == End::Host && from(link));
+        let mut left: Vec<Vec<usize>> = starts.rev().map(|link| vec![link]).collect();
+        while let Some(way) = left.pop() {
+            let Some(&last) = way.last() else { continue };
+            steps += 1;
+            if steps > MAX_STEPS {
+                return Err(LatencyError::Limit { limit: MAX_STEPS, what: "links to follow" });
+            }
+            match links[last].to {
+                End::Host if to(last) => {
+                    if found.len() as u64 >= MAX_WAYS {
+                        return Err(LatencyError::Limit {
+                            limit: MAX_WAYS,
+                            what: "ways from inputs to outputs",
+                        });
+                    }
+                    let route = self.route(way).filter(|route| {
+                        phases = phases.saturating_add(route.phases);
+                        phases <= MAX_PHASES
+                    });
+                    let what = "phases of the ticks to each other";
+                    found.push(route.ok_or(LatencyError::Limit { limit: MAX_PHASES, what })?);
+                }
+                End::Host => {}
+                End::Core(core) => {
+                    let been = way.iter().filter(|link| links[**link].to == End::Core(core)).count();
+                    if been == 1 && self.spans[core].is_some() {
+                        left.extend(leaving[core].iter().map(|&link| [&way[..], &[link]].concat()));
+                    }
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    fn route(&self, links: Vec<usize>) -> Option<Route> {
+        let core = |link: &usize| match self.description.links[*link].to {
+            End::Core(core) => Some(core),
+            End::Host => None,
+        };
+        let cores: Vec<usize> = links.iter().filter_map(core).collect();
+        let phases = cores.iter().try_fold(1, |all, core| lcm(all, self.description.cores[*core].every))?;
+        Some(Route { links, cores, phases })
+    }
+
+    pub(super) fn grid(&self, core: usize) -> Grid {
+        let known = &self.description.cores[core];
+        Grid { period: known.period(self.description.tick) as i64, offset: known.offset as i64 }
+    }
+
+    /// The passages of what goes onto a way's first link in a cycle, at the earliest: what reads it can be the last of a period that is
+    /// under way.
+    pub fn fastest(&self, way: &[usize], start: i64) -> Vec<Pass> {
+        self.passes(way, start, |core, span, link, next, start| {
+            let (cycle, grid) = (start + carry(self.description, link), self.grid(core));
+            let tick = grid.from(cycle - grid.period);
+            let under_way = at_once(self.description, link) && cycle <= tick + span.worst;
+            let (reads, waits) = match under_way {
+                true => (cycle, cycle.max(tick + span.best)),
+                false => (grid.from(cycle), grid.from(cycle) + span.best),
+            };
+            // A `wait` publishes what was written by then.
+            let leaves = if at_wait(self.description, next) { waits.max(reads + 1) } else { reads + 1 };
+            Pass { core, reads, under_way, waits, leaves }
+        })
+    }
+
+    /// The same at the latest: the first whole period with the value reads it, and writes what follows from it at its end. FIFOs are empty.
+    pub fn slowest(&self, way: &[usize], start: i64) -> Vec<Pass> {
+        self.passes(way, start, |core, span, link, next, start| {
+            let cycle = start + carry(self.description, link) + contention(self.description, link);
+            let grid = self.grid(core);
+            let reads = grid.from(cycle);
+            let waits = reads + span.worst;
+            let leaves = match (span.late, at_wait(self.description, next)) {
+                (0, _) => waits,
+                // What issues with the `wait` is published by the next one.
+                (_, true) => waits + grid.period,
+                (late, false) => waits + late,
+            };
+            Pass { core, reads, under_way: false, waits, leaves }
+        })
+    }
+
+    fn passes(
+        &self,
+        way: &[usize],
+        start: i64,
+        pass: impl Fn(usize, Span, &Link, &Link, i64) -> Pass,
+    ) -> Vec<Pass> {
+        let links = &self.description.links;
+        let mut passes: Vec<Pass> = Vec::new();
+        for pair in way.windows(2) {
+            let [link, next] = [&links[pair[0]], &links[pair[1]]];
+            let End::Core(core) = link.to else { continue };
+            let Some(span) = self.spans[core] else { continue };
+            let start = passes.last().map_or(start, |last| last.leaves);
+            passes.push(pass(core, span, link, next, start));
+        }
+        passes
+    }
+}
+
+/// Cycles after its issue in which a bundle writes an output port; 0 if it writes none.
+fn late(program: &Program, address: BundleAddress) -> u32 {
+    let machine: &Machine = program.machine;
+    let Some(Ok(bundle)) = program.bundle(address) else { return 0 };
+    let latency = |(instruction, slot): (&takt_isa::Instruction, &takt_isa::Slot)| {
+        let unit = &slot.units[slot.unit_for(instruction.op.row().function)?];
+        instruction.writes(slot).filter(|register| machine.is_output(*register)).map(|_| unit.latency)
+    };
+    bundle.iter().zip(machine.slots).filter_map(latency).max().unwrap_or(0)
+}
+
+/// Whether a link carries what its sender's `wait` publishes.
+fn at_wait(description: &Description, link: &Link) -> bool {
+    match link.kind {
+        LinkKind::Snapshot { strobe } => strobe.is_none(),
+        LinkKind::Wire => description.core(link.from).is_some_and(|core| core.program.latched),
+        LinkKind::Fifo { .. } => false,
+    }
+}
+
+/// From the write (or the `wait`) of a core to where the receiver's bundles may read it, or to a tick that takes it; to where the
+/// host sees it.
+pub(super) fn carry(description: &Description, link: &Link) -> i64 {
+    let (transit, ended) = (link.transit() as i64, ENDED_DELAY as i64);
+    let host = link.from == End::Host;
+    // From where it arrives at the gate, or is seen by the host.
+    let goes_in = 1 + description.core(link.to).map_or(0, |core| core.input_delay() as i64);
+    match (&link.kind, link.to) {
+        (LinkKind::Wire, _) => transit + goes_in + if at_wait(description, link) { ended } else { 0 },
+        (LinkKind::Fifo { .. }, End::Core(_)) => transit + 1 + goes_in,
+        (LinkKind::Fifo { .. }, End::Host) => transit + 1,
+        (LinkKind::Snapshot { .. }, to) => {
+            let seen = transit + 1 + if host { 0 } else { ended };
+            match to {
+                End::Core(core) => seen + description.taking(core) as i64,
+                End::Host => seen,
+            }
+        }
+    }
+}
+
+/// Cycles that a value can wait while others go in before it.
+pub(super) fn contention(description: &Description, link: &Link) -> i64 {
+    match link.to {
+        // Those of snapshots go in at a fixed time.
+        End::Core(core) if !link.is_snapshot() => description.mailboxes(core).len() as i64 - 1,
+        _ => 0,
+    }
+}
+
+/// Whether a receiver's running period can read what arrives.
+pub(super) fn at_once(description: &Description, link: &Link) -> bool {
+    !link.is_snapshot() && description.core(link.to).is_some_and(|core| !core.program.latched)
+}
+
+fn lcm(a: u64, b: u64) -> Option<u64> {
+    let (mut x, mut y) = (a, b);
+    while y > 0 {
+        (x, y) = (y, x % y);
+    }
+    (a / x.max(1)).checked_mul(b)
+}
+
+const _: () = assert!(MIN_LATENCY > ENDED_DELAY, "a link's transit is what is beyond the core's own way");
