@@ -153,6 +153,7 @@ impl Panes {
 /// Where the session is, in one line.
 pub(crate) fn head(session: &mut Session) -> String {
     let (cycle, period) = (session.cycle(), session.period());
+    let time = session.time();
     let stall = session.stall();
     let (address, issue) = session.next_issue();
     let program = session.program();
@@ -181,7 +182,8 @@ pub(crate) fn head(session: &mut Session) -> String {
             }
         }
     };
-    format!("cycle {cycle}, period {period}: {what}")
+    let period = format!("period {period}");
+    if time == period { format!("{period}: {what}") } else { format!("{time}, {period}: {what}") }
 }
 
 /// The next bundle's slots with their operations.
