@@ -5,6 +5,7 @@ use crate::ends::Fifo;
 use crate::protocol::{self, Frame, Line, LinkError, PAGE, Receiver, WORDS, address};
 use crate::top::{self, RECORDS};
 use std::collections::VecDeque;
+use takt_isa::fp::Flags;
 
 /// Times that a request is made.
 const ATTEMPTS: u32 = 8;
@@ -92,6 +93,17 @@ impl Status {
     /// It has stopped with a fault.
     pub fn fault(self) -> bool {
         self.0 & 4 != 0
+    }
+
+    /// The slot whose operation the fault is of.
+    pub fn fault_slot(self) -> usize {
+        (self.0 >> 4 & 7) as usize
+    }
+
+    /// The sticky exception flags.
+    pub fn flags(self) -> Flags {
+        // From overflow on, as there.
+        Flags::from_bits((self.0 >> 7 & 7) as u8 * Flags::OVERFLOW.bits())
     }
 
     /// It is in reset.
@@ -405,6 +417,13 @@ mod tests {
         fn patience(&self) -> u32 {
             2
         }
+    }
+
+    #[test]
+    fn flags_of_a_status() {
+        let all = [(7, Flags::OVERFLOW), (8, Flags::DIVIDE_BY_ZERO), (9, Flags::INVALID)];
+        assert!(all.iter().all(|(bit, flag)| Status(1 << bit | 5).flags() == *flag));
+        assert_eq!((Status(6 << 4 | 4).flags(), Status(6 << 4 | 4).fault_slot()), (Flags::NONE, 6));
     }
 
     #[test]

@@ -422,12 +422,13 @@ fn differences_are_told_once_and_by_name() {
         assert!(text.contains(says), "{text}");
     }
     // What nobody writes is compared where the session begins.
-    let word = Planted { word: Some((0, 9, 0x100)), ..Planted::default() };
-    let (_, said, _) = begin(2, word, false, false);
-    assert!(
-        said.contains("data word 9 (`table[1]`) is ") && said.contains("does not write it\nperiod 2: "),
-        "{said}"
-    );
+    let (constant, bits) = program().constants[0];
+    let (_, said, _) =
+        begin(2, Planted { register: Some((0, constant, 1)), ..Planted::default() }, false, false);
+    assert_eq!(bits, 0.5_f32.to_bits());
+    let says =
+        " is 0.50000006 on the board, 0.5 in the emulator, and the program does not write it\nperiod 2: ";
+    assert!(said.starts_with("register ") && said.contains(says), "{said}");
     let (_, said, _) = begin(2, Planted::default(), false, false);
     assert!(said.starts_with("period 2: waits for the tick, since bundle "), "{said}");
     // Nothing is said where nothing differs, whatever was never written.

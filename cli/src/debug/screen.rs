@@ -7,7 +7,7 @@ use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use ratatui::layout::Rect;
 use std::time::Duration;
-use takt_debug::console::{Console, KEYS, complete};
+use takt_debug::console::{Commands, Console, KEYS, complete};
 use takt_debug::session::Control;
 use takt_debug::view::{self, Screen};
 use tui_input::Input;
@@ -205,7 +205,7 @@ impl Front<'_> {
                     _ => {}
                 }
             }
-            screen.running = Some(running(control));
+            screen.running = Some(running(console.counts(), control));
             terminal.0.draw(|frame| view::draw(frame, screen))?;
             Ok(())
         });
