@@ -2,9 +2,9 @@
 
 use crate::ends::{Ends, INPUT_ENDS, OUTPUT_ENDS};
 use crate::kind::Direction;
-use crate::protocol::{INPUTS, OUTPUTS};
-use takt_isa::program::Port;
-use takt_isa::{BankIndex, Program, Type};
+use crate::protocol::{CORE_DATA, CORE_REGISTERS, CORE_WORDS, INPUTS, OUTPUTS};
+use takt_isa::program::{Port, Space};
+use takt_isa::{BankIndex, Program, Register, Type};
 use takt_system::{Description, End, LinkKind, Source};
 
 /// Addresses of each core's ports, and of its registers: core *n*'s are *n* times as many further on.
@@ -121,18 +121,19 @@ impl Application<'_> {
         }
     }
 
-    /// Where a port is: `n`, `core.n`, or what the system's file calls the host's end of a link.
+    /// Where a port is: `n`, `core.n`, or what the system's file calls the host's end of a link; or another register of a core,
+    /// `x`, `@m12`, or a data word, `table[3]`.
     ///
     /// # Errors
     /// In words, what is wrong with the name.
     pub fn find(self, name: &str) -> Result<Place, String> {
         match self {
             Application::Program(program) => {
-                let found = port_of(program, 0, name);
-                found.map(|(place, _)| place).ok_or_else(|| {
+                let found = port_of(program, 0, name).map(|(place, _)| place);
+                found.or_else(|| self.held(0, name)).ok_or_else(|| {
                     let names = program.inputs.iter().chain(&program.outputs);
                     format!(
-                        "the program has no port `{name}`; there are {}",
+                        "the program has no port, register or data word `{name}`; there are the ports {}",
                         listed(names.map(|port| port.name.as_str()))
                     )
                 })
@@ -150,11 +151,69 @@ impl Application<'_> {
         if let Some(address) = place.set {
             return Ok((address, place.ty));
         }
+        if place.read >= CORE_REGISTERS {
+            return Err(format!("`{name}` is no port but the core's own, which only its program writes"));
+        }
         let is_output = (OUTPUTS..INPUT_ENDS).contains(&place.read) || place.read >= OUTPUT_ENDS;
         match self.connect(Direction::Input, name) {
             Err(text) if !is_output => Err(text),
             _ => Err(format!("`{name}` is an output port, which the program sets")),
         }
+    }
+
+    /// A core's program; a single program is that of core 0.
+    fn program(&self, core: usize) -> Option<&Program> {
+        match self {
+            Application::Program(program) => (core == 0).then_some(*program),
+            Application::System(description) => description.cores.get(core).map(|core| core.program.as_ref()),
+        }
+    }
+
+    /// The address at which the host reads a core's register; those of following registers of the bank follow. An input port's is that of
+    /// the port. None if there is no such register.
+    pub fn register(&self, core: usize, register: Register) -> Option<u16> {
+        let machine = self.program(core)?.machine;
+        let offset = core as u16;
+        match machine.inputs.index(register) {
+            Some(index) => Some(INPUTS + CORE * offset + index.get()),
+            None => {
+                machine.has_register(register).then(|| CORE_REGISTERS + CORE_WORDS * offset + register.get())
+            }
+        }
+    }
+
+    /// The address at which the host reads a core's data word; those of following words follow. None if there is no such word. In a
+    /// system, words from 1024 on have no address.
+    pub fn word(&self, core: usize, word: u32) -> Option<u16> {
+        let mut depth = self.program(core)?.machine.data_depth;
+        if let Application::System(_) = self {
+            depth = depth.min(CORE_WORDS.into());
+        }
+        (word < depth).then(|| CORE_DATA + CORE_WORDS * core as u16 + word as u16)
+    }
+
+    /// Where another register than a port, or a data word, is.
+    fn held(&self, core: usize, name: &str) -> Option<Place> {
+        let program = self.program(core)?;
+        let place = |read: u16, ty: Type| Some(Place { read, set: None, ty });
+        if let Some(register) = name.strip_prefix('@') {
+            return place(self.register(core, program.machine.register_address(register)?)?, Type::F);
+        }
+        if let Some(known) = program.registers.iter().find(|known| known.name == name) {
+            return place(self.register(core, known.register)?, known.ty);
+        }
+        let (label, index) = match name.strip_suffix(']') {
+            Some(name) => name.split_once('[')?,
+            None => (name, "0"),
+        };
+        let base = match label {
+            "" => 0,
+            _ => {
+                let mut data = program.symbols.iter().filter(|symbol| symbol.space == Space::Data);
+                data.find(|symbol| symbol.name == label)?.address
+            }
+        };
+        place(self.word(core, base.checked_add(index.parse().ok()?)?)?, Type::F)
     }
 
     /// The names of all ports, as [`Application::find`] takes them; of a system, those of cores.
@@ -304,11 +363,16 @@ fn find(description: &Description, name: &str) -> Result<Place, String> {
     let by_end = || ends.place(name);
     let of_core = |core: usize, port: &str| {
         let known = &description.cores[core];
-        let (place, direction) = port_of(&known.program, core, port).ok_or_else(|| {
-            let all = known.program.inputs.iter().chain(&known.program.outputs);
-            let names = listed(all.map(|port| port.name.as_str()));
-            format!("core `{}` has no port `{port}`; there are {names}", known.name)
-        })?;
+        let Some((place, direction)) = port_of(&known.program, core, port) else {
+            return Application::System(description).held(core, port).ok_or_else(|| {
+                let all = known.program.inputs.iter().chain(&known.program.outputs);
+                let names = listed(all.map(|port| port.name.as_str()));
+                format!(
+                    "core `{}` has no port, register or data word `{port}`; there are the ports {names}",
+                    known.name
+                )
+            });
+        };
         // What a core's port gets, the host sets at its end of the link.
         let set = match direction {
             Direction::Input => end_of(description, &ends, direction, core, port).ok().map(Ends::input),

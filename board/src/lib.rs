@@ -41,6 +41,7 @@ pub const VERILOG: &[(&str, &str)] = &[
     ("takt_filter.v", include_str!("../verilog/takt_filter.v")),
     ("takt_follow.v", include_str!("../verilog/takt_follow.v")),
     ("takt_guard.v", include_str!("../verilog/takt_guard.v")),
+    ("takt_observe.v", include_str!("../verilog/takt_observe.v")),
     ("takt_pwm.v", include_str!("../verilog/takt_pwm.v")),
     ("takt_quadrature.v", include_str!("../verilog/takt_quadrature.v")),
     ("takt_scale.v", include_str!("../verilog/takt_scale.v")),

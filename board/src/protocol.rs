@@ -13,6 +13,12 @@ pub const INPUTS: u16 = 0x1000;
 pub const OUTPUTS: u16 = 0x2000;
 /// Address of the first part of the image's first record.
 pub const IMAGE: u16 = 0x4000;
+/// Address of register 0 of core 0.
+pub const CORE_REGISTERS: u16 = 0x8000;
+/// Address of its data word 0.
+pub const CORE_DATA: u16 = 0xc000;
+/// Addresses of each core's registers, and of its data words: core *n*'s are *n* times as many further on.
+pub const CORE_WORDS: u16 = 0x400;
 /// Records of the image that have addresses at a time.
 pub const PAGE: usize = 0x1000;
 /// Pages of a system's image, at most.
@@ -54,7 +60,7 @@ const fn register(address: u16, name: &'static str, access: &'static str, text: 
 }
 
 /// The host's registers. Generator, host and docs/protocol.md take them from here.
-pub const REGISTERS: [Register; 18] = [
+pub const REGISTERS: [Register; 20] = [
     register(0, "id", "r", "0x54414b54; on a board with a system 0x54414b53"),
     register(
         1,
@@ -95,6 +101,8 @@ pub const REGISTERS: [Register; 18] = [
         "rw",
         "of a system, which 4096 records of the image have addresses: 0 for the first",
     ),
+    register(18, "observed", "r", "1: registers and data memory can be read; 0: the wiring leaves that out"),
+    register(19, "issued", "r", "15:0 the bundle that issued last, if `observed` is 1"),
 ];
 
 /// The registers as rows of the table in docs/protocol.md.

@@ -40,6 +40,8 @@ pub struct Wiring {
     pub deadlines: u32,
     /// Periods without a request of the host until the outputs are safe; 0: any number.
     pub host: u32,
+    /// Whether the host can read registers and data memory of the cores, for which there are then copies.
+    pub observe: bool,
     /// Pins with a meaning of their own, by [`SIGNALS`]' order.
     pub signals: [Option<String>; SIGNALS.len()],
     /// The peripherals, in the order of the file.
@@ -137,6 +139,7 @@ impl Wiring {
             autostart: false,
             deadlines: 1,
             host: 0,
+            observe: true,
             signals: [const { None }; SIGNALS.len()],
             peripherals: Vec::new(),
         }
@@ -343,6 +346,7 @@ impl<'a> Reader<'a> {
         let autostart = top.boolean("autostart").is_some_and(|at| at.value);
         let deadlines = top.integer("deadlines", 1, 65535).map_or(1, |at| at.value);
         let host = top.integer("host", 0, 65535).map_or(0, |at| at.value);
+        let observe = top.boolean("observe").is_none_or(|at| at.value);
         let mut signals = [const { None }; SIGNALS.len()];
         if let Some(table) = top.table("signals") {
             for (signal, pin) in SIGNALS.iter().zip(&mut signals) {
@@ -367,6 +371,7 @@ impl<'a> Reader<'a> {
             autostart,
             deadlines,
             host,
+            observe,
             signals,
             peripherals,
         })

@@ -408,6 +408,27 @@ fn compare(description: &Description, sim: Simulation, ticks: u32) {
         }
     }
     assert!(compared > 6 * ticks, "{compared}");
+    // And all that each core holds in the end, in answers so long that noise would get most of them.
+    host.line.noise = 0;
+    let on_board = Application::from(description);
+    for (number, core) in description.cores.iter().enumerate() {
+        let machine = core.program.machine;
+        let emulator = system.core(number);
+        for slot in machine.slots {
+            let first = slot.bank.registers().next().expect("a bank has registers");
+            let at = on_board.register(number, first).expect("it can be read");
+            let read = host.read(at, slot.bank.depth.into()).expect("a bank");
+            for (register, bits) in slot.bank.registers().zip(read) {
+                let known = emulator.register(register).unwrap_or(bits);
+                assert_eq!(bits, known, "{}.{}", core.name, core.program.register_text(register));
+            }
+        }
+        let words = emulator.memory();
+        let read =
+            host.read(on_board.word(number, 0).expect("it can be read"), words.len()).expect("the memory");
+        let differs = words.iter().zip(&read).position(|(word, read)| word != read);
+        assert_eq!(differs, None, "{}: a data word", core.name);
+    }
     assert!(host.retries > 0, "there was no noise");
     for (core, name) in description.cores.iter().enumerate().map(|(number, core)| (number, &core.name)) {
         let periods = host.register_of(core, "periods").expect("a register");
@@ -433,6 +454,8 @@ fn planted_faults_are_noticed() {
         ("board/takt_follow.v", "turns == LAST ? 32'd0", "turns == 32'd0 ? 32'd0"),
         ("board/takt_follow.v", "FIRST = LEAD + OFFSET - 2", "FIRST = LEAD - 2"),
         ("board/takt_turn.v", ".exponent(EXPONENTS[10*which1 +: 10])", ".exponent(10'd0)"),
+        // A core has what another one is loaded with.
+        ("takt_peripherals.v", ".load(loads[1])", ".load(loads[0])"),
     ];
     for (at, from, to) in faults {
         let mut files = circuit.files.clone();

@@ -6,7 +6,7 @@
 //   of 20 bytes within a frame ends it.
 //   A write whose number is that of the request before is answered, not made again.
 //   Bus: address and bus_value, or bus_write, stand for a cycle; what is read is on bus_read READ cycles later. Accesses to addresses
-//   {1000 to 3fff} (hexadecimal) wait for grant, which may depend on address, but not longer than 2^PATIENCE cycles: then they are refused (status 2).
+//   1000 to 3fff and from 8000 on (hexadecimal) wait for grant, which may depend on address, but not longer than 2^PATIENCE cycles: then they are refused (status 2).
 //   due, for a cycle: what stands at `stream` words (1 to 15) from stream_at on is sent, after the word at periods_at, unless the line is busy: then
 //   lost goes up by one. heard: for a cycle at each request.
 
@@ -142,7 +142,7 @@ module takt_bridge #(
     reg  [PATIENCE-1:0] patience;
     reg  [7:0]  status, last_sequence, kind, number, stream_number;
     reg         known, streams;
-    wire        port   = at[15:12] != 4'd0 & at[15:14] == 2'd0;
+    wire        port   = at[15:12] != 4'd0 & at[15:14] != 2'd1;
     wire        repeats = has_data & known & request == last_sequence;
     reg         sends;
     wire        sent;

@@ -130,13 +130,22 @@ fn the_loop_closes_through_the_pins_of_a_simulated_board() {
         "{}",
         different.stderr
     );
+    // The data memory, which this program leaves zero.
+    assert_eq!(live("read [0] [1023]"), "[0] = 0\n[1023] = 0\n");
+    let beyond =
+        folder.line(&format!("live {port} --baud {baud} --program {program} --machine t1 read [1024]"));
+    assert!(beyond.stderr.contains("no port, register or data word `[1024]`"), "{}", beyond.stderr);
     let without = folder.line(&format!("live {port} --baud {baud} shadow"));
     assert!(without.stderr.contains("ports have names in the program: --program FILE"), "{}", without.stderr);
     let loaded = folder.line(&format!("load {port} --baud {baud} {program} --machine t1 --stopped")).ok();
     assert!(loaded.contains("records loaded and compared; stopped"), "{loaded}");
     let broken = folder.line(&format!("live {port} --baud {baud} --program {program} set nothing=1"));
     assert_eq!(broken.status, Some(1));
-    assert!(broken.stderr.contains("the program has no port `nothing`"), "{}", broken.stderr);
+    assert!(
+        broken.stderr.contains("the program has no port, register or data word `nothing`"),
+        "{}",
+        broken.stderr
+    );
 
     // Unplugged: the board ends while a host is at its port. (What the host has open is read from Linux' list.)
     let mut host = std::process::Command::new(env!("CARGO_BIN_EXE_takt"));

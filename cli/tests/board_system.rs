@@ -109,7 +109,7 @@ fn wrong_systems_and_ports_are_refused() {
     folder.write("axis.toml", format!("{system}{many}"));
     refused(
         "board build --board ulx3s-85f --wiring wiring.toml --program axis.toml --sources -o out",
-        "the system needs 228 block RAMs at least, 9 of them for the image of ",
+        "the system needs 252 block RAMs at least, 9 of them for the image of ",
     );
     refused(&format!("board check {} --machine t1", axis()), "--machine is for a program");
     refused(

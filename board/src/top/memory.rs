@@ -2,6 +2,7 @@
 
 use super::Contents;
 use crate::boards::Board;
+use crate::wiring::Wiring;
 use takt_isa::Machine;
 use takt_rtl::synthesis;
 use takt_system::Description;
@@ -10,13 +11,14 @@ use thiserror::Error;
 /// A device has too little block RAM.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error(
-    "the system needs {needed} block RAMs at least, {image} of them for the image of {records} records and {cores} for its cores; the {device} has {has}"
+    "the system needs {needed} block RAMs at least, {image} of them for the image of {records} records, {cores} for its cores{copies}; the {device} has {has}"
 )]
 pub struct TooMuch {
     needed: u64,
     image: u64,
     records: usize,
     cores: u64,
+    copies: String,
     device: &'static str,
     has: u64,
 }
@@ -37,15 +39,34 @@ fn core(machine: &Machine) -> u64 {
     synthesis::of_machine(machine.name).map_or(least, |measured| measured.resources.block_rams)
 }
 
-pub(super) fn check(board: &Board, description: &Description, contents: &Contents) -> Result<(), TooMuch> {
-    let cores = description.cores.iter().map(|known| core(known.program.machine)).sum();
+/// Block RAMs of the copies that the host reads.
+fn copies(machine: &Machine) -> u64 {
+    let banks = machine.slots.iter().map(|slot| blocks(slot.bank.depth.into(), 32));
+    banks.sum::<u64>() + blocks(machine.data_depth.into(), 32)
+}
+
+pub(super) fn check(
+    board: &Board,
+    wiring: &Wiring,
+    description: &Description,
+    contents: &Contents,
+) -> Result<(), TooMuch> {
+    let machines = || description.cores.iter().map(|known| known.program.machine);
+    let cores = machines().map(core).sum();
+    let observers = if wiring.observe { machines().map(copies).sum() } else { 0 };
     let image = blocks(contents.room as u64, RECORD);
-    let (needed, has) = (cores + image, board.device.blocks);
+    let (needed, has) = (cores + image + observers, board.device.blocks);
     if needed <= has {
         return Ok(());
     }
     let (device, records) = (board.device.part, contents.records.len());
-    Err(TooMuch { needed, image, records, cores, device, has })
+    let copies = match observers {
+        0 => String::new(),
+        n => format!(
+            ", {n} for copies of registers and data that the host reads (`observe = false` leaves them out)"
+        ),
+    };
+    Err(TooMuch { needed, image, records, cores, copies, device, has })
 }
 
 #[cfg(test)]

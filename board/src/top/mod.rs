@@ -135,7 +135,7 @@ pub fn circuit<'a>(
             (design.files, design.ecp5, around)
         }
         Application::System(description) => {
-            memory::check(board, description, &contents)?;
+            memory::check(board, wiring, description, &contents)?;
             let design = system_design(description)?;
             let circuit = fingerprint(&design);
             let around = system::around(wiring, &design.plan, &contents, circuit, &library);

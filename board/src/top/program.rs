@@ -1,6 +1,6 @@
 //! The module around the core of a single program, with its peripherals.
 
-use super::parts::{common, fill, instance, net, setting, to_integer, values};
+use super::parts::{Observer, common, fill, instance, net, setting, to_integer, values};
 use super::{IMAGE_BITS, RECORDS};
 use crate::application::Application;
 use crate::kind::Direction;
@@ -62,6 +62,7 @@ pub(super) fn around(
         }
         parts += &instance(peripheral, "put", &|register| connected.contains(&register));
     }
+    let observer = Observer::of_program();
     let mut all = common(wiring, ["fault", "|misses"]);
     all.extend(values([
         ("ID", format!("{:08x}", protocol::ID)),
@@ -88,6 +89,8 @@ pub(super) fn around(
         ("PARTS", parts),
         ("CORE", core.to_owned()),
         ("STREAMS", open_streams(machine)),
+        ("OBSERVE", observer.instance(machine, wiring.observe)),
+        ("WATCHED", observer.pins("", wiring.observe)),
         ("FTOI", to_integer(library)),
     ]));
     fill(include_str!("program.v.in"), &all)

@@ -1,6 +1,6 @@
 //! The module around a system of several cores, with its peripherals.
 
-use super::parts::{Values, common, fill, instance, net, to_integer, values};
+use super::parts::{Observer, Values, common, fill, instance, net, to_integer, values};
 use super::{Contents, bits};
 use crate::application::{Application, CORE};
 use crate::ends::{Ends, INPUT_ENDS};
@@ -76,7 +76,7 @@ pub(super) fn around(
         ("NETS", nets),
         ("PARTS", parts),
         ("CORE", plan.top.clone()),
-        ("SYSTEM", around.system()),
+        ("SYSTEM", around.system(wiring.observe)),
     ]));
     all.extend(around.ends());
     all.extend(around.cores(wiring, &to_integer(library)));
@@ -213,6 +213,12 @@ impl<'a> Around<'a> {
     );",
                 wiring.deadlines, wiring.host
             );
+            let observer = Observer::of_core(k);
+            let _ = writeln!(
+                parts,
+                "    wire [15:0] last_issued{k};\n    wire [31:0] core_register{k}, core_data{k};"
+            );
+            parts += &observer.instance(machine, wiring.observe);
             let fault = format!("{{13'd0, fault_kind[{} +: 3], fault_address[{} +: 16]}}", 3 * k, 16 * k);
             let own = [
                 ("status", "status"),
@@ -222,13 +228,14 @@ impl<'a> Around<'a> {
                 ("most_cycles", "most_cycles"),
             ];
             let own = own.map(|(register, net)| (register, format!("{net}{k}")));
-            for (register, value) in own.into_iter().chain([("fault", fault)]) {
+            let issued = format!("{{16'd0, last_issued{k}}}");
+            for (register, value) in own.into_iter().chain([("fault", fault), ("issued", issued)]) {
                 let at = protocol::address(register) + CORE * k as u16;
                 let _ = writeln!(reads, "            16'd{at}: register_value <= {value};");
             }
             let _ = writeln!(
                 seen,
-                "            4'd{k}: {{seen_value, read_value}} <= {{seen_there{k}, read{k}}};"
+                "            4'd{k}: {{seen_value, read_value, core_register, core_data}} <= {{seen_there{k}, read{k}, core_register{k}, core_data{k}}};"
             );
         }
         values([("CORE_PARTS", parts), ("CORE_READS", reads), ("SEEN", seen)])
@@ -266,7 +273,7 @@ impl<'a> Around<'a> {
     }
 
     /// Connections of the system's top.
-    fn system(&self) -> String {
+    fn system(&self, observe: bool) -> String {
         let mut text = String::new();
         for pin in self.plan.pins() {
             let value = self.pin(&pin).unwrap_or_default();
@@ -287,6 +294,7 @@ impl<'a> Around<'a> {
             for (port, net) in own {
                 let _ = writeln!(text, "        .board{k}_{port}({net}),");
             }
+            text += &Observer::of_core(k).pins(&format!("board{k}_"), observe);
         }
         text.trim_end().to_owned()
     }

@@ -12,7 +12,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 use takt_board::ends::{Ends, Fifo};
-use takt_board::protocol::{ENABLE, HOLD, RESTART, RUN};
+use takt_board::protocol::{CORE_REGISTERS, CORE_WORDS, ENABLE, HOLD, RESTART, RUN};
 use takt_board::serial::Serial;
 use takt_board::top::image;
 use takt_board::{Application, CORE, Host};
@@ -85,7 +85,7 @@ pub(crate) fn load(arguments: &LoadBoard, color: bool, out: &mut Out) -> Result<
 pub(crate) struct Live {
     #[command(flatten)]
     port: Port,
-    /// The program, or the system, that runs there, for the names of its ports. A port of a system's core is `core.port`.
+    /// The program, or the system, that runs there, for its names. What a core of a system has is `core.name`.
     #[arg(long, value_name = "FILE")]
     program: Option<PathBuf>,
     #[command(flatten)]
@@ -110,9 +110,9 @@ enum Command {
     Step,
     /// Go on after `hold`.
     Go,
-    /// Read ports; all of them unless named.
+    /// Read ports, registers and data words; all ports unless named.
     Read {
-        /// Ports.
+        /// Ports, registers (`x`, `@m12`), data words (`table[3]`).
         names: Vec<String>,
     },
     /// Set input ports, between two periods.
@@ -146,9 +146,9 @@ enum Command {
         /// The FIFO.
         name: String,
     },
-    /// Print ports every N periods, with the period's number.
+    /// Print ports, registers or data words every N periods, with the period's number.
     Stream {
-        /// Ports: of one core, with numbers that are close to each other.
+        /// Ports, or what `read` takes besides: of one core, with numbers that are close to each other.
         #[arg(required = true)]
         names: Vec<String>,
         /// Periods from one to the next.
@@ -209,9 +209,13 @@ impl Stream {
         let found = names.iter().map(|name| find(application, name)).collect::<Result<Vec<_>>>()?;
         let first = found.iter().map(|(address, _)| *address).min().unwrap_or(0);
         let last = found.iter().map(|(address, _)| *address).max().unwrap_or(0);
+        let place = |address: u16| match address < CORE_REGISTERS {
+            true => address / CORE,
+            false => address / CORE_WORDS,
+        };
         ensure!(
-            first / CORE == last / CORE && last - first < STREAMED,
-            "one stream has {STREAMED} ports whose numbers follow each other: inputs or outputs of one core"
+            place(first) == place(last) && last - first < STREAMED,
+            "one stream has {STREAMED} numbers that follow each other: inputs, outputs, registers or data words of one core"
         );
         let ports = found.iter().map(|(address, ty)| (usize::from(address - first), *ty)).collect();
         Ok(Stream { first, words: u32::from(last - first) + 1, ports })

@@ -24,11 +24,25 @@ pub(super) const STATUS: [Net; 8] = [
 
 /// Ports of a core's module that a board looks at, in whose top they have the names of [`SystemPlan::board_port`]: first the one that it
 /// drives, then those that it reads.
-pub(super) fn watched(plan: &SystemPlan, core: usize) -> (Net, [Net; 7]) {
+pub(super) fn watched(plan: &SystemPlan, core: usize) -> (Net, Vec<Net>) {
     let own = &plan.cores[core];
-    let pins = [net::INPUT_WRITE, own.input_index(), net::INPUT_VALUE];
-    let [write, index, value] = pins;
-    let told = [net::READ_VALUE, write, index, value, net::TICK_MISSED, net::TICK_LOST, net::STATUS];
+    let told = vec![
+        net::READ_VALUE,
+        net::INPUT_WRITE,
+        own.input_index(),
+        net::INPUT_VALUE,
+        net::TICK_MISSED,
+        net::TICK_LOST,
+        net::STATUS,
+        net::ISSUED,
+        net::ISSUED_ADDRESS,
+        net::STORED,
+        net::STORED_ADDRESS,
+        net::STORED_VALUE,
+        own.retire(),
+        own.retire_register(),
+        own.retire_value(),
+    ];
     (own.read_output(), told)
 }
 
@@ -83,9 +97,12 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
     let is_watched = plan.driver == Driver::Board;
     if is_watched {
         let (asked, shown) = watched(plan, core);
-        ports
-            .push(input(asked).heading("For a board: ports of the core, and what goes into its input pins."));
-        ports.extend(shown.map(output));
+        ports.push(
+            input(asked).heading(
+                "For a board: ports of the core, what goes into its input pins, and what it writes.",
+            ),
+        );
+        ports.extend(shown.into_iter().map(output));
     }
     let heading = vec![
         format!("{}: the core {} of the system, {}, with its gate.", plan.core_module(core), known.name, own.machine.name),
@@ -170,7 +187,10 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
         net::STATUS,
     ]);
     let seen: Vec<Net> = match is_watched {
-        true => open.extract_if(.., |net| watched(plan, core).1.contains(net)).collect(),
+        true => {
+            let (_, told) = watched(plan, core);
+            open.extract_if(.., |net| told.contains(net)).collect()
+        }
         false => Vec::new(),
     };
     let mut pins: [(Net, Expr); 4] = [

@@ -183,9 +183,9 @@ fn ports(plan: &SystemPlan) -> Vec<Port> {
             let name = &plan.description.cores[core].name;
             ports.push(
                 input(plan.board_port(core, &asked))
-                    .heading(format!("{name}: an output port, and its input pins.")),
+                    .heading(format!("{name}: an output port, its input pins, and what it writes.")),
             );
-            ports.extend(shown.map(|net| Port::new(Direction::Output, plan.board_port(core, &net))));
+            ports.extend(shown.iter().map(|net| Port::new(Direction::Output, plan.board_port(core, net))));
         }
     }
     ports
