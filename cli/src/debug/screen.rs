@@ -195,6 +195,7 @@ impl Front<'_> {
     fn execute(&mut self, line: &str) -> Result<()> {
         let Front { console, control, terminal, screen, .. } = self;
         screen.typed = None;
+        let counts = console.counts();
         let answer = execute(&mut **console, line, control, || {
             while event::poll(Duration::ZERO)? {
                 match event::read()? {
@@ -205,7 +206,7 @@ impl Front<'_> {
                     _ => {}
                 }
             }
-            screen.running = Some(running(console.counts(), control));
+            screen.running = Some(running(counts, control));
             terminal.0.draw(|frame| view::draw(frame, screen))?;
             Ok(())
         });
