@@ -160,16 +160,6 @@ impl Latches {
         latches
     }
 
-    /// As they are in a machine between two periods, whose registers `state` has: the inputs there are taken at the next tick.
-    pub(crate) fn stand(&mut self, state: &State, machine: &Machine) {
-        self.publish(state, machine);
-        for register in machine.inputs.registers().filter(|register| state.written.contains(*register)) {
-            self.inputs[register.index()] = state.get(register);
-            self.changed.push(register);
-        }
-        self.take = false;
-    }
-
     fn publish(&mut self, state: &State, machine: &Machine) {
         for register in machine.slots.iter().flat_map(|slot| machine.output_registers(slot)) {
             if state.written.contains(register) {

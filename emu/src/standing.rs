@@ -45,10 +45,7 @@ impl Emulator {
             *word = *bits;
         }
         state.flags = standing.flags;
-        if let Some(mut latches) = state.latches.take() {
-            latches.stand(state, self.program.machine);
-            state.latches = Some(latches);
-        }
+        state.publish_outputs(self.program.machine);
         match standing.at {
             At::Reset => {}
             At::Wait(address) => {
