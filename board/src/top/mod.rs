@@ -29,8 +29,10 @@ pub const SYSTEM_RECORDS: usize = crate::protocol::PAGES * crate::protocol::PAGE
 pub const TOP: &str = "takt_board";
 /// Name of the module around core and peripherals.
 pub const AROUND: &str = "takt_peripherals";
-/// Cycles that a reset of the board lasts, after which pins are valid.
+/// The number, as a power of two, of the cycles that a reset of the board lasts at least.
 const RESET_BITS: u32 = 8;
+/// Cycles from power-up until the board's reset is over. Before, a simulation's pins may be anything.
+pub const RESET: u32 = 2 << RESET_BITS;
 
 /// Why there is no circuit.
 #[derive(Debug, Error)]

@@ -232,6 +232,8 @@ impl<'a> Drive<'a> {
         let pins: Vec<[usize; 2]> = self.axes.iter().map(pins).filter_map(|[a, b]| Some([a?, b?])).collect();
         let mut frames = Receiver::default();
         let mut ticks = Vec::new();
+        // What is no tick yet may look like one.
+        sim.run(takt_board::top::RESET, &[])?;
         // Cycles of the next run: one, until the first tick is seen; then steps, of which one begins at each tick.
         let (mut next, mut waits) = (1, None::<Instant>);
         while !is_over.load(Ordering::Relaxed) {
