@@ -266,7 +266,7 @@ fn a_board_at_the_prompt() {
     terminal.press("\x03");
     terminal.until("another stop", |screen| screen.contents().matches("interrupted\nperiod ").count() == 2);
     terminal.line("print error == wanted - n\r");
-    terminal.shows("= 1");
+    terminal.shows("\nerror == wanted - n = 1");
     terminal.line("\x04");
     terminal.ends();
     assert!(terminal.text().ends_with("the program runs; outputs drive"), "{}", terminal.text());
