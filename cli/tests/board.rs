@@ -207,9 +207,7 @@ fn a_board_is_debugged() {
     assert_eq!(wiring.matches("baud = 1_000_000").count(), 1);
     folder.write("wiring.toml", wiring.replace("baud = 1_000_000", "baud = 10_000_000"));
     let board = SimulatedBoard::start(
-        &format!(
-            "board sim --board ulx3s-85f --wiring wiring.toml --program ring.s --machine t1 --axis motor,encoder,20000"
-        ),
+        "board sim --board ulx3s-85f --wiring wiring.toml --program ring.s --machine t1 --axis motor,encoder,20000",
         folder.path(),
     );
     let (port, baud) = (board.port.clone(), board.baud.clone());
