@@ -309,9 +309,22 @@ fn a_board_is_debugged() {
         "{stopped:?}"
     );
 
+    // One that does not come to its `wait`, and outputs that drive while it is stepped.
+    folder.write("endless.s", RING.replace("count, 1\n", "count, 1\n bnz wanted, period\n"));
+    folder.line(&format!("load {port} --baud {baud} endless.s --machine t1")).ok();
+    let endless =
+        debug("endless.s", "--restart", "set wanted = 1\nstep\nwhere\nprint x\ngoto start\nprint x\n");
+    let says = "error: standard input:2: the program does not come to its `wait`";
+    assert!(endless.status == Some(1) && endless.stderr.contains(says), "{endless:?}");
+    assert!(endless.stdout.contains("period 0: has not come to its `wait`; bundle "), "{endless:?}");
+    assert!(endless.stderr.contains("standard input:4: the program is in a period"), "{endless:?}");
+    assert!(endless.stdout.contains("x = (never written)\nthe program stays held"), "{endless:?}");
+    let driven = debug("endless.s", "--restart --drive", "step 2\n").ok();
+    assert!(driven.ends_with("the program stays held; outputs drive\n"), "{driven}");
+
     // Unplugged while a script waits for its next command.
     let mut host = std::process::Command::new(env!("CARGO_BIN_EXE_takt"));
-    let line = format!("debug halts.s --machine t1 --board {port} --baud {baud} --restart");
+    let line = format!("debug endless.s --machine t1 --board {port} --baud {baud} --restart");
     host.args(line.split_whitespace()).current_dir(folder.path());
     let mut host = host.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     wait_until_at(&mut host, &port);

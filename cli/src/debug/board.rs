@@ -148,7 +148,15 @@ impl<L: Line> Board<L> {
     fn settle(&mut self) -> Result<(), RemoteError> {
         // Any read of a register waits for that.
         let any = self.program.machine.slots.iter().flat_map(|slot| slot.bank.registers()).next();
-        self.registers(any.as_slice()).map(drop)
+        match self.registers(any.as_slice()) {
+            // It may be refused later than the host waits for an answer.
+            Err(RemoteError::Other(_))
+                if self.state().is_ok_and(|state| state.activity == Activity::InPeriod) =>
+            {
+                Err(RemoteError::Busy)
+            }
+            read => read.map(drop),
+        }
     }
 
     /// Addresses of ports, by their names.
