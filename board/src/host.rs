@@ -123,6 +123,17 @@ impl Status {
     }
 }
 
+/// What a fault is about, from the register `fault`.
+pub fn fault_kind(register: u32) -> &'static str {
+    match register >> 16 & 7 {
+        1 => "illegal word",
+        2 => "data address",
+        3 => "return stack full",
+        4 => "return stack empty",
+        _ => "of an unknown kind",
+    }
+}
+
 impl<L: Line> Host<L> {
     /// Asks who is there. `number` is that of the first request: any, but not the same each time.
     ///

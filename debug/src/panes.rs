@@ -152,8 +152,7 @@ impl Panes {
 
 /// Where the session is, in one line.
 pub(crate) fn head(session: &mut Session) -> String {
-    let (cycle, period) = (session.cycle(), session.period());
-    let time = session.time();
+    let (cycle, times) = (session.cycle(), session.times());
     let stall = session.stall();
     let (address, issue) = session.next_issue();
     let program = session.program();
@@ -182,8 +181,7 @@ pub(crate) fn head(session: &mut Session) -> String {
             }
         }
     };
-    let period = format!("period {period}");
-    if time == period { format!("{period}: {what}") } else { format!("{time}, {period}: {what}") }
+    format!("{times}: {what}")
 }
 
 /// The next bundle's slots with their operations.

@@ -12,6 +12,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
+use takt_board::host::fault_kind;
 use takt_board::protocol::{self, ENABLE, HOLD, Line, LinkError, RESTART, RUN};
 use takt_board::{Application, Host, top};
 use takt_debug::remote::{Activity, Remote, RemoteConsole, RemoteError, RemoteSession, State};
@@ -113,17 +114,6 @@ fn failed(error: LinkError) -> RemoteError {
     }
 }
 
-/// Why a core stopped with a fault, by the number in its register.
-fn fault_kind(number: u32) -> &'static str {
-    match number {
-        1 => "illegal word",
-        2 => "data address",
-        3 => "return stack full",
-        4 => "return stack empty",
-        _ => "of an unknown kind",
-    }
-}
-
 impl<L: Line> Board<L> {
     fn register(&mut self, name: &str) -> Result<u32, RemoteError> {
         self.host.register(name).map_err(failed)
@@ -185,7 +175,7 @@ impl<L: Line> Remote for Board<L> {
                 let fault = self.register("fault")?;
                 let slot = self.program.machine.slots.get(s.fault_slot());
                 let slot = slot.map_or(String::new(), |slot| format!(" of slot {}", slot.name));
-                let kind = fault_kind(fault >> 16 & 7);
+                let kind = fault_kind(fault);
                 Activity::Faulted(BundleAddress::new(fault & 0xffff), format!("{kind}{slot}"))
             }
             s if s.halted() => Activity::Halted,

@@ -62,7 +62,7 @@ pub(crate) struct Debug {
     #[arg(long, value_name = "PORT", conflicts_with_all = ["inputs", "tick", "track", "tui"])]
     board: Option<PathBuf>,
     /// Baud rate of the board, as in the wiring file.
-    #[arg(long, default_value_t = 115_200, requires = "board")]
+    #[arg(long, default_value_t = number::BAUD, requires = "board")]
     baud: u32,
     /// Start the program on the board again, held at its first `wait`; otherwise it is held where its period ends.
     #[arg(long, requires = "board")]

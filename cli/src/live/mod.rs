@@ -4,6 +4,7 @@ mod system;
 
 use crate::board::carried::Carried;
 use crate::files::{self, Out};
+use crate::number;
 use crate::select::{OptionalMachine, SourceArguments};
 use crate::shadow;
 use anyhow::{Context, Result, anyhow, bail, ensure};
@@ -18,16 +19,13 @@ use takt_board::top::image;
 use takt_board::{Application, CORE, Host};
 use takt_isa::Type;
 
-/// Of a wiring that does not state another.
-pub(crate) const BAUD: u32 = 115_200;
-
 /// A board's serial port.
 #[derive(Args)]
 struct Port {
     /// The serial port: /dev/ttyUSB0, or what `takt board sim` says.
     port: PathBuf,
     /// Baud rate, as in the wiring file.
-    #[arg(long, default_value_t = BAUD)]
+    #[arg(long, default_value_t = number::BAUD)]
     baud: u32,
 }
 

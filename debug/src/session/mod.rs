@@ -429,6 +429,11 @@ impl Session {
         }
     }
 
+    /// The same, with the periods that have passed.
+    pub(crate) fn times(&self) -> String {
+        if self.afar { self.time() } else { format!("{}, period {}", self.time(), self.period()) }
+    }
+
     /// What an expression reads, or, without one, what the stops do.
     pub(crate) fn reads(&self, live: Option<&Live>) -> Reads {
         let mut reads = Reads::default();
