@@ -5,6 +5,7 @@ use crate::ends::Fifo;
 use crate::protocol::{self, Frame, Line, LinkError, PAGE, Receiver, WORDS, address};
 use crate::top::{self, RECORDS};
 use std::collections::VecDeque;
+use takt_isa::fp::Flags;
 
 /// Times that a request is made.
 const ATTEMPTS: u32 = 8;
@@ -94,6 +95,17 @@ impl Status {
         self.0 & 4 != 0
     }
 
+    /// The slot whose operation the fault is of.
+    pub fn fault_slot(self) -> usize {
+        (self.0 >> 4 & 7) as usize
+    }
+
+    /// The sticky exception flags.
+    pub fn flags(self) -> Flags {
+        // From overflow on, as there.
+        Flags::from_bits((self.0 >> 7 & 7) as u8 * Flags::OVERFLOW.bits())
+    }
+
     /// It is in reset.
     pub fn in_reset(self) -> bool {
         self.0 >> 10 & 1 != 0
@@ -108,6 +120,17 @@ impl Status {
     pub fn causes(self) -> impl Iterator<Item = &'static str> {
         let names = ["fault", "halt", "missed deadline", "host silent", "stop", "NaN output"];
         names.into_iter().enumerate().filter(move |(i, _)| self.0 >> (12 + i) & 1 != 0).map(|(_, name)| name)
+    }
+}
+
+/// What a fault is about, from the register `fault`.
+pub fn fault_kind(register: u32) -> &'static str {
+    match register >> 16 & 7 {
+        1 => "illegal word",
+        2 => "data address",
+        3 => "return stack full",
+        4 => "return stack empty",
+        _ => "of an unknown kind",
     }
 }
 
@@ -405,6 +428,13 @@ mod tests {
         fn patience(&self) -> u32 {
             2
         }
+    }
+
+    #[test]
+    fn flags_of_a_status() {
+        let all = [(7, Flags::OVERFLOW), (8, Flags::DIVIDE_BY_ZERO), (9, Flags::INVALID)];
+        assert!(all.iter().all(|(bit, flag)| Status(1 << bit | 5).flags() == *flag));
+        assert_eq!((Status(6 << 4 | 4).flags(), Status(6 << 4 | 4).fault_slot()), (Flags::NONE, 6));
     }
 
     #[test]

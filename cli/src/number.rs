@@ -5,6 +5,9 @@
 use std::num::NonZeroU64;
 use std::ops::RangeInclusive;
 
+/// The baud rate of a board whose wiring does not state another.
+pub(crate) const BAUD: u32 = 115_200;
+
 /// The number at the beginning of a text, and what follows it. No word (`nan`, `inf`) is a number.
 fn split(text: &str) -> (&str, &str) {
     let text = text.trim();

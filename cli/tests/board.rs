@@ -4,7 +4,16 @@
 mod common;
 
 use common::{Folder, SimulatedBoard};
+use std::io::Write;
 use std::process::Stdio;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+use takt_asm::{MemoryLoader, Options, assemble};
+use takt_board::protocol::{ANSWER, CORE_REGISTERS, IMAGE, Line, Receiver, checksum};
+use takt_board::serial::Serial;
+use takt_board::terminal::Terminal;
+use takt_isa::T1;
 
 fn example(name: &str) -> String {
     format!("{}/../programs/examples/board/{name}", env!("CARGO_MANIFEST_DIR"))
@@ -147,28 +156,290 @@ fn the_loop_closes_through_the_pins_of_a_simulated_board() {
         broken.stderr
     );
 
-    // Unplugged: the board ends while a host is at its port. (What the host has open is read from Linux' list.)
+    // Unplugged: the board ends while a host is at its port.
     let mut host = std::process::Command::new(env!("CARGO_BIN_EXE_takt"));
     let shadow =
         format!("live {port} --baud {baud} --program {program} --machine t1 shadow --periods 1000000");
     host.args(shadow.split_whitespace()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut host = host.spawn().unwrap();
-    let open = std::path::PathBuf::from(format!("/proc/{}/fd", host.id()));
-    let is_at_the_port = || {
-        let files = std::fs::read_dir(&open).into_iter().flatten().flatten();
-        files
-            .filter_map(|file| std::fs::read_link(file.path()).ok())
-            .any(|file| file.as_os_str() == port.as_str())
-    };
-    while host.try_wait().unwrap().is_none() && !is_at_the_port() {
-        std::thread::sleep(std::time::Duration::from_millis(20));
-    }
+    wait_until_at(&mut host, &port);
     drop(board);
     let done = host.wait_with_output().unwrap();
     let stderr = String::from_utf8_lossy(&done.stderr);
     let says = "the line is gone: the port was unplugged, or the simulated board has ended";
     assert!(done.status.code() == Some(1) && stderr.contains(says), "{done:?}");
     assert!(done.stdout.is_empty(), "{done:?}");
+}
+
+/// A position loop that keeps its last eight errors in a ring.
+const RING: &str = "\
+.input  n:int, wanted:int
+.output duty, error:int
+.reg    at:int sum count:int x
+.const  gain = 0.02
+        mov     duty, zero
+        mov     error, zero
+        mov     at, zero
+        mov     count, zero
+        fadd    sum, zero, zero
+        wait    period
+.period
+period: isub    error, wanted, n
+        itof    x, error
+        fmul    duty, x, gain
+        fadd    sum, sum, x
+        st      ring[at], x
+        iadd    at, at, 1
+        iand    at, at, 7
+        iadd    count, count, 1
+        wait    period
+.data
+ring:   .float  0, 0, 0, 0, 0, 0, 0, 0
+";
+
+/// The debugger on a simulated board: registers, memory, moves, differences, and how it leaves what runs.
+#[test]
+fn a_board_is_debugged() {
+    let folder = Folder::new();
+    folder.write("ring.s", RING);
+    // A faster line saves time: a whole data memory is read often.
+    let wiring = std::fs::read_to_string(example("position.toml")).unwrap();
+    assert_eq!(wiring.matches("baud = 1_000_000").count(), 1);
+    folder.write("wiring.toml", wiring.replace("baud = 1_000_000", "baud = 10_000_000"));
+    let board = SimulatedBoard::start(
+        "board sim --board ulx3s-85f --wiring wiring.toml --program ring.s --machine t1 --axis motor,encoder,20000",
+        folder.path(),
+    );
+    let (port, baud) = (board.port.clone(), board.baud.clone());
+    let debug = |file: &str, more: &str, commands: &str| {
+        let line = format!("debug {file} --machine t1 --board {port} --baud {baud} {more}");
+        folder.fed(&line, commands.as_bytes())
+    };
+    let status = || folder.line(&format!("live {port} --baud {baud} status")).ok();
+    assert!(status().contains("the program runs; outputs drive"), "{}", status());
+
+    // What is shown is what the program must have computed, and agrees with the emulator all the way.
+    let same = "check error == wanted - n\ncheck x == error\ncheck abs(duty - x * gain) < 0.0001\ncheck ring[(at + 7) % 8] == x\n\
+        check count == period\ncheck at == period % 8\n";
+    let commands = format!(
+        "print count, ring[1]\n{same}step\n{same}set wanted = 7\nstep 3\n{same}check wanted == 7\nuntil at == 2\ncheck at == 2\n{same}\
+         watch at == 5\ncontinue\ncheck at == 5\nregisters\nmemory ring 8\nwhere\nquit\n"
+    );
+    let text = debug("ring.s", "", &commands).ok();
+    assert!(text.starts_with("period ") && text.contains(": waits for the tick, since bundle "), "{text}");
+    assert!(text.contains("; outputs drive\n   12  period: isub    error, wanted, n\n"), "{text}");
+    assert!(text.contains("at           r") && text.contains("    0 ring         "), "{text}");
+    assert!(text.ends_with("(takt) quit\nthe program runs; outputs drive\n"), "{text}");
+    assert!(status().contains("the program runs; outputs drive"), "{}", status());
+
+    // From the beginning, where what was never written is known; held, as was asked for.
+    let commands = format!("print x\nstep 12\n{same}check sum == 12 * x\n");
+    let text = debug("ring.s", "--restart", &commands).ok();
+    assert!(text.starts_with("period 0: waits") && text.contains("x = (never written)\n"), "{text}");
+    assert!(text.ends_with("the program stays held; outputs are safe\n"), "{text}");
+    assert!(status().contains("the program held; outputs are safe"), "{}", status());
+    let text = debug("ring.s", "", "goto start\nstep\ngo\nhold\ngo\n").ok();
+    assert!(text.ends_with("the program runs; outputs are safe\n"), "{text}");
+
+    // Another program there is no session for: its names would be others.
+    folder.write("other.s", RING.replace("itof    x, error", "itof    x, wanted"));
+    let other = debug("other.s", "", "print x\n");
+    assert_eq!((other.status, other.stdout.as_str()), (Some(1), ""));
+    assert!(
+        other.stderr.contains("the board does not carry other.s; `takt load")
+            && other.stderr.contains("of what it carries is another"),
+        "{}",
+        other.stderr
+    );
+    folder.write("longer.s", RING.replace("wait    period\n.data", "nop\n wait period\n.data"));
+    let longer = debug("longer.s", "", "print x\n");
+    assert!(longer.stderr.contains("what it carries has "), "{}", longer.stderr);
+
+    // Differences: another program runs, and the board seems to carry the right one.
+    let planted = |what: &str, by: &str, commands: &str| {
+        assert_eq!(RING.matches(what).count(), 1);
+        folder.write("planted.s", RING.replace(what, by));
+        folder.line(&format!("load {port} --baud {baud} planted.s --machine t1")).ok();
+        let liar = Liar::start(&port, baud.parse().unwrap());
+        let line = format!("debug ring.s --machine t1 --board {} --baud {baud}", liar.port);
+        folder.fed(&line, commands.as_bytes())
+    };
+    let done = planted(
+        "isub    error, wanted, n",
+        "iadd    error, wanted, n",
+        "set wanted = 900\nstep 4\nprint error\n",
+    );
+    assert_eq!(done.status, Some(1), "{done:?}");
+    let says = "output port `duty` is ";
+    assert!(
+        done.stderr.contains(says)
+            && done.stderr.contains("inputs: n = ")
+            && done.stderr.contains("wanted = 900"),
+        "{done:?}"
+    );
+    assert!(done.stdout.ends_with("the program runs; outputs drive\n"), "{done:?}");
+    let done = planted("iadd    count, count, 1", "isub    count, count, 1", "step 2\n");
+    assert!(done.stderr.contains("`count` (register r2) is -") && done.status == Some(1), "{done:?}");
+    let done = planted("st      ring[at], x", "st      ring[at], sum", "step 2\n");
+    assert!(done.stderr.contains(": data word ") && done.stderr.contains(" (`ring["), "{done:?}");
+    let done = planted("gain = 0.02", "gain = 0.03", "");
+    assert!(
+        done.stdout
+            .contains(" is 0.03 on the board, 0.02 in the emulator, and the program does not write it\n"),
+        "{done:?}"
+    );
+
+    // A program that stops.
+    folder.write(
+        "halts.s",
+        RING.replace(
+            "iadd    count, count, 1\n",
+            "iadd    count, count, 1\n isub x, count, 5\n bz x, stop\n",
+        )
+        .replace(".data", "stop: halt\n.data"),
+    );
+    folder.line(&format!("load {port} --baud {baud} halts.s --machine t1 --stopped")).ok();
+    let stopped = debug("halts.s", "", "step\ngoto start\nstep 9\ncheck count == 5\nstep\n");
+    assert!(stopped.stdout.starts_with("stopped, in reset; outputs are safe\n"), "{stopped:?}");
+    assert!(stopped.stdout.contains("the program has halted\nperiod 4: halted at bundle "), "{stopped:?}");
+    assert!(stopped.stdout.ends_with("the program has halted; outputs are safe\n"), "{stopped:?}");
+    let says = "standard input:1: the program is stopped: `goto start` starts it again\n";
+    assert!(
+        stopped.stderr.contains(says) && stopped.stderr.contains("standard input:5: the program has halted"),
+        "{stopped:?}"
+    );
+
+    // One that does not come to its `wait`, and outputs that drive while it is stepped.
+    folder.write("endless.s", RING.replace("count, 1\n", "count, 1\n bnz wanted, period\n"));
+    folder.line(&format!("load {port} --baud {baud} endless.s --machine t1")).ok();
+    let endless =
+        debug("endless.s", "--restart", "set wanted = 1\nstep\nwhere\nprint x\ngoto start\nprint x\n");
+    let says = "error: standard input:2: the program does not come to its `wait`";
+    assert!(endless.status == Some(1) && endless.stderr.contains(says), "{endless:?}");
+    assert!(endless.stdout.contains("period 0: has not come to its `wait`; bundle "), "{endless:?}");
+    assert!(endless.stderr.contains("standard input:4: the program is in a period"), "{endless:?}");
+    assert!(endless.stdout.contains("x = (never written)\nthe program stays held"), "{endless:?}");
+    let driven = debug("endless.s", "--restart --drive", "step 2\n").ok();
+    assert!(driven.ends_with("the program stays held; outputs drive\n"), "{driven}");
+
+    // Unplugged while a script waits for its next command.
+    let mut host = std::process::Command::new(env!("CARGO_BIN_EXE_takt"));
+    let line = format!("debug endless.s --machine t1 --board {port} --baud {baud} --restart");
+    host.args(line.split_whitespace()).current_dir(folder.path());
+    let mut host = host.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    wait_until_at(&mut host, &port);
+    drop(board);
+    // It may have ended already.
+    let _ = host.stdin.take().unwrap().write_all(b"step\nprint count\n");
+    let done = host.wait_with_output().unwrap();
+    let stderr = String::from_utf8_lossy(&done.stderr);
+    let says = "the line is gone: the port was unplugged, or the simulated board has ended";
+    assert!(done.status.code() == Some(1) && stderr.contains(says), "{done:?}");
+}
+
+/// Stands between a host and a board, and says of any image that it is RING's.
+struct Liar {
+    port: String,
+    over: Arc<AtomicBool>,
+    thread: Option<std::thread::JoinHandle<()>>,
+}
+
+impl Liar {
+    fn start(port: &str, baud: u32) -> Liar {
+        let options = Options { machine: &T1, ..Options::default() };
+        let program = assemble("ring.s", &MemoryLoader::new(&[("ring.s", RING)]), &options).unwrap().program;
+        let records = takt_board::top::image(&program).unwrap().records;
+        let image: Vec<u32> =
+            records.iter().flat_map(|[low, high, place]| [*low, *high, *place, 0]).collect();
+        let mut host = Terminal::new().unwrap();
+        let mut board = Serial::open(port.as_ref(), baud).unwrap();
+        let (port, over) = (host.path().to_str().unwrap().to_owned(), Arc::new(AtomicBool::new(false)));
+        let ends = Arc::clone(&over);
+        let thread = std::thread::spawn(move || {
+            let (mut request, mut receiver) = (Vec::new(), Receiver::default());
+            while !ends.load(Ordering::Relaxed) {
+                request.extend(host.receive().unwrap());
+                let [_, _, command, count, low, high, ..] = request[..] else {
+                    std::thread::sleep(Duration::from_millis(1));
+                    continue;
+                };
+                let data = if command == 2 { 4 * usize::from(count) } else { 0 };
+                if request.len() < 8 + data {
+                    continue;
+                }
+                board.send(&request).unwrap();
+                request.clear();
+                let frame = loop {
+                    receiver.put(&board.receive().unwrap());
+                    if let Some(frame) = receiver.frame() {
+                        break frame;
+                    }
+                };
+                let mut words = frame.words;
+                let address = u16::from_le_bytes([low, high]);
+                if (IMAGE..CORE_REGISTERS).contains(&address) {
+                    words = image[usize::from(address - IMAGE)..][..words.len()].to_vec();
+                }
+                let mut answer = vec![ANSWER, frame.number, frame.status, words.len() as u8];
+                answer.extend(words.iter().flat_map(|word| word.to_le_bytes()));
+                let sum = checksum(&answer[1..]);
+                answer.extend(sum.to_le_bytes());
+                host.send(&answer).unwrap();
+            }
+        });
+        Liar { port, over, thread: Some(thread) }
+    }
+}
+
+impl Drop for Liar {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+        let _ = self.thread.take().map(std::thread::JoinHandle::join);
+    }
+}
+
+/// Waits until a process has the port open, as Linux' list of its files says, or has ended.
+fn wait_until_at(host: &mut std::process::Child, port: &str) {
+    let open = std::path::PathBuf::from(format!("/proc/{}/fd", host.id()));
+    let is_at_the_port = || {
+        let files = std::fs::read_dir(&open).into_iter().flatten().flatten();
+        files.filter_map(|file| std::fs::read_link(file.path()).ok()).any(|file| file.as_os_str() == port)
+    };
+    while host.try_wait().unwrap().is_none() && !is_at_the_port() {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
+fn what_a_session_on_a_board_cannot_do_is_refused_first() {
+    let folder = Folder::new();
+    folder.write("ring.s", RING);
+    folder.write("typo.txt", "step\nback\n");
+    folder.write("system.toml", "");
+    for (line, status, says) in [
+        ("debug ring.s --board /dev/nothing", 1, "cannot open /dev/nothing: is the board plugged in"),
+        (
+            "debug ring.s --board /dev/nothing --script typo.txt",
+            1,
+            "typo.txt:2: `back`: a circuit does not go back",
+        ),
+        (
+            "debug system.toml --board /dev/nothing",
+            2,
+            "--board is for a single program, and system.toml is a system",
+        ),
+        ("debug ring.s --board /dev/nothing --tui", 2, "cannot be used with"),
+        ("debug ring.s --board /dev/nothing --inputs in.csv", 2, "cannot be used with"),
+        ("debug ring.s --board /dev/nothing --tick 100", 2, "cannot be used with"),
+        ("debug --track --board /dev/nothing", 2, "cannot be used with"),
+        ("debug ring.s --baud 9600", 2, "--board <PORT>"),
+        ("debug ring.s --restart", 2, "--board <PORT>"),
+        ("debug ring.s --drive", 2, "--board <PORT>"),
+    ] {
+        let done = folder.line(line);
+        assert_eq!((done.status, done.stdout.as_str()), (Some(status), ""), "{line}: {done:?}");
+        assert!(done.stderr.contains(says), "{line}: {}", done.stderr);
+    }
 }
 
 fn hybrid(name: &str) -> String {

@@ -242,3 +242,32 @@ fn a_long_run_is_interrupted() {
     terminal.line("\x04");
     terminal.ends();
 }
+
+/// A board that runs freely is held by Ctrl-C, and an endless search ended by it; the board is left as it was found.
+#[cfg(unix)]
+#[test]
+fn a_board_at_the_prompt() {
+    let folder = Folder::new();
+    let example = |name: &str| format!("{}/../programs/examples/board/{name}", env!("CARGO_MANIFEST_DIR"));
+    let program = format!("{} --machine t1", example("position.s"));
+    let wiring = example("position.toml");
+    let board = format!("board sim --board ulx3s-85f --wiring {wiring} --program {program}");
+    let board = common::SimulatedBoard::start(&board, folder.path());
+    let line = format!("exec takt debug {program} --board {} --baud {}", board.port, board.baud);
+    let mut terminal = Terminal::new(&folder, &line, 40, 100);
+    terminal.shows("waits for the tick, since bundle");
+    terminal.line("unt\t err\t == 1000\r");
+    terminal.shows("until error == 1000");
+    terminal.shows("in period ");
+    terminal.press("\x03");
+    terminal.shows("interrupted\nperiod ");
+    terminal.line("cont\t\r");
+    terminal.until("a long run", |screen| screen.contents().matches("Ctrl-C stops").count() == 1);
+    terminal.press("\x03");
+    terminal.until("another stop", |screen| screen.contents().matches("interrupted\nperiod ").count() == 2);
+    terminal.line("print error == wanted - n\r");
+    terminal.shows("\nerror == wanted - n = 1");
+    terminal.line("\x04");
+    terminal.ends();
+    assert!(terminal.text().ends_with("the program runs; outputs drive"), "{}", terminal.text());
+}

@@ -7,6 +7,7 @@ pub mod heads;
 mod info;
 pub mod inputs;
 pub mod panes;
+pub mod remote;
 pub mod session;
 pub mod system;
 pub mod trace;

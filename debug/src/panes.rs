@@ -152,7 +152,7 @@ impl Panes {
 
 /// Where the session is, in one line.
 pub(crate) fn head(session: &mut Session) -> String {
-    let (cycle, period) = (session.cycle(), session.period());
+    let (cycle, times) = (session.cycle(), session.times());
     let stall = session.stall();
     let (address, issue) = session.next_issue();
     let program = session.program();
@@ -181,7 +181,7 @@ pub(crate) fn head(session: &mut Session) -> String {
             }
         }
     };
-    format!("cycle {cycle}, period {period}: {what}")
+    format!("{times}: {what}")
 }
 
 /// The next bundle's slots with their operations.

@@ -42,6 +42,7 @@ mod jit;
 mod jit;
 mod machine;
 mod micro;
+mod standing;
 mod statistics;
 mod system;
 #[cfg(feature = "testing")]
@@ -52,5 +53,6 @@ pub use emulator::{CompiledRuns, Emulator, MAX_CYCLE, Observed, Status, Step, St
 pub use event::{Event, PortWrite, Retire};
 pub use fault::{Fault, FaultKind, LoadError, ShownFault};
 pub use machine::MAX_NAN_WRITES;
+pub use standing::{At, Standing};
 pub use statistics::Statistics;
 pub use system::{Number, PeriodError, PeriodReport, PortError, Row, Rows};

@@ -1,5 +1,7 @@
 //! `takt debug`: a session at a prompt, from a script, or full-screen.
 
+#[cfg(feature = "board")]
+mod board;
 mod history;
 mod prompt;
 #[cfg(feature = "tui")]
@@ -20,6 +22,7 @@ use indicatif::HumanCount;
 use std::io::{BufRead, BufReader, IsTerminal, Write};
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Duration;
@@ -55,6 +58,18 @@ pub(crate) struct Debug {
     /// Full-screen: source, bundle, registers, operations in flight, stalls, ports, watches, and the same commands.
     #[arg(long)]
     tui: bool,
+    /// Debug the board at this serial port, which carries the program: it stops only at the ends of periods.
+    #[arg(long, value_name = "PORT", conflicts_with_all = ["inputs", "tick", "track", "tui"])]
+    board: Option<PathBuf>,
+    /// Baud rate of the board, as in the wiring file.
+    #[arg(long, default_value_t = number::BAUD, requires = "board")]
+    baud: u32,
+    /// Start the program on the board again, held at its first `wait`; otherwise it is held where its period ends.
+    #[arg(long, requires = "board")]
+    restart: bool,
+    /// Let the board's outputs drive after a start. Periods take as long as commands do: nothing may hang on them.
+    #[arg(long, requires = "board")]
+    drive: bool,
     #[command(flatten)]
     closed_loop: ClosedLoopArguments,
 }
@@ -66,6 +81,7 @@ Examples:
   takt debug prog.s --inputs in.csv          with recorded inputs
   takt debug prog.s --script checks.txt      commands from a file: a test
   takt debug system.toml --inputs in.csv     several cores in one time: a base tick for each row
+  takt debug prog.s --board /dev/ttyUSB0     on a board that carries it, a period at a time
   takt debug --track                         the robot's controller, where the tracking error is largest";
 
 /// Rows of inputs; more is an error.
@@ -87,6 +103,12 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
     if reads_stdin && reads.iter().any(|(_, path)| files::is_dash(path)) {
         let text = "commands come from standard input: give --script, or files in place of `-`";
         return Err(Failure::Usage(text.to_owned()).into());
+    }
+    if let Some(_port) = &arguments.board {
+        #[cfg(feature = "board")]
+        return board::run(arguments, _port, color, out);
+        #[cfg(not(feature = "board"))]
+        return absent::left_out("board");
     }
     if let Some(file) = arguments.file.as_deref().filter(|file| load::is_system(file)) {
         return of_system(arguments, file, color, out);
@@ -113,25 +135,49 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
         out.flush()?;
         return screen::run(&mut console, &control);
     }
-    converse(Console::new(session), script, &control, color, out)
+    local(Console::new(session), script, &control, color, out)
 }
 
-/// Commands from where they come.
-fn converse<C: Commands + Send + 'static>(
+/// A session on an emulator.
+fn local<C: Commands + Send + 'static>(
     mut console: C,
     script: Option<(String, String)>,
     control: &Arc<Control>,
     color: bool,
     out: &mut Out,
 ) -> Result<()> {
-    let place = console.place();
-    out.write_all(place.as_bytes())?;
-    match script {
-        Some((name, text)) => batch(&mut console, &name, &mut text.as_bytes(), color, out)?,
-        None if std::io::stdin().is_terminal() => prompt::run(console, control, color, out)?,
-        None => batch(&mut console, "standard input", &mut BufReader::new(std::io::stdin()), color, out)?,
+    if script.is_none() && std::io::stdin().is_terminal() {
+        let heard = Arc::clone(control);
+        ctrlc::set_handler(move || heard.interrupt()).context("cannot catch Ctrl-C")?;
     }
-    Ok(())
+    let place = console.place();
+    converse(console, &place, script, control, &AtomicBool::new(false), color, out)
+}
+
+/// Commands from where they come, until there are no more or `ended` says so; `place` is where the session begins.
+fn converse<C: Commands + Send + 'static>(
+    mut console: C,
+    place: &str,
+    script: Option<(String, String)>,
+    control: &Arc<Control>,
+    ended: &AtomicBool,
+    color: bool,
+    out: &mut Out,
+) -> Result<()> {
+    out.write_all(place.as_bytes())?;
+    let mut stdin = BufReader::new(std::io::stdin());
+    let done = match script {
+        Some((name, text)) => batch(&mut console, &name, &mut text.as_bytes(), ended, color, out),
+        None if std::io::stdin().is_terminal() => return prompt::run(console, control, color, out),
+        None => batch(&mut console, "standard input", &mut stdin, ended, color, out),
+    };
+    done.and(leave(&mut console, out))
+}
+
+/// Ends a session.
+fn leave(console: &mut dyn Commands, out: &mut Out) -> Result<()> {
+    let left = console.leave().map_err(|error| anyhow!("{error}"))?;
+    Ok(out.write_all(left.as_bytes())?)
 }
 
 /// A session on a system.
@@ -141,7 +187,7 @@ fn of_system(arguments: &Debug, file: &Path, color: bool, out: &mut Out) -> Resu
     check_system(arguments)?;
     let script = arguments.script.as_deref().map(script::<SystemConsole>).transpose()?;
     let (console, _) = open_system(arguments, file, &control, color)?;
-    converse(console, script, &control, color, out)
+    local(console, script, &control, color, out)
 }
 
 /// Refuses what a system's session has not got.
@@ -251,6 +297,7 @@ fn batch(
     console: &mut dyn Commands,
     name: &str,
     lines: &mut dyn BufRead,
+    ended: &AtomicBool,
     color: bool,
     out: &mut Out,
 ) -> Result<()> {
@@ -268,6 +315,9 @@ fn batch(
                 out.flush()?;
                 output::error(&format!("{name}:{number}: {error}"), color);
             }
+        }
+        if ended.load(Ordering::Relaxed) {
+            bail!("{name}:{number}: interrupted");
         }
         if console.quit() {
             break;
@@ -298,6 +348,6 @@ fn execute<C: Commands + Send>(
 }
 
 /// What to say of a command that runs.
-fn running(control: &Control) -> String {
-    format!("in cycle {}; Ctrl-C stops", HumanCount(control.cycle()))
+fn running(counts: &str, control: &Control) -> String {
+    format!("in {counts} {}; Ctrl-C stops", HumanCount(control.cycle()))
 }

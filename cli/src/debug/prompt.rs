@@ -1,7 +1,7 @@
 //! The prompt of `takt debug`.
 
 use super::history::{self, Past};
-use super::{execute, running};
+use super::{execute, leave, running};
 use crate::files::Out;
 use crate::output;
 use anyhow::{Context, Result};
@@ -52,29 +52,27 @@ pub(super) fn run<C: Commands + Send + 'static>(
     color: bool,
     out: &mut Out,
 ) -> Result<()> {
-    let heard = Arc::clone(control);
-    ctrlc::set_handler(move || heard.interrupt()).context("cannot catch Ctrl-C")?;
     let console = Rc::new(RefCell::new(console));
     let Past { history, file } = Past::load();
     let mut editor: Editor<Prompt<C>, FileHistory> =
         Editor::with_history(history::config(), history).context("cannot use the terminal")?;
     editor.set_helper(Some(Prompt(Rc::clone(&console))));
-    loop {
+    while !console.borrow().quit() {
         out.flush()?;
         let line = match editor.readline("(takt) ") {
             Ok(line) => line,
             Err(ReadlineError::Interrupted) => continue,
-            Err(ReadlineError::Eof) => return Ok(()),
+            Err(ReadlineError::Eof) => break,
             Err(error) => return Err(error).context("cannot read the terminal"),
         };
         history::append(editor.history_mut(), file.as_deref());
         let mut console = console.borrow_mut();
-        let mut shown = false;
+        let (mut shown, counts) = (false, console.counts());
         let answer = execute(&mut *console, &line, control, || {
             shown = std::io::stderr().is_terminal();
             if shown {
                 // A bar would fill the line, and the terminal's `^C` break it.
-                write!(std::io::stderr(), "\r{}{CLEAR}", running(control))?;
+                write!(std::io::stderr(), "\r{}{CLEAR}", running(counts, control))?;
             }
             Ok(())
         });
@@ -85,8 +83,6 @@ pub(super) fn run<C: Commands + Send + 'static>(
             Ok(text) => out.write_all(text.as_bytes())?,
             Err(error) => output::error(&error, color),
         }
-        if console.quit() {
-            return Ok(());
-        }
     }
+    leave(&mut *console.borrow_mut(), out)
 }

@@ -7,7 +7,7 @@ use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use ratatui::layout::Rect;
 use std::time::Duration;
-use takt_debug::console::{Console, KEYS, complete};
+use takt_debug::console::{Commands, Console, KEYS, complete};
 use takt_debug::session::Control;
 use takt_debug::view::{self, Screen};
 use tui_input::Input;
@@ -195,6 +195,7 @@ impl Front<'_> {
     fn execute(&mut self, line: &str) -> Result<()> {
         let Front { console, control, terminal, screen, .. } = self;
         screen.typed = None;
+        let counts = console.counts();
         let answer = execute(&mut **console, line, control, || {
             while event::poll(Duration::ZERO)? {
                 match event::read()? {
@@ -205,7 +206,7 @@ impl Front<'_> {
                     _ => {}
                 }
             }
-            screen.running = Some(running(control));
+            screen.running = Some(running(counts, control));
             terminal.0.draw(|frame| view::draw(frame, screen))?;
             Ok(())
         });

@@ -4,12 +4,13 @@ mod system;
 
 use crate::board::carried::Carried;
 use crate::files::{self, Out};
+use crate::number;
 use crate::select::{OptionalMachine, SourceArguments};
 use crate::shadow;
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::{Args, Subcommand};
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 use takt_board::ends::{Ends, Fifo};
 use takt_board::protocol::{CORE_REGISTERS, CORE_WORDS, ENABLE, HOLD, RESTART, RUN};
@@ -24,20 +25,24 @@ struct Port {
     /// The serial port: /dev/ttyUSB0, or what `takt board sim` says.
     port: PathBuf,
     /// Baud rate, as in the wiring file.
-    #[arg(long, default_value_t = 115_200)]
+    #[arg(long, default_value_t = number::BAUD)]
     baud: u32,
 }
 
 impl Port {
     fn open(&self) -> Result<Host<Serial>> {
-        let name = self.port.display();
-        let line = Serial::open(&self.port, self.baud).with_context(|| {
-            format!("cannot open {name}: is the board plugged in, and may you use the port?")
-        })?;
-        // Not the number of the last request of an earlier command.
-        let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.subsec_micros());
-        Host::connect(line, now as u8).with_context(|| format!("{name} at {} baud", self.baud))
+        open(&self.port, self.baud)
     }
+}
+
+/// What answers at a serial port.
+pub(crate) fn open(port: &Path, baud: u32) -> Result<Host<Serial>> {
+    let name = port.display();
+    let line = Serial::open(port, baud)
+        .with_context(|| format!("cannot open {name}: is the board plugged in, and may you use the port?"))?;
+    // Not the number of the last request of an earlier command.
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.subsec_micros());
+    Host::connect(line, now as u8).with_context(|| format!("{name} at {baud} baud"))
 }
 
 /// Load a program, or the programs of a system, into a board over its serial port, and start it.

@@ -15,7 +15,7 @@ use takt_asm::nearest;
 
 /// What completes an argument.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Completion {
+pub(crate) enum Completion {
     None,
     Names,
     Words(&'static [&'static str]),
@@ -115,7 +115,7 @@ fn usages(wanted: &dyn Fn(&Command) -> bool) -> String {
     text
 }
 
-fn help(name: &str) -> Result<String, String> {
+pub(crate) fn help(name: &str) -> Result<String, String> {
     if !name.is_empty() {
         let command = find(name)?;
         let short =
@@ -248,6 +248,19 @@ pub trait Commands {
     /// Names that complete the word that a line ends with, and where that word begins.
     fn complete(&self, line: &str) -> (usize, Vec<String>);
 
+    /// Ends the session; what there is to say of what it leaves behind.
+    ///
+    /// # Errors
+    /// Why that is not left as it should be.
+    fn leave(&mut self) -> Result<String, String> {
+        Ok(String::new())
+    }
+
+    /// What [`Control::cycle`](crate::session::Control::cycle) counts.
+    fn counts(&self) -> &'static str {
+        "cycle"
+    }
+
     /// What is wrong with a line that is no command.
     fn mistake(line: &str) -> Option<String>
     where
@@ -352,9 +365,12 @@ impl Console {
 
     /// Where the session is.
     pub fn place(&mut self) -> String {
-        let mut text = panes::head(&mut self.session);
-        text.push('\n');
-        let session = &self.session;
+        format!("{}\n{}", panes::head(&mut self.session), self.at_hand())
+    }
+
+    /// The source line and the bundle at this position, and the calls that lead to it.
+    pub(crate) fn at_hand(&self) -> String {
+        let (session, mut text) = (&self.session, String::new());
         if let Some(location) = session.location()
             && let Some(line) = session.source_line(location)
         {

@@ -98,7 +98,7 @@ impl Console {
         }
         self.failed += 1;
         let why = holds.err().map_or(String::new(), |error| format!(" ({error})"));
-        let mut text = format!("check failed in cycle {}: {}{why}", self.session.cycle(), live.text());
+        let mut text = format!("check failed in {}: {}{why}", self.session.time(), live.text());
         for name in live.places() {
             if let Ok(part) = self.session.parse(name) {
                 let _ = write!(text, "\n    {name} = {}", self.short(&part));

@@ -209,6 +209,15 @@ impl Live {
         }
     }
 
+    /// The first name in it that is not known of a machine which runs elsewhere.
+    pub(crate) fn hidden(&self) -> Option<&str> {
+        self.operands.iter().find_map(|(_, operand, written)| match operand {
+            Operand::Cycle | Operand::Depth => Some(written.as_str()),
+            Operand::Memory { offset, index, .. } => offset.hidden().or_else(|| index.hidden()),
+            _ => None,
+        })
+    }
+
     /// The registers and data words that it reads, as written.
     pub(crate) fn places(&self) -> Vec<&str> {
         let is_place = |operand: &Operand| {

@@ -19,6 +19,7 @@ mod run;
 mod search;
 mod stops;
 
+pub(crate) use expression::Reads;
 pub use expression::{Live, Place};
 pub use meaning::Life;
 pub use number::{Shown, UlpDistance, hex_float, ulp_distance};
@@ -191,6 +192,8 @@ pub struct Session {
     next_id: u32,
     /// The line that a breakpoint stopped at, and the cycle.
     line: Option<(Cycle, Location)>,
+    /// Whether the machine that it looks at runs elsewhere, so that cycles and calls are not known.
+    afar: bool,
     /// Cycles for which a command may run.
     pub run_limit: Cycle,
 }
@@ -220,6 +223,7 @@ impl Session {
             stops: Vec::new(),
             next_id: 1,
             line: None,
+            afar: false,
             run_limit: RUN_LIMIT,
         };
         session.set_row();
@@ -344,7 +348,11 @@ impl Session {
         if text.trim().is_empty() {
             return Err("an expression is missing".to_owned());
         }
-        Live::parse(text.trim(), self.program(), &self.options.constants, &self.options.names)
+        let live = Live::parse(text.trim(), self.program(), &self.options.constants, &self.options.names)?;
+        match live.hidden().filter(|_| self.afar) {
+            Some(name) => Err(format!("`{name}` is not known of a board; `period` and `address` are")),
+            None => Ok(live),
+        }
     }
 
     /// The value of an expression.
@@ -405,6 +413,35 @@ impl Session {
         self.checkpoints.clear();
         self.edits.clear();
         self.checkpoints.push(self.core.clone());
+    }
+
+    /// Looks at a machine that runs elsewhere, between two periods.
+    pub(crate) fn look_afar(&mut self, emulator: Emulator, periods: u64) {
+        self.afar = true;
+        self.look(emulator, periods, true);
+    }
+
+    /// This position's time, as far as it is known.
+    pub(crate) fn time(&self) -> String {
+        match self.afar {
+            true => format!("period {}", self.period()),
+            false => format!("cycle {}", self.cycle()),
+        }
+    }
+
+    /// The same, with the periods that have passed.
+    pub(crate) fn times(&self) -> String {
+        if self.afar { self.time() } else { format!("{}, period {}", self.time(), self.period()) }
+    }
+
+    /// What an expression reads, or, without one, what the stops do.
+    pub(crate) fn reads(&self, live: Option<&Live>) -> Reads {
+        let mut reads = Reads::default();
+        match live {
+            Some(live) => live.reads(&mut reads),
+            None => self.stops.iter().for_each(|(_, stop)| stop.reads(&mut reads)),
+        }
+        reads
     }
 
     // ---- Changing.

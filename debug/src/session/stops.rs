@@ -1,6 +1,6 @@
 //! Breakpoints and watchpoints.
 
-use super::expression::{self, Live};
+use super::expression::{self, Live, Reads};
 use super::{Session, Why};
 use takt_asm::expr::Value;
 use takt_isa::program::{Location, Space};
@@ -64,6 +64,19 @@ impl Stop {
     pub fn text(&self) -> &str {
         match self {
             Stop::Break { text, .. } | Stop::Watch { text, .. } => text,
+        }
+    }
+
+    /// Adds what its expressions read.
+    pub(super) fn reads(&self, reads: &mut Reads) {
+        match self {
+            Stop::Break { condition, .. } => condition.iter().for_each(|condition| condition.reads(reads)),
+            Stop::Watch { what, test, .. } => {
+                what.reads(reads);
+                if let Test::Equals(other) | Test::Above(other) = test {
+                    other.reads(reads);
+                }
+            }
         }
     }
 }

@@ -1,0 +1,381 @@
+//! A debug session on a machine that runs elsewhere, on a board: it can be held at the end of a period, looked at, and let run a
+//! period more.
+//!
+//! **What there is to see** is read from the machine and shown by an emulator that is placed where it stands
+//! ([`RemoteSession::show`]): all that looks at a [`Session`] works. What nobody can know is left out: operations in flight (there
+//! are none between two periods), cycles, the return stack.
+//!
+//! **The shadow** is another emulator, which runs beside the machine with the same inputs, read back after each period. What differs
+//! is told, and the shadow goes on from what the machine has.
+
+mod console;
+mod extent;
+mod machine;
+mod shadow;
+
+pub use console::RemoteConsole;
+pub use machine::{Activity, Remote, RemoteError, State};
+
+use crate::session::{Control, Live, Search, Session, Why};
+use extent::Extent;
+use shadow::{End, Shadow};
+use std::sync::Arc;
+use takt_emu::{At, Emulator, Fault, Standing};
+use takt_isa::fp::Flags;
+use takt_isa::{Program, Register};
+
+/// Periods for which a command runs at most.
+pub const PERIODS: u64 = 1_000_000;
+
+/// Why a command stopped.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RemoteWhy {
+    /// As in a session of one's own.
+    Of(Why),
+    /// A fault of the machine, which its shadow may have had too.
+    Fault(Option<Fault>),
+    /// Another one than the shadow: the first difference, in words.
+    Different(String),
+    /// There was nothing to stop at in so many periods.
+    Limit(u64),
+}
+
+/// What a command waits for, and what it must read for that.
+struct Goal {
+    search: Search,
+    registers: Vec<Register>,
+    memory: bool,
+}
+
+/// A session.
+pub struct RemoteSession {
+    remote: Box<dyn Remote + Send>,
+    control: Arc<Control>,
+    extent: Extent,
+    /// The program after a reset, to be placed elsewhere.
+    base: Emulator,
+    state: State,
+    /// What was read last.
+    seen: Standing,
+    shadow: Shadow,
+    /// Whether `seen` is what the machine has.
+    settled: bool,
+}
+
+impl RemoteSession {
+    /// A session on a machine that carries this program: held, if it runs, at the end of a period.
+    ///
+    /// # Errors
+    /// If the machine does not answer, or the emulator cannot hold the program. A program that does not come to its `wait` is no error.
+    pub fn attach(
+        program: &Program,
+        mut remote: Box<dyn Remote + Send>,
+        control: Arc<Control>,
+    ) -> Result<RemoteSession, RemoteError> {
+        let base = Emulator::new(program)?;
+        let mut memory = program.data.clone();
+        memory.resize(base.memory().len(), 0);
+        let registers = program.constants.iter().copied().collect();
+        let seen = Standing { at: At::Reset, registers, memory, flags: Flags::NONE };
+        let shadow = Shadow::placed(&base, &seen);
+        let (extent, state) = (Extent::of(program), remote.state()?);
+        Ok(RemoteSession { remote, control, extent, base, state, seen, shadow, settled: false })
+    }
+
+    /// What the machine does, as far as was heard.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Whether what is shown is what the machine has.
+    pub fn is_settled(&self) -> bool {
+        self.settled
+    }
+
+    /// The program.
+    pub fn program(&self) -> &Program {
+        self.base.program()
+    }
+
+    /// Shows the machine in a session of its program.
+    pub fn show(&self, view: &mut Session) {
+        let mut emulator = self.base.clone();
+        let mut standing = self.seen.clone();
+        standing.registers.retain(|register, _| self.is_known(*register));
+        emulator.stand(&standing);
+        view.look_afar(emulator, self.state.periods);
+    }
+
+    /// Whether a register was ever written. What it holds otherwise is of no interest.
+    fn is_known(&self, register: Register) -> bool {
+        self.program().machine.is_input(register) || self.shadow.register(register).is_some()
+    }
+
+    // ---- Moving.
+
+    /// Holds the machine where the period ends, and looks at it. The shadow goes on from there.
+    ///
+    /// # Errors
+    /// If it does not answer, or does not wait.
+    pub fn hold(&mut self) -> Result<RemoteWhy, RemoteError> {
+        self.settled = false;
+        self.state = self.remote.state()?;
+        if !self.state.is_still() {
+            let held = self.remote.hold();
+            self.state = self.remote.state()?;
+            held?;
+        }
+        self.read_inputs()?;
+        let extent = self.extent.clone();
+        self.read(&extent.registers, &extent.words)?;
+        self.follow()?;
+        // What the program does not write must be as it was loaded, at its start.
+        let started = self.state.activity != Activity::Stopped;
+        let loaded = if started { shadow::loaded(&self.base, &self.seen, &self.extent) } else { None };
+        self.settled = true;
+        Ok(loaded.map_or_else(|| self.why(None), RemoteWhy::Different))
+    }
+
+    /// Asks what it does.
+    ///
+    /// # Errors
+    /// If it does not answer.
+    pub fn ask(&mut self) -> Result<(), RemoteError> {
+        self.state = self.remote.state()?;
+        Ok(())
+    }
+
+    /// Lets it run.
+    ///
+    /// # Errors
+    /// If it does not answer.
+    pub fn go(&mut self) -> Result<(), RemoteError> {
+        self.settled = false;
+        self.remote.go()?;
+        self.ask()
+    }
+
+    /// Lets it run until somebody interrupts it or it stops, and holds it.
+    ///
+    /// # Errors
+    /// If it does not answer, or does not wait.
+    pub fn run_freely(&mut self) -> Result<RemoteWhy, RemoteError> {
+        self.go()?;
+        let mut interrupted = false;
+        while self.state.activity == Activity::Runs && !interrupted {
+            self.state = self.remote.poll()?;
+            interrupted = self.interrupted();
+        }
+        match self.hold()? {
+            RemoteWhy::Of(Why::Done) if interrupted => Ok(RemoteWhy::Of(Why::Interrupted)),
+            why => Ok(why),
+        }
+    }
+
+    /// Starts the program again, held at its first `wait`. The shadow starts with it.
+    ///
+    /// # Errors
+    /// If it does not answer, or does not wait.
+    pub fn restart(&mut self) -> Result<RemoteWhy, RemoteError> {
+        self.settled = false;
+        let restarted = self.remote.restart();
+        self.state = self.remote.state()?;
+        restarted?;
+        self.read_inputs()?;
+        let extent = self.extent.clone();
+        self.read(&extent.registers, &extent.words)?;
+        let (shadow, end) = Shadow::started(&self.base, &self.inputs());
+        self.shadow = shadow;
+        let outputs = self.remote.outputs()?;
+        let different = self.compare(&outputs, end.as_ref()).or_else(|| self.compare_all());
+        self.end_of_move(different, end)
+    }
+
+    /// Runs so many periods, [`PERIODS`] at most, or until what it waits for.
+    ///
+    /// # Errors
+    /// If the machine does not answer, or does not wait.
+    fn advance(
+        &mut self,
+        view: &mut Session,
+        count: Option<u64>,
+        mut goal: Option<Goal>,
+    ) -> Result<RemoteWhy, RemoteError> {
+        let (mut why, mut different, mut end) = (RemoteWhy::Of(Why::Done), None, None);
+        self.settled = false;
+        let most = count.filter(|count| *count <= PERIODS);
+        for number in 0.. {
+            if most == Some(number) {
+                break;
+            }
+            if number == PERIODS {
+                why = RemoteWhy::Limit(PERIODS);
+                break;
+            }
+            if self.interrupted() {
+                why = RemoteWhy::Of(Why::Interrupted);
+                break;
+            }
+            (different, end) = self.period()?;
+            if different.is_some() || self.state.activity != Activity::Held {
+                break;
+            }
+            let Some(Goal { search, registers, memory }) = &mut goal else { continue };
+            let words = if *memory { self.extent.written_words.clone() } else { Vec::new() };
+            self.read(registers, &words)?;
+            self.show(view);
+            if let Some(found) = search.visit(view, None) {
+                why = RemoteWhy::Of(view.stopped(found));
+                break;
+            }
+        }
+        let extent = self.extent.clone();
+        self.read(&extent.written, &extent.written_words)?;
+        let different = different.or_else(|| self.compare_all());
+        match self.end_of_move(different, end)? {
+            RemoteWhy::Of(Why::Done) => Ok(why),
+            other => Ok(other),
+        }
+    }
+
+    /// The end of a command, with all that the program writes read: after a difference, the shadow goes on from the machine.
+    fn end_of_move(&mut self, different: Option<String>, end: Option<End>) -> Result<RemoteWhy, RemoteError> {
+        self.stand()?;
+        let why = match different {
+            Some(different) => {
+                self.follow()?;
+                RemoteWhy::Different(different)
+            }
+            None => self.why(end),
+        };
+        self.settled = true;
+        Ok(why)
+    }
+
+    /// Why it does not go on, or that it can.
+    fn why(&self, end: Option<End>) -> RemoteWhy {
+        match (&self.state.activity, end) {
+            (Activity::Halted, _) => RemoteWhy::Of(Why::Halted),
+            (Activity::Faulted(..), Some(End::Fault(fault))) => RemoteWhy::Fault(Some(fault)),
+            (Activity::Faulted(..), _) => RemoteWhy::Fault(None),
+            _ => RemoteWhy::Of(Why::Done),
+        }
+    }
+
+    /// One period of machine and shadow: the first difference at their outputs, and what the shadow stopped at.
+    fn period(&mut self) -> Result<(Option<String>, Option<End>), RemoteError> {
+        let before = self.state.periods;
+        let stepped = self.remote.step();
+        self.state = self.remote.state()?;
+        stepped?;
+        if self.state.activity == Activity::Held
+            && self.state.periods as u32 != (before as u32).wrapping_add(1)
+        {
+            let text = "it did not run the one period that was asked for: is another host connected?";
+            return Err(RemoteError::Other(text.to_owned()));
+        }
+        self.read_inputs()?;
+        let outputs = self.remote.outputs()?;
+        let end = self.shadow.period(&self.inputs());
+        Ok((self.compare(&outputs, end.as_ref()), end))
+    }
+
+    fn interrupted(&self) -> bool {
+        let interrupted = self.control.report(self.state.periods);
+        if interrupted {
+            self.control.clear();
+        }
+        interrupted
+    }
+
+    // ---- Reading and setting.
+
+    /// Sets an input port.
+    ///
+    /// # Errors
+    /// If the machine does not answer.
+    pub fn set_input(&mut self, port: Register, bits: u32) -> Result<(), RemoteError> {
+        self.remote.set_input(port, bits)?;
+        self.seen.registers.insert(port, bits);
+        Ok(())
+    }
+
+    fn read(&mut self, registers: &[Register], words: &[u32]) -> Result<(), RemoteError> {
+        let read = self.remote.registers(registers)?;
+        self.seen.registers.extend(registers.iter().copied().zip(read));
+        for (word, bits) in words.iter().zip(self.remote.words(words)?) {
+            if let Some(place) = self.seen.memory.get_mut(*word as usize) {
+                *place = bits;
+            }
+        }
+        Ok(())
+    }
+
+    fn read_inputs(&mut self) -> Result<(), RemoteError> {
+        let read = self.remote.inputs()?;
+        let ports = self.base.program().inputs.iter().map(|port| port.register);
+        self.seen.registers.extend(ports.zip(read));
+        Ok(())
+    }
+
+    fn inputs(&self) -> Vec<(Register, u32)> {
+        let ports = self.program().inputs.iter().map(|port| port.register);
+        ports.filter_map(|port| Some((port, *self.seen.registers.get(&port)?))).collect()
+    }
+
+    /// Takes down where the machine stands.
+    fn stand(&mut self) -> Result<(), RemoteError> {
+        let State { activity, issued, flags, .. } = &self.state;
+        self.seen.flags = *flags;
+        self.seen.at = match activity {
+            Activity::Stopped => At::Reset,
+            Activity::Halted => At::Stopped(*issued),
+            Activity::Faulted(address, _) => At::Stopped(*address),
+            _ => At::Wait(*issued),
+        };
+        if self.base.clone().stand(&self.seen) {
+            return Ok(());
+        }
+        let text = format!("it waits at bundle {issued}, where the program has no `wait`");
+        Err(RemoteError::Other(text))
+    }
+
+    /// The shadow goes on from where the machine stands.
+    fn follow(&mut self) -> Result<(), RemoteError> {
+        self.stand()?;
+        self.shadow = Shadow::placed(&self.base, &self.seen);
+        Ok(())
+    }
+
+    // ---- Comparing.
+
+    /// The first difference in how the period ended, or at the outputs.
+    fn compare(&self, outputs: &[u32], end: Option<&End>) -> Option<String> {
+        let different = self.shadow.ended(&self.state, end, self.program()).or_else(|| {
+            let inputs = self.inputs();
+            self.shadow.outputs(outputs, &inputs, self.program())
+        })?;
+        Some(format!("period {}: {different}", self.state.periods))
+    }
+
+    /// The first difference in a register or data word that the program writes.
+    fn compare_all(&self) -> Option<String> {
+        let different = self.shadow.values(&self.seen, &self.extent, self.program())?;
+        Some(format!("after period {}: {different}", self.state.periods))
+    }
+
+    /// Waits for an expression, or, without one, for the stops of a session; `None` if it has none.
+    fn goal(&self, view: &Session, live: Option<Live>) -> Option<Goal> {
+        let reads = view.reads(live.as_ref());
+        let search = match live {
+            Some(live) => Search::value(live, view),
+            None => Search::stops(view)?,
+        };
+        let written = |register: &Register| self.extent.registers.binary_search(register).is_ok();
+        Some(Goal {
+            search,
+            registers: reads.registers.into_iter().filter(written).collect(),
+            memory: reads.memory,
+        })
+    }
+}

@@ -1,0 +1,70 @@
+//! A machine placed where another one of the same program stands: what a debugger knows of a circuit.
+
+use crate::emulator::{Emulator, Front, Status};
+use std::collections::BTreeMap;
+use takt_isa::fp::Flags;
+use takt_isa::{BundleAddress, Flow, Register};
+
+/// What is known of a machine with nothing in flight. Its return stack is not, and is taken as empty.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Standing {
+    /// Where it stands.
+    pub at: At,
+    /// Registers with their bits, input ports as the host has set them; those that are not here were never written.
+    pub registers: BTreeMap<Register, u32>,
+    /// The data memory, from word 0.
+    pub memory: Vec<u32>,
+    /// The sticky exception flags.
+    pub flags: Flags,
+}
+
+/// Where a machine stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum At {
+    /// At its beginning, after a reset.
+    Reset,
+    /// The `wait` of this bundle has issued.
+    Wait(BundleAddress),
+    /// It has stopped at this bundle.
+    Stopped(BundleAddress),
+}
+
+impl Emulator {
+    /// Resets the machine and places it where another one of its program stands. Cycles count from here.
+    ///
+    /// Returns false, and leaves it reset, if it is said to wait at a bundle that has no `wait`.
+    pub fn stand(&mut self, standing: &Standing) -> bool {
+        self.reset();
+        let state = &mut self.state;
+        for (&register, &bits) in &standing.registers {
+            if register != Register::ZERO && self.program.machine.has_register(register) {
+                state.set(register, bits);
+            }
+        }
+        for (word, bits) in state.memory.iter_mut().zip(&standing.memory) {
+            *word = *bits;
+        }
+        state.flags = standing.flags;
+        state.publish_outputs(self.program.machine);
+        match standing.at {
+            At::Reset => {}
+            At::Wait(address) => {
+                let bundle = self.program.bundle(address).and_then(Result::ok);
+                let Some(Flow::Wait(target)) = bundle.map(|bundle| Flow::of(&bundle)) else {
+                    self.reset();
+                    return false;
+                };
+                self.front = Front { next: target, delivered: 0, from: address };
+                self.status = Status::Waiting { since: 0, address };
+                self.ticks.waited = Some(0);
+                self.now = 1;
+            }
+            At::Stopped(address) => {
+                self.front = Front { next: address, delivered: 0, from: address };
+                self.status = Status::Halted { cycle: 0, address };
+                self.now = 1;
+            }
+        }
+        true
+    }
+}

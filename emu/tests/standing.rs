@@ -1,0 +1,90 @@
+//! A machine placed where another one stands between two periods goes on as that one does.
+
+use std::collections::BTreeMap;
+use takt_emu::testing::{Options, Random, input_ports, random_program};
+use takt_emu::{At, Emulator, Standing, Status};
+use takt_isa::spec::units::MAX_LATENCY;
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, MACHINES, Register};
+
+/// What is known of an emulator with nothing in flight.
+fn standing(emulator: &Emulator, at: At) -> Standing {
+    let known = |register| Some((register, emulator.register(register)?));
+    Standing {
+        at,
+        registers: Register::all().filter_map(known).collect(),
+        memory: emulator.memory().to_vec(),
+        flags: emulator.flags(),
+    }
+}
+
+/// Registers, memory, flags, outputs.
+type Seen = (BTreeMap<Register, u32>, Vec<u32>, u8, Vec<Option<u32>>);
+
+fn seen(emulator: &Emulator) -> Seen {
+    let Standing { registers, memory, flags, .. } = standing(emulator, At::Reset);
+    let outputs = Register::all().map(|register| emulator.output_bits(register));
+    (registers, memory, flags.bits(), outputs.collect())
+}
+
+fn drain(emulator: &mut Emulator) {
+    emulator.run_until(emulator.now() + Cycle::from(MAX_LATENCY)).unwrap();
+}
+
+#[test]
+fn it_goes_on_as_the_other() {
+    let mut compared = 0;
+    for seed in 0..60 {
+        let machine = MACHINES[seed as usize % MACHINES.len()];
+        let mut program = random_program(seed, machine, Options::TAME);
+        program.latched = seed % 3 == 0;
+        let mut random = Random::new(seed);
+        let mut original = Emulator::new(&program).unwrap();
+        for port in input_ports(machine) {
+            original.set_input_bits(port, 0).unwrap();
+        }
+        let mut other = Emulator::new(&program).unwrap();
+        let mut inputs: Vec<(Register, u32)> = Vec::new();
+        for period in 0..6 {
+            for (port, bits) in &inputs {
+                original.set_input_bits(*port, *bits).unwrap();
+            }
+            let Ok(report) = original.run_period(&[]) else { break };
+            drain(&mut original);
+            if period > 0 {
+                let again = other.run_period(&[]).unwrap();
+                drain(&mut other);
+                assert_eq!(again.cycles, report.cycles, "seed {seed}, period {period}");
+                assert!(seen(&other) == seen(&original), "seed {seed}, period {period}");
+                compared += 1;
+            }
+            let Status::Waiting { address, .. } = *original.status() else { break };
+            assert!(original.stack().is_empty());
+            // The host has set the next inputs before it looked.
+            inputs = input_ports(machine).map(|port| (port, random.word())).collect();
+            let mut standing = standing(&original, At::Wait(address));
+            standing.registers.extend(inputs.iter().copied());
+            assert!(other.stand(&standing));
+            let (mut registers, memory, flags, outputs) = seen(&other);
+            assert!(registers == standing.registers && memory == standing.memory);
+            assert_eq!((flags, other.next_address()), (standing.flags.bits(), original.next_address()));
+            let published = Register::all().zip(outputs).filter_map(|(port, bits)| Some((port, bits?)));
+            registers.retain(|register, _| machine.is_output(*register));
+            assert!(published.eq(registers), "seed {seed}, period {period}");
+        }
+    }
+    assert!(compared > 100, "only {compared} periods were compared");
+}
+
+#[test]
+fn nobody_waits_where_there_is_no_wait() {
+    let program = random_program(1, MACHINES[0], Options::TAME);
+    let mut emulator = Emulator::new(&program).unwrap();
+    let fresh = standing(&emulator, At::Reset);
+    for at in [At::Wait(BundleAddress::new(0)), At::Wait(BundleAddress::new(u16::MAX.into()))] {
+        assert!(!emulator.stand(&Standing { at, ..fresh.clone() }));
+        assert_eq!((emulator.now(), emulator.status()), (0, &Status::Running));
+    }
+    assert!(emulator.stand(&Standing { at: At::Stopped(BundleAddress::new(2)), ..fresh }));
+    assert!(matches!(emulator.status(), Status::Halted { .. }));
+}
