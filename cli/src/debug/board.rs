@@ -23,6 +23,9 @@ use takt_isa::{BundleAddress, Program, Register};
 const GAP: u16 = 4;
 /// How often a board that runs is asked.
 const POLL: Duration = Duration::from_millis(50);
+/// How often a board is asked whether its period has ended, and how long after the last time.
+const ASKED: u32 = 100;
+const AGAIN: Duration = Duration::from_millis(10);
 /// The exit status of what Ctrl-C ended, as shells have it.
 const INTERRUPTED: i32 = 130;
 
@@ -136,17 +139,16 @@ impl<L: Line> Board<L> {
 
     /// Once the program waits between two periods, or has stopped.
     fn settle(&mut self) -> Result<(), RemoteError> {
-        // Any read of a register waits for that.
-        let any = self.program.machine.slots.iter().flat_map(|slot| slot.bank.registers()).next();
-        match self.registers(any.as_slice()) {
-            // It may be refused later than the host waits for an answer.
-            Err(RemoteError::Other(_))
-                if self.state().is_ok_and(|state| state.activity == Activity::InPeriod) =>
-            {
-                Err(RemoteError::Busy)
+        for _ in 0..ASKED {
+            let status = self.host.status().map_err(failed)?;
+            if status.waiting() || status.halted() || status.fault() {
+                // Any read of a register waits until peripherals have the outputs, too.
+                let any = self.program.machine.slots.iter().flat_map(|slot| slot.bank.registers()).next();
+                return self.registers(any.as_slice()).map(drop);
             }
-            read => read.map(drop),
+            thread::sleep(AGAIN);
         }
+        Err(RemoteError::Busy)
     }
 
     /// Addresses of ports, by their names.
