@@ -116,6 +116,17 @@ impl Status {
         self.0 >> 11 & 1 != 0
     }
 
+    /// What the program does, in words; `control` is that register.
+    pub fn activity(self, control: u32) -> &'static str {
+        match self {
+            _ if self.fault() => "stopped with a fault",
+            _ if self.halted() => "halted",
+            _ if self.in_reset() => "stopped",
+            _ if control & protocol::HOLD != 0 => "held",
+            _ => "runs",
+        }
+    }
+
     /// What stopped the drive.
     pub fn causes(self) -> impl Iterator<Item = &'static str> {
         let names = ["fault", "halt", "missed deadline", "host silent", "stop", "NaN output"];
@@ -224,6 +235,18 @@ impl<L: Line> Host<L> {
             self.number = self.number.wrapping_add(1);
             let bytes = protocol::write(self.number, address.wrapping_add((WORDS * i) as u16), some);
             self.request(&bytes, self.number)?;
+        }
+        Ok(())
+    }
+
+    /// Sets ports, in ascending order of their addresses; those that follow each other change together, between two periods.
+    ///
+    /// # Errors
+    /// If the board does not answer, or refuses.
+    pub fn set_ports(&mut self, settings: &[(u16, u32)]) -> Result<(), LinkError> {
+        for together in settings.chunk_by(|a, b| a.0 + 1 == b.0) {
+            let values: Vec<u32> = together.iter().map(|(_, bits)| *bits).collect();
+            self.write(together[0].0, &values)?;
         }
         Ok(())
     }

@@ -17,6 +17,7 @@ pub mod protocol;
 pub mod routed;
 pub mod serial;
 pub mod simulation;
+mod stream;
 mod taken;
 #[cfg(unix)]
 pub mod terminal;
@@ -30,6 +31,7 @@ pub use boards::Board;
 pub use document::Mistake;
 pub use host::Host;
 pub use kind::Kind;
+pub use stream::{STREAMED, Stream};
 pub use wiring::Wiring;
 
 /// The Verilog of the peripherals and of what is around the core, by file name.

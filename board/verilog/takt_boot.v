@@ -7,7 +7,7 @@
 //   written with zeros, input ports too, and all records have been written, and SETTLE cycles longer. A boot during a boot begins it
 //   again. load and input_write have a bit for each core; zeros go to all cores at once.
 //   The host writes a record in parts of 32 bits; the part 2 completes it: 0 low and 1 high bits of the value, 2 place = {core, slot,
-//   space, address}. part_read: of the record `at`, a cycle after it stands.
+//   space, address}. part_read: of the record `at`, two cycles after it stands: the second is the block RAM's own delay.
 
 module takt_boot #(
     parameter IMAGE   = "image.hex",
@@ -43,7 +43,7 @@ module takt_boot #(
     reg  [WIDTH-1:0] records [0:ROOM-1];
     initial $readmemh(IMAGE, records);
 
-    reg  [WIDTH-1:0] record;
+    reg  [WIDTH-1:0] fetched, record;
     wire [72:0]     whole = record;
     reg  [31:0]     low;
     reg  [15:0]     high;
@@ -51,7 +51,7 @@ module takt_boot #(
     reg  [15:0]     clears;     // program words of each slot, then data, then input ports
     reg  [2:0]      slot;
     reg  [1:0]      state;      // 0: at rest, 1: zeros, 2: records, 3: settles
-    reg             valid, clearing, clears_data, clears_input;
+    reg             fetches, valid, clearing, clears_data, clears_input;
     reg  [15:0]     cleared;
     reg  [2:0]      cleared_slot;
 
@@ -65,7 +65,8 @@ module takt_boot #(
     wire [15:0] last_clear = slot == PORT_SLOT ? LAST_PORT : slot == DATA_SLOT ? LAST_DATA : LAST_CODE;
 
     always @(posedge clk) begin
-        record <= records[read_at];
+        fetched <= records[read_at];
+        record  <= fetched;
         if (write & part == 2'd0) low <= value;
         if (write & part == 2'd1) high <= value[15:0];
     end
@@ -98,7 +99,8 @@ module takt_boot #(
     assign load_value   = clearing | clears_input ? 48'd0 : record[47:0];
 
     always @(posedge clk) begin
-        valid        <= state == 2'd2 & next != count;
+        fetches      <= state == 2'd2 & next != count;
+        valid        <= fetches;
         clearing     <= state == 2'd1 & slot != PORT_SLOT;
         clears_input <= state == 2'd1 & slot == PORT_SLOT;
         clears_data  <= slot == DATA_SLOT;

@@ -5,6 +5,7 @@
 //! and looks for Ctrl-C.
 
 mod accuracy;
+mod board;
 mod failure;
 mod interrupt;
 mod model;
@@ -20,6 +21,8 @@ use pyo3::prelude::*;
 mod _takt {
     #[pymodule_export]
     use crate::accuracy::{accuracy, enclose};
+    #[pymodule_export]
+    use crate::board::Board;
     #[pymodule_export]
     use crate::failure::Failure;
     #[pymodule_export]

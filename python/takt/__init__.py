@@ -9,13 +9,17 @@
     sim = program.sim()                                  # the same, period by period
     y = sim.step({"x": 0.25})["y"]
 
+    board = takt.Board("/dev/ttyUSB0", program)            # and on a board
+
 The arithmetic is the machine's, bit for bit, and so are the cycles. `takt.urdf`, `takt.casadi` and `takt.sympy` make programs
 from robots' descriptions and from expressions.
 """
 
+from takt._board import Board, BoardStatus
 from takt._errors import (
     AssemblyError,
     AssemblyWarning,
+    BoardError,
     Diagnostic,
     FaultError,
     ModelError,
@@ -50,6 +54,9 @@ __all__ = [
     "AssemblyError",
     "AssemblyWarning",
     "Assumed",
+    "Board",
+    "BoardError",
+    "BoardStatus",
     "Bound",
     "Diagnostic",
     "Enclosure",

@@ -104,6 +104,10 @@ class ModelError(TaktError, ValueError):
         self.line = line
 
 
+class BoardError(TaktError, OSError):
+    """A board does not answer, cannot do what is asked, or is no board."""
+
+
 class FaultError(TaktError, RuntimeError):
     """The machine has stopped where the program does not mean it to."""
 

@@ -13,10 +13,10 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 use takt_board::ends::{Ends, Fifo};
-use takt_board::protocol::{CORE_REGISTERS, CORE_WORDS, ENABLE, HOLD, RESTART, RUN};
+use takt_board::protocol::{ENABLE, HOLD, RESTART, RUN};
 use takt_board::serial::Serial;
 use takt_board::top::image;
-use takt_board::{Application, CORE, Host};
+use takt_board::{Application, Host, Stream};
 use takt_isa::Type;
 
 /// A board's serial port.
@@ -194,35 +194,6 @@ enum Prepared {
     Stream(Stream),
 }
 
-/// Ports that one frame has.
-struct Stream {
-    first: u16,
-    words: u32,
-    /// Of each port, its place among the words, and its type.
-    ports: Vec<(usize, Type)>,
-}
-
-impl Stream {
-    fn new(application: Application<'_>, names: &[String]) -> Result<Stream> {
-        let found = names.iter().map(|name| find(application, name)).collect::<Result<Vec<_>>>()?;
-        let first = found.iter().map(|(address, _)| *address).min().unwrap_or(0);
-        let last = found.iter().map(|(address, _)| *address).max().unwrap_or(0);
-        let place = |address: u16| match address < CORE_REGISTERS {
-            true => address / CORE,
-            false => address / CORE_WORDS,
-        };
-        ensure!(
-            place(first) == place(last) && last - first < STREAMED,
-            "one stream has {STREAMED} numbers that follow each other: inputs, outputs, registers or data words of one core"
-        );
-        let ports = found.iter().map(|(address, ty)| (usize::from(address - first), *ty)).collect();
-        Ok(Stream { first, words: u32::from(last - first) + 1, ports })
-    }
-}
-
-/// Words of a frame of the stream, at most.
-const STREAMED: u16 = 15;
-
 fn prepare(command: &Command, carried: Option<&Carried>) -> Result<Prepared> {
     let named = || carried.context("ports have names in the program: --program FILE");
     Ok(match command {
@@ -251,7 +222,10 @@ fn prepare(command: &Command, carried: Option<&Carried>) -> Result<Prepared> {
             let ends = Ends::of(&named()?.system("`pop`")?.description);
             Prepared::Pop(ends.fifo(name, true).map_err(|text| anyhow!("{text}"))?.clone())
         }
-        Command::Stream { names, .. } => Prepared::Stream(Stream::new(named()?.application(), names)?),
+        Command::Stream { names, .. } => {
+            let stream = Stream::of(named()?.application(), names);
+            Prepared::Stream(stream.map_err(|text| anyhow!("{text}"))?)
+        }
         _ => Prepared::Nothing,
     })
 }
@@ -277,13 +251,7 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
         }
         Command::Status => {
             let status = host.status()?;
-            let state = match status {
-                s if s.fault() => "stopped with a fault",
-                s if s.halted() => "halted",
-                s if s.in_reset() => "stopped",
-                _ if control & HOLD != 0 => "held",
-                _ => "runs",
-            };
+            let state = status.activity(control);
             let drive = if status.drives() { "drive" } else { "are safe" };
             writeln!(out, "the program {state}; outputs {drive}")?;
             let causes: Vec<&str> = status.causes().collect();
@@ -316,7 +284,7 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
         }
         Command::Set { .. } => {
             if let Prepared::Settings(settings) = &prepared {
-                set(&mut host, settings)?;
+                host.set_ports(settings)?;
             }
         }
         Command::Shadow { periods, drive, .. } => {
@@ -324,7 +292,7 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
             // Held from its beginning on, so that no period goes by unseen.
             host.set("control", RUN | HOLD | enable | RESTART)?;
             if let Prepared::Settings(settings) = &prepared {
-                set(&mut host, settings)?;
+                host.set_ports(settings)?;
             }
             match named()? {
                 Carried::Program(program) => shadow::run(&mut host, program, *periods, out)?,
@@ -361,16 +329,17 @@ fn streamed(
     color: bool,
     out: &mut Out,
 ) -> Result<()> {
-    host.set("stream", every << 20 | stream.words << 16 | u32::from(stream.first))?;
+    host.set("stream", stream.register(every))?;
     let (mut printed, mut silent) = (0, 0);
     while printed < count && silent < SILENCE {
-        match host.streamed()? {
-            Some(frame) if frame.words.len() == stream.words as usize + 1 => {
-                let values = stream.ports.iter().map(|(at, ty)| shown(frame.words[1 + at], *ty));
-                writeln!(out, "{} {}", frame.words[0], values.collect::<Vec<_>>().join(" "))?;
+        let frame = host.streamed()?;
+        match frame.as_ref().and_then(|frame| stream.values(frame)) {
+            Some((period, values)) => {
+                let values = values.map(|(bits, ty)| shown(bits, ty));
+                writeln!(out, "{period} {}", values.collect::<Vec<_>>().join(" "))?;
                 (printed, silent) = (printed + 1, 0);
             }
-            _ => silent += 1,
+            None => silent += 1,
         }
     }
     host.set("stream", 0)?;
@@ -383,15 +352,6 @@ fn streamed(
             &format!("{lost} frames were lost since power-up: use a larger --every"),
             color,
         );
-    }
-    Ok(())
-}
-
-/// Sets input ports, in ascending order; those whose numbers follow each other change together.
-fn set(host: &mut Host<Serial>, settings: &[(u16, u32)]) -> Result<()> {
-    for together in settings.chunk_by(|a, b| a.0 + 1 == b.0) {
-        let values: Vec<u32> = together.iter().map(|(_, bits)| *bits).collect();
-        host.write(together[0].0, &values)?;
     }
     Ok(())
 }

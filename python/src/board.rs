@@ -1,0 +1,164 @@
+//! A board at a serial port, from Python.
+
+use crate::program::{Program, kind};
+use pyo3::exceptions::PyValueError;
+use pyo3::import_exception;
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
+use takt_board::host::fault_kind;
+use takt_board::protocol::{ENABLE, HOLD, LinkError, RESTART, RUN};
+use takt_board::serial::Serial;
+use takt_board::{Application, Host, Stream, top};
+
+import_exception!(takt._errors, BoardError);
+
+/// What the program does, whether outputs drive, what stopped them, the fault, counters by name.
+type Status = (&'static str, bool, Vec<&'static str>, Option<(u32, String)>, Vec<(&'static str, u32)>);
+
+/// Counters that a board has.
+const COUNTERS: [&str; 6] = ["periods", "misses", "cycles", "most_cycles", "errors", "lost"];
+
+/// A board at a serial port.
+#[pyclass(module = "takt._takt")]
+pub(crate) struct Board {
+    host: Host<Serial>,
+    program: Arc<takt_isa::Program>,
+    stream: Option<Stream>,
+}
+
+fn failed(error: LinkError) -> PyErr {
+    BoardError::new_err(error.to_string())
+}
+
+fn wrong(text: String) -> PyErr {
+    PyValueError::new_err(text)
+}
+
+#[pymethods]
+impl Board {
+    #[new]
+    fn new(py: Python<'_>, port: PathBuf, program: &Program, baud: u32) -> PyResult<Board> {
+        let program = Arc::clone(&program.program);
+        let host = py.detach(|| {
+            let opened = Serial::open(&port, baud);
+            let line = opened
+                .map_err(|error| BoardError::new_err(format!("cannot open {}: {error}", port.display())))?;
+            // Not the number of the last request of an earlier host.
+            let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.subsec_micros());
+            let mut host = Host::connect(line, now as u8).map_err(failed)?;
+            host.fits(&*program).map_err(failed)?;
+            Ok::<_, PyErr>(host)
+        })?;
+        Ok(Board { host, program, stream: None })
+    }
+
+    fn status(&mut self, py: Python<'_>) -> PyResult<Status> {
+        let host = &mut self.host;
+        py.detach(|| {
+            let (control, status) = (host.register("control")?, host.status()?);
+            let fault = match status.fault() {
+                true => {
+                    let word = host.register("fault")?;
+                    Some((word & 0xffff, fault_kind(word).to_owned()))
+                }
+                false => None,
+            };
+            let mut counters = Vec::new();
+            for name in COUNTERS {
+                counters.push((name, host.register(name)?));
+            }
+            Ok((status.activity(control), status.drives(), status.causes().collect(), fault, counters))
+        })
+        .map_err(failed)
+    }
+
+    /// Loads the program; it does not start.
+    fn load(&mut self, py: Python<'_>) -> PyResult<()> {
+        let records = top::image(&*self.program).map_err(|error| wrong(error.to_string()))?.records;
+        let host = &mut self.host;
+        py.detach(|| host.load(&records)).map_err(failed)
+    }
+
+    /// `start`, `stop`, `hold` or `go`.
+    fn control(&mut self, py: Python<'_>, what: &str) -> PyResult<()> {
+        let host = &mut self.host;
+        py.detach(|| {
+            let control = host.register("control")?;
+            let next = match what {
+                "start" => RUN | ENABLE | RESTART | control & HOLD,
+                "stop" => control & HOLD,
+                "hold" => control | HOLD,
+                _ => control & !HOLD,
+            };
+            host.set("control", next)
+        })
+        .map_err(failed)
+    }
+
+    /// A period, while it is held.
+    fn step(&mut self, py: Python<'_>) -> PyResult<()> {
+        let host = &mut self.host;
+        let held = py.detach(|| host.register("control")).map_err(failed)? & HOLD != 0;
+        if !held {
+            return Err(BoardError::new_err("the program is not held: `board.hold()` first"));
+        }
+        py.detach(|| host.set("step", 1)).map_err(failed)
+    }
+
+    /// Type and bits of what these names stand for.
+    fn read(&mut self, py: Python<'_>, names: Vec<String>) -> PyResult<Vec<(&'static str, u32)>> {
+        let application = Application::from(&*self.program);
+        let places = names.iter().map(|name| application.find(name)).collect::<Result<Vec<_>, _>>();
+        let places = places.map_err(wrong)?;
+        let host = &mut self.host;
+        py.detach(|| {
+            let mut values = Vec::with_capacity(places.len());
+            for place in places {
+                values.push((kind(place.ty), host.read(place.read, 1)?.first().copied().unwrap_or(0)));
+            }
+            Ok(values)
+        })
+        .map_err(failed)
+    }
+
+    /// Sets input ports; those with consecutive numbers change together.
+    fn set(&mut self, py: Python<'_>, values: Vec<(String, u32)>) -> PyResult<()> {
+        let application = Application::from(&*self.program);
+        let settings =
+            values.iter().map(|(name, bits)| application.settable(name).map(|(at, _)| (at, *bits)));
+        let mut settings = settings.collect::<Result<Vec<_>, _>>().map_err(wrong)?;
+        settings.sort_unstable();
+        let host = &mut self.host;
+        py.detach(|| host.set_ports(&settings)).map_err(failed)
+    }
+
+    /// Begins to stream what these names stand for; their types.
+    fn stream(&mut self, py: Python<'_>, names: Vec<String>, every: u32) -> PyResult<Vec<&'static str>> {
+        let application = Application::from(&*self.program);
+        let stream = Stream::of(application, &names).map_err(wrong)?;
+        let types = names.iter().map(|name| application.find(name).map(|place| kind(place.ty)));
+        let types = types.collect::<Result<Vec<_>, _>>().map_err(wrong)?;
+        let register = stream.register(every);
+        let host = &mut self.host;
+        py.detach(|| host.set("stream", register)).map_err(failed)?;
+        self.stream = Some(stream);
+        Ok(types)
+    }
+
+    /// The next frame: its period, and bits of each name; `None` if there is none within a tenth of a second.
+    fn frame(&mut self, py: Python<'_>) -> PyResult<Option<(u32, Vec<u32>)>> {
+        let host = &mut self.host;
+        let frame = py.detach(|| host.streamed()).map_err(failed)?;
+        let (Some(stream), Some(frame)) = (&self.stream, frame) else { return Ok(None) };
+        Ok(stream.values(&frame).map(|(period, values)| (period, values.map(|(bits, _)| bits).collect())))
+    }
+
+    /// Ends the stream.
+    fn quiet(&mut self, py: Python<'_>) -> PyResult<()> {
+        self.stream = None;
+        let host = &mut self.host;
+        py.detach(|| host.set("stream", 0)).map_err(failed)
+    }
+}

@@ -1,0 +1,190 @@
+"""A program on a board, over its serial port."""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from takt import _takt
+from takt._errors import BoardError
+from takt._ports import count_of, near, numbers, words_of
+
+if TYPE_CHECKING:
+    from takt._program import Program
+
+#: Periods from one frame of a stream to the next, at most.
+_EVERY = 4095
+#: Bits per second, at most.
+_BAUD = 12_000_000
+#: Times in a row, a tenth of a second each, that a stream may bring nothing.
+_SILENCE = 50
+
+
+@dataclass(frozen=True)
+class BoardStatus:
+    """What a board tells about its program."""
+
+    #: `runs`, `held`, `stopped`, `halted` or `stopped with a fault`.
+    state: str
+    #: Whether the outputs drive; otherwise they are safe.
+    drives: bool
+    #: What stopped the drive: `fault`, `halt`, `missed deadline`, `host silent`, `stop`, `NaN output`.
+    causes: tuple[str, ...]
+    #: Bundle and kind of a fault.
+    fault: tuple[int, str] | None
+    #: Periods and missed deadlines since the start; cycles from tick to outputs, of the last period and the most; frames that were
+    #: dropped, and frames of the stream that were not sent, since power-up.
+    periods: int
+    misses: int
+    cycles: int
+    most_cycles: int
+    errors: int
+    lost: int
+
+
+def _value(kind: str, bits: int) -> float | int:
+    if kind == "float":
+        return float(struct.unpack("<f", struct.pack("<I", bits))[0])
+    return bits - (1 << 32) if kind == "int" and bits >> 31 else bits
+
+
+class Board:
+    """A board that carries a circuit from `takt board build` (docs/board.md):
+
+        board = takt.Board("/dev/ttyUSB0", program, baud=1_000_000)
+        board.load()
+        board.start()
+        board.set({"wanted": 52})
+        for period, values in board.stream(["force"], every=10, count=100):
+            ...
+
+    Values are of ports, and what can only be read: registers that the source names, `@m12`, data words (`table[3]`).
+    """
+
+    #: The program whose names are used. Nothing checks that the board carries it, but `load`.
+    program: Program
+
+    def __init__(self, port: str | os.PathLike[str], program: Program, *, baud: int = 115_200) -> None:
+        """Opens a serial port, or what `takt board sim` prints.
+
+        Args:
+            port: The serial port.
+            program: The program that runs there, or is to be loaded.
+            baud: Bits per second, as in the wiring.
+
+        Raises:
+            BoardError: there is no such port, nothing answers, or what answers is no board with a single program.
+        """
+        self.program = program
+        rate = count_of("baud", baud) or 0
+        if rate > _BAUD:
+            raise ValueError(f"baud is {rate}: it is {_BAUD} at most")
+        self._core = _takt.Board(port, program._core, rate)
+
+    @property
+    def status(self) -> BoardStatus:
+        """What the program does, and counters."""
+        state, drives, causes, fault, counters = self._core.status()
+        return BoardStatus(state, drives, tuple(causes), fault, **dict(counters))
+
+    def load(self) -> None:
+        """Stops the board's program and loads this one, which is read back and compared. It stays until power-off, and is not held."""
+        self._core.load()
+
+    def start(self) -> None:
+        """Starts the program from its beginning; outputs drive with the end of its first period. If it was held, it is held there."""
+        self._core.control("start")
+
+    def stop(self) -> None:
+        """Stops the program; outputs are safe."""
+        self._core.control("stop")
+
+    def hold(self) -> None:
+        """No more ticks: the program waits at the end of its period. Outputs keep what they drive."""
+        self._core.control("hold")
+
+    def go(self) -> None:
+        """Ticks again."""
+        self._core.control("go")
+
+    def step(self, inputs: Mapping[str, ArrayLike] | None = None) -> dict[str, float | int]:
+        """Sets inputs and runs one period, while the program is held.
+
+        Returns:
+            The outputs after it, by port.
+
+        Raises:
+            BoardError: the program is not held, or does not come to its `wait`.
+        """
+        self.set(inputs or {})
+        self._core.step()
+        return self.read(*self.program.outputs)
+
+    def read(self, *names: str) -> dict[str, float | int]:
+        """Values by name, between two periods or of a program that has stopped; without names, of all ports.
+
+        Raises:
+            BoardError: the program does not wait for its tick.
+            ValueError: there is no such name.
+        """
+        wanted = list(names) or [*self.program.inputs, *self.program.outputs]
+        return {name: _value(*value) for name, value in zip(wanted, self._core.read(wanted))}
+
+    def set(self, values: Mapping[str, ArrayLike]) -> None:
+        """Sets input ports between two periods; those with consecutive numbers, up to 16, change together.
+
+        Raises:
+            BoardError: the program does not wait for its tick.
+            ValueError: a name or value that does not fit; then nothing is set.
+        """
+        words: list[tuple[str, int]] = []
+        for name, value in values.items():
+            port = self.program.inputs.get(name)
+            if port is None:
+                raise ValueError(f"the program has no input `{name}`{near(name, list(self.program.inputs))}")
+            array = numbers(f"`{name}`", value)
+            if array.shape != ():
+                raise ValueError(f"`{name}` is one number, not an array of shape {array.shape}")
+            words.append((name, int(words_of(f"`{name}`", port, np.asarray(array)))))
+        self._core.set(words)
+
+    def stream(
+        self, names: list[str], *, every: int = 1, count: int | None = None
+    ) -> Iterator[tuple[int, dict[str, float | int]]]:
+        """Values that the board sends by itself, with the number of the period: names of which one frame has 15 that follow each other.
+
+        Args:
+            names: As for `read`.
+            every: Periods from one frame to the next, up to 4095. Frames for which the line has no time are left out, and counted in
+                `status.lost`.
+            count: How many; without it, until the iterator is closed.
+
+        Raises:
+            BoardError: no frame comes: the program has no periods any more.
+        """
+        periods = count_of("every", every) or 1
+        if periods > _EVERY:
+            raise ValueError(f"every is {periods}: it is {_EVERY} at most")
+        return self._frames(list(names), periods, count_of("count", count))
+
+    def _frames(self, names: list[str], every: int, count: int | None) -> Iterator[tuple[int, dict[str, Any]]]:
+        kinds = self._core.stream(names, every)
+        try:
+            seen, silent = 0, 0
+            while count is None or seen < count:
+                frame = self._core.frame()
+                silent = 0 if frame else silent + 1
+                if silent == _SILENCE:
+                    raise BoardError(f"the stream ended after {seen} frames: the program has no periods any more")
+                if frame:
+                    seen += 1
+                    period, words = frame
+                    yield period, {name: _value(kind, bits) for name, kind, bits in zip(names, kinds, words)}
+        finally:
+            self._core.quiet()
