@@ -1,6 +1,7 @@
 //! What is generated for a wiring: the module around core and peripherals, the board's top level, the image in block RAM, pins.
 
 mod memory;
+mod observer;
 mod parts;
 mod program;
 mod system;

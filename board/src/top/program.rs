@@ -1,6 +1,7 @@
 //! The module around the core of a single program, with its peripherals.
 
-use super::parts::{Observer, common, fill, instance, net, setting, to_integer, values};
+use super::observer::Observer;
+use super::parts::{common, fill, instance, net, setting, to_integer, values};
 use super::{IMAGE_BITS, RECORDS};
 use crate::application::Application;
 use crate::kind::Direction;

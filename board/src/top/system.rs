@@ -1,6 +1,7 @@
 //! The module around a system of several cores, with its peripherals.
 
-use super::parts::{Observer, Values, common, fill, instance, net, to_integer, values};
+use super::observer::Observer;
+use super::parts::{Values, common, fill, instance, net, to_integer, values};
 use super::{Contents, bits};
 use crate::application::{Application, CORE};
 use crate::ends::{Ends, INPUT_ENDS};
