@@ -121,8 +121,8 @@ impl Application<'_> {
         }
     }
 
-    /// Where a port is: `n`, `core.n`, or what the system's file calls the host's end of a link; or another register of a core,
-    /// `x`, `@m12`, or a data word, `table[3]`.
+    /// Where the host finds a port (`n`, `core.n`, or what the system's file calls the host's end of a link), another register of a core
+    /// (`x`, `@m12`), or a data word (`table[3]`).
     ///
     /// # Errors
     /// In words, what is wrong with the name.
@@ -169,8 +169,8 @@ impl Application<'_> {
         }
     }
 
-    /// The address at which the host reads a core's register; those of following registers of the bank follow. An input port's is that of
-    /// the port. None if there is no such register.
+    /// The address at which the host reads a core's register. The bank's next registers have the next addresses. An input port is read at
+    /// the port's own address. None if there is no such register.
     pub fn register(&self, core: usize, register: Register) -> Option<u16> {
         let machine = self.program(core)?.machine;
         let offset = core as u16;
@@ -182,8 +182,8 @@ impl Application<'_> {
         }
     }
 
-    /// The address at which the host reads a core's data word; those of following words follow. None if there is no such word. In a
-    /// system, words from 1024 on have no address.
+    /// The address at which the host reads a core's data word. The next words have the next addresses. None if there is no such word. In
+    /// a system, words from 1024 on have no address.
     pub fn word(&self, core: usize, word: u32) -> Option<u16> {
         let mut depth = self.program(core)?.machine.data_depth;
         if let Application::System(_) = self {
@@ -192,7 +192,7 @@ impl Application<'_> {
         (word < depth).then(|| CORE_DATA + CORE_WORDS * core as u16 + word as u16)
     }
 
-    /// Where another register than a port, or a data word, is.
+    /// Where a register that is no port, or a data word, is.
     fn held(&self, core: usize, name: &str) -> Option<Place> {
         let program = self.program(core)?;
         let place = |read: u16, ty: Type| Some(Place { read, set: None, ty });

@@ -95,14 +95,14 @@ impl Status {
         self.0 & 4 != 0
     }
 
-    /// The slot whose operation the fault is of.
+    /// The slot of the operation that faulted.
     pub fn fault_slot(self) -> usize {
         (self.0 >> 4 & 7) as usize
     }
 
     /// The sticky exception flags.
     pub fn flags(self) -> Flags {
-        // From overflow on, as there.
+        // In the same order, from overflow on.
         Flags::from_bits((self.0 >> 7 & 7) as u8 * Flags::OVERFLOW.bits())
     }
 
@@ -116,7 +116,7 @@ impl Status {
         self.0 >> 11 & 1 != 0
     }
 
-    /// What the program does, in words; `control` is that register.
+    /// What the program does, in words; `control` is the value of that register.
     pub fn activity(self, control: u32) -> &'static str {
         match self {
             _ if self.fault() => "stopped with a fault",
@@ -134,7 +134,7 @@ impl Status {
     }
 }
 
-/// What a fault is about, from the register `fault`.
+/// The kind of a fault, in words, from the value of the register `fault`.
 pub fn fault_kind(register: u32) -> &'static str {
     match register >> 16 & 7 {
         1 => "illegal word",
@@ -239,7 +239,8 @@ impl<L: Line> Host<L> {
         Ok(())
     }
 
-    /// Sets ports, in ascending order of their addresses; those that follow each other change together, between two periods.
+    /// Sets ports, which must be in ascending order of their addresses. Ports with consecutive addresses change together, between two
+    /// periods.
     ///
     /// # Errors
     /// If the board does not answer, or refuses.

@@ -1,18 +1,18 @@
-//! What a board sends by itself every few periods: which words a frame has, and what they are called.
+//! What a board sends by itself every few periods: which words are in a frame, and what they are called.
 
 use crate::application::{Application, CORE};
 use crate::protocol::{CORE_REGISTERS, CORE_WORDS, Frame};
 use takt_isa::Type;
 
-/// Words of a frame of the stream, at most, beside the number of the period.
+/// Words of a frame of the stream, at most, besides the number of the period.
 pub const STREAMED: u16 = 15;
 
-/// Ports, registers or data words that one frame has.
+/// Ports, registers or data words that one frame carries.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stream {
     first: u16,
     words: u32,
-    /// Of each name, its place among the words, and its type.
+    /// For each name, its place among the words, and its type.
     values: Vec<(usize, Type)>,
 }
 
@@ -20,7 +20,7 @@ impl Stream {
     /// A stream of what these names stand for ([`Application::find`]).
     ///
     /// # Errors
-    /// In words: a name that there is not, or names that one frame cannot have together.
+    /// In words: a name that does not exist, or names that do not fit into one frame.
     pub fn of(application: Application<'_>, names: &[String]) -> Result<Stream, String> {
         let found = names.iter().map(|name| application.find(name)).collect::<Result<Vec<_>, _>>()?;
         let addresses = || found.iter().map(|place| place.read);
@@ -38,12 +38,12 @@ impl Stream {
         Ok(Stream { first, words: u32::from(last - first) + 1, values })
     }
 
-    /// What the register `stream` is to be for a frame every so many periods, 4095 at most.
+    /// The value of the register `stream` for a frame every `every` periods, 4095 at most.
     pub fn register(&self, every: u32) -> u32 {
         every << 20 | self.words << 16 | u32::from(self.first)
     }
 
-    /// The period of a frame, and bits and type of each name; `None` if the frame is another stream's.
+    /// The period of a frame, and the bits and type of each name's value; `None` if the frame is another stream's.
     pub fn values<'f>(&'f self, frame: &'f Frame) -> Option<(u32, impl Iterator<Item = (u32, Type)> + 'f)> {
         let (period, words) = frame.words.split_first()?;
         let values = self.values.iter().map(|(at, ty)| (words[*at], *ty));

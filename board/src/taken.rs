@@ -19,7 +19,7 @@ pub(crate) struct Taken<'a> {
     pub(crate) link: usize,
 }
 
-/// Of each core, in the order of the wiring, what peripherals take. Ports that are none of the system's are left out.
+/// For each core, what peripherals take from it, in the order of the wiring. Ports that the system does not have are left out.
 pub(crate) fn taken<'a>(description: &Description, wiring: &'a Wiring) -> Vec<Vec<Taken<'a>>> {
     let ends = Ends::of(description);
     let mut all = vec![Vec::new(); description.cores.len()];
@@ -36,7 +36,7 @@ pub(crate) fn taken<'a>(description: &Description, wiring: &'a Wiring) -> Vec<Ve
     all
 }
 
-/// The most pipeline registers of a link that these come over: they are taken once the last one's value is there.
+/// The largest number of pipeline registers on a link that these come over: they are taken once the slowest value has arrived.
 pub(crate) fn transit(description: &Description, taken: &[Taken<'_>]) -> u64 {
     taken.iter().map(|taken| Link::transit(&description.links[taken.link])).max().unwrap_or(0)
 }

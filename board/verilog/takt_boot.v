@@ -6,8 +6,9 @@
 //   boot: high for a cycle starts it, at any time: reset is high from the next cycle on, until program and data memories have been
 //   written with zeros, input ports too, and all records have been written, and SETTLE cycles longer. A boot during a boot begins it
 //   again. load and input_write have a bit for each core; zeros go to all cores at once.
-//   The host writes a record in parts of 32 bits; the part 2 completes it: 0 low and 1 high bits of the value, 2 place = {core, slot,
-//   space, address}. part_read: of the record `at`, two cycles after it stands: the second is the block RAM's own delay.
+//   The host writes a record in parts of 32 bits: 0 and 1 are the low and high bits of the value, 2 is the place {core, slot, space,
+//   address} and completes the record. part_read: part `part` of record `at`, two cycles after `at` stands: one for the block RAM,
+//   one for a register behind it, because the block RAM itself is slow.
 
 module takt_boot #(
     parameter IMAGE   = "image.hex",

@@ -1,14 +1,15 @@
 // takt_bridge: the host's requests, over a UART, in frames with a checksum: docs/protocol.md.
 //
 // Contract
-//   A frame that comes in whole, with the right checksum, is a request: so many reads or writes of words at an address and those that follow, of
-//   which all are made, without a pause, or none. It is answered when they are done. Others are dropped and counted in errors; a gap
-//   of 20 bytes within a frame ends it.
+//   A frame that comes in whole, with the right checksum, is a request: so many reads or writes of words, at an address and those that
+//   follow. All are made, without a pause, or none. It is answered when they are done. Other frames are dropped and counted in errors;
+//   a gap of 20 bytes within a frame ends it.
 //   A write whose number is that of the request before is answered, not made again.
 //   Bus: address and bus_value, or bus_write, stand for a cycle; what is read is on bus_read READ cycles later. Accesses to addresses
-//   1000 to 3fff and from 8000 on (hexadecimal) wait for grant, which may depend on address, but not longer than 2^PATIENCE cycles: then they are refused (status 2).
-//   due, for a cycle: what stands at `stream` words (1 to 15) from stream_at on is sent, after the word at periods_at, unless the line is busy: then
-//   lost goes up by one. heard: for a cycle at each request.
+//   1000 to 3fff and from 8000 on (hexadecimal) wait for grant, which may depend on address, but not longer than 2^PATIENCE cycles:
+//   then they are refused (status 2).
+//   due, high for a cycle: the word at periods_at is sent, and then `stream` words (1 to 15) from stream_at on, unless the bridge is busy:
+//   then lost goes up by one. heard: high for a cycle at each request.
 
 module takt_bridge #(
     parameter DIVIDE   = 434,

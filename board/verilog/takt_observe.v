@@ -1,19 +1,19 @@
-// takt_observe: what a core's registers and data memory hold, for a host to look at, beside the running core.
+// takt_observe: copies of a core's registers and data memory, which a host can read while the core runs.
 //
 // Contract
-//   It keeps copies: of what the core says that it writes (its ports for verification) and of what it is loaded with. The core's own
-//   memories have no port left, and the core does not become slower by it.
-//   at: the address of a register, or of a data word; two cycles later register_value and data_value are what it holds. A register
-//   of no slot's bank is 0; what was never written since power-up may be anything.
-//   still: the core issues nothing. settled: it has not for so long that nothing is in flight any more.
+//   The copies take what the core writes, as its ports for verification report it, and what it is loaded with. The core's own memories
+//   have no port to spare, and copies do not slow the core down.
+//   at: the address of a register and of a data word. Two cycles later, register_value and data_value are what these hold. A register
+//   that is in no slot's bank reads as 0; what has not been written since power-up may read as anything.
+//   still: the core issues nothing. settled: still has been high for so long that nothing is in flight any more.
 //   last: the bundle that issued last.
 
 module takt_observe #(
     parameter SLOTS   = 3,
     parameter BANKS   = 30'd0,  // of each slot, slot 0 lowest, 10 bits: the address of its bank's first register
-    parameter INDICES = 12'd0,  // of each slot, 4 bits: how many an index into its bank has
+    parameter INDICES = 12'd0,  // of each slot, 4 bits: how many bits an index into its bank has
     parameter DATA    = 10,     // bits of a data word's address
-    parameter SETTLE  = 32      // cycles from an issue until all that it does is here
+    parameter SETTLE  = 32      // cycles from an issue until all that it writes is in the copies
 ) (
     input  wire                clk,
     input  wire                load,
@@ -45,7 +45,7 @@ module takt_observe #(
     end
 
     wire              loads = load & load_space == 2'd2;
-    wire [SLOTS-1:0]    mine;   // the slot whose bank has the register of the cycle before
+    wire [SLOTS-1:0]    mine;   // the slot whose bank has the register that `at` named in the cycle before
     wire [32*SLOTS-1:0] held;
     genvar s;
     generate

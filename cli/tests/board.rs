@@ -247,13 +247,13 @@ fn a_board_is_debugged() {
     assert_eq!((other.status, other.stdout.as_str()), (Some(1), ""));
     assert!(
         other.stderr.contains("the board does not carry other.s; `takt load")
-            && other.stderr.contains("of what it carries is another"),
+            && other.stderr.contains("of its image differs"),
         "{}",
         other.stderr
     );
     folder.write("longer.s", RING.replace("wait    period\n.data", "nop\n wait period\n.data"));
     let longer = debug("longer.s", "", "print x\n");
-    assert!(longer.stderr.contains("what it carries has "), "{}", longer.stderr);
+    assert!(longer.stderr.contains("its image has "), "{}", longer.stderr);
 
     // Differences: another program runs, and the board seems to carry the right one.
     let planted = |what: &str, by: &str, commands: &str| {

@@ -1,16 +1,16 @@
-//! A machine placed where another one of the same program stands: what a debugger knows of a circuit.
+//! Places an emulated machine where another one, with the same program, stands: a circuit, as far as a debugger knows it.
 
 use crate::emulator::{Emulator, Front, Status};
 use std::collections::BTreeMap;
 use takt_isa::fp::Flags;
 use takt_isa::{BundleAddress, Flow, Register};
 
-/// What is known of a machine with nothing in flight. Its return stack is not, and is taken as empty.
+/// What is known of a machine with nothing in flight. Its return stack is not known, and is taken to be empty.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Standing {
     /// Where it stands.
     pub at: At,
-    /// Registers with their bits, input ports as the host has set them; those that are not here were never written.
+    /// Registers with their bits, and input ports as the host has set them. A register that is not here was never written.
     pub registers: BTreeMap<Register, u32>,
     /// The data memory, from word 0.
     pub memory: Vec<u32>,
@@ -30,9 +30,9 @@ pub enum At {
 }
 
 impl Emulator {
-    /// Resets the machine and places it where another one of its program stands. Cycles count from here.
+    /// Resets the machine and places it where another one with its program stands. Cycles count from here.
     ///
-    /// Returns false, and leaves it reset, if it is said to wait at a bundle that has no `wait`.
+    /// Returns false, and leaves it reset, if it is to wait at a bundle that has no `wait`.
     pub fn stand(&mut self, standing: &Standing) -> bool {
         self.reset();
         let state = &mut self.state;

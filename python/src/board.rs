@@ -45,7 +45,7 @@ impl Board {
             let opened = Serial::open(&port, baud);
             let line = opened
                 .map_err(|error| BoardError::new_err(format!("cannot open {}: {error}", port.display())))?;
-            // Not the number of the last request of an earlier host.
+            // The first request's number: not that of an earlier host's last request.
             let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.subsec_micros());
             let mut host = Host::connect(line, now as u8).map_err(failed)?;
             host.fits(&*program).map_err(failed)?;
@@ -97,7 +97,7 @@ impl Board {
         .map_err(failed)
     }
 
-    /// A period, while it is held.
+    /// Runs one period, while the program is held.
     fn step(&mut self, py: Python<'_>) -> PyResult<()> {
         let host = &mut self.host;
         let held = py.detach(|| host.register("control")).map_err(failed)? & HOLD != 0;
@@ -107,7 +107,7 @@ impl Board {
         py.detach(|| host.set("step", 1)).map_err(failed)
     }
 
-    /// Type and bits of what these names stand for.
+    /// Type and bits of each name's value.
     fn read(&mut self, py: Python<'_>, names: Vec<String>) -> PyResult<Vec<(&'static str, u32)>> {
         let application = Application::from(&*self.program);
         let places = names.iter().map(|name| application.find(name)).collect::<Result<Vec<_>, _>>();
@@ -134,7 +134,7 @@ impl Board {
         py.detach(|| host.set_ports(&settings)).map_err(failed)
     }
 
-    /// Begins to stream what these names stand for; their types.
+    /// Begins to stream the values of these names; returns their types.
     fn stream(&mut self, py: Python<'_>, names: Vec<String>, every: u32) -> PyResult<Vec<&'static str>> {
         let application = Application::from(&*self.program);
         let stream = Stream::of(application, &names).map_err(wrong)?;
@@ -147,7 +147,7 @@ impl Board {
         Ok(types)
     }
 
-    /// The next frame: its period, and bits of each name; `None` if there is none within a tenth of a second.
+    /// The next frame: its period, and the bits of each name's value; `None` if there is none within a tenth of a second.
     fn frame(&mut self, py: Python<'_>) -> PyResult<Option<(u32, Vec<u32>)>> {
         let host = &mut self.host;
         let frame = py.detach(|| host.streamed()).map_err(failed)?;

@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 _EVERY = 4095
 #: Bits per second, at most.
 _BAUD = 12_000_000
-#: Times in a row, a tenth of a second each, that a stream may bring nothing.
+#: Tenths of a second in a row in which a stream may bring nothing.
 _SILENCE = 50
 
 
 @dataclass(frozen=True)
 class BoardStatus:
-    """What a board tells about its program."""
+    """What a board reports about its program."""
 
     #: `runs`, `held`, `stopped`, `halted` or `stopped with a fault`.
     state: str
@@ -38,8 +38,8 @@ class BoardStatus:
     causes: tuple[str, ...]
     #: Bundle and kind of a fault.
     fault: tuple[int, str] | None
-    #: Periods and missed deadlines since the start; cycles from tick to outputs, of the last period and the most; frames that were
-    #: dropped, and frames of the stream that were not sent, since power-up.
+    #: Since the start: periods, missed deadlines, and the cycles from tick to outputs, of the last period and at most. Since power-up:
+    #: frames that were dropped (`errors`), and frames of the stream that were not sent (`lost`).
     periods: int
     misses: int
     cycles: int
@@ -64,14 +64,14 @@ class Board:
         for period, values in board.stream(["force"], every=10, count=100):
             ...
 
-    Values are of ports, and what can only be read: registers that the source names, `@m12`, data words (`table[3]`).
+    Ports are read and set. Registers, by their name in the source or their place (`@m12`), and data words (`table[3]`) are only read.
     """
 
-    #: The program whose names are used. Nothing checks that the board carries it, but `load`.
+    #: The program whose names are used. Only `load` makes sure that the board carries it.
     program: Program
 
     def __init__(self, port: str | os.PathLike[str], program: Program, *, baud: int = 115_200) -> None:
-        """Opens a serial port, or what `takt board sim` prints.
+        """Opens a serial port, or the pseudo-terminal that `takt board sim` prints.
 
         Args:
             port: The serial port.
@@ -94,7 +94,8 @@ class Board:
         return BoardStatus(state, drives, tuple(causes), fault, **dict(counters))
 
     def load(self) -> None:
-        """Stops the board's program and loads this one, which is read back and compared. It stays until power-off, and is not held."""
+        """Stops the board's program and loads this one, which is read back and compared. It stays until power-off. The program does not
+        start, and is no longer held."""
         self._core.load()
 
     def start(self) -> None:
@@ -110,7 +111,7 @@ class Board:
         self._core.control("hold")
 
     def go(self) -> None:
-        """Ticks again."""
+        """Lets the program run on after `hold`."""
         self._core.control("go")
 
     def step(self, inputs: Mapping[str, ArrayLike] | None = None) -> dict[str, float | int]:
@@ -127,7 +128,7 @@ class Board:
         return self.read(*self.program.outputs)
 
     def read(self, *names: str) -> dict[str, float | int]:
-        """Values by name, between two periods or of a program that has stopped; without names, of all ports.
+        """Values by name, read between two periods or when the program has stopped; without names, those of all ports.
 
         Raises:
             BoardError: the program does not wait for its tick.
@@ -157,13 +158,14 @@ class Board:
     def stream(
         self, names: list[str], *, every: int = 1, count: int | None = None
     ) -> Iterator[tuple[int, dict[str, float | int]]]:
-        """Values that the board sends by itself, with the number of the period: names of which one frame has 15 that follow each other.
+        """Values that the board sends by itself, each time with the number of the period. The names must lie within 15 consecutive ports,
+        registers or data words.
 
         Args:
             names: As for `read`.
             every: Periods from one frame to the next, up to 4095. Frames for which the line has no time are left out, and counted in
                 `status.lost`.
-            count: How many; without it, until the iterator is closed.
+            count: How many frames; without it, until the iterator is closed.
 
         Raises:
             BoardError: no frame comes: the program has no periods any more.

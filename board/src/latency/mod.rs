@@ -1,6 +1,6 @@
 //! From an edge at a pin to an edge at a pin, in cycles: the contracts of the modules on the way, added up.
 //!
-//! `board/tests/top.rs` and `board/tests/system.rs` measure them in the complete top level.
+//! `board/tests/top.rs`, `board/tests/system.rs` and `board/tests/pins.rs` measure these cycles in the complete top level.
 
 mod system;
 
@@ -51,13 +51,14 @@ pub struct End {
 pub struct Way {
     /// Of a system, the cores that it leads through.
     pub cores: Vec<String>,
-    /// Of a system, the links before, between and after them.
+    /// Of a system, the links before, between and after these cores.
     pub links: Vec<String>,
     /// From an edge at a pin to the register that a program reads.
     pub inputs: Vec<End>,
     /// From there to the registers that a program writes, if no deadline is missed.
     pub between: Vec<Part>,
-    /// All of `between`. Over several cores, the worst of one part may exclude the worst of another: then this is less than their sum.
+    /// All of `between` together. Over several cores, the worst of one part may exclude the worst of another: then this is less than the
+    /// sum of the parts.
     pub periods: Part,
     /// From there to an edge at a pin.
     pub outputs: Vec<End>,
@@ -81,10 +82,9 @@ impl Way {
 pub struct Ways {
     /// The ways; of a program, one at most.
     pub ways: Vec<Way>,
-    /// Peripherals with ports that have no edge to count from or to, as a converter's.
+    /// Peripherals whose ports have no edge to count from or to, such as converters.
     pub others: Vec<String>,
-    /// FIFOs of a system that values would go over, from a pin to a pin. How long that takes depends on what is queued: these ways are not
-    /// among `ways`.
+    /// FIFOs on ways from pin to pin of a system. Such ways are not among `ways`, because their latency depends on what is queued.
     pub queues: Vec<String>,
 }
 
@@ -127,7 +127,7 @@ fn edge_out(peripheral: &Peripheral) -> Option<Vec<Part>> {
     }
 }
 
-/// What peripherals have at one side of a program: ends of ways, and those without an edge.
+/// What a peripheral gives a program: each port, and the end of ways there; none if there is no edge to count from.
 fn inputs(peripheral: &Peripheral) -> impl Iterator<Item = (&str, Option<End>)> {
     let registers = peripheral.kind.reads.iter().zip(&peripheral.reads);
     registers.filter_map(|(register, port)| {
@@ -146,7 +146,7 @@ fn end(peripheral: &Peripheral, port: &str, parts: Vec<Part>) -> End {
     End { peripheral: peripheral.name.clone(), port: port.to_owned(), parts }
 }
 
-/// Peripherals of a wiring of which no port is an end of a way.
+/// Peripherals of a wiring with no port that is an end of a way.
 fn others(wiring: &Wiring) -> Vec<String> {
     let is_other = |peripheral: &&Peripheral| {
         !inputs(peripheral).chain(outputs(peripheral)).any(|(_, end)| end.is_some())
@@ -154,7 +154,7 @@ fn others(wiring: &Wiring) -> Vec<String> {
     wiring.peripherals.iter().filter(is_other).map(|peripheral| peripheral.name.clone()).collect()
 }
 
-/// The ways of a program whose periods, from its tick to its `wait`, take so many cycles, with the tick after the `wait`.
+/// The ways of a program whose periods take between `best` and `worst` cycles from tick to `wait`, the next tick coming after the `wait`.
 pub fn ways(wiring: &Wiring, (best, worst): (u64, u64)) -> Ways {
     let inputs: Vec<_> = wiring.peripherals.iter().flat_map(inputs).collect();
     let outputs: Vec<_> = wiring.peripherals.iter().flat_map(outputs).collect();

@@ -1,5 +1,5 @@
-//! The ways through a system of several cores: which cores and links, and when each core reads and waits, is `takt_system`'s to say
-//! (docs/system.md); here is what a board puts before and behind (docs/board.md).
+//! The ways through a system of several cores. `takt_system` says which cores and links they take, and when each core reads and waits
+//! (docs/system.md); what a board adds before and after is here (docs/board.md).
 
 use super::{End, Part, Way, Ways, inputs, others, outputs};
 use crate::application::Application;
@@ -12,11 +12,11 @@ use takt_isa::timing::ENDED_DELAY;
 use takt_system::latency::{LatencyError, Pass, Passages, Route};
 use takt_system::{Description, LinkKind};
 
-/// From the board's tick, in which peripherals capture, to the cycle in which that is written to links.
+/// From the board's tick, at which peripherals capture their registers, to the cycle in which these are written to links.
 const DUE: i64 = 1;
 /// `takt_turn`: from `ended`, two cycles after a `wait`, to the cycle in which `put` is high, with no output and no register on a link.
 const TURN: i64 = 8;
-/// Its part from the cycle in which it looks at links' values to `put`, with no output.
+/// The part of `TURN` from the cycle in which `takt_turn` looks at the links' values to `put`, with no output.
 const PUT: i64 = 7;
 
 /// The least and the most of something.
@@ -36,11 +36,11 @@ impl Range {
     }
 }
 
-/// Ends of ways, by the link that begins or ends there.
+/// Ends of ways, by the link that begins or ends at them.
 type ByLink = BTreeMap<usize, Vec<End>>;
 
-/// The ways through a system's cores, each at most once, if no deadline is missed. A core is taken to read a value in the first period with
-/// it, and to write what follows from it by that period's `wait`.
+/// The ways through a system's cores, through none twice, if no deadline is missed. A core is assumed to read a value in the first period
+/// with it, and to write what follows from it by that period's `wait`.
 ///
 /// # Errors
 /// If there are too many ways to find, or too many phases of ticks to go through.
@@ -111,12 +111,13 @@ fn tails(wiring: &Wiring, taken: &[Vec<Taken<'_>>]) -> ByLink {
     tails
 }
 
-/// The parts between the registers of peripherals at both ends of a way, and all of them; `taken` is what peripherals take from the last core.
+/// The parts between the peripherals' registers at both ends of a way, and all of them together; `taken` is what peripherals take from the
+/// last core.
 fn between(passages: &Passages<'_>, route: &Route, last: usize, taken: &[Taken<'_>]) -> (Vec<Part>, Part) {
     let (description, cores) = (passages.description(), &route.cores);
     let (tick, lead) = (description.tick as i64, description.lead() as i64);
     let puts = puts(passages, last, taken, &route.links);
-    // Cycles from one stage to the next: the board's tick, where each core reads, the last one's `wait`.
+    // Cycles from one stage to the next: the board's tick, each core's read, the last core's `wait`.
     let mut stages = vec![Range::NONE; cores.len() + 1];
     let (mut all, mut under_way) = (Range::NONE, vec![false; cores.len()]);
     for phase in 0..route.phases as i64 {
@@ -158,9 +159,9 @@ fn between(passages: &Passages<'_>, route: &Route, last: usize, taken: &[Taken<'
 /// From a core's `wait` to the cycle in which the peripherals take on what it has written.
 struct Puts {
     cycles: Range,
-    /// Cycles that are added if the `wait`'s own bundle writes outputs: they go with the next `wait`.
+    /// Cycles that are added if the `wait`'s own bundle writes outputs: these are taken at the next `wait`.
     late: i64,
-    /// Whether values can be taken with the `wait` before their own, as they are written.
+    /// Whether values can be taken in the turn of the `wait` before their own, as soon as they are written.
     early: bool,
 }
 
@@ -172,9 +173,9 @@ fn puts(passages: &Passages<'_>, core: usize, taken: &[Taken<'_>], way: &[usize]
     let most = transit(description, taken) as i64;
     let own = way.last().map_or(0, |link| description.links[*link].transit() as i64);
     let turn = most + registers + TURN;
-    // A `wait` that comes before the registers were put after the one before has its turn then.
+    // A `wait` that comes before the registers of the last one were put has its turn after that.
     let again = (turn - (period - (worst - best))).clamp(0, turn - 1);
-    // Values are looked at when those of the slowest link are there.
+    // Values are looked at when those of the slowest link have arrived.
     let early = worst + most - own + again >= period;
     let least = if early { own + 1 + registers + PUT } else { ended + turn };
     let late = if passages.late(core) > ended { period } else { 0 };

@@ -23,7 +23,8 @@ pub struct TooMuch {
     has: u64,
 }
 
-/// Block RAMs of ECP5 for a memory with one port that writes and one that reads: words and bits of each of their forms.
+/// Block RAMs of an ECP5 that a memory with one write port and one read port takes: the fewest over all forms of a block RAM, each so
+/// many words of so many bits.
 fn blocks(words: u64, width: u64) -> u64 {
     let forms = [(512, 36), (1024, 18), (2048, 9), (4096, 4), (8192, 2), (16384, 1)];
     forms.map(|(deep, wide)| words.div_ceil(deep) * width.div_ceil(wide)).into_iter().min().unwrap_or(0)
@@ -32,7 +33,7 @@ fn blocks(words: u64, width: u64) -> u64 {
 /// Bits of a record of the image.
 const RECORD: u64 = 73;
 
-/// Block RAMs of a core: what synthesis counted; of a machine that was not measured, its program and data.
+/// Block RAMs of a core: as synthesis counted them, or, for a machine that was not measured, those of its program and data.
 fn core(machine: &Machine) -> u64 {
     let programs = machine.slots.len() as u64 * blocks(machine.code_depth.into(), 48);
     let least = programs + blocks(machine.data_depth.into(), 32);

@@ -1,9 +1,9 @@
-//! What keeps a core's registers and data memory for the host: `takt_observe.v` beside the core.
+//! Copies of a core's registers and data memory for the host: `takt_observe.v` beside the core.
 
 use std::fmt::Write as _;
 use takt_isa::{Bank, Machine};
 
-/// What a core shows to `takt_observe`: its port, and bits for each slot, or in all.
+/// What a core shows to `takt_observe`: the name of the port, its bits, and whether each slot has so many.
 const WATCHED: [(&str, u32, bool); 8] = [
     ("issued", 1, false),
     ("issued_address", 16, false),
@@ -15,18 +15,18 @@ const WATCHED: [(&str, u32, bool); 8] = [
     ("retire_value", 32, true),
 ];
 
-/// Cycles from the last issue until everything is in the copies, beside the longest latency: results pass two registers on the way.
+/// Cycles from the last issue until everything is in the copies, besides the longest latency: results pass two registers on the way.
 const COPIED: u32 = 6;
 
-/// What keeps a core's registers and data for the host.
+/// An instance of `takt_observe`, or what takes its place.
 pub(super) struct Observer {
-    /// The end of its nets' names: the core's number, or nothing.
+    /// What its nets' names end with: the core's number, or nothing.
     core: String,
-    /// Whether the core is loaded.
+    /// The expression that says that the core is being loaded.
     load: String,
-    /// Whether it issues nothing.
+    /// The expression that says that the core issues nothing.
     still: String,
-    /// The net that says whether all is there.
+    /// The net that says that everything is in the copies.
     settled: String,
 }
 
@@ -45,7 +45,7 @@ impl Observer {
         Observer { core: core.to_string(), load: of("loads"), still, settled: of("settled") }
     }
 
-    /// The copies of a core's registers and data; without them zeros.
+    /// The copies of a core's registers and data; zeros if there are none.
     pub(super) fn instance(&self, machine: &Machine, observe: bool) -> String {
         let Observer { core, load, still, settled } = self;
         let mut text = String::new();
@@ -86,7 +86,7 @@ impl Observer {
         text
     }
 
-    /// Of a core's ports those that it takes, with `prefix` before their names; open, if there are no copies.
+    /// The ports of a core that it looks at, with `prefix` before their names; left open if there are no copies.
     pub(super) fn pins(&self, prefix: &str, observe: bool) -> String {
         let net = |name: &str| if observe { format!("{name}{}", self.core) } else { String::new() };
         WATCHED.iter().map(|(name, ..)| format!("        .{prefix}{name}({}),\n", net(name))).collect()

@@ -1,4 +1,5 @@
-//! What the modules around a program's core and around a system have in common: pins, peripherals, placeholders of the templates.
+//! What the module around a program's core and the one around a system have in common: pins, peripherals, placeholders of their
+//! templates.
 
 use super::{AROUND, own_pins};
 use crate::kind::Direction;
@@ -22,12 +23,12 @@ pub(super) fn direction(direction: Direction) -> &'static str {
     }
 }
 
-/// What each place of a template gets.
+/// Placeholders and their values.
 pub(super) fn values<const N: usize>(values: [(&str, String); N]) -> Values {
     values.map(|(name, value)| (name.to_owned(), value)).into()
 }
 
-/// The places that both templates have. Signals are what `fault` and `deadline` show.
+/// The placeholders that both templates have. `fault` and `deadline` are the expressions behind the signals of these names.
 pub(super) fn common(wiring: &Wiring, [fault, deadline]: [&str; 2]) -> Values {
     let pins: String =
         own_pins(wiring).iter().map(|(name, way, _)| format!(",\n    {} {name}", direction(*way))).collect();
@@ -69,7 +70,7 @@ pub(super) fn common(wiring: &Wiring, [fault, deadline]: [&str; 2]) -> Values {
     registers.chain(own).collect()
 }
 
-/// The converter's code for a number with point to an integer, as its header has it.
+/// The converter's code for float to integer, from the converter's header.
 pub(super) fn to_integer(library: &Library) -> String {
     let convert = library.text("convert.v").unwrap_or_default();
     u8::from(convert.lines().any(|line| line == "//@ op 1'b1 ftoi")).to_string()

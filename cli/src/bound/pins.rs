@@ -27,13 +27,13 @@ struct Table {
     width: usize,
 }
 
-/// What there is to say about the ways.
+/// The ways, and what else there is to say about them.
 struct Found<'a> {
     application: Application<'a>,
     board: Board,
     wiring: Wiring,
     ways: Ways,
-    /// Where a deadline can be missed, which no bound includes.
+    /// Where a deadline can be missed; the bounds do not include that.
     late: Vec<String>,
 }
 

@@ -19,14 +19,14 @@ use takt_debug::remote::{Activity, Remote, RemoteConsole, RemoteError, RemoteSes
 use takt_debug::session::{Control, Options, Session};
 use takt_isa::{BundleAddress, Program, Register};
 
-/// Registers or words between two that are read, up to which one request reads both.
+/// Two addresses that differ by no more than this are read with one request.
 const GAP: u16 = 4;
-/// How often a board that runs is asked.
+/// Time between two looks at a board that runs.
 const POLL: Duration = Duration::from_millis(50);
-/// How often a board is asked whether its period has ended, and how long after the last time.
+/// How many times a board is asked whether its period has ended, and the time between two of them.
 const ASKED: u32 = 100;
 const AGAIN: Duration = Duration::from_millis(10);
-/// The exit status of what Ctrl-C ended, as shells have it.
+/// The exit status after Ctrl-C, by the shells' convention.
 const INTERRUPTED: i32 = 130;
 
 /// A session on a board.
@@ -34,14 +34,14 @@ pub(super) fn run(arguments: &Debug, port: &Path, color: bool, out: &mut Out) ->
     let file = arguments.file.as_deref().context("no file")?;
     if load::is_system(file) {
         let text = format!(
-            "--board is for a single program, and {} is a system; `takt live {} --program {} read CORE.PORT` reads ports of its cores, `shadow` compares them with the emulator",
+            "--board is for a single program, and {} is a system; `takt live {} --program {} read CORE.NAME` reads ports and registers of its cores, `shadow` compares their outputs with the emulator's",
             files::input_name(file),
             port.display(),
             files::input_name(file)
         );
         return Err(Failure::Usage(text).into());
     }
-    // Mistakes in what was given are found before the board is touched.
+    // Mistakes on the command line are found before the board is touched.
     let commands = arguments.script.as_deref().map(script::<RemoteConsole>).transpose()?;
     let loaded = Load::new(arguments.machine.machine, color).with(&arguments.source).with_source(file)?;
     super::changed_sources(file, &loaded, color);
@@ -58,7 +58,7 @@ pub(super) fn run(arguments: &Debug, port: &Path, color: bool, out: &mut Out) ->
     })?;
     if host.register("observed")? == 0 {
         bail!(
-            "the board's circuit leaves out what reads registers and data words (`observe = false` in its wiring); `takt live {}` reads ports",
+            "the board's circuit has no copies of registers and data words to read (`observe = false` in its wiring); `takt live {}` reads ports",
             port.display()
         );
     }
@@ -72,8 +72,8 @@ pub(super) fn run(arguments: &Debug, port: &Path, color: bool, out: &mut Out) ->
     converse(console, &said, commands, &control, &ended, color, out)
 }
 
-/// Ctrl-C stops the command that runs. Without a prompt it ends the session after that, so that the board is left as it should be;
-/// said again, at once.
+/// Ctrl-C stops the command that runs. Without a prompt it then also ends the session, which leaves the board as it should be; a second
+/// Ctrl-C ends the process at once.
 fn interrupts(control: &Arc<Control>, interactive: bool) -> Result<Arc<AtomicBool>> {
     let ended = Arc::new(AtomicBool::new(false));
     let (heard, ends) = (Arc::clone(control), Arc::clone(&ended));
@@ -87,17 +87,17 @@ fn interrupts(control: &Arc<Control>, interactive: bool) -> Result<Arc<AtomicBoo
     Ok(ended)
 }
 
-/// That the image in the board is this one.
+/// Checks that the image in the board is this one.
 fn carries<L: Line>(host: &mut Host<L>, records: &[[u32; 3]]) -> Result<()> {
     let there = host.register("records")? as usize;
     if there != records.len() {
-        bail!("what it carries has {there} records, this program {}", records.len());
+        bail!("its image has {there} records, this program's has {}", records.len());
     }
     // Four words of address for each record, of which the last is not there.
     let words = host.read(protocol::IMAGE, 4 * records.len())?;
     let differs = records.iter().zip(words.chunks(4)).position(|(record, words)| record[..] != words[..3]);
     match differs {
-        Some(record) => bail!("record {record} of what it carries is another"),
+        Some(record) => bail!("record {record} of its image differs"),
         None => Ok(()),
     }
 }
@@ -126,7 +126,7 @@ impl<L: Line> Board<L> {
         self.host.set(name, value).map_err(failed)
     }
 
-    /// Values at addresses, which ascend. Those that are near each other are read together.
+    /// Values at addresses in ascending order. Those near each other are read together.
     fn read(&mut self, addresses: &[u16]) -> Result<Vec<u32>, RemoteError> {
         let mut values = Vec::with_capacity(addresses.len());
         for near in addresses.chunk_by(|a, b| b - a <= GAP) {
@@ -137,12 +137,12 @@ impl<L: Line> Board<L> {
         Ok(values)
     }
 
-    /// Once the program waits between two periods, or has stopped.
+    /// Waits until the program is between two periods, or has stopped.
     fn settle(&mut self) -> Result<(), RemoteError> {
         for _ in 0..ASKED {
             let status = self.host.status().map_err(failed)?;
             if status.waiting() || status.halted() || status.fault() {
-                // Any read of a register waits until peripherals have the outputs, too.
+                // The read of any register also waits until the peripherals have the outputs.
                 let any = self.program.machine.slots.iter().flat_map(|slot| slot.bank.registers()).next();
                 return self.registers(any.as_slice()).map(drop);
             }

@@ -58,16 +58,17 @@ pub(crate) struct Debug {
     /// Full-screen: source, bundle, registers, operations in flight, stalls, ports, watches, and the same commands.
     #[arg(long)]
     tui: bool,
-    /// Debug the board at this serial port, which carries the program: it stops only at the ends of periods.
+    /// Debug the program on the board at this serial port, which must carry it; it stops only at the end of a period.
     #[arg(long, value_name = "PORT", conflicts_with_all = ["inputs", "tick", "track", "tui"])]
     board: Option<PathBuf>,
     /// Baud rate of the board, as in the wiring file.
     #[arg(long, default_value_t = number::BAUD, requires = "board")]
     baud: u32,
-    /// Start the program on the board again, held at its first `wait`; otherwise it is held where its period ends.
+    /// Start the board's program again and hold it at its first `wait`; otherwise it is held at the end of the current period.
     #[arg(long, requires = "board")]
     restart: bool,
-    /// Let the board's outputs drive after a start. Periods take as long as commands do: nothing may hang on them.
+    /// Let the board's outputs drive after --restart or `goto start`. Periods then last as long as commands take: connect nothing that
+    /// depends on their timing.
     #[arg(long, requires = "board")]
     drive: bool,
     #[command(flatten)]
@@ -88,7 +89,7 @@ Examples:
 const ROWS: usize = 1 << 20;
 /// Bytes of a script.
 const SCRIPT_LIMIT: usize = 16 << 20;
-/// How often a command that runs is looked after.
+/// Time between two looks at a command that runs.
 const WATCH: Duration = Duration::from_millis(50);
 
 pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
@@ -154,7 +155,8 @@ fn local<C: Commands + Send + 'static>(
     converse(console, &place, script, control, &AtomicBool::new(false), color, out)
 }
 
-/// Commands from where they come, until there are no more or `ended` says so; `place` is where the session begins.
+/// Executes commands from a script, the prompt or standard input, until there are no more or `ended` is set; `place` says where the
+/// session begins.
 fn converse<C: Commands + Send + 'static>(
     mut console: C,
     place: &str,
@@ -183,14 +185,14 @@ fn leave(console: &mut dyn Commands, out: &mut Out) -> Result<()> {
 /// A session on a system.
 fn of_system(arguments: &Debug, file: &Path, color: bool, out: &mut Out) -> Result<()> {
     let control = Arc::new(Control::default());
-    // What was asked for wrongly, and a mistake in a script, is found before anything runs.
+    // Wrong options and mistakes in a script are found before anything runs.
     check_system(arguments)?;
     let script = arguments.script.as_deref().map(script::<SystemConsole>).transpose()?;
     let (console, _) = open_system(arguments, file, &control, color)?;
     local(console, script, &control, color, out)
 }
 
-/// Refuses what a system's session has not got.
+/// Refuses options that a system's session does not have.
 fn check_system(arguments: &Debug) -> Result<()> {
     let refused = [
         ("--machine", arguments.machine.machine.is_some(), "the system's file names each core's"),

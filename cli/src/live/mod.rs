@@ -22,7 +22,7 @@ use takt_isa::Type;
 /// A board's serial port.
 #[derive(Args)]
 struct Port {
-    /// The serial port: /dev/ttyUSB0, or what `takt board sim` says.
+    /// The serial port: /dev/ttyUSB0, or the one that `takt board sim` prints.
     port: PathBuf,
     /// Baud rate, as in the wiring file.
     #[arg(long, default_value_t = number::BAUD)]
@@ -40,7 +40,7 @@ pub(crate) fn open(port: &Path, baud: u32) -> Result<Host<Serial>> {
     let name = port.display();
     let line = Serial::open(port, baud)
         .with_context(|| format!("cannot open {name}: is the board plugged in, and may you use the port?"))?;
-    // Not the number of the last request of an earlier command.
+    // The first request's number: not that of an earlier command's last request.
     let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.subsec_micros());
     Host::connect(line, now as u8).with_context(|| format!("{name} at {baud} baud"))
 }
@@ -83,7 +83,7 @@ pub(crate) fn load(arguments: &LoadBoard, color: bool, out: &mut Out) -> Result<
 pub(crate) struct Live {
     #[command(flatten)]
     port: Port,
-    /// The program, or the system, that runs there, for its names. What a core of a system has is `core.name`.
+    /// The program, or the system, that runs there, for its names. In a system, a name is `core.name`.
     #[arg(long, value_name = "FILE")]
     program: Option<PathBuf>,
     #[command(flatten)]
@@ -119,7 +119,7 @@ enum Command {
         #[arg(required = true)]
         values: Vec<String>,
     },
-    /// Run the program from its beginning, a period at a time, beside the emulator with the same inputs, and name the first output
+    /// Run the program from its beginning, a period at a time, alongside the emulator with the same inputs, and report the first output
     /// that differs. Outputs stay safe unless --drive is given; afterwards the board is held.
     Shadow {
         /// `name=value`: input ports that the host sets, before the first period.
@@ -127,7 +127,7 @@ enum Command {
         /// Periods to compare; of a system, base ticks.
         #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
         periods: u32,
-        /// Let outputs drive. Periods take as long as the line does: nothing may hang on them.
+        /// Let outputs drive. Periods then last as long as the serial line takes: connect nothing that depends on their timing.
         #[arg(long)]
         drive: bool,
     },
@@ -146,13 +146,13 @@ enum Command {
     },
     /// Print ports, registers or data words every N periods, with the period's number.
     Stream {
-        /// Ports, or what `read` takes besides: of one core, with numbers that are close to each other.
+        /// Ports, registers or data words, as for `read`: all of one kind, of one core, and within 15 consecutive numbers.
         #[arg(required = true)]
         names: Vec<String>,
-        /// Periods from one to the next.
+        /// Periods from one line to the next.
         #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..4096))]
         every: u32,
-        /// Values to print.
+        /// Lines to print.
         #[arg(long, default_value_t = 100)]
         count: u32,
     },
@@ -182,7 +182,7 @@ fn bits(text: &str, ty: Type) -> Option<u32> {
     }
 }
 
-/// What a command needs, from the command line alone: it is checked before the line is opened.
+/// What a command needs from the command line: it is checked before the serial port is opened.
 enum Prepared {
     Nothing,
     /// Addresses and values.
@@ -320,7 +320,7 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
-/// Prints ports of so many frames of the stream.
+/// Prints the values of `count` frames of the stream.
 fn streamed(
     host: &mut Host<Serial>,
     stream: &Stream,
@@ -356,5 +356,5 @@ fn streamed(
     Ok(())
 }
 
-/// Tenths of a second without a frame, until a stream has ended.
+/// Tenths of a second without a frame, after which the stream is taken to have ended.
 const SILENCE: u32 = 50;

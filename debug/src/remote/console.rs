@@ -1,4 +1,4 @@
-//! Commands on a machine that runs elsewhere: those that move it, a period at a time, and a single session's for what there is to see.
+//! Commands on a machine that runs elsewhere: its own, which move it a period at a time, and those of a single session that inspect.
 
 use super::{Activity, RemoteError, RemoteSession, RemoteWhy};
 use crate::console::{Commands, Completion, Console, inspection, named, only_looks, split, told};
@@ -14,11 +14,11 @@ struct Row(&'static str, &'static str, &'static str, &'static str, Completion, R
 
 #[rustfmt::skip]
 const COMMANDS: &[Row] = &[
-    Row("step", "s", "[period] [N]", "Run a period, or so many.", Completion::Words(&["period"]), RemoteConsole::step),
-    Row("continue", "c", "", "Run on, a period at a time, to a stop. If there is none: freely, until Ctrl-C.", Completion::None, |c, _| c.resume()),
-    Row("until", "u", "EXPR", "Run on, a period at a time, until an expression is not zero.", Completion::Names, RemoteConsole::until),
-    Row("goto", "g", "PLACE", "Go on to `period N` (so many have passed), or start again, held: `start`.", Completion::Words(&["period", "start"]), RemoteConsole::go_to),
-    Row("break", "br", "period N [if EXPR]", "Stop when so many periods have passed.", Completion::Names, RemoteConsole::add_break),
+    Row("step", "s", "[period] [N]", "Run one period, or N.", Completion::Words(&["period"]), RemoteConsole::step),
+    Row("continue", "c", "", "Run, a period at a time, to a stop. If none is set, run freely until Ctrl-C.", Completion::None, |c, _| c.resume()),
+    Row("until", "u", "EXPR", "Run, a period at a time, until an expression is not zero.", Completion::Names, RemoteConsole::until),
+    Row("goto", "g", "PLACE", "`period N`: run until N periods have passed. `start`: start again, held at the first `wait`.", Completion::Words(&["period", "start"]), RemoteConsole::go_to),
+    Row("break", "br", "period N [if EXPR]", "Stop when N periods have passed.", Completion::Names, RemoteConsole::add_break),
     Row("watch", "w", "EXPR [== EXPR | > EXPR | nan | subnormal]", "Stop after the period in which a value changes, or becomes equal, above, a NaN, a subnormal number.", Completion::Names, |c, a| c.view.execute(&format!("watch {a}"))),
     Row("delete", "d", "[N]", "Remove a stop, or all.", Completion::None, |c, a| c.view.execute(&format!("delete {a}"))),
     Row("stops", "", "", "List stops.", Completion::None, |c, _| c.view.execute("stops")),
@@ -27,27 +27,27 @@ const COMMANDS: &[Row] = &[
     Row("go", "", "", "Let it run.", Completion::None, |c, _| c.go()),
     Row("where", "", "", "Where the program is.", Completion::None, |c, _| Ok(c.place())),
     Row("help", "h", "[COMMAND]", "This list, or one command.", Completion::None, |_, a| help(a)),
-    Row("quit", "q", "", "Leave. What ran when this began runs again, unless it was held or started again since.", Completion::None, |c, _| { c.quit = true; Ok(String::new()) }),
+    Row("quit", "q", "", "Leave. A program that ran when the session began runs again, unless `hold` or `goto start` was given.", Completion::None, |c, _| { c.quit = true; Ok(String::new()) }),
 ];
 
-/// A single session's commands that there are not, and why.
+/// A single session's commands that do not exist here, and why.
 const REFUSED: &[(&str, &str)] = &[
     ("back", BACK),
     ("reverse", BACK),
     ("flight", "between two periods nothing is in flight"),
-    ("stalls", "the circuit does not count stalls; `takt bound` and `takt analyse` know them"),
+    ("stalls", "the circuit does not count stalls; `takt bound` and `takt analyse` show them"),
     (
         "accuracy",
-        "it takes every operation from reset on, and the circuit tells only where a period ends; `accuracy` of `takt debug` without --board has it",
+        "it needs every operation from reset on, and the circuit shows only the ends of periods; use `takt debug` without --board",
     ),
 ];
 const BACK: &str =
     "a circuit does not go back; `goto start` starts it again, and `takt debug` without --board goes back";
 
-/// What a single session would do inside a period.
+/// Why what a single session does inside a period is refused.
 const INSIDE: &str = "a board stops only between two periods; `takt debug` without --board stops anywhere";
 
-/// Inspection of a single session.
+/// The commands of a single session that inspect, and that exist here.
 fn of_view() -> impl Iterator<Item = &'static str> {
     let own = |name: &str| COMMANDS.iter().any(|row| row.0 == name);
     let refused = |name: &str| REFUSED.iter().any(|(refused, _)| *refused == name);
@@ -98,13 +98,16 @@ fn help(name: &str) -> Result<String, String> {
     for Row(name, short, arguments, what, ..) in COMMANDS {
         let _ = writeln!(text, "{short:<2} {:<20}  {what}", format!("{name} {arguments}"));
     }
-    let _ =
-        writeln!(text, "While it is held, as without --board: {}.", of_view().collect::<Vec<_>>().join(", "));
+    let _ = writeln!(
+        text,
+        "While the program is held, as without --board: {}.",
+        of_view().collect::<Vec<_>>().join(", ")
+    );
     text.push_str("An empty line repeats a step. Expressions are the assembler's, over live values; also `period address`.\n");
     Ok(text)
 }
 
-/// What is to become of the machine when the session ends.
+/// How the machine is left when the session ends.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Leave {
     Running,
@@ -116,7 +119,7 @@ pub struct RemoteConsole {
     session: RemoteSession,
     /// What there is to see.
     view: Console,
-    /// Whether somebody can say Ctrl-C.
+    /// Whether somebody can press Ctrl-C.
     interactive: bool,
     leave: Option<Leave>,
     quit: bool,
@@ -125,11 +128,11 @@ pub struct RemoteConsole {
 }
 
 impl RemoteConsole {
-    /// Commands on a machine, which is held, or started again if `restart` says so; `view` is a session of its program, with its names
-    /// and sources. What there is to say of that comes with it.
+    /// Commands on a machine, which is held, or started again if `restart` is set; `view` is a session of its program, with its names
+    /// and sources. Returned with them: what to print first.
     ///
     /// # Errors
-    /// If the machine does not answer. That its program does not wait is no error.
+    /// If the machine does not answer. A program that does not reach its `wait` is no error.
     pub fn new(
         session: RemoteSession,
         view: Session,
@@ -164,7 +167,7 @@ impl RemoteConsole {
         if self.session.state().drives { "outputs drive" } else { "outputs are safe" }
     }
 
-    /// What is said when a command has moved the machine: a difference is an error, so that a script fails.
+    /// What to print when a command has moved the machine: a difference is an error, so that a script fails.
     fn arrive(&mut self, moved: Result<RemoteWhy, RemoteError>) -> Result<String, String> {
         let why = match moved {
             Ok(why) => why,
@@ -191,7 +194,7 @@ impl RemoteConsole {
         }
     }
 
-    /// That values can be read, or why not.
+    /// Checks that values can be read; the error says why not.
     fn needs_values(&self) -> Result<(), String> {
         match &self.session.state().activity {
             Activity::Runs => Err("the program runs: `hold` first".to_owned()),
@@ -206,7 +209,7 @@ impl RemoteConsole {
         }
     }
 
-    /// That a period can be run, or why not.
+    /// Checks that a period can be run; the error says why not.
     fn needs_held(&self) -> Result<(), String> {
         self.needs_values()?;
         let state = match self.session.state().activity {
@@ -299,7 +302,7 @@ impl RemoteConsole {
         let inputs = &self.session.program().inputs;
         let port = inputs.iter().map(|port| port.register).find(|port| place == Place::Register(*port));
         let port = port.ok_or(
-            "only input ports can be set on a board: the circuit has no way in to other registers and to data words",
+            "only input ports can be set on a board: the host cannot write other registers or data words",
         )?;
         self.session.set_input(port, bits).map_err(|error| error.to_string())?;
         self.session.show(&mut self.view.session);
@@ -327,7 +330,7 @@ impl RemoteConsole {
         Ok(self.place())
     }
 
-    /// Leaves the machine as it was found, or as was asked for since; what it does then.
+    /// Leaves the machine as it was found, or as was asked for since; returns what it then does, in words.
     ///
     /// # Errors
     /// If it does not answer.
@@ -351,7 +354,7 @@ impl RemoteConsole {
     }
 }
 
-/// However the session ends, the machine is not left held for that.
+/// However the session ends, that alone does not leave the machine held.
 impl Drop for RemoteConsole {
     fn drop(&mut self) {
         let _ = self.release();
@@ -429,7 +432,7 @@ impl Commands for RemoteConsole {
                 matching(word, &mut words.iter().copied())
             }
             Ok(Meant::Own(Row(.., Completion::None, _))) | Err(_) => (word, Vec::new()),
-            // What completes with names completes so in a single session.
+            // Names are completed as in a single session.
             Ok(_) => self.view.complete(line),
         }
     }

@@ -1,9 +1,9 @@
-//! What of a machine a program uses: what is read of it.
+//! Which registers and data words a program uses, and so which are read from its machine.
 
 use std::collections::BTreeSet;
 use takt_isa::{Effect, Program, Register};
 
-/// Registers and data words, all ascending. Input ports are not among the registers.
+/// Registers and data words, in ascending order. Input ports are not among the registers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Extent {
     /// Registers that the program writes.
@@ -27,7 +27,7 @@ impl Extent {
                     (Effect::Store, Register::ZERO) => {
                         words.insert(instruction.constant);
                     }
-                    // It may be any.
+                    // It may be any word.
                     (Effect::Store, _) => words.extend(0..machine.data_depth),
                     _ => {}
                 }

@@ -1,10 +1,10 @@
-//! A machine that runs elsewhere: what it does, and what can be asked of it.
+//! A machine that runs elsewhere: what it does, and what it can be asked to do.
 
 use takt_emu::LoadError;
 use takt_isa::fp::Flags;
 use takt_isa::{BundleAddress, Register};
 
-/// What a machine does that runs elsewhere.
+/// What a machine that runs elsewhere does.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Activity {
     /// It is in reset.
@@ -21,7 +21,7 @@ pub enum Activity {
     Faulted(BundleAddress, String),
 }
 
-/// What it tells about itself at any time.
+/// What such a machine reports about itself at any time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct State {
     /// What it does.
@@ -37,19 +37,19 @@ pub struct State {
 }
 
 impl State {
-    /// Whether values can be read, and stay as they are until somebody moves it.
+    /// Whether values can be read, and stay the same until a command moves the machine.
     pub(super) fn is_still(&self) -> bool {
         !matches!(self.activity, Activity::Runs | Activity::InPeriod)
     }
 }
 
-/// Why it did not do what was asked.
+/// Why the machine did not do what was asked.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RemoteError {
     /// The program does not come to its `wait`.
     #[error("the program does not come to its `wait`, and values can be read only where it waits")]
     Busy,
-    /// It does not answer, or something else, in words.
+    /// Anything else, such as no answer, in words.
     #[error("{0}")]
     Other(String),
 }
@@ -60,25 +60,25 @@ impl From<LoadError> for RemoteError {
     }
 }
 
-/// A machine that runs elsewhere. Each may fail because it does not answer.
+/// A machine that runs elsewhere. Each method may fail because the machine does not answer.
 #[allow(clippy::missing_errors_doc, reason = "said above, once")]
 pub trait Remote {
     /// What it does now.
     fn state(&mut self) -> Result<State, RemoteError>;
 
-    /// The same, after a little time in which it may have done something.
+    /// The same, after a short time, so that it is not asked all the time.
     fn poll(&mut self) -> Result<State, RemoteError>;
 
-    /// No more ticks. It then waits between two periods, or has stopped.
+    /// Gives no more ticks. On return, the machine waits between two periods, or has stopped.
     fn hold(&mut self) -> Result<(), RemoteError>;
 
-    /// Ticks again.
+    /// Gives ticks again.
     fn go(&mut self) -> Result<(), RemoteError>;
 
-    /// One period while it is held. It then waits again, or has stopped.
+    /// Runs one period while the machine is held. On return, it waits again, or has stopped.
     fn step(&mut self) -> Result<(), RemoteError>;
 
-    /// From its beginning to its first `wait`, and held there, or to where it has stopped.
+    /// Runs from the beginning to the first `wait`, where the machine is held, or to where it stops.
     fn restart(&mut self) -> Result<(), RemoteError>;
 
     /// Sets an input port for the periods to come.
@@ -90,9 +90,9 @@ pub trait Remote {
     /// Output ports as the outside sees them, in the program's order.
     fn outputs(&mut self) -> Result<Vec<u32>, RemoteError>;
 
-    /// Registers, which ascend.
+    /// The values of registers, given in ascending order.
     fn registers(&mut self, registers: &[Register]) -> Result<Vec<u32>, RemoteError>;
 
-    /// Data words, which ascend.
+    /// The values of data words, given in ascending order.
     fn words(&mut self, words: &[u32]) -> Result<Vec<u32>, RemoteError>;
 }

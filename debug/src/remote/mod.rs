@@ -1,12 +1,12 @@
-//! A debug session on a machine that runs elsewhere, on a board: it can be held at the end of a period, looked at, and let run a
-//! period more.
+//! A debug session on a machine that runs elsewhere, such as a board: the machine can be held at the end of a period, looked at, and
+//! made to run one more period.
 //!
-//! **What there is to see** is read from the machine and shown by an emulator that is placed where it stands
-//! ([`RemoteSession::show`]): all that looks at a [`Session`] works. What nobody can know is left out: operations in flight (there
-//! are none between two periods), cycles, the return stack.
+//! **What there is to see** is read from the machine and shown by an emulator that is placed where the machine stands
+//! ([`RemoteSession::show`]), so everything that looks at a [`Session`] works. What cannot be known is left out: operations in flight
+//! (there are none between two periods), cycles, the return stack.
 //!
-//! **The shadow** is another emulator, which runs beside the machine with the same inputs, read back after each period. What differs
-//! is told, and the shadow goes on from what the machine has.
+//! **The shadow** is another emulator, which runs alongside the machine with the same inputs, read back after each period. A difference
+//! is reported, and the shadow continues from the machine's values.
 
 mod console;
 mod extent;
@@ -24,23 +24,23 @@ use takt_emu::{At, Emulator, Fault, Standing};
 use takt_isa::fp::Flags;
 use takt_isa::{Program, Register};
 
-/// Periods for which a command runs at most.
+/// The most periods for which a command runs.
 pub const PERIODS: u64 = 1_000_000;
 
 /// Why a command stopped.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RemoteWhy {
-    /// As in a session of one's own.
+    /// As in a session on an emulator.
     Of(Why),
     /// A fault of the machine, which its shadow may have had too.
     Fault(Option<Fault>),
-    /// Another one than the shadow: the first difference, in words.
+    /// The machine differs from its shadow: the first difference, in words.
     Different(String),
-    /// There was nothing to stop at in so many periods.
+    /// Nothing to stop at in so many periods.
     Limit(u64),
 }
 
-/// What a command waits for, and what it must read for that.
+/// What a command waits for, and what must be read for that.
 struct Goal {
     search: Search,
     registers: Vec<Register>,
@@ -52,7 +52,7 @@ pub struct RemoteSession {
     remote: Box<dyn Remote + Send>,
     control: Arc<Control>,
     extent: Extent,
-    /// The program after a reset, to be placed elsewhere.
+    /// The program after a reset; copies of it are placed where the machine stands.
     base: Emulator,
     state: State,
     /// What was read last.
@@ -63,7 +63,7 @@ pub struct RemoteSession {
 }
 
 impl RemoteSession {
-    /// A session on a machine that carries this program: held, if it runs, at the end of a period.
+    /// A session on a machine that carries this program. [`RemoteSession::hold`] or [`RemoteSession::restart`] comes next.
     ///
     /// # Errors
     /// If the machine does not answer, or the emulator cannot hold the program. A program that does not come to its `wait` is no error.
@@ -82,7 +82,7 @@ impl RemoteSession {
         Ok(RemoteSession { remote, control, extent, base, state, seen, shadow, settled: false })
     }
 
-    /// What the machine does, as far as was heard.
+    /// What the machine did when it was last asked.
     pub fn state(&self) -> &State {
         &self.state
     }
@@ -106,14 +106,14 @@ impl RemoteSession {
         view.look_afar(emulator, self.state.periods);
     }
 
-    /// Whether a register was ever written. What it holds otherwise is of no interest.
+    /// Whether a register was ever written. What it holds otherwise is not shown.
     fn is_known(&self, register: Register) -> bool {
         self.program().machine.is_input(register) || self.shadow.register(register).is_some()
     }
 
     // ---- Moving.
 
-    /// Holds the machine where the period ends, and looks at it. The shadow goes on from there.
+    /// Holds the machine at the end of its period, and reads it. The shadow continues from there.
     ///
     /// # Errors
     /// If it does not answer, or does not wait.
@@ -129,14 +129,14 @@ impl RemoteSession {
         let extent = self.extent.clone();
         self.read(&extent.registers, &extent.words)?;
         self.follow()?;
-        // What the program does not write must be as it was loaded, at its start.
+        // Once the program has started, what it does not write must be as it was loaded.
         let started = self.state.activity != Activity::Stopped;
         let loaded = if started { shadow::loaded(&self.base, &self.seen, &self.extent) } else { None };
         self.settled = true;
         Ok(loaded.map_or_else(|| self.why(None), RemoteWhy::Different))
     }
 
-    /// Asks what it does.
+    /// Asks the machine what it does.
     ///
     /// # Errors
     /// If it does not answer.
@@ -145,7 +145,7 @@ impl RemoteSession {
         Ok(())
     }
 
-    /// Lets it run.
+    /// Lets the machine run.
     ///
     /// # Errors
     /// If it does not answer.
@@ -155,7 +155,7 @@ impl RemoteSession {
         self.ask()
     }
 
-    /// Lets it run until somebody interrupts it or it stops, and holds it.
+    /// Lets the machine run until somebody interrupts it or it stops, and holds it.
     ///
     /// # Errors
     /// If it does not answer, or does not wait.
@@ -191,7 +191,7 @@ impl RemoteSession {
         self.end_of_move(different, end)
     }
 
-    /// Runs so many periods, [`PERIODS`] at most, or until what it waits for.
+    /// Runs `count` periods, or until `goal` is reached; [`PERIODS`] at most.
     ///
     /// # Errors
     /// If the machine does not answer, or does not wait.
@@ -238,7 +238,7 @@ impl RemoteSession {
         }
     }
 
-    /// The end of a command, with all that the program writes read: after a difference, the shadow goes on from the machine.
+    /// The end of a command, once all that the program writes has been read. After a difference, the shadow continues from the machine.
     fn end_of_move(&mut self, different: Option<String>, end: Option<End>) -> Result<RemoteWhy, RemoteError> {
         self.stand()?;
         let why = match different {
@@ -252,7 +252,7 @@ impl RemoteSession {
         Ok(why)
     }
 
-    /// Why it does not go on, or that it can.
+    /// Why the machine cannot go on, or `Done` if it can.
     fn why(&self, end: Option<End>) -> RemoteWhy {
         match (&self.state.activity, end) {
             (Activity::Halted, _) => RemoteWhy::Of(Why::Halted),
@@ -262,7 +262,7 @@ impl RemoteSession {
         }
     }
 
-    /// One period of machine and shadow: the first difference at their outputs, and what the shadow stopped at.
+    /// Runs one period of machine and shadow: the first difference at their outputs, and what stopped the shadow.
     fn period(&mut self) -> Result<(Option<String>, Option<End>), RemoteError> {
         let before = self.state.periods;
         let stepped = self.remote.step();
@@ -323,7 +323,7 @@ impl RemoteSession {
         ports.filter_map(|port| Some((port, *self.seen.registers.get(&port)?))).collect()
     }
 
-    /// Takes down where the machine stands.
+    /// Records where the machine stands.
     fn stand(&mut self) -> Result<(), RemoteError> {
         let State { activity, issued, flags, .. } = &self.state;
         self.seen.flags = *flags;
@@ -340,7 +340,7 @@ impl RemoteSession {
         Err(RemoteError::Other(text))
     }
 
-    /// The shadow goes on from where the machine stands.
+    /// Makes the shadow continue from where the machine stands.
     fn follow(&mut self) -> Result<(), RemoteError> {
         self.stand()?;
         self.shadow = Shadow::placed(&self.base, &self.seen);
@@ -364,7 +364,7 @@ impl RemoteSession {
         Some(format!("after period {}: {different}", self.state.periods))
     }
 
-    /// Waits for an expression, or, without one, for the stops of a session; `None` if it has none.
+    /// The goal of waiting for an expression, or, without one, for the session's stops; `None` if there are none.
     fn goal(&self, view: &Session, live: Option<Live>) -> Option<Goal> {
         let reads = view.reads(live.as_ref());
         let search = match live {

@@ -1,4 +1,4 @@
-//! The emulator beside a machine that runs elsewhere, and how the two differ.
+//! The emulator alongside a machine that runs elsewhere, and how the two differ.
 
 use super::extent::Extent;
 use super::{Activity, State};
@@ -9,7 +9,7 @@ use takt_isa::program::{Port, Space};
 use takt_isa::timing::Cycle;
 use takt_isa::{Program, Register, Type};
 
-/// Cycles within which a period of the emulator is to end: many more than a machine is waited for.
+/// Cycles within which a period must end on the emulator: many more than anyone waits for the machine.
 const PERIOD: Cycle = 1 << 26;
 
 /// What stopped the emulator.
@@ -23,7 +23,7 @@ impl From<PeriodError> for End {
     fn from(error: PeriodError) -> End {
         match error {
             PeriodError::Fault(fault) => End::Fault(fault),
-            // Nothing asks for ports by name.
+            // `Port` does not occur: no port is asked for by name.
             PeriodError::Halted | PeriodError::Port(_) => End::Halted,
         }
     }
@@ -31,19 +31,19 @@ impl From<PeriodError> for End {
 
 pub(super) struct Shadow {
     emulator: Emulator,
-    /// Whether it was placed where the machine stood, so that it does not know the return stack.
+    /// Whether it was placed where the machine stood, and so does not know the return stack.
     placed: bool,
 }
 
 impl Shadow {
-    /// Where the machine stands.
+    /// A shadow placed where the machine stands.
     pub(super) fn placed(base: &Emulator, standing: &Standing) -> Shadow {
         let mut emulator = base.clone();
         emulator.stand(standing);
         Shadow { emulator, placed: true }
     }
 
-    /// From a reset to its first `wait`.
+    /// A shadow that has run from reset to its first `wait`, and what stopped it, if anything did.
     pub(super) fn started(base: &Emulator, inputs: &[(Register, u32)]) -> (Shadow, Option<End>) {
         let mut shadow = Shadow { emulator: base.clone(), placed: false };
         shadow.set(inputs);
@@ -58,13 +58,13 @@ impl Shadow {
 
     fn set(&mut self, inputs: &[(Register, u32)]) {
         for (port, bits) in inputs {
-            // They are the program's.
+            // These ports are the program's, so this cannot fail.
             let _ = self.emulator.set_input_bits(*port, *bits);
         }
         self.emulator.set_cycle_limit(self.emulator.now() + PERIOD);
     }
 
-    /// One period; what it stopped at, if it did.
+    /// Runs one period; what stopped it, if anything did.
     pub(super) fn period(&mut self, inputs: &[(Register, u32)]) -> Option<End> {
         self.set(inputs);
         self.emulator.run_period(&[]).err().map(End::from)
@@ -76,7 +76,7 @@ impl Shadow {
         in_flight.map(|retire| retire.value).or_else(|| self.emulator.register(register))
     }
 
-    /// How the ends of a period differ.
+    /// How the two differ in the way that a period ended.
     pub(super) fn ended(&self, state: &State, end: Option<&End>, program: &Program) -> Option<String> {
         let board = match (&state.activity, end) {
             (Activity::Held, None) | (Activity::Halted, Some(End::Halted)) => return None,
@@ -178,7 +178,7 @@ fn both(ty: Type, bits: u32, other: u32) -> String {
     format!("is {} on the board, {} in the emulator", value::text(ty, bits), value::text(ty, other))
 }
 
-/// A register's name and place, and how it is read.
+/// A register's name and place, and its type.
 fn register_name(program: &Program, register: Register) -> (String, Type) {
     let mut named = program.outputs.iter().chain(&program.inputs).chain(&program.registers);
     let place = program.machine.register_name(register).unwrap_or_default();

@@ -350,7 +350,7 @@ impl Session {
         }
         let live = Live::parse(text.trim(), self.program(), &self.options.constants, &self.options.names)?;
         match live.hidden().filter(|_| self.afar) {
-            Some(name) => Err(format!("`{name}` is not known of a board; `period` and `address` are")),
+            Some(name) => Err(format!("a board does not report `{name}`; `period` and `address` are known")),
             None => Ok(live),
         }
     }

@@ -1,4 +1,4 @@
-//! How long a host's command takes to an output, over cores and links, at best and at worst.
+//! How long a host's command takes to reach an output, over cores and links, at best and at worst.
 //!
 //! A core that gets a value reads it in its next period and writes what follows from it by that period's end; links and ticks
 //! add what `docs/system.md` says. Ticks come on one grid, so that the way from core to core is followed for every phase that
@@ -19,7 +19,7 @@ pub const MAX_WAYS: u64 = 4096;
 pub const MAX_STEPS: u64 = 1 << 18;
 /// Phases of the ticks to each other that are gone through at most, over all ways.
 pub const MAX_PHASES: u64 = 1 << 18;
-/// Ends that the least time is looked for among, at most, for one phase.
+/// Ends among which the least time is looked for, at most, for one phase.
 const MAX_ENDS: u32 = 64;
 
 /// A way from a host's command to an output, and how long it takes.
@@ -86,7 +86,8 @@ fn measure(passages: &Passages<'_>, Route { links: way, cores, phases }: Route) 
         let link = &description.links[head];
         for phase in 0..phases / description.cores[first].every {
             let tick = grid.offset + phase as i64 * grid.period;
-            // As late as it can be for this tick, or for the period that it begins, and just too late for it.
+            // For the best case, as late as it can be for this tick, or for the period that begins with it; for the worst, just too late
+            // for the tick.
             let start = tick - carry(description, link);
             let runs =
                 passages.span(first).filter(|_| at_once(description, link)).map_or(0, |(_, worst)| worst);
@@ -114,14 +115,14 @@ fn end(passages: &Passages<'_>, way: &[usize], passes: &[Pass]) -> i64 {
     passes.last().map_or(0, |pass| pass.leaves) + carry(description, &description.links[*last])
 }
 
-/// The least that a command takes which is given in one of these cycles.
+/// The least time that a command takes if it is given in one of the cycles from `first` to `last`.
 fn least(passages: &Passages<'_>, way: &[usize], first: i64, last: i64) -> i64 {
     let end = |start| end(passages, way, &passages.fastest(way, start));
-    // What links take, and a cycle in each core between them, no start can save.
+    // No start can save what the links take, and a cycle in each core between them.
     let description = passages.description();
     let carries = way.iter().map(|link| carry(description, &description.links[*link]) + 1);
     let floor = carries.sum::<i64>() - 1;
-    // A later start never ends earlier, so that of all starts with one end the last is the best.
+    // A later start never ends earlier, so of all starts with the same end the last is the best.
     let (mut start, mut best, earliest) = (last, i64::MAX, end(first));
     for _ in 0..MAX_ENDS {
         let at = end(start);

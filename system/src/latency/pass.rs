@@ -13,9 +13,9 @@ struct Span {
     best: i64,
     /// At most, likewise.
     worst: i64,
-    /// Cycles after the `wait` in which what issues together with it is written to outputs; 0: nothing is.
+    /// Cycles from the `wait` until what issues together with it is written to outputs; 0: nothing is.
     late: i64,
-    /// What a period can take if a tick comes right after the `wait` before, and must stay below.
+    /// What a period can take if its tick comes right after the last `wait`, and what it must stay below.
     in_time: (Cycle, Cycle),
 }
 
@@ -41,7 +41,7 @@ pub struct Route {
     pub links: Vec<usize>,
     /// The cores between them.
     pub cores: Vec<usize>,
-    /// Base ticks after which the ticks of these cores come again as they came.
+    /// Base ticks after which the ticks of these cores repeat.
     pub phases: u64,
 }
 
@@ -82,12 +82,12 @@ impl<'a> Passages<'a> {
                 _ => description.taking(number) + ENDED_DELAY - 1,
             };
             let periods = || bounds.sections.iter().filter(|section| !section.once);
-            // A tick that always comes when the front end has refilled finds it so.
+            // If every tick comes after the front end has refilled, no period includes a refill.
             let refilled = in_time.saturating_add(core.program.machine.refill.into()) <= period;
             let worst = periods().map(|section| section.cycles.worst).max().filter(|_| refilled);
             let ends = periods().flat_map(|section| &section.ends);
             let below = period.saturating_sub(spare);
-            // A period that takes more misses its tick, and is told of by itself.
+            // A period that takes more misses its tick, which `deadline` reports.
             let kept = |cycles: Cycle| cycles.min(below.saturating_sub(1)) as i64;
             Some(Span {
                 best: kept(periods().map(|section| section.cycles.best).min().unwrap_or(0)),
@@ -105,14 +105,14 @@ impl<'a> Passages<'a> {
         self.description
     }
 
-    /// That a core can miss its tick, if it can.
+    /// The error that a core can miss its tick, if it can.
     pub fn deadline(&self, core: usize) -> Option<LatencyError> {
         let (worst, period) = self.spans[core]?.in_time;
         let core = self.description.cores[core].name.clone();
         (worst >= period).then_some(LatencyError::Deadline { core, worst, period })
     }
 
-    /// Cycles after a core's `wait` in which what issues together with it is written to outputs; 0 if nothing is.
+    /// Cycles from a core's `wait` until what issues together with it is written to outputs; 0 if nothing is.
     pub fn late(&self, core: usize) -> i64 {
         self.spans[core].map_or(0, |span| span.late)
     }
@@ -140,7 +140,7 @@ impl<'a> Passages<'a> {
             }
         }
         let (mut found, mut steps, mut phases) = (Vec::new(), 0, 0_u64);
-        // Last in, first out: the next way goes on from where this one branched off last.
+        // Last in, first out: the next way continues from where this one last branched.
         let starts = (0..links.len()).filter(|&link| links[link].from == End::Host && from(link));
         let mut left: Vec<Vec<usize>> = starts.rev().map(|link| vec![link]).collect();
         while let Some(way) = left.pop() {
@@ -191,8 +191,8 @@ impl<'a> Passages<'a> {
         Grid { period: known.period(self.description.tick) as i64, offset: known.offset as i64 }
     }
 
-    /// The passages of what goes onto a way's first link in a cycle, at the earliest: what reads it can be the last of a period that is
-    /// under way.
+    /// The earliest passages of a value that goes onto a way's first link in cycle `start`: the bundle that reads it can be the last of a
+    /// period that is under way.
     pub fn fastest(&self, way: &[usize], start: i64) -> Vec<Pass> {
         self.passes(way, start, |core, span, link, next, start| {
             let (cycle, grid) = (start + carry(self.description, link), self.grid(core));
@@ -208,7 +208,7 @@ impl<'a> Passages<'a> {
         })
     }
 
-    /// The same at the latest: the first whole period with the value reads it, and writes what follows from it at its end. FIFOs are empty.
+    /// The latest passages: the first whole period with the value reads it, and writes what follows from it at its end. FIFOs are empty.
     pub fn slowest(&self, way: &[usize], start: i64) -> Vec<Pass> {
         self.passes(way, start, |core, span, link, next, start| {
             let cycle = start + carry(self.description, link) + contention(self.description, link);
@@ -244,7 +244,7 @@ impl<'a> Passages<'a> {
     }
 }
 
-/// Cycles after its issue in which a bundle writes an output port; 0 if it writes none.
+/// Cycles from a bundle's issue until it has written its output ports; 0 if it writes none.
 fn late(program: &Program, address: BundleAddress) -> u32 {
     let machine: &Machine = program.machine;
     let Some(Ok(bundle)) = program.bundle(address) else { return 0 };
@@ -264,12 +264,12 @@ fn at_wait(description: &Description, link: &Link) -> bool {
     }
 }
 
-/// From the write (or the `wait`) of a core to where the receiver's bundles may read it, or to a tick that takes it; to where the
+/// Cycles from the write (or the `wait`) of a core until the receiver's bundles can read the value, or a tick can take it, or until the
 /// host sees it.
 pub(super) fn carry(description: &Description, link: &Link) -> i64 {
     let (transit, ended) = (link.transit() as i64, ENDED_DELAY as i64);
     let host = link.from == End::Host;
-    // From where it arrives at the gate, or is seen by the host.
+    // From its arrival at the gate, or until the host sees it.
     let goes_in = 1 + description.core(link.to).map_or(0, |core| core.input_delay() as i64);
     match (&link.kind, link.to) {
         (LinkKind::Wire, _) => transit + goes_in + if at_wait(description, link) { ended } else { 0 },
@@ -285,7 +285,7 @@ pub(super) fn carry(description: &Description, link: &Link) -> i64 {
     }
 }
 
-/// Cycles that a value can wait while others go in before it.
+/// Cycles that a value can wait at the gate while others go in before it.
 pub(super) fn contention(description: &Description, link: &Link) -> i64 {
     match link.to {
         // Those of snapshots go in at a fixed time.
@@ -307,4 +307,5 @@ fn lcm(a: u64, b: u64) -> Option<u64> {
     (a / x.max(1)).checked_mul(b)
 }
 
-const _: () = assert!(MIN_LATENCY > ENDED_DELAY, "a link's transit is what is beyond the core's own way");
+const _: () =
+    assert!(MIN_LATENCY > ENDED_DELAY, "a link's transit is what its latency adds to the core's own");
