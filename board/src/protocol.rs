@@ -269,7 +269,7 @@ pub enum LinkError {
     Silence(u32),
     /// The program does not wait.
     #[error(
-        "the program does not wait for its tick, so its ports cannot be read or set between periods; `takt live PORT stop` stops it"
+        "the program does not wait for its tick, so there is no time between periods to read or set anything of it; `takt live PORT stop` stops it"
     )]
     Busy,
     /// No period ends.

@@ -28,6 +28,8 @@ pub(super) struct Observer {
     still: String,
     /// The net that says that everything is in the copies.
     settled: String,
+    /// The address that the host reads; of a system's core without the core's number, which is above.
+    at: &'static str,
 }
 
 impl Observer {
@@ -35,19 +37,25 @@ impl Observer {
     pub(super) fn of_program() -> Observer {
         let [load, still, settled] =
             ["load", "core_rst | waiting | halted | fault", "settled"].map(str::to_owned);
-        Observer { core: String::new(), load, still, settled }
+        Observer { core: String::new(), load, still, settled, at: "address[11:0]" }
     }
 
     /// That of a system's core.
     pub(super) fn of_core(core: usize) -> Observer {
         let of = |net: &str| format!("{net}[{core}]");
         let still = format!("core_rst | {} | {} | {}", of("waiting"), of("halted"), of("fault"));
-        Observer { core: core.to_string(), load: of("loads"), still, settled: of("settled") }
+        Observer {
+            core: core.to_string(),
+            load: of("loads"),
+            still,
+            settled: of("settled"),
+            at: "{2'd0, address[9:0]}",
+        }
     }
 
     /// The copies of a core's registers and data; zeros if there are none.
     pub(super) fn instance(&self, machine: &Machine, observe: bool) -> String {
-        let Observer { core, load, still, settled } = self;
+        let Observer { core, load, still, settled, at } = self;
         let mut text = String::new();
         if !observe {
             let _ = writeln!(
@@ -72,7 +80,7 @@ impl Observer {
             text,
             "    takt_observe #(.SLOTS({slots}), .BANKS({}), .INDICES({}), .DATA({}), .SETTLE({})) observe{core} (
         .clk(clk), .load({load}), .load_space(load_space), .load_address(load_address[9:0]), .load_value(load_value[31:0]),
-        .still({still}), .at(address[11:0]), .settled({settled}), .last(last_issued{core}),
+        .still({still}), .at({at}), .settled({settled}), .last(last_issued{core}),
         .register_value(core_register{core}), .data_value(core_data{core}),
         {}
     );
