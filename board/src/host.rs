@@ -7,6 +7,9 @@ use crate::top::{self, RECORDS};
 use std::collections::VecDeque;
 use takt_isa::fp::Flags;
 
+/// The registers that count: of a program's periods since its start, and of the line's frames since power-up.
+pub const COUNTERS: [&str; 6] = ["periods", "misses", "cycles", "most_cycles", "errors", "lost"];
+
 /// Times that a request is made.
 const ATTEMPTS: u32 = 8;
 

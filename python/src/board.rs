@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
-use takt_board::host::fault_kind;
+use takt_board::host::{COUNTERS, fault_kind};
 use takt_board::protocol::{ENABLE, HOLD, LinkError, RESTART, RUN};
 use takt_board::serial::Serial;
 use takt_board::{Application, Host, Stream, top};
@@ -16,9 +16,6 @@ import_exception!(takt._errors, BoardError);
 
 /// What the program does, whether outputs drive, what stopped them, the fault, counters by name.
 type Status = (&'static str, bool, Vec<&'static str>, Option<(u32, String)>, Vec<(&'static str, u32)>);
-
-/// Counters that a board has.
-const COUNTERS: [&str; 6] = ["periods", "misses", "cycles", "most_cycles", "errors", "lost"];
 
 /// A board at a serial port.
 #[pyclass(module = "takt._takt")]

@@ -13,6 +13,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 use takt_board::ends::{Ends, Fifo};
+use takt_board::host::COUNTERS;
 use takt_board::protocol::{ENABLE, HOLD, RESTART, RUN};
 use takt_board::serial::Serial;
 use takt_board::top::image;
@@ -261,7 +262,7 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
             if status.fault() {
                 writeln!(out, "fault at bundle {}", host.register("fault")? & 0xffff)?;
             }
-            for name in ["periods", "misses", "cycles", "most_cycles", "errors", "lost"] {
+            for name in COUNTERS {
                 writeln!(out, "{name:<12} {}", host.register(name)?)?;
             }
         }

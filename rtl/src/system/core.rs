@@ -3,6 +3,7 @@
 use super::SystemPlan;
 use super::plan::Driver;
 use super::plan::OutputPort;
+use crate::plan::Plan;
 use crate::plan::names::net;
 use crate::verilog::{Direction, Expr, Instance, Module, ModuleError, Net, Port, choose, concat, decimal};
 use takt_isa::{Bank, BankIndex, Register};
@@ -26,11 +27,14 @@ pub(super) const STATUS: [Net; 8] = [
 /// drives, then those that it reads.
 pub(super) fn watched(plan: &SystemPlan, core: usize) -> (Net, Vec<Net>) {
     let own = &plan.cores[core];
-    let told = vec![
+    let inputs = [net::INPUT_WRITE, own.input_index(), net::INPUT_VALUE];
+    (own.read_output(), inputs.into_iter().chain(told(own)).collect())
+}
+
+/// Output ports of a core that nobody but a board looks at.
+fn told(own: &Plan) -> Vec<Net> {
+    vec![
         net::READ_VALUE,
-        net::INPUT_WRITE,
-        own.input_index(),
-        net::INPUT_VALUE,
         net::TICK_MISSED,
         net::TICK_LOST,
         net::STATUS,
@@ -42,8 +46,7 @@ pub(super) fn watched(plan: &SystemPlan, core: usize) -> (Net, Vec<Net>) {
         own.retire(),
         own.retire_register(),
         own.retire_value(),
-    ];
-    (own.read_output(), told)
+    ]
 }
 
 /// Which mailboxes have a value that arrives.
@@ -170,29 +173,9 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
             }
         }
     }
-    open.extend([
-        net::READ_VALUE,
-        net::TICK_MISSED,
-        net::TICK_LOST,
-        net::ISSUED,
-        net::ISSUED_ADDRESS,
-        net::STORED,
-        net::STORED_ADDRESS,
-        net::STORED_VALUE,
-        own.retire(),
-        own.retire_address(),
-        own.retire_register(),
-        own.retire_value(),
-        own.retire_flags(),
-        net::STATUS,
-    ]);
-    let seen: Vec<Net> = match is_watched {
-        true => {
-            let (_, told) = watched(plan, core);
-            open.extract_if(.., |net| told.contains(net)).collect()
-        }
-        false => Vec::new(),
-    };
+    let (seen, unseen) = if is_watched { (told(own), Vec::new()) } else { (Vec::new(), told(own)) };
+    open.extend(unseen);
+    open.extend([own.retire_address(), own.retire_flags()]);
     let mut pins: [(Net, Expr); 4] = [
         (net::INPUT_WRITE, LOAD_INPUT | gate_write),
         (own.input_index(), choose(net::RST, net::LOAD_ADDRESS.low(own.input_bits), gate_index)),
