@@ -176,10 +176,10 @@ T3 = Machine {
         Slot {
             name: "mul",
             bank: bank("m", 0, 256),
-            units: &[MULTIPLY, DIVROOT, SINE, ARCTANGENT, ARCCOSINE],
+            units: &[MULTIPLY, CONVERT, SINE, ARCTANGENT, ARCCOSINE],
         },
-        Slot { name: "add", bank: bank("a", 256, 256), units: &[ADD, CONVERT] },
-        Slot { name: "aux", bank: bank("x", 512, 256), units: &[ALU, MEMORY, SEQUENCER] },
+        Slot { name: "add", bank: bank("a", 256, 256), units: &[ADD] },
+        Slot { name: "aux", bank: bank("x", 512, 256), units: &[ALU, DIVROOT, MEMORY, SEQUENCER] },
     ],
     inputs: bank("i", 768, 256),
     outputs_per_bank: 32,
