@@ -39,25 +39,32 @@ period:
 ; The sum is taken about 1/2, as (small terms + (z² - 1/2)) + (R² + 1/2): z² - 1/2 is exact for 1/4 ≤ z² ≤ 1, so that only the last
 ; addition rounds at the size of the sum.
 .const  xp = sqrt(3)/2*R                ; xp_2 = -xp_3; yp_1 = R, yp_2 = yp_3 = -R/2
+; Of three like terms the sum's is added first, but in the lengths: from these leads the longest chain, and of its sum xy is late.
 .macro  arms    s, f, px, py, sum       ; s_i = sum - f·(px·xp_i + py·yp_i), i = 1, 2, 3
-.reg    px2 py2 e2 e3 py1
+.reg    px2 py2 py1 side
         fmul    px2, px, f*xp
         fmul    py2, py, f*R/2
-        fsub    e2, py2, px2
-        fadd    e3, py2, px2
-        fadd    {s}2, sum, e2
-        fadd    {s}3, sum, e3
-        fadd    py1, py2, py2           ; yp_1 = -2·yp_2
+        fmul    py1, py, f*R            ; yp_1 = -2·yp_2
+        fadd    side, sum, py2
+        fsub    {s}2, side, px2
+        fadd    {s}3, side, px2
         fsub    {s}1, sum, py1
 .endm
-.reg    xx yy zz xy  ll1 ll2 ll3
+.reg    xx yy zz xy  px2 py2 py1 e2 e3  ll1 ll2 ll3
         fmul    xx, x, x
         fmul    yy, y, y
         fmul    zz, z, z
         fadd    xy, xx, yy
         fsub    zz, zz, 0.5
         fadd    xy, xy, zz
-        arms    ll, 2, x, y, xy
+        fmul    px2, x, 2*xp
+        fmul    py2, y, R
+        fadd    py1, py2, py2           ; here not by a product: slot mul has more to do
+        fsub    e2, py2, px2
+        fadd    e3, py2, px2
+        fsub    ll1, xy, py1
+        fadd    ll2, xy, e2
+        fadd    ll3, xy, e3
         .rep i, 1, 3
         fadd    ll{i}, ll{i}, R^2 + 0.5
         fsqrt   l{i}d, ll{i}            ; l = |d|
@@ -199,62 +206,62 @@ period:
 ; Ts·KI when the sign changes (tc = 0), and falls by the same amount every period, to ξc times at tc = Tc/2 and to 1 at tc = Tc. It is
 ; compared half a step off, where rounding does not matter.
 .const  fall = 2*(xc - 1)*Ts/Tc*gain
-.macro  integrator i, vd, e             ; s_i = sat(s_i + (φ_t + 1)·Ts·KI·e)
-.reg    sg same:int later ramp eabs large:int early:int step
-        fsign   sg, vd
+.macro  integrator i, sign, e           ; s_i = sat(s_i + (φ_t + 1)·Ts·KI·e)
+.reg    sg same:int later held eabs large:int early:int ramp step
+        fsign   sg, sign
         feq     same, sg, sg{i}
         mov     sg{i}, sg
         fsub    later, boost{i}, fall
         fmax    later, later, gain
         sel     boost{i}, same, later, (2*xc - 1)*gain
+        sel     held, same, later, gain ; tc ≤ 0: no boost in the period of the reversal itself
+        fle     early, xc*gain - fall/2, held ; tc ≤ Tc/2
         fabs    eabs, e
         fle     large, ec{i}, eabs      ; φ_e
-        sel     ramp, large, boost{i}, gain
-        fle     early, xc*gain - fall/2, boost{i} ; tc ≤ Tc/2
+        sel     ramp, large, held, gain
         sel     ramp, early, xc*gain, ramp
-        sel     ramp, same, ramp, gain  ; tc ≤ 0: no boost in the period of the reversal itself
         fmul    step, ramp, e
         fadd    step, s{i}, step
         fsat    s{i}, step, smax{i}*KI
 .endm
-.macro  control i, qd, vd, ad           ; acc_i = (a_d + KV·v_d) - KV·v + KP·e + KI·s
+.macro  control i, qd, vd, ad, sign     ; acc_i = KV·v_d - KV·v + KP·e + a_d + KI·s: what is late is added last. sign: of v_d
 .reg    ff e
         fmul    ff, vd, KV
-        fadd    ff, ad, ff              ; up to here no measurement
         fsub    e, qd, p{i}
-        integrator i, vd, e
+        integrator i, sign, e
         fsub    ff, ff, vel{i}
         fmul    e, e, KP
-        fadd    e, e, s{i}
-        fadd    acc{i}, ff, e
+        fadd    ff, ff, e
+        fadd    ff, ff, ad
+        fadd    acc{i}, ff, s{i}
 .endm
 .reg    acc1 acc2 acc3 acc4 acc5
         .if macro.feedforward           ; the variant tracking_friction.s: for the arms ff_i in place of M·a_d, for the table beyond it
 .reg    ff1 ff2 ff3 ff4 ff5
         feedforward
         .rep i, 1, 3
-        control i, l{i}d, v{i}d, zero
+        control i, l{i}d, v{i}d, zero, dv{i} ; d·v has v's sign
         fmul    acc{i}, acc{i}, M{i}
         fadd    ff{i}, ff{i}, G{i}
         fadd    F{i}, acc{i}, ff{i}
         .endr
-        control 4, alpha, omega_alpha, eps_alpha
+        control 4, alpha, omega_alpha, eps_alpha, omega_alpha
         fmul    acc4, acc4, J44
         fadd    ff4, ff4, G4
         fadd    tau4, acc4, ff4
-        control 5, gamma, omega_gamma, eps_gamma
+        control 5, gamma, omega_gamma, eps_gamma, omega_gamma
         fmul    acc5, acc5, J55
         fadd    tau5, acc5, ff5
         .else
         .rep i, 1, 3
-        control i, l{i}d, v{i}d, a{i}d
+        control i, l{i}d, v{i}d, a{i}d, dv{i} ; d·v has v's sign
         fmul    acc{i}, acc{i}, M{i}
         fadd    F{i}, acc{i}, G{i}
         .endr
-        control 4, alpha, omega_alpha, eps_alpha
+        control 4, alpha, omega_alpha, eps_alpha, omega_alpha
         fmul    acc4, acc4, J44
         fadd    tau4, acc4, G4
-        control 5, gamma, omega_gamma, eps_gamma
+        control 5, gamma, omega_gamma, eps_gamma, omega_gamma
         fmul    tau5, acc5, J55
         .endif
 

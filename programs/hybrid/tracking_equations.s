@@ -30,10 +30,12 @@ period: .late n1, n2, n3, n4, n5 = 2
 .macro  arms    to, f, px, py, sum      ; to_i = sum - f·(px·xp_i + py·yp_i)
 .reg    px2 py2
         px2, py2 = px*(f*xp), py*(f*R/2)
-        to[2], to[3], to[1] = sum + (py2 - px2), sum + (py2 + px2), sum - (py2 + py2)
+        to[2], to[3], to[1] = sum + py2 - px2, sum + py2 + px2, sum - py*(f*R)
 .endm
+.reg    px2 py2
         xy = x*x + y*y + (z*z - 0.5)
-        arms    L, 2, x, y, xy
+        px2, py2 = x*(2*xp), y*R
+        L[2], L[3], L[1] = xy + (py2 - px2), xy + (py2 + px2), xy - (py2 + py2)
         dv = x*vx + y*vy + z*vz
         arms    D, 1, vx, vy, dv
         da = x*ax + y*ay + z*az + (vx*vx + vy*vy + vz*vz)
@@ -92,22 +94,23 @@ period: .late n1, n2, n3, n4, n5 = 2
 
 ; ---- 7, 8. Control law, (28), (36), with the nonlinear integrator, (29)-(35), (37) -----------------------------------------
 .reg    acc[5]
-.macro  control i, qd, vd, ad
-.reg    e same:int ramp
+.macro  control i, qd, vd, ad, sd       ; sd: of v_d's sign
+.reg    e same:int later held ramp
         e = qd - p[i]
-        same, sg[i] = sign(vd) == sg[i], sign(vd)
-        boost[i] = same ? max(boost[i] - fall, gain) : (2*xc - 1)*gain
-        ramp = xc*gain - fall/2 <= boost[i] ? xc*gain : ec{i} <= abs(e) ? boost[i] : gain
-        s[i] = sat(s[i] + (same ? ramp : gain)*e, smax{i}*KI)
-        acc[i] = ad + vd*KV - vel[i] + (e*KP + s[i])
+        same, sg[i] = sign(sd) == sg[i], sign(sd)
+        later = max(boost[i] - fall, gain)
+        boost[i], held = same ? later : (2*xc - 1)*gain, same ? later : gain
+        ramp = xc*gain - fall/2 <= held ? xc*gain : ec{i} <= abs(e) ? held : gain
+        s[i] = sat(s[i] + ramp*e, smax{i}*KI)
+        acc[i] = vd*KV - vel[i] + e*KP + ad + s[i]
 .endm
         .rep i, 1, 3
-        control i, l{i}d, v{i}d, a{i}d
+        control i, l{i}d, v{i}d, a{i}d, D[i]
         F{i} = acc[i]*M[i] + G[i]
         .endr
-        control 4, alpha, omega_alpha, eps_alpha
+        control 4, alpha, omega_alpha, eps_alpha, omega_alpha
         tau4 = acc[4]*J44 + G[4]
-        control 5, gamma, omega_gamma, eps_gamma
+        control 5, gamma, omega_gamma, eps_gamma, omega_gamma
         tau5 = acc[5]*J55
 
         wait    period

@@ -171,9 +171,9 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
 //   adr_i counts words; addresses are hexadecimal:
 {table}//   {INPUTS:04x} + port  w  input port
 //   {OUTPUTS:04x} + port  r  output port: what was last written to it; if LATCHED, as of the last `wait`
-//   Accesses are acknowledged in the next cycle; reads of output ports three cycles later than that, for the banks' ports and the
-//   choice among them are read in cycles of their own; load_low and, with RESTORE, input ports only when a reset in progress has lasted long enough. What is
-//   written nowhere is lost, what is read nowhere is 0.
+//   Accesses are acknowledged two cycles later, for the address is decoded in a cycle of its own; reads of output ports five
+//   cycles later, for the banks' ports and the choice among them are read in cycles of their own; load_low and, with RESTORE,
+//   input ports only when a reset in progress has lasted long enough. What is written nowhere is lost, what is read nowhere is 0.
 //   rst_i: for a cycle at least, after power-up.
 //   waiting: the program waits for the tick: the outputs of the period stand. It can serve as an interrupt.
 //   LATCHED: the core's.
@@ -212,6 +212,8 @@ module {name} #(
     reg  [2:0]  reading;      // an output port: its number is in output_index, the banks have read it, its value is in output_value
     reg         waited;       // since reset
     reg         periodic;     // the period is not 0
+    // A request whose address has been decoded, and what is at it.
+    reg         asked, at_control, at_status, at_period, at_tick, at_place, at_high, at_low, at_input, at_output;
 
     wire        deadline_missed, halted, fault, restored;
     wire [2:0]  fault_kind, fault_slot, flags;
@@ -220,24 +222,32 @@ module {name} #(
 
     wire quiet    = in_reset == 7'd{RESET_CYCLES};
     wire rst      = ~(run & settled);
-    wire to_input = adr_i[15:{input_bits}] == {input_page_bits}'d{input_page};
-    wire held     = we_i & (adr_i == 16'd{low} | (to_input & RESTORE != 0));
-    wire outputs  = ~we_i & adr_i[15:{port_bits}] == {output_page_bits}'d{output_page};
+    wire held     = at_low | (at_input & RESTORE != 0);
     wire request  = cyc_i & stb_i & ~ack_o;
-    wire access   = request & (settled | ~held) & (reading[2] | ~outputs);
+    wire access   = request & asked & (settled | ~held) & (reading[2] | ~at_output);
     wire writes   = access & we_i;
     wire due      = waited & periodic & elapsed >= last;
 
     always @(posedge clk_i) begin
+        asked        <= request;
+        at_control   <= adr_i == 16'd{control};
+        at_status    <= adr_i == 16'd{status};
+        at_period    <= adr_i == 16'd{period};
+        at_tick      <= we_i & adr_i == 16'd{tick};
+        at_place     <= we_i & adr_i == 16'd{place};
+        at_high      <= we_i & adr_i == 16'd{high};
+        at_low       <= we_i & adr_i == 16'd{low};
+        at_input     <= we_i & adr_i[15:{input_bits}] == {input_page_bits}'d{input_page} & ~&adr_i[{input_high}:0];  // the last is `zero`
+        at_output    <= ~we_i & adr_i[15:{port_bits}] == {output_page_bits}'d{output_page};
         ack_o        <= access;
-        ticks        <= (writes & adr_i == 16'd{tick}) | due;
-        loads        <= writes & adr_i == 16'd{low};
-        writes_input <= writes & to_input & ~&adr_i[{input_high}:0];  // the last is `zero`
+        ticks        <= (access & at_tick) | due;
+        loads        <= access & at_low;
+        writes_input <= access & at_input;
         input_index  <= adr_i[{input_high}:0];
         // Under this condition it is no copy of input_index, with which synthesis would merge it.
-        if (outputs) output_index <= adr_i[{port_high}:0];
+        if (at_output) output_index <= adr_i[{port_high}:0];
         output_value <= read_value;
-        reading      <= request & outputs & ~access ? {{reading[1:0], 1'b1}} : 3'd0;
+        reading      <= request & asked & at_output & ~access ? {{reading[1:0], 1'b1}} : 3'd0;
         value        <= dat_i;
         last         <= period - 32'd1;
         periodic     <= period != 32'd0;
@@ -248,21 +258,18 @@ module {name} #(
         done         <= quiet & restored;
         settled      <= done;
         if (writes) begin
-            case (adr_i)
-                16'd{control}: begin
-                    run <= dat_i[0];
-                    if (~dat_i[0] & run) {{settled, done, in_reset}} <= 9'd0;
-                end
-                16'd{period}: period <= dat_i;
-                16'd{place}: {{slot, space, place}} <= dat_i[20:0];
-                16'd{high}: high <= dat_i[15:0];
-                16'd{low}: begin
-                    low          <= dat_i;
-                    load_address <= place;
-                    place        <= place + 16'd1;
-                end
-                default: ;
-            endcase
+            if (at_control) begin
+                run <= dat_i[0];
+                if (~dat_i[0] & run) {{settled, done, in_reset}} <= 9'd0;
+            end
+            if (at_period) period <= dat_i;
+            if (at_place) {{slot, space, place}} <= dat_i[20:0];
+            if (at_high) high <= dat_i[15:0];
+            if (at_low) begin
+                low          <= dat_i;
+                load_address <= place;
+                place        <= place + 16'd1;
+            end
         end
         if (rst_i) begin
             run      <= 1'b0;
@@ -274,13 +281,8 @@ module {name} #(
 
     always @(posedge clk_i) begin
         if (access) begin
-            if (outputs) dat_o <= output_value;
-            else case (adr_i)
-                16'd{control}: dat_o <= {{31'd0, run}};
-                16'd{status}: dat_o <= {status_word};
-                16'd{period}: dat_o <= period;
-                default: dat_o <= 32'd0;
-            endcase
+            dat_o <= at_output ? output_value : at_control ? {{31'd0, run}} : at_status ? {status_word} :
+                     at_period ? period : 32'd0;
         end
     end
 
