@@ -32,7 +32,7 @@ first:                                  ; before the first period: previous posi
 
 .period
 period:
-        .late   n1, n2, n3, n4, n5 = 2  ; what needs no measurement goes before the sample, for up to 2 cycles
+        .late   n1, n2, n3, n4, n5 = 1  ; what needs no measurement goes before the sample, for up to a cycle
 
 ; ---- 1. Inverse kinematics with derivatives, (7)-(11) --------------------------------------------------------------
 ; With |p_i| = R: l² = |d|² = x² + y² + z² + R² - 2·(x·xp + y·yp), and likewise d·v = x·vx + y·vy + z·vz - (xp·vx + yp·vy).
@@ -82,7 +82,7 @@ period:
         fdiv    v{i}d, dv{i}, l{i}d
         .endr
 
-; a = (vx² + vy² + vz² + d·(ax,ay,az) - v²) / l
+; a = (vx² + vy² + vz² + d·(ax,ay,az) - v²) / l, with v² = (d·v)² / l²: no quotient waits for another.
 .reg    vxx vyy vzz vv  xa ya za da  da1 da2 da3  w1 w2 w3
         fmul    vxx, vx, vx
         fmul    vyy, vy, vy
@@ -97,7 +97,8 @@ period:
         fadd    da, da, vv
         arms    da, 1, ax, ay, da
         .rep i, 1, 3
-        fmul    w{i}, v{i}d, v{i}d
+        fmul    w{i}, dv{i}, dv{i}
+        fdiv    w{i}, w{i}, ll{i}
         fsub    da{i}, da{i}, w{i}
         fdiv    a{i}d, da{i}, l{i}d
         .endr
@@ -227,12 +228,17 @@ period:
 .macro  control i, qd, vd, ad, sign     ; acc_i = KV·v_d - KV·v + KP·e + a_d + KI·s: what is late is added last. sign: of v_d
 .reg    ff e
         fmul    ff, vd, KV
+        .if i > 3                       ; the table's a_d is an input
+        fadd    ff, ff, ad
+        .endif
         fsub    e, qd, p{i}
         integrator i, sign, e
         fsub    ff, ff, vel{i}
         fmul    e, e, KP
         fadd    ff, ff, e
+        .if i <= 3                      ; an arm's has been computed
         fadd    ff, ff, ad
+        .endif
         fadd    acc{i}, ff, s{i}
 .endm
 .reg    acc1 acc2 acc3 acc4 acc5

@@ -23,7 +23,7 @@ first:  .rep i, 1, 5
         .endr
 
 .period
-period: .late n1, n2, n3, n4, n5 = 2
+period: .late n1, n2, n3, n4, n5 = 1
 
 ; ---- 1. Inverse kinematics with derivatives, (7)-(11), and the table, (18)-(20) --------------------------------------
 .reg    xy L[3] dv D[3] da A[3]
@@ -41,9 +41,10 @@ period: .late n1, n2, n3, n4, n5 = 2
         da = x*ax + y*ay + z*az + (vx*vx + vy*vy + vz*vz)
         arms    A, 1, ax, ay, da
         .rep i, 1, 3
-        l{i}d = sqrt(L[i] + (R^2 + 0.5))
+        L[i] = L[i] + (R^2 + 0.5)
+        l{i}d = sqrt(L[i])
         v{i}d = D[i]/l{i}d
-        a{i}d = (A[i] - v{i}d*v{i}d)/l{i}d
+        a{i}d = (A[i] - D[i]*D[i]/L[i])/l{i}d
         .endr
         th4d, th5d, om4d, om5d, ep4d, ep5d = alpha, gamma, omega_alpha, omega_gamma, eps_alpha, eps_gamma
 
@@ -102,7 +103,11 @@ period: .late n1, n2, n3, n4, n5 = 2
         boost[i], held = same ? later : (2*xc - 1)*gain, same ? later : gain
         ramp = xc*gain - fall/2 <= held ? xc*gain : ec{i} <= abs(e) ? held : gain
         s[i] = sat(s[i] + ramp*e, smax{i}*KI)
+        .if i > 3
+        acc[i] = vd*KV + ad - vel[i] + e*KP + s[i]
+        .else
         acc[i] = vd*KV - vel[i] + e*KP + ad + s[i]
+        .endif
 .endm
         .rep i, 1, 3
         control i, l{i}d, v{i}d, a{i}d, D[i]
