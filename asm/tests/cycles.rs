@@ -20,13 +20,13 @@ fn cycles(folder: &str, name: &str, machine: &'static Machine) -> u32 {
 #[test]
 fn programs_take_no_longer() {
     let figures = [
-        ("hybrid", "tracking.s", &T3, 124),
-        ("hybrid", "tracking_literal.s", &T3, 338),
-        ("hybrid", "tracking.s", &T1, 304),
-        ("hybrid", "tracking_friction.s", &T3, 270),
-        ("hybrid", "tracking_friction.s", &T1, 651),
+        ("hybrid", "tracking.s", &T3, 112),
+        ("hybrid", "tracking_literal.s", &T3, 275),
+        ("hybrid", "tracking.s", &T1, 307),
+        ("hybrid", "tracking_friction.s", &T3, 257),
+        ("hybrid", "tracking_friction.s", &T1, 654),
         ("arm", "forward.s", &T3, 100),
-        ("arm", "inverse.s", &T3, 209),
+        ("arm", "inverse.s", &T3, 212),
     ];
     for (folder, name, machine, most) in figures {
         let found = cycles(folder, name, machine);

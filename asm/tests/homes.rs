@@ -15,7 +15,7 @@ use takt_isa::{MACHINES, Machine, Program, ROWS, T1, T3};
 
 /// Instructions of each slot of t3, with two sources.
 const MNEMONICS: [&[&str]; 3] =
-    [&["fmul", "fmul", "fdiv"], &["fadd", "fsub"], &["fmax", "ixor", "fsat", "ior"]];
+    [&["fmul", "fmul"], &["fadd", "fsub"], &["fmax", "ixor", "fdiv", "fsat", "ior"]];
 
 /// A program whose states, temporary names and ports are written from all slots, in straight code, branches, a loop and a subroutine.
 fn source(seed: u64) -> String {

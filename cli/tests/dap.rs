@@ -227,13 +227,13 @@ fn exceptions_stop_where_they_are_raised() {
         "nan.s",
         "\
 .output y
-.reg n:int t
+.reg n:int _t
         li      n, 40
 turn:   isub    n, n, 1
         bnz     n, turn
-        fsqrt   t, -4.0
-        mov     y, t
-        fmul    t, 3e38, 10.0
+        fsqrt   _t, -4.0
+        mov     y, _t
+        fmul    _t, 3e38, 10.0
         halt
 ",
     );

@@ -112,7 +112,7 @@ fn without_periods_and_after_the_last() {
         ]
     );
     // It issues with the last `wait` and is written when the run is over.
-    let late = ".input x\n.output F\n.once\n wait p\n.period\np: wait p || fdiv F, x, x\n";
+    let late = ".input x\n.output F\n.once\n wait p\n.period\np: wait p || fmul F, x, inf\n";
     folder.write("late.s", late);
     let done = folder.line("run late.s --periods 1 --deny all");
     assert_eq!(done.status, Some(3), "{}", done.stderr);

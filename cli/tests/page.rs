@@ -103,7 +103,7 @@ fn hovering_shows_the_details() {
             document.body.append(`[${shown}: ${tip.textContent}]`);
         };
         const about = (text) => [...document.querySelectorAll('rect')].find((rect) => rect.dataset.tip.includes(text));
-        over(about('slot mul'));
+        over(about('slot aux'));
         over(about('before cycle'));
         over(document.getElementById('labels'));
     </script>";

@@ -156,13 +156,13 @@ fn each_row_is_answered_as_it_comes() {
         running.send(&format!("n,time,a{end}"));
         for n in 0..5 {
             running.send(&format!("{n},now,4{end}"));
-            assert_eq!(running.line(), format!("0.25,{},11\n", n + 1));
+            assert_eq!(running.line(), format!("0.25,{},12\n", n + 1));
         }
         // In pieces, and several at once.
         running.send("5,no");
         running.send(&format!("w,4{end}6,now,4{end}7,now,4{end}"));
         for n in 5..8 {
-            assert_eq!(running.line(), format!("0.25,{},11\n", n + 1));
+            assert_eq!(running.line(), format!("0.25,{},12\n", n + 1));
         }
         assert_eq!(running.end(), (Some(0), String::new(), String::new()));
     }
@@ -173,7 +173,7 @@ fn a_row_that_is_wrong_ends_the_run() {
     let folder = Folder::new();
     let mut running = Running::new(&folder, "");
     running.send("a,n\n4,1\n4,x\n4,2\n");
-    assert_eq!((running.line(), running.line()), ("F,k,cycles\n".to_owned(), "0.25,2,11\n".to_owned()));
+    assert_eq!((running.line(), running.line()), ("F,k,cycles\n".to_owned(), "0.25,2,12\n".to_owned()));
     let error = "error: standard input:3: column n: `x` is no integer between -2147483648 and 2147483647\n";
     assert_eq!(running.end(), (Some(1), String::new(), error.to_owned()));
     // A plant that says nothing at all.
@@ -207,7 +207,7 @@ fn standard_output_has_rows_only() {
     let folder = Folder::new();
     folder.write("nan.s", ECHO.replace("1.0, a", "zero, a"));
     let done = folder.fed("run nan.s --inputs - --outputs - --stats", b"a,n\n0,1\n");
-    assert_eq!((done.status, done.stdout.as_str()), (Some(0), "F,k,cycles\nNaN,2,11\n"));
+    assert_eq!((done.status, done.stdout.as_str()), (Some(0), "F,k,cycles\nNaN,2,12\n"));
     assert!(done.stderr.contains("warning: NaN written to F"), "{}", done.stderr);
     assert!(done.stderr.contains("1 period on t3") && done.stderr.contains("operations:"), "{}", done.stderr);
 }

@@ -169,7 +169,7 @@ fn the_hybrid_robot_on_two_processors() {
     let overall = |run: &serde_json::Value| number(&run["tracking_error_m"]["overall"]);
     assert!((overall(&one) - overall(&both)).abs() < 1e-7, "{both} {one}");
     assert_eq!(both["missed"], 0);
-    assert_eq!(both["cores"][0]["longest"], 319);
+    assert_eq!(both["cores"][0]["longest"], 324);
     assert!(number(&both["points"][0]["largest_error"]) < 6.2e-8, "{both}");
     let text = folder.line(&format!("track -q --periods 10 --system {two}")).ok();
     assert!(text.contains("n1, n2, n3, … (5) -> F1, F2, F3, … (20), through tracking"), "{text}");
@@ -224,7 +224,12 @@ fn a_head_that_is_read_after_its_pop() {
     for name in ["two.toml", "generation.s", "tracking.s", "robot.s"] {
         let text = std::fs::read_to_string(speed(&format!("../hybrid/{name}"))).unwrap();
         let without = text.lines().filter(|line| !line.starts_with(".order") || !line.ends_with(", pop"));
-        folder.write(name, without.map(|line| format!("{line}\n")).collect::<String>());
+        let text: String = without.map(|line| format!("{line}\n")).collect();
+        // On t4 the schedule puts a read behind the pop.
+        folder.write(
+            name,
+            text.replace("program = \"generation.s\"", "program = \"generation.s\"\nmachine = \"t4\""),
+        );
     }
     let done = folder.line("bound two.toml");
     assert_eq!(done.status, Some(0));

@@ -27,10 +27,11 @@ const COMMON: &[Fault] = &[
     ("takt_sine", "quadrant3[1] ^ (quadrant3[0] & op3)", "quadrant3[1]"),
     // Waiting for operands: too short, in each of the ways in which a result is in flight.
     ("takt_hazard", "r_later | r_on_issue", "r_later"),
-    ("takt_hazard", "(|hit[DEPTH-1:3]) | (|late_hit)", "|hit[DEPTH-1:3]"),
-    ("takt_hazard", "(|hit[DEPTH-1:3]) | (|late_hit)", "|late_hit"),
+    ("takt_hazard", "(|(hit >> MIDDLE)) | (|late_hit)", "|(hit >> MIDDLE)"),
+    ("takt_hazard", "|hit[MIDDLE-1:3]", "|hit[MIDDLE-2:3]"),
+    ("takt_hazard", "r_bank & (r_near | r_far)", "r_near | r_far"),
     ("takt_hazard", "(r_later & ~(|r_at2)) | r_on_issue_late", "r_later & ~(|r_at2)"),
-    ("takt_hazard", "(|m_later) | (|(m_on_issue & ~i_early))", "|m_later"),
+    ("takt_hazard", "<= |(m_on_issue & ~i_early)", "<= 1'b0"),
     // Too long.
     ("takt_hazard", "i_later & ~(|i_at2)", "i_later"),
     // Forwarding.
@@ -67,6 +68,7 @@ const OF_T3: &[Fault] = &[
     ("takt_divroot", "a_sign_1 & ~a_zero & ~a_nan", "a_sign_1 & ~a_nan"),
     ("takt_arctangent", "sign & ~nan", "1'b0"),
     ("takt_arccosine", "negative_19 ? HALF_TURN - shifted : shifted", "shifted"),
+    ("takt_hazard", "(|(hit >> MIDDLE)) | (|late_hit)", "|late_hit"),
     ("takt_hazard", "(|r_at2) | r_on_issue_early", "|r_at2"),
     ("takt_hazard", "m_at2 | (m_on_issue & i_early)", "m_at2"),
     ("takt_program", "{48-LOW{legal}}", "{48-LOW{1'b1}}"),
@@ -88,7 +90,7 @@ fn generated_for_t3(plan: &Plan) -> Vec<MadeFault> {
     let (core, mul) = (plan.top(), plan.slot("mul").expect("t3's slot"));
     let writes = Expr::from(plan.writes_at(Stage::Issue)).any_bit();
     let kept = |kept: Expr| (net::STICKY & kept).to_string();
-    // The product's write port is taken by the quotient.
+    // The product's write port is taken by the sine.
     let product = mul.bit(Stage::Read, ControlBit::Result(5)) & any(mul.booked(6));
     vec![
         (core.clone(), (net::PENDING | writes).to_string(), net::PENDING.to_string()),

@@ -23,7 +23,7 @@ const EXAMPLES: &[Example] = &[
         name: "rules",
         machine: &T3,
         source: "
-            fdiv m1, i0, i1 || fadd a1, i0, i1
+            fsin m1, i0 || fadd a1, i0, i1
             fmul m2, i0, i1
             fadd a2, m2, i0
             mov x1, i0

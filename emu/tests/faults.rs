@@ -137,9 +137,9 @@ fn a_fault_in_a_block_undoes_what_came_after() {
                   .preset x1 nan
                   period: ld x4, 9[zero]
                   iadd x4, x4, x0
-                  st 9[zero], x4 || fdiv m1, m0, i1
+                  st 9[zero], x4
                   fmin x224, x1, m0
-                  nop
+                  fdiv x5, m0, i1
                   nop
                   ld x3, 0[i0]
                   wait 0";
@@ -170,25 +170,25 @@ fn a_fault_in_a_block_undoes_what_came_after() {
 #[test]
 fn a_fault_in_a_block_undoes_results_of_earlier_blocks() {
     let source = ".preset m0 1.0
-                  fdiv m1, m0, zero
+                  fdiv x1, m0, zero
                   jmp 2
                   ld x3, 0[i0]
-                  mov x4, m1
+                  mov x4, x1
                   halt";
     let mut emulator = Emulator::new(&program(&T3, source)).unwrap();
     emulator.set_input_bits(input(&T3, 0), 5000).unwrap();
     let fault = emulator.run().unwrap_err();
     assert_eq!((fault.address, fault.cycle), (at(2), 2 + 2 * u64::from(T3.refill)));
     assert!(emulator.flags().is_empty());
-    let m1 = T3.register_address("m1").unwrap();
-    assert_eq!(emulator.register(m1), None);
-    assert_eq!(emulator.in_flight().map(|retire| retire.register).collect::<Vec<_>>(), [Some(m1)]);
+    let x1 = T3.register_address("x1").unwrap();
+    assert_eq!(emulator.register(x1), None);
+    assert_eq!(emulator.in_flight().map(|retire| retire.register).collect::<Vec<_>>(), [Some(x1)]);
 }
 
 #[test]
 fn the_cycle_limit_is_exact_and_the_hosts() {
     for source in
-        ["again: jmp again", ".preset m0 1.0\nagain: fdiv m0, m0, m0\nfmul m1, m0, m0\njmp again", "wait 0"]
+        ["again: jmp again", ".preset x0 1.0\nagain: fdiv x0, x0, x0\nfmul m1, x0, x0\njmp again", "wait 0"]
     {
         for limit in 0..60 {
             let mut blocks = Emulator::new(&program(&T3, source)).unwrap();

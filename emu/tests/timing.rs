@@ -171,7 +171,7 @@ fn issue_is_in_order_and_whole() {
 #[test]
 fn destination_waits_for_the_earlier_result() {
     for (machine, source, register_name) in [
-        (&T3, ".preset m1 2.0\nfdiv m0, m1, m1\nfmul m0, m1, m1\nnop", "m0"),
+        (&T3, ".preset x1 2.0\nfdiv x0, x1, x1\nmov x0, x1\nnop", "x0"),
         (&T1, ".preset r1 2.0\nfdiv r0, r1, r1\nmov r0, r1\nnop", "r0"),
     ] {
         let divide = latency(machine, Function::Divide);
@@ -199,7 +199,7 @@ fn unit_accepts_one_operation_every_interval() {
         &[((at(2), cause), interval - 2)],
     );
     // Fully pipelined on t3.
-    check(&T3, ".preset m0 2.0\nfdiv m1, m0, m0\nfdiv m2, m0, m0\nnop", &[0, 1, 2], &[]);
+    check(&T3, ".preset m0 2.0\nfdiv x1, m0, m0\nfdiv x2, m0, m0\nnop", &[0, 1, 2], &[]);
 }
 
 /// Rule 6: two results of a bank never reach its write port in one cycle; the later bundle tries cycle by cycle.
@@ -223,7 +223,7 @@ fn write_port_takes_one_result_a_cycle() {
     // Banks have a port each.
     let at = latency(&T3, Function::Divide) - latency(&T3, Function::Add);
     let nops = "nop\n".repeat(at as usize - 1);
-    let source = format!(".preset m0 2.0\nfdiv m1, m0, m0\n{nops}fadd a1, m0, m0\nnop");
+    let source = format!(".preset m0 2.0\nfdiv x1, m0, m0\n{nops}fadd a1, m0, m0\nnop");
     check(&T3, &source, &(0..at + 2).collect::<Vec<_>>(), &[]);
 }
 
@@ -281,12 +281,12 @@ fn drain_waits_for_every_result() {
     check(&T1, &source, &cycles, &[((common::at(at), Cause::Drain), alu)]);
     let divide = latency(&T3, Function::Divide);
     for (op, next) in [("clrflags", Some(divide + 1)), ("wait 0", None), ("halt", None)] {
-        let source = format!(".preset m0 2.0\nfdiv m1, m0, m0 || mov x0, m0\n{op}\nnop");
+        let source = format!(".preset m0 2.0\nfdiv x1, m0, m0 || fmul m1, m0, m0\n{op}\nnop");
         let cycles: Vec<u64> = [0, divide].into_iter().chain(next).collect();
         check(&T3, &source, &cycles, &[((common::at(1), Cause::Drain), divide - 1)]);
     }
     // What issues together with it is not waited for.
-    check(&T3, ".preset m0 2.0\nfdiv m1, m0, m0 || halt", &[0], &[]);
+    check(&T3, ".preset m0 2.0\nfmul m1, m0, m0 || halt", &[0], &[]);
 }
 
 /// A jump costs the refill.
@@ -418,13 +418,13 @@ fn flags_are_read_before_they_are_cleared() {
 /// A result shows, and its flags join, in the cycle of its writeback and not before.
 #[test]
 fn results_show_at_writeback() {
-    let source = ".preset m0 1.0\nfdiv m1, m0, zero\nfmul m2, m0, m0\nhalt";
+    let source = ".preset m0 1.0\nfdiv x1, m0, zero\nfmul m2, m0, m0\nhalt";
     let (first, divide, multiply) =
         (u64::from(T3.refill), latency(&T3, Function::Divide), latency(&T3, Function::Multiply));
     for blocks in [false, true] {
         let mut emulator = Emulator::new(&program(&T3, source)).unwrap();
         emulator.set_blocks(blocks);
-        for (cycle, register_name) in [(first + 1 + multiply, "m2"), (first + divide, "m1")] {
+        for (cycle, register_name) in [(first + 1 + multiply, "m2"), (first + divide, "x1")] {
             emulator.run_until(cycle).unwrap();
             assert_eq!(emulator.register(register(&T3, register_name)), None, "{register_name}");
             assert!(emulator.flags().is_empty());

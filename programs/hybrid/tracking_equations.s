@@ -1,5 +1,5 @@
-; One period of the hybrid robot's tracking algorithm, (7)-(37) of the founding paper, in equations: the same bits, and on t3 and t1 the same cycles, as
-; tracking.s, which says where a formula differs from the printed one, and why. The mission flies tracking.s.
+; One period of the hybrid robot's tracking algorithm, (7)-(37) of the founding paper, in equations: the same bits as tracking.s, and as
+; many cycles, give or take a few. tracking.s says where a formula differs from the printed one, and why. The mission flies tracking.s.
 
 .include "robot.s"
 .schedule on

@@ -69,11 +69,11 @@
 .macro  feedforward
 .reg    f1 f2 f3
 ;                    velocity     Fc      Fs  vs  v0        Fv
-        friction f1,  v1d,         8.018,  0,  1,  2.11e-4,  19.03
+        friction f1,  v1d,         8.018,  0,  1,  2.11e-4,  19.04
         friction f2,  v2d,         8.018,  0,  1,  2.11e-4,  19.03
         friction f3,  v3d,         8.018,  0,  1,  2.11e-4,  19.03
-        friction ff4, omega_alpha, 0.3055, 0,  1,  5.686e-3, 0
-        friction ff5, omega_gamma, 0.2031, 0,  1,  5.528e-3, 0
+        friction ff4, omega_alpha, 0.3057, 0,  1,  5.622e-3, 0
+        friction ff5, omega_gamma, 0.2031, 0,  1,  5.533e-3, 0
         coupled
         .rep i, 1, 3
         fadd    ff{i}, ff{i}, f{i}

@@ -51,8 +51,10 @@ module takt_hazard #(
     output wire [SLOTS-1:0]             next_past
 );
 
-    // Comparisons with all that is in flight; m_at[j] for place j, m_later for place 3 and beyond.
-    wire [SLOTS-1:0] m_at0, m_at1, m_at2, m_later, m_on_read, m_on_issue, r_at2, i_at2;
+    // Comparisons with all that is in flight; m_at[j] for place j, m_near and m_far for place 3 and beyond. These two are the
+    // widest: they are registered apart, and for all slots, of which the address's bank chooses when it is in read.
+    localparam MIDDLE = DEPTH < 9 ? DEPTH : 9;
+    wire [SLOTS-1:0] m_at0, m_at1, m_at2, m_near, m_far, m_on_read, m_on_issue, r_at2, i_at2;
 
     genvar s, j;
     generate
@@ -69,7 +71,8 @@ module takt_hazard #(
             assign m_at0[s]      = m_bank[s] & hit[0];
             assign m_at1[s]      = m_bank[s] & hit[1];
             assign m_at2[s]      = m_bank[s] & hit[2];
-            assign m_later[s]    = m_bank[s] & ((|hit[DEPTH-1:3]) | (|late_hit));
+            assign m_near[s]     = |hit[MIDDLE-1:3];
+            assign m_far[s]      = (|(hit >> MIDDLE)) | (|late_hit);
             assign m_on_read[s]  = m_bank[s] & r_writes[s] & (r_dest[s*INDEX +: INDEX] == m_index);
             assign m_on_issue[s] = m_bank[s] & i_writes[s] & (i_dest[s*INDEX +: INDEX] == m_index);
             assign r_at2[s]      = r_bank[s] & in_flight[s*DEPTH+2] & (index2 == r_index);
@@ -78,10 +81,12 @@ module takt_hazard #(
     endgenerate
 
     // In read: the result is in place 2 or beyond (r_later), in place 1, in place 0; or the bundle in issue computes it.
-    reg r_later, r_on_issue, r_on_issue_early, r_on_issue_late, r_at1, r_at0;
+    reg [SLOTS-1:0] r_near, r_far;
+    reg r_from_issue, r_on_issue, r_on_issue_early, r_on_issue_late, r_at1, r_at0;
     // In issue: likewise.
     reg i_later, i_at1;
 
+    wire r_later = (|(r_bank & (r_near | r_far))) | r_from_issue;
     assign r_waits   = r_later | r_on_issue;
     assign i_waits   = i_later;
     assign r_taken   = r_at1 | r_at0;
@@ -91,7 +96,9 @@ module takt_hazard #(
 
     always @(posedge clk) begin
         if (advance) begin
-            r_later          <= (|m_later) | (|(m_on_issue & ~i_early));
+            r_near           <= m_near;
+            r_far            <= m_far;
+            r_from_issue     <= |(m_on_issue & ~i_early);
             r_at1            <= |(m_at2 | (m_on_issue & i_early));
             r_at0            <= |m_at1;
             r_past           <= m_at0;
@@ -102,13 +109,15 @@ module takt_hazard #(
             i_later          <= (r_later & ~(|r_at2)) | r_on_issue_late;
             i_at1            <= (|r_at2) | r_on_issue_early;
         end else begin
-            r_later <= r_later & ~(|r_at2);
-            r_at1   <= |r_at2;
-            r_at0   <= r_at1;
-            r_past  <= r_bank & {SLOTS{r_at0}};
-            r_copy  <= r_bank & {SLOTS{~r_at0}};
-            i_later <= i_later & ~(|i_at2);
-            i_at1   <= |i_at2;
+            r_near       <= r_near & ~{SLOTS{|r_at2}};
+            r_far        <= r_far & ~{SLOTS{|r_at2}};
+            r_from_issue <= r_from_issue & ~(|r_at2);
+            r_at1        <= |r_at2;
+            r_at0        <= r_at1;
+            r_past       <= r_bank & {SLOTS{r_at0}};
+            r_copy       <= r_bank & {SLOTS{~r_at0}};
+            i_later      <= i_later & ~(|i_at2);
+            i_at1        <= |i_at2;
         end
     end
 

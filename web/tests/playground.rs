@@ -175,7 +175,7 @@ fn the_robot_follows_the_path() {
     call(&mut playground, "assemble", params);
     let first = call(&mut playground, "track", json!({ "begin": true, "periods": 150 }));
     // The first period takes what the controller does only once besides.
-    assert_eq!((&first["done"], &first["cycles"]), (&json!(150), &json!(124)));
+    assert_eq!((&first["done"], &first["cycles"]), (&json!(150), &json!(112)));
     assert!(first["longest"].as_u64() >= first["cycles"].as_u64(), "{}", first["longest"]);
     assert_eq!(first["poses"].as_array().map(Vec::len), Some(2));
     let more = call(&mut playground, "track", json!({ "periods": 150 }));

@@ -37,11 +37,11 @@ impl Friction {
 
 /// The friction of the five axes, as identified on the nominal robot with `takt track --fit-friction`. No axis shows Stribeck's effect.
 pub const IDENTIFIED: [Friction; 5] = [
+    plain(8.018, 2.11e-4, 19.04),
     plain(8.018, 2.11e-4, 19.03),
     plain(8.018, 2.11e-4, 19.03),
-    plain(8.018, 2.11e-4, 19.03),
-    plain(0.3055, 5.686e-3, 0.0),
-    plain(0.2031, 5.528e-3, 0.0),
+    plain(0.3057, 5.622e-3, 0.0),
+    plain(0.2031, 5.533e-3, 0.0),
 ];
 
 /// Without Stribeck's effect.

@@ -172,15 +172,15 @@ fn by_rule() -> Vec<Mutation> {
 const BY_HAND: [(&str, &str); 12] = [
     ("fmul    xv, x, vx", "fmul    xv, x, vy"),
     ("fmul    za, z, az", "fmul    za, z, vz"),
-    ("fadd    {s}2, sum, e2", "fadd    {s}2, sum, px2"),
-    ("fmul    w{i}, v{i}d, v{i}d", "fmul    w{i}, v{i}d, v1d"),
+    ("fsub    {s}2, side, px2", "fsub    {s}2, sum, px2"),
+    ("fdiv    w{i}, w{i}, ll{i}", "fdiv    w{i}, w{i}, ll1"),
     ("arms    dv, 1, vx, vy, dv", "arms    dv, 2, vx, vy, dv"),
     ("mov     om5d, omega_gamma", "mov     om5d, omega_alpha"),
     ("fsub    w, q1, q3", "fsub    w, q2, q3"),
     ("mass    1, 2, s12, 3, s13", "mass    1, 3, s12, 2, s13"),
     ("mass    3, 1, s13, 2, s23", "mass    3, 1, s13, 2, s12"),
     ("fadd    la3, la1, w", "fadd    la3, la1, u"),
-    ("sel     ramp, same, ramp, gain", "sel     ramp, early, ramp, gain"),
+    ("sel     ramp, large, held, gain", "sel     ramp, same, held, gain"),
     ("control i, l{i}d, v{i}d, zero", "control i, l{i}d, v{i}d, a{i}d"),
 ];
 

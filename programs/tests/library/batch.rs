@@ -4,6 +4,7 @@
 
 use std::collections::HashMap;
 use takt_isa::fp::{Flags, Host};
+use takt_isa::spec::check::MAX_SLOTS;
 use takt_isa::{Effect, Program, ROWS, Register, compute};
 
 /// Operands at once: what the first-level cache holds beside some dozens of registers.
@@ -102,7 +103,7 @@ impl Batch {
         for (&input, operand) in self.inputs.iter().zip(operands) {
             self.columns[input] = *operand;
         }
-        let mut results = [[0; LANES]; 3];
+        let mut results = [[0; LANES]; MAX_SLOTS];
         for bundle in &self.bundles {
             // Every operation of a bundle reads before any writes.
             for (step, result) in bundle.iter().zip(&mut results) {
