@@ -34,22 +34,19 @@
 period:
 
 ; ---- Sines and cosines ------------------------------------------------------------------------------------------------
-.reg    th23 r1 r2 r23 r3 r4 r5 r6  s1 c1 s2 c2 s23 c23 s4 c4 s5 c5 s6 c6
+.reg    th23 r1 r2 r23 r4 r5 r6  s1 c1 s2 c2 s23 c23 s4 c4 s5 c5 s6 c6
         fadd    th23, th2, th3
-        fmul    r23, th23, rad
-        .rep i, 1, 6
-        fmul    r{i}, th{i}, rad
-        .endr
-.macro  sincos  s, c, r
+.macro  sincos  s, c, r, angle
+        fmul    r, angle, rad
         fsin    s, r
         fcos    c, r
 .endm
-        sincos  s6, c6, r6
-        sincos  s5, c5, r5
-        sincos  s4, c4, r4
-        sincos  s23, c23, r23
-        sincos  s2, c2, r2
-        sincos  s1, c1, r1
+        sincos  s6, c6, r6, th6
+        sincos  s5, c5, r5, th5
+        sincos  s4, c4, r4, th4
+        sincos  s23, c23, r23, th23
+        sincos  s2, c2, r2, th2
+        sincos  s1, c1, r1, th1
 
 ; ---- Tool's axis w in the plane: radially (2.9), upward, and across ------------------------------------------------------
 .reg    a b  wr wrr wz wzz
@@ -62,25 +59,34 @@ period:
         fmul    wzz, c23, c5
         fsub    wz, wz, wzz
 
-; yaw = atan2(w_y, w_x) = θ1 - atan2(b, t6), brought back into a turn.
-.reg    turn turns:int whole yw
-        fatan2  turn, b, wr
-        fmul    turn, turn, 1/rad
-        fsub    turn, th1, turn
-        fmul    whole, turn, 1/360
-        ftoi    turns, whole
-        itof    whole, turns
+; yaw = atan2(w_y, w_x): θ1 - atan2(b, t6), less whole turns: a sum with `integers` has no room for a fraction.
+.const  integers = 1.5*2^23
+.reg    across turn turned whole yw
+        fatan2  across, b, wr
+        fmul    yw, across, 1/rad
+        fsub    yw, th1, yw
+        fmul    turned, across, 1/(2*pi)
+        fmul    turn, th1, 1/360
+        fsub    turn, turn, turned
+        fadd    whole, turn, integers
+        fsub    whole, whole, integers
         fmul    whole, whole, 360
-        fsub    yw, turn, whole
+        fsub    yw, yw, whole
 
-; pitch = atan2(w_z, √(w_x² + w_y²)); joint 1 does not change the root.
-.reg    wr2 b2 flat2 flat pt
+; pitch has the sine w_z and the cosine √(w_x² + w_y²), which joint 1 does not change. The arccosine of the smaller one is exact.
+.reg    wr2 b2 flat2 flat  down:int perrad ph pl high:int
         fmul    wr2, wr, wr
         fmul    b2, b, b
         fadd    flat2, wr2, b2
         fsqrt   flat, flat2
-        fatan2  pt, wz, flat
-        fmul    pt, pt, 1/rad
+        flt     down, wz, zero
+        sel     perrad, down, -1/rad, 1/rad
+        facos   ph, flat
+        fmul    ph, ph, perrad          ; beyond ±45°
+        facos   pl, wz
+        fmul    pl, pl, 1/rad
+        fsub    pl, 90.0, pl            ; within
+        flt     high, flat2, 0.5
 
 ; roll = atan2(v_z, -u_z); u_z = c6·P - s6·Q, v_z = -s6·P - c6·Q.
 .reg    cc P Pr Q uz uzz vz vzz rl
@@ -124,7 +130,7 @@ period:
         fadd    n, n, nn                ; across: -n
 
 ; ---- The arm: radially and upward; then about joint 1 ----------------------------------------------------------------------
-.reg    R Ra Rb Rc Z Za Zb Zc  xx xs yy ys
+.reg    R Ra Rb Rc Z Za Zb Zc  xx xs ty1 ys
         fmul    Ra, c2, a2
         fadd    Ra, Ra, a1
         fmul    Rb, c23, g
@@ -140,9 +146,9 @@ period:
         fmul    xx, c1, R
         fmul    xs, s1, n
         fadd    xx, xx, xs
-        fmul    yy, s1, R
+        fmul    ty1, s1, R
         fmul    ys, c1, n
-        fsub    yy, yy, ys
+        fsub    ty1, ty1, ys
 
 ; ---- Configuration: on which branch of (2.22), (2.29), (2.34) the joints lie -------------------------------------------------
 .reg    wc wcc  s3a r3a  k0:int k1:int k2:int
@@ -151,7 +157,8 @@ period:
         fadd    wc, wc, wcc
         fadd    wc, wc, Ra              ; the wrist's centre, radially: behind joint 1's axis?
         flt     k0, wc, zero
-        fsub    r3a, r3, alpha
+        fsub    r3a, r23, r2
+        fsub    r3a, r3a, alpha
         fsin    s3a, r3a
         flt     k1, zero, s3a
         flt     k2, zero, s5
@@ -167,15 +174,17 @@ period:
         fadd    alls, tx, ty
         fadd    alls, alls, tz
         fadd    all, all, alls
-        fmul    all, all, zero
-        feq     good, all, zero
+        fabs    all, all
+        flt     good, all, inf
         fle     level, flat2, steep
         sel     status, good, level, 2
         sel     x, good, xx, x
-        sel     y, good, yy, y
+        sel     y, good, ty1, y
         sel     z, good, Z, z
         sel     roll, good, rl, roll
-        sel     pitch, good, pt, pitch
+        sel     pl, good, pl, pitch
+        iand    high, high, good
+        sel     pitch, high, ph, pl
         sel     yaw, good, yw, yaw
         sel     config0, good, k0, config0
         sel     config1, good, k1, config1
