@@ -59,34 +59,48 @@ period:
         fmul    wzz, c23, c5
         fsub    wz, wz, wzz
 
-; yaw = atan2(w_y, w_x): θ1 - atan2(b, t6), less whole turns: a sum with `integers` has no room for a fraction.
+; yaw = atan2(w_y, w_x): θ1, less whole turns, - atan2(b, t6). A sum with `integers` has no room for a fraction.
 .const  integers = 1.5*2^23
-.reg    across turn turned whole yw
-        fatan2  across, b, wr
-        fmul    yw, across, 1/rad
-        fsub    yw, th1, yw
-        fmul    turned, across, 1/(2*pi)
-        fmul    turn, th1, 1/360
-        fsub    turn, turn, turned
-        fadd    whole, turn, integers
+.reg    whole home yw size turn other  back:int beyond:int
+        fmul    whole, th1, 1/360
+        fadd    whole, whole, integers
         fsub    whole, whole, integers
         fmul    whole, whole, 360
-        fsub    yw, yw, whole
+        fsub    home, th1, whole        ; θ1 within half a turn
+        fatan2  yw, b, wr
+        fmul    yw, yw, 1/rad
+        fsub    yw, home, yw            ; within a whole one
+        flt     back, yw, zero
+        sel     turn, back, -360.0, 360.0
+        fsub    other, yw, turn
+        fabs    size, yw
+        flt     beyond, 180, size
+        sel     yw, beyond, other, yw
 
-; pitch has the sine w_z and the cosine √(w_x² + w_y²), which joint 1 does not change. The arccosine of the smaller one is exact.
-.reg    wr2 b2 flat2 flat  down:int perrad ph pl high:int
+; pitch = 90° - acos(w_z), w_z = sin(pitch). Within 10° of the vertical, where w_z says little, ±(90° - asin(flat)) with the arcsine's
+; series: flat = √(w_x² + w_y²) = cos(pitch), which joint 1 does not change. So the arctangents' unit has yaw and roll only.
+.const  upright = 0.5^5                 ; of flat²
+.reg    wr2 b2 flat2 flat4 flat  as asn upper lower sine pt  down:int steeply:int
         fmul    wr2, wr, wr
         fmul    b2, b, b
         fadd    flat2, wr2, b2
         fsqrt   flat, flat2
+        fmul    as, flat2, 1/(6*rad)
+        fadd    as, as, 1/rad
+        fmul    flat4, flat2, flat2
+        fmul    asn, flat4, 3/(40*rad)
+        fadd    as, as, asn
+        fmul    as, as, flat
+        fsub    upper, 90.0, as
+        fneg    lower, upper
         flt     down, wz, zero
-        sel     perrad, down, -1/rad, 1/rad
-        facos   ph, flat
-        fmul    ph, ph, perrad          ; beyond ±45°
-        facos   pl, wz
-        fmul    pl, pl, 1/rad
-        fsub    pl, 90.0, pl            ; within
-        flt     high, flat2, 0.5
+        sel     upper, down, lower, upper
+        fsat    sine, wz, 1.0           ; beyond 1 by a rounding
+        facos   pt, sine
+        fmul    pt, pt, 1/rad
+        fsub    pt, 90.0, pt
+        flt     steeply, flat2, upright
+        sel     pt, steeply, upper, pt
 
 ; roll = atan2(v_z, -u_z); u_z = c6·P - s6·Q, v_z = -s6·P - c6·Q.
 .reg    cc P Pr Q uz uzz vz vzz rl
@@ -130,7 +144,7 @@ period:
         fadd    n, n, nn                ; across: -n
 
 ; ---- The arm: radially and upward; then about joint 1 ----------------------------------------------------------------------
-.reg    R Ra Rb Rc Z Za Zb Zc  xx xs ty1 ys
+.reg    R Ra Rb Rc Z Za Zb Zc  xx xs yy ys
         fmul    Ra, c2, a2
         fadd    Ra, Ra, a1
         fmul    Rb, c23, g
@@ -146,9 +160,9 @@ period:
         fmul    xx, c1, R
         fmul    xs, s1, n
         fadd    xx, xx, xs
-        fmul    ty1, s1, R
+        fmul    yy, s1, R
         fmul    ys, c1, n
-        fsub    ty1, ty1, ys
+        fsub    yy, yy, ys
 
 ; ---- Configuration: on which branch of (2.22), (2.29), (2.34) the joints lie -------------------------------------------------
 .reg    wc wcc  s3a r3a  k0:int k1:int k2:int
@@ -179,12 +193,10 @@ period:
         fle     level, flat2, steep
         sel     status, good, level, 2
         sel     x, good, xx, x
-        sel     y, good, ty1, y
+        sel     y, good, yy, y
         sel     z, good, Z, z
         sel     roll, good, rl, roll
-        sel     pl, good, pl, pitch
-        iand    high, high, good
-        sel     pitch, high, ph, pl
+        sel     pitch, good, pt, pitch
         sel     yaw, good, yw, yaw
         sel     config0, good, k0, config0
         sel     config1, good, k1, config1

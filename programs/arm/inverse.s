@@ -41,7 +41,7 @@ period:
         sincos  sy, cy, ry, yaw
 
 ; ---- Wrist's centre c = end - tx·u - ty·v - (tz + d6)·w ---------------------------------------------------------------------------------
-.reg    e ee f ff tl  cpcy cpsy spcy spsy  wx wxt wxe wxf  wy wyt wye wyf  wz wzt wze
+.reg    e ee f ff tl  tlcp spcy spsy  wx wxt wxe wxf  wy wyt wye wyf  wz wzt wze
         fmul    ee, tx, cr
         fmul    e, ty, sr
         fsub    e, e, ee                ; of the tool point along e
@@ -49,66 +49,66 @@ period:
         fmul    ff, ty, cr
         fadd    f, f, ff                ; and along f
         fadd    tl, tz, d6
-        fmul    cpcy, cp, cy
-        fmul    cpsy, cp, sy
+        fmul    tlcp, tl, cp
         fmul    spcy, sp, cy
         fmul    spsy, sp, sy
-        fmul    wxt, tl, cpcy
+        fmul    wxt, tlcp, cy
         fsub    wxt, x, wxt
         fmul    wxe, e, spcy
         fmul    wxf, f, sy
         fadd    wx, wxe, wxf
         fadd    wx, wxt, wx
-        fmul    wyt, tl, cpsy
+        fmul    wyt, tlcp, sy
         fsub    wyt, y, wyt
         fmul    wye, e, spsy
         fmul    wyf, f, cy
         fsub    wy, wye, wyf
         fadd    wy, wyt, wy
-        fsub    wz, z, d1
         fmul    wzt, tl, sp
-        fsub    wz, wz, wzt
         fmul    wze, e, cp
+        fadd    wze, wze, wzt
+        fsub    wz, z, d1
         fsub    wz, wz, wze             ; above joint 2
 
 ; ---- θ1, (2.22): its cosine and sine are wx/r and wy/r, or their opposites ------------------------------------------------------
-.reg    sgn1  r2 r2c r  als acs t1
+.reg    sgn1  r2 r2y r  sx sy1 t1
         sel     sgn1, config0, -1.0, 1.0
         fmul    r2, wx, wx
-        fmul    r2c, wy, wy
-        fadd    r2, r2, r2c
+        fmul    r2y, wy, wy
+        fadd    r2, r2, r2y
         fsqrt   r, r2
-        fmul    als, wx, sgn1
-        fmul    acs, wy, sgn1
-        fatan2  t1, acs, als
+        fmul    sx, wx, sgn1
+        fmul    sy1, wy, sgn1
+        fatan2  t1, sy1, sx
         fmul    t1, t1, 1/rad
 
 ; ---- The triangle of upper arm and forearm: X = ±r - a1 radially, Z upward. The elbow's angle ψ has cosine K/(2·a2·L) and sine ±S/(2·a2·L),
-;      where S² = (2·a2·L)² - K² = ((a2 + L)² - D)·(D - (a2 - L)²), D = X² + Z². r = √r2 is late: D is linear in it. -----------------------
+;      S² = (2·a2·L)² - K² = ((a2 + L)² - D)·(D - (a2 - L)²), D = X² + Z² = r² + Z² + a1² - 2·a1·(±r). r is a root and late: it
+;      enters S² with one product and one sum, S² = P1·P2 - (2·a1·r)² + (±r)·F. -----------------------------------------------------
 .const  far  = (a2 + sqrt(L2))^2 - a1^2
 .const  near = (a2 - sqrt(L2))^2 - a1^2
-.reg    a1s ta fa  Z2 P1 P2 PP PPr F S  K  a1r
+.reg    a1s a1t a1f  Z2 P1 P2 PP PPr F S  K Kr
         sel     a1s, config0, -float(a1), float(a1)
-        sel     ta, config0, -float(2*a1), float(2*a1)
-        sel     fa, config0, -float(4*a1), float(4*a1)
+        sel     a1t, config0, -float(2*a1), float(2*a1)
+        sel     a1f, config0, -float(4*a1), float(4*a1)
         fmul    Z2, wz, wz
         fsub    P1, far, Z2
         fsub    P1, P1, r2
         fsub    P2, Z2, near
         fadd    P2, P2, r2
-        fmul    a1r, ta, r
         fmul    PP, P1, P2
         fmul    PPr, r2, (2*a1)^2
         fsub    PP, PP, PPr
         fsub    F, Z2, (far + near)/2
         fadd    F, F, r2
-        fmul    F, F, fa
+        fmul    F, F, a1f
         fmul    F, F, r
         fadd    PP, PP, F
         fsqrt   S, PP
         fadd    K, Z2, a1^2 - a2^2 - L2
         fadd    K, K, r2
-        fsub    K, K, a1r
+        fmul    Kr, a1t, r
+        fsub    K, K, Kr
 
 ; θ3 = α ∓ acos(K/(2·a2·L)), (2.29).
 .reg    elbow ps t3 t3a beyond:int
@@ -136,7 +136,7 @@ period:
         fatan2  t2, ZA, XA
         fmul    t2, t2, 1/rad
 
-; cos and sin of θ2 + θ3, times D: (X + iZ)·(a3 + i·d4)/(2·L²)·(K + 2·L² ± iS).
+; cos and sin of θ2 + θ3, times D: (X + iZ)·(a3 + i·d4)·(1 + (K ± iS)/(2·L²)).
 .reg    G  Tx Txx Ty Tyy  c23 c23z s23 s23z
         fadd    G, K, 2*L2
         fmul    Tx, Xs, a3/(2*L2)
@@ -152,7 +152,7 @@ period:
         fmul    s23z, Tx, B
         fadd    s23, s23, s23z
 
-; ---- Orientation seen from frame 1, times r or its opposite: radial parts of w, u, v; what crosses the arm ------------------------------
+; ---- Orientation seen from frame 1, times ±r: radial parts of w, u, v; what crosses the arm. `al` and `ac` are ±r times cos and sin of θ1 - yaw --
 .reg    rs  al all ac acc p q pu puu pv pvv wzr uz vz  crsp srsp
         fmul    rs, r, sgn1
         fmul    al, wx, cy
@@ -162,7 +162,7 @@ period:
         fmul    acc, wx, sy
         fsub    ac, ac, acc
         fmul    p, cp, al
-        fmul    q, cp, ac
+        fmul    q, cp, ac               ; s1·w_x - c1·w_y
         fmul    crsp, cr, sp
         fmul    srsp, sr, sp
         fmul    pu, crsp, al
@@ -177,12 +177,13 @@ period:
         fmul    vz, sr, cp
         fmul    vz, vz, rs              ; v_z
 
-; ---- The wrist, (2.34)-(2.39), times D·r: sin θ5 = ±√(…) divides both parts of θ4 and of θ6: only its sign matters ----------------------
-.reg    D  c5 c5z n nz n2 q2 s52 s5  side side4 side6 wrist qs t5 t4 t6  m mz k kz
-        fadd    D, K, a2^2 + L2
-        sel     side, config2, 1.0, -1.0
+; ---- The wrist, (2.34)-(2.39), times ±r·D: sin θ5 = ±√(…) divides both parts of θ4 and of θ6: only its sign matters ---------------------
+.reg    X2 D  c5 c5z n nz n2 q2 s52 s5  side side4 side6 wrist qs t5 t4 t6  m mz k kz
+        fmul    X2, X, X
+        fadd    D, X2, Z2
+        sel     side, config2, 1.0, -1.0 ; of sin θ5
         sel     wrist, config2, 1/rad, -1/rad
-        fmul    side4, side, sgn1
+        fmul    side4, side, sgn1       ; with the sign of ±r
         fneg    side6, side4
         fmul    c5, s23, p
         fmul    c5z, c23, wzr
@@ -190,8 +191,8 @@ period:
         fmul    c5, c5, sgn1
         fmul    n, c23, p
         fmul    nz, s23, wzr
-        fadd    n, n, nz                ; cos θ4·sin θ5
-        fmul    q, q, D                 ; sin θ4·sin θ5
+        fadd    n, n, nz                ; cos θ4
+        fmul    q, q, D                 ; sin θ4
         fmul    n2, n, n
         fmul    q2, q, q
         fadd    s52, n2, q2
@@ -206,7 +207,7 @@ period:
         fmul    m, s23, pu
         fmul    mz, c23, uz
         fadd    m, m, mz
-        fmul    m, m, side6             ; cos θ6, times |sin θ5|
+        fmul    m, m, side6             ; cos θ6
         fmul    k, s23, pv
         fmul    kz, c23, vz
         fadd    k, k, kz
