@@ -25,8 +25,8 @@ fn programs_take_no_longer() {
         ("hybrid", "tracking.s", &T1, 307),
         ("hybrid", "tracking_friction.s", &T3, 257),
         ("hybrid", "tracking_friction.s", &T1, 654),
-        ("arm", "forward.s", &T3, 100),
-        ("arm", "inverse.s", &T3, 212),
+        ("arm", "forward.s", &T3, 96),
+        ("arm", "inverse.s", &T3, 190),
     ];
     for (folder, name, machine, most) in figures {
         let found = cycles(folder, name, machine);

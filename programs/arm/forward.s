@@ -34,22 +34,19 @@
 period:
 
 ; ---- Sines and cosines ------------------------------------------------------------------------------------------------
-.reg    th23 r1 r2 r23 r3 r4 r5 r6  s1 c1 s2 c2 s23 c23 s4 c4 s5 c5 s6 c6
+.reg    th23 r1 r2 r23 r4 r5 r6  s1 c1 s2 c2 s23 c23 s4 c4 s5 c5 s6 c6
         fadd    th23, th2, th3
-        fmul    r23, th23, rad
-        .rep i, 1, 6
-        fmul    r{i}, th{i}, rad
-        .endr
-.macro  sincos  s, c, r
+.macro  sincos  s, c, r, angle
+        fmul    r, angle, rad
         fsin    s, r
         fcos    c, r
 .endm
-        sincos  s6, c6, r6
-        sincos  s5, c5, r5
-        sincos  s4, c4, r4
-        sincos  s23, c23, r23
-        sincos  s2, c2, r2
-        sincos  s1, c1, r1
+        sincos  s6, c6, r6, th6
+        sincos  s5, c5, r5, th5
+        sincos  s4, c4, r4, th4
+        sincos  s23, c23, r23, th23
+        sincos  s2, c2, r2, th2
+        sincos  s1, c1, r1, th1
 
 ; ---- Tool's axis w in the plane: radially (2.9), upward, and across ------------------------------------------------------
 .reg    a b  wr wrr wz wzz
@@ -62,25 +59,48 @@ period:
         fmul    wzz, c23, c5
         fsub    wz, wz, wzz
 
-; yaw = atan2(w_y, w_x) = θ1 - atan2(b, t6), brought back into a turn.
-.reg    turn turns:int whole yw
-        fatan2  turn, b, wr
-        fmul    turn, turn, 1/rad
-        fsub    turn, th1, turn
-        fmul    whole, turn, 1/360
-        ftoi    turns, whole
-        itof    whole, turns
+; yaw = atan2(w_y, w_x): θ1, less whole turns, - atan2(b, t6). A sum with `integers` has no room for a fraction.
+.const  integers = 1.5*2^23
+.reg    whole home yw size turn other  back:int beyond:int
+        fmul    whole, th1, 1/360
+        fadd    whole, whole, integers
+        fsub    whole, whole, integers
         fmul    whole, whole, 360
-        fsub    yw, turn, whole
+        fsub    home, th1, whole        ; θ1 within half a turn
+        fatan2  yw, b, wr
+        fmul    yw, yw, 1/rad
+        fsub    yw, home, yw            ; within a whole one
+        flt     back, yw, zero
+        sel     turn, back, -360.0, 360.0
+        fsub    other, yw, turn
+        fabs    size, yw
+        flt     beyond, 180, size
+        sel     yw, beyond, other, yw
 
-; pitch = atan2(w_z, √(w_x² + w_y²)); joint 1 does not change the root.
-.reg    wr2 b2 flat2 flat pt
+; pitch = 90° - acos(w_z), w_z = sin(pitch). Within 10° of the vertical, where w_z says little, ±(90° - asin(flat)) with the arcsine's
+; series: flat = √(w_x² + w_y²) = cos(pitch), which joint 1 does not change. So the arctangents' unit has yaw and roll only.
+.const  upright = 0.5^5                 ; of flat²
+.reg    wr2 b2 flat2 flat4 flat  as asn upper lower sine pt  down:int steeply:int
         fmul    wr2, wr, wr
         fmul    b2, b, b
         fadd    flat2, wr2, b2
         fsqrt   flat, flat2
-        fatan2  pt, wz, flat
+        fmul    as, flat2, 1/(6*rad)
+        fadd    as, as, 1/rad
+        fmul    flat4, flat2, flat2
+        fmul    asn, flat4, 3/(40*rad)
+        fadd    as, as, asn
+        fmul    as, as, flat
+        fsub    upper, 90.0, as
+        fneg    lower, upper
+        flt     down, wz, zero
+        sel     upper, down, lower, upper
+        fsat    sine, wz, 1.0           ; beyond 1 by a rounding
+        facos   pt, sine
         fmul    pt, pt, 1/rad
+        fsub    pt, 90.0, pt
+        flt     steeply, flat2, upright
+        sel     pt, steeply, upper, pt
 
 ; roll = atan2(v_z, -u_z); u_z = c6·P - s6·Q, v_z = -s6·P - c6·Q.
 .reg    cc P Pr Q uz uzz vz vzz rl
@@ -151,7 +171,8 @@ period:
         fadd    wc, wc, wcc
         fadd    wc, wc, Ra              ; the wrist's centre, radially: behind joint 1's axis?
         flt     k0, wc, zero
-        fsub    r3a, r3, alpha
+        fsub    r3a, r23, r2
+        fsub    r3a, r3a, alpha
         fsin    s3a, r3a
         flt     k1, zero, s3a
         flt     k2, zero, s5
@@ -167,8 +188,8 @@ period:
         fadd    alls, tx, ty
         fadd    alls, alls, tz
         fadd    all, all, alls
-        fmul    all, all, zero
-        feq     good, all, zero
+        fabs    all, all
+        flt     good, all, inf
         fle     level, flat2, steep
         sel     status, good, level, 2
         sel     x, good, xx, x

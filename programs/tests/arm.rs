@@ -13,8 +13,8 @@ use takt_programs::arm::{
 /// Errors that the programs may have, mm and degrees.
 const ERROR: f64 = 0.0005;
 /// Cycles that a period may take.
-const FORWARD_CYCLES: u64 = 107;
-const INVERSE_CYCLES: u64 = 240;
+const FORWARD_CYCLES: u64 = 96;
+const INVERSE_CYCLES: u64 = 195;
 
 /// A program and its ports, in the order of its source.
 struct Ported {
