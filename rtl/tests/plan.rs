@@ -94,8 +94,8 @@ fn every_reason() {
         // An adder every third cycle beside a pipelined divider.
         (
             units(1, &[Unit { interval: 3, ..ADD }, DIVROOT]),
-            "slot `add`: unit `add` has latency 5 and interval 3; beside results that are in flight for 10 cycles, a unit of \
-             interval above 1 needs a latency of 12 and an interval of 3 at least",
+            "slot `add`: unit `add` has latency 5 and interval 3; beside results that are in flight for 11 cycles, a unit of \
+             interval above 1 needs a latency of 13 and an interval of 3 at least",
         ),
     ];
     for (machine, message) in cases {
