@@ -13,6 +13,7 @@ macro_rules! files {
 #[rustfmt::skip]
 pub(crate) const UNITS: &[File] = files!("units":
     "add.v"
+    "addmul.v"
     "alu.v"
     "alu_late.v"
     "arccosine.v"

@@ -199,9 +199,7 @@ T1 = Machine {
         bank: bank("r", 0, 512),
         // A sine at most every nine cycles: then what is in flight needs as many places as the other units' latency.
         units: &[
-            ADD,
-            CONVERT,
-            MULTIPLY,
+            ADDMUL,
             DIVIDE,
             ROOT,
             Unit { interval: 9, ..SINE },
