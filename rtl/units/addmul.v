@@ -81,7 +81,9 @@ module takt_addmul #(
                                        : a_special & b_special & (a[31] ^ b_sign);
 
     wire [47:0] product;    // of the next stage
-    takt_significand_product u_product (.clk(clk), .a({~a_small, a[22:0]}), .b({~b_small, b[22:0]}), .p(product));
+    takt_significand_product #(.SMALL(1)) u_product (
+        .clk(clk), .a({~a_small, a[22:0]}), .b({~b_small, b[22:0]}), .p(product)
+    );
 
     // A carry comes in from a place below the others.
     wire [9:0]  other     = converts ? -10'd157 : {2'd0, b_exponent} ^ {10{~multiplies}};

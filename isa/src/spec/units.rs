@@ -59,8 +59,7 @@ units! {
     ADDMUL    addmul    [Add Multiply Convert] 8/1 ["swapped operands, partial products" "product, distance" "shifted right" "sum" "shifted left by bytes" "normalised" "rounded"] "binary32 sum, product and conversion in one pipeline: they share alignment, normalisation and rounding; small.";
     FUSED     fused     [Fused Multiply Add] 6/1 ["partial products" "product, aligned addend" "sum" "leading zeros, shifted by nibbles" "normalised, rounded"] "binary32 product and sum with one rounding; a product, or a sum, alone has the bits of the units that compute only that. A machine's row says which functions it executes there.";
     DIVROOT   divroot   [Divide Root] 10/1 ["classified" "normalised" "reciprocal" "first digit" "first product" "first residual" "second digit" "second product" "rounded"] "Division and square root, very high radix: a reciprocal table, two quotient digits of 14 and 10 bits, rounding by the sign of the last residual.";
-    DIVIDE    divide    [Divide]      18/14 [] "Iterative radix-4 divider.";
-    ROOT      root      [Root]        16/13 [] "Iterative square root, two bits a cycle.";
+    RECURRENCE recurrence [Divide Root] 21/15 [] "Division and square root by one digit recurrence, two bits a cycle; no multiplier.";
     SINE      sine      [Sine]        14/1 ["aligned" "multiple" "table" "multiple of π/2" "remainder" "segment" "coefficients" "slope's product" "polynomial" "product" "sums" "difference" "rounded"] "Sine and cosine: the distance from the nearest multiple of π/2, which comes from a table, and a piecewise quadratic; three 18x18 products.";
     ARCTANGENT arctangent [Arctangent] 24/16 [] "Digit-by-digit division whose divisor grows with the digits found; a table of arctangents; no multiplier.";
     ARCCOSINE arccosine [Arccosine]   30/16 [] "Digit-by-digit square root; each digit adds its multiple of a function from a table; no multiplier.";
