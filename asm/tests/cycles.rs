@@ -22,9 +22,9 @@ fn programs_take_no_longer() {
     let figures = [
         ("hybrid", "tracking.s", &T3, 124),
         ("hybrid", "tracking_literal.s", &T3, 338),
-        ("hybrid", "tracking.s", &T1, 304),
+        ("hybrid", "tracking.s", &T1, 311),
         ("hybrid", "tracking_friction.s", &T3, 270),
-        ("hybrid", "tracking_friction.s", &T1, 651),
+        ("hybrid", "tracking_friction.s", &T1, 654),
         ("arm", "forward.s", &T3, 100),
         ("arm", "inverse.s", &T3, 209),
     ];

@@ -20,11 +20,11 @@
 //   ftoi              goes to the right to its place; the sum rounds and negates: with n for what is left of the point and up
 //                     (0 or 1) for rounding, -(n + up) = ~n + ~up
 //
-// Places: 32 to 0; what falls below them is only known to have been something, but for the lower part of a product that
-// does not go to the right: `below`, places -1 to -15. S and L have their leading ones in place 31, a product in 32 or 31; an integer in 32
-// to 1. `exponent` is one less than the exponent field of a number with its
-// leading one in place 32: the leading one adds itself when the result is rounded. The shift to the left stops where the
-// exponent is 0.
+// Places: 32 to 0. Of what goes below them to the right it is only known whether it was something; the lower part of a
+// product, `below`, is in places -1 to -15, and stays there if the product goes to the right, for then nothing goes to the
+// left. S and L have their leading ones in place 31, a product in 32 or 31; an integer is in places 32 to 1. `exponent` is one
+// less than the exponent field of a number with its leading one in place 32: the leading one adds itself when the result is
+// rounded. The shift to the left stops where the exponent is 0.
 //
 // Pipeline
 //   1  swapped operands     S and L; difference or sum of the exponents; partial products
@@ -171,7 +171,6 @@ module takt_addmul #(
     wire        lost =
         (right2[4] & (|s2[15:0])) | (right2[3] & (|by16[7:0])) | (right2[2] & (|by8[3:0])) |
         (right2[1] & (|by4[1:0])) | (right2[0] & by2[0]);
-    wire        moves = beyond2 | (|right2);
     wire [9:0]  product_exponent = 10'd0 - distance2;
 
     reg [32:0]  s3;
@@ -184,9 +183,8 @@ module takt_addmul #(
     always @(posedge clk) begin
         s3          <= by1 ^ {33{subtracts2}};
         below3      <= below2;
-        if (moves) below3 <= 15'd0;
         l3          <= l2;
-        lost3       <= lost | (moves & (|below2));
+        lost3       <= lost;
         exponent3   <= multiplies2 ? product_exponent[8:0] & {9{distance2[9]}} : {1'b0, exponent2};
         to_integer3 <= to_integer2;
         too_large3  <= too_large2;
@@ -216,7 +214,7 @@ module takt_addmul #(
     always @(posedge clk) begin
         sum4        <= sum[33:1];
         below4      <= below3;
-        lost4       <= lost3 & ~to_integer3;
+        lost4       <= lost3;
         exponent4   <= exponent3;
         allowed4[1] <= |exponent3[8:3];
         allowed4[2] <= |exponent3[8:4];
