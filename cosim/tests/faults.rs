@@ -8,6 +8,7 @@ mod common;
 
 use common::folder;
 use takt_cosim::{LockstepError, Model, random};
+use takt_isa::spec::units::ADDMUL;
 use takt_isa::{Machine, Shape, T1, T3};
 use takt_rtl::plan::names::{decode, net};
 use takt_rtl::plan::{ControlBit, Plan, Stage};
@@ -78,8 +79,9 @@ const OF_T3: &[Fault] = &[
 #[rustfmt::skip]
 const OF_T1: &[Fault] = &[
     ("takt_alu_late", "waiting[36*WAIT-1 -: 36]", "(waiting[36*WAIT-1 -: 36] & ~36'd8)"),
-    ("takt_divide", "a_signaling | b_signaling | undefined", "a_signaling | b_signaling"),
-    ("takt_root", "sign_1 & is_zero", "1'b0"),
+    ("takt_addmul", "sign5 & ~(zero5 & cancels5)", "sign5"),
+    ("takt_recurrence", "is_signaling | b_signaling | undefined", "is_signaling | b_signaling"),
+    ("takt_recurrence", "a_sign & ~is_zero & ~is_nan", "a_sign & ~is_nan"),
 ];
 
 /// A fault whose text is made.
@@ -109,9 +111,9 @@ fn generated_for_t3(plan: &Plan) -> Vec<MadeFault> {
 /// Likewise for t1: the write port that iterative units take.
 fn generated_for_t1(plan: &Plan) -> Vec<MadeFault> {
     let one = plan.slot("one").expect("t1's slot");
-    let mut taken = one.booked(5);
-    taken.push(one.bit(Stage::Issue, ControlBit::Result(5)));
-    vec![(plan.top(), any(taken).to_string(), "1'b0".to_owned())]
+    let taken =
+        one.bit(Stage::Read, ControlBit::Result(ADDMUL.latency)) & any(one.booked(ADDMUL.latency + 1));
+    vec![(plan.top(), format!("({taken})"), "1'b0".to_owned())]
 }
 
 /// Likewise for t3 with latched ports.

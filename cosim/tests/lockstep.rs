@@ -69,7 +69,13 @@ fn rows_of_a_strangers() {
     let two = TWO.get_or_init(|| Machine {
         name: "two",
         slots: Vec::leak(vec![
-            slot("mul", "m", 0, 256, &[MULTIPLY, DIVIDE, ROOT]),
+            slot(
+                "mul",
+                "m",
+                0,
+                256,
+                &[MULTIPLY, Unit { interval: 16, ..RECURRENCE }, Unit { interval: 9, ..SINE }],
+            ),
             slot("rest", "a", 256, 128, &[ADD, CONVERT, ALU_LATE, MEMORY, SEQUENCER]),
         ]),
         ..T3

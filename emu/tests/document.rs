@@ -47,7 +47,7 @@ const EXAMPLES: &[Example] = &[
             rdflags r4
             nop",
         ticks: &[],
-        cycles: 48,
+        cycles: 53,
     },
     Example {
         name: "wait",

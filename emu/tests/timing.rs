@@ -191,12 +191,18 @@ fn unit_accepts_one_operation_every_interval() {
         &T1,
         ".preset r0 2.0
          fdiv r1, r0, r0
-         fsqrt r2, r0
+         fsin r2, r0
          fdiv r3, r0, r0
          nop",
-        // The root's writeback, one cycle after the quotient's, is not in the way of the second quotient's.
         &[0, 1, interval, interval + 1],
         &[((at(2), cause), interval - 2)],
+    );
+    // A root takes the same unit.
+    check(
+        &T1,
+        ".preset r0 2.0\nfdiv r1, r0, r0\nfsqrt r2, r0\nnop",
+        &[0, interval, interval + 1],
+        &[((at(1), cause), interval - 1)],
     );
     // Fully pipelined on t3.
     check(&T3, ".preset m0 2.0\nfdiv x1, m0, m0\nfdiv x2, m0, m0\nnop", &[0, 1, 2], &[]);
@@ -205,17 +211,17 @@ fn unit_accepts_one_operation_every_interval() {
 /// Rule 6: two results of a bank never reach its write port in one cycle; the later bundle tries cycle by cycle.
 #[test]
 fn write_port_takes_one_result_a_cycle() {
-    let [add, divide, root] =
-        [Function::Add, Function::Divide, Function::Root].map(|function| latency(&T1, function));
-    // The root comes one cycle after the quotient.
-    let root_at = divide + 1 - root;
-    // The sum, issued in `at`, would come with the quotient; one later with the root; one later it comes alone.
+    let [add, divide, sine] =
+        [Function::Add, Function::Divide, Function::Sine].map(|function| latency(&T1, function));
+    // The sine comes one cycle after the quotient.
+    let sine_at = divide + 1 - sine;
+    // The sum, issued in `at`, would come with the quotient; one later with the sine; one later it comes alone.
     let at = divide - add;
     let nops = |count: u64| "nop\n".repeat(count as usize);
     let source = format!(
-        ".preset r0 2.0\nfdiv r1, r0, r0\n{}fsqrt r2, r0\n{}fadd r3, r0, r0\nnop",
-        nops(root_at - 1),
-        nops(at - root_at - 1)
+        ".preset r0 2.0\nfdiv r1, r0, r0\n{}fsin r2, r0\n{}fadd r3, r0, r0\nnop",
+        nops(sine_at - 1),
+        nops(at - sine_at - 1)
     );
     let cycles: Vec<u64> = (0..at).chain([at + 2, at + 3]).collect();
     let (slot, _) = T1.host(Function::Add).unwrap();

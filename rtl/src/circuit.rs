@@ -359,14 +359,14 @@ mod tests {
             }
         }
         let message = |unit: Unit| library.circuit(&unit).expect_err("no such circuit").to_string();
-        use takt_isa::spec::units::{ALU_LATE, CONVERT, DIVIDE};
+        use takt_isa::spec::units::{ALU_LATE, CONVERT, RECURRENCE};
         assert_eq!(
             message(Unit { latency: 4, ..ADD }),
             "unit `add` has latency 4; rtl/units/add.v needs latency 5"
         );
         assert_eq!(
-            message(Unit { interval: 13, ..DIVIDE }),
-            "unit `divide` has interval 13; rtl/units/divide.v needs interval 14 at least"
+            message(Unit { interval: 14, ..RECURRENCE }),
+            "unit `recurrence` has interval 14; rtl/units/recurrence.v needs interval 15 at least"
         );
         assert!(message(Unit { latency: 6, ..CONVERT }).ends_with("latency 4 or 5"));
         assert!(message(Unit { latency: 2, ..ALU_LATE }).ends_with("latency 3 to 16"));

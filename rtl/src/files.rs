@@ -13,16 +13,16 @@ macro_rules! files {
 #[rustfmt::skip]
 pub(crate) const UNITS: &[File] = files!("units":
     "add.v"
+    "addmul.v"
     "alu.v"
     "alu_late.v"
     "arccosine.v"
     "arctangent.v"
     "convert.v"
-    "divide.v"
     "divroot.v"
     "fused.v"
     "multiply.v"
-    "root.v"
+    "recurrence.v"
     "sine.v"
     "common/takt_arccosine_table.v"
     "common/takt_arctangent_table.v"

@@ -64,8 +64,10 @@ tests! {
     sine: sine fsin, "takes half an hour";
     cosine: sine fcos, "takes half an hour";
     arccosine: arccosine facos, "takes hours";
-    root: root fsqrt, "takes hours";
+    root: recurrence fsqrt, "takes hours";
     divroot: divroot fsqrt, "takes half an hour";
     to_float: convert itof, "takes a quarter of an hour";
     to_integer: convert ftoi, "takes a quarter of an hour";
+    to_float_small: addmul itof, "takes a quarter of an hour";
+    to_integer_small: addmul ftoi, "takes a quarter of an hour";
 }

@@ -78,8 +78,8 @@ fn every_reason() {
             "slot `add`: unit `add` has latency 4; rtl/units/add.v needs latency 5",
         ),
         (
-            units(0, &[MULTIPLY, Unit { interval: 13, ..DIVIDE }]),
-            "slot `mul`: unit `divide` has interval 13; rtl/units/divide.v needs interval 14 at least",
+            units(0, &[MULTIPLY, Unit { interval: 14, ..RECURRENCE }]),
+            "slot `mul`: unit `recurrence` has interval 14; rtl/units/recurrence.v needs interval 15 at least",
         ),
         (
             units(0, &[Unit { name: "twofold", ..MULTIPLY }]),

@@ -71,4 +71,4 @@ macro_rules! units {
     };
 }
 
-units! { alu alu_late add convert multiply fused divroot divide root sine arctangent arccosine }
+units! { alu alu_late add addmul convert multiply fused divroot recurrence sine arctangent arccosine }

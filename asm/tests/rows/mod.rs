@@ -18,7 +18,7 @@ const ROWS: &[(&str, &Slots)] = &[
     ),
     (
         "two_dividers",
-        &[("mul", MUL), ("add", &[ADD, CONVERT]), ("aux", &[ALU, DIVIDE, ROOT, MEMORY, SEQUENCER])],
+        &[("mul", MUL), ("add", &[ADD, CONVERT]), ("aux", &[ALU, RECURRENCE, MEMORY, SEQUENCER])],
     ),
     ("two_alus", &[("mul", MUL), ("add", &[ALU, ADD, CONVERT]), ("aux", &[ALU, MEMORY, SEQUENCER])]),
     // A function that takes longer in one slot than in the other.
@@ -92,7 +92,7 @@ pub(crate) fn random(mut below: impl FnMut(u64) -> u64) -> &'static Machine {
     let mut units: Vec<Vec<Unit>> = vec![Vec::new(); count];
     let alternatives: [&[&[Unit]]; 7] = [
         &[&[MULTIPLY]],
-        &[&[DIVROOT], &[DIVIDE, ROOT]],
+        &[&[DIVROOT], &[RECURRENCE]],
         &[&[SINE], &[Unit { interval: 9, ..SINE }]],
         &[&[ARCTANGENT, ARCCOSINE]],
         &[&[ADD]],

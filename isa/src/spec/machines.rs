@@ -197,14 +197,11 @@ T1 = Machine {
     slots: &[Slot {
         name: "one",
         bank: bank("r", 0, 512),
-        // A sine at most every nine cycles: then what is in flight needs as many places as the other units' latency.
+        // A sine at most every six cycles: then what is in flight needs as many places as the other units' latency.
         units: &[
-            ADD,
-            CONVERT,
-            MULTIPLY,
-            DIVIDE,
-            ROOT,
-            Unit { interval: 9, ..SINE },
+            ADDMUL,
+            RECURRENCE,
+            Unit { interval: 6, ..SINE },
             ALU_LATE,
             MEMORY,
             SEQUENCER,

@@ -51,15 +51,15 @@ units! {
     // constant name functions latency/interval cuts text
     SEQUENCER sequencer [Control]     0/1  [] "Branches, calls, the period's end; writes no register.";
     ALU       alu       [Alu]         2/1  ["result"] "Integer, logic, comparison, selection, minimum, maximum, saturation.";
-    ALU_LATE  alu_late  [Alu]         5/1  ["result" "result" "result" "result"] "The ALU with its result as late as the adder's, so that one write port serves both without conflict.";
+    ALU_LATE  alu_late  [Alu]         8/1  ["result" "result" "result" "result" "result" "result" "result"] "The ALU with its result as late as addmul's, so that one write port serves both without conflict.";
     MEMORY    memory    [Memory]      4/1  ["address" "memory output" "output register"] "The data memory's one port.";
     ADD       add       [Add]         5/1  ["swapped operands" "aligned operands" "sum, leading zeros" "normalised, rounded"] "binary32 adder.";
     CONVERT   convert   [Convert]     5/1  ["operand" "magnitude, leading zeros" "shifted" "rounded"] "Integer to binary32 and back.";
     MULTIPLY  multiply  [Multiply]    5/1  ["partial products" "product, shift count" "normalised" "rounded"] "binary32 multiplier: three 18x18 products, and 6x6 bits in logic.";
+    ADDMUL    addmul    [Add Multiply Convert] 8/1 ["swapped operands, partial products" "product, distance" "shifted right" "sum" "shifted left by bytes" "normalised" "rounded"] "binary32 sum, product and conversion in one pipeline: they share alignment, normalisation and rounding; small.";
     FUSED     fused     [Fused Multiply Add] 6/1 ["partial products" "product, aligned addend" "sum" "leading zeros, shifted by nibbles" "normalised, rounded"] "binary32 product and sum with one rounding; a product, or a sum, alone has the bits of the units that compute only that. A machine's row says which functions it executes there.";
     DIVROOT   divroot   [Divide Root] 11/1 ["classified" "normalised" "table's words" "reciprocal" "first digit" "first product" "first residual" "second digit" "second product" "rounded"] "Division and square root, very high radix: a reciprocal table, two quotient digits of 14 and 10 bits, rounding by the sign of the last residual.";
-    DIVIDE    divide    [Divide]      18/14 [] "Iterative radix-4 divider.";
-    ROOT      root      [Root]        16/13 [] "Iterative square root, two bits a cycle.";
+    RECURRENCE recurrence [Divide Root] 21/15 [] "Division and square root by one digit recurrence, two bits a cycle; no multiplier.";
     SINE      sine      [Sine]        14/1 ["aligned" "multiple" "table" "multiple of π/2" "remainder" "segment" "coefficients" "slope's product" "polynomial" "product" "sums" "difference" "rounded"] "Sine and cosine: the distance from the nearest multiple of π/2, which comes from a table, and a piecewise quadratic; three 18x18 products.";
     ARCTANGENT arctangent [Arctangent] 24/16 [] "Digit-by-digit division whose divisor grows with the digits found; a table of arctangents; no multiplier.";
     ARCCOSINE arccosine [Arccosine]   30/16 [] "Digit-by-digit square root; each digit adds its multiple of a function from a table; no multiplier.";

@@ -305,6 +305,8 @@ impl Simulation {
         for edge in [SIN_LIMIT, SIN_IDENTITY, 0x4116_cbe4, 0x437c_e5f1] {
             values.extend((edge - 2..=edge + 2).flat_map(|magnitude| [magnitude, magnitude | 0x8000_0000]));
         }
+        // By infinity it has the exponent that the smallest normal number would come from.
+        values.push(0x40a0_0000);
         values.sort_unstable();
         values.dedup();
         values

@@ -1,11 +1,14 @@
 // takt_significand_product: the product of two significands of 24 bits.
 //
 // Contract
-//   p = a * b of the cycle before: the partial products are registered, their sum is combinational. No reset.
+//   p = a * b of the cycle before: the partial products are registered, their sum is combinational. No reset. With SMALL
+//   the sum takes two thirds of the logic, and longer.
 //
 // 24 = 6 + 18 bits: three products of 18 x 18 bits, and that of the upper 6 bits in logic, for a multiplier is too good for it.
 
-module takt_significand_product (
+module takt_significand_product #(
+    parameter SMALL = 0
+) (
     input  wire        clk,
     input  wire [23:0] a,
     input  wire [23:0] b,
@@ -35,9 +38,23 @@ module takt_significand_product (
     end
 
     // The sum's low 18 bits are those of low_low.
-    wire [29:0] upper =
-        {2'd0, fractions1, low_low[35:18]} + {ones1, 23'd0} + ({6'd0, high_low[23:0]} + {6'd0, low_high[23:0]});
+    wire [29:0] upper;
     wire        unused_high = |{high_low[35:24], low_high[35:24]};  // zero: 6 x 18 bits
+
+    // Of the four summands at once synthesis makes carry-save adders, in logic, and one carry chain. What is kept is a chain
+    // of its own.
+    generate
+        if (SMALL != 0) begin : g_small
+            (* keep *) wire [24:0] middle;
+            (* keep *) wire [11:0] highest;
+            assign middle  = {1'd0, high_low[23:0]} + {1'd0, low_high[23:0]};
+            assign highest = {2'd0, fractions1} + {ones1, 5'd0};
+            assign upper = {highest, low_low[35:18]} + {5'd0, middle};
+        end else begin : g_fast
+            assign upper =
+                {2'd0, fractions1, low_low[35:18]} + {ones1, 23'd0} + ({6'd0, high_low[23:0]} + {6'd0, low_high[23:0]});
+        end
+    endgenerate
 
     assign p = {upper, low_low[17:0]};
 
