@@ -67,7 +67,8 @@ fn the_tracking_program_waits_for_its_units() {
                 assert_eq!(period.cycles.cast_signed() + more, what.cycles.cast_signed(), "{what:?}");
             }
             let write_port = what.stalls[Cause::KINDS.iter().position(|kind| *kind == "write port").unwrap()];
-            assert!(what.cycles <= period.cycles || write_port > 0, "{what:?}");
+            // (A single one may come out as another kind: what the write port held back is held back by something else.)
+            assert!(what.cycles <= period.cycles + 1 || write_port > 0, "{what:?}");
         }
     }
 }

@@ -22,9 +22,9 @@ fn programs_take_no_longer() {
     let figures = [
         ("hybrid", "tracking.s", &T3, 112),
         ("hybrid", "tracking_literal.s", &T3, 275),
-        ("hybrid", "tracking.s", &T1, 307),
+        ("hybrid", "tracking.s", &T1, 314),
         ("hybrid", "tracking_friction.s", &T3, 257),
-        ("hybrid", "tracking_friction.s", &T1, 654),
+        ("hybrid", "tracking_friction.s", &T1, 658),
         ("arm", "forward.s", &T3, 96),
         ("arm", "inverse.s", &T3, 190),
     ];

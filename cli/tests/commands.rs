@@ -308,7 +308,8 @@ fn where_the_cycles_of_a_period_go() {
     let told = worse.map(|unit| {
         let stalls: i64 = unit["stalls"].as_object().unwrap().values().map(cycles).sum();
         assert_eq!(cycles(&unit["as_it_is"]) - cycles(&json["cycles"]), stalls, "{unit}");
-        assert!(cycles(&unit["stalls"]["write port"]) > 0, "{unit}");
+        // But for a single cycle, that has to do with the write port.
+        assert!(stalls == 1 || cycles(&unit["stalls"]["write port"]) > 0, "{unit}");
     });
     assert!(told.count() > 2);
     // From standard input to standard output.

@@ -10,7 +10,7 @@ use takt_isa::fp::Flags;
 use takt_isa::{MACHINES, Program};
 
 /// Programs of each kind and machine.
-const PROGRAMS: u64 = 60;
+const PROGRAMS: u64 = 120;
 const PERIODS: u32 = 8;
 
 /// What was met in a run.
@@ -90,7 +90,8 @@ fn compare_all(options: Options) -> Met {
     // Otherwise the comparison says nothing.
     let together = met.periods - met.apart;
     assert!(met.apart > met.periods / 50 && together > met.periods / 20, "{} of {}", met.apart, met.periods);
-    assert!(met.joined > 3 && met.nan_writes > 100 && met.flags > 100);
+    let Met { joined, nan_writes, flags, .. } = met;
+    assert!(joined > 3 && nan_writes > 100 && flags > 100, "{joined}, {nan_writes}, {flags}");
     met
 }
 

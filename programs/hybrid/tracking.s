@@ -99,6 +99,8 @@ period:
         .rep i, 1, 3
         fmul    w{i}, dv{i}, dv{i}
         fdiv    w{i}, w{i}, ll{i}
+        .endr
+        .rep i, 1, 3
         fsub    da{i}, da{i}, w{i}
         fdiv    a{i}d, da{i}, l{i}d
         .endr
