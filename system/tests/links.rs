@@ -45,10 +45,10 @@ fn a_wire_is_read_from_its_latency_on() {
         system.run_until(start + 150).unwrap();
         seen.push(system.output("o").unwrap());
     }
-    // mov n issues at the tick + 7 (six bundles before it), is written 5 later, and read 10 after that: at 22, by the
-    // bundle that issues one after the tick of offset 21.
+    // mov n issues at the tick + 9 (when c is there), is written 8 later, and read 10 after that: at 27, by the bundle
+    // that issues one after the tick of offset 26.
     let first = seen.iter().position(|&value| value == 1).unwrap();
-    assert_eq!(first, 21);
+    assert_eq!(first, 26);
     assert!(seen[..first].iter().all(|&value| value == 0) && seen[first..].iter().all(|&value| value == 1));
 }
 
@@ -64,8 +64,8 @@ fn a_snapshot_is_taken_before_the_tick() {
         system.run_until(start + 150).unwrap();
         seen.push(system.output("o").unwrap());
     }
-    // The wait issues when n is written, at 12: T >= 12 + 10 + 1 + 1.
-    assert_eq!(seen.iter().position(|&value| value == 1), Some(24));
+    // The wait issues when n is written, at 17: T >= 17 + 10 + 1 + 1.
+    assert_eq!(seen.iter().position(|&value| value == 1), Some(29));
 }
 
 #[test]
