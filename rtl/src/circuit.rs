@@ -92,7 +92,7 @@ pub enum CircuitError {
 }
 
 /// What a circuit can do: a Verilog module refuses other parameters by instantiating a module that does not exist and whose name says
-/// why, such as `takt_divide_has_latency_18_and_interval_14`. This is the part of it that concerns one parameter.
+/// why, such as `takt_recurrence_has_latency_21_and_interval_15`. This is the part of it that concerns one parameter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Limit {
     /// The parameter, in lower case: `latency`.
