@@ -59,7 +59,7 @@ period:
         fadd    xy, xy, zz
         fmul    px2, x, 2*xp
         fmul    py2, y, R
-        fadd    py1, py2, py2           ; here not by a product: slot mul has more to do
+        fadd    py1, py2, py2           ; here not by a product: slot mul is full enough
         fsub    e2, py2, px2
         fadd    e3, py2, px2
         fsub    ll1, xy, py1
