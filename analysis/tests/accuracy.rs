@@ -267,6 +267,102 @@ fn hazards_name_the_operation_and_what_it_reads() {
     }
 }
 
+/// The problems that the analysis lists for a period, with declarations before it.
+fn problems(declarations: &str, period: &str) -> (Vec<Problem>, Enclosure) {
+    let text = format!("{declarations}{HEAD}{period} wait p\n");
+    let enclosure = enclose(&source(&text, &T3)).unwrap();
+    (enclosure.hazards.iter().map(|hazard| hazard.problem).collect(), enclosure)
+}
+
+const ONE_INPUT: &str = ".input x\n.output y\n.reg t:int u:int f g\n";
+
+#[test]
+fn integers_wrap_as_in_the_machine() {
+    // 0x3f800000 - 0x80000000 wraps to a negative number, whose float cancels the constant at x = 1.
+    let (found, _) = problems(
+        &format!("{ONE_INPUT}.range x = 1, 1.5\n"),
+        " isub t, x:bits, 0x80000000\n itof f, t\n fadd f, f, 1082130432.0\n fdiv y, 1.0, f\n",
+    );
+    assert_eq!(found, [Problem::DivisionByZero]);
+    // Taking two from the exponent of zero borrows from the sign: -1.7e38.
+    let quarter = " isub y:float, x:bits, 2<<23\n";
+    let (found, enclosure) = problems(&format!("{ONE_INPUT}.range x = -1, 0\n"), quarter);
+    assert_eq!((found, enclosure.outputs[0].range), (vec![Problem::Output], None));
+    let (found, enclosure) = problems(&format!("{ONE_INPUT}.range x = 1, 2\n"), quarter);
+    let range = enclosure.outputs[0].range.unwrap();
+    assert!(found.is_empty() && (range.low, range.high) == (0.25, 0.5), "{range:?}");
+}
+
+#[test]
+fn an_integer_behind_a_hazard_may_be_any() {
+    let (found, enclosure) = problems(
+        ".input x, z\n.output y\n.reg n:int f\n.range x = 30, 40\n.range z = 0, 40\n",
+        " fsub f, x, z\n fsqrt f, f\n ftoi n, f\n itof f, n\n fsub f, f, 5.0\n fdiv y, 1.0, f\n",
+    );
+    assert_eq!(found, [Problem::Domain, Problem::DivisionByZero]);
+    assert_eq!(enclosure.outputs[0].error, None);
+    // A comparison gives 1 or 0 all the same.
+    let (found, enclosure) = problems(
+        ".input x\n.output y\n.reg c:int f\n.range x = -1, 40\n",
+        " fsqrt f, x\n flt c, f, 2.0\n itof y, c\n",
+    );
+    let range = enclosure.outputs[0].range.unwrap();
+    assert_eq!((found, range.low, range.high), (vec![Problem::Domain], 0.0, 1.0));
+}
+
+#[test]
+fn an_input_that_is_not_latched_may_change_between_reads() {
+    let twice = " mov f, x\n fsub y, f, x\n";
+    let ports = format!("{ONE_INPUT}.range x = 1, 2\n");
+    let (_, enclosure) = problems(&format!(".ports latched\n{ports}"), twice);
+    assert!(enclosure.outputs[0].range.unwrap().magnitude() < 1e-12);
+    let (_, enclosure) = problems(&ports, twice);
+    assert_eq!(enclosure.outputs[0].range.unwrap().magnitude(), 1.0);
+    // One bundle reads once.
+    let (_, enclosure) = problems(&ports, " fsub y, x, x\n");
+    assert!(enclosure.outputs[0].range.unwrap().magnitude() < 1e-12);
+}
+
+#[test]
+fn the_first_period_must_begin_in_the_ranges_that_matter() {
+    let first = |once: &str, range: &str| {
+        let text = format!(
+            ".input x\n.range x = 0, 1\n.output y\n.state s\n{range}\n{once}\n wait q\n.period\nq: nop\np: mov y, s\n mov s, 0.5\n wait p\n"
+        );
+        let enclosure = enclose(&source(&text, &T3)).unwrap();
+        let found: Vec<_> =
+            enclosure.first().map(|state| state.found.map(|found| (found.low, found.high))).collect();
+        assert_eq!(enclosure.later().count(), 0);
+        found
+    };
+    let range = ".range s = -1, 1";
+    assert_eq!(first(".once\n mov s, 2.0", range), [Some((2.0, 2.0))]);
+    assert_eq!(first(".preset s = -3\n.once", range), [Some((-3.0, -3.0))]);
+    assert_eq!(first(".once\n mov s, x", range), []);
+    assert_eq!(first(".once\n mov s, x", ".range s = 0.25, 0.75"), [Some((0.0, 1.0))]);
+    // An integer is taken as an integer.
+    let text = ".output y\n.state n:int\n.range n = 0, 5\n.preset n = 0\n.once\n wait p\n.period\np: itof y, n\n mov n, 100\n wait p\n";
+    let enclosure = enclose(&source(text, &T3)).unwrap();
+    let later: Vec<_> = enclosure.later().map(|state| state.found.unwrap().high).collect();
+    assert_eq!((enclosure.first().count(), later), (0, vec![100.0]));
+    // What the first period writes before anything reads it may begin anywhere: the tracking program's last positions.
+    let text = ".input x\n.range x = 0, 1\n.output y\n.state s\n.range s = 0, 1\n.once\n wait q\nq: mov s, x\n.period\np: mov y, s\n mov s, x\n wait p\n";
+    assert!(enclose(&source(text, &T3)).unwrap().assumed.is_empty());
+}
+
+#[test]
+fn conversions_and_outputs_are_hazards_too() {
+    let convert = " ftoi t, x\n itof y, t\n";
+    let (found, enclosure) = problems(&format!("{ONE_INPUT}.range x = 0, 3e9\n"), convert);
+    let range = enclosure.outputs[0].range.unwrap();
+    assert_eq!((found, range.low, range.high), (vec![Problem::Conversion], 0.0, 2_147_483_648.0));
+    assert!(problems(&format!("{ONE_INPUT}.range x = -2147483648, 2147483520\n"), convert).0.is_empty());
+    // A constant is converted as any number.
+    assert_eq!(problems(ONE_INPUT, " ftoi t, 3e9\n itof y, t\n").0, [Problem::Conversion]);
+    assert_eq!(problems(ONE_INPUT, " mov y:bits, 0x7fc00000\n").0, [Problem::Output]);
+    assert_eq!(problems(ONE_INPUT, " li y, 0x7f800000\n").0, [Problem::Output]);
+}
+
 #[test]
 fn what_cannot_be_enclosed_says_what_is_needed() {
     let refused = |text: &str| enclose(&source(text, &T3)).unwrap_err().to_string();
@@ -358,7 +454,8 @@ p:      fadd    y, s, x
 
 /// A macro of the library, in line or called as a subroutine, of an input with this range.
 fn of_library(function: &str, (low, high): (f64, f64), called: bool, machine: &'static Machine) -> Program {
-    let once = ".include <math.s>\n.input x\n.output y\n";
+    // The functions read their operand several times.
+    let once = ".ports latched\n.include <math.s>\n.input x\n.output y\n";
     let text = match called {
         false => format!("{once}.range x = {low}, {high}\n{HEAD} {function} y, x\n wait p\n"),
         true => format!(

@@ -14,8 +14,8 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_analysis::accuracy::{
-    Assumed, Decision, Enclosure, Hazard, Interval, Lost, OperationAccuracy, OutputAccuracy, OutputBound,
-    Part, Shadow, Worst, enclose,
+    Assumed, Decision, Enclosure, Hazard, Interval, Lost, Moment, OperationAccuracy, OutputAccuracy,
+    OutputBound, Part, Shadow, Worst, enclose,
 };
 use takt_emu::Emulator;
 use takt_isa::Program;
@@ -24,8 +24,8 @@ use takt_isa::program::Location;
 /// Measure the outputs' errors against binary64, or bound them for every run, and name the lines that they come from.
 ///
 /// With --inputs, runs the program on recorded inputs, and beside it the same operations in binary64. Without, follows every path through a
-/// period for all inputs and states within their `.range`: bounds each output's error, and shows that there is no NaN, no overflow and no
-/// division by zero, or names the operations where there may be (status 1).
+/// period for all inputs and states within their `.range`: bounds each output's error, and shows that there is no NaN, no overflow, no
+/// division by zero and no conversion out of range, or names the operations where there may be (status 1).
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Accuracy {
@@ -77,7 +77,7 @@ pub(crate) fn run(arguments: &Accuracy, color: bool, out: &mut Out) -> Result<()
         } else {
             bounded.text(out)?;
         }
-        let safe = enclosure.hazards.is_empty();
+        let safe = enclosure.hazards.is_empty() && enclosure.first().next().is_none();
         return if safe { Ok(()) } else { Err(Failure::Reported.into()) };
     };
     let shadow = measure(arguments, inputs, program).map_err(|error| fault::told(error, &loaded, color))?;
@@ -388,10 +388,14 @@ impl Bounded<'_> {
                 "operands": operands.collect::<Vec<_>>(),
             })
         };
-        let assumed = |Assumed { range, found }: &Assumed| {
+        let assumed = |Assumed { range, moment, found }: &Assumed| {
             json!({
                 "name": program.register_text(range.register),
                 "range": range.ends(),
+                "when": match moment {
+                    Moment::First => "first period begins",
+                    Moment::Later => "period ends",
+                },
                 "found": ends(*found),
             })
         };
@@ -433,9 +437,12 @@ impl Bounded<'_> {
         }
         writeln!(out, "  ulp: of the largest value in the range")?;
         if enclosure.hazards.is_empty() {
-            writeln!(out, "\nno NaN, no overflow, no division by zero is possible")?;
+            writeln!(
+                out,
+                "\nno NaN, no overflow, no division by zero, no conversion out of range is possible"
+            )?;
         } else {
-            writeln!(out, "\nnot excluded")?;
+            writeln!(out, "\nnot excluded (operations that depend on these are not examined)")?;
         }
         for hazard in &enclosure.hazards {
             let operands = self.operands(hazard).into_iter();
@@ -444,14 +451,22 @@ impl Bounded<'_> {
             let what = hazard.problem;
             writeln!(out, "  {}: {what}: {}", program.word_text(hazard.word as usize), operands.join(", "))?;
         }
-        if !enclosure.assumed.is_empty() {
-            writeln!(out, "\nranges that a period is not shown to keep; they are taken as promised")?;
-        }
-        for Assumed { range, found } in &enclosure.assumed {
+        let states = |Assumed { range, found, .. }: &Assumed, found_text: &str, out: &mut Out| {
             let (low, high) = range.ends();
             let name = program.register_text(range.register);
-            writeln!(out, "  {name}: [{low:.6e}, {high:.6e}], may be left in {}", interval(*found))?;
+            writeln!(out, "  {name}: [{low:.6e}, {high:.6e}], {found_text} {}", interval(*found))
+        };
+        if enclosure.first().next().is_some() {
+            writeln!(
+                out,
+                "\nstates not shown to begin the first period in their range; then nothing above holds"
+            )?;
         }
+        enclosure.first().try_for_each(|state| states(state, "begins in", out))?;
+        if enclosure.later().next().is_some() {
+            writeln!(out, "\nranges that a period is not shown to keep; they are taken as promised")?;
+        }
+        enclosure.later().try_for_each(|state| states(state, "may be left in", out))?;
         Ok(())
     }
 }

@@ -8,7 +8,7 @@ use numpy::{PyReadonlyArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::num::NonZeroU64;
-use takt_analysis::accuracy::{Interval, OutputAccuracy, Part, Shadow, Worst};
+use takt_analysis::accuracy::{Interval, Moment, OutputAccuracy, Part, Shadow, Worst};
 use takt_emu::{Emulator, Fault};
 
 /// An error, the period from 0, what the output was, and what it is in binary64.
@@ -64,8 +64,8 @@ pub(crate) struct OutputBound {
 /// What may go wrong at a place, and the names and ranges of what the operation reads.
 type Hazard = (String, String, Vec<(String, Option<Ends>)>);
 
-/// A state's name, its range, and what a period may leave in it.
-type Assumed = (String, Ends, Option<Ends>);
+/// A state's name, its range, whether the first period begins or any later one ends, and where the state may be then.
+type Assumed = (String, Ends, bool, Option<Ends>);
 
 /// Encloses what every period computes.
 #[pyfunction]
@@ -94,7 +94,8 @@ pub(crate) fn enclose(
         (program.word_text(hazard.word as usize), hazard.problem.to_string(), operands.collect())
     };
     let assumed = |state: &takt_analysis::accuracy::Assumed| {
-        (program.register_text(state.range.register), state.range.ends(), state.found.map(ends))
+        let first = state.moment == Moment::First;
+        (program.register_text(state.range.register), state.range.ends(), first, state.found.map(ends))
     };
     Ok((
         found.outputs.iter().map(output).collect(),

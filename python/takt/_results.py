@@ -76,11 +76,13 @@ class Hazard:
 
 @dataclass(frozen=True)
 class Assumed:
-    """A state whose range the source promises, and that a period is not shown to stay in."""
+    """A state that is not shown to be in the range that the source promises: when the first period begins, or when one ends."""
 
     name: str
     range: tuple[float, float]
-    #: What a period may leave in it.
+    #: Whether this is about the beginning of the first period; else about the end of every period.
+    first: bool
+    #: Where it may be then; None if that is not known as a number.
     found: tuple[float, float] | None
 
 
@@ -108,8 +110,8 @@ class Enclosure:
 
     @property
     def safe(self) -> bool:
-        """Whether no NaN, no overflow and no division by zero is possible."""
-        return not self.hazards
+        """Whether no NaN, no overflow, no division by zero and no conversion out of range is possible, as long as states keep their ranges."""
+        return not self.hazards and not any(state.first for state in self.assumed)
 
 
 @dataclass(frozen=True)

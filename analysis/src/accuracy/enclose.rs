@@ -6,14 +6,14 @@
 use super::affine::Affine;
 use super::bits;
 use super::interval::Interval;
-use super::probe::Probe;
-use super::value::{INTEGERS, MAX_PATTERNS, Number, Operand, Problem, Value};
-use super::{ROUNDERS, ulp};
+use super::value::{MAX_PATTERNS, Number, Operand, Problem, Value};
+use super::{LARGEST_ROUNDED, ROUNDERS, fixed, is_rounder, ulp};
 use crate::error::{BoundError, Refusal, place};
 use crate::graph::{Edge, Graph};
+use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
-use takt_isa::fp::Host;
+use takt_isa::fp::{Flags, Host};
 use takt_isa::program::{Port, Range};
 use takt_isa::{
     BundleAddress, Effect, Flow, Instruction, Program, Register, Row, SlotIndex, Type, compute, real,
@@ -57,12 +57,23 @@ pub struct Hazard {
     pub operands: Vec<(Register, Option<Interval>)>,
 }
 
-/// A state that was not shown to stay in its range.
+/// The moment at which a state must lie in its range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moment {
+    /// The first period begins: the base of the induction over periods.
+    First,
+    /// A period ends that began with all states in their ranges: its step.
+    Later,
+}
+
+/// A state that was not shown to be in its range.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Assumed {
     /// The state.
     pub range: Range,
-    /// What the period may leave in it.
+    /// The moment.
+    pub moment: Moment,
+    /// Where it may be then; `None` if that is not known as a number.
     pub found: Option<Interval>,
 }
 
@@ -71,12 +82,25 @@ pub struct Assumed {
 pub struct Enclosure {
     /// The outputs that carry binary32 and that a period writes.
     pub outputs: Vec<OutputBound>,
-    /// Operations that may have no number as their result. If there are none: no NaN, no overflow, no division by zero.
+    /// Operations that may have no number as their result, or convert a number that fits no integer; of those that depend on such an
+    /// operation, the first. If there are none: no NaN, no overflow, no division by zero, no conversion out of range.
     pub hazards: Vec<Hazard>,
-    /// States whose range the source promises and nothing proves.
+    /// States whose range is promised by the source and not proved, at one of the two moments of an induction over periods.
     pub assumed: Vec<Assumed>,
     /// Operations gone through.
     pub operations: u64,
+}
+
+impl Enclosure {
+    /// States not shown to begin the first period in their range: where there is one, the rest need not hold.
+    pub fn first(&self) -> impl Iterator<Item = &Assumed> {
+        self.assumed.iter().filter(|state| state.moment == Moment::First)
+    }
+
+    /// States not shown to end a period in their range.
+    pub fn later(&self) -> impl Iterator<Item = &Assumed> {
+        self.assumed.iter().filter(|state| state.moment == Moment::Later)
+    }
 }
 
 /// Encloses what every period of a program computes; of a program without periods, the run to its `halt`.
@@ -91,6 +115,10 @@ pub fn enclose(program: &Program) -> Result<Enclosure, BoundError> {
         symbols: Vec::new(),
         hazards: BTreeMap::new(),
         outputs: BTreeMap::new(),
+        initial: BTreeMap::new(),
+        first: BTreeSet::new(),
+        needed: BTreeSet::new(),
+        fixed: fixed(program),
         left: BTreeMap::new(),
         bundles: 0,
         operations: 0,
@@ -104,13 +132,13 @@ pub fn enclose(program: &Program) -> Result<Enclosure, BoundError> {
         if !seen.insert((once, address)) {
             continue;
         }
-        for target in explorer.section(once, address)? {
-            sections.push((false, target));
-        }
+        let targets = explorer.section(once, address)?;
+        sections.extend(targets.iter().map(|target| (false, *target)));
         if once {
             // Outputs are compared at the ends of periods.
             once_outputs = std::mem::take(&mut explorer.outputs);
-            explorer.left.clear();
+            explorer.initial = std::mem::take(&mut explorer.left);
+            explorer.first.extend(targets);
         }
     }
     if seen.len() == 1 {
@@ -123,6 +151,8 @@ pub fn enclose(program: &Program) -> Result<Enclosure, BoundError> {
 #[derive(Clone)]
 struct State {
     registers: BTreeMap<Register, Value>,
+    /// States that were not shown to begin the first period in their range, and that nothing has been written to since.
+    unshown: BTreeSet<Register>,
     /// Words that this period has written.
     memory: BTreeMap<u32, Value>,
     /// Return addresses, and the turns of the loops that are being turned.
@@ -143,7 +173,13 @@ struct Explorer<'p> {
     symbols: Vec<Option<u32>>,
     hazards: BTreeMap<(u32, Problem), Operands>,
     outputs: BTreeMap<Register, Value>,
-    /// What states hold at the end of a period.
+    /// The states' values when the first period begins, the bundles where that does, and the states whose value then matters.
+    initial: BTreeMap<Register, Value>,
+    first: BTreeSet<BundleAddress>,
+    needed: BTreeSet<Register>,
+    /// Constants for good: [`fixed`].
+    fixed: BTreeMap<Register, u32>,
+    /// The states' values at the end of a period.
     left: BTreeMap<Register, Value>,
     bundles: u64,
     operations: u64,
@@ -176,28 +212,26 @@ impl Explorer<'_> {
     }
 
     /// What is known when a section begins.
-    fn begin(&mut self, once: bool) -> State {
+    fn begin(&mut self, once: bool, address: BundleAddress) -> State {
+        let program = self.program;
+        // Later, a register that the program writes may hold something else than its preset.
+        let constants = if once { program.constants.iter().copied().collect() } else { self.fixed.clone() };
         let mut registers: BTreeMap<Register, Value> =
-            self.program.constants.iter().map(|(register, bits)| (*register, Value::bits(*bits))).collect();
-        if !once {
-            // What the program writes may be another by now.
-            for word in self.program.code.chunks_exact(self.program.machine.slots.len()) {
-                for (word, slot) in word.iter().zip(self.program.machine.slots) {
-                    if let Some(register) = Instruction::decode(*word).ok().and_then(|i| i.writes(slot)) {
-                        registers.remove(&register);
-                    }
-                }
-            }
-        }
+            constants.into_iter().map(|(register, bits)| (register, Value::bits(bits))).collect();
         registers.insert(Register::ZERO, Value::bits(0));
-        for range in &self.program.ranges {
-            if once && !self.program.machine.is_input(range.register) {
+        let mut unshown = BTreeSet::new();
+        for range in &program.ranges {
+            let input = program.machine.is_input(range.register);
+            if once && !input {
                 continue;
             }
             let value = self.ranged(range);
             registers.insert(range.register, value);
+            if !input && self.first.contains(&address) && !shown(range, self.initial.get(&range.register)) {
+                unshown.insert(range.register);
+            }
         }
-        State { registers, memory: BTreeMap::new(), calls: Vec::new(), turns: BTreeMap::new() }
+        State { registers, unshown, memory: BTreeMap::new(), calls: Vec::new(), turns: BTreeMap::new() }
     }
 
     fn ranged(&mut self, range: &Range) -> Value {
@@ -211,10 +245,23 @@ impl Explorer<'_> {
         }
     }
 
+    /// Gives the input ports that a bundle reads new values: unless they are latched, the host may have set them since the last read.
+    fn sample(&mut self, address: BundleAddress, state: &mut State) {
+        let program = self.program;
+        let Some(Ok(instructions)) = program.bundle(address).filter(|_| !program.latched) else { return };
+        let reads: BTreeSet<Register> = instructions.iter().flat_map(Instruction::reads).copied().collect();
+        for range in program.ranges.iter().filter(|range| reads.contains(&range.register)) {
+            if program.machine.is_input(range.register) {
+                let value = self.ranged(range);
+                state.registers.insert(range.register, value);
+            }
+        }
+    }
+
     /// Follows every way from a section's beginning; where its `wait`s go on.
     fn section(&mut self, once: bool, address: BundleAddress) -> Result<Vec<BundleAddress>, BoundError> {
         let mut ways: BTreeMap<Position, (BundleAddress, State)> = BTreeMap::new();
-        let begin = self.begin(once);
+        let begin = self.begin(once, address);
         self.join(&mut ways, address, begin)?;
         let mut targets = Vec::new();
         while let Some((_, (address, mut state))) = ways.pop_first() {
@@ -223,6 +270,7 @@ impl Explorer<'_> {
                 let limit = Refusal::Limit { limit: MAX_BUNDLES, what: "bundles on the way here" };
                 return Err(self.error(address, limit));
             }
+            self.sample(address, &mut state);
             let flow = self.graph.node(address)?.flow;
             let before = match flow {
                 Flow::Branch { register, .. } => Some(self.read(&state, register, address)?),
@@ -320,6 +368,7 @@ impl Explorer<'_> {
                     known.registers.insert(*register, joined);
                 }
                 known.registers.retain(|register, _| state.registers.contains_key(register));
+                known.unshown.extend(&state.unshown);
                 let words: BTreeSet<u32> = known.memory.keys().chain(state.memory.keys()).copied().collect();
                 for word in words {
                     let initial = || self.initial(word);
@@ -356,7 +405,15 @@ impl Explorer<'_> {
     }
 
     /// The value of a register, which must be known.
-    fn read(&self, state: &State, register: Register, address: BundleAddress) -> Result<Value, BoundError> {
+    fn read(
+        &mut self,
+        state: &State,
+        register: Register,
+        address: BundleAddress,
+    ) -> Result<Value, BoundError> {
+        if state.unshown.contains(&register) {
+            self.needed.insert(register);
+        }
         match state.registers.get(&register) {
             Some(Value::Unknown) | None => {
                 let name = self.program.register_text(register);
@@ -382,11 +439,26 @@ impl Explorer<'_> {
         for ((number, slot), instruction) in machine.numbered_slots().zip(&instructions) {
             let value = self.operation(address, number, instruction, state)?;
             if let (Some(register), Some(value)) = (instruction.writes(slot), value) {
+                let floats = |port: &Port| port.register == register && port.ty == Type::F;
+                if self.program.outputs.iter().any(floats)
+                    && value.float().is_err_and(|problem| problem != Problem::Told)
+                {
+                    self.hazards
+                        .entry((self.word(address, number), Problem::Output))
+                        .or_insert_with(|| vec![(register, None)]);
+                }
                 written.push((register, value));
             }
         }
-        state.registers.extend(written);
+        for (register, value) in written {
+            state.unshown.remove(&register);
+            state.registers.insert(register, value);
+        }
         Ok(())
+    }
+
+    fn word(&self, address: BundleAddress, slot: SlotIndex) -> u32 {
+        (address.index() * self.program.machine.slots.len() + slot.index()) as u32
     }
 
     fn operation(
@@ -396,7 +468,7 @@ impl Explorer<'_> {
         instruction: &Instruction,
         state: &mut State,
     ) -> Result<Option<Value>, BoundError> {
-        let word = (address.index() * self.program.machine.slots.len() + slot.index()) as u32;
+        let word = self.word(address, slot);
         let mut operands = [(); 3].map(|()| Value::bits(0));
         for (operand, register) in operands.iter_mut().zip(instruction.reads()) {
             *operand = self.read(state, *register, address)?;
@@ -464,34 +536,39 @@ impl Explorer<'_> {
         let (op, row) = (instruction.op, instruction.op.row());
         let sources = row.shape.sources();
         let integer = row.result_type() == Type::I;
-        if (row.ulp.is_none() || integer)
-            && let Some(value) = patterns(operands, sources, |a, b, c| compute::<Host>(op, a, b, c).bits)
-        {
-            return value;
+        if row.ulp.is_none() || integer {
+            let raises = Cell::new(false);
+            let known = patterns(operands, sources, |a, b, c| {
+                let value = compute::<Host>(op, a, b, c);
+                raises.set(raises.get() || value.flags != Flags::NONE);
+                value.bits
+            });
+            if let Some(value) = known.filter(|_| !raises.get()) {
+                return value;
+            }
         }
-        let operand = |i: usize| Operand(Ok(operands[i].clone()));
-        let Some(Operand(result)) = real(op, operand(0), operand(1), operand(2)) else { return Value::Any };
-        let value = match result {
-            // A sum of integers wraps where it does not fit.
-            Ok(Value::Integer(number)) if !number.actual.within(INTEGERS) => return Value::Any,
-            Ok(value) if row.result_type() != Type::F => return self.own(value),
-            Ok(Value::Whole(value)) => {
-                value.whole().and_then(|number| self.round(word, row, &number, instruction, operands))
+        let operand = |i: usize| Operand::of(operands[i].clone());
+        let Some(result) = real(op, operand(0), operand(1), operand(2)) else { return Value::Any };
+        let Operand { value, mut problem, terms } = result;
+        let value = match value {
+            value if problem.is_some() || row.result_type() != Type::F => value,
+            Value::Whole(_) | Value::Float(_) => {
+                let rounded =
+                    value.float().and_then(|number| self.round(word, instruction, &number, terms, operands));
+                rounded.unwrap_or_else(|overflow| {
+                    problem = Some(overflow);
+                    Value::Broken
+                })
             }
-            Ok(Value::Float(number)) => self.round(word, row, &number, instruction, operands),
-            Ok(value) => Ok(value),
-            Err(problem) => Err(problem),
+            value => value,
         };
-        value.map(|value| self.own(value)).unwrap_or_else(|problem| {
-            if problem != Problem::Told {
-                let value = |value: &Value| value.float().ok().map(|number| number.actual);
-                let reads = instruction.reads().iter().zip(operands);
-                let reads: Vec<_> = reads.map(|(register, operand)| (*register, value(operand))).collect();
-                self.hazards.entry((word, problem)).or_insert(reads);
-            }
-            // Whichever way a decision falls, it is followed.
-            if integer { Value::patterns(BTreeSet::from([0, 1])) } else { Value::Broken }
-        })
+        if let Some(problem) = problem.filter(|problem| *problem != Problem::Told) {
+            let value = |value: &Value| value.float().ok().map(|number| number.actual);
+            let reads = instruction.reads().iter().zip(operands);
+            let reads: Vec<_> = reads.map(|(register, operand)| (*register, value(operand))).collect();
+            self.hazards.entry((word, problem)).or_insert(reads);
+        }
+        self.own(value)
     }
 
     /// A value that depends on no other, as far as is known, is one that others may depend on.
@@ -513,28 +590,44 @@ impl Explorer<'_> {
     fn round(
         &mut self,
         word: u32,
-        row: &Row,
-        number: &Number,
         instruction: &Instruction,
+        number: &Number,
+        terms: Option<[Interval; 2]>,
         operands: &[Value; 3],
     ) -> Result<Value, Problem> {
         let exact = number.exact.meet(number.form.range());
         let actual = number.actual.meet(exact + number.error.range());
+        let number = Number { actual, exact, ..number.clone() };
+        let rounder = |register: &Register| self.fixed.get(register).is_some_and(|bits| is_rounder(*bits));
+        let terms = terms.filter(|_| instruction.reads().iter().any(rounder));
+        let (may_decide, may_round) = terms.map_or((false, true), decides);
+        let decided = may_decide.then(|| bits::nearest(&number, self.symbol(None)));
+        let rounded = match may_round {
+            true => Some(self.rounded(word, instruction.op.row(), number, operands)?),
+            false => None,
+        };
+        let both = match (decided, rounded) {
+            (Some(decided), Some(rounded)) => decided.join(&rounded),
+            (decided, rounded) => decided.or(rounded).ok_or(Problem::Overflow)?,
+        };
+        Ok(Value::Float(Rc::new(both)))
+    }
+
+    /// The same where its rounding counts as an error.
+    fn rounded(
+        &mut self,
+        word: u32,
+        row: &Row,
+        mut number: Number,
+        operands: &[Value; 3],
+    ) -> Result<Number, Problem> {
+        let actual = number.actual;
         let bound = row.ulp.unwrap_or(0.0);
         let magnitude = actual.magnitude();
         let fits = |grid: i32| grid >= -149 && magnitude <= 2f64.powi((24 + grid).min(127));
         let largest = f64::from(f32::MAX);
-        let mut number = Number { actual, exact, ..number.clone() };
         if bound == 0.0 || number.grid.is_some_and(fits) {
-            return if magnitude <= largest {
-                Ok(Value::Float(Rc::new(number)))
-            } else {
-                Err(Problem::Overflow)
-            };
-        }
-        if self.rounds_to_integer(instruction, operands, actual) {
-            let symbol = self.symbol(None);
-            return Ok(Value::Float(Rc::new(bits::nearest(&number, symbol))));
+            return if magnitude <= largest { Ok(number) } else { Err(Problem::Overflow) };
         }
         let local = bound * ulp(magnitude);
         // A NaN does not fit.
@@ -543,17 +636,14 @@ impl Explorer<'_> {
             return Err(Problem::Overflow);
         }
         // All operands known to the bit: so is the result.
-        let known = patterns(operands, instruction.op.row().shape.sources(), |a, b, c| {
-            compute::<Host>(instruction.op, a, b, c).bits
-        });
+        let known = patterns(operands, row.shape.sources(), |a, b, c| compute::<Host>(row.op, a, b, c).bits);
         if let Some(Value::Patterns(known)) = &known
             && let (1, Some(bits)) = (known.len(), known.first())
         {
             let value = Interval::point(f64::from(f32::from_bits(*bits)));
-            let constant = Affine::free(value - number.exact);
-            number.error = if operands.iter().all(is_exact) { constant } else { number.error };
+            number.error = Affine::free(value - number.exact);
             number.actual = value;
-            return Ok(Value::Float(Rc::new(number)));
+            return Ok(number);
         }
         let symbol = self.symbol(Some(word));
         number.error = number.error.with(symbol, local);
@@ -563,27 +653,7 @@ impl Explorer<'_> {
             false => actual.widened(local),
         };
         number.actual = number.actual.meet(number.exact + number.error.range());
-        Ok(Value::Float(Rc::new(number)))
-    }
-
-    /// Whether an operation adds a number beyond which binary32 has no fraction: it is meant as a decision for the nearest integer.
-    fn rounds_to_integer(&self, instruction: &Instruction, operands: &[Value; 3], result: Interval) -> bool {
-        let magnitude = result.abs();
-        if magnitude.low < ROUNDERS[0] || magnitude.high >= 2.0 * ROUNDERS[0] {
-            return false;
-        }
-        let is_constant = |value: f64| {
-            let bits = (value as f32).to_bits();
-            operands.iter().any(|operand| *operand == Value::bits(bits))
-        };
-        let probe = |operand: &Value| {
-            let middle = operand.float().map_or(0.0, |number| number.actual.middle());
-            Probe::new(middle, (middle as f32).to_bits())
-        };
-        let [a, b, c] = operands.each_ref().map(probe);
-        let terms = real(instruction.op, a, b, c).and_then(|result| result.sum);
-        let rounder = |term: f64| ROUNDERS.contains(&term.abs()) && (is_constant(term) || is_constant(-term));
-        terms.is_some_and(|terms| terms.into_iter().any(rounder))
+        Ok(number)
     }
 
     /// A period ends.
@@ -594,6 +664,8 @@ impl Explorer<'_> {
                 join_into(&mut self.outputs, *register, value);
             }
         }
+        // On to the next period, which may read it.
+        self.needed.extend(&state.unshown);
         for range in &self.program.ranges {
             if let Some(value) = state.registers.get(&range.register) {
                 join_into(&mut self.left, range.register, value);
@@ -621,15 +693,22 @@ impl Explorer<'_> {
                 parts,
             })
         };
+        let states =
+            self.program.ranges.iter().filter(|range| !self.program.machine.is_input(range.register));
         let assumed = |range: &Range| {
-            let value = self.left.get(&range.register)?;
-            let found = match value {
-                Value::Integer(number) => Some(number.actual),
-                value => value.float().ok().map(|number| number.actual),
-            };
-            let (low, high) = range.ends();
-            let shown = found.is_some_and(|found| found.within(Interval::new(low, high)));
-            (!shown).then_some(Assumed { range: *range, found })
+            let initial = self.initial.get(&range.register);
+            let first = self.needed.contains(&range.register).then(|| Assumed {
+                range: *range,
+                moment: Moment::First,
+                found: initial.and_then(|value| held(range, value)),
+            });
+            let left = self.left.get(&range.register);
+            let later = left.filter(|value| !shown(range, Some(value))).map(|value| Assumed {
+                range: *range,
+                moment: Moment::Later,
+                found: held(range, value),
+            });
+            first.into_iter().chain(later)
         };
         let outputs = self.program.outputs.iter().filter(|port| port.ty == Type::F).filter_map(output);
         let hazard = |((word, problem), operands): (&(u32, Problem), &Vec<_>)| Hazard {
@@ -640,10 +719,25 @@ impl Explorer<'_> {
         Enclosure {
             outputs: outputs.collect(),
             hazards: self.hazards.iter().map(hazard).collect(),
-            assumed: self.program.ranges.iter().filter_map(assumed).collect(),
+            assumed: states.flat_map(assumed).collect(),
             operations: self.operations,
         }
     }
+}
+
+/// A state's value as its range takes it: as binary32 or as an integer.
+fn held(range: &Range, value: &Value) -> Option<Interval> {
+    match range.ty {
+        Type::F => value.float().ok().map(|number| number.actual),
+        Type::I | Type::B => Some(value.whole().actual),
+    }
+}
+
+/// Whether a state is known to be in its range.
+fn shown(range: &Range, value: Option<&Value>) -> bool {
+    let (low, high) = range.ends();
+    let found = value.and_then(|value| held(range, value));
+    found.is_some_and(|found| found.within(Interval::new(low, high)))
 }
 
 fn join_into(values: &mut BTreeMap<Register, Value>, register: Register, value: &Value) {
@@ -651,9 +745,21 @@ fn join_into(values: &mut BTreeMap<Register, Value>, register: Register, value: 
     values.insert(register, joined);
 }
 
-/// Whether an operand is what it would be exactly.
-fn is_exact(value: &Value) -> bool {
-    matches!(value, Value::Patterns(_))
+/// Whether a sum of these terms may be, and may not be, a decision for the nearest integer: one term is a number beyond which binary32
+/// has no fraction, and the other is small. [`Shadow`](super::Shadow) takes the same decisions by the terms of the run.
+fn decides(terms: [Interval; 2]) -> (bool, bool) {
+    let [a, b] = terms;
+    let (mut may, mut must) = (false, false);
+    for (rounder, small) in [(a, b), (b, a)] {
+        let magnitude = small.abs();
+        for value in ROUNDERS.into_iter().flat_map(|value| [value, -value]) {
+            if rounder.contains(value) && magnitude.low <= LARGEST_ROUNDED {
+                may = true;
+                must |= rounder.low == rounder.high && magnitude.high <= LARGEST_ROUNDED;
+            }
+        }
+    }
+    (may, !must)
 }
 
 /// What an operation makes of every combination of its operands' patterns, if these are known and not too many.

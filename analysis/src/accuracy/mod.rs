@@ -11,13 +11,35 @@ mod probe;
 mod shadow;
 mod value;
 
-pub use enclose::{Assumed, Enclosure, Hazard, MAX_BUNDLES, OutputBound, enclose};
+use std::collections::BTreeMap;
+use takt_isa::{Instruction, Program, Register};
+
+pub use enclose::{Assumed, Enclosure, Hazard, MAX_BUNDLES, Moment, OutputBound, enclose};
 pub use interval::Interval;
 pub use shadow::{Decision, Lost, OperationAccuracy, OutputAccuracy, Part, Shadow, Worst};
 pub use value::Problem;
 
-/// Numbers that are added to round to integers: binary32 has no fraction there, and what is added is smaller.
+/// Numbers that are added to round to integers: binary32 has no fraction there.
 const ROUNDERS: [f64; 2] = [8_388_608.0, 12_582_912.0];
+/// The largest magnitude that is rounded so.
+const LARGEST_ROUNDED: f64 = 4_194_304.0;
+
+fn is_rounder(bits: u32) -> bool {
+    ROUNDERS.contains(&f64::from(f32::from_bits(bits)).abs())
+}
+
+/// The registers that the loader sets and no operation writes, with their bits: constants for good.
+fn fixed(program: &Program) -> BTreeMap<Register, u32> {
+    let mut fixed: BTreeMap<Register, u32> = program.constants.iter().copied().collect();
+    for bundle in program.code.chunks_exact(program.machine.slots.len()) {
+        for (word, slot) in bundle.iter().zip(program.machine.slots) {
+            if let Some(register) = Instruction::decode(*word).ok().and_then(|i| i.writes(slot)) {
+                fixed.remove(&register);
+            }
+        }
+    }
+    fixed
+}
 /// Exponent of the smallest normal binary32.
 const LEAST_EXPONENT: i32 = -126;
 /// Digits of a binary32 after the first.

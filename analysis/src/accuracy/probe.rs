@@ -1,5 +1,6 @@
 //! The rows' meaning in binary64, with an eye on sums.
 
+use super::FRACTION;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 use takt_isa::fp::{Bitwise, Real};
 
@@ -11,11 +12,31 @@ pub(super) struct Probe {
     pub(super) bits: u32,
     /// The terms of the last addition on the way here.
     pub(super) sum: Option<[f64; 2]>,
+    /// Of an operand that is taken as an integer: its exact value as a float.
+    whole: Option<f64>,
+    /// Of an operation on the bits of one float with an error that scales it by a power of two or changes its sign only: that
+    /// operation's exact result.
+    pub(super) carried: Option<f64>,
 }
 
 impl Probe {
     pub(super) fn new(value: f64, bits: u32) -> Probe {
-        Probe { value, bits, sum: None }
+        Probe { value, bits, sum: None, whole: None, carried: None }
+    }
+
+    /// Whether its exact value as a float is not the run's.
+    fn carries(self) -> bool {
+        let exact = self.whole.unwrap_or(self.value);
+        !exact.is_nan() && exact != f64::from(f32::from_bits(self.bits))
+    }
+
+    /// The float scaled by the power of two that adding (or subtracting) an integer to its bits amounts to; `None` if the integer has
+    /// digits of the fraction.
+    fn scaled(self, by: Probe, sign: i32) -> Option<f64> {
+        let (exact, _) = self.whole.zip(by.whole)?;
+        let exponent = by.bits.cast_signed() >> FRACTION;
+        let scales = self.carries() && !by.carries() && exponent << FRACTION == by.bits.cast_signed();
+        scales.then(|| exact * 2f64.powi(sign * exponent))
     }
 
     fn map(self, value: f64) -> Probe {
@@ -36,7 +57,8 @@ impl Add for Probe {
 
     fn add(self, other: Probe) -> Probe {
         let (a, b) = (self.value, other.value);
-        Probe { sum: Some([a, b]), ..Probe::of(a + b) }
+        let carried = self.scaled(other, 1).or_else(|| other.scaled(self, 1));
+        Probe { sum: Some([a, b]), carried, ..Probe::of(a + b) }
     }
 }
 
@@ -44,7 +66,8 @@ impl Sub for Probe {
     type Output = Probe;
 
     fn sub(self, other: Probe) -> Probe {
-        self + -other
+        let (a, b) = (self.value, -other.value);
+        Probe { sum: Some([a, b]), carried: self.scaled(other, -1), ..Probe::of(a + b) }
     }
 }
 
@@ -117,7 +140,8 @@ impl Real for Probe {
     }
 
     fn integer(self) -> Probe {
-        Probe::of(f64::from(self.bits.cast_signed()))
+        let whole = Some(self.value);
+        Probe { whole, ..Probe::new(f64::from(self.bits.cast_signed()), self.bits) }
     }
 
     fn nearest(self) -> Probe {
@@ -141,9 +165,16 @@ impl Real for Probe {
         if self.bits != 0 { yes } else { no }
     }
 
-    /// Nothing: whoever asks sees from the row that it has no meaning.
-    fn bitwise(self, _: Bitwise, _: Probe) -> Probe {
-        Probe::of(f64::NAN)
+    /// No number, as the row says; but masks of the sign carry an error on.
+    fn bitwise(self, op: Bitwise, other: Probe) -> Probe {
+        let masked = |float: Probe, mask: Probe| match (op, mask.bits) {
+            _ if !float.carries() || mask.carries() => None,
+            (Bitwise::And, 0x7fff_ffff) => Some(float.value.abs()),
+            (Bitwise::Or, 0x8000_0000) => Some(-float.value.abs()),
+            (Bitwise::Xor, 0x8000_0000) => Some(-float.value),
+            _ => None,
+        };
+        Probe { carried: masked(self, other).or_else(|| masked(other, self)), ..Probe::of(f64::NAN) }
     }
 }
 

@@ -1,14 +1,14 @@
 //! Binary64 beside the bit-exact run.
 
 use super::probe::Probe;
-use super::{ROUNDERS, ulp};
+use super::{LARGEST_ROUNDED, ROUNDERS, fixed, is_rounder, ulp};
 use std::cmp::Ordering;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 use takt_emu::{Emulator, Fault, Status, Step};
 use takt_isa::fp::Host;
 use takt_isa::timing::Cycle;
-use takt_isa::{BundleAddress, Effect, Instruction, Op, Program, Register, Type, compute, real};
+use takt_isa::{BundleAddress, Effect, Instruction, Program, Register, Type, compute, real};
 
 /// An operation's share of an error: the word of the program and what it adds, with its sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,6 +104,8 @@ struct Cell {
 #[derive(Clone)]
 pub struct Shadow {
     program: Rc<Program>,
+    /// Constants for good that are added to round to integers.
+    rounders: Rc<BTreeSet<Register>>,
     registers: BTreeMap<Register, Cell>,
     memory: BTreeMap<u32, Cell>,
     operations: BTreeMap<u32, OperationAccuracy>,
@@ -157,6 +159,12 @@ impl Shadow {
         };
         Shadow {
             outputs: ports.map(output).collect(),
+            rounders: fixed(program)
+                .into_iter()
+                .filter(|(_, bits)| is_rounder(*bits))
+                .map(|(at, _)| at)
+                .collect::<BTreeSet<_>>()
+                .into(),
             program: Rc::new(program.clone()),
             registers: BTreeMap::new(),
             memory: BTreeMap::new(),
@@ -243,7 +251,7 @@ impl Shadow {
         }
         let address = instruction.constant.wrapping_add(operands[0].bits);
         match instruction.effect() {
-            Effect::Compute => Some(self.compute(instruction.op, &operands, word)),
+            Effect::Compute => Some(self.compute(instruction, &operands, word)),
             Effect::Load => {
                 let bits = emulator.memory().get(address as usize).copied().unwrap_or(0);
                 Some(Operand::of(self.memory.get(&address), bits).outcome())
@@ -259,8 +267,8 @@ impl Shadow {
         }
     }
 
-    fn compute(&mut self, op: Op, operands: &[Operand; 3], word: u32) -> Outcome {
-        let [a, b, c] = operands;
+    fn compute(&mut self, instruction: &Instruction, operands: &[Operand; 3], word: u32) -> Outcome {
+        let (op, [a, b, c]) = (instruction.op, operands);
         let bits = compute::<Host>(op, a.bits, b.bits, c.bits).bits;
         let period = self.period;
         let evaluate = |shadowed: usize| {
@@ -272,12 +280,19 @@ impl Shadow {
         };
         let carries = operands.iter().any(|operand| !operand.parts.is_empty());
         let row = op.row();
+        if carries && let Some(exact) = evaluate(3).and_then(|probe| probe.carried) {
+            return self.carried(operands, bits, exact, word);
+        }
         let (Some(plain), Some(bound)) = (evaluate(0), row.ulp) else {
             if carries {
                 lose(&mut self.lost, word, period, false);
             }
             return Outcome::exact(bits);
         };
+        let wholes = (0..row.shape.sources()).filter(|&i| row.source_type(i) == Type::I);
+        if wholes.into_iter().any(|i| operands[i].error() != 0.0) {
+            lose(&mut self.lost, word, period, false);
+        }
         if row.result_type() == Type::I {
             if evaluate(3).is_some_and(|shadow| shadow.value != f64::from(bits.cast_signed())) {
                 decide(&mut self.decisions, word, period);
@@ -289,7 +304,8 @@ impl Shadow {
         let operation = self.operations.entry(word).or_default();
         operation.count += 1;
         if let Some(terms) = plain.sum {
-            if let Some(nearest) = rounds_to_integer(terms) {
+            let rounder = instruction.reads().iter().any(|register| self.rounders.contains(register));
+            if let Some(nearest) = rounds_to_integer(terms).filter(|_| rounder) {
                 // Meant as a decision: the nearest integer.
                 let shadow = evaluate(3).and_then(|shadow| rounds_to_integer(shadow.sum?));
                 if carries && shadow != Some(nearest) {
@@ -322,6 +338,20 @@ impl Shadow {
         if local != 0.0 {
             parts = merge(&parts, &[Part { word, error: local }], 1.0);
         }
+        Outcome { bits, shadow: Some((exact, parts)) }
+    }
+
+    /// The result of an operation on the bits of the one operand that has an error, which keeps it.
+    fn carried(&mut self, operands: &[Operand; 3], bits: u32, exact: f64, word: u32) -> Outcome {
+        let value = f64::from(f32::from_bits(bits));
+        let Some(operand) = operands.iter().find(|operand| operand.error() != 0.0) else {
+            return Outcome::exact(bits);
+        };
+        if !value.is_finite() || !exact.is_finite() {
+            lose(&mut self.lost, word, self.period, true);
+            return Outcome::exact(bits);
+        }
+        let parts = merge(&[], &operand.parts, (value - exact) / operand.error());
         Outcome { bits, shadow: Some((exact, parts)) }
     }
 
@@ -419,7 +449,8 @@ impl OperationAccuracy {
 fn rounds_to_integer(terms: [f64; 2]) -> Option<f64> {
     let [a, b] = terms;
     let of = |rounder: f64, value: f64| {
-        (ROUNDERS.contains(&rounder.abs()) && value.abs() <= 4_194_304.0).then(|| value.round_ties_even())
+        let rounds = ROUNDERS.contains(&rounder.abs()) && value.abs() <= LARGEST_ROUNDED;
+        rounds.then(|| value.round_ties_even())
     };
     of(a, b).or_else(|| of(b, a))
 }

@@ -43,7 +43,7 @@ pub(super) enum Value {
     Whole(Rc<Value>),
     /// Any 32 bits.
     Any,
-    /// What follows from a problem that has been told.
+    /// Any 32 bits, which depend on a hazard that is listed. As an operand of binary32 it is not listed again.
     Broken,
     /// Nothing that this period has written, and no range says what.
     Unknown,
@@ -76,7 +76,7 @@ impl Number {
         Number { actual: range, exact: range, form: Affine::of(range, symbol), error, grid }
     }
 
-    fn join(&self, other: &Number) -> Number {
+    pub(super) fn join(&self, other: &Number) -> Number {
         Number {
             actual: self.actual.hull(other.actual),
             exact: self.exact.hull(other.exact),
@@ -138,10 +138,7 @@ impl Value {
                 (Ok(a), Ok(b)) => Value::Float(Rc::new(a.join(&b))),
                 _ => Value::Any,
             },
-            _ => match (self.whole(), other.whole()) {
-                (Ok(a), Ok(b)) => Value::Integer(Rc::new(a.join(&b))),
-                _ => Value::Any,
-            },
+            _ => Value::Integer(Rc::new(self.whole().join(&other.whole()))),
         }
     }
 
@@ -156,25 +153,33 @@ impl Value {
             }
             Value::Integer(number) => Ok(Rc::new(bits::to_float(number)?)),
             Value::Offset(offset) => Ok(Rc::new(bits::to_float(&offset.number)?)),
-            Value::Whole(value) => value.whole(),
+            Value::Whole(value) => Ok(value.whole()),
             Value::Any => Err(Problem::Bits),
             Value::Broken | Value::Unknown => Err(Problem::Told),
         }
     }
 
-    /// As a signed integer.
-    pub(super) fn whole(&self) -> Result<Rc<Number>, Problem> {
+    /// As a signed integer: every 32 bits are one.
+    pub(super) fn whole(&self) -> Rc<Number> {
         match self {
-            Value::Integer(number) => Ok(Rc::clone(number)),
-            Value::Offset(offset) => Ok(Rc::new(offset.number.clone())),
-            Value::Float(number) => Ok(Rc::new(bits::of_float(number))),
+            Value::Integer(number) => Rc::clone(number),
+            Value::Offset(offset) => Rc::new(offset.number.clone()),
+            Value::Float(number) => Rc::new(bits::of_float(number)),
             Value::Whole(value) => value.whole(),
             Value::Patterns(patterns) => {
                 let mut values = patterns.iter().map(|bits| f64::from(bits.cast_signed()));
-                Ok(Rc::new(hull(&mut values).ok_or(Problem::NotFinite)?))
+                Rc::new(hull(&mut values).unwrap_or_else(bits::anything))
             }
-            Value::Any => Ok(Rc::new(bits::integer(INTEGERS, Affine::free(INTEGERS), 0))),
-            Value::Broken | Value::Unknown => Err(Problem::Told),
+            Value::Any | Value::Broken | Value::Unknown => Rc::new(bits::anything()),
+        }
+    }
+
+    /// Whether it is binary32 with an error, so that its bits are not those of the exact value.
+    pub(super) fn carries(&self) -> bool {
+        match self {
+            Value::Float(number) => !number.error.is_zero(),
+            Value::Whole(value) => value.carries(),
+            _ => false,
         }
     }
 
@@ -233,11 +238,15 @@ pub enum Problem {
     Domain,
     /// The result may be too large for binary32.
     Overflow,
+    /// The result may not fit a 32-bit integer, so that the conversion saturates and is invalid.
+    Conversion,
     /// An operand may be infinite or a NaN: a pattern of bits that says so.
     NotFinite,
     /// An operand is bits that nothing encloses as a number.
     Bits,
-    /// What an earlier problem leads to: that one is told.
+    /// A word that may be infinite or a NaN, or that nothing encloses as a number, is written to an output of binary32.
+    Output,
+    /// An operand depends on a hazard that is listed.
     Told,
 }
 
@@ -247,51 +256,66 @@ impl std::fmt::Display for Problem {
             Problem::DivisionByZero => "the divisor may be zero",
             Problem::Domain => "the operand may lie where the function has no value",
             Problem::Overflow => "the result may be too large for binary32",
+            Problem::Conversion => "the result may not fit a 32-bit integer",
             Problem::NotFinite => "an operand may be infinite or a NaN",
             Problem::Bits => "an operand is bits that nothing encloses as a number",
+            Problem::Output => "what is written to this output may be infinite or a NaN",
             Problem::Told => "an earlier problem",
         })
     }
 }
 
-/// What an instruction computes with: an operand, or what has become of it.
+/// Abstract operand or result: what holds in every run, and the hazard on the way to it, if there is one.
 #[derive(Clone, Debug)]
-pub(super) struct Operand(pub(super) Result<Value, Problem>);
+pub(super) struct Operand {
+    /// With a hazard, what the result may be all the same: for most operations anything.
+    pub(super) value: Value,
+    pub(super) problem: Option<Problem>,
+    /// Of a sum: what its two terms may be in the run.
+    pub(super) terms: Option<[Interval; 2]>,
+}
 
 impl Operand {
-    fn number(&self) -> Result<Rc<Number>, Problem> {
-        self.0.as_ref().map_err(|problem| *problem)?.float()
+    pub(super) fn of(value: Value) -> Operand {
+        Operand { value, problem: None, terms: None }
     }
 
     fn float(number: Number) -> Operand {
-        Operand(Ok(Value::Float(Rc::new(number))))
+        Operand::of(Value::Float(Rc::new(number)))
+    }
+
+    fn failed(problem: Problem) -> Operand {
+        Operand { problem: Some(problem), ..Operand::of(Value::Broken) }
+    }
+
+    fn number(&self) -> Result<Rc<Number>, Problem> {
+        self.problem.map_or_else(|| self.value.float(), Err)
     }
 
     fn one(&self, of: impl FnOnce(&Number) -> Result<Number, Problem>) -> Operand {
-        Operand(self.number().and_then(|number| of(&number)).map(|number| Value::Float(Rc::new(number))))
+        self.number().and_then(|number| of(&number)).map_or_else(Operand::failed, Operand::float)
     }
 
     fn two(&self, other: &Operand, of: impl FnOnce(&Number, &Number) -> Result<Number, Problem>) -> Operand {
         let both = self.number().and_then(|a| Ok((a, other.number()?)));
-        Operand(both.and_then(|(a, b)| of(&a, &b)).map(|number| Value::Float(Rc::new(number))))
+        both.and_then(|(a, b)| of(&a, &b)).map_or_else(Operand::failed, Operand::float)
     }
 
     /// Both, if an operation takes them as integers.
     fn wholes<'o>(&'o self, other: &'o Operand) -> Option<(&'o Value, &'o Value)> {
-        match (self.0.as_ref().ok()?, other.0.as_ref().ok()?) {
+        match (&self.value, &other.value) {
             (Value::Whole(a), Value::Whole(b)) => Some((a, b)),
             _ => None,
         }
     }
 
     fn decide(&self, other: &Operand, of: impl FnOnce(Interval, Interval) -> (bool, bool)) -> Operand {
-        let extent = |operand: &Operand| operand.0.as_ref().map_err(|problem| *problem)?.extent();
-        let both = extent(self).and_then(|a| Ok((a, extent(other)?)));
-        Operand(both.map(|(a, b)| {
-            let (yes, no) = of(a, b);
-            let may = [(yes, 1), (no, 0)].into_iter().filter(|(may, _)| *may).map(|(_, bits)| bits);
-            Value::patterns(may.collect())
-        }))
+        let both = self.value.extent().and_then(|a| Ok((a, other.value.extent()?)));
+        match both {
+            Ok((a, b)) => Operand::of(bits::decided(of(a, b))),
+            // Whichever way it falls: a comparison gives 1 or 0 of a NaN, too.
+            Err(problem) => Operand { problem: Some(problem), ..Operand::of(bits::decided((true, true))) },
+        }
     }
 
     /// A function with this value and derivative.
@@ -337,9 +361,11 @@ impl Add for Operand {
 
     fn add(self, other: Operand) -> Operand {
         if let Some((a, b)) = self.wholes(&other) {
-            return Operand(bits::sum(a, b));
+            return Operand::of(bits::sum(a, b));
         }
-        self.two(&other, |a, b| {
+        let mut terms = None;
+        let sum = self.two(&other, |a, b| {
+            terms = Some([a.actual, b.actual]);
             let form = a.form.add(&b.form);
             Ok(Number {
                 actual: a.actual + b.actual,
@@ -348,7 +374,8 @@ impl Add for Operand {
                 grid: a.grid.zip(b.grid).map(|(a, b)| a.min(b)),
                 form,
             })
-        })
+        });
+        Operand { terms, ..sum }
     }
 }
 
@@ -373,7 +400,7 @@ impl Sub for Operand {
 
     fn sub(self, other: Operand) -> Operand {
         if let Some((a, b)) = self.wholes(&other) {
-            return Operand(bits::difference(a, b));
+            return Operand::of(bits::difference(a, b));
         }
         self + -other
     }
@@ -438,12 +465,14 @@ impl Real for Operand {
             if x.actual.low < 0.0 {
                 return Err(Problem::Domain);
             }
-            let exact = x.exact.sqrt();
+            let actual = x.actual.sqrt();
+            // Where the exact operand is below zero, the run's result counts as exact.
+            let exact = if x.exact.low < 0.0 { x.exact.sqrt().hull(actual) } else { x.exact.sqrt() };
             // |√A - √a| ≤ √|A - a|.
             let most = Interval::point(x.error.range().magnitude()).sqrt().high;
             let error =
                 if x.error.is_zero() { Affine::constant(0.0) } else { Affine::constant(0.0).widened(most) };
-            Ok(Number { actual: x.actual.sqrt(), exact, form: Affine::free(exact), error, grid: None })
+            Ok(Number { actual, exact, form: Affine::free(exact), error, grid: None })
         })
     }
 
@@ -557,16 +586,19 @@ impl Real for Operand {
     }
 
     fn integer(self) -> Operand {
-        Operand(self.0.map(|value| Value::Whole(Rc::new(value))))
+        Operand { value: Value::Whole(Rc::new(self.value)), terms: None, ..self }
     }
 
     fn nearest(self) -> Operand {
-        Operand(self.number().map(|x| {
-            let nearest = |value: f64| value.round_ties_even().clamp(INTEGERS.low, INTEGERS.high);
-            let range = Interval::new(nearest(x.actual.low), nearest(x.actual.high));
-            let (form, error) = (Affine::free(range), Affine::constant(0.0));
-            Value::Integer(Rc::new(Number { actual: range, exact: range, form, error, grid: Some(0) }))
-        }))
+        let x = match self.number() {
+            Ok(x) => x,
+            Err(problem) => return Operand::failed(problem),
+        };
+        let rounded = Interval::new(x.actual.low.round_ties_even(), x.actual.high.round_ties_even());
+        let kept = |value: f64| value.clamp(INTEGERS.low, INTEGERS.high);
+        let range = Interval::new(kept(rounded.low), kept(rounded.high));
+        let value = Value::Integer(Rc::new(bits::integer(range, Affine::free(range), 0)));
+        Operand { problem: (!rounded.within(INTEGERS)).then_some(Problem::Conversion), ..Operand::of(value) }
     }
 
     fn equal(self, other: Operand) -> Operand {
@@ -586,15 +618,15 @@ impl Real for Operand {
     }
 
     fn choose(self, yes: Operand, no: Operand) -> Operand {
-        match self.0.as_ref().map_or((true, true), Value::tested) {
+        match self.value.tested() {
             (false, _) => yes,
             (_, false) => no,
-            _ => Operand(yes.0.and_then(|yes| Ok(yes.join(&no.0?)))),
+            _ => Operand { problem: yes.problem.or(no.problem), ..Operand::of(yes.value.join(&no.value)) },
         }
     }
 
     fn bitwise(self, op: Bitwise, other: Operand) -> Operand {
-        Operand(self.0.and_then(|a| bits::bitwise(op, &a, &other.0?)))
+        Operand::of(bits::bitwise(op, &self.value, &other.value))
     }
 }
 
@@ -604,9 +636,9 @@ impl Operand {
         let limit = f64::from(f32::from_bits(SIN_LIMIT));
         let within = |x: &Number| x.actual.within(Interval::new(-limit, limit));
         match self.number() {
-            Ok(x) if !within(&x) => Operand(Err(Problem::Domain)),
+            Ok(x) if !within(&x) => Operand::failed(Problem::Domain),
             Ok(x) => Operand::float(Number::clone(&x)),
-            Err(problem) => Operand(Err(problem)),
+            Err(problem) => Operand::failed(problem),
         }
     }
 }

@@ -1,0 +1,534 @@
+//! A falsifier of `takt accuracy`: random programs over all operations, runs that look for values at the ends of ranges, and a
+//! comparison of every statement of an [`Enclosure`] with what the run does.
+//!
+//! `TAKT_PROGRAMS=10000 cargo test --release -p takt-analysis --test enclosures` is the campaign; `TAKT_SEED` moves its seeds.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use takt_analysis::accuracy::{Enclosure, Problem, Shadow, enclose};
+use takt_asm::{MemoryLoader, Options};
+use takt_emu::testing::Random;
+use takt_emu::{Emulator, Status, Step};
+use takt_isa::fp::{Flags, Host};
+use takt_isa::program::Range;
+use takt_isa::timing::Cycle;
+use takt_isa::{Effect, Instruction, MACHINES, Machine, Program, ROWS, Register, Row, Type, compute};
+
+/// Programs of a run of the tests, and periods of each.
+const PROGRAMS: u64 = 600;
+const PERIODS: usize = 48;
+/// Cycles of a period after which a run is given up.
+const LONGEST: Cycle = 20_000;
+
+/// Words that operations on bits meet in practice: masks, exponents, integers; and numbers that round to integers.
+const CONSTANTS: [&str; 24] = [
+    "0x7fffffff",
+    "0x80000000",
+    "0xff800000",
+    "0x007fffff",
+    "0xfffff000",
+    "0xffffffff",
+    "0",
+    "1",
+    "3",
+    "23",
+    "127 << 23",
+    "1 << 23",
+    "2 << 23",
+    "-(1 << 23)",
+    "0x3f2aaaab",
+    "0x3f800000",
+    "12582912.0",
+    "8388608.0",
+    "-12582912.0",
+    "1.0",
+    "-0.5",
+    "0.7",
+    "1082130432.0",
+    "3.0e38",
+];
+
+fn pick<'a, T: ?Sized>(random: &mut Random, from: &[&'a T]) -> &'a T {
+    from[random.below(from.len() as u32) as usize]
+}
+
+/// Ends of a range: of usual size, around powers of two, tiny, large, of one sign or both.
+fn ends(random: &mut Random) -> (f32, f32) {
+    let number = |random: &mut Random| {
+        let unit = random.below(1 << 20) as f32 / (1 << 19) as f32 - 1.0;
+        match random.below(12) {
+            0 => 0.0,
+            1 => [1.0, -1.0, 2.0, 0.5, 4.0][random.below(5) as usize],
+            2 => unit * 1e-38,
+            3 => f32::from_bits(random.below(1 << 23)) * unit.signum(),
+            4 => unit * 5e6,
+            5 => unit * 3e9,
+            6 => unit * 1e20,
+            7 => unit * 3e38,
+            8 => unit * 100.0,
+            _ => unit * 3.0,
+        }
+    };
+    let one = number(random);
+    let other = match random.below(3) {
+        0 => one * (1.0 + random.below(1000) as f32 / 1e4),
+        _ => number(random),
+    };
+    if one.is_finite() && other.is_finite() { (one.min(other), one.max(other)) } else { (-1.0, 1.0) }
+}
+
+/// Writes a program of straight lines, branches and loops over all operations that a machine has.
+struct Writer<'r> {
+    random: &'r mut Random,
+    text: String,
+    /// Names that hold floats and integers, of which operands are taken by preference.
+    floats: Vec<String>,
+    integers: Vec<String>,
+    temporaries: Vec<String>,
+    labels: u32,
+    rows: Vec<&'static Row>,
+}
+
+impl Writer<'_> {
+    fn operand(&mut self, ty: Type) -> String {
+        let random = &mut *self.random;
+        let suffix = match ty {
+            Type::F => "float",
+            Type::I => "int",
+            Type::B => "bits",
+        };
+        let constants = match ty {
+            // A literal float, or none.
+            Type::F => &CONSTANTS[16..],
+            _ => &CONSTANTS[..16],
+        };
+        if random.once_in(if ty == Type::F { 6 } else { 3 }) {
+            return pick(random, constants).to_owned();
+        }
+        let float = match ty {
+            Type::F => !random.once_in(12),
+            Type::I => random.once_in(4),
+            Type::B => random.once_in(2),
+        };
+        let names = if float || self.integers.is_empty() { &self.floats } else { &self.integers };
+        format!("{}:{suffix}", names[random.below(names.len() as u32) as usize])
+    }
+
+    fn operation(&mut self, hot: bool) {
+        let row = self.rows[self.random.below(self.rows.len() as u32) as usize];
+        let operands: Vec<String> =
+            (0..row.shape.sources()).map(|i| self.operand(row.source_type(i))).collect();
+        // Results of operations on bits are floats now and then.
+        let float = match row.result_type() {
+            Type::F => true,
+            Type::I => self.random.once_in(3) && row.source_type(0) == Type::I,
+            Type::B => self.random.once_in(2),
+        };
+        // Within branches, what was written before is written again, so that paths have something to join.
+        let again = hot && !self.temporaries.is_empty() && !self.random.once_in(3);
+        let name = match again {
+            true => {
+                let known = self.random.below(self.temporaries.len() as u32) as usize;
+                self.temporaries[known].clone()
+            }
+            false => format!("t{}", self.temporaries.len()),
+        };
+        if !again {
+            self.temporaries.push(name.clone());
+        }
+        let ty = if float { "float" } else { "int" };
+        writeln!(self.text, " {} {name}:{ty}, {}", row.mnemonic, operands.join(", ")).unwrap();
+        if !hot {
+            if float { &mut self.floats } else { &mut self.integers }.push(name);
+        }
+    }
+
+    fn load(&mut self) {
+        let index = self.operand(Type::I);
+        let (at, name) = (format!("t{}", self.temporaries.len()), format!("t{}", self.temporaries.len() + 1));
+        writeln!(self.text, " iand {at}:int, {index}, 3\n ld {name}:float, V[{at}:int]").unwrap();
+        self.temporaries.extend([at.clone(), name.clone()]);
+        self.integers.push(at);
+        self.floats.push(name);
+    }
+
+    fn branch(&mut self) {
+        let condition = self.operand(Type::B);
+        if !condition.contains(':') {
+            return;
+        }
+        self.labels += 1;
+        let (label, way) = (self.labels, pick(self.random, &["bz", "bnz"]));
+        writeln!(self.text, " {way} {condition}, l{label}").unwrap();
+        for _ in 0..1 + self.random.below(3) {
+            self.again();
+        }
+        writeln!(self.text, "l{label}:").unwrap();
+    }
+
+    /// An operation that writes what has a value already.
+    fn again(&mut self) {
+        if !self.temporaries.is_empty() {
+            let before = self.temporaries.len();
+            for _ in 0..8 {
+                let length = self.text.len();
+                self.operation(true);
+                if self.temporaries.len() == before {
+                    return;
+                }
+                self.text.truncate(length);
+                self.temporaries.truncate(before);
+            }
+        }
+    }
+
+    fn turns(&mut self) {
+        self.labels += 1;
+        let (label, turns) = (self.labels, 1 + self.random.below(4));
+        writeln!(self.text, " li k, {turns}\n.loop_bound {turns}\nl{label}:").unwrap();
+        for _ in 0..1 + self.random.below(3) {
+            self.again();
+        }
+        writeln!(self.text, " isub k, k, 1\n bnz k, l{label}").unwrap();
+    }
+}
+
+/// The source of a random program.
+fn source(random: &mut Random, machine: &'static Machine) -> String {
+    let mut text = String::new();
+    if random.once_in(2) {
+        text += ".ports latched\n";
+    }
+    if random.once_in(2) {
+        text += ".schedule on\n";
+    }
+    text += ".input x0, x1, x2, n0:int\n.output y0, y1, y2, y3\n.state s0\n.state c0:int\n.reg k:int\n";
+    for name in ["x0", "x1", "x2", "s0"] {
+        let (low, high) = ends(random);
+        writeln!(text, ".range {name} = {low:e}, {high:e}").unwrap();
+    }
+    let (low, size) = (random.below(200) as i32 - 100, [3, 100, 1 << 20][random.below(3) as usize]);
+    writeln!(text, ".range n0 = {low}, {}", low + random.below(size) as i32).unwrap();
+    writeln!(text, ".range c0 = 0, {}", random.below(9)).unwrap();
+    // Most programs have a second of each row's kind: arithmetic, or everything.
+    let only_float = random.once_in(3);
+    let offered = |row: &&'static Row| {
+        let float = row.types.iter().all(|ty| *ty == Type::F);
+        row.effect == Effect::Compute
+            && machine.slots.iter().any(|slot| slot.unit_for(row.function).is_some())
+            && (!only_float || float)
+    };
+    let rows: Vec<_> = ROWS.iter().filter(offered).collect();
+    let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+    let mut writer = Writer {
+        floats: names(&["x0", "x1", "x2", "s0"]),
+        integers: names(&["n0", "c0"]),
+        temporaries: Vec::new(),
+        labels: 0,
+        rows,
+        random,
+        text: String::new(),
+    };
+    for _ in 0..1 + writer.random.below(10) {
+        match writer.random.below(14) {
+            0 if !only_float => writer.load(),
+            1 | 2 => writer.branch(),
+            3 => writer.turns(),
+            _ => writer.operation(false),
+        }
+    }
+    // Outputs: what was computed last, integers as the numbers that they are, now and then any bits.
+    for i in 0..4 {
+        let random = &mut *writer.random;
+        let last = |names: &[String], random: &mut Random| {
+            names[names.len() - 1 - random.below(names.len().min(4) as u32) as usize].clone()
+        };
+        let line = match random.below(if only_float { 2 } else { 4 }) {
+            2 => format!(" itof y{i}, {}:int", last(&writer.integers, random)),
+            3 if random.once_in(3) => format!(" mov y{i}:float, {}:float", last(&writer.integers, random)),
+            _ => format!(" mov y{i}:float, {}:float", last(&writer.floats, random)),
+        };
+        writeln!(writer.text, "{line}").unwrap();
+    }
+    let states = [writer.operand(Type::F), writer.operand(Type::I)];
+    let random = &mut *writer.random;
+    let keeps = random.once_in(2);
+    let state = match random.below(3) {
+        0 => format!(" mov s0:float, {}\n", states[0]),
+        1 => " fmul s0, s0, 0.5\n".to_owned(),
+        _ => String::new(),
+    };
+    let counter = match random.below(3) {
+        0 => format!(" iand c0:int, {}, 3\n", states[1].replace(":float", ":int")),
+        1 if !keeps => " iadd c0, c0, 1\n".to_owned(),
+        _ => String::new(),
+    };
+    let body = std::mem::take(&mut writer.text) + &state + &counter;
+    let temporaries = writer.temporaries.join(" ");
+    let start = pick(writer.random, &["0.0", "1.0", "-2.0", "1e-39", "zero", "x0"]);
+    let first = pick(writer.random, &["0", "1", "4", "n0"]);
+    if !temporaries.is_empty() {
+        writeln!(text, ".reg {temporaries}").unwrap();
+    }
+    let enter = match writer.random.below(3) {
+        // The first period has code of its own.
+        0 => " wait q\nq: mov s0, 0.25\n.period\np:\n".to_owned(),
+        _ => " wait p\n.period\np:\n".to_owned(),
+    };
+    let presets = match writer.random.below(3) {
+        0 => ".preset s0 = 0.5\n.preset c0 = 2\n.once\n".to_owned(),
+        _ => format!(".once\n mov s0, {start}\n mov c0, {first}\n"),
+    };
+    let data = ".data\nV: .float 1.0, -2.5\n .word 3, 0x3f000000\n";
+    text + &presets + &enter + &body + " wait p\n" + data
+}
+
+/// Values of a range that break claims: its ends, what is next to them, zeros, powers of two, subnormals, anything.
+fn draw(range: &Range, random: &mut Random) -> u32 {
+    let (low, high) = range.ends();
+    if range.ty != Type::F {
+        let inside = low + (high - low) * f64::from(random.below(1 << 16)) / 65_535.0;
+        let value = [low, high, inside.round(), 0.0][random.below(4) as usize];
+        return (value.clamp(low, high) as i32).cast_unsigned();
+    }
+    let (low, high) = (low as f32, high as f32);
+    let part = random.below(1 << 24) as f32 / (1 << 24) as f32;
+    let inside = low + part * (high - low);
+    let value = match random.below(10) {
+        0 => low,
+        1 => high,
+        2 => low.next_up(),
+        3 => high.next_down(),
+        4 => [0.0, -0.0][random.below(2) as usize],
+        5 => 2f32.powi(random.below(60) as i32 - 30) * [1.0, -1.0][random.below(2) as usize],
+        6 => f32::from_bits(random.below(1 << 23)),
+        7 => inside.round(),
+        _ => inside,
+    };
+    let value = if value.is_finite() { value } else { 0.0 };
+    // Zero of either sign stays.
+    if value >= low && value <= high { value.to_bits() } else { value.clamp(low, high).to_bits() }
+}
+
+/// Operations whose result holds, whatever their operands: comparisons, and integers as the numbers that they are.
+fn settles(row: &Row) -> bool {
+    matches!(row.mnemonic, "feq" | "flt" | "fle" | "ieq" | "ilt" | "iltu" | "itof")
+}
+
+/// Registers that may depend on a listed hazard, and whether data memory may: nothing is said of what is computed from them.
+fn tainted(program: &Program, enclosure: &Enclosure) -> BTreeSet<Register> {
+    let listed = |word: usize| {
+        let here = enclosure.hazards.iter().filter(|hazard| hazard.word as usize == word);
+        here.into_iter().any(|hazard| !matches!(hazard.problem, Problem::Conversion | Problem::Output))
+    };
+    let slots = program.machine.slots.len();
+    let mut tainted = BTreeSet::new();
+    loop {
+        let before = tainted.len();
+        for (word, bits) in program.code.iter().enumerate() {
+            let Ok(instruction) = Instruction::decode(*bits) else { continue };
+            let Some(register) = instruction.writes(&program.machine.slots[word % slots]) else { continue };
+            let row = instruction.op.row();
+            let from = instruction.reads().iter().any(|register| tainted.contains(register));
+            if !settles(row) && (listed(word) || from) {
+                tainted.insert(register);
+            }
+        }
+        if tainted.len() == before {
+            return tainted;
+        }
+    }
+}
+
+/// Statements that were compared with a run.
+#[derive(Default, Debug)]
+struct Checked {
+    programs: u64,
+    /// Programs that the analysis does not follow, and those with no hazard.
+    refused: u64,
+    safe: u64,
+    bounds: u64,
+    /// Bounds of which a run reached a third.
+    tight: u64,
+    states: u64,
+    /// Operations that raised a flag, each listed.
+    raised: u64,
+}
+
+/// A run of a program against its enclosure.
+struct Run<'p> {
+    program: &'p Program,
+    enclosure: &'p Enclosure,
+    tainted: BTreeSet<Register>,
+    /// Inputs may change in every cycle.
+    restless: bool,
+}
+
+impl Run<'_> {
+    fn inputs(&self, emulator: &mut Emulator, random: &mut Random) {
+        for range in self.program.ranges.iter().filter(|range| self.program.machine.is_input(range.register))
+        {
+            emulator.set_input_bits(range.register, draw(range, random)).unwrap();
+        }
+    }
+
+    /// An operation of the run: a flag that it raises is listed, unless it depends on a listed hazard.
+    fn operation(&self, emulator: &Emulator, word: usize, instruction: &Instruction, checked: &mut Checked) {
+        if instruction.effect() != Effect::Compute {
+            return;
+        }
+        let mut operands = [0; 3];
+        for (operand, register) in operands.iter_mut().zip(instruction.reads()) {
+            *operand = emulator.register(*register).unwrap_or(0);
+        }
+        let value = compute::<Host>(instruction.op, operands[0], operands[1], operands[2]);
+        let known = instruction.reads().iter().all(|register| !self.tainted.contains(register));
+        let listed = self.enclosure.hazards.iter().any(|hazard| hazard.word as usize == word);
+        if value.flags != Flags::NONE {
+            checked.raised += u64::from(listed);
+            assert!(listed || !known, "{instruction:?} of {operands:08x?} raises {}", value.flags);
+        }
+    }
+
+    /// Whether the statements hold after this period, too: while states are in their ranges.
+    fn states(&self, emulator: &Emulator, checked: &mut Checked) -> bool {
+        let mut kept = true;
+        for range in self.program.ranges.iter().filter(|range| !self.program.machine.is_input(range.register))
+        {
+            let bits = emulator.register(range.register).unwrap();
+            let value = match range.ty {
+                Type::F => f64::from(f32::from_bits(bits)),
+                _ => f64::from(bits.cast_signed()),
+            };
+            let (low, high) = range.ends();
+            let within = low <= value && value <= high;
+            let assumed = self.enclosure.later().any(|state| state.range.register == range.register);
+            checked.states += u64::from(!assumed);
+            assert!(within || assumed, "a state is {value}, {bits:08x}, of [{low}, {high}]");
+            kept &= within;
+        }
+        kept
+    }
+
+    fn run(&self, periods: usize, random: &mut Random, checked: &mut Checked) {
+        let (program, machine) = (self.program, self.program.machine);
+        let mut emulator = Emulator::new(program).unwrap();
+        let mut shadow = Shadow::new(program).each_period_afresh();
+        self.inputs(&mut emulator, random);
+        let mut begun = false;
+        for _ in 0..periods {
+            if let Status::Waiting { since, .. } = *emulator.status() {
+                self.inputs(&mut emulator, random);
+                emulator.tick_at(emulator.now().max(since + Cycle::from(machine.refill)));
+                shadow.begin_period();
+                begun = true;
+            }
+            let end = emulator.now() + LONGEST;
+            loop {
+                if self.restless && random.once_in(3) {
+                    self.inputs(&mut emulator, random);
+                }
+                // A fault, or a loop beyond what its source promises.
+                let Ok(step) = emulator.step_cycle() else { return };
+                let Step::Issued { address, .. } = step else {
+                    if emulator.now() > end {
+                        return;
+                    }
+                    continue;
+                };
+                shadow.issued(&emulator, address);
+                if let Some(Ok(instructions)) = program.bundle(address) {
+                    for (slot, instruction) in instructions.iter().enumerate() {
+                        let word = address.index() * machine.slots.len() + slot;
+                        self.operation(&emulator, word, instruction, checked);
+                    }
+                }
+                match emulator.status() {
+                    Status::Running => {}
+                    Status::Waiting { .. } => break,
+                    Status::Halted { .. } | Status::Faulted(_) => return,
+                }
+            }
+            if begun {
+                shadow.compare(&emulator);
+                if self.enclosure.hazards.is_empty() {
+                    assert!(emulator.flags().is_empty(), "{}", emulator.flags());
+                    for port in program.outputs.iter().filter(|port| port.ty == Type::F) {
+                        let value = f32::from_bits(emulator.register(port.register).unwrap());
+                        assert!(value.is_finite(), "{} is {value}", port.name);
+                    }
+                }
+                if !self.states(&emulator, checked) {
+                    break;
+                }
+            } else if self.enclosure.first().next().is_some() {
+                return;
+            }
+        }
+        for bound in &self.enclosure.outputs {
+            let measured = shadow.outputs().iter().find(|output| output.register == bound.register).unwrap();
+            let (Some(error), Some(range), Some(worst)) = (bound.error, bound.range, measured.absolute)
+            else {
+                continue;
+            };
+            // Binary64 rounds, too.
+            let slack = error * 1e-6 + 1e-12 * range.magnitude() + 1e-44;
+            assert!(worst.error <= error + slack, "{}: {worst:?} beyond {error}", bound.name);
+            for worst in [measured.absolute, measured.ulp, measured.relative].into_iter().flatten() {
+                assert!(range.contains(worst.value), "{}: {worst:?} beyond {range:?}", bound.name);
+            }
+            checked.bounds += 1;
+            checked.tight += u64::from(error > 0.0 && worst.error > error / 3.0);
+        }
+    }
+}
+
+fn assembled(text: &str, machine: &'static Machine) -> Option<Program> {
+    let options = Options { machine, ..Options::default() };
+    let assembled = takt_asm::assemble_bytes("test.s", text.into(), &MemoryLoader::new(&[]), &options);
+    match assembled {
+        Ok(assembled) => Some(assembled.program),
+        Err(diagnostics) => panic!("{}\n{text}", diagnostics.render(false)),
+    }
+}
+
+/// Compares the statements about one program with its runs.
+fn check(seed: u64, checked: &mut Checked) {
+    let mut random = Random::new(seed);
+    let machine = MACHINES[random.below(MACHINES.len() as u32) as usize];
+    let text = source(&mut random, machine);
+    let Some(program) = assembled(&text, machine) else { return };
+    checked.programs += 1;
+    let enclosure = match enclose(&program) {
+        Ok(enclosure) => enclosure,
+        Err(_) => {
+            checked.refused += 1;
+            return;
+        }
+    };
+    checked.safe += u64::from(enclosure.hazards.is_empty());
+    let run = Run {
+        tainted: tainted(&program, &enclosure),
+        restless: !program.latched && random.once_in(2),
+        program: &program,
+        enclosure: &enclosure,
+    };
+    let result =
+        std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| run.run(PERIODS, &mut random, checked)));
+    assert!(result.is_ok(), "seed {seed} on {}:\n{text}{enclosure:#?}", machine.name);
+}
+
+#[test]
+fn no_run_contradicts_an_enclosure() {
+    let number = |name: &str| std::env::var(name).ok().map(|text| text.parse::<u64>().unwrap());
+    let (programs, first) = (number("TAKT_PROGRAMS").unwrap_or(PROGRAMS), number("TAKT_SEED").unwrap_or(0));
+    let mut checked = Checked::default();
+    for seed in first..first + programs {
+        check(seed, &mut checked);
+    }
+    println!("{checked:?}");
+    // Statements that are seldom made, or so wide that nothing comes near, would not be tested by this.
+    let Checked { programs, refused, safe, bounds, tight, states, raised } = checked;
+    assert!(refused < programs / 4 && safe > programs / 8 && bounds > programs / 2, "too little is stated");
+    assert!(tight > programs / 20 && states > programs && raised > programs / 4, "nothing comes near");
+}
