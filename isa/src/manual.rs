@@ -291,6 +291,65 @@ pub fn markdown() -> String {
     out
 }
 
+/// The capacities of the machines as Markdown: `docs/what-fits.md`.
+pub fn capacities() -> String {
+    let mut out = String::from(
+        "# What fits\n\n\
+         Generated from the table of machines (`isa/src/spec/machines.rs`) by `cargo xtask docs`; do not edit.\n\n\
+         The capacities of each machine. A program that needs more of one is refused, with the number that it needs; `takt asm FILE`\n\
+         prints what a program takes, `--symbols -` where everything lies.\n\n|",
+    );
+    let machines = manual().machines;
+    let rows: [(&str, &dyn Fn(&Machine) -> String); 7] = [
+        ("operations a cycle (slots)", &|machine| machine.slots.len().to_string()),
+        ("bundles of program memory", &|machine| machine.code_depth.to_string()),
+        ("words of data memory", &|machine| machine.data_depth.to_string()),
+        ("registers, of which each slot writes its own bank", &|machine| {
+            let banks: Vec<String> = machine
+                .slots
+                .iter()
+                .map(|slot| format!("{} in {}", slot.bank.depth, slot.bank.name))
+                .collect();
+            banks.join(", ")
+        }),
+        ("output ports, the last registers of each bank", &|machine| machine.outputs_per_bank.to_string()),
+        ("input ports", &|machine| (machine.inputs.depth - 1).to_string()),
+        ("subroutine calls inside one another", &|machine| machine.stack_depth.to_string()),
+    ];
+    for machine in machines {
+        let _ = write!(out, " | {}", machine.name);
+    }
+    out.push_str(" |\n|---|");
+    out.push_str(&"---|".repeat(machines.len()));
+    out.push('\n');
+    for (what, of) in rows {
+        let _ = write!(out, "| {what}");
+        for machine in machines {
+            let _ = write!(out, " | {}", of(machine));
+        }
+        out.push_str(" |\n");
+    }
+    out.push_str(
+        "\n## What shares what\n\n\
+         - **Constants take registers**: each literal that an operation reads has one, in a bank that is free at that place; equal\n  \
+         literals share it. A preset takes none beyond its register.\n\
+         - **Output ports take registers** of the bank of the slot that computes them, from the end. A port is written by one slot.\n\
+         - **Elements of arrays** are registers like others: each lies in the bank of the slot that writes it.\n\
+         - **Values that no register is left for** are kept in data memory, if equations compute them; `takt asm` lists them, with the\n  \
+         cycles that they cost.\n\
+         - **Subroutines share the program memory**; a macro or a repetition takes its bundles at every use. A loop takes its bundles\n  \
+         once, and a branch taken costs the front end's refill ([timing.md](timing.md)).\n\
+         - **A system of several cores** gives each core all of this ([system.md](system.md)).\n\n\
+         ## In numbers\n\n\
+         Straight-line code of a few hundred operations is what these machines are made for: the hybrid robot's controller takes 290\n\
+         operations, a six-axis arm's inverse dynamics 244 ([models.md](models.md)). A matrix of 12 by 12 takes 144 registers or data\n\
+         words; a product of two of them, unrolled, more bundles than there are. Loops over arrays cost a load, an operation and a\n\
+         refill for each turn, so that a Kalman filter of 12 states or a neural network of some thousand weights fits in loops only, at\n\
+         15 to 25 times the cycles of its multiplications, or not at all.\n",
+    );
+    out
+}
+
 fn field_text(field: Field) -> String {
     let bits = field.bits();
     format!("{} [{}:{}]", field.name(), bits.low + bits.width - 1, bits.low)

@@ -24,6 +24,7 @@ pub(crate) const SYNTHESIS: &str = "docs/synthesis.md";
 fn generated(root: &Path) -> Result<Vec<(&'static str, String)>> {
     let mut files = vec![
         ("docs/isa.md", takt_isa::manual::markdown()),
+        ("docs/what-fits.md", takt_isa::manual::capacities()),
         (GRAMMAR, takt_editor::grammar::textmate_text()),
         (TREE_SITTER, takt_editor::tree_sitter::grammar_text()),
         ("editors/tree-sitter-takt/queries/highlights.scm", takt_editor::tree_sitter::highlights()),
