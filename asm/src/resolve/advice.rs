@@ -5,6 +5,7 @@ use crate::context::{At, Reported};
 use crate::expand::load::Loader;
 use crate::report::diag::Diagnostic;
 use crate::report::nearest;
+use crate::report::source::line_feeds;
 use crate::resolve::Resolver;
 use crate::syntax::ast::*;
 use crate::syntax::name::NameId;
@@ -106,7 +107,9 @@ impl Resolver<'_> {
         let libraries = self.loader.places().iter().filter(|place| !place.takes_quoted());
         let mut files = libraries.flat_map(|place| place.names().into_iter().map(move |name| (place, name)));
         let found = files.find(|(place, name)| {
-            place.load(name).is_ok_and(|bytes| String::from_utf8_lossy(&bytes).lines().any(defines))
+            place
+                .load(name)
+                .is_ok_and(|bytes| line_feeds(&String::from_utf8_lossy(&bytes)).lines().any(defines))
         });
         found.map(|(_, name)| name)
     }

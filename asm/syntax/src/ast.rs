@@ -515,6 +515,16 @@ impl Operator {
         }
     }
 
+    /// Whether it compares two values: its result is 1 or 0.
+    pub const fn compares(self) -> bool {
+        self.precedence() == Operator::Eq.precedence()
+    }
+
+    /// Whether it joins conditions, and other integers, bit by bit.
+    pub const fn joins(self) -> bool {
+        matches!(self, Operator::And | Operator::Or)
+    }
+
     /// Whether it may stand before an operand.
     pub const fn is_prefix(self) -> bool {
         matches!(self, Operator::Add | Operator::Sub | Operator::Complement | Operator::Not)

@@ -10,6 +10,7 @@ mod explain;
 pub mod expr;
 mod expression;
 mod grammar;
+mod grouping;
 pub mod intern;
 mod lex;
 pub mod limits;

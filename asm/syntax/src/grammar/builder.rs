@@ -20,15 +20,15 @@ pub(crate) struct Builder<'a> {
 /// Lengths of the lists that the grammar appends to.
 #[derive(Clone, Copy)]
 pub(crate) struct Mark {
-    nodes: u32,
+    pub(crate) nodes: u32,
     operands: u32,
     operations: u32,
     memories: u32,
     casts: u32,
-    elements: u32,
+    pub(crate) elements: u32,
     equations: u32,
     sizes: u32,
-    templates: u32,
+    pub(crate) templates: u32,
 }
 
 impl Builder<'_> {

@@ -66,6 +66,8 @@ pub(crate) struct LineTokens {
     pub(crate) continued: bool,
     /// It may nest deeply: many brackets, prefix operators and powers.
     pub(crate) nested: bool,
+    /// It has a comparison, and another or `&` or `|`.
+    pub(crate) compared: bool,
 }
 
 /// Reads a file's tokens, some thousand lines at a time.
@@ -161,6 +163,10 @@ impl<'s> Lexer<'s> {
                     Token::Bad
                 }
             };
+            if let Token::Operator(operator) = token {
+                line.compares += usize::from(operator.compares());
+                line.joins += usize::from(operator.joins());
+            }
             tokens.push((token, span));
             // Blanks before the first token do not count.
             if (span.end - line.from) as usize > limits::LINE_BYTES
@@ -196,16 +202,23 @@ struct Line {
     long: bool,
     /// Tokens that may nest expressions.
     nesting: usize,
+    /// Comparisons.
+    compares: usize,
+    /// `&` and `|`.
+    joins: usize,
 }
 
 impl Line {
     fn new(start: usize, number: u32, from: u32) -> Line {
-        Line { start, number, from, bad: false, continued: false, unknown: false, long: false, nesting: 0 }
+        let (bad, continued, unknown, long) = (false, false, false, false);
+        Line { start, number, from, bad, continued, unknown, long, nesting: 0, compares: 0, joins: 0 }
     }
 
     fn end(&self, end: usize) -> LineTokens {
         let nested = self.nesting > limits::EXPRESSION_DEPTH || end - self.start > limits::EXPRESSION_NODES;
-        LineTokens { end: end as u32, number: self.number, bad: self.bad, continued: self.continued, nested }
+        let Line { number, bad, continued, compares, joins, .. } = *self;
+        let compared = compares > 0 && compares + joins > 1;
+        LineTokens { end: end as u32, number, bad, continued, nested, compared }
     }
 }
 
