@@ -79,7 +79,7 @@ pub(crate) struct LoopBound {
 /// A `.preset`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Preset {
-    pub(crate) register: Name,
+    pub(crate) register: Operand,
     /// Whether `@` stands before it.
     pub(crate) placed: bool,
     pub(crate) value: Expr,

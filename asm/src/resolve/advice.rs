@@ -5,9 +5,10 @@ use crate::context::{At, Reported};
 use crate::expand::load::Loader;
 use crate::report::diag::Diagnostic;
 use crate::report::nearest;
-use crate::report::source::line_feeds;
+use crate::report::source::{Span, line_feeds};
 use crate::resolve::Resolver;
 use crate::syntax::ast::*;
+use crate::syntax::foreign;
 use crate::syntax::name::NameId;
 use takt_isa::{Effect, ROWS, Row};
 
@@ -73,7 +74,11 @@ impl Resolver<'_> {
             span,
             format!("there is no instruction or macro `{text}`"),
         );
-        let error = if Directive::ALL.iter().any(|known| known.name() == directive) {
+        let rest = Span::new(span.end, written.span.end);
+        let rest = self.context.reports.sources.text(rest);
+        let error = if let Some(help) = foreign::statement(&text, rest) {
+            error.help(help)
+        } else if Directive::ALL.iter().any(|known| known.name() == directive) {
             error.did_you_mean(Some(directive))
         } else if let Some(file) = self.library_with(&text) {
             from_library(error, &file)

@@ -9,6 +9,7 @@ mod blocks;
 mod explain;
 pub mod expr;
 mod expression;
+pub mod foreign;
 mod grammar;
 mod grouping;
 pub mod intern;

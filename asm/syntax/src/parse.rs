@@ -194,6 +194,8 @@ fn number_lines(operations: &mut [Operation], tokens: &[(Token, Span)], first: u
 fn broken(tokens: &[(Token, Span)], line: &LineTokens, ast: &mut Ast) {
     ast.broken.push(line.number);
     let (label, rest) = match tokens {
+        // `name := value` declares no label.
+        [(Token::Name(_), _), (Token::Colon, _), (Token::Assign, _), ..] => (None, tokens),
         [(Token::Name(name), span), (Token::Colon, _), rest @ ..] => {
             (Some(Name { name: NameRef::plain(*name), span: *span }), rest)
         }

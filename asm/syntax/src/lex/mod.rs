@@ -5,6 +5,7 @@ mod raw;
 
 use crate::ast::Directive;
 use crate::ast::Operator;
+use crate::foreign;
 use crate::intern::Interner;
 use crate::limits;
 use crate::name::NameId;
@@ -147,7 +148,15 @@ impl<'s> Lexer<'s> {
                     let text = self.lexer.slice();
                     token(raw, text, &mut line.nesting, names).unwrap_or_else(|message| {
                         line.bad = true;
-                        sink.add(Severity::Error, "token", span, || message.diagnostic(span, text));
+                        sink.add(Severity::Error, "token", span, || {
+                            match message {
+                                TokenError::NotNumber => {
+                                    range_before(&tokens[line.start..], names, text, span)
+                                }
+                                _ => None,
+                            }
+                            .unwrap_or_else(|| message.diagnostic(span, text))
+                        });
                         Token::Bad
                     })
                 }
@@ -262,6 +271,16 @@ impl TokenError {
                 .help(format!("a name has at most {}", limits::NAME_BYTES)),
         }
     }
+}
+
+/// What to say of a range where a number is read, given the line's tokens before it.
+fn range_before(before: &[(Token, Span)], names: &Interner, text: &str, span: Span) -> Option<Diagnostic> {
+    let name = |(token, span): &(Token, Span)| match token {
+        Token::Name(name) => Some((names.text(*name), *span)),
+        _ => None,
+    };
+    let last = before.len().saturating_sub(3);
+    foreign::range(&before[last..].iter().map(name).collect::<Vec<_>>(), text, span)
 }
 
 fn token(raw: Raw, text: &str, nesting: &mut usize, names: &mut Interner) -> Result<Token, TokenError> {
