@@ -29,7 +29,7 @@ use foldhash::HashMap;
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::rc::Rc;
-use takt_isa::program::{Location, Range, Space};
+use takt_isa::program::{Location, Range};
 use takt_isa::spec::instructions::Function;
 use takt_isa::{MACHINES, Op, ROWS, Register, Slots, Type};
 
@@ -69,7 +69,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         versions: Vec::new(),
     };
     let types = flat.data.iter().flat_map(|data| match data {
-        Data::Space(count) => std::iter::repeat_n(Type::B, *count as usize),
+        Data::Space(_, _, count) => std::iter::repeat_n(Type::B, *count as usize),
         Data::Value(_, _, ty) => std::iter::repeat_n(*ty, 1),
     });
     context.declared.data_types = types.collect();
@@ -77,7 +77,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
     let data_words = context.declared.data_types.len() as u32;
     let is_full = data_words > machine.data_depth;
     if is_full {
-        data_full(context, data_words);
+        data_full(context, &flat.data, data_words);
     }
     let (pool, own_files) = (HashMap::default(), Vec::new());
     let has_equations = context.asts.iter().any(|ast| !ast.equations.is_empty());
@@ -125,24 +125,33 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
 }
 
 /// Reports that the source declares more data than the machine has memory for.
-fn data_full(context: &mut Context, words: u32) {
+fn data_full(context: &mut Context, data: &[Data], words: u32) {
     let depth = context.machine.data_depth;
     let message = format!(
         "the data memory is full: {words} words of data, and {} has {depth}, {} too few",
         context.machine.name,
         words - depth
     );
-    // The part that the first word without a place belongs to.
-    let labels = context.declared.labels.iter().filter(|label| label.space == Space::Data);
-    let last = labels.filter(|label| label.position <= depth).max_by_key(|label| label.position);
-    let error = match last {
-        Some(label) if label.position == depth => {
-            Diagnostic::error("memory-full", label.span, message).here("no room from here on")
-        }
-        Some(label) => Diagnostic::error("memory-full", label.span, message)
-            .here(format!("no room from its word {} on", depth - label.position)),
-        None => Diagnostic::placeless("memory-full", message),
+    // What the first word without a place belongs to.
+    let mut end = 0;
+    let found = data.iter().find_map(|data| {
+        let (at, span, count) = match *data {
+            Data::Space(at, span, count) => (at, span, count),
+            Data::Value(at, value, _) => (at, value.span, 1),
+        };
+        end += count;
+        (end > depth).then_some((at, span, end - count))
+    });
+    let Some((at, span, start)) = found else { return };
+    let here = match depth - start {
+        0 => "no room from here on".to_owned(),
+        fitting => format!("room for {fitting} of these"),
     };
+    let mut error = Diagnostic::error("memory-full", span, message).here(here);
+    let tables = context.declared.labels.iter().filter(|label| label.is_table() && label.position <= depth);
+    if let Some(table) = tables.max_by_key(|label| label.position) {
+        error = error.also(table.span, format!("in `{}`", table.name));
+    }
     let enough = MACHINES.iter().filter(|machine| machine.data_depth >= words);
     let enough: Vec<&str> = enough.map(|machine| machine.name).collect();
     let error = match &enough[..] {
@@ -152,7 +161,7 @@ fn data_full(context: &mut Context, words: u32) {
         }
         names => error.help(format!("assemble for {}, whose data memory holds it", names.join(" or "))),
     };
-    context.reports.sink.push(error);
+    context.report(at.scope, error);
 }
 
 /// Which slots execute an instruction.
@@ -445,7 +454,7 @@ impl Resolver<'_> {
     fn data(&mut self) {
         for entry in std::mem::take(&mut self.flat.data) {
             match entry {
-                Data::Space(count) => {
+                Data::Space(_, _, count) => {
                     let length = self.ir.data.len() + count as usize;
                     self.ir.data.resize(length, 0);
                 }
