@@ -6,6 +6,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use takt_isa::program::Location;
 use takt_isa::spec::instructions::Function;
+use takt_isa::text::in_script;
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
 
@@ -151,8 +152,7 @@ impl<'p> Picture<'p> {
 
     /// The picture as a page for a browser, which needs nothing else.
     pub fn html(&self) -> String {
-        // `</` would end the script.
-        let data = self.json().to_string().replace("</", "<\\/");
+        let data = in_script(&self.json().to_string());
         include_str!("picture.html").replace("/*DATA*/", &data)
     }
 

@@ -266,7 +266,7 @@ impl Checked {
         context.asts = Vec::new();
         // For another order, should registers run out.
         let source = ir.scheduled.then(|| ir.clone());
-        let mut report = schedule::schedule(&mut ir, effort, None, &mut sink);
+        let mut report = schedule::schedule(&mut ir, effort, schedule::Order::Free, &mut sink);
         if sink.errors > 0 {
             return Err(sink.finish(sources));
         }

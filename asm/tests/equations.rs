@@ -617,3 +617,64 @@ fn placed_registers_are_written_by_their_slot() {
         }
     }
 }
+
+/// What is loaded from a table has the type of its words, with an index or without; a store of another type is counted.
+#[test]
+fn what_is_loaded_has_the_type_of_its_table() {
+    let source = |load: &str, equation: &str| {
+        format!(
+            ".input x, i:int\n.output y\n.reg d\n.data\nV: .float 1.5, 2.5\nW: .word 1, 2\nS: .space 4\n.period\np: {load}\n y = {equation}\n wait p\n"
+        )
+    };
+    for place in ["V[i]", "V+1", "V", "V[1]", "S[i]", "[i]", "S"] {
+        good(&source(&format!("ld d, {place}"), "d*x"));
+    }
+    for place in ["W[i]", "W+1", "W", "W[1]", "S[i]", "[i]"] {
+        good(&source(&format!("ld d, {place}"), "itof(d)*x"));
+    }
+    let refused = |load: &str, equation: &str, help: &str| {
+        let text = bad(&source(load, equation), &T3).render(false);
+        assert!(text.contains(help), "{load}, {equation}: {text}");
+    };
+    for place in ["W[i]", "W+1", "W"] {
+        refused(&format!("ld d, {place}"), "d*x", "`itof(d)`");
+    }
+    for place in ["V[i]", "V+1", "V"] {
+        refused(&format!("ld d, {place}"), "itof(d)", "`d` is a float");
+    }
+    // The words of a table that has both may be either; so may those of one that something else is stored in.
+    good(&source("ld d, V[i]", "d*x").replace(".float 1.5, 2.5", ".float 1.5\n .word 2"));
+    good(&source("st V[i], i\n ld d, V[i]", "itof(d)"));
+    good(&source("ld d:int, V[i]", "itof(d)"));
+    // A part of a table does not end it.
+    good(&source("ld d, V[i]", "itof(d)").replace("2.5\n", "2.5\n_part: .word 1\n"));
+}
+
+/// Elements stand wherever registers do.
+#[test]
+fn elements_have_presets_and_ranges() {
+    let text = ".input q\n.output y\n.reg k[2] t\n.state s[2,2]\n.const N = 2\n.preset k[1] = 0.5\n.preset k[N] = 1.5\n\
+                .rep i, 1, 2\n.rep j, 1, 2\n.preset s[i,j] = i + 10*j\n.endr\n.endr\n.range s[1,2], q = -1, 1\n\
+                .macro half v\n.preset v[1] = 2\n.endm\n.reg w[1]\n half w\n.period\n\
+                p: t = k[1]*q + k[2]*s[2,1] + w[1]\n s[2,1] = t\n s[1,2] = t\n y = s[1,1] + s[1,2] + s[2,2]\n wait p\n";
+    let program = good(text).program;
+    let preset = |name: &str| {
+        let register = program.registers.iter().find(|port| port.name == name).expect("it is named").register;
+        let bits = program.constants.iter().find(|constant| constant.0 == register).expect("it is preset").1;
+        f32::from_bits(bits)
+    };
+    let all = ["k[1]", "k[2]", "s[1,1]", "s[1,2]", "s[2,1]", "s[2,2]", "w[1]"].map(preset);
+    assert_eq!(all, [0.5, 1.5, 11.0, 21.0, 12.0, 22.0, 2.0]);
+    assert_eq!(program.ranges.len(), 2);
+    for (wrong, said) in [
+        (".preset k = 1", "`k` is an array, and one register is needed here"),
+        (".preset k[3] = 1", "has no element 3"),
+        (".preset k[1,1] = 1", "has 1 index, not 2"),
+        (".preset t[1] = 1", "is a register, not an array"),
+        (".preset @m3[1] = 1", "a register is needed here"),
+        (".preset k[1] 3", "expected `=`"),
+    ] {
+        let report = bad(&format!("{text}{wrong}\n"), &T3).render(false);
+        assert!(report.contains(said), "{wrong}: {report}");
+    }
+}

@@ -163,3 +163,63 @@ fn an_order_near_to_the_source_may_be_enough() {
     let expected = (0..400).fold(value(0), |s, i| s - value(i / 20) * (1.0 - value(i % 20)));
     assert_eq!(emulator.output("y").unwrap(), Some(Number::Float(expected)));
 }
+
+/// Sums of products of constants, each of which has a register, by hand-written operations.
+fn products(constants: usize) -> String {
+    let mut text = ".schedule on\n.input x\n.output y\n.reg s v\n.state g h\n.preset g = 1\n.preset h = 2\n.once\n wait p\n.period\np:\n mov s, x\n"
+        .to_owned();
+    let constant = |i: usize| 1.0 + i as f64 / 1024.0;
+    for i in (0..constants).step_by(2) {
+        let other = constant((i + 1).min(constants - 1));
+        text += &format!(" fmul v, {}, {other}\n fadd s, s, v\n", constant(i));
+    }
+    text + " fadd g, g, h\n fadd h, h, g\n mov y, s\n wait p\n"
+}
+
+/// Where registers do not suffice for a short schedule, length is given for them, in the end all of it: what fits without the
+/// scheduler fits with it.
+#[test]
+fn what_fits_without_the_scheduler_fits_with_it() {
+    for machine in MACHINES {
+        let all: usize =
+            machine.slots.iter().map(|slot| usize::from(slot.bank.depth - machine.outputs_per_bank)).sum();
+        let (mut fitting, mut longer) = (0, 0);
+        // Constants leave ever fewer registers: in the end no more than the source's own order needs.
+        for constants in (all - 60..all - 12).step_by(8).chain(all - 12..=all) {
+            let what = format!("{constants} constants on {}", machine.name);
+            let text = products(constants);
+            let Ok(written) = assembled(&text.replace(".schedule on", ""), machine) else { continue };
+            let scheduled = assembled(&text, machine);
+            let scheduled = scheduled.unwrap_or_else(|errors| panic!("{what}: {}", errors.render(false)));
+            let ((y, cycles), (expected, most)) = (output(&scheduled), output(&written));
+            assert_eq!(y, expected, "{what}");
+            assert!(cycles <= most, "{what}: {cycles} cycles, {most} without the scheduler");
+            let block = scheduled.blocks.iter().find(|block| block.label.as_deref() == Some("p")).unwrap();
+            assert_eq!(cycles, u64::from(block.cycles), "{what}");
+            assert!(block.bound.cycles() <= block.cycles, "{what}");
+            assert!(scheduled.spills.iter().all(|of| of.values.is_empty()), "{what}");
+            fitting += 1;
+            longer += usize::from(!scheduled.spills.is_empty());
+        }
+        assert!(fitting > 6 && longer > 0, "{}: {fitting} fit, {longer} of them longer", machine.name);
+    }
+}
+
+fn output(assembled: &Assembled) -> (Option<Number>, u64) {
+    let mut emulator = Emulator::new(&assembled.program).unwrap();
+    emulator.set_input("x", Number::Float(0.7)).unwrap();
+    emulator.run_period(&[]).unwrap();
+    let cycles = emulator.run_period(&[]).unwrap().cycles;
+    (emulator.output("y").unwrap(), cycles)
+}
+
+/// A full bank says what fills it, and points there.
+#[test]
+fn a_full_bank_says_what_fills_it() {
+    let report = |text: &str, machine| assembled(text, machine).unwrap_err().render(false);
+    insta::assert_snapshot!("constants", report(&products(500), &takt_isa::T1));
+    // Room for all constants and names, and for one value where two are needed.
+    insta::assert_snapshot!("few_left", report(&products(477), &takt_isa::T1));
+    let values = source(300).replace(".once\n", ".state n:int\n.once\n li n, 0\n st 5[n], a\n");
+    insta::assert_snapshot!("values", report(&values, &T3));
+}

@@ -6,6 +6,7 @@ use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
+use takt_isa::text::visible;
 
 /// Whether a path means standard input or output.
 pub(crate) fn is_dash(path: &Path) -> bool {
@@ -59,6 +60,8 @@ pub(crate) struct Out {
     writer: Box<dyn Write>,
     name: String,
     partial: Option<Partial>,
+    /// Of results for people: the beginning of a character whose rest is still to come.
+    shown: Option<Vec<u8>>,
 }
 
 /// A file under its temporary name, which is removed when this is dropped.
@@ -77,10 +80,15 @@ impl Drop for Partial {
 const BUFFER: usize = 1 << 16;
 
 impl Out {
-    /// Standard output.
-    pub(crate) fn stdout() -> Out {
+    /// Standard output, for a file's contents.
+    fn stdout() -> Out {
         let writer = BufWriter::with_capacity(BUFFER, io::stdout());
-        Out { writer: Box::new(writer), name: "standard output".to_owned(), partial: None }
+        Out { writer: Box::new(writer), name: "standard output".to_owned(), partial: None, shown: None }
+    }
+
+    /// Standard output, for results: names and texts from outside are in them, of which no terminal shall take a command.
+    pub(crate) fn results() -> Out {
+        Out { shown: Some(Vec::new()), ..Out::stdout() }
     }
 
     /// Begins a file. What can be known to be wrong with the path is found here, before the work.
@@ -90,13 +98,14 @@ impl Out {
         }
         let name = path.display().to_string();
         let (file, partial) = begin(path).with_context(|| format!("cannot write {name}"))?;
-        Ok(Out { writer: Box::new(BufWriter::with_capacity(BUFFER, file)), name, partial })
+        let writer = Box::new(BufWriter::with_capacity(BUFFER, file));
+        Ok(Out { writer, name, partial, shown: None })
     }
 
     /// Ends the file, which is there from now on.
     pub(crate) fn finish(mut self) -> Result<()> {
         self.flush()?;
-        let Out { writer, name, partial } = self;
+        let Out { writer, name, partial, .. } = self;
         drop(writer);
         partial.map_or(Ok(()), |Partial { ref temporary, ref target }| {
             fs::rename(temporary, target).with_context(|| format!("cannot write {name}"))
@@ -110,7 +119,13 @@ impl Out {
 
 impl Write for Out {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let result = self.writer.write(bytes);
+        let result = match &mut self.shown {
+            None => self.writer.write(bytes),
+            Some(begun) => {
+                let text = shown(begun, bytes);
+                self.writer.write_all(text.as_bytes()).map(|()| bytes.len())
+            }
+        };
         self.named(result)
     }
 
@@ -118,6 +133,29 @@ impl Write for Out {
         let result = self.writer.flush();
         self.named(result)
     }
+}
+
+/// Bytes of results as they are shown. `begun` keeps the beginning of a character that they end in, and has that of the bytes
+/// before them.
+fn shown(begun: &mut Vec<u8>, bytes: &[u8]) -> String {
+    begun.extend_from_slice(bytes);
+    let mut text = String::with_capacity(begun.len());
+    let mut rest = 0;
+    for chunk in begun.utf8_chunks() {
+        text.push_str(&visible(chunk.valid()));
+        rest += chunk.valid().len() + chunk.invalid().len();
+        let is_last = rest == begun.len();
+        // A character has four bytes at most.
+        if is_last && std::str::from_utf8(chunk.invalid()).is_err_and(|error| error.error_len().is_none()) {
+            rest -= chunk.invalid().len();
+            break;
+        }
+        if !chunk.invalid().is_empty() {
+            text.push(char::REPLACEMENT_CHARACTER);
+        }
+    }
+    begun.drain(..rest);
+    text
 }
 
 fn begin(path: &Path) -> Result<(File, Option<Partial>)> {
@@ -189,5 +227,22 @@ fn identity(path: &Path) -> Option<PathBuf> {
                 path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
             Some(fs::canonicalize(folder).ok()?.join(path.file_name()?))
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_are_shown_in_whatever_pieces_they_come() {
+        let text = "a\x1b]0;t\x07 µ𝄞\u{9b}1m\r\n\tend";
+        let wanted = "a\\u001b]0;t\\u0007 µ𝄞\\u009b1m\\u000d\n\tend";
+        for size in 1..=text.len() {
+            let mut begun = Vec::new();
+            let all: String = text.as_bytes().chunks(size).map(|piece| shown(&mut begun, piece)).collect();
+            assert_eq!((all.as_str(), begun.len()), (wanted, 0), "pieces of {size}");
+        }
+        assert_eq!(shown(&mut Vec::new(), b"a\xffb"), "a\u{fffd}b");
     }
 }

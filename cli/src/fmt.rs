@@ -49,7 +49,7 @@ pub(crate) fn run(arguments: &Fmt, out: &mut Out) -> Result<()> {
                 stale = true;
                 writeln!(out, "{name}")?;
             }
-            (false, _) if files::is_dash(path) => out.write_all(laid.as_bytes())?,
+            (false, _) if files::is_dash(path) => files::write(path, laid.as_bytes())?,
             (false, true) => {}
             (false, false) => files::write(path, laid.as_bytes())?,
         }

@@ -192,7 +192,7 @@ fn end(result: Result<()>, color: bool) -> ExitCode {
 }
 
 fn main() -> ExitCode {
-    let mut out = Out::stdout();
+    let mut out = Out::results();
     let arguments = match parse(&mut out) {
         Ok(arguments) => arguments,
         Err(status) => return status,

@@ -3,6 +3,7 @@
 use crate::files::Out;
 use anyhow::Result;
 use std::io::{self, IsTerminal, Write};
+use takt_isa::text::visible;
 
 /// Writes a value as JSON, for people to read too.
 pub(crate) fn json(value: &impl serde::Serialize, out: &mut Out) -> Result<()> {
@@ -11,24 +12,43 @@ pub(crate) fn json(value: &impl serde::Serialize, out: &mut Out) -> Result<()> {
     Ok(writeln!(out, "{text}")?)
 }
 
-/// Shows a text on standard error. If nobody can read it, there is nobody to tell.
+/// Shows a text on standard error, which may be coloured and has no other command to a terminal. If nobody can read it, there is
+/// nobody to tell.
 pub(crate) fn message(text: &str) {
     let text = text.trim_end();
     if !text.is_empty() {
-        let _ = writeln!(io::stderr(), "{text}");
+        let _ = writeln!(io::stderr(), "{}", coloured(text));
     }
+}
+
+/// A text with all that a terminal would obey escaped, but for colours.
+fn coloured(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(at) = rest.find("\x1b[") {
+        let (before, command) = rest.split_at(at);
+        let length = command[2..]
+            .find(|c: char| !(c.is_ascii_digit() || c == ';'))
+            .map_or(command.len(), |end| end + 2);
+        let is_colour = command[length..].starts_with('m');
+        shown.push_str(&visible(before));
+        let end = if is_colour { length + 1 } else { 2 };
+        shown.push_str(&if is_colour { command[..end].into() } else { visible(&command[..end]) });
+        rest = &command[end..];
+    }
+    shown + &visible(rest)
 }
 
 /// Shows an error.
 pub(crate) fn error(text: &str, color: bool) {
     let (on, off) = if color { ("\x1b[1;31m", "\x1b[0m") } else { ("", "") };
-    message(&format!("{on}error{off}: {text}"));
+    message(&format!("{on}error{off}: {}", visible(text)));
 }
 
 /// Shows a warning.
 pub(crate) fn warning(text: &str, color: bool) {
     let (on, off) = if color { ("\x1b[1;33m", "\x1b[0m") } else { ("", "") };
-    message(&format!("{on}warning{off}: {text}"));
+    message(&format!("{on}warning{off}: {}", visible(text)));
 }
 
 /// An error and its causes in one line. Some errors repeat their cause in their own text; it is said once.
@@ -105,5 +125,17 @@ impl Color {
                 io::stderr().is_terminal() && !refused
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_have_colours_and_no_other_commands() {
+        let text = "\x1b[1;31merror\x1b[0m: a\x1b]0;title\x07\x1b[2J\x1b[\u{9b}31m\n";
+        let shown = "\x1b[1;31merror\x1b[0m: a\\u001b]0;title\\u0007\\u001b[2J\\u001b[\\u009b31m\n";
+        assert_eq!(coloured(text), shown);
     }
 }

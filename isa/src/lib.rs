@@ -27,6 +27,7 @@ pub mod number;
 pub mod program;
 pub mod shape;
 pub mod spec;
+pub mod text;
 pub mod timing;
 
 pub use encode::{DecodeError, EncodeError, Instruction, PlacementError};

@@ -1,5 +1,6 @@
 //! What a program must keep to beyond each line's own rules: who writes a register, and whether anyone does.
 
+mod reach;
 pub(crate) mod types;
 
 use crate::context::{Context, ScopeId};
@@ -84,6 +85,7 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
     }
     if !opaque {
         no_wait(context, ir);
+        reach::check(context, ir);
         for array in context.declared.arrays.clone() {
             // Of an array it is enough that one element is used.
             let elements = array.elements().map(RegisterId::index);
@@ -308,14 +310,7 @@ fn no_wait(context: &mut Context, ir: &Ir) {
         if bundle.operations.iter().any(ends) {
             return;
         }
-        // A call comes back.
-        let goes_on = |operation: &Operation| {
-            operation.row().effect.falls_through() || operation.row().effect == Effect::Call
-        };
-        if bundle.operations.iter().all(goes_on) {
-            reached.push(index + 1);
-        }
-        reached.extend(bundle.operations.iter().filter_map(|operation| target(ir, operation)));
+        reached.extend(reach::next(ir, index, bundle));
     }
     let Some(first) = ir.bundles.get(ir.period as usize).and_then(|bundle| bundle.operations.first()) else {
         return;

@@ -7,7 +7,7 @@
 
 use crate::check::{dest_span, source_span, text};
 use crate::context::{Context, ScopeId, type_name, words};
-use crate::ir::given::{Given, GivenTypes, Kind, Part, What};
+use crate::ir::given::{self, Given, GivenTypes, Kind, Part, What};
 use crate::ir::runs::Run;
 use crate::ir::{Ir, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::report::diag::Diagnostic;
@@ -17,7 +17,6 @@ use crate::syntax::expr::Value;
 use foldhash::HashMap;
 use smallvec::SmallVec;
 use std::cell::Cell;
-use takt_isa::program::Space;
 use takt_isa::{Effect, ROWS, Row, Type};
 
 #[derive(Clone, Copy, Debug)]
@@ -355,21 +354,13 @@ fn literal<V: Known>(operation: &Operation, kind: Kind, what: What, span: Span) 
     V::new(kind, Some(Origin { what, span, scope: ScopeId(operation.expansion) }))
 }
 
-/// The types of the tables of data memory: each goes from its label to the next.
+/// The types of the tables of data memory, by label.
 fn tables<V: Known>(ir: &Ir, types: &[Type]) -> HashMap<LabelId, V> {
-    let labels = ir.labels.iter().enumerate().filter(|(_, label)| label.space == Space::Data);
-    let mut starts: Vec<usize> = labels.clone().map(|(_, label)| label.position as usize).collect();
-    starts.push(types.len());
-    starts.sort_unstable();
-    let table = |(number, label): (usize, &crate::ir::Label)| {
-        let start = label.position as usize;
-        let end = starts[starts.partition_point(|next| *next <= start).min(starts.len() - 1)];
-        let kinds = types.get(start..end).unwrap_or(&[]).iter().map(|ty| Kind::of(*ty));
-        let kind = kinds.reduce(Kind::join).unwrap_or(Kind::Any);
-        let origin = Origin { what: What::Table, span: label.span, scope: ScopeId::ROOT };
-        (LabelId(number as u32), V::new(kind, Some(origin)))
+    let typed = |(label, kind): (LabelId, Kind)| {
+        let span = ir.labels[label.0 as usize].span;
+        (label, V::new(kind, Some(Origin { what: What::Table, span, scope: ScopeId::ROOT })))
     };
-    labels.map(table).collect()
+    given::tables(&ir.labels, types).into_iter().map(typed).collect()
 }
 
 /// The instruction that converts from one type to another.
@@ -454,8 +445,26 @@ fn wrong_source(
         }
         _ => String::new(),
     };
-    let help = format!("{declare}{}or write `{written}:bits` if its bits are meant", convert(ty, wanted));
+    // What compares integers has a counterpart for floats: to round them first would compare others.
+    let instead = match comparison(operation.row(), ty) {
+        Some(other) => {
+            format!("compare {} with `{other}`, ", if ty == Type::F { "floats" } else { "integers" })
+        }
+        None => convert(ty, wanted),
+    };
+    let help = format!("{declare}{instead}or write `{written}:bits` if its bits are meant");
     context.report(ScopeId(operation.expansion), warning.help(help));
+}
+
+/// The instruction that compares floats as this one compares integers.
+fn comparison(row: &Row, ty: Type) -> Option<&'static str> {
+    let compares = |row: &Row, ty| row.effect == Effect::Compute && row.types == [Type::I, ty, ty];
+    if ty != Type::F || !compares(row, Type::I) {
+        return None;
+    }
+    let forms: Vec<String> = row.forms().map(|form| form.symbol).collect();
+    let same = |other: &&Row| compares(other, ty) && other.forms().any(|form| forms.contains(&form.symbol));
+    ROWS.iter().find(same).map(|row| row.mnemonic)
 }
 
 /// An operand without the type that it is taken as.

@@ -11,7 +11,7 @@ use crate::report::diag::{Diagnostic, Sink};
 use crate::report::source::Span;
 use foldhash::{HashSet, HashSetExt as _};
 use std::collections::BTreeMap;
-use takt_isa::program::{LoopBound, Port, Range, Section, Space, Symbol};
+use takt_isa::program::{LoopBound, Port, Range, Section, Symbol};
 use takt_isa::{BundleAddress, Instruction, Program, Register, SlotIndex, Type};
 
 /// A program, and which of its words a macro, a repetition or the assembler itself made (as indices into its code, ascending).
@@ -118,7 +118,7 @@ pub(crate) fn is_too_long(ir: &Ir) -> bool {
     ir.operations().filter(|operation| operation.slot.is_some()).count() > words
 }
 
-/// The memories of the machine hold only so much.
+/// The program memory of the machine holds only so much.
 pub(crate) fn limits(ir: &Ir, sink: &mut Sink) {
     let depth = ir.machine.code_depth as usize;
     if ir.bundles.len() > depth {
@@ -126,16 +126,6 @@ pub(crate) fn limits(ir: &Ir, sink: &mut Sink) {
         let message =
             format!("{} bundles, and {}'s program memory holds {depth}", ir.bundles.len(), ir.machine.name);
         sink.push(Diagnostic::error("memory-full", first, message).here("the first that does not fit"));
-    }
-    let depth = ir.machine.data_depth as usize;
-    if ir.data.len() > depth {
-        let message = format!("{} words, and {}'s data memory holds {depth}", ir.data.len(), ir.machine.name);
-        let last =
-            ir.labels.iter().filter(|label| label.space == Space::Data).max_by_key(|label| label.position);
-        sink.push(match last {
-            Some(label) => Diagnostic::error("memory-full", label.span, message).here("the last part of it"),
-            None => Diagnostic::placeless("memory-full", message),
-        });
     }
 }
 

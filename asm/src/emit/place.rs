@@ -9,8 +9,9 @@
 //! last use: it takes a register that is free for so long. While there are enough, each gets one of its own.
 
 use crate::ir::runs::Run;
-use crate::ir::{Ir, RegisterId, RegisterKind, VirtualRegister};
+use crate::ir::{Ir, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::report::diag::{Diagnostic, Sink};
+use crate::report::source::Span;
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use takt_isa::{Bank, Register, SlotIndex};
 
@@ -75,47 +76,88 @@ pub(crate) struct Room {
     homeless: Vec<usize>,
 }
 
+/// How many values a bank must hold at a time at most, and the first bundle where it must.
+#[derive(Clone, Copy, Default)]
+struct Peak {
+    values: usize,
+    bundle: u32,
+}
+
 impl Room {
     /// By slot, how many values its bank must hold at a time at most.
-    pub(crate) fn needed(&self) -> Vec<usize> {
-        let mut changes: Vec<BTreeMap<u32, i64>> = vec![BTreeMap::new(); self.free.len()];
-        for (range, writer) in self.ranges.iter().zip(&self.writer) {
-            if let (Some((first, last)), Some(slot)) = (*range, *writer) {
-                // What is never read needs its register for a moment.
-                let last = last.max(first + 1);
-                *changes[slot.index()].entry(first).or_default() += 1;
-                *changes[slot.index()].entry(last).or_default() -= 1;
-            }
-        }
-        let most = |changes: &BTreeMap<u32, i64>| {
-            let counts = changes.values().scan(0, |count, change| {
-                *count += change;
-                Some(*count)
-            });
-            counts.max().unwrap_or(0) as usize
-        };
-        changes.iter().map(most).collect()
+    fn peaks(&self) -> Vec<Peak> {
+        peaks(&self.ranges, &self.writer, self.free.len())
+    }
+
+    fn holds_values(&self) -> bool {
+        self.peaks().iter().zip(&self.free).all(|(peak, free)| peak.values <= *free)
     }
 
     /// Whether a bank has too few registers for values that are needed at the same time, and all else has its place.
     pub(crate) fn is_short(&self) -> bool {
-        let enough = self.needed().iter().zip(&self.free).all(|(needed, free)| needed <= free);
-        !enough && self.missing.is_empty() && self.homeless.is_empty()
+        !self.holds_values() && self.missing.is_empty() && self.homeless.is_empty()
     }
+
+    /// How many registers are missing.
+    pub(crate) fn shortage(&self) -> usize {
+        let peaks = self.peaks();
+        let values = peaks.iter().zip(&self.free).map(|(peak, free)| peak.values.saturating_sub(*free));
+        values.sum::<usize>() + self.missing.len() + self.homeless.len()
+    }
+
+    /// Whether everything has its place.
+    pub(crate) fn has_all(&self) -> bool {
+        self.missing.is_empty() && self.homeless.is_empty() && self.holds_values()
+    }
+}
+
+fn peaks(ranges: &[Option<(u32, u32)>], writer: &[Option<SlotIndex>], slots: usize) -> Vec<Peak> {
+    let mut changes: Vec<BTreeMap<u32, i64>> = vec![BTreeMap::new(); slots];
+    for (range, writer) in ranges.iter().zip(writer) {
+        if let (Some((first, last)), Some(slot)) = (*range, *writer) {
+            // What is never read needs its register for a moment.
+            let last = last.max(first + 1);
+            *changes[slot.index()].entry(first).or_default() += 1;
+            *changes[slot.index()].entry(last).or_default() -= 1;
+        }
+    }
+    let most = |changes: &BTreeMap<u32, i64>| {
+        let mut peak = Peak::default();
+        let mut count = 0;
+        for (&bundle, change) in changes {
+            count += change;
+            if count as usize > peak.values {
+                peak = Peak { values: count as usize, bundle };
+            }
+        }
+        peak
+    };
+    changes.iter().map(most).collect()
 }
 
 /// Gives every register that is used a place. `why` is what has been found of values that find none: why they cannot be kept
 /// elsewhere.
 pub(crate) fn place(ir: &Ir, runs: &[Run], why: Option<&str>, sink: &mut Sink) -> Placement {
     let mut room = room(ir, runs, sink);
-    let at_a_time = room.needed();
+    let peaks = room.peaks();
     let shared = share(ir, &mut room);
-    report(ir, &room, &at_a_time, why, sink);
+    report(ir, &room, &peaks, why, sink);
     Placement { addresses: room.addresses, shared }
 }
 
-/// Places all registers but those of short-lived values.
+/// Places all registers but those of short-lived values. While there are enough, constants leave room for all of these; if not,
+/// for as many as are needed at a time.
 pub(crate) fn room(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Room {
+    let room = room_beside(ir, runs, false, sink);
+    if room.has_all() {
+        return room;
+    }
+    let closer = room_beside(ir, runs, true, &mut Sink::default());
+    if closer.shortage() < room.shortage() { closer } else { room }
+}
+
+/// The same. Where it is `close`, constants leave the registers that short-lived values need at a time, and no more.
+fn room_beside(ir: &Ir, runs: &[Run], close: bool, sink: &mut Sink) -> Room {
     let machine = ir.machine;
     // The slot that writes each register, and whether an operation uses it at all.
     let mut writer: Vec<Option<SlotIndex>> = vec![None; ir.registers.len()];
@@ -137,10 +179,18 @@ pub(crate) fn room(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Room {
     outputs(ir, &writer, &mut space, &mut addresses, sink);
     let mut ranges = ranges(ir, runs);
     let is_local = |index: usize| ranges[index].is_some() && addresses[index].is_none();
-    // The most registers that short-lived values need in each bank: room that constants leave if they can.
+    // The registers that short-lived values need in each bank: room that constants leave if they can.
     let mut wanted_by_locals = vec![0; machine.slots.len()];
-    for index in (0..ir.registers.len()).filter(|index| is_local(*index)) {
-        wanted_by_locals[writer[index].unwrap_or(SlotIndex::FIRST).index()] += 1;
+    if close {
+        let local =
+            |(index, range): (usize, &Option<(u32, u32)>)| range.filter(|_| addresses[index].is_none());
+        let local: Vec<Option<(u32, u32)>> = ranges.iter().enumerate().map(local).collect();
+        let needed = peaks(&local, &writer, machine.slots.len());
+        wanted_by_locals = needed.iter().map(|peak| peak.values as i64).collect();
+    } else {
+        for index in (0..ir.registers.len()).filter(|index| is_local(*index)) {
+            wanted_by_locals[writer[index].unwrap_or(SlotIndex::FIRST).index()] += 1;
+        }
     }
     // Constants come after what has its bank: they go wherever there is room.
     let is_constant = |index: &usize| {
@@ -173,9 +223,9 @@ pub(crate) fn room(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Room {
         let kind = ir.registers[index].kind;
         let windows = machine.slots.iter().enumerate();
         let windows = windows.map(|(s, slot)| (s, Window::of(&slot.bank, kind, machine.outputs_per_bank)));
-        // The first of equals.
-        let roomiest =
-            windows.rev().max_by_key(|(s, window)| space.room(*window) as i64 - wanted_by_locals[*s]);
+        // The first of equals; one that is full has none to spare, however little its values need.
+        let open = windows.rev().filter(|(_, window)| space.room(*window) > 0);
+        let roomiest = open.max_by_key(|(s, window)| space.room(*window) as i64 - wanted_by_locals[*s]);
         match roomiest.and_then(|(_, window)| space.take(window)) {
             Some(address) => addresses[index] = Some(address),
             None => homeless.push(index),
@@ -340,22 +390,56 @@ fn share(ir: &Ir, room: &mut Room) -> Vec<bool> {
     shared
 }
 
+/// What the registers of a bank are needed for.
+struct Fill {
+    constants: usize,
+    /// States, and what more than one block uses.
+    lasting: usize,
+    /// Values that only one block uses, at a time.
+    values: usize,
+    /// Where one of the constants is used.
+    constant: Option<Span>,
+}
+
+impl Fill {
+    fn total(&self) -> usize {
+        self.constants + self.lasting + self.values
+    }
+}
+
+impl std::fmt::Display for Fill {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let of = |count: usize, one: &str, many: &str| match count {
+            0 => None,
+            1 => Some(format!("1 {one}")),
+            count => Some(format!("{count} {many}")),
+        };
+        let parts = [
+            of(self.constants, "for a constant", "for constants"),
+            of(
+                self.lasting,
+                "for a name that keeps its value from block to block",
+                "for names that keep their values from block to block",
+            ),
+            of(
+                self.values,
+                "for a value of a block",
+                "for values of one block that are needed at the same time",
+            ),
+        ];
+        let parts: Vec<String> = parts.into_iter().flatten().collect();
+        f.write_str(&parts.join(", "))
+    }
+}
+
 /// One error for each bank that is full.
-fn report(ir: &Ir, room: &Room, at_a_time: &[usize], why: Option<&str>, sink: &mut Sink) {
+fn report(ir: &Ir, room: &Room, peaks: &[Peak], why: Option<&str>, sink: &mut Sink) {
     let machine = ir.machine;
-    let Room { writer, missing, homeless, .. } = room;
+    let Room { missing, homeless, .. } = room;
     let mut rest: Vec<&(usize, Option<SlotIndex>)> = missing.iter().collect();
     while let Some(&&(first, slot)) = rest.first() {
         let kind = ir.registers[first].kind;
         let same = |(_, other): &(usize, Option<SlotIndex>)| *other == slot;
-        let names: Vec<&str> = rest
-            .iter()
-            .filter(|entry| same(entry))
-            .map(|entry| match ir.registers[entry.0].name.as_str() {
-                "" => "a part of an equation",
-                name => name,
-            })
-            .collect();
         let bank = slot.map_or(&machine.inputs, |slot| &machine.slot(slot).bank);
         let window = Window::of(bank, kind, machine.outputs_per_bank);
         let available = usize::from(window.end - window.first);
@@ -365,60 +449,117 @@ fn report(ir: &Ir, room: &Room, at_a_time: &[usize], why: Option<&str>, sink: &m
             address.is_some_and(|address| (window.first..window.end).contains(&address.get()))
         };
         let placed = (0..).zip(&room.addresses).filter(|(index, address)| lasts(*index) && inside(address));
-        let lasting = placed.count() + rest.iter().filter(|entry| same(entry) && lasts(entry.0)).count();
-        let needed = lasting + slot.map_or(0, |slot| at_a_time[slot.index()]);
-        let what = match kind {
-            RegisterKind::Input => "input ports".to_owned(),
-            _ => format!("registers in bank {}", bank.name),
+        let (constants, others): (Vec<usize>, Vec<usize>) = placed
+            .map(|(index, _)| index)
+            .partition(|index| matches!(ir.registers[*index].kind, RegisterKind::Constant(_)));
+        let peak = slot.map_or(Peak::default(), |slot| peaks[slot.index()]);
+        let fill = Fill {
+            constants: constants.len(),
+            lasting: others.len() + rest.iter().filter(|entry| same(entry) && lasts(entry.0)).count(),
+            values: peak.values,
+            constant: constants.last().map(|index| ir.registers[*index].span),
         };
-        let mut error = Diagnostic::error(
-            "bank-full",
-            ir.registers[first].span,
-            format!("{needed} {what} are needed, and {} has {available}", machine.name),
-        )
-        .here("no room for this one");
-        error = error.note(format!("no room for: {}", few(&names)));
-        if let Some(slot) = slot {
-            let slot = machine.slot(slot);
-            error =
-                error.note(format!("bank {} is the one that slot `{}` writes", slot.bank.name, slot.name));
+        // Where constants find no room, neither do values: that is the same mistake.
+        if lasts(first) || homeless.is_empty() {
+            sink.push(full(ir, room, (first, slot), &fill, peak, available, why));
         }
-        if let Some(why) = why {
-            error = error.note(why);
-        }
-        if matches!(kind, RegisterKind::Plain | RegisterKind::State) {
-            error = error.help("use a register again once its value is no longer needed");
-        }
-        sink.push(error);
         rest.retain(|entry| !same(entry));
     }
     if let Some(first) = homeless.first() {
-        let written = writer.iter().filter(|slot| slot.is_some()).count();
         let available: usize = machine
             .slots
             .iter()
             .map(|slot| usize::from(slot.bank.depth - machine.outputs_per_bank.min(slot.bank.depth)))
             .sum();
-        let constants =
-            ir.registers.iter().filter(|register| matches!(register.kind, RegisterKind::Constant(_)));
-        let error = Diagnostic::error(
-            "bank-full",
-            ir.registers[*first].span,
-            format!(
-                "no register is left for {} constant{}",
-                homeless.len(),
-                if homeless.len() == 1 { "" } else { "s" }
-            ),
-        )
-        .note(format!(
-            "{} constants and {written} written registers, and {} has {available} registers",
-            constants.count(),
-            machine.name
-        ))
-        .help("load rarely used constants with `li`, or keep them in data memory");
+        let kind = |wanted: fn(RegisterKind) -> bool| {
+            ir.registers.iter().filter(move |register| wanted(register.kind)).count()
+        };
+        let fill = Fill {
+            constants: kind(|kind| matches!(kind, RegisterKind::Constant(_))),
+            lasting: lasting(ir, room),
+            values: peaks.iter().map(|peak| peak.values).sum(),
+            constant: None,
+        };
+        let plural = if homeless.len() == 1 { "" } else { "s" };
+        let message = format!("no register is left for {} constant{plural}", homeless.len());
+        let error = Diagnostic::error("bank-full", ir.registers[*first].span, message)
+            .note(format!("{} has {available} registers, and needed are {fill}", machine.name))
+            .help(CONSTANTS_ELSEWHERE);
         sink.push(error);
     }
 }
+
+/// Registers that keep their values from block to block.
+fn lasting(ir: &Ir, room: &Room) -> usize {
+    let is_one = |index: &usize| {
+        let kind = ir.registers[*index].kind;
+        matches!(kind, RegisterKind::Plain | RegisterKind::State) && room.ranges[*index].is_none()
+    };
+    let placed = (0..room.addresses.len()).filter(|index| room.addresses[*index].is_some()).filter(is_one);
+    placed.count() + room.missing.iter().filter(|(index, _)| is_one(index)).count()
+}
+
+/// The error of a full bank, or of too many inputs: `first` is the first register that finds no room.
+fn full(
+    ir: &Ir,
+    room: &Room,
+    (first, slot): (usize, Option<SlotIndex>),
+    fill: &Fill,
+    peak: Peak,
+    available: usize,
+    why: Option<&str>,
+) -> Diagnostic {
+    let (machine, register) = (ir.machine, &ir.registers[first]);
+    let needed = fill.total();
+    let missing = room.missing.iter().filter(|(_, other)| *other == slot);
+    let names: Vec<&str> = missing
+        .map(|(index, _)| ir.registers[*index].name.as_str())
+        .filter(|name| !name.is_empty())
+        .collect();
+    let Some(slot) = slot else {
+        let message = format!("{needed} input ports are needed, and {} has {available}", machine.name);
+        return Diagnostic::error("bank-full", register.span, message)
+            .here("no room for this one")
+            .note(format!("no room for: {}", few(&names)));
+    };
+    let slot_row = machine.slot(slot);
+    let bank = slot_row.bank.name;
+    let message =
+        format!("{needed} registers in bank {bank} are needed, and {} has {available}", machine.name);
+    // Values of a block are too many where most are needed at a time, not where one of them is declared.
+    let writes = |operation: &&Operation| operation.slot == Some(slot) && operation.dest.is_some();
+    let crowded = room.ranges[first].and_then(|_| {
+        let operations = &ir.bundles.get(peak.bundle as usize)?.operations;
+        operations.iter().find(writes).or(operations.first())
+    });
+    let mut error = match crowded {
+        Some(operation) => Diagnostic::error("bank-full", operation.span, message)
+            .here(format!("here the block needs {} values at a time", peak.values)),
+        None => Diagnostic::error("bank-full", register.span, message).here("no room for this one"),
+    };
+    let mostly_constants = fill.constants > fill.lasting + fill.values;
+    if let Some(span) = fill.constant.filter(|_| mostly_constants) {
+        error =
+            error.also(span, format!("one of {} constants, each of which has a register", fill.constants));
+    }
+    error = error.note(format!("bank {bank}, which slot `{}` writes: {fill}", slot_row.name));
+    if !names.is_empty() {
+        error = error.note(format!("no room for: {}", few(&names)));
+    }
+    if let Some(why) = why {
+        error = error.note(why);
+    }
+    if mostly_constants {
+        error.help(CONSTANTS_ELSEWHERE)
+    } else if crowded.is_some() {
+        error.help("compute what is needed late closer to where it is needed, or use fewer values at a time")
+    } else {
+        error.help("use a register again once its value is no longer needed")
+    }
+}
+
+/// Where a constant can be if not in a register.
+const CONSTANTS_ELSEWHERE: &str = "load rarely used constants with `li`, or keep them in data memory";
 
 /// The first names of a list.
 fn few(names: &[&str]) -> String {

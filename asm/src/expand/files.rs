@@ -6,7 +6,7 @@ use crate::expand::{Expander, FrameKind};
 use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::nearest;
-use crate::report::source::Span;
+use crate::report::source::{Lines, Span};
 use crate::syntax::parse;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -39,9 +39,11 @@ pub(crate) enum Unread {
 fn text_of(bytes: Vec<u8>) -> Result<String, Unread> {
     String::from_utf8(bytes).map_err(|error| {
         let offset = error.utf8_error().valid_up_to();
-        let before = &error.as_bytes()[..offset];
-        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
-        let column = offset - before.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1) + 1;
+        // What precedes is text.
+        let before = std::str::from_utf8(&error.as_bytes()[..offset]).unwrap_or_default();
+        let lines = Lines::of(before);
+        let index = lines.index(offset as u32);
+        let (line, column) = (index + 1, offset - lines.range(index).map_or(0, |range| range.start) + 1);
         Unread::NotText { byte: error.as_bytes()[offset], offset, line, column }
     })
 }

@@ -62,8 +62,8 @@ pub(crate) struct Fast {
 pub(crate) enum Data {
     /// A number, by its type.
     Value(At, Expr, Type),
-    /// Zeros.
-    Space(u32),
+    /// Zeros: where they are asked for, and how many.
+    Space(At, Span, u32),
 }
 
 /// A `.loop_bound`: of the bundle that follows, by its number in its section.
@@ -79,7 +79,7 @@ pub(crate) struct LoopBound {
 /// A `.preset`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Preset {
-    pub(crate) register: Name,
+    pub(crate) register: Operand,
     /// Whether `@` stands before it.
     pub(crate) placed: bool,
     pub(crate) value: Expr,
@@ -548,7 +548,7 @@ impl<'l> Expander<'l> {
                     return Err(self.context.error(at.scope, "limit", words.span, message));
                 }
                 self.data_words += count as usize;
-                self.flat.data.push(Data::Space(count as u32));
+                self.flat.data.push(Data::Space(at, words.span, count as u32));
                 self.check_data(at, span);
             }
             DirectiveKind::Macro { name, parameters, end } => {

@@ -1,11 +1,12 @@
 //! What the source says of the types of operations' parts, where the instruction leaves them open.
 
-use crate::ir::{LabelId, Operation};
+use crate::ir::{Label, LabelId, Operation};
 use crate::report::source::Span;
 use crate::syntax::expr::Value;
 use foldhash::HashMap;
 use smallvec::SmallVec;
 use takt_isa::Type;
+use takt_isa::program::Space;
 
 /// What is known of a value's type.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -43,6 +44,23 @@ impl Kind {
             _ => None,
         }
     }
+}
+
+/// The types of the tables of data memory, given those of its words: what all words of a table have in common. Each goes from
+/// its label to the next table's.
+pub(crate) fn tables(labels: &[Label], types: &[Type]) -> HashMap<LabelId, Kind> {
+    let mut starts: Vec<usize> =
+        labels.iter().filter(|label| label.is_table()).map(|label| label.position as usize).collect();
+    starts.push(types.len());
+    starts.sort_unstable();
+    let table = |(number, label): (usize, &Label)| {
+        let start = label.position as usize;
+        let end = starts[starts.partition_point(|next| *next <= start).min(starts.len() - 1)];
+        let kinds = types.get(start..end).unwrap_or(&[]).iter().map(|ty| Kind::of(*ty));
+        (LabelId(number as u32), kinds.reduce(Kind::join).unwrap_or(Kind::Any))
+    };
+    let labels = labels.iter().enumerate().filter(|(_, label)| label.space == Space::Data);
+    labels.map(table).collect()
 }
 
 /// A part of an operation that the source says something of.

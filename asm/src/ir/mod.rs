@@ -277,6 +277,14 @@ pub struct Label {
     pub span: Span,
 }
 
+impl Label {
+    /// Whether it begins a table of data memory. One whose name begins with `_` stands within the table before it.
+    pub(crate) fn is_table(&self) -> bool {
+        let name = self.name.rsplit('.').next().unwrap_or(&self.name);
+        self.space == Space::Data && !name.starts_with('_')
+    }
+}
+
 /// How often a loop may turn.
 #[derive(Clone, Copy, Debug)]
 pub struct LoopBound {

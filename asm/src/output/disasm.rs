@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use std::fmt::Write as _;
 use takt_isa::program::{Columns, Location, Port, Space};
 use takt_isa::spec::instructions::Function;
+use takt_isa::text::push_visible;
 use takt_isa::{BundleAddress, Effect, Instruction, Op, Program, Register, SlotIndex, Type};
 
 /// The source text of a program.
@@ -264,7 +265,8 @@ fn quoted(text: &str) -> String {
             '"' | '\\' => quoted.extend(['\\', c]),
             '\n' => quoted.push_str("\\n"),
             '\r' => quoted.push_str("\\r"),
-            c => quoted.push(c),
+            // In a name of a file, say: what a terminal would obey.
+            c => push_visible(&mut quoted, c),
         }
     }
     quoted.push('"');

@@ -6,7 +6,7 @@
 //! directive that cannot be read is left as it is, on all its lines.
 
 use crate::report::diag::Sink;
-use crate::report::source::Sources;
+use crate::report::source::{Sources, line_feeds};
 use crate::syntax::intern::Interner;
 use crate::syntax::parse;
 use crate::syntax::tokens::{Token, TokenKind, lines};
@@ -20,6 +20,8 @@ pub const COMMENT: usize = 40;
 
 /// The source, laid out. Laying it out again changes nothing.
 pub fn format(text: &str) -> String {
+    // A carriage return alone ends a line too.
+    let text = &*line_feeds(text);
     let (mut sources, mut names, mut sink) = (Sources::default(), Interner::new(), Sink::default());
     // What is too large for the assembler is nothing to be laid out.
     let Some(file) = sources.add("", text.into()) else { return text.to_owned() };

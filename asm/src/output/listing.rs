@@ -4,8 +4,10 @@ use crate::Assembled;
 use crate::report::source::Lines;
 use crate::syntax::expr::Value;
 use serde::Serialize;
+use std::borrow::Cow;
 use std::fmt::Write as _;
 use takt_isa::program::{Columns, Location, Port, Space};
+use takt_isa::text::visible;
 use takt_isa::{Instruction, Program, SlotIndex, Type};
 
 /// The listing of an assembled program: for each bundle its address, its words in the order of the slots, and the source
@@ -17,7 +19,10 @@ pub fn listing(assembled: &Assembled) -> String {
     lister.code();
     lister.data();
     lister.constants();
-    lister.text
+    match visible(&lister.text) {
+        Cow::Borrowed(_) => lister.text,
+        Cow::Owned(text) => text,
+    }
 }
 
 struct Lister<'a> {

@@ -9,7 +9,6 @@ use crate::syntax::ast::Operator;
 use crate::syntax::ast::*;
 use crate::syntax::name::NameRef;
 use std::rc::Rc;
-use takt_isa::program::Space;
 
 /// Nodes of expressions, and of the arguments that they name, that are looked at for a label.
 const NODES: u32 = 1 << 12;
@@ -58,12 +57,10 @@ impl Resolver<'_> {
     /// A constant address by the name of a table lies in that table.
     fn check_table(&mut self, at: At, label: LabelId, word: i64, span: Span) {
         let context = &self.context;
-        let tables = || context.declared.labels.iter().filter(|label| label.space == Space::Data);
+        let tables = || context.declared.labels.iter().filter(|label| label.is_table());
         let found = &context.declared.labels[label.0 as usize];
         let (first, words) = (i64::from(found.position), i64::from(self.data_words));
-        // A label whose name begins with `_` stands within a table.
-        let is_table = |name: &str| !name.rsplit('.').next().unwrap_or(name).starts_with('_');
-        let next = tables().filter(|other| other.position > found.position && is_table(&other.name));
+        let next = tables().filter(|other| other.position > found.position);
         let end = next.map(|other| i64::from(other.position)).min().unwrap_or(words);
         if (first..end).contains(&word) {
             return;
@@ -73,7 +70,7 @@ impl Resolver<'_> {
         let message = format!("this is {side} of `{}`", found.name);
         let mut error = Diagnostic::error("table", span, message)
             .also(found.span, format!("`{}` has {}", found.name, count(end - first)));
-        let there = tables().filter(|other| i64::from(other.position) <= word && is_table(&other.name));
+        let there = tables().filter(|other| i64::from(other.position) <= word);
         match there.max_by_key(|other| other.position).filter(|_| word < words) {
             Some(other) => {
                 error.severity = Severity::Warning;

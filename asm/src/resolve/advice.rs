@@ -5,8 +5,10 @@ use crate::context::{At, Reported};
 use crate::expand::load::Loader;
 use crate::report::diag::Diagnostic;
 use crate::report::nearest;
+use crate::report::source::{Span, line_feeds};
 use crate::resolve::Resolver;
 use crate::syntax::ast::*;
+use crate::syntax::foreign;
 use crate::syntax::name::NameId;
 use takt_isa::{Effect, ROWS, Row};
 
@@ -72,7 +74,11 @@ impl Resolver<'_> {
             span,
             format!("there is no instruction or macro `{text}`"),
         );
-        let error = if Directive::ALL.iter().any(|known| known.name() == directive) {
+        let rest = Span::new(span.end, written.span.end);
+        let rest = self.context.reports.sources.text(rest);
+        let error = if let Some(help) = foreign::statement(&text, rest) {
+            error.help(help)
+        } else if Directive::ALL.iter().any(|known| known.name() == directive) {
             error.did_you_mean(Some(directive))
         } else if let Some(file) = self.library_with(&text) {
             from_library(error, &file)
@@ -106,7 +112,9 @@ impl Resolver<'_> {
         let libraries = self.loader.places().iter().filter(|place| !place.takes_quoted());
         let mut files = libraries.flat_map(|place| place.names().into_iter().map(move |name| (place, name)));
         let found = files.find(|(place, name)| {
-            place.load(name).is_ok_and(|bytes| String::from_utf8_lossy(&bytes).lines().any(defines))
+            place
+                .load(name)
+                .is_ok_and(|bytes| line_feeds(&String::from_utf8_lossy(&bytes)).lines().any(defines))
         });
         found.map(|(_, name)| name)
     }

@@ -6,7 +6,7 @@ use crate::context::{At, Reported, Wanted, type_name, words};
 use crate::expand::equation::Results;
 use crate::expand::{Fast, Item};
 use crate::ir::given::Kind;
-use crate::ir::{Attribution, Bundle, Operation, RegisterId, RegisterKind, VirtualRegister};
+use crate::ir::{Attribution, Bundle, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
@@ -18,7 +18,7 @@ use crate::syntax::ast::*;
 use crate::syntax::expr::Value;
 use smallvec::SmallVec;
 use std::rc::Rc;
-use takt_isa::{Op, Slots, Type};
+use takt_isa::{Effect, Op, Slots, Type};
 
 /// What a part of an equation is.
 #[derive(Clone, Copy, Debug)]
@@ -173,16 +173,45 @@ impl Resolver<'_> {
         if let Some(kind) = given(Part::Dest).or_else(|| given(Part::Immediate)) {
             return kind;
         }
-        let source = |which: usize| {
-            let id = operation.sources[which];
-            given(Part::Source(which as u8)).unwrap_or_else(|| {
-                match self.context.declared.registers[id.index()].kind {
-                    RegisterKind::Constant(_) | RegisterKind::Zero => Kind::Any,
-                    _ => self.kind(id),
-                }
-            })
-        };
-        self.forms.result(operation.op, source)
+        match operation.row().effect {
+            // What is loaded has the type of its table, whatever type the index has.
+            Effect::Load => self.table_kind(operation).map_or(Kind::Any, |(_, kind)| kind),
+            _ => self.forms.result(operation.op, |which| self.source_kind(operation, which)),
+        }
+    }
+
+    /// What is known of the type of a source of an operation.
+    fn source_kind(&self, operation: &Operation, which: usize) -> Kind {
+        use crate::ir::given::{Given, Part};
+        match self.context.declared.given.get(operation, Part::Source(which as u8)) {
+            Some(Given::Cast(ty)) => return Kind::of(ty),
+            Some(Given::Literal { kind, .. }) => return kind,
+            _ => {}
+        }
+        let id = operation.sources[which];
+        match self.context.declared.registers[id.index()].kind {
+            RegisterKind::Constant(_) | RegisterKind::Zero => Kind::Any,
+            _ => self.kind(id),
+        }
+    }
+
+    /// The table that a load or store names, and what is known of the type of its words.
+    fn table_kind(&self, operation: &Operation) -> Option<(LabelId, Kind)> {
+        use crate::ir::given::{Given, Part};
+        match self.context.declared.given.get(operation, Part::Table) {
+            Some(Given::Table(label)) => self.tables.get(&label).map(|kind| (label, *kind)),
+            _ => None,
+        }
+    }
+
+    /// Notes for the equations below what a store leaves in its table.
+    pub(super) fn note_store(&mut self, operation: &Operation) {
+        if operation.row().effect == Effect::Store
+            && let Some((label, kind)) = self.table_kind(operation)
+        {
+            let kind = kind.join(self.source_kind(operation, 1));
+            self.tables.insert(label, kind);
+        }
     }
 
     /// Writes an equation's values to its registers, all of them computed before any is written.

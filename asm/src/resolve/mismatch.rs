@@ -8,6 +8,7 @@ use crate::report::source::Span;
 use crate::resolve::Resolver;
 use crate::resolve::advice::from_library;
 use crate::resolve::equation::Term;
+use crate::syntax::ast::Operator;
 use takt_isa::Type;
 
 impl Resolver<'_> {
@@ -42,14 +43,17 @@ impl Resolver<'_> {
                 .any(|meaning| meaning.sources.iter().any(|which| meaning.op.row().source_type(*which) == ty))
         };
         let error = match (find(Kind::Int), find(Kind::Float)) {
-            (Some(int), Some(float)) => {
+            // Where neither would do as the other is, both being of its type is no help.
+            (Some(int), Some(float)) if condition || wants(Type::F) => {
                 let (name, other) = (text(self, int), text(self, float));
                 let message = format!("{shown} between an integer and a float");
                 let error = Diagnostic::error("equation", int.span, message)
                     .here("an integer")
                     .also(float.span, "a float");
+                // A comparison with a float that is rounded first would compare another.
+                let compares = Operator::COMPARISONS.iter().any(|operator| operator.text() == symbol);
                 match (convert(Type::I, Type::F), convert(Type::F, Type::I)) {
-                    (Some(float_of), Some(int_of)) if wants(Type::I) => error
+                    (Some(float_of), Some(int_of)) if wants(Type::I) && !compares => error
                         .help(format!("convert one of them: `{float_of}({name})` or `{int_of}({other})`")),
                     (Some(float_of), _) => {
                         error.mend(format!("convert it: `{float_of}({name})`"), format!("{float_of}({name})"))
@@ -79,6 +83,21 @@ impl Resolver<'_> {
                 let name = text(self, float);
                 let message = format!("{shown} takes integers, and `{name}` is a float");
                 let error = Diagnostic::error("equation", float.span, message).here("a float");
+                let (and, or, not) = (Operator::And.text(), Operator::Or.text(), Operator::Not.text());
+                if symbol == not {
+                    let zero = format!("{name} == 0");
+                    let message = error.message;
+                    let error = Diagnostic::error("equation", span, message)
+                        .mend(format!("compare it: `{zero}`"), zero);
+                    return self.context.report(at.scope, error);
+                }
+                if symbol == and || symbol == or {
+                    // Bits of a number, as a condition; or a comparison without its parentheses.
+                    let error = error.help(format!(
+                        "conditions are comparisons in parentheses, as `({name} > 0) {symbol} …`; declare `{name}:bits` if its pattern is meant"
+                    ));
+                    return self.context.report(at.scope, error);
+                }
                 match convert(Type::F, Type::I) {
                     Some(convert) => error.mend(
                         format!(

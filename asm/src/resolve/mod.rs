@@ -15,9 +15,10 @@ mod slots;
 use crate::context::{Array, At, Binding, Context, Reported, ScopeId};
 use crate::expand::load::Loader;
 use crate::expand::{self, Data, Flat, Item, Timing};
-use crate::ir::given::Kind;
+use crate::ir::given::{self, Kind};
 use crate::ir::{
-    Attribution, Bundle, Constant, Demand, DemandKind, Ir, LoopBound, Operation, RegisterId, RegisterKind,
+    Attribution, Bundle, Constant, Demand, DemandKind, Ir, LabelId, LoopBound, Operation, RegisterId,
+    RegisterKind,
 };
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
@@ -30,7 +31,7 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 use takt_isa::program::{Location, Range};
 use takt_isa::spec::instructions::Function;
-use takt_isa::{Op, ROWS, Register, Slots, Type};
+use takt_isa::{MACHINES, Op, ROWS, Register, Slots, Type};
 
 /// The most cycles that a demand on ports can name: many times what a program memory holds.
 const MAX_CYCLES: u32 = 1 << 24;
@@ -67,11 +68,17 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         parts: Vec::new(),
         versions: Vec::new(),
     };
-    let words = |data: &Data| match data {
-        Data::Space(count) => *count,
-        Data::Value(..) => 1,
-    };
-    let data_words = flat.data.iter().map(words).sum();
+    let types = flat.data.iter().flat_map(|data| match data {
+        Data::Space(_, _, count) => std::iter::repeat_n(Type::B, *count as usize),
+        Data::Value(_, _, ty) => std::iter::repeat_n(*ty, 1),
+    });
+    context.declared.data_types = types.collect();
+    let tables = given::tables(&context.declared.labels, &context.declared.data_types);
+    let data_words = context.declared.data_types.len() as u32;
+    let is_full = data_words > machine.data_depth;
+    if is_full {
+        data_full(context, &flat.data, data_words);
+    }
     let (pool, own_files) = (HashMap::default(), Vec::new());
     let has_equations = context.asts.iter().any(|ast| !ast.equations.is_empty());
     let mut resolver = Resolver {
@@ -84,6 +91,8 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         own_files,
         label: 0,
         data_words,
+        is_full,
+        tables,
         cast: None,
         forms: Forms::new(),
         kinds: Vec::new(),
@@ -115,6 +124,46 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
     ir
 }
 
+/// Reports that the source declares more data than the machine has memory for.
+fn data_full(context: &mut Context, data: &[Data], words: u32) {
+    let depth = context.machine.data_depth;
+    let message = format!(
+        "the data memory is full: {words} words of data, and {} has {depth}, {} too few",
+        context.machine.name,
+        words - depth
+    );
+    // What the first word without a place belongs to.
+    let mut end = 0;
+    let found = data.iter().find_map(|data| {
+        let (at, span, count) = match *data {
+            Data::Space(at, span, count) => (at, span, count),
+            Data::Value(at, value, _) => (at, value.span, 1),
+        };
+        end += count;
+        (end > depth).then_some((at, span, end - count))
+    });
+    let Some((at, span, start)) = found else { return };
+    let here = match depth - start {
+        0 => "no room from here on".to_owned(),
+        fitting => format!("room for {fitting} of these"),
+    };
+    let mut error = Diagnostic::error("memory-full", span, message).here(here);
+    let tables = context.declared.labels.iter().filter(|label| label.is_table() && label.position <= depth);
+    if let Some(table) = tables.max_by_key(|label| label.position) {
+        error = error.also(table.span, format!("in `{}`", table.name));
+    }
+    let enough = MACHINES.iter().filter(|machine| machine.data_depth >= words);
+    let enough: Vec<&str> = enough.map(|machine| machine.name).collect();
+    let error = match &enough[..] {
+        [] => {
+            let most = MACHINES.iter().map(|machine| machine.data_depth).max().unwrap_or(depth);
+            error.note(format!("no machine has more than {most}"))
+        }
+        names => error.help(format!("assemble for {}, whose data memory holds it", names.join(" or "))),
+    };
+    context.report(at.scope, error);
+}
+
 /// Which slots execute an instruction.
 #[derive(Clone, Copy)]
 enum Host {
@@ -140,6 +189,10 @@ pub(crate) struct Resolver<'c> {
     pub(crate) cast: Option<Type>,
     /// Words of data memory that the source declares.
     pub(crate) data_words: u32,
+    /// Whether that is more than the machine has, which is reported.
+    pub(crate) is_full: bool,
+    /// What is known of the types of tables, as far as the program is read.
+    pub(crate) tables: HashMap<LabelId, Kind>,
     /// What equations write for instructions.
     forms: Forms,
     /// What was last written to each register, above the line at hand.
@@ -293,6 +346,7 @@ impl Resolver<'_> {
     fn note_results(&mut self, bundle: &Bundle) {
         let is_opaque = bundle.is_opaque();
         for operation in &bundle.operations {
+            self.note_store(operation);
             if let Some(dest) = operation.dest {
                 let kind = self.result_kind(operation);
                 self.set_kind(dest, kind);
@@ -400,17 +454,15 @@ impl Resolver<'_> {
     fn data(&mut self) {
         for entry in std::mem::take(&mut self.flat.data) {
             match entry {
-                Data::Space(count) => {
+                Data::Space(_, _, count) => {
                     let length = self.ir.data.len() + count as usize;
                     self.ir.data.resize(length, 0);
-                    self.context.declared.data_types.resize(length, Type::B);
                 }
                 Data::Value(at, value, ty) => {
                     let word = self.context.value(at, value.id);
                     let word = word.and_then(|word| self.bits(at, word, ty, value.into()));
                     // A word with a mistake keeps its place.
                     self.ir.data.push(word.unwrap_or(0));
-                    self.context.declared.data_types.push(ty);
                 }
             }
         }
@@ -539,11 +591,11 @@ impl Resolver<'_> {
     fn range_registers(
         &mut self,
         at: At,
-        name: Name,
+        operand: Operand,
         placed: bool,
     ) -> Result<(Vec<RegisterId>, Type), Reported> {
-        if !placed {
-            let id = self.context.spelled(at, name.name, name.span)?;
+        if let (OperandKind::Name(name), false) = (operand.kind, placed) {
+            let id = self.context.spelled(at, name, operand.span)?;
             if let Binding::Array(number) = self.context.lookup(at.scope, id) {
                 let Array { first, sizes, .. } = &self.context.declared.arrays[number as usize];
                 let count = sizes.iter().product::<u32>() as usize;
@@ -553,7 +605,7 @@ impl Resolver<'_> {
                 return Ok((members, ty));
             }
         }
-        let (register, ty) = self.preset_register(at, name, placed)?;
+        let (register, ty) = self.preset_register(at, operand, placed)?;
         // A place has no type: its range is one of floats.
         Ok((vec![register], if placed { Type::F } else { ty }))
     }

@@ -365,18 +365,28 @@ impl Resolver<'_> {
         Err(self.context.report(at.scope, error))
     }
 
-    /// The register that a `.preset` names, by its name or its place.
+    /// The register that a `.preset` names, by its name or its place, or the element of an array.
     pub(crate) fn preset_register(
         &mut self,
         at: At,
-        name: Name,
+        operand: Operand,
         placed: bool,
     ) -> Result<(RegisterId, Type), Reported> {
-        let operand = Operand { kind: OperandKind::Name(name.name), span: name.span };
         let (place, given, meaning) = if placed { (at, operand, None) } else { self.meaning(at, operand)? };
         let (register, ty) = match (given.kind, meaning) {
             (_, Some((_, Binding::Register(register)))) => {
                 (register, self.context.declared.registers[register.index()].ty)
+            }
+            (_, Some((_, binding @ Binding::Array(array)))) => {
+                let Array { name, sizes, .. } = &self.context.declared.arrays[array as usize];
+                let first = vec!["1"; sizes.len()].join(",");
+                let message = format!("`{name}` is an array, and one register is needed here");
+                let help = format!("name its elements, as `{name}[{first}]`");
+                let mut error = Diagnostic::error("operand", given.span, message).help(help);
+                if let Some(declared) = self.context.declared.declaration(binding) {
+                    error = error.also(declared, "declared here");
+                }
+                return Err(self.context.report(at.scope, error));
             }
             (OperandKind::Name(name) | OperandKind::Place(name), _) => {
                 if let Some((id, Binding::None)) = meaning
@@ -597,6 +607,10 @@ impl Resolver<'_> {
                 (value, given.span, RegisterId::ZERO)
             }
         };
+        // Where the data has no room, its places are no mistakes of their own.
+        if self.is_full && self.table_of(place, given.kind).is_some() {
+            return Err(Reported);
+        }
         match self.field(at, value, Field::Offset, span, "an offset")? {
             Constant::Value(offset) => {
                 self.check_address(at, (place, given), offset, base, span);

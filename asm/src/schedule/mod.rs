@@ -64,10 +64,20 @@ pub struct Report {
     pub timing: Vec<TimingReport>,
 }
 
-/// Schedules every block of bundles that ask for it ([`Bundle::scheduled`]), and checks what is demanded of ports. With a `reach`, no
-/// operation issues before one that stands so many bundles or more before it in the source: fewer values are then needed at
-/// a time, and the schedule may be longer.
-pub fn schedule(ir: &mut Ir, effort: u32, reach: Option<usize>, sink: &mut Sink) -> Report {
+/// How far a schedule may depart from the source's order. The nearer to it, the fewer values are needed at a time, and the longer
+/// the schedule may be.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Order {
+    /// As far as need be.
+    Free,
+    /// No operation issues before one that stands so many bundles or more before it.
+    Near(usize),
+    /// Not at all: bundles stay as they are written, on the slots that they have without a scheduler.
+    Written,
+}
+
+/// Schedules every block of bundles that ask for it ([`Bundle::scheduled`]), and checks what is demanded of ports.
+pub fn schedule(ir: &mut Ir, effort: u32, order: Order, sink: &mut Sink) -> Report {
     if ir.demands.is_empty() && !ir.scheduled {
         return Report::default();
     }
@@ -93,10 +103,15 @@ pub fn schedule(ir: &mut Ir, effort: u32, reach: Option<usize>, sink: &mut Sink)
             continue;
         }
         let demands = Demands::new(ir, old, demands);
-        let mut block = Block::new(ir, &fixed_registers, old, scheduled.then_some(&banks));
-        if !scheduled {
+        let moves = scheduled && order != Order::Written;
+        let mut block = Block::new(ir, &fixed_registers, old, moves.then_some(&banks));
+        if !moves {
             let start = block.problem.as_written();
-            report.timing.extend(demands.check(&block, &start, None, scheduled, sink));
+            report.timing.extend(demands.check(&block, &start, None, scheduled && moves, sink));
+            if scheduled {
+                let cycles = start.last().map_or(0, |last| last + 1);
+                report.blocks.push(block.report(ir, *run, address, old.len(), cycles, block.problem.bound()));
+            }
             bundles.extend_from_slice(old);
             continue;
         }
@@ -104,20 +119,16 @@ pub fn schedule(ir: &mut Ir, effort: u32, reach: Option<usize>, sink: &mut Sink)
             bundles.extend_from_slice(old);
             continue;
         }
-        let bound = reach.map(|reach| block.problem.keep_near(reach));
+        let bound = match order {
+            Order::Near(reach) => Some(block.problem.keep_near(reach)),
+            Order::Free | Order::Written => None,
+        };
         let solution = solve::solve(&block.problem, effort);
         report.timing.extend(demands.check(&block, &solution.plan.start, solution.window, scheduled, sink));
         let packed = block.pack(old, &solution.plan);
         banks.settle(&packed);
-        report.blocks.push(BlockReport {
-            location: old.first().and_then(|bundle| ir.location(bundle.operations.first()?)),
-            label: label_at(ir, run.start as u32),
-            address: BundleAddress::new(address),
-            operations: block.problem.tasks.iter().map(|task| task.operations as u32).sum(),
-            bundles: packed.len() as u32,
-            cycles: solution.length,
-            bound: bound.unwrap_or(solution.bound),
-        });
+        let bound = bound.unwrap_or(solution.bound);
+        report.blocks.push(block.report(ir, *run, address, packed.len(), solution.length, bound));
         bundles.extend(packed);
     }
     let end = bundles.len() as u32;
@@ -281,6 +292,28 @@ impl Block {
             problem.tasks.push(task);
         }
         Block { problem, origins }
+    }
+
+    /// What became of the block, a run that begins at an address now.
+    fn report(
+        &self,
+        ir: &Ir,
+        run: runs::Run,
+        address: u32,
+        bundles: usize,
+        cycles: u32,
+        bound: Bound,
+    ) -> BlockReport {
+        let first = ir.bundles[run.start..run.end].first();
+        BlockReport {
+            location: first.and_then(|bundle| ir.location(bundle.operations.first()?)),
+            label: label_at(ir, run.start as u32),
+            address: BundleAddress::new(address),
+            operations: self.problem.tasks.iter().map(|task| task.operations as u32).sum(),
+            bundles: bundles as u32,
+            cycles,
+            bound,
+        }
     }
 
     /// The bundles of a schedule: tasks that issue in one cycle become one bundle. A gap that only a demand makes is filled, for

@@ -256,8 +256,8 @@ pub enum DirectiveKind {
     Const(Name, Expr),
     /// `.preset`.
     Preset {
-        /// The register, by its name or its place.
-        register: Name,
+        /// The register, by its name or its place; or an element of an array.
+        register: Operand,
         /// Whether `@` stands before it: then it is a place.
         placed: bool,
         /// What the loader writes there.
@@ -319,8 +319,8 @@ pub enum DirectiveKind {
     LoopBound(Expr),
     /// `.range`, the registers, whether `@` stands before them, the least and the largest value.
     Range {
-        /// The registers, by their names or their places.
-        registers: Vec<Name>,
+        /// The registers, by their names or their places; or elements of arrays.
+        registers: Vec<Operand>,
         /// Whether `@` stands before them: then they are places.
         placed: bool,
         /// The least value.
@@ -513,6 +513,20 @@ impl Operator {
             Operator::Power => 8,
             Operator::Complement | Operator::Not => 0,
         }
+    }
+
+    /// The operators that compare two values.
+    pub const COMPARISONS: &[Operator] =
+        &[Operator::Eq, Operator::Ne, Operator::Lt, Operator::Le, Operator::Gt, Operator::Ge];
+
+    /// Whether it compares two values: its result is 1 or 0.
+    pub const fn compares(self) -> bool {
+        self.precedence() == Operator::Eq.precedence()
+    }
+
+    /// Whether it joins conditions, and other integers, bit by bit.
+    pub const fn joins(self) -> bool {
+        matches!(self, Operator::And | Operator::Or)
     }
 
     /// Whether it may stand before an operand.

@@ -1,6 +1,7 @@
 //! What a line that the grammar does not take probably means.
 
 use crate::ast::Directive;
+use crate::foreign;
 use crate::grammar::Expected;
 use crate::lex::Token;
 use crate::name::NameId;
@@ -41,6 +42,9 @@ pub(crate) fn describe<'s>(
         Token::Directive(directive) if !is_alone => Some(*directive),
         _ => None,
     });
+    if !is_alone && let Some(diagnostic) = foreign::describe(tokens, at, text) {
+        return diagnostic;
+    }
     let diagnostic = Diagnostic::error("syntax", span, "");
     let mut diagnostic = diagnostic.here(match expected.len() {
         0 => "not expected here".to_owned(),

@@ -7,6 +7,7 @@ use crate::ast::*;
 use crate::blocks;
 use crate::explain::describe;
 use crate::grammar::{self, Body, Builder, Line};
+use crate::grouping;
 use crate::intern::Interner;
 use crate::lex::{Chunk, Lexer, LineTokens, Token};
 use crate::limits;
@@ -93,6 +94,9 @@ fn parse_chunk(chunk: &Chunk, source: &Source, ast: &mut Ast, sink: &mut Sink, s
         let mark = builder.mark();
         if shortcut && let Some(parsed) = grammar::common_line(tokens, &mut builder) {
             add(parsed, line, tokens, source, &mut builder.ast, sink);
+            if line.compared {
+                grouping::check(&builder, mark, source, sink);
+            }
             continue;
         }
         builder.rewind(mark);
@@ -102,7 +106,12 @@ fn parse_chunk(chunk: &Chunk, source: &Source, ast: &mut Ast, sink: &mut Sink, s
             false => bundle.get_or_init(grammar::line),
         };
         match grammar.parse_with_state(input, &mut builder).into_result() {
-            Ok(parsed) => add(parsed, line, tokens, source, &mut builder.ast, sink),
+            Ok(parsed) => {
+                add(parsed, line, tokens, source, &mut builder.ast, sink);
+                if line.compared {
+                    grouping::check(&builder, mark, source, sink);
+                }
+            }
             Err(errors) => {
                 builder.rewind(mark);
                 if !sink.keeps(Severity::Error) {
@@ -185,6 +194,8 @@ fn number_lines(operations: &mut [Operation], tokens: &[(Token, Span)], first: u
 fn broken(tokens: &[(Token, Span)], line: &LineTokens, ast: &mut Ast) {
     ast.broken.push(line.number);
     let (label, rest) = match tokens {
+        // `name := value` declares no label.
+        [(Token::Name(_), _), (Token::Colon, _), (Token::Assign, _), ..] => (None, tokens),
         [(Token::Name(name), span), (Token::Colon, _), rest @ ..] => {
             (Some(Name { name: NameRef::plain(*name), span: *span }), rest)
         }

@@ -2,6 +2,7 @@
 
 use crate::ast::Directive;
 use crate::lex::Raw;
+use crate::report::source::line_feeds;
 use logos::Logos;
 use std::ops::Range;
 
@@ -53,6 +54,7 @@ pub struct Token {
 
 /// The tokens of a text, in order, line by line: a list for each line, its line break excluded.
 pub fn lines(text: &str) -> Vec<Vec<Token>> {
+    let text = &*line_feeds(text);
     let mut lines = vec![Vec::new()];
     let mut lexer = Raw::lexer(text);
     let mut end = 0;
@@ -115,6 +117,7 @@ mod tests {
         #[test]
         fn nothing_is_lost(text in "([a-f{}0-9 .,;:|\"\\\\\t\r\n\u{e9}=]|0x|\n; c\n){0,60}") {
             let lines = lines(&text);
+            let text = line_feeds(&text);
             prop_assert_eq!(lines.len(), text.bytes().filter(|byte| *byte == b'\n').count() + 1);
             let mut end = 0;
             for (line, tokens) in text.split('\n').zip(&lines) {

@@ -295,7 +295,7 @@ module {TOP} (
 
 endmodule
 ",
-        board.text,
+        takt_isa::text::one_line(&board.text),
         board.clock.1,
         wiring.clock,
         1 << RESET_BITS,

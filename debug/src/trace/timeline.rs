@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use takt_isa::BundleAddress;
+use takt_isa::text::in_script;
 use takt_isa::timing::{Cause, Cycle};
 use takt_system::{Description, End, LinkEvent, LinkEventKind, LinkKind, System};
 
@@ -160,8 +161,7 @@ impl Timeline {
 
     /// The picture as a page for a browser, which needs nothing else.
     pub fn html(&self, description: &Description, start: Cycle, name: &str) -> String {
-        // `</` would end the script.
-        let data = self.json(description, start, name).to_string().replace("</", "<\\/");
+        let data = in_script(&self.json(description, start, name).to_string());
         include_str!("timeline.html").replace("/*DATA*/", &data)
     }
 }

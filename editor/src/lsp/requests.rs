@@ -17,7 +17,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use takt_asm::source::Span;
+use takt_asm::source::{Span, line_feeds};
 
 /// Why a request has no answer.
 pub(crate) struct Failed(pub(crate) ErrorCode, pub(crate) String);
@@ -388,7 +388,7 @@ impl Here<'_> {
     /// How lines have moved since the program was scheduled.
     fn moved(&self) -> Option<Moved> {
         let old = &self.full?.files.named(&self.file.name)?.text.text;
-        let new = &self.file.text.text;
+        let (old, new) = (&*line_feeds(old), &*line_feeds(&self.file.text.text));
         if old == new {
             return Some(Moved { head: u32::MAX, tail: u32::MAX, by: 0 });
         }

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
+use takt_asm::source::line_feeds;
 use takt_asm::tokens::{self, TokenKind};
 use takt_asm::{Directive, Open};
 
@@ -145,7 +146,7 @@ fn includes(path: &Path, text: &str) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let name = Directive::Include.name();
     let mut files = Vec::new();
-    for line in text.lines().filter(|line| line.contains(name)) {
+    for line in line_feeds(text).lines().filter(|line| line.contains(name)) {
         let lines = tokens::lines(line);
         let mut tokens = lines.iter().flatten();
         let is_include = |kind, range: &std::ops::Range<usize>| {
@@ -165,7 +166,7 @@ fn includes(path: &Path, text: &str) -> Vec<PathBuf> {
 fn opens_section(text: &str) -> bool {
     let names = [Directive::Once, Directive::Period].map(|directive| directive.name());
     let is_one = |line: &&str| names.iter().any(|name| line.contains(name));
-    text.lines().filter(is_one).any(|line| {
+    line_feeds(text).lines().filter(is_one).any(|line| {
         let is_section = |token: &tokens::Token| {
             token.kind == TokenKind::Directive && names.contains(&&line[token.range.clone()])
         };

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 /// A text within a comment.
 fn comment(text: &str) -> String {
-    text.replace("*/", "* /")
+    text.replace("*/", "* /").replace("/*", "/ *")
 }
 
 pub(super) fn write(header: &Header) -> String {

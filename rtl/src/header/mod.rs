@@ -14,6 +14,7 @@ use crate::wishbone::{self, REGISTERS};
 use serde::Serialize;
 use takt_analysis::SectionBounds;
 use takt_isa::program::Port;
+use takt_isa::text::one_line;
 use takt_isa::{BundleAddress, Program, Type};
 
 /// The version of [`Header`]'s JSON.
@@ -232,10 +233,11 @@ impl Header {
         }
     }
 
-    /// In a line, what it is of.
+    /// In a line, what it is of. The name is that of a file, and may be anything.
     fn title(&self) -> String {
         let ports = if self.latched { ", ports latched" } else { "" };
-        format!("{}: the program on {}, as its host sees it on the bus{ports}.", self.name, self.machine)
+        let name = one_line(&self.name);
+        format!("{name}: the program on {}, as its host sees it on the bus{ports}.", self.machine)
     }
 
     /// Each figure of the program's cycles with a name, and what it is.

@@ -20,7 +20,7 @@ fn quoted(text: &str) -> String {
 
 /// A text in a line of documentation.
 fn line(text: &str) -> String {
-    text.replace(['\n', '\r'], " ").replace('[', "\\[")
+    text.replace('[', "\\[")
 }
 
 pub(super) fn write(header: &Header) -> String {

@@ -2,6 +2,7 @@
 
 use super::{Direction, Expr, Instance, Item, Kind, Module, Port, Statement};
 use std::fmt::Write as _;
+use takt_isa::text::visible;
 
 /// Columns of a line.
 const COLUMNS: usize = 120;
@@ -41,6 +42,8 @@ pub(super) fn module(module: &Module) -> String {
 
 /// A comment in as many lines as it takes; those after the first stand as far in as the first one's text.
 fn comment(v: &mut String, indent: &str, text: &str) {
+    // What it says of files and links is from outside.
+    let text = &*visible(text);
     let inner = &text[..text.len() - text.trim_start().len()];
     let mut line = format!("{indent}//");
     let mut words = text.split_whitespace().peekable();

@@ -1,7 +1,7 @@
 //! Values that find no register: kept in data memory while they are not needed.
 //!
 //! Where a block of equations has more values at a time than a bank has registers, first an order is tried in which fewer are
-//! needed at a time ([`schedule()`](schedule::schedule)'s reach); then values whose next use is farthest are stored in words that nothing else
+//! needed at a time ([`Order`]), in the end that of the source; then values whose next use is farthest are stored in words that nothing else
 //! touches, and loaded before that use ([`block`]). The shorter program is taken. What hand-written operations write
 //! stays in its register.
 
@@ -11,7 +11,7 @@ use super::place::{self, Room};
 use crate::ir::runs::{self, Run};
 use crate::ir::{Bundle, Ir};
 use crate::report::diag::Sink;
-use crate::schedule::{self, Report};
+use crate::schedule::{self, Order, Report};
 use takt_isa::BundleAddress;
 use takt_isa::program::Location;
 
@@ -68,7 +68,8 @@ impl std::fmt::Display for Spilled {
     }
 }
 
-/// Shares of a block's operations within which the order of the source is kept, to need fewer registers: a half, a quarter …
+/// Shares of a block's operations within which the order of the source is kept, to need fewer registers: a half, a quarter …; so
+/// many where not even the source's own order is known to suffice.
 const REACHES: u32 = 5;
 
 /// A program in which all values have a register.
@@ -92,7 +93,7 @@ impl Relieved {
 /// was scheduled.
 ///
 /// # Errors
-/// Why it cannot be done; the program is as it was.
+/// Why it cannot be done; the program is in its order or in that of the source, whichever lacks fewer registers.
 pub(crate) fn relieve(
     ir: &mut Ir,
     report: &mut Report,
@@ -101,46 +102,81 @@ pub(crate) fn relieve(
 ) -> Result<Vec<Spills>, Option<String>> {
     let runs = runs::runs(ir);
     let room = place::room(ir, &runs, &mut Sink::default());
-    if report.blocks.is_empty() || !room.is_short() || ir.bundles.len() > ir.machine.code_depth as usize {
+    if report.blocks.is_empty() || room.has_all() || ir.bundles.len() > ir.machine.code_depth as usize {
         return Ok(Vec::new());
     }
-    let spilled = by_memory(ir, &runs, &room, report);
-    let ordered = source.and_then(|source| by_order(source, report, effort));
-    let (spilled, why) = match spilled {
-        Ok(relieved) => (Some(relieved), None),
-        Err(why) => (None, Some(why)),
+    // With the source's order as the last resort, no program that fits without the scheduler fails to fit with it.
+    let as_written = source.map(|source| by_order(source, report, effort, Order::Written));
+    let (written, unfit) = match as_written {
+        Some(Ok(written)) => (Some(written), None),
+        Some(Err(unfit)) => (None, unfit),
+        None => (None, None),
     };
-    let best = ordered.into_iter().chain(spilled).min_by_key(Relieved::cycles).ok_or(why)?;
+    let (mut spilled, mut why, mut near) = (None, None, None);
+    if room.is_short() || written.is_some() {
+        let longest = report.blocks.iter().map(|block| block.operations).max().unwrap_or(1);
+        // Ever nearer, as long as something fits in the end.
+        let last = if written.is_some() { longest.ilog2() } else { REACHES };
+        near = source.and_then(|source| {
+            (1..=last).find_map(|shift| {
+                let reach = (longest >> shift).max(1) as usize;
+                by_order(source, report, effort, Order::Near(reach)).ok()
+            })
+        });
+    }
+    if room.is_short() {
+        match by_memory(ir, &runs, &room, report) {
+            Ok(relieved) => spilled = Some(relieved),
+            Err(reason) => why = Some(reason),
+        }
+    }
+    let best = near.into_iter().chain(spilled).chain(written).min_by_key(Relieved::cycles);
+    let Some(best) = best else {
+        // What is missing is told of the order that is short of least.
+        if let Some((unfit, missing)) = unfit
+            && missing < room.shortage()
+        {
+            *ir = unfit;
+        }
+        return Err(why);
+    };
     *ir = best.ir;
     *report = best.report;
     Ok(best.spills)
 }
 
-/// By an order near to that of the source: as near as need be.
-fn by_order(source: &Ir, before: &Report, effort: u32) -> Option<Relieved> {
-    let longest = before.blocks.iter().map(|block| block.operations).max()?;
-    (1..=REACHES).find_map(|shift| {
-        let reach = (longest >> shift).max(1) as usize;
-        let mut ir = source.clone();
-        let mut sink = Sink::default();
-        let mut report = schedule::schedule(&mut ir, effort, Some(reach), &mut sink);
-        let room = place::room(&ir, &runs::runs(&ir), &mut Sink::default());
-        if sink.errors > 0 || room.is_short() {
-            return None;
-        }
-        for (block, free) in report.blocks.iter_mut().zip(&before.blocks) {
-            block.bound = free.bound.clone();
-        }
-        let longer = report.blocks.iter().zip(&before.blocks).enumerate();
-        let longer = longer.filter(|(_, (after, free))| after.cycles > free.cycles);
-        let spills = longer.map(|(block, (after, free))| Spills {
-            block,
-            values: Vec::new(),
-            cycles: after.cycles - free.cycles,
-        });
-        let spills = spills.collect();
-        Some(Relieved { ir, report, spills }).filter(Relieved::fits)
-    })
+/// By an order near to that of the source.
+///
+/// # Errors
+/// If not all values have room in it: the program, and how many registers it lacks; none if it breaks a demand.
+fn by_order(
+    source: &Ir,
+    before: &Report,
+    effort: u32,
+    order: Order,
+) -> Result<Relieved, Option<(Ir, usize)>> {
+    let mut ir = source.clone();
+    let mut sink = Sink::default();
+    let mut report = schedule::schedule(&mut ir, effort, order, &mut sink);
+    let room = place::room(&ir, &runs::runs(&ir), &mut Sink::default());
+    if sink.errors > 0 || ir.bundles.len() > ir.machine.code_depth as usize {
+        return Err(None);
+    }
+    if !room.has_all() {
+        return Err(Some((ir, room.shortage())));
+    }
+    for (block, free) in report.blocks.iter_mut().zip(&before.blocks) {
+        block.bound = free.bound.clone();
+    }
+    let longer = report.blocks.iter().zip(&before.blocks).enumerate();
+    let longer = longer.filter(|(_, (after, free))| after.cycles > free.cycles);
+    let spills = longer.map(|(block, (after, free))| Spills {
+        block,
+        values: Vec::new(),
+        cycles: after.cycles - free.cycles,
+    });
+    let spills = spills.collect();
+    Ok(Relieved { ir, report, spills })
 }
 
 /// By loads and stores.
@@ -199,7 +235,7 @@ fn by_memory(ir: &Ir, runs: &[Run], room: &Room, before: &Report) -> Result<Reli
         let mut stands = relieved.ir.clone();
         stands.bundles.iter_mut().for_each(|bundle| bundle.scheduled = false);
         let mut sink = Sink::default();
-        relieved.report.timing = schedule::schedule(&mut stands, 0, None, &mut sink).timing;
+        relieved.report.timing = schedule::schedule(&mut stands, 0, Order::Free, &mut sink).timing;
         if sink.errors > 0 {
             return Err("with values kept in data memory, what is demanded of ports is not met".to_owned());
         }

@@ -4,6 +4,7 @@ use super::ImageError;
 use super::meta::MetaType;
 use super::validate::{FILE_NAME, is_spelled, wrong_port};
 use crate::output::names::{DebugInfo, NamedValue, Names, Position, Scope};
+use crate::report::source::line_feeds;
 use crate::syntax::expr::Value;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
@@ -135,7 +136,7 @@ pub(super) fn from_json(bytes: &[u8], program: &Program) -> Result<DebugInfo, Im
     };
     check(&names, program)?;
     Ok(DebugInfo {
-        sources: debug.sources.into_iter().map(|Source { name, text }| (name, text)).collect(),
+        sources: debug.sources.into_iter().map(|of| (of.name, line_feeds(&of.text).into_owned())).collect(),
         constants: debug.constants.into_iter().map(constant).collect::<Result<_, _>>()?,
         names,
     })

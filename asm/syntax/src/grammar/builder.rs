@@ -20,15 +20,15 @@ pub(crate) struct Builder<'a> {
 /// Lengths of the lists that the grammar appends to.
 #[derive(Clone, Copy)]
 pub(crate) struct Mark {
-    nodes: u32,
+    pub(crate) nodes: u32,
     operands: u32,
     operations: u32,
     memories: u32,
     casts: u32,
-    elements: u32,
+    pub(crate) elements: u32,
     equations: u32,
     sizes: u32,
-    templates: u32,
+    pub(crate) templates: u32,
 }
 
 impl Builder<'_> {
@@ -124,6 +124,14 @@ impl Builder<'_> {
                     Some('n') => '\n',
                     Some('r') => '\r',
                     Some('t') => '\t',
+                    // A character by its code, in four hexadecimal digits; without them it is a `u`.
+                    Some('u') => match code(characters.as_str()) {
+                        Some(c) => {
+                            characters.nth(3);
+                            c
+                        }
+                        None => 'u',
+                    },
                     Some(other) => other,
                     None => '\\',
                 },
@@ -132,6 +140,12 @@ impl Builder<'_> {
         }
         text
     }
+}
+
+/// The character that four hexadecimal digits at a text's beginning stand for.
+fn code(text: &str) -> Option<char> {
+    let digits = text.get(..4).filter(|digits| digits.bytes().all(|byte| byte.is_ascii_hexdigit()))?;
+    char::from_u32(u32::from_str_radix(digits, 16).ok()?)
 }
 
 impl<'t> Inspector<'t, Tokens<'t>> for Builder<'_> {

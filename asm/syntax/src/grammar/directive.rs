@@ -1,7 +1,7 @@
 //! The grammar of directives.
 
 use super::expected::What;
-use super::{Body, Builder, Rule, rule};
+use super::{Body, Builder, Rule, indices, rule};
 use crate::ast::*;
 use crate::lex::Token;
 use chumsky::prelude::*;
@@ -10,6 +10,7 @@ use chumsky::prelude::*;
 pub(super) fn directive<'t, 'a: 't>(
     name: Rule<'t, 'a, Name>,
     expr: Rule<'t, 'a, Expr>,
+    expression: Rule<'t, 'a, ()>,
 ) -> Rule<'t, 'a, Body> {
     let comma = || just(Token::Comma).labelled(What::Comma);
     let is = |directive| just(Token::Directive(directive));
@@ -71,13 +72,26 @@ pub(super) fn directive<'t, 'a: 't>(
     let word = is(Directive::Word).ignore_then(values.clone()).map(DirectiveKind::Word);
     let assigned = name.clone().then_ignore(just(Token::Assign).labelled(What::Assign)).then(expr.clone());
     let assigned = rule(assigned);
+    // A register by its name, or an element of an array.
+    let register = name.clone().then(indices(expression, 1).or_not()).map_with(|(name, starts), e| {
+        let span = e.span();
+        let builder: &mut Builder<'a> = e.state();
+        let kind = match starts {
+            Some(starts) => OperandKind::Element(builder.element(name, starts)),
+            None => OperandKind::Name(name.name),
+        };
+        Operand { kind, span }
+    });
+    let register = rule(register);
     let constant = is(Directive::Const)
         .ignore_then(assigned.clone())
         .map(|(name, value)| DirectiveKind::Const(name, value));
     let preset = is(Directive::Preset)
         .ignore_then(just(Token::At).or_not())
-        .then(assigned.clone())
-        .map(|(at, (register, value))| DirectiveKind::Preset { register, placed: at.is_some(), value });
+        .then(register.clone().labelled(What::Register))
+        .then_ignore(just(Token::Assign).labelled(What::Assign))
+        .then(expr.clone())
+        .map(|((at, register), value)| DirectiveKind::Preset { register, placed: at.is_some(), value });
     let space = is(Directive::Space).ignore_then(expr.clone()).map(DirectiveKind::Space);
     let branch = is(Directive::If).ignore_then(expr.clone()).map(|condition| DirectiveKind::If(condition, 0));
     let elif =
@@ -132,9 +146,17 @@ pub(super) fn directive<'t, 'a: 't>(
         more.insert(0, first);
         more
     }));
+    let registers = register
+        .clone()
+        .labelled(What::Register)
+        .then(comma().or_not().ignore_then(register).repeated().collect::<Vec<_>>())
+        .map(|(first, mut more)| {
+            more.insert(0, first);
+            more
+        });
     let range = is(Directive::Range)
         .ignore_then(just(Token::At).or_not())
-        .then(ports.clone())
+        .then(registers)
         .then_ignore(just(Token::Assign).labelled(What::Assign))
         .then(expr.clone().labelled(What::Least))
         .then_ignore(comma())

@@ -102,7 +102,7 @@ pub(crate) fn line<'t, 'a: 't>() -> Rule<'t, 'a, Line> {
         .collect::<Vec<()>>()
         .map(|count| Body::Bundle(count.len() as u32));
 
-    let directive = directive(name.clone(), expr);
+    let directive = directive(name.clone(), expr, expression.clone());
     let body = rule(bundle).or(directive).labelled(What::InstructionOrDirective).or(empty().to(Body::Empty));
     // A plain label takes one look ahead; only a template is read twice.
     let label = name.then_ignore(just(Token::Colon)).or_not();

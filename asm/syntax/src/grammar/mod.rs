@@ -12,7 +12,7 @@ mod expression;
 mod line;
 mod shortcut;
 
-pub(crate) use builder::Builder;
+pub(crate) use builder::{Builder, Mark};
 pub(crate) use expected::Expected;
 pub(crate) use line::{equation, line};
 pub(crate) use shortcut::common_line;

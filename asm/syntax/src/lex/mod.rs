@@ -5,6 +5,7 @@ mod raw;
 
 use crate::ast::Directive;
 use crate::ast::Operator;
+use crate::foreign;
 use crate::intern::Interner;
 use crate::limits;
 use crate::name::NameId;
@@ -66,6 +67,8 @@ pub(crate) struct LineTokens {
     pub(crate) continued: bool,
     /// It may nest deeply: many brackets, prefix operators and powers.
     pub(crate) nested: bool,
+    /// It has a comparison, and another or `&` or `|`.
+    pub(crate) compared: bool,
 }
 
 /// Reads a file's tokens, some thousand lines at a time.
@@ -145,7 +148,15 @@ impl<'s> Lexer<'s> {
                     let text = self.lexer.slice();
                     token(raw, text, &mut line.nesting, names).unwrap_or_else(|message| {
                         line.bad = true;
-                        sink.add(Severity::Error, "token", span, || message.diagnostic(span, text));
+                        sink.add(Severity::Error, "token", span, || {
+                            match message {
+                                TokenError::NotNumber => {
+                                    range_before(&tokens[line.start..], names, text, span)
+                                }
+                                _ => None,
+                            }
+                            .unwrap_or_else(|| message.diagnostic(span, text))
+                        });
                         Token::Bad
                     })
                 }
@@ -161,6 +172,10 @@ impl<'s> Lexer<'s> {
                     Token::Bad
                 }
             };
+            if let Token::Operator(operator) = token {
+                line.compares += usize::from(operator.compares());
+                line.joins += usize::from(operator.joins());
+            }
             tokens.push((token, span));
             // Blanks before the first token do not count.
             if (span.end - line.from) as usize > limits::LINE_BYTES
@@ -196,16 +211,23 @@ struct Line {
     long: bool,
     /// Tokens that may nest expressions.
     nesting: usize,
+    /// Comparisons.
+    compares: usize,
+    /// `&` and `|`.
+    joins: usize,
 }
 
 impl Line {
     fn new(start: usize, number: u32, from: u32) -> Line {
-        Line { start, number, from, bad: false, continued: false, unknown: false, long: false, nesting: 0 }
+        let (bad, continued, unknown, long) = (false, false, false, false);
+        Line { start, number, from, bad, continued, unknown, long, nesting: 0, compares: 0, joins: 0 }
     }
 
     fn end(&self, end: usize) -> LineTokens {
         let nested = self.nesting > limits::EXPRESSION_DEPTH || end - self.start > limits::EXPRESSION_NODES;
-        LineTokens { end: end as u32, number: self.number, bad: self.bad, continued: self.continued, nested }
+        let Line { number, bad, continued, compares, joins, .. } = *self;
+        let compared = compares > 0 && compares + joins > 1;
+        LineTokens { end: end as u32, number, bad, continued, nested, compared }
     }
 }
 
@@ -249,6 +271,16 @@ impl TokenError {
                 .help(format!("a name has at most {}", limits::NAME_BYTES)),
         }
     }
+}
+
+/// What to say of a range where a number is read, given the line's tokens before it.
+fn range_before(before: &[(Token, Span)], names: &Interner, text: &str, span: Span) -> Option<Diagnostic> {
+    let name = |(token, span): &(Token, Span)| match token {
+        Token::Name(name) => Some((names.text(*name), *span)),
+        _ => None,
+    };
+    let last = before.len().saturating_sub(3);
+    foreign::range(&before[last..].iter().map(name).collect::<Vec<_>>(), text, span)
 }
 
 fn token(raw: Raw, text: &str, nesting: &mut usize, names: &mut Interner) -> Result<Token, TokenError> {

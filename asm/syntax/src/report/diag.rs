@@ -5,13 +5,15 @@
 
 use crate::limits;
 use crate::report::levels::{Level, Levels, WARNINGS};
-use crate::report::source::{Lines, Sources, Span};
+use crate::report::source::{Lines, Source, Sources, Span};
 use codespan_reporting::diagnostic as codespan;
 use codespan_reporting::files::{Error, Files};
 use codespan_reporting::term;
+use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::sync::Arc;
+use takt_isa::text::{is_hidden, one_line, push_visible, visible};
 
 /// How bad it is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, PartialOrd, Ord, serde::Serialize)]
@@ -268,7 +270,8 @@ impl Diagnostics {
         self.list.is_empty() && self.more_errors + self.more_warnings == 0
     }
 
-    /// The text for a terminal: for each its message, file, line, column, the line of source and a caret.
+    /// The text for a terminal: for each its message, file, line, column, the line of source and a caret. Characters that a
+    /// terminal would obey are escaped, whether they stand in a source, in its name or in a message.
     pub fn render(&self, colour: bool) -> String {
         let mut view = View::new(&self.sources);
         let config = term::Config { tab_width: 8, ..term::Config::default() };
@@ -329,18 +332,67 @@ impl Diagnostics {
     }
 }
 
+/// A source as it is shown: with hidden characters escaped.
+struct Shown<'s> {
+    name: String,
+    text: Cow<'s, str>,
+    /// The lines of the text that is shown.
+    lines: Lines,
+    /// For each escaped character the byte behind it, in the source and in what is shown.
+    moved: Vec<(usize, usize)>,
+}
+
+impl<'s> Shown<'s> {
+    fn of(source: &'s Source) -> Shown<'s> {
+        let (name, written) = (one_line(&source.name), source.text.as_str());
+        // A carriage return belongs to its line's end: no other is in a source.
+        let hidden = |c: char| is_hidden(c) && c != '\r';
+        if !written.contains(hidden) {
+            return Shown { name, text: written.into(), lines: Lines::of(written), moved: Vec::new() };
+        }
+        let (mut text, mut moved) = (String::with_capacity(written.len() + 64), Vec::new());
+        for (at, c) in written.char_indices() {
+            if hidden(c) {
+                push_visible(&mut text, c);
+                moved.push((at + c.len_utf8(), text.len()));
+            } else {
+                text.push(c);
+            }
+        }
+        Shown { name, lines: Lines::of(&text), text: text.into(), moved }
+    }
+
+    /// Where a byte of the source is shown.
+    fn place(&self, byte: usize) -> usize {
+        let before = self.moved.partition_point(|(written, _)| *written <= byte);
+        let (written, shown) = before.checked_sub(1).map_or((0, 0), |last| self.moved[last]);
+        shown + (byte - written)
+    }
+
+    /// The byte of the source that is shown there; of an escaped character its first.
+    fn byte(&self, place: usize) -> usize {
+        let before = self.moved.partition_point(|(_, shown)| *shown <= place);
+        let (written, shown) = before.checked_sub(1).map_or((0, 0), |last| self.moved[last]);
+        let next = self.moved.get(before).map_or(usize::MAX, |next| next.0 - 1);
+        (written + (place - shown)).min(next)
+    }
+}
+
 /// The sources as codespan-reporting reads them. Of a long line it sees only the part around the diagnostic at hand, or
 /// else one error in a line of a megabyte would be a megabyte of text.
 struct View<'s> {
     sources: &'s Sources,
+    /// The lines of sources, as they are written.
     lines: HashMap<usize, Lines>,
-    /// File, line index and visible bytes, where a line is cut.
+    /// What is shown of those that a diagnostic points into.
+    shown: HashMap<usize, Shown<'s>>,
+    /// File, line index and visible bytes of what is shown, where a line is cut.
     windows: Vec<(usize, usize, Range<usize>)>,
 }
 
 impl<'s> View<'s> {
     fn new(sources: &'s Sources) -> View<'s> {
-        View { sources, lines: HashMap::new(), windows: Vec::new() }
+        View { sources, lines: HashMap::new(), shown: HashMap::new(), windows: Vec::new() }
     }
 
     /// Readies the view for a diagnostic, and returns it with places that lie in what is seen.
@@ -350,26 +402,28 @@ impl<'s> View<'s> {
             Severity::Warning => codespan::Severity::Warning,
             Severity::Error => codespan::Severity::Error,
         };
-        let mut shown =
-            codespan::Diagnostic::new(severity).with_code(diagnostic.code).with_message(&diagnostic.message);
+        let mut shown = codespan::Diagnostic::new(severity)
+            .with_code(diagnostic.code)
+            .with_message(visible(&diagnostic.message));
         for (i, label) in diagnostic.labels.iter().enumerate() {
             let file = self.file_of(label.span);
             let Some(range) = self.window(file, label.span) else { continue };
             let style = if i == 0 { codespan::LabelStyle::Primary } else { codespan::LabelStyle::Secondary };
-            shown.labels.push(codespan::Label::new(style, file, range).with_message(&label.message));
+            shown.labels.push(codespan::Label::new(style, file, range).with_message(visible(&label.message)));
         }
-        shown.notes.extend(diagnostic.notes.iter().map(|note| format!("note: {note}")));
-        shown.notes.extend(diagnostic.help.iter().map(|help| format!("help: {help}")));
+        shown.notes.extend(diagnostic.notes.iter().map(|note| format!("note: {}", visible(note))));
+        shown.notes.extend(diagnostic.help.iter().map(|help| format!("help: {}", visible(help))));
         shown
     }
 
-    /// Opens a window on the span's line if that is long; the part of the span that is then seen, as bytes of its file.
+    /// Opens a window on the span's line if that is long; the part of the span that is then seen, as bytes of what is shown.
     fn window(&mut self, file: usize, span: Span) -> Option<Range<usize>> {
         let source = self.sources.files().get(file)?;
-        let clamp = |offset: u32| ((offset - source.base) as usize).min(source.text.len());
+        let shown = self.shown.entry(file).or_insert_with(|| Shown::of(source));
+        let clamp = |offset: u32| shown.place(((offset - source.base) as usize).min(source.text.len()));
         let (start, mut end) = (clamp(span.start), clamp(span.end));
-        let index = self.lines(file)?.index(start as u32);
-        let line = self.lines(file)?.range(index)?;
+        let index = shown.lines.index(start as u32);
+        let line = shown.lines.range(index)?;
         // Diagnostics point within a line; a bundle that continues on further lines is shown by its first.
         end = end.min(line.end).max(start);
         if line.len() <= limits::QUOTED_BYTES {
@@ -380,7 +434,7 @@ impl<'s> View<'s> {
             None => {
                 let from = start.saturating_sub(limits::QUOTED_BYTES / 2).max(line.start);
                 let to = (from + limits::QUOTED_BYTES).min(line.end);
-                let seen = boundary(&source.text, from)..boundary(&source.text, to);
+                let seen = boundary(&shown.text, from)..boundary(&shown.text, to);
                 self.windows.push((file, index, seen.clone()));
                 seen
             }
@@ -422,27 +476,30 @@ impl<'s> Files<'s> for View<'_> {
     type Source = &'s str;
 
     fn name(&'s self, id: usize) -> Result<&'s str, Error> {
-        self.sources.files().get(id).map(|file| &*file.name).ok_or(Error::FileMissing)
+        self.shown.get(&id).map(|shown| shown.name.as_str()).ok_or(Error::FileMissing)
     }
 
     fn source(&'s self, id: usize) -> Result<&'s str, Error> {
-        self.sources.files().get(id).map(|file| file.text.as_str()).ok_or(Error::FileMissing)
+        self.shown.get(&id).map(|shown| &*shown.text).ok_or(Error::FileMissing)
     }
 
     fn line_index(&'s self, id: usize, byte: usize) -> Result<usize, Error> {
-        self.lines.get(&id).map(|lines| lines.index(byte as u32)).ok_or(Error::FileMissing)
+        self.shown.get(&id).map(|shown| shown.lines.index(byte as u32)).ok_or(Error::FileMissing)
     }
 
     fn column_number(&'s self, id: usize, line: usize, byte: usize) -> Result<usize, Error> {
-        let whole = self.lines.get(&id).and_then(|lines| lines.range(line)).ok_or(Error::FileMissing)?;
-        let text = self.source(id)?;
-        Ok(1 + text.get(whole.start..byte.min(text.len())).map_or(0, |text| text.chars().count()))
+        // Columns count what is written.
+        let shown = self.shown.get(&id).ok_or(Error::FileMissing)?;
+        let start = shown.lines.range(line).ok_or(Error::FileMissing)?.start;
+        let text = &self.sources.files().get(id).ok_or(Error::FileMissing)?.text;
+        let before = text.get(shown.byte(start)..shown.byte(byte).min(text.len()));
+        Ok(1 + before.map_or(0, |text| text.chars().count()))
     }
 
     fn line_range(&'s self, id: usize, line: usize) -> Result<Range<usize>, Error> {
         if let Some((_, _, seen)) = self.windows.iter().find(|(f, l, _)| (*f, *l) == (id, line)) {
             return Ok(seen.clone());
         }
-        self.lines.get(&id).and_then(|lines| lines.range(line)).ok_or(Error::FileMissing)
+        self.shown.get(&id).and_then(|shown| shown.lines.range(line)).ok_or(Error::FileMissing)
     }
 }

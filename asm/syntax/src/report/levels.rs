@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 /// Every warning: its name, and what it is about.
 pub const WARNINGS: &[(&str, &str)] = &[
+    ("grouping", "a comparison stands beside `&`, `|` or another comparison without parentheses"),
     ("never-written", "a register with a place is read, and nothing writes it"),
     (
         "next-head",
@@ -15,6 +16,7 @@ pub const WARNINGS: &[(&str, &str)] = &[
     ("target", "a jump leads past the program's end"),
     ("types", "a value is read as another type than it is"),
     ("underflow", "a constant rounds to zero"),
+    ("unreachable", "nothing leads to a piece of code"),
     ("unused", "a name is declared and not used, or written and not read"),
 ];
 
@@ -113,7 +115,7 @@ mod tests {
         }
         assert!(
             fails("error=type")
-                .starts_with("there is no warning `type`; did you mean `types`? (warnings: never-")
+                .starts_with("there is no warning `type`; did you mean `types`? (warnings: grouping, never-")
         );
         assert!(fails("allow=").starts_with("there is no warning ``"));
     }

@@ -2,8 +2,33 @@
 //!
 //! All files of a program share one space of offsets, so that a [`Span`] of eight bytes names a place in any of them.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
+
+/// A text whose lines all end in a line feed, perhaps behind a carriage return: one that stands alone, as on old Macs, becomes
+/// a line feed. No byte moves, so that a place in one is a place in the other.
+pub fn line_feeds(text: &str) -> Cow<'_, str> {
+    let mut lone = lone_returns(text).peekable();
+    if lone.peek().is_none() {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len());
+    let mut from = 0;
+    for at in lone {
+        out.push_str(&text[from..at]);
+        out.push('\n');
+        from = at + 1;
+    }
+    out.push_str(&text[from..]);
+    Cow::Owned(out)
+}
+
+/// Where carriage returns stand that no line feed follows.
+fn lone_returns(text: &str) -> impl Iterator<Item = usize> + '_ {
+    let bytes = text.as_bytes();
+    text.match_indices('\r').map(|(at, _)| at).filter(|at| bytes.get(at + 1) != Some(&b'\n'))
+}
 
 /// A range of bytes in the program's sources.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Default, PartialOrd, Ord)]
@@ -79,8 +104,12 @@ impl Sources {
         self.add_shared(name, text.into())
     }
 
-    /// The same, of a text that others have too.
+    /// The same, of a text that others have too. Its lines are those that [`line_feeds`] makes of it.
     pub fn add_shared(&mut self, name: &str, text: Arc<String>) -> Option<usize> {
+        let text = match line_feeds(&text) {
+            Cow::Borrowed(_) => text,
+            Cow::Owned(text) => text.into(),
+        };
         // One offset lies between two files: the end of one is not the start of the next.
         let base = self.files.last().map_or(0, |last| last.base as usize + last.text.len() + 1);
         u32::try_from(base + text.len() + 1).ok()?;
@@ -113,9 +142,11 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Finds the lines of a text.
+    /// Finds the lines of a text: each ends in a line feed, a carriage return, or both.
     pub fn of(text: &str) -> Lines {
-        let ends = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(i, _)| i as u32 + 1);
+        let bytes = text.as_bytes();
+        let is_end = |i: usize, byte: u8| byte == b'\n' || byte == b'\r' && bytes.get(i + 1) != Some(&b'\n');
+        let ends = bytes.iter().enumerate().filter(|(i, byte)| is_end(*i, **byte)).map(|(i, _)| i as u32 + 1);
         Lines { starts: std::iter::once(0).chain(ends).collect(), length: text.len() as u32 }
     }
 
@@ -135,5 +166,20 @@ impl Lines {
     pub fn text<'t>(&self, text: &'t str, number: u32) -> Option<&'t str> {
         let range = self.range((number as usize).checked_sub(1)?)?;
         text.get(range).map(|line| line.trim_end_matches(['\n', '\r']))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_end_in_whatever_ends_lines() {
+        let text = "a\r\r\nb\nc\rd";
+        let lines = Lines::of(text);
+        let all: Vec<&str> = (1..=5).map_while(|number| lines.text(text, number)).collect();
+        assert_eq!(all, ["a", "", "b", "c", "d"]);
+        assert_eq!(line_feeds(text), "a\n\r\nb\nc\nd");
+        assert!(matches!(line_feeds("a\r\nb\n"), Cow::Borrowed(_)));
     }
 }
