@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use std::io::Write;
 use std::path::Path;
 use takt_analysis::Bounds;
-use takt_board::latency::{End, Part, Way, Ways, system_ways, ways};
+use takt_board::latency::{End, Part, Way, Ways, program_ways, system_ways};
 use takt_board::{Application, Board, Wiring};
 use takt_isa::Program;
 use takt_system::Description;
@@ -53,10 +53,12 @@ pub(super) fn program(
     let program_takes = periods
         .reduce(|a, b| takt_analysis::Span { best: a.best.min(b.best), worst: a.worst.max(b.worst) })
         .context("the program has no period: it never waits for the tick")?;
-    let ways = ways(&wiring, (program_takes.best, program_takes.worst));
-    let Some(way) = ways.ways.first() else {
+    let span = (program_takes.best, program_takes.worst);
+    let ways = program_ways(&wiring, program, span);
+    let Some(way) = takt_board::latency::ways(&wiring, span).ways.pop().filter(|_| !ways.ways.is_empty())
+    else {
         bail!(
-            "{name}: no path from pin to pin: the wiring needs an input (quadrature, step, digital-in) and an output (pwm, sigma-delta, digital-out) that are connected to ports"
+            "{name}: no path from pin to pin: the wiring needs an input (quadrature, step, digital-in) and an output (pwm, sigma-delta, digital-out) that are connected to ports, the second of which depends on the first"
         );
     };
     let (busy, period) = (Part::sum("", &way.between[1..]).worst, u64::from(wiring.period));
@@ -116,7 +118,7 @@ impl Found<'_> {
         }
         writeln!(
             out,
-            "cycles from an edge at a pin to an edge at a pin: {} on {}, {} at {} MHz",
+            "cycles from an edge at a pin to the first edge at a pin that follows: {} on {}, {} at {} MHz",
             files::input_name(&arguments.file),
             self.board.name,
             self.application.cores(),
@@ -150,12 +152,12 @@ impl Found<'_> {
         let way = |way: &Way| {
             json!({
                 "inputs": ends(&way.inputs), "between": parts(&way.between), "outputs": ends(&way.outputs),
-                "total": part(&way.total()),
+                "total": part(&way.total()), "is_certain": way.is_certain,
             })
         };
         let ways = &self.ways.ways;
         let mut value = match self.application {
-            Application::Program(_) => way(&ways[0]),
+            Application::Program(_) => json!({ "ways": ways.iter().map(way).collect::<Vec<_>>() }),
             Application::System(_) => {
                 let way = |known: &Way| {
                     let mut value = way(known);
@@ -200,7 +202,8 @@ impl Group {
         };
         let alike = |a: &Group, b: &Group| {
             let [a, b] = [&a.way, &b.way];
-            (&a.cores, inner(a), &a.between, &a.periods) == (&b.cores, inner(b), &b.between, &b.periods)
+            let key = |way: &Way| (way.periods.clone(), way.is_certain);
+            (&a.cores, inner(a), &a.between, key(a)) == (&b.cores, inner(b), &b.between, key(b))
         };
         grouped(
             ways.iter().map(alone),
@@ -235,7 +238,14 @@ impl Group {
         between.iter().try_for_each(|part| line(part, table, out))?;
         ends(&self.way.outputs, table, out)?;
         writeln!(out, "in all")?;
-        line(&self.way.total(), table, out)
+        line(&self.way.total(), table, out)?;
+        if !self.way.is_certain {
+            writeln!(
+                out,
+                "  not certain: branches or addresses of data memory can put the response off to later periods"
+            )?;
+        }
+        Ok(())
     }
 }
 
