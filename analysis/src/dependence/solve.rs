@@ -1,7 +1,7 @@
 //! The fixed point of the data flow for one input, period by period.
 
 use super::cell::Cell;
-use super::graph::{Flat, Gate, Reads, Section, Step, Writes};
+use super::graph::{Flat, Gate, Place, Reads, Section, Step, Writes};
 use super::{MAX_ROUNDS, Periods, Sent};
 use takt_isa::Register;
 
@@ -13,7 +13,7 @@ struct Ends {
     /// Before the `wait`'s own bundle, and after it.
     before: State,
     after: State,
-    /// The least that any place has anywhere in it.
+    /// The least that any port, or what is sent of it, has anywhere in it.
     any: State,
 }
 
@@ -29,10 +29,10 @@ pub(super) struct Solved<'a> {
 }
 
 /// Where ways meet.
-fn merged(into: Option<State>, state: &State) -> State {
+fn merge(into: &mut Option<State>, state: &State) {
     match into {
-        None => state.clone(),
-        Some(into) => into.iter().zip(state).map(|(one, other)| one.or(*other)).collect(),
+        None => *into = Some(state.clone()),
+        Some(into) => into.iter_mut().zip(state).for_each(|(one, other)| *one = one.or(*other)),
     }
 }
 
@@ -58,13 +58,15 @@ impl<'a> Solved<'a> {
                 let mut later: State = ends.after.iter().map(|cell| cell.later()).collect();
                 source.into_iter().for_each(|source| later[source] = Cell::INPUT);
                 for &to in &section.next {
-                    next[to] = Some(merged(next[to].take(), &later));
+                    merge(&mut next[to], &later);
                 }
             }
             let next: Vec<State> = next.into_iter().map(|state| state.unwrap_or_else(none)).collect();
             if next == entries {
                 let all = |pick: fn(&Ends) -> &State| {
-                    ends.iter().fold(None, |all, ends| Some(merged(all, pick(ends)))).unwrap_or_else(none)
+                    let mut all = None;
+                    ends.iter().for_each(|ends| merge(&mut all, pick(ends)));
+                    all.unwrap_or_else(none)
                 };
                 return solved(
                     true,
@@ -108,60 +110,54 @@ impl Flat {
         let mut after: Vec<Option<State>> = vec![None; blocks.len()];
         // Of branches that no way has led to so far, the best.
         let mut tested = vec![Cell::BOTTOM; blocks.len()];
-        let mut ends = Ends { before: Vec::new(), after: Vec::new(), any: Vec::new() };
-        let mut changed = true;
-        while changed {
+        let mut changed;
+        loop {
             changed = false;
             let (mut before_end, mut after_end) = (None, None);
-            ends.any = vec![Cell::NONE; self.places];
+            let mut any = entry.clone();
             for (number, block) in blocks.iter().enumerate() {
                 let mut state = (number == 0).then(|| entry.clone());
                 for state_before in block.before.iter().filter_map(|&before| after[before].as_ref()) {
-                    state = Some(merged(state, state_before));
+                    merge(&mut state, state_before);
                 }
                 let Some(mut state) = state else { continue };
-                open(&block.gates, &tested, &mut state);
-                let under = |tested: &[Cell]| {
-                    block.under.iter().fold(Cell::NONE, |all, &branch| all.under(tested[branch]))
-                };
-                let mut decided = under(&tested);
+                open(&block.gates, &tested, &mut state, &mut any);
+                let mut decided =
+                    block.under.iter().fold(Cell::NONE, |all, &branch| all.under(tested[branch]));
                 if let Some(which) = self.which {
                     decided = decided.under(state[which]);
                 }
-                let observe = |any: &mut State, state: &State| {
-                    any.iter_mut().zip(state).for_each(|(any, cell)| *any = any.under(*cell));
-                };
-                observe(&mut ends.any, &state);
+                let mut memory = None;
                 for (at, step) in block.steps.iter().enumerate() {
-                    let is_last = at + 1 == block.steps.len();
-                    if is_last {
+                    if at + 1 == block.steps.len() {
                         let test = block.tests.map_or(Cell::NONE, |place| state[place]);
                         changed |= std::mem::replace(&mut tested[number], test) != test;
                         if block.waits {
-                            before_end = Some(merged(before_end, &state));
+                            merge(&mut before_end, &state);
                         }
                     }
-                    self.step(step, decided, &mut state);
-                    for place in step.places(&self.memory) {
-                        ends.any[place] = ends.any[place].under(state[place]);
-                    }
+                    self.step(step, decided, &mut state, &mut memory, &mut any);
                 }
                 if block.waits {
-                    after_end = Some(merged(after_end, &state));
+                    merge(&mut after_end, &state);
                 }
                 if after[number].as_ref() != Some(&state) {
                     (after[number], changed) = (Some(state), true);
                 }
             }
-            for (end, into) in [(before_end, &mut ends.before), (after_end, &mut ends.after)] {
-                let mut end = end.unwrap_or_else(|| vec![Cell::NONE; self.places]);
-                open(&section.gates, &tested, &mut end);
-                self.choose(section, &tested, &mut end);
-                ends.any.iter_mut().zip(&end).for_each(|(any, cell)| *any = any.under(*cell));
-                *into = end;
+            if changed {
+                continue;
             }
+            let mut end = |end: Option<State>| {
+                let mut end = end.unwrap_or_else(|| vec![Cell::NONE; self.places]);
+                open(&section.gates, &tested, &mut end, &mut any);
+                self.choose(section, &tested, &mut end);
+                end
+            };
+            let (before, after) = (end(before_end), end(after_end));
+            any.iter_mut().zip(&after).for_each(|(any, cell)| *any = any.under(*cell));
+            return Ends { before, after, any };
         }
-        ends
     }
 
     /// What was written depends on which period ran, and which comes next on that, and on the branches that lead to its `wait`.
@@ -175,41 +171,60 @@ impl Flat {
         }
     }
 
-    fn step(&self, step: &Step, decided: Cell, state: &mut State) {
-        let read = |from: &Reads, state: &State| {
-            let places =
-                |places: &[usize]| places.iter().fold(Cell::NONE, |all, &place| all.with(state[place]));
-            match from {
-                Reads::Places(from) => places(from),
-                Reads::Memory(which) => {
+    /// Executes a bundle. `memory` is what a word of the data memory depends on, any one, if it is known.
+    fn step(
+        &self,
+        step: &Step,
+        decided: Cell,
+        state: &mut State,
+        memory: &mut Option<Cell>,
+        any: &mut State,
+    ) {
+        let mut read = |from: &Reads| match from {
+            Reads::Places(from) => of_all(from, state),
+            Reads::Memory(which) => {
+                let words = memory.get_or_insert_with(|| {
                     let words = state[self.memory.clone()].iter().copied().reduce(Cell::or);
-                    words.unwrap_or(Cell::NONE).with(places(which))
-                }
+                    words.unwrap_or(Cell::NONE)
+                });
+                words.with(of_all(which, state))
             }
         };
-        let values: Vec<Cell> = step.moves.iter().map(|(from, _)| read(from, state).under(decided)).collect();
+        let values: Vec<Cell> = step.moves.iter().map(|(from, _)| read(from).under(decided)).collect();
         for (&(_, to), value) in step.moves.iter().zip(values) {
-            match to {
-                Writes::Place(place) => state[place] = value,
-                Writes::Gathered(place) => state[place] = state[place].or(value),
+            let (place, value) = match to {
+                Writes::Place(place) => (place, value),
+                Writes::Gathered(place) => (place, state[place].or(value)),
                 Writes::Memory => {
                     state[self.memory.clone()].iter_mut().for_each(|word| *word = word.or(value));
+                    *memory = memory.map(|words| words.or(value));
+                    continue;
                 }
+            };
+            if self.memory.contains(&place) {
+                *memory = None;
             }
+            (state[place], any[place]) = (value, any[place].under(value));
         }
         for &(port, sent) in &step.sends {
-            state[sent] = state[port].under(decided);
+            let value = state[port].under(decided);
+            (state[sent], any[sent]) = (value, any[sent].under(value));
         }
     }
 }
 
+/// What depends on all of these places.
+fn of_all(places: &[Place], state: &State) -> Cell {
+    places.iter().fold(Cell::NONE, |all, &place| all.with(state[place]))
+}
+
 /// What depends on a branch because the ways that it parts write differently.
-fn open(gates: &[Gate], tested: &[Cell], state: &mut State) {
-    for gate in gates {
-        for &place in &gate.written {
-            let cell = state[place];
-            state[place] =
-                if gate.always { cell.with(tested[gate.branch]) } else { cell.under(tested[gate.branch]) };
+fn open(gates: &[Gate], tested: &[Cell], state: &mut State, any: &mut State) {
+    for Gate { branch, always, written } in gates {
+        let test = tested[*branch];
+        for &place in written {
+            let cell = if *always { state[place].with(test) } else { state[place].under(test) };
+            (state[place], any[place]) = (cell, any[place].under(cell));
         }
     }
 }
