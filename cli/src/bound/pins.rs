@@ -184,6 +184,10 @@ impl Found<'_> {
 struct Group {
     /// With all inputs and outputs.
     way: Way,
+    /// The names of its inputs.
+    inputs: Vec<String>,
+    /// The names of its outputs.
+    outputs: Vec<String>,
     /// The links that they begin with.
     first: Vec<String>,
     /// The links that they end with.
@@ -192,8 +196,12 @@ struct Group {
 
 impl Group {
     fn all(ways: &[Way]) -> Vec<Group> {
+        let names =
+            |ends: &[End]| ends.iter().map(|end| format!("{} {}", end.peripheral, end.port)).collect();
         let alone = |way: &Way| Group {
             way: way.clone(),
+            inputs: names(&way.inputs),
+            outputs: names(&way.outputs),
             first: way.links.first().cloned().into_iter().collect(),
             last: way.links.last().cloned().into_iter().collect(),
         };
@@ -209,16 +217,20 @@ impl Group {
             ways.iter().map(alone),
             alike,
             (
-                |group| &group.first,
+                |group| &group.inputs,
                 |group, other| {
                     group.first.extend(other.first);
+                    group.first.dedup();
+                    group.inputs.extend(other.inputs);
                     group.way.inputs.extend(other.way.inputs);
                 },
             ),
             (
-                |group| &group.last,
+                |group| &group.outputs,
                 |group, other| {
                     group.last.extend(other.last);
+                    group.last.dedup();
+                    group.outputs.extend(other.outputs);
                     group.way.outputs.extend(other.way.outputs);
                 },
             ),
