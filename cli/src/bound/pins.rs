@@ -126,7 +126,11 @@ impl Found<'_> {
         )?;
         let parts = self.ways.ways.iter().flat_map(|way| &way.between);
         let width = parts.map(|part| part.text.chars().count()).max().unwrap_or(0).max(WIDTH);
-        for group in Group::all(&self.ways.ways) {
+        let groups = match self.application {
+            Application::Program(_) => Group::of_program(&self.ways.ways),
+            Application::System(_) => Group::all(&self.ways.ways),
+        };
+        for group in groups {
             group.write(Table { clock: self.wiring.clock, width }, out)?;
         }
         for late in &self.late {
@@ -192,6 +196,8 @@ struct Group {
     first: Vec<String>,
     /// The links that they end with.
     last: Vec<String>,
+    /// Of a program, the ports that outputs follow, and these, where not all follow all.
+    ports: Vec<[Vec<String>; 2]>,
 }
 
 impl Group {
@@ -204,6 +210,7 @@ impl Group {
             outputs: names(&way.outputs),
             first: way.links.first().cloned().into_iter().collect(),
             last: way.links.last().cloned().into_iter().collect(),
+            ports: Vec::new(),
         };
         let inner = |way: &Way| -> Vec<String> {
             way.links.get(1..way.links.len().saturating_sub(1)).unwrap_or_default().to_vec()
@@ -237,7 +244,38 @@ impl Group {
         )
     }
 
+    /// Of a program, whose ways share all that is between their ends unless states differ: such ways as one, with its ports.
+    fn of_program(ways: &[Way]) -> Vec<Group> {
+        let mut groups: Vec<Group> = Vec::new();
+        for group in Group::all(ways) {
+            let [inputs, outputs] = [&group.way.inputs, &group.way.outputs];
+            let ports = [inputs, outputs].map(|ends| ends.iter().map(|end| end.port.clone()).collect());
+            let alike = |other: &&mut Group| {
+                (&other.way.between, other.way.is_certain) == (&group.way.between, group.way.is_certain)
+            };
+            match groups.iter_mut().find(alike) {
+                None => groups.push(Group { ports: vec![ports], ..group }),
+                Some(other) => {
+                    other.ports.push(ports);
+                    let add = |ends: &mut Vec<End>, more: &[End]| {
+                        let new: Vec<End> = more.iter().filter(|end| !ends.contains(end)).cloned().collect();
+                        ends.extend(new);
+                    };
+                    add(&mut other.way.inputs, inputs);
+                    add(&mut other.way.outputs, outputs);
+                }
+            }
+        }
+        groups
+    }
+
     fn write(&self, table: Table, out: &mut Out) -> Result<()> {
+        if let [_, _, ..] = self.ports[..] {
+            writeln!(out, "which follows which")?;
+            for [inputs, outputs] in &self.ports {
+                writeln!(out, "  {} -> {}", inputs.join(", "), outputs.join(", "))?;
+            }
+        }
         let Way { cores, links, between, .. } = &self.way;
         if !cores.is_empty() {
             writeln!(out, "\nthrough {}", cores.join(", "))?;
