@@ -8,6 +8,7 @@ use takt_isa::{BundleAddress, Flow, Instruction, Program, Register, SlotIndex};
 
 /// A bundle.
 pub(crate) struct Node {
+    pub(crate) instructions: Vec<Instruction>,
     pub(crate) timing: Bundle,
     pub(crate) flow: Flow,
     /// Whether its branch is taken, where that is known: it depends on a register that holds one value for good.
@@ -35,6 +36,8 @@ pub(crate) struct Loop {
 /// A program's control flow.
 pub(crate) struct Graph<'p> {
     pub(crate) program: &'p Program,
+    /// Registers that hold one value for good.
+    pub(crate) known: BTreeMap<Register, u32>,
     nodes: Vec<Result<Node, (SlotIndex, IllegalWord)>>,
     /// Where ways meet or a counted loop begins.
     leaders: BTreeSet<BundleAddress>,
@@ -46,11 +49,11 @@ impl<'p> Graph<'p> {
         let known = known_registers(program);
         let bundles = program.addresses().filter_map(|address| program.bundle(address));
         let node = |instructions: Vec<Instruction>| {
-            let flow = Flow::of(&instructions);
-            Node { timing: Bundle::new(program.machine, &instructions), flow, taken: taken(flow, &known) }
+            let (flow, timing) = (Flow::of(&instructions), Bundle::new(program.machine, &instructions));
+            Node { timing, flow, taken: taken(flow, &known), instructions }
         };
         let nodes = bundles.map(|bundle| bundle.map(node)).collect();
-        let mut graph = Graph { program, nodes, leaders: BTreeSet::new(), loops: BTreeMap::new() };
+        let mut graph = Graph { program, known, nodes, leaders: BTreeSet::new(), loops: BTreeMap::new() };
         let jumps = program.addresses().flat_map(|from| graph.edges(from)).filter(|(jump, _)| *jump);
         graph.leaders = jumps
             .map(|(_, edge)| edge.to)

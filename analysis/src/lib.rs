@@ -2,6 +2,7 @@
 //!
 //! - [`accuracy`]: the errors of a run's outputs against binary64, and where they come from.
 //! - [`bound`]: the best and the worst that each section of a program can take, from the program alone.
+//! - [`dependence`]: after how many periods an output follows an input.
 //! - [`faster`]: what faster units would bring.
 //! - [`follow`]: a run up to the period that is looked at.
 //! - [`straight()`]: in which cycle each operation of a straight line issues, and what it waits for.
@@ -11,6 +12,7 @@
 
 pub mod accuracy;
 pub mod bound;
+pub mod dependence;
 mod error;
 pub mod faster;
 pub mod follow;

@@ -31,13 +31,16 @@ pub(crate) struct Bound {
     pub(crate) machine: OptionalMachine,
     #[command(flatten)]
     pub(crate) source: SourceArguments,
-    /// Fail (status 1) unless every period ends before the next tick, this time after its own: `100us`, `0.1ms`, or a
-    /// number of cycles.
+    /// Fail (status 1) unless every period ends before the next tick, this time after its own, or, of a system, unless every first response
+    /// is certain to come within this time: `100us`, `0.1ms`, or a number of cycles.
     #[arg(long, value_name = "TIME", value_parser = number::time, allow_hyphen_values = true)]
     pub(crate) deadline: Option<Time>,
     /// Clock in MHz, for a deadline in seconds and for cycles to time.
     #[arg(long, value_name = "MHZ", default_value_t = select::PAPER_CLOCK, value_parser = number::clock, allow_hyphen_values = true)]
     pub(crate) clock: f64,
+    /// With a system and --deadline: FIFOs are empty when a command comes. Without it, no deadline of a way over one is certain to be kept.
+    #[arg(long, requires = "deadline")]
+    pub(crate) empty_fifos: bool,
     /// From an edge at a pin of a board to one at another: the cycles of each part of the way, with the peripherals of --wiring.
     #[cfg(feature = "board")]
     #[arg(long, requires = "wiring")]
@@ -115,6 +118,10 @@ pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
     files::check(&[("FILE", &arguments.file)], &[])?;
     if load::is_system(&arguments.file) {
         return system::bound::run(arguments, color, out);
+    }
+    if arguments.empty_fifos {
+        let why = "--empty-fifos is for systems, which have FIFOs between their cores";
+        return Err(Failure::Usage(why.to_owned()).into());
     }
     let program =
         Load::new(arguments.machine.machine, color).with(&arguments.source).program(&arguments.file)?;

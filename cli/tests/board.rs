@@ -510,16 +510,35 @@ fn the_way_from_pin_to_pin_has_a_bound() {
     }
     let json: serde_json::Value =
         serde_json::from_str(&bound(&format!("--wiring {wiring} --json")).ok()).unwrap();
+    let way = &json["ways"][0];
     let sum = |edge: &str| {
-        let parts = [&json["inputs"][0]["parts"], &json["between"], &json["outputs"][0]["parts"]];
+        let parts = [&way["inputs"][0]["parts"], &way["between"], &way["outputs"][0]["parts"]];
         parts
             .iter()
             .flat_map(|parts| parts.as_array().unwrap())
             .map(|part| part[edge].as_u64().unwrap())
             .sum::<u64>()
     };
-    assert_eq!(json["total"]["best"], sum("best"));
-    assert_eq!(json["total"]["worst"], sum("worst"));
+    assert_eq!(way["total"]["best"], sum("best"));
+    assert_eq!(way["total"]["worst"], sum("worst"));
+    // Two periods of states are two more periods on the way, and what follows nothing is on none.
+    let delayed = "delayed.s";
+    folder.write(
+        delayed,
+        ".input n1:int n2:int n3:int n4:int n5:int\n.output F1 F2 F3 tau4 tau5\n.state s:int\n.state t:int\n.once\n mov s, zero\n\
+         mov t, zero\n mov F2, zero\n mov F3, zero\n mov tau5, zero\n wait p\n.period\np: itof F1, t\n mov t, s\n mov s, n1\n itof tau4, n1\n wait p\n",
+    );
+    let bound = folder.line(&format!("bound {delayed} --pins --wiring {wiring} -W allow=unused")).ok();
+    let json: serde_json::Value = serde_json::from_str(
+        &folder.line(&format!("bound {delayed} --pins --wiring {wiring} -W allow=unused --json")).ok(),
+    )
+    .unwrap();
+    assert!(bound.contains("  through 2 periods of states                  12000 "), "{bound}");
+    assert!(!bound.contains("encoder2") && !bound.contains("motor2"), "{bound}");
+    let totals: Vec<u64> =
+        json["ways"].as_array().unwrap().iter().map(|way| way["total"]["best"].as_u64().unwrap()).collect();
+    assert_eq!((totals.len(), totals[0] + 12000), (2, totals[1]), "{json}");
+    let bound = |more: &str| folder.line(&format!("bound {program} --pins {more}"));
     let refused = |more: &str, says: &str| {
         let done = bound(more);
         assert!(done.status == Some(1) && done.stderr.contains(says), "{more}: {done:?}");

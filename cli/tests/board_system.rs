@@ -177,7 +177,9 @@ fn the_ways_from_pin_to_pin_over_cores_have_bounds() {
         ("wiring.toml", "[peripheral.lamp]", more),
         ("axis.toml", "[[wire]]\nfrom = \"host.limit\"", links),
         ("servo.s", ".input  n:int ", ".input  n2:int, n3:int\n.input  n:int "),
+        ("servo.s", "wanted - itof(n)\n", "wanted - itof(n) - itof(n2) - itof(n3)\n"),
         ("watch.s", ".output peak ", ".input  late\n.output next\n.output peak "),
+        ("watch.s", "        fabs    a, error\n", "        fadd    a, error, late\n        fabs    a, a\n"),
     ];
     copied(&folder, &several);
     let text = folder.line(&format!("{bound} -W allow=unused")).ok();

@@ -44,9 +44,61 @@ fn bound_follows_a_command_through_the_cores() {
     };
     // A command that comes just too late for a tick waits for the next one.
     assert!(worst("u") > 125_000 && worst("u") < 2 * 125_000, "{}", worst("u"));
-    let late = folder.line(&format!("bound {toml} --deadline {}", worst("u") - 1));
+    let late = folder.line(&format!("bound {toml} --deadline {} --empty-fifos", worst("u") - 1));
     assert_eq!(late.status, Some(1));
-    folder.line(&format!("bound {toml} --deadline {}", worst("seen.peak"))).ok();
+    folder.line(&format!("bound {toml} --deadline {} --empty-fifos", worst("seen.peak"))).ok();
+    // What is queued comes first.
+    let queued = folder.line(&format!("bound {toml} --deadline {}", worst("seen.peak")));
+    assert_eq!(queued.status, Some(1));
+    assert!(queued.stdout.contains("if nothing is queued in moves: not certain to be kept\n"), "{queued:?}");
+    let single = folder.line(&format!("bound {} --deadline 100 --empty-fifos", speed("watch.s")));
+    assert!(single.status == Some(2) && single.stderr.contains("--empty-fifos is for systems"), "{single:?}");
+}
+
+#[test]
+fn bound_counts_the_periods_of_states() {
+    let folder = Folder::new();
+    let system = |outputs: &str| {
+        let wires =
+            outputs.split(' ').map(|name| format!("[[wire]]\nfrom = \"a.{name}\"\nto = \"host.{name}\"\n"));
+        let core = "tick = 200\n[[core]]\nname = \"a\"\nprogram = \"a.s\"\n[[wire]]\nfrom = \"host.x\"\nto = \"a.x\"\n";
+        format!("{core}{}", wires.collect::<String>())
+    };
+    folder.write(
+        "a.s",
+        ".input x:int\n.output direct:int delayed:int ring:int same:int\n.state s1:int s2:int s3:int n:int\n.data\nd: .space 4\n.once\n\
+         mov s1, zero\n mov s2, zero\n mov s3, zero\n mov n, zero\n mov direct, zero\n mov delayed, zero\n mov ring, zero\n\
+         mov same, 1\n wait p\n.period\np: mov delayed, s3\n mov s3, s2\n mov s2, s1\n mov s1, x\n iadd direct, x, s3\n\
+         ld ring, d[n]\n st d[n], x\n iadd n, n, 1\n iand n, n, 3\n wait p\n",
+    );
+    folder.write("direct.toml", system("direct"));
+    folder.write("delayed.toml", system("direct delayed"));
+    folder.write("ring.toml", system("ring"));
+    folder.write("same.toml", system("same"));
+    // The response of the delay line comes after three periods; without it, within one.
+    assert!(folder.line("bound direct.toml --deadline 250").ok().contains("carry the command on"));
+    let late = folder.line("bound delayed.toml --deadline 250");
+    assert_eq!(late.status, Some(1), "{late:?}");
+    assert!(late.stdout.contains("    through states: a 3 periods\n    59"), "{late:?}");
+    let json = |line: &str| -> Value { serde_json::from_str(&folder.line(line).stdout).unwrap() };
+    let way = &json("bound delayed.toml --deadline 250 --json")["latencies"][1];
+    assert_eq!((&way["states"]["least"][0], &way["kept"]), (&Value::from(3), &Value::from(false)));
+    let worst = way["worst"].as_u64().unwrap();
+    folder.line(&format!("bound delayed.toml --deadline {worst}")).ok();
+    assert_eq!(folder.line(&format!("bound delayed.toml --deadline {}", worst - 1)).status, Some(1));
+    // How long a ring is, its addresses say: nothing is certain, whatever the deadline.
+    let ring = folder.line("bound ring.toml --deadline 1ms");
+    assert!(
+        ring.status == Some(1) && ring.stdout.contains("with the fewest states: not certain to be kept\n"),
+        "{ring:?}"
+    );
+    let way = &json("bound ring.toml --deadline 1ms --json")["latencies"][0];
+    assert_eq!(
+        (&way["worst"], &way["kept"], &way["states"]["most"]),
+        (&Value::Null, &Value::Null, &Value::Null)
+    );
+    let none = folder.line("bound same.toml --deadline 1ms");
+    assert!(none.status == Some(1) && none.stderr.contains("no way leads from an input"), "{none:?}");
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use takt_model::functions::{Function, Options, What, derive};
 use takt_model::graph::{Delays, Rewrites};
+use takt_model::robot::MAX_LINKS;
 use takt_model::robot::{Robot, dh, urdf};
 
 const UR5: &str = include_str!("data/ur5.urdf");
@@ -177,6 +178,41 @@ fn wrong_robots_are_refused() {
         message(UR5, Some("wrist_3_link"), Some("tool0")),
         "no joint moves between `wrist_3_link` and `tool0`"
     );
+}
+
+/// A description with so many links, one carried by the other: the last by a joint that turns, the others by fixed ones.
+fn chain(links: usize) -> String {
+    let link = |number: usize| format!("<link name=\"l{number}\"/>\n");
+    let joint = |number: usize| {
+        let (kind, child) = (if number + 2 == links { "continuous" } else { "fixed" }, number + 1);
+        format!(
+            "<joint name=\"j{number}\" type=\"{kind}\"><parent link=\"l{number}\"/><child link=\"l{child}\"/><axis xyz=\"0 0 1\"/></joint>\n"
+        )
+    };
+    let [links, joints]: [String; 2] = [(0..links).map(link).collect(), (0..links - 1).map(joint).collect()];
+    format!("<robot name=\"chain\">\n{links}{joints}</robot>")
+}
+
+#[test]
+fn what_is_nested_or_long_without_end_is_refused() {
+    let within =
+        |depth: usize| format!("<robot name=\"x\">\n{}{}</robot>", "<a>".repeat(depth), "</a>".repeat(depth));
+    assert_eq!(message(&within(urdf::MAX_DEPTH - 1), None, None), "the robot has no link");
+    for depth in [urdf::MAX_DEPTH, 10_000, 1_000_000] {
+        let text = "2: more than 64 elements are within one another here; a robot needs fewer";
+        assert_eq!(message(&within(depth), None, None), text);
+    }
+    assert_eq!(message(&chain(MAX_LINKS), None, None), "");
+    assert_eq!(message(&chain(MAX_LINKS), Some("l0"), Some("l4095")), "");
+    let line = MAX_LINKS + 2;
+    let text = "the robot has more than 4096 links: leave out what does not move";
+    for links in [MAX_LINKS + 1, 100_000] {
+        assert_eq!(message(&chain(links), None, None), format!("{line}: {text}"));
+    }
+    let joints = chain(MAX_LINKS).replace("</robot>", &"<joint/>".repeat(2)).to_owned() + "</robot>";
+    assert!(message(&joints, None, None).contains("more than 4096 joints, fixed ones included"));
+    let wide = format!("<robot name=\"x\">{}</robot>", "<a/>".repeat(urdf::MAX_NODES as usize));
+    assert_eq!(message(&wide, None, None), "the file has more than 1048576 elements and texts");
 }
 
 #[test]

@@ -7,6 +7,10 @@ mod system;
 pub use system::system_ways;
 
 use crate::wiring::{Peripheral, Wiring};
+use std::collections::{BTreeMap, BTreeSet};
+use takt_analysis::dependence::{Dependence, Sent};
+use takt_isa::Program;
+use takt_isa::program::Port;
 
 /// A part of the way.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -62,6 +66,9 @@ pub struct Way {
     pub periods: Part,
     /// From there to an edge at a pin.
     pub outputs: Vec<End>,
+    /// Whether the worst is: otherwise branches, or addresses of data memory, can put the first response off, and the worst is that of the
+    /// fewest states that it can come through.
+    pub is_certain: bool,
 }
 
 impl Way {
@@ -80,7 +87,7 @@ impl Way {
 /// The ways through a board.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Ways {
-    /// The ways; of a program, one at most.
+    /// The ways. Of a program, they differ in the states between their inputs and outputs.
     pub ways: Vec<Way>,
     /// Peripherals whose ports have no edge to count from or to, such as converters.
     pub others: Vec<String>,
@@ -154,6 +161,59 @@ fn others(wiring: &Wiring) -> Vec<String> {
     wiring.peripherals.iter().filter(is_other).map(|peripheral| peripheral.name.clone()).collect()
 }
 
+/// The periods that states take, in words; nothing for none.
+fn states_text(least: u32, most: u32) -> Option<String> {
+    match (least, most) {
+        (0, 0) => None,
+        (1, 1) => Some("through a period of states".to_owned()),
+        (least, most) if least == most => Some(format!("through {most} periods of states")),
+        (least, most) => Some(format!("through {least} to {most} periods of states")),
+    }
+}
+
+/// The ways of a program, as [`ways`] has them, and the periods that states add: those of inputs and outputs with the same states
+/// together. Outputs that follow none of the inputs are left out.
+pub fn program_ways(wiring: &Wiring, program: &Program, span: (u64, u64)) -> Ways {
+    let mut all = ways(wiring, span);
+    let dependence = Dependence::new(program, &BTreeSet::new()).unwrap_or_else(|_| Dependence::unknown());
+    let sent = if program.latched { Sent::AtWait } else { Sent::Written };
+    let register =
+        |ports: &[Port], name: &str| ports.iter().find(|port| port.name == name).map(|port| port.register);
+    let split = |way: Way| {
+        // For the same states, each input's outputs; for the same of both, all inputs.
+        let (mut outputs, mut inputs) = (BTreeMap::<_, Vec<usize>>::new(), BTreeMap::<_, Vec<usize>>::new());
+        for (number, input) in way.inputs.iter().enumerate() {
+            let Some(input) = register(&program.inputs, &input.port) else { continue };
+            let on = dependence.on(input);
+            for (end, output) in way.outputs.iter().enumerate() {
+                let output = register(&program.outputs, &output.port);
+                if let Some(periods) = output.and_then(|output| on.output(output, sent)) {
+                    outputs.entry((periods.least, periods.most, number)).or_default().push(end);
+                }
+            }
+        }
+        for ((least, most, input), outputs) in outputs {
+            inputs.entry((least, most, outputs)).or_default().push(input);
+        }
+        let period = u64::from(wiring.period);
+        let of =
+            |ends: &[End], numbers: &[usize]| numbers.iter().map(|number| ends[*number].clone()).collect();
+        let each = move |((least, most, outputs), inputs): ((u32, Option<u32>, Vec<usize>), Vec<usize>)| {
+            let latest = most.unwrap_or(least);
+            let mut between = way.between.clone();
+            if let Some(text) = states_text(least, latest) {
+                between.insert(3, Part::new(text, u64::from(least) * period, u64::from(latest) * period));
+            }
+            let periods = Part::sum("", &between);
+            let [inputs, outputs] = [of(&way.inputs, &inputs), of(&way.outputs, &outputs)];
+            Way { inputs, outputs, between, periods, is_certain: most.is_some(), ..way.clone() }
+        };
+        inputs.into_iter().map(each).collect::<Vec<_>>()
+    };
+    all.ways = all.ways.into_iter().flat_map(split).collect();
+    all
+}
+
 /// The ways of a program whose periods take between `best` and `worst` cycles from tick to `wait`, the next tick coming after the `wait`.
 pub fn ways(wiring: &Wiring, (best, worst): (u64, u64)) -> Ways {
     let inputs: Vec<_> = wiring.peripherals.iter().flat_map(inputs).collect();
@@ -168,7 +228,8 @@ pub fn ways(wiring: &Wiring, (best, worst): (u64, u64)) -> Ways {
     let [inputs, outputs] =
         [inputs, outputs].map(|ends| ends.into_iter().filter_map(|(_, end)| end).collect::<Vec<_>>());
     let periods = Part::sum("", &between);
-    let way = Way { cores: Vec::new(), links: Vec::new(), inputs, between, periods, outputs };
+    let way =
+        Way { cores: Vec::new(), links: Vec::new(), inputs, between, periods, outputs, is_certain: true };
     let is_way = !way.inputs.is_empty() && !way.outputs.is_empty();
     Ways { ways: is_way.then_some(way).into_iter().collect(), others: others(wiring), queues: Vec::new() }
 }

@@ -1,7 +1,7 @@
 //! The ways through a system of several cores. `takt_system` says which cores and links they take, and when each core reads and waits
 //! (docs/system.md); what a board adds before and after is here (docs/board.md).
 
-use super::{End, Part, Way, Ways, inputs, others, outputs};
+use super::{End, Part, Way, Ways, inputs, others, outputs, states_text};
 use crate::application::Application;
 use crate::ends::Ends;
 use crate::kind::Direction;
@@ -36,18 +36,18 @@ impl Range {
     }
 }
 
-/// Ends of ways, by the link that begins or ends at them.
-type ByLink = BTreeMap<usize, Vec<End>>;
+/// Ends of ways, by the link that begins or ends at them, with the link's field.
+type ByLink = BTreeMap<usize, Vec<(usize, End)>>;
 
 /// The ways through a system's cores, through none twice, if no deadline is missed. A core is assumed to read a value in the first period
-/// with it, and to write what follows from it by that period's `wait`.
+/// with it, and to write what follows from it by that period's `wait`, or as many periods later as its states take.
 ///
 /// # Errors
 /// If there are too many ways to find, or too many phases of ticks to go through.
 pub fn system_ways(wiring: &Wiring, passages: &Passages<'_>) -> Result<Ways, LatencyError> {
     let description = passages.description();
     let taken = taken(description, wiring);
-    let (heads, tails) = (heads(description, wiring), tails(wiring, &taken));
+    let (heads, tails) = (heads(description, wiring), tails(description, wiring, &taken));
     let is_fifo = |link: &&usize| matches!(description.links[**link].kind, LinkKind::Fifo { .. });
     let (mut ways, mut queues) = (Vec::new(), BTreeSet::new());
     for route in passages.routes(|link| heads.contains_key(&link), |link| tails.contains_key(&link))? {
@@ -61,14 +61,22 @@ pub fn system_ways(wiring: &Wiring, passages: &Passages<'_>) -> Result<Ways, Lat
         else {
             continue;
         };
+        let of = |ends: &[(usize, End)], fields: &[usize]| -> Vec<End> {
+            ends.iter().filter(|(field, _)| fields.contains(field)).map(|(_, end)| end.clone()).collect()
+        };
+        let (inputs, outputs) = (of(&heads[first], &route.inputs), of(&tails[last], &route.outputs));
+        if inputs.is_empty() || outputs.is_empty() {
+            continue;
+        }
         let (between, periods) = between(passages, &route, *core, &taken[*core]);
         ways.push(Way {
             cores: route.cores.iter().map(|core| description.cores[*core].name.clone()).collect(),
             links: route.links.iter().map(|link| description.links[*link].name.clone()).collect(),
-            inputs: heads[first].clone(),
+            inputs,
             between,
             periods,
-            outputs: tails[last].clone(),
+            outputs,
+            is_certain: route.most.is_some(),
         });
     }
     Ok(Ways { ways, others: others(wiring), queues: queues.into_iter().collect() })
@@ -87,7 +95,7 @@ fn heads(description: &Description, wiring: &Wiring) -> ByLink {
                 && link.from == takt_system::End::Host
                 && link.fields.iter().any(|field| field.from == driven.name);
             if same || number == driven.link {
-                heads.entry(number).or_default().push(end.clone());
+                heads.entry(number).or_default().push((driven.field, end.clone()));
             }
         }
     }
@@ -95,8 +103,8 @@ fn heads(description: &Description, wiring: &Wiring) -> ByLink {
 }
 
 /// The links from which a peripheral takes values.
-fn tails(wiring: &Wiring, taken: &[Vec<Taken<'_>>]) -> ByLink {
-    let mut tails = ByLink::new();
+fn tails(description: &Description, wiring: &Wiring, taken: &[Vec<Taken<'_>>]) -> ByLink {
+    let (ends, mut tails) = (Ends::of(description), ByLink::new());
     for peripheral in &wiring.peripherals {
         for (port, end) in outputs(peripheral) {
             let Some(end) = end else { continue };
@@ -104,7 +112,7 @@ fn tails(wiring: &Wiring, taken: &[Vec<Taken<'_>>]) -> ByLink {
             let found =
                 all.find(|taken| taken.peripheral.name == peripheral.name && taken.written.port == port);
             if let Some(taken) = found {
-                tails.entry(taken.link).or_default().push(end);
+                tails.entry(taken.link).or_default().push((ends.outputs[taken.end].field, end));
             }
         }
     }
@@ -122,9 +130,9 @@ fn between(passages: &Passages<'_>, route: &Route, last: usize, taken: &[Taken<'
     let (mut all, mut under_way) = (Range::NONE, vec![false; cores.len()]);
     for phase in 0..route.phases as i64 {
         let due = phase * tick - lead;
-        let [fastest, slowest] = [passages.fastest(&route.links, due), passages.slowest(&route.links, due)];
+        let [fastest, slowest] = [passages.fastest(route, due), passages.slowest(route, due)];
         for (passes, is_fastest) in [(&fastest, true), (&slowest, false)] {
-            let waits = |pass: &Pass| if is_fastest && puts.early { pass.reads } else { pass.waits };
+            let waits = |pass: &Pass| if is_fastest && puts.early { pass.writes } else { pass.waits };
             let reached = passes.iter().map(|pass| pass.reads).chain(passes.last().map(waits));
             let mut before = due - DUE;
             for (stage, cycle) in stages.iter_mut().zip(reached) {
@@ -139,12 +147,15 @@ fn between(passages: &Passages<'_>, route: &Route, last: usize, taken: &[Taken<'
     }
     let mut parts = vec![Part::new("until the board's tick", 0, tick as u64 - 1)];
     let mut from = "registers".to_owned();
-    for ((core, under_way), stage) in cores.iter().zip(&under_way).zip(&stages) {
+    for (place, ((core, under_way), stage)) in cores.iter().zip(&under_way).zip(&stages).enumerate() {
         let name = &description.cores[*core].name;
         let to =
             if *under_way { format!("into a period of {name}") } else { format!("to the tick of {name}") };
         parts.push(stage.part(format!("{from} {to}")));
-        from = format!("{name}, from {}", if *under_way { "there" } else { "tick" });
+        let states = route.most.as_ref().map_or(route.least[place], |most| most[place]);
+        let states =
+            states_text(route.least[place], states).map_or_else(String::new, |states| format!(" {states}"));
+        from = format!("{name}, from {}{states}", if *under_way { "there" } else { "tick" });
     }
     parts.push(stages[cores.len()].part(format!("{from} to `wait`")));
     let mut after = vec![puts.cycles.part(format!("output ports to registers ({})", taken.len()))];

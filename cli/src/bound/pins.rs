@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use std::io::Write;
 use std::path::Path;
 use takt_analysis::Bounds;
-use takt_board::latency::{End, Part, Way, Ways, system_ways, ways};
+use takt_board::latency::{End, Part, Way, Ways, program_ways, system_ways};
 use takt_board::{Application, Board, Wiring};
 use takt_isa::Program;
 use takt_system::Description;
@@ -53,10 +53,12 @@ pub(super) fn program(
     let program_takes = periods
         .reduce(|a, b| takt_analysis::Span { best: a.best.min(b.best), worst: a.worst.max(b.worst) })
         .context("the program has no period: it never waits for the tick")?;
-    let ways = ways(&wiring, (program_takes.best, program_takes.worst));
-    let Some(way) = ways.ways.first() else {
+    let span = (program_takes.best, program_takes.worst);
+    let ways = program_ways(&wiring, program, span);
+    let Some(way) = takt_board::latency::ways(&wiring, span).ways.pop().filter(|_| !ways.ways.is_empty())
+    else {
         bail!(
-            "{name}: no path from pin to pin: the wiring needs an input (quadrature, step, digital-in) and an output (pwm, sigma-delta, digital-out) that are connected to ports"
+            "{name}: no path from pin to pin: the wiring needs an input (quadrature, step, digital-in) and an output (pwm, sigma-delta, digital-out) that are connected to ports, the second of which depends on the first"
         );
     };
     let (busy, period) = (Part::sum("", &way.between[1..]).worst, u64::from(wiring.period));
@@ -116,7 +118,7 @@ impl Found<'_> {
         }
         writeln!(
             out,
-            "cycles from an edge at a pin to an edge at a pin: {} on {}, {} at {} MHz",
+            "cycles from an edge at a pin to the first edge at a pin that follows: {} on {}, {} at {} MHz",
             files::input_name(&arguments.file),
             self.board.name,
             self.application.cores(),
@@ -124,7 +126,11 @@ impl Found<'_> {
         )?;
         let parts = self.ways.ways.iter().flat_map(|way| &way.between);
         let width = parts.map(|part| part.text.chars().count()).max().unwrap_or(0).max(WIDTH);
-        for group in Group::all(&self.ways.ways) {
+        let groups = match self.application {
+            Application::Program(_) => Group::of_program(&self.ways.ways),
+            Application::System(_) => Group::all(&self.ways.ways),
+        };
+        for group in groups {
             group.write(Table { clock: self.wiring.clock, width }, out)?;
         }
         for late in &self.late {
@@ -150,12 +156,12 @@ impl Found<'_> {
         let way = |way: &Way| {
             json!({
                 "inputs": ends(&way.inputs), "between": parts(&way.between), "outputs": ends(&way.outputs),
-                "total": part(&way.total()),
+                "total": part(&way.total()), "is_certain": way.is_certain,
             })
         };
         let ways = &self.ways.ways;
         let mut value = match self.application {
-            Application::Program(_) => way(&ways[0]),
+            Application::Program(_) => json!({ "ways": ways.iter().map(way).collect::<Vec<_>>() }),
             Application::System(_) => {
                 let way = |known: &Way| {
                     let mut value = way(known);
@@ -182,47 +188,94 @@ impl Found<'_> {
 struct Group {
     /// With all inputs and outputs.
     way: Way,
+    /// The names of its inputs.
+    inputs: Vec<String>,
+    /// The names of its outputs.
+    outputs: Vec<String>,
     /// The links that they begin with.
     first: Vec<String>,
     /// The links that they end with.
     last: Vec<String>,
+    /// Of a program, the ports that outputs follow, and these, where not all follow all.
+    ports: Vec<[Vec<String>; 2]>,
 }
 
 impl Group {
     fn all(ways: &[Way]) -> Vec<Group> {
+        let names =
+            |ends: &[End]| ends.iter().map(|end| format!("{} {}", end.peripheral, end.port)).collect();
         let alone = |way: &Way| Group {
             way: way.clone(),
+            inputs: names(&way.inputs),
+            outputs: names(&way.outputs),
             first: way.links.first().cloned().into_iter().collect(),
             last: way.links.last().cloned().into_iter().collect(),
+            ports: Vec::new(),
         };
         let inner = |way: &Way| -> Vec<String> {
             way.links.get(1..way.links.len().saturating_sub(1)).unwrap_or_default().to_vec()
         };
         let alike = |a: &Group, b: &Group| {
             let [a, b] = [&a.way, &b.way];
-            (&a.cores, inner(a), &a.between, &a.periods) == (&b.cores, inner(b), &b.between, &b.periods)
+            let key = |way: &Way| (way.periods.clone(), way.is_certain);
+            (&a.cores, inner(a), &a.between, key(a)) == (&b.cores, inner(b), &b.between, key(b))
         };
         grouped(
             ways.iter().map(alone),
             alike,
             (
-                |group| &group.first,
+                |group| &group.inputs,
                 |group, other| {
                     group.first.extend(other.first);
+                    group.first.dedup();
+                    group.inputs.extend(other.inputs);
                     group.way.inputs.extend(other.way.inputs);
                 },
             ),
             (
-                |group| &group.last,
+                |group| &group.outputs,
                 |group, other| {
                     group.last.extend(other.last);
+                    group.last.dedup();
+                    group.outputs.extend(other.outputs);
                     group.way.outputs.extend(other.way.outputs);
                 },
             ),
         )
     }
 
+    /// Of a program, whose ways share all that is between their ends unless states differ: such ways as one, with its ports.
+    fn of_program(ways: &[Way]) -> Vec<Group> {
+        let mut groups: Vec<Group> = Vec::new();
+        for group in Group::all(ways) {
+            let [inputs, outputs] = [&group.way.inputs, &group.way.outputs];
+            let ports = [inputs, outputs].map(|ends| ends.iter().map(|end| end.port.clone()).collect());
+            let alike = |other: &&mut Group| {
+                (&other.way.between, other.way.is_certain) == (&group.way.between, group.way.is_certain)
+            };
+            match groups.iter_mut().find(alike) {
+                None => groups.push(Group { ports: vec![ports], ..group }),
+                Some(other) => {
+                    other.ports.push(ports);
+                    let add = |ends: &mut Vec<End>, more: &[End]| {
+                        let new: Vec<End> = more.iter().filter(|end| !ends.contains(end)).cloned().collect();
+                        ends.extend(new);
+                    };
+                    add(&mut other.way.inputs, inputs);
+                    add(&mut other.way.outputs, outputs);
+                }
+            }
+        }
+        groups
+    }
+
     fn write(&self, table: Table, out: &mut Out) -> Result<()> {
+        if let [_, _, ..] = self.ports[..] {
+            writeln!(out, "which follows which")?;
+            for [inputs, outputs] in &self.ports {
+                writeln!(out, "  {} -> {}", inputs.join(", "), outputs.join(", "))?;
+            }
+        }
         let Way { cores, links, between, .. } = &self.way;
         if !cores.is_empty() {
             writeln!(out, "\nthrough {}", cores.join(", "))?;
@@ -235,7 +288,14 @@ impl Group {
         between.iter().try_for_each(|part| line(part, table, out))?;
         ends(&self.way.outputs, table, out)?;
         writeln!(out, "in all")?;
-        line(&self.way.total(), table, out)
+        line(&self.way.total(), table, out)?;
+        if !self.way.is_certain {
+            writeln!(
+                out,
+                "  not certain: branches or addresses of data memory can put the response off to later periods"
+            )?;
+        }
+        Ok(())
     }
 }
 

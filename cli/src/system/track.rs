@@ -1,6 +1,6 @@
 //! `takt track --system`: the hybrid robot on a system of cores, one of which computes the path's points.
 
-use super::bound::{bounds, write_ways};
+use super::bound::{bounds, way_json, write_ways};
 use super::{LoadedSystem, load, record, told};
 use crate::files::{self, Out};
 use crate::output;
@@ -264,9 +264,7 @@ impl Ran<'_> {
             let error = self.worst(kind);
             json!({ "of": name, "unit": unit, "largest_error": error.absolute, "ulps": error.ulps_of_largest() })
         });
-        let ways = self.ways.iter().map(|way| {
-            json!({ "inputs": way.inputs, "outputs": way.outputs, "best": way.best, "worst": way.worst })
-        });
+        let ways = self.ways.iter().map(|way| way_json(&self.loaded.description, way));
         json!({
             "system": files::input_name(self.file), "path": self.path, "periods": self.periods, "clock_mhz": self.arguments.clock,
             "tick": self.loaded.description.tick, "cores": cores.collect::<Vec<_>>(), "missed": self.missed(),

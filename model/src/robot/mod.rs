@@ -2,6 +2,7 @@
 
 pub mod dh;
 pub mod frames;
+mod nesting;
 pub mod space;
 mod tree;
 pub mod urdf;
@@ -85,8 +86,10 @@ pub struct Robot {
 
 /// Standard gravity as robot models have it, m/s².
 pub const GRAVITY: f64 = 9.81;
-/// Joints that a robot may have.
+/// Joints that move which a robot may have.
 pub const MAX_JOINTS: usize = 128;
+/// Links that a description may have, and joints, fixed ones included.
+pub const MAX_LINKS: usize = 4096;
 
 impl Robot {
     /// The link of a name.

@@ -3,7 +3,7 @@
 use super::space::{self, IDENTITY, Inertia, M3, Pose, V3};
 use super::{Frame, GRAVITY, Joint, Kind, MAX_JOINTS, Robot};
 use crate::Error;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// How the joint of a description moves.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -121,7 +121,7 @@ impl Tree {
                 let end = path.iter().position(|joint| joint.parent == base);
                 let end = end
                     .ok_or_else(|| Error::plain(format!("--tip: link `{tip}` is not carried by `{base}`")))?;
-                Some(path[..=end].iter().map(|joint| joint.name.as_str()).collect::<Vec<_>>())
+                Some(path[..=end].iter().map(|joint| joint.name.as_str()).collect::<HashSet<_>>())
             }
         };
         // Upwards in the root's frame, as the base sees it with all joints at 0.
@@ -141,6 +141,8 @@ impl Tree {
         for joint in &self.joints {
             children.entry(&joint.parent).or_default().push(joint);
         }
+        let bodies: HashMap<&str, &Inertia> =
+            self.links.iter().map(|(name, body)| (name.as_str(), body)).collect();
         let mut held = Vec::new();
         let mut stack: Vec<(&str, Carrier)> = vec![(base, Carrier::Known(None, Pose::IDENTITY))];
         let mut seen = 0;
@@ -157,7 +159,7 @@ impl Tree {
                 return Err(Error::plain("the links are no tree: a link carries itself"));
             }
             robot.frames.push(Frame { name: link.to_owned(), joint: carrier, pose });
-            let body = self.links.iter().find(|(name, _)| name == link).map(|(_, body)| body.outside(&pose));
+            let body = bodies.get(link).map(|body| body.outside(&pose));
             if let (Some(joint), Some(body)) = (carrier, body) {
                 let joint: &mut Joint = &mut robot.joints[joint];
                 joint.body = joint.body.plus(&body);
@@ -172,7 +174,7 @@ impl Tree {
                         continue;
                     }
                 };
-                if way.as_ref().is_some_and(|way| !way.contains(&joint.name.as_str())) {
+                if way.as_ref().is_some_and(|way| !way.contains(joint.name.as_str())) {
                     // What branches off the base has no effect.
                     if carrier.is_some() {
                         held.push(joint.name.as_str());

@@ -1,12 +1,17 @@
 //! Robots from URDF.
 
-use super::Kind;
+use super::nesting::too_deep;
 use super::space::{self, Inertia, Pose};
 use super::tree::{Element, ElementKind, Tree, rotation};
+use super::{Kind, MAX_LINKS};
 use crate::Error;
 
 /// The largest description that is read, bytes.
 pub const MAX_BYTES: usize = 64 << 20;
+/// Elements within one another at most. (A description of URDF has 6; parsers call themselves for each.)
+pub const MAX_DEPTH: usize = 64;
+/// Elements, and texts between them, at most.
+pub const MAX_NODES: u32 = 1 << 20;
 /// How far an angle may be from a multiple of a quarter turn to be taken for it, rad: descriptions write π/2 with 6 to 16 digits.
 pub const SNAP: f64 = 1e-6;
 /// The most that it may be, rad: beyond, it would be another geometry.
@@ -20,10 +25,19 @@ pub fn read(source: &str, snap: f64) -> Result<Tree, Error> {
     if source.len() > MAX_BYTES {
         return Err(Error::plain(format!("the file is longer than {} MiB", MAX_BYTES >> 20)));
     }
+    if let Some(line) = too_deep(source, MAX_DEPTH) {
+        let text = format!("more than {MAX_DEPTH} elements are within one another here; a robot needs fewer");
+        return Err(Error::on(line, text));
+    }
     // This parser says where it is that a text is no XML.
-    let document = roxmltree::Document::parse(source).map_err(|error| {
+    let options =
+        roxmltree::ParsingOptions { nodes_limit: MAX_NODES, ..roxmltree::ParsingOptions::default() };
+    let document = roxmltree::Document::parse_with_options(source, options).map_err(|error| {
         let text = format!("this is no XML: {error}");
         match error {
+            roxmltree::Error::NodesLimitReached => {
+                Error::plain(format!("the file has more than {MAX_NODES} elements and texts"))
+            }
             // It gives these the first line.
             roxmltree::Error::UnclosedRootNode | roxmltree::Error::NoRootNode => Error::plain(text),
             error => Error::on(error.pos().row as usize, text),
@@ -32,6 +46,14 @@ pub fn read(source: &str, snap: f64) -> Result<Tree, Error> {
     if document.root_element().tag_name().name() != "robot" {
         let name = document.root_element().tag_name().name();
         return Err(Error::plain(format!("this is no URDF: its element is `{name}`, not `robot`")));
+    }
+    for (element, what) in [("link", "links"), ("joint", "joints, fixed ones included")] {
+        let mut all = document.root_element().children().filter(|child| child.has_tag_name(element));
+        if let Some(one) = all.nth(MAX_LINKS) {
+            let line = document.text_pos_at(one.range().start).row as usize;
+            let text = format!("the robot has more than {MAX_LINKS} {what}: leave out what does not move");
+            return Err(Error::on(line, text));
+        }
     }
     let robot = urdf_rs::read_from_string(source).map_err(|error| not_urdf(source, &error.to_string()))?;
     convert(&robot, snap).map_err(|error| error.located(source))

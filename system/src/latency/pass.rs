@@ -1,7 +1,9 @@
 //! When a value passes through the cores on its way, from the bounds of their periods and the rules of `docs/system.md`.
 
+use super::carried::{Carried, States};
 use super::{LatencyError, MAX_PHASES, MAX_STEPS, MAX_WAYS};
 use crate::description::{Description, End, Link, LinkKind, MIN_LATENCY};
+use std::collections::{BTreeMap, BTreeSet};
 use takt_analysis::Bounds;
 use takt_isa::timing::{Cycle, ENDED_DELAY};
 use takt_isa::{BundleAddress, Machine, Program};
@@ -28,13 +30,15 @@ pub struct Pass {
     pub reads: i64,
     /// Whether the period is under way when the value arrives.
     pub under_way: bool,
-    /// The cycle in which the period's `wait` issues.
+    /// The tick of the period that writes what follows from it: that of `reads`, or as many later as states take.
+    pub writes: i64,
+    /// The cycle in which that period's `wait` issues.
     pub waits: i64,
     /// The cycle in which what follows from the value goes onto the next link: that of its writeback, or of the `wait` that publishes it.
     pub leaves: i64,
 }
 
-/// A way from the host to the host.
+/// A way from the host to the host, of fields that take the same states.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Route {
     /// Its links, in order.
@@ -43,6 +47,23 @@ pub struct Route {
     pub cores: Vec<usize>,
     /// Base ticks after which the ticks of these cores repeat.
     pub phases: u64,
+    /// Fields of its first link.
+    pub inputs: Vec<usize>,
+    /// Fields of its last link, each of which follows each of `inputs`.
+    pub outputs: Vec<usize>,
+    /// For each core, after how many of its periods an output can follow.
+    pub least: Vec<u32>,
+    /// After how many it does at most; none if branches or addresses can put it off without end.
+    pub most: Option<Vec<u32>>,
+    /// Whether states carry the input on to later periods.
+    pub lasting: bool,
+}
+
+impl Route {
+    /// The periods of the worst case: the most that states take, or, where nothing is certain, what they take on the shortest path.
+    fn periods(&self) -> &[u32] {
+        self.most.as_ref().unwrap_or(&self.least)
+    }
 }
 
 /// The cores' periods, and how values pass through them.
@@ -50,6 +71,7 @@ pub struct Route {
 pub struct Passages<'a> {
     description: &'a Description,
     spans: Vec<Option<Span>>,
+    carried: Carried,
 }
 
 /// A tick of a core.
@@ -96,8 +118,10 @@ impl<'a> Passages<'a> {
                 in_time: (in_time, below),
             })
         };
-        let spans = bounds.iter().enumerate().map(|(number, bounds)| span(number, bounds)).collect();
-        Passages { description, spans }
+        let spans: Vec<Option<Span>> =
+            bounds.iter().enumerate().map(|(number, bounds)| span(number, bounds)).collect();
+        let carried = Carried::new(description, |core| spans.get(core).is_some_and(Option::is_some));
+        Passages { description, spans, carried }
     }
 
     /// The system.
@@ -122,8 +146,8 @@ impl<'a> Passages<'a> {
         self.spans[core].map(|span| (span.best, span.worst))
     }
 
-    /// Every way that begins with one of these links from the host, and ends with one of those to the host. None goes through a core twice,
-    /// or through one that never waits for a tick.
+    /// Every way that begins with one of these links from the host, and ends with one of those to the host, if an output depends on an input
+    /// over it. None goes through a core twice, or through one that never waits for a tick.
     ///
     /// # Errors
     /// If there are too many, or too many phases of ticks to go through.
@@ -157,12 +181,15 @@ impl<'a> Passages<'a> {
                             what: "ways from inputs to outputs",
                         });
                     }
-                    let route = self.route(way).filter(|route| {
-                        phases = phases.saturating_add(route.phases);
-                        phases <= MAX_PHASES
-                    });
                     let what = "phases of the ticks to each other";
-                    found.push(route.ok_or(LatencyError::Limit { limit: MAX_PHASES, what })?);
+                    let error = LatencyError::Limit { limit: MAX_PHASES, what };
+                    for route in self.along(way).ok_or_else(|| error.clone())? {
+                        phases = phases.saturating_add(route.phases);
+                        if phases > MAX_PHASES {
+                            return Err(error);
+                        }
+                        found.push(route);
+                    }
                 }
                 End::Host => {}
                 End::Core(core) => {
@@ -176,14 +203,28 @@ impl<'a> Passages<'a> {
         Ok(found)
     }
 
-    fn route(&self, links: Vec<usize>) -> Option<Route> {
+    /// A way's fields, those together that take the same states; none if there are too many phases to count.
+    fn along(&self, links: Vec<usize>) -> Option<Vec<Route>> {
         let core = |link: &usize| match self.description.links[*link].to {
             End::Core(core) => Some(core),
             End::Host => None,
         };
         let cores: Vec<usize> = links.iter().filter_map(core).collect();
         let phases = cores.iter().try_fold(1, |all, core| lcm(all, self.description.cores[*core].every))?;
-        Some(Route { links, cores, phases })
+        let mut outputs: BTreeMap<(usize, States), BTreeSet<usize>> = BTreeMap::new();
+        for (input, output, states) in self.carried.along(self.description, &links) {
+            outputs.entry((input, states)).or_default().insert(output);
+        }
+        let mut inputs: BTreeMap<(States, BTreeSet<usize>), Vec<usize>> = BTreeMap::new();
+        for ((input, states), outputs) in outputs {
+            inputs.entry((states, outputs)).or_default().push(input);
+        }
+        let route = |((states, outputs), inputs): ((States, BTreeSet<usize>), Vec<usize>)| {
+            let States { least, most, lasting } = states;
+            let (links, cores, outputs) = (links.clone(), cores.clone(), outputs.into_iter().collect());
+            Route { links, cores, phases, inputs, outputs, least, most, lasting }
+        };
+        Some(inputs.into_iter().map(route).collect())
     }
 
     pub(super) fn grid(&self, core: usize) -> Grid {
@@ -193,52 +234,51 @@ impl<'a> Passages<'a> {
 
     /// The earliest passages of a value that goes onto a way's first link in cycle `start`: the bundle that reads it can be the last of a
     /// period that is under way.
-    pub fn fastest(&self, way: &[usize], start: i64) -> Vec<Pass> {
-        self.passes(way, start, |core, span, link, next, start| {
+    pub fn fastest(&self, route: &Route, start: i64) -> Vec<Pass> {
+        self.passes(&route.links, &route.least, start, |core, span, [link, next], periods, start| {
             let (cycle, grid) = (start + carry(self.description, link), self.grid(core));
             let tick = grid.from(cycle - grid.period);
             let under_way = at_once(self.description, link) && cycle <= tick + span.worst;
-            let (reads, waits) = match under_way {
-                true => (cycle, cycle.max(tick + span.best)),
-                false => (grid.from(cycle), grid.from(cycle) + span.best),
-            };
+            let (reads, tick) = if under_way { (cycle, tick) } else { (grid.from(cycle), grid.from(cycle)) };
+            let later = periods * grid.period;
+            let (writes, tick) = (reads.max(tick + later), tick + later);
+            let waits = writes.max(tick + span.best);
             // A `wait` publishes what was written by then.
-            let leaves = if at_wait(self.description, next) { waits.max(reads + 1) } else { reads + 1 };
-            Pass { core, reads, under_way, waits, leaves }
+            let leaves = if at_wait(self.description, next) { waits.max(writes + 1) } else { writes + 1 };
+            Pass { core, reads, under_way, writes, waits, leaves }
         })
     }
 
-    /// The latest passages: the first whole period with the value reads it, and writes what follows from it at its end. FIFOs are empty.
-    pub fn slowest(&self, way: &[usize], start: i64) -> Vec<Pass> {
-        self.passes(way, start, |core, span, link, next, start| {
+    /// The latest passages: the first whole period with the value reads it, and writes what follows from it at its end, or after as many
+    /// more as its states can take. FIFOs are empty. Where nothing is certain of the states, it is the latest on the shortest path.
+    pub fn slowest(&self, route: &Route, start: i64) -> Vec<Pass> {
+        self.passes(&route.links, route.periods(), start, |core, span, [link, next], periods, start| {
             let cycle = start + carry(self.description, link) + contention(self.description, link);
             let grid = self.grid(core);
             let reads = grid.from(cycle);
-            let waits = reads + span.worst;
-            let leaves = match (span.late, at_wait(self.description, next)) {
-                (0, _) => waits,
-                // What issues with the `wait` is published by the next one.
-                (_, true) => waits + grid.period,
-                (late, false) => waits + late,
-            };
-            Pass { core, reads, under_way: false, waits, leaves }
+            let writes = reads + periods * grid.period;
+            let waits = writes + span.worst;
+            // What issues with the `wait` is published by the next one, which is a period more.
+            let leaves = waits + if at_wait(self.description, next) { 0 } else { span.late };
+            Pass { core, reads, under_way: false, writes, waits, leaves }
         })
     }
 
     fn passes(
         &self,
         way: &[usize],
+        periods: &[u32],
         start: i64,
-        pass: impl Fn(usize, Span, &Link, &Link, i64) -> Pass,
+        pass: impl Fn(usize, Span, [&Link; 2], i64, i64) -> Pass,
     ) -> Vec<Pass> {
         let links = &self.description.links;
         let mut passes: Vec<Pass> = Vec::new();
-        for pair in way.windows(2) {
+        for (pair, &periods) in way.windows(2).zip(periods) {
             let [link, next] = [&links[pair[0]], &links[pair[1]]];
             let End::Core(core) = link.to else { continue };
             let Some(span) = self.spans[core] else { continue };
             let start = passes.last().map_or(start, |last| last.leaves);
-            passes.push(pass(core, span, link, next, start));
+            passes.push(pass(core, span, [link, next], periods.into(), start));
         }
         passes
     }
@@ -256,7 +296,7 @@ fn late(program: &Program, address: BundleAddress) -> u32 {
 }
 
 /// Whether a link carries what its sender's `wait` publishes.
-fn at_wait(description: &Description, link: &Link) -> bool {
+pub(super) fn at_wait(description: &Description, link: &Link) -> bool {
     match link.kind {
         LinkKind::Snapshot { strobe } => strobe.is_none(),
         LinkKind::Wire => description.core(link.from).is_some_and(|core| core.program.latched),

@@ -1,0 +1,81 @@
+//! Immediate dominators of a graph, by the iteration of Cooper, Harvey and Kennedy.
+
+/// For each node, the last node before it that every way from `root` to it leads over; of the root itself, and of nodes that no way leads
+/// to, none.
+pub(super) fn dominators(to: &[Vec<usize>], before: &[Vec<usize>], root: usize) -> Vec<Option<usize>> {
+    // By depth first search, a node after all that follow it.
+    let (mut order, mut seen) = (Vec::new(), vec![false; to.len()]);
+    let mut stack = vec![(root, 0)];
+    seen[root] = true;
+    while let Some((node, next)) = stack.last_mut() {
+        let node = *node;
+        match to[node].get(*next) {
+            Some(&following) => {
+                *next += 1;
+                if !std::mem::replace(&mut seen[following], true) {
+                    stack.push((following, 0));
+                }
+            }
+            None => {
+                order.push(node);
+                stack.pop();
+            }
+        }
+    }
+    let mut number = vec![0; to.len()];
+    for (place, &node) in order.iter().enumerate() {
+        number[node] = place;
+    }
+    let mut found: Vec<Option<usize>> = vec![None; to.len()];
+    found[root] = Some(root);
+    let mut changed = true;
+    while changed {
+        changed = false;
+        for &node in order.iter().rev().filter(|&&node| node != root) {
+            let mut last: Option<usize> = None;
+            for &from in before[node].iter().filter(|&&from| found[from].is_some()) {
+                last = Some(match last {
+                    None => from,
+                    Some(last) => common(&found, &number, last, from),
+                });
+            }
+            if last != found[node] {
+                (found[node], changed) = (last, true);
+            }
+        }
+    }
+    found[root] = None;
+    found
+}
+
+/// The last node that the ways to both lead over.
+fn common(found: &[Option<usize>], number: &[usize], mut one: usize, mut other: usize) -> usize {
+    while one != other {
+        let later = if number[one] < number[other] { &mut one } else { &mut other };
+        match found[*later] {
+            Some(before) if before != *later => *later = before,
+            // Only the root has none before it, and its number is the largest.
+            _ => return one.max(other),
+        }
+    }
+    one
+}
+
+#[cfg(test)]
+mod tests {
+    use super::dominators;
+
+    #[test]
+    fn of_a_branch_in_a_loop() {
+        // 0 -> 1 -> 2 or 3 -> 4 -> 1 or 5
+        let to = [vec![1], vec![2, 3], vec![4], vec![4], vec![1, 5], vec![]];
+        let mut before = vec![Vec::new(); to.len()];
+        for (from, to) in to.iter().enumerate() {
+            to.iter().for_each(|&to| before[to].push(from));
+        }
+        let over = [None, Some(0), Some(1), Some(1), Some(1), Some(4)];
+        assert_eq!(dominators(&to, &before, 0), over);
+        let under = [Some(1), Some(4), Some(4), Some(4), Some(5), None];
+        assert_eq!(dominators(&before, &to, 5), under);
+    }
+}

@@ -1,0 +1,507 @@
+//! The repeating periods of a program as graphs of blocks, calls put in place, with what controls each block.
+
+use super::MAX_NODES;
+use super::dominators::dominators;
+use crate::error::{BoundError, Refusal};
+use crate::graph::{Graph, Node};
+use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
+use std::ops::Range;
+use takt_isa::spec::units::MAX_LATENCY;
+use takt_isa::{BundleAddress, Effect, Flow, Instruction, Program, Register, Slot};
+
+/// The number of a place: of a register that is written or an input, of a data word, and of what else keeps a value.
+pub(super) type Place = usize;
+
+/// Where a value comes from.
+#[derive(Clone, Debug)]
+pub(super) enum Reads {
+    /// These places.
+    Places(Vec<Place>),
+    /// A word of the data memory, any one; and these places, which say which.
+    Memory(Vec<Place>),
+}
+
+/// Where a value goes.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Writes {
+    /// A place.
+    Place(Place),
+    /// A place that keeps what it had besides: sticky flags.
+    Gathered(Place),
+    /// A word of the data memory, any one.
+    Memory,
+}
+
+/// A bundle's operations: all read before any writes.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Step {
+    pub(super) moves: Vec<(Reads, Writes)>,
+    /// Output ports that this bundle sends: the port's place, and that of what is sent.
+    pub(super) sends: Vec<(Place, Place)>,
+}
+
+/// Where the ways that a branch parts have met again.
+#[derive(Clone, Debug)]
+pub(super) struct Gate {
+    /// The block with the branch.
+    pub(super) branch: usize,
+    /// Whether every way to here leads over the branch.
+    pub(super) always: bool,
+    /// What is written on the ways.
+    pub(super) written: Vec<Place>,
+}
+
+/// Bundles that are entered at the first and left at the last.
+#[derive(Debug, Default)]
+pub(super) struct Block {
+    pub(super) before: Vec<usize>,
+    pub(super) steps: Vec<Step>,
+    /// The place that its branch tests.
+    pub(super) tests: Option<Place>,
+    /// The blocks whose branches decide whether it is executed.
+    pub(super) under: Vec<usize>,
+    pub(super) gates: Vec<Gate>,
+    /// Whether its last bundle is a `wait`.
+    pub(super) waits: bool,
+}
+
+/// A period, from one bundle to its `wait`s.
+#[derive(Debug)]
+pub(super) struct Section {
+    /// Its blocks, from the first on: the ways between them go to later ones, except those of loops.
+    pub(super) blocks: Vec<Block>,
+    /// The gates at its end.
+    pub(super) gates: Vec<Gate>,
+    /// The periods that come next, by number.
+    pub(super) next: Vec<usize>,
+}
+
+/// All repeating periods.
+#[derive(Debug)]
+pub(super) struct Flat {
+    pub(super) sections: Vec<Section>,
+    pub(super) places: usize,
+    pub(super) registers: BTreeMap<Register, Place>,
+    /// The words of the data memory.
+    pub(super) memory: Range<Place>,
+    /// What was sent last of a port by another, and whether it is certain which of the port's values that was.
+    pub(super) sent: BTreeMap<(Register, Register), (Place, bool)>,
+    /// Which of several periods runs.
+    pub(super) which: Option<Place>,
+    /// All that any period writes.
+    pub(super) written: Vec<Place>,
+}
+
+/// A bundle on its way of calls.
+struct Bundle<'g> {
+    node: &'g Node,
+    to: Vec<usize>,
+    before: Vec<usize>,
+    waits: Option<BundleAddress>,
+}
+
+impl Flat {
+    /// Of a program; none if it is too large.
+    pub(super) fn new(
+        program: &Program,
+        sent_by: &BTreeSet<(Register, Register)>,
+    ) -> Result<Option<Flat>, BoundError> {
+        let graph = Graph::new(program)?;
+        // From reset on, from `wait` to `wait`.
+        let (mut found, mut left) = (BTreeMap::new(), targets(&unfolded(&graph, BundleAddress::RESET)?));
+        let mut nodes = 0;
+        while let Some(address) = left.pop() {
+            if !found.contains_key(&address) {
+                let bundles = unfolded(&graph, address)?;
+                nodes += bundles.len();
+                if nodes > MAX_NODES {
+                    return Ok(None);
+                }
+                left.extend(targets(&bundles));
+                found.insert(address, bundles);
+            }
+        }
+        keep_repeating(&mut found);
+        let mut places = Places::new(&graph, &found);
+        let sent =
+            sent_by.iter().map(|&pair| (pair, (places.another(), ordered(&graph, &found, pair)))).collect();
+        places.sent = sent;
+        let which = (found.len() > 1).then(|| places.another());
+        let numbers: BTreeMap<BundleAddress, usize> = found.keys().copied().zip(0..).collect();
+        let sections: Vec<Section> =
+            found.values().map(|bundles| section(&graph, bundles, &places, &numbers)).collect();
+        let steps = sections.iter().flat_map(|section| &section.blocks).flat_map(|block| &block.steps);
+        let written: BTreeSet<Place> = steps.flat_map(|step| step.places(&places.memory)).collect();
+        Ok(Some(Flat {
+            sections,
+            places: places.count,
+            registers: places.registers,
+            memory: places.memory,
+            sent: places.sent,
+            which,
+            written: written.into_iter().collect(),
+        }))
+    }
+}
+
+fn targets(bundles: &[Bundle<'_>]) -> Vec<BundleAddress> {
+    bundles.iter().filter_map(|bundle| bundle.waits).collect()
+}
+
+/// The bundles that are reached from one, each once for each way of calls that leads to it. More than [`MAX_NODES`] are cut off.
+fn unfolded<'g>(graph: &'g Graph<'_>, start: BundleAddress) -> Result<Vec<Bundle<'g>>, BoundError> {
+    let error = |at, refusal| BoundError::new(graph.program, at, refusal);
+    // A way of calls is the one before and where it returns to; the first is none.
+    let mut calls: Vec<Option<(usize, BundleAddress)>> = vec![None];
+    let mut call_numbers = HashMap::new();
+    let mut numbers = HashMap::from([((0, start), 0)]);
+    let (mut bundles, mut left) = (Vec::new(), VecDeque::from([(0, start)]));
+    while let Some((call, address)) = left.pop_front() {
+        let node = graph.node(address)?;
+        let mut waits = None;
+        let next: Vec<(usize, BundleAddress)> = match node.flow {
+            Flow::Call(target) => {
+                let next = calls.len();
+                let number = *call_numbers.entry((call, address.next())).or_insert(next);
+                if number == next {
+                    calls.push(Some((call, address.next())));
+                }
+                vec![(number, target)]
+            }
+            Flow::Return => match calls[call] {
+                Some(before) => vec![before],
+                None => return Err(error(address, Refusal::StackUnderflow)),
+            },
+            Flow::Wait(_) if call > 0 => return Err(error(address, Refusal::WaitInSubroutine)),
+            Flow::Wait(target) => {
+                waits = Some(target);
+                Vec::new()
+            }
+            _ => graph.successors(address).map(|edge| (call, edge.to)).collect(),
+        };
+        let mut to = Vec::new();
+        for place in next {
+            let number = numbers.len();
+            let number = *numbers.entry(place).or_insert_with(|| {
+                left.push_back(place);
+                number
+            });
+            if !to.contains(&number) {
+                to.push(number);
+            }
+        }
+        bundles.push(Bundle { node, to, before: Vec::new(), waits });
+        if numbers.len() > MAX_NODES {
+            break;
+        }
+    }
+    if numbers.len() <= MAX_NODES {
+        prune(&mut bundles);
+    }
+    Ok(bundles)
+}
+
+/// Leaves out ways that end in a `halt`, after which nothing follows any more, and enters where each bundle is reached from.
+fn prune(bundles: &mut [Bundle<'_>]) {
+    let mut before = vec![Vec::new(); bundles.len()];
+    for (from, bundle) in bundles.iter().enumerate() {
+        bundle.to.iter().for_each(|&to| before[to].push(from));
+    }
+    let mut ends = vec![false; bundles.len()];
+    let mut left: Vec<usize> = (0..bundles.len()).filter(|&bundle| bundles[bundle].waits.is_some()).collect();
+    while let Some(bundle) = left.pop() {
+        if !std::mem::replace(&mut ends[bundle], true) {
+            left.extend(&before[bundle]);
+        }
+    }
+    for (bundle, before) in bundles.iter_mut().zip(before) {
+        bundle.to.retain(|&to| ends[to]);
+        bundle.before = before.into_iter().filter(|&from| ends[from]).collect();
+    }
+}
+
+/// Leaves out periods that no way of periods leads to again.
+fn keep_repeating(found: &mut BTreeMap<BundleAddress, Vec<Bundle<'_>>>) {
+    let next: BTreeMap<BundleAddress, Vec<BundleAddress>> =
+        found.iter().map(|(&address, bundles)| (address, targets(bundles))).collect();
+    found.retain(|start, _| {
+        let (mut seen, mut left) = (BTreeSet::new(), next[start].clone());
+        while let Some(address) = left.pop() {
+            if seen.insert(address) {
+                left.extend(&next[&address]);
+            }
+        }
+        seen.contains(start)
+    });
+}
+
+/// The numbers of places.
+struct Places {
+    count: usize,
+    registers: BTreeMap<Register, Place>,
+    known: BTreeMap<Register, u32>,
+    words: BTreeMap<i64, Place>,
+    memory: Range<Place>,
+    flags: Option<Place>,
+    sent: BTreeMap<(Register, Register), (Place, bool)>,
+}
+
+impl Places {
+    fn new(graph: &Graph<'_>, found: &BTreeMap<BundleAddress, Vec<Bundle<'_>>>) -> Places {
+        let machine = graph.program.machine;
+        let mut places = Places {
+            count: 0,
+            registers: BTreeMap::new(),
+            known: graph.known.clone(),
+            words: BTreeMap::new(),
+            memory: 0..0,
+            flags: None,
+            sent: BTreeMap::new(),
+        };
+        let instructions = || {
+            let bundles = found.values().flatten();
+            bundles.flat_map(|bundle| bundle.node.instructions.iter().zip(machine.slots))
+        };
+        let (mut registers, mut words) = (BTreeSet::new(), BTreeSet::new());
+        for (instruction, slot) in instructions() {
+            registers.extend(instruction.writes(slot));
+            registers.extend(instruction.reads().iter().filter(|register| machine.is_input(**register)));
+            if matches!(instruction.effect(), Effect::Load | Effect::Store) {
+                words.extend(places.word(instruction));
+            }
+        }
+        places.registers = registers.into_iter().zip(0..).collect();
+        places.count = places.registers.len();
+        let first = places.count;
+        places.words = words.into_iter().zip(first..).collect();
+        // The last stands for all words that no constant address names.
+        places.count += places.words.len() + 1;
+        places.memory = first..places.count;
+        let reads_flags = instructions().any(|(instruction, _)| instruction.effect() == Effect::ReadFlags);
+        places.flags = reads_flags.then(|| places.another());
+        places
+    }
+
+    fn another(&mut self) -> Place {
+        self.count += 1;
+        self.count - 1
+    }
+
+    /// The word that a load or store uses, if its address is a constant.
+    fn word(&self, instruction: &Instruction) -> Option<i64> {
+        let base = self.known.get(&instruction.sources[0])?;
+        Some(i64::from(instruction.constant) + i64::from(base.cast_signed()))
+    }
+
+    fn of(&self, registers: &[Register]) -> Vec<Place> {
+        registers.iter().filter_map(|register| self.registers.get(register).copied()).collect()
+    }
+
+    /// What a bundle does.
+    fn step(&self, instructions: &[Instruction], slots: &[Slot]) -> Step {
+        let mut step = Step::default();
+        for (instruction, slot) in instructions.iter().zip(slots) {
+            let to = instruction.writes(slot).and_then(|register| self.registers.get(&register).copied());
+            let reads = self.of(instruction.reads());
+            let word = || self.word(instruction).and_then(|word| self.words.get(&word).copied());
+            let (from, to) = match instruction.effect() {
+                Effect::Compute => {
+                    if let Some(flags) = self.flags {
+                        step.moves.push((Reads::Places(reads.clone()), Writes::Gathered(flags)));
+                    }
+                    (Reads::Places(reads), to.map(Writes::Place))
+                }
+                Effect::Immediate => (Reads::Places(Vec::new()), to.map(Writes::Place)),
+                Effect::Load => match word() {
+                    Some(word) => (Reads::Places(vec![word]), to.map(Writes::Place)),
+                    None => (Reads::Memory(reads), to.map(Writes::Place)),
+                },
+                Effect::Store => match word() {
+                    Some(word) => {
+                        (Reads::Places(self.of(&instruction.sources[1..2])), Some(Writes::Place(word)))
+                    }
+                    None => (Reads::Places(reads), Some(Writes::Memory)),
+                },
+                Effect::ReadFlags => (Reads::Places(self.flags.into_iter().collect()), to.map(Writes::Place)),
+                Effect::ClearFlags => (Reads::Places(Vec::new()), self.flags.map(Writes::Place)),
+                _ => continue,
+            };
+            step.moves.extend(to.map(|to| (from, to)));
+        }
+        let writes: Vec<Register> = instructions
+            .iter()
+            .zip(slots)
+            .filter_map(|(instruction, slot)| instruction.writes(slot))
+            .collect();
+        for ((port, by), (place, _)) in &self.sent {
+            if let Some(port) = self.registers.get(port).filter(|_| writes.contains(by)) {
+                step.sends.push((*port, *place));
+            }
+        }
+        step
+    }
+}
+
+impl Step {
+    /// The places that it may write.
+    pub(super) fn places(&self, memory: &Range<Place>) -> impl Iterator<Item = Place> {
+        let moves = self.moves.iter().flat_map(|(_, to)| match to {
+            Writes::Place(place) | Writes::Gathered(place) => *place..place + 1,
+            Writes::Memory => memory.clone(),
+        });
+        moves.chain(self.sends.iter().map(|(_, place)| *place))
+    }
+}
+
+/// Whether a write to `by` always sends the value that the last bundle before it, or its own, wrote to `port`: results are written in
+/// another order than they issue in if their latencies differ by more than their bundles are apart.
+fn ordered(
+    graph: &Graph<'_>,
+    found: &BTreeMap<BundleAddress, Vec<Bundle<'_>>>,
+    (port, by): (Register, Register),
+) -> bool {
+    let slots = graph.program.machine.slots;
+    let latency = |bundle: &Bundle<'_>, register: Register| {
+        let mut writes = bundle.node.instructions.iter().zip(slots);
+        writes.find_map(|(instruction, slot)| {
+            instruction.writes(slot).filter(|written| *written == register)?;
+            Some(slot.units[slot.unit_for(instruction.op.row().function)?].latency)
+        })
+    };
+    found.values().all(|bundles| {
+        (0..bundles.len()).all(|at| {
+            let Some(own) = latency(&bundles[at], by) else { return true };
+            // What a `wait`'s own bundle writes comes in the next period.
+            if bundles[at].waits.is_some() {
+                return false;
+            }
+            [true, false].into_iter().all(|is_before| {
+                let (mut seen, mut level) = (BTreeSet::from([at]), vec![at]);
+                (0..MAX_LATENCY).all(|distance| {
+                    let right = level.iter().all(|&other| match latency(&bundles[other], port) {
+                        Some(_) if bundles[other].waits.is_some() => false,
+                        Some(latency) if is_before => latency <= own + distance,
+                        Some(latency) => distance == 0 || latency + distance > own,
+                        None => true,
+                    });
+                    let further = |&other: &usize| {
+                        if is_before { &bundles[other].before } else { &bundles[other].to }
+                    };
+                    let next: Vec<usize> = level.iter().flat_map(further).copied().collect();
+                    level = next.into_iter().filter(|&other| seen.insert(other)).collect();
+                    right
+                })
+            })
+        })
+    }) && found.values().flatten().all(|bundle| bundle.waits.is_none() || latency(bundle, port).is_none())
+}
+
+/// Joins bundles to blocks and finds what controls them.
+fn section(
+    graph: &Graph<'_>,
+    bundles: &[Bundle<'_>],
+    places: &Places,
+    numbers: &BTreeMap<BundleAddress, usize>,
+) -> Section {
+    let slots = graph.program.machine.slots;
+    let heads = order(bundles);
+    let block_of: HashMap<usize, usize> = heads.iter().copied().zip(0..).collect();
+    let mut blocks: Vec<Block> = Vec::new();
+    let mut to: Vec<Vec<usize>> = Vec::new();
+    for &head in &heads {
+        let (mut at, mut block) = (head, Block::default());
+        loop {
+            block.steps.push(places.step(&bundles[at].node.instructions, slots));
+            match bundles[at].to[..] {
+                [next] if !block_of.contains_key(&next) => at = next,
+                _ => break,
+            }
+        }
+        if let (Flow::Branch { register, .. }, [_, _, ..]) = (bundles[at].node.flow, &bundles[at].to[..]) {
+            block.tests = places.registers.get(&register).copied();
+        }
+        block.waits = bundles[at].waits.is_some();
+        to.push(bundles[at].to.iter().filter_map(|next| block_of.get(next).copied()).collect());
+        blocks.push(block);
+    }
+    // The end, after the last block.
+    let end = blocks.len();
+    for (block, to) in blocks.iter().zip(&mut to) {
+        to.extend(block.waits.then_some(end));
+    }
+    to.push(Vec::new());
+    let mut before = vec![Vec::new(); end + 1];
+    for (from, to) in to.iter().enumerate() {
+        to.iter().for_each(|&to| before[to].push(from));
+    }
+    let first = dominators(&to, &before, 0);
+    let last = dominators(&before, &to, end);
+    let mut end_gates = Vec::new();
+    for branch in
+        (0..end).filter(|&block| to[block].len() > 1 && blocks[block].tests.is_some()).collect::<Vec<_>>()
+    {
+        let Some(meet) = last[branch] else { continue };
+        let (mut region, mut left) = (BTreeSet::new(), to[branch].clone());
+        while let Some(block) = left.pop() {
+            if block != meet && region.insert(block) {
+                left.extend(&to[block]);
+            }
+        }
+        let written = region
+            .iter()
+            .flat_map(|&block| &blocks[block].steps)
+            .flat_map(|step| step.places(&places.memory));
+        let written: BTreeSet<Place> = written.collect();
+        region.iter().for_each(|&block| blocks[block].under.push(branch));
+        let always = is_over(&first, branch, meet);
+        let gate = Gate { branch, always, written: written.into_iter().collect() };
+        if meet == end { end_gates.push(gate) } else { blocks[meet].gates.push(gate) }
+    }
+    for (block, before) in blocks.iter_mut().zip(before) {
+        block.before = before;
+    }
+    let next: BTreeSet<usize> =
+        targets(bundles).iter().filter_map(|target| numbers.get(target).copied()).collect();
+    Section { blocks, gates: end_gates, next: next.into_iter().collect() }
+}
+
+/// Whether each way to `block` leads over `over`.
+fn is_over(dominators: &[Option<usize>], over: usize, mut block: usize) -> bool {
+    while let Some(next) = dominators[block].filter(|&next| next != block) {
+        if next == over {
+            return true;
+        }
+        block = next;
+    }
+    false
+}
+
+/// The bundles at which blocks begin, so that ways lead to later ones where no loop closes.
+fn order(bundles: &[Bundle<'_>]) -> Vec<usize> {
+    let begins = |bundle: usize| match bundles[bundle].before[..] {
+        [before] if bundle > 0 => bundles[before].to.len() > 1,
+        _ => true,
+    };
+    let (mut order, mut seen) = (Vec::new(), vec![false; bundles.len()]);
+    let mut stack = vec![(0, 0)];
+    if let Some(first) = seen.first_mut() {
+        *first = true;
+    }
+    while let Some((bundle, next)) = stack.last_mut() {
+        let bundle = *bundle;
+        match bundles.get(bundle).and_then(|at| at.to.get(*next)) {
+            Some(&to) => {
+                *next += 1;
+                if !std::mem::replace(&mut seen[to], true) {
+                    stack.push((to, 0));
+                }
+            }
+            None => {
+                order.extend(begins(bundle).then_some(bundle));
+                stack.pop();
+            }
+        }
+    }
+    order.reverse();
+    order
+}

@@ -1,0 +1,230 @@
+//! The fixed point of the data flow for one input, period by period.
+
+use super::cell::Cell;
+use super::graph::{Flat, Gate, Place, Reads, Section, Step, Writes};
+use super::{MAX_ROUNDS, Periods, Sent};
+use takt_isa::Register;
+
+/// What every place depends on.
+type State = Vec<Cell>;
+
+/// The ends of a section, whichever way leads there.
+struct Ends {
+    /// Before the `wait`'s own bundle, and after it.
+    before: State,
+    after: State,
+    /// The least that any port, or what is sent of it, has anywhere in it.
+    any: State,
+}
+
+/// What depends on one input.
+#[derive(Debug)]
+pub(super) struct Solved<'a> {
+    flat: &'a Flat,
+    /// Whether the rounds came to an end.
+    whole: bool,
+    before: State,
+    after: State,
+    any: State,
+}
+
+/// Where ways meet.
+fn merge(into: &mut Option<State>, state: &State) {
+    match into {
+        None => *into = Some(state.clone()),
+        Some(into) => into.iter_mut().zip(state).for_each(|(one, other)| *one = one.or(*other)),
+    }
+}
+
+impl<'a> Solved<'a> {
+    pub(super) fn new(flat: &'a Flat, input: Register) -> Solved<'a> {
+        let source = flat.registers.get(&input).copied();
+        let none = || {
+            let mut state = vec![Cell::NONE; flat.places];
+            source.into_iter().for_each(|source| state[source] = Cell::INPUT);
+            state
+        };
+        let solved = |whole, before, after, any| Solved { flat, whole, before, after, any };
+        if source.is_none() {
+            return solved(true, none(), none(), none());
+        }
+        // From nothing that depends, each round is one more period; what is certain becomes more with each.
+        let mut entries: Vec<State> = flat.sections.iter().map(|_| none()).collect();
+        for _ in 0..MAX_ROUNDS {
+            let ends: Vec<Ends> =
+                flat.sections.iter().zip(&entries).map(|(section, entry)| flat.run(section, entry)).collect();
+            let mut next: Vec<Option<State>> = vec![None; entries.len()];
+            for (section, ends) in flat.sections.iter().zip(&ends) {
+                let mut later: State = ends.after.iter().map(|cell| cell.later()).collect();
+                source.into_iter().for_each(|source| later[source] = Cell::INPUT);
+                for &to in &section.next {
+                    merge(&mut next[to], &later);
+                }
+            }
+            let next: Vec<State> = next.into_iter().map(|state| state.unwrap_or_else(none)).collect();
+            if next == entries {
+                let all = |pick: fn(&Ends) -> &State| {
+                    let mut all = None;
+                    ends.iter().for_each(|ends| merge(&mut all, pick(ends)));
+                    all.unwrap_or_else(none)
+                };
+                return solved(
+                    true,
+                    all(|ends| &ends.before),
+                    all(|ends| &ends.after),
+                    all(|ends| &ends.any),
+                );
+            }
+            entries = next;
+        }
+        solved(false, none(), none(), none())
+    }
+
+    pub(super) fn output(&self, output: Register, sent: Sent) -> Option<Periods> {
+        if !self.whole {
+            return Some(Periods::UNKNOWN);
+        }
+        let place = *self.flat.registers.get(&output)?;
+        let (least, most) = match sent {
+            Sent::Written => (self.any[place], self.after[place]),
+            Sent::AtWait => (self.before[place], self.before[place]),
+            Sent::By(by) => match self.flat.sent.get(&(output, by))? {
+                (sent, true) => (self.any[*sent], self.after[*sent]),
+                (sent, false) => {
+                    let any = self.any[place].with(self.any[*sent]).uncertain();
+                    (any, any)
+                }
+            },
+        };
+        // In between, an output may hold what the period before has written.
+        let (least, end) = (least.periods()?, most.periods());
+        let (most, lasting) = end.map_or((None, false), |end| (end.most, end.lasting));
+        Some(Periods { least: least.least, most, lasting })
+    }
+}
+
+impl Flat {
+    /// A period from a state on.
+    fn run(&self, section: &Section, entry: &State) -> Ends {
+        let blocks = &section.blocks;
+        let mut after: Vec<Option<State>> = vec![None; blocks.len()];
+        // Of branches that no way has led to so far, the best.
+        let mut tested = vec![Cell::BOTTOM; blocks.len()];
+        let mut changed;
+        loop {
+            changed = false;
+            let (mut before_end, mut after_end) = (None, None);
+            let mut any = entry.clone();
+            for (number, block) in blocks.iter().enumerate() {
+                let mut state = (number == 0).then(|| entry.clone());
+                for state_before in block.before.iter().filter_map(|&before| after[before].as_ref()) {
+                    merge(&mut state, state_before);
+                }
+                let Some(mut state) = state else { continue };
+                open(&block.gates, &tested, &mut state, &mut any);
+                let mut decided =
+                    block.under.iter().fold(Cell::NONE, |all, &branch| all.under(tested[branch]));
+                if let Some(which) = self.which {
+                    decided = decided.under(state[which]);
+                }
+                let mut memory = None;
+                for (at, step) in block.steps.iter().enumerate() {
+                    if at + 1 == block.steps.len() {
+                        let test = block.tests.map_or(Cell::NONE, |place| state[place]);
+                        changed |= std::mem::replace(&mut tested[number], test) != test;
+                        if block.waits {
+                            merge(&mut before_end, &state);
+                        }
+                    }
+                    self.step(step, decided, &mut state, &mut memory, &mut any);
+                }
+                if block.waits {
+                    merge(&mut after_end, &state);
+                }
+                if after[number].as_ref() != Some(&state) {
+                    (after[number], changed) = (Some(state), true);
+                }
+            }
+            if changed {
+                continue;
+            }
+            let mut end = |end: Option<State>| {
+                let mut end = end.unwrap_or_else(|| vec![Cell::NONE; self.places]);
+                open(&section.gates, &tested, &mut end, &mut any);
+                self.choose(section, &tested, &mut end);
+                end
+            };
+            let (before, after) = (end(before_end), end(after_end));
+            any.iter_mut().zip(&after).for_each(|(any, cell)| *any = any.under(*cell));
+            return Ends { before, after, any };
+        }
+    }
+
+    /// What was written depends on which period ran, and which comes next on that, and on the branches that lead to its `wait`.
+    fn choose(&self, section: &Section, tested: &[Cell], end: &mut State) {
+        let Some(which) = self.which else { return };
+        let ran = end[which];
+        self.written.iter().for_each(|&place| end[place] = end[place].under(ran));
+        if section.next.len() > 1 {
+            let branches = section.gates.iter().map(|gate| tested[gate.branch]);
+            end[which] = branches.fold(ran, Cell::under);
+        }
+    }
+
+    /// Executes a bundle. `memory` is what a word of the data memory depends on, any one, if it is known.
+    fn step(
+        &self,
+        step: &Step,
+        decided: Cell,
+        state: &mut State,
+        memory: &mut Option<Cell>,
+        any: &mut State,
+    ) {
+        let mut read = |from: &Reads| match from {
+            Reads::Places(from) => of_all(from, state),
+            Reads::Memory(which) => {
+                let words = memory.get_or_insert_with(|| {
+                    let words = state[self.memory.clone()].iter().copied().reduce(Cell::or);
+                    words.unwrap_or(Cell::NONE)
+                });
+                words.with(of_all(which, state))
+            }
+        };
+        let values: Vec<Cell> = step.moves.iter().map(|(from, _)| read(from).under(decided)).collect();
+        for (&(_, to), value) in step.moves.iter().zip(values) {
+            let (place, value) = match to {
+                Writes::Place(place) => (place, value),
+                Writes::Gathered(place) => (place, state[place].or(value)),
+                Writes::Memory => {
+                    state[self.memory.clone()].iter_mut().for_each(|word| *word = word.or(value));
+                    *memory = memory.map(|words| words.or(value));
+                    continue;
+                }
+            };
+            if self.memory.contains(&place) {
+                *memory = None;
+            }
+            (state[place], any[place]) = (value, any[place].under(value));
+        }
+        for &(port, sent) in &step.sends {
+            let value = state[port].under(decided);
+            (state[sent], any[sent]) = (value, any[sent].under(value));
+        }
+    }
+}
+
+/// What depends on all of these places.
+fn of_all(places: &[Place], state: &State) -> Cell {
+    places.iter().fold(Cell::NONE, |all, &place| all.with(state[place]))
+}
+
+/// What depends on a branch because the ways that it parts write differently.
+fn open(gates: &[Gate], tested: &[Cell], state: &mut State, any: &mut State) {
+    for Gate { branch, always, written } in gates {
+        let test = tested[*branch];
+        for &place in written {
+            let cell = if *always { state[place].with(test) } else { state[place].under(test) };
+            (state[place], any[place]) = (cell, any[place].under(cell));
+        }
+    }
+}

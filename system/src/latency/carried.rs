@@ -1,0 +1,146 @@
+//! After how many of its periods a core passes a value on, from each field of a link to it to each of one from it.
+
+use super::pass::at_wait;
+use crate::description::{Description, End, Link, LinkKind};
+use std::collections::{BTreeMap, BTreeSet};
+use takt_analysis::dependence::{Dependence, Dependents, Periods, Sent};
+use takt_isa::Register;
+
+/// Of each field of one link, and each of another: whether and when the second follows the first.
+type Fields = Vec<Vec<Option<Periods>>>;
+
+/// What every core of a system passes on.
+#[derive(Clone, Debug)]
+pub(super) struct Carried {
+    between: BTreeMap<(usize, usize), Fields>,
+}
+
+/// What of a way's last link follows what of its first.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct States {
+    /// For each core in between, the least number of its periods.
+    pub(super) least: Vec<u32>,
+    /// So many at most, if that is certain of every core.
+    pub(super) most: Option<Vec<u32>>,
+    /// Whether states carry the value on to later periods.
+    pub(super) lasting: bool,
+}
+
+/// A field of a way's first link, one of its last, and what is between them.
+pub(super) type Between = (usize, usize, States);
+
+impl Carried {
+    /// Of the cores that wait for ticks.
+    pub(super) fn new(description: &Description, waits: impl Fn(usize) -> bool) -> Carried {
+        let mut between = BTreeMap::new();
+        for number in (0..description.cores.len()).filter(|&core| waits(core)) {
+            let links = |end: fn(&Link) -> End| {
+                let links = description.links.iter().enumerate();
+                links.filter(move |(_, link)| end(link) == End::Core(number)).collect::<Vec<_>>()
+            };
+            let (inward, outward) = (links(|link| link.to), links(|link| link.from));
+            let fields = |link: &Link| {
+                let fields: Vec<_> = link.fields.iter().filter_map(|field| field.output).collect();
+                fields
+            };
+            let by = outward.iter().filter_map(|(_, link)| match sent(description, link) {
+                Sent::By(by) => Some(fields(link).into_iter().map(move |field| (field, by))),
+                Sent::Written | Sent::AtWait => None,
+            });
+            let by: BTreeSet<(Register, Register)> = by.flatten().collect();
+            // What cannot be followed has no bounds either.
+            let dependence = Dependence::new(&description.cores[number].program, &by);
+            let dependence = dependence.unwrap_or_else(|_| Dependence::unknown());
+            let mut dependents: BTreeMap<Register, Dependents<'_>> = BTreeMap::new();
+            for &(from, link) in &inward {
+                let arriving = arriving(link);
+                for &port in arriving.iter().flatten() {
+                    dependents.entry(port).or_insert_with(|| dependence.on(port));
+                }
+                for &(to, next) in &outward {
+                    let sent = sent(description, next);
+                    let periods = |ports: &Vec<Register>, output: Option<Register>| {
+                        let each = ports.iter().filter_map(|port| dependents[port].output(output?, sent));
+                        each.reduce(Periods::sooner)
+                    };
+                    let row = |ports: &Vec<Register>| {
+                        next.fields.iter().map(|field| periods(ports, field.output)).collect()
+                    };
+                    between.insert((from, to), arriving.iter().map(row).collect());
+                }
+            }
+        }
+        Carried { between }
+    }
+
+    /// Which fields of a way's last link follow which of its first, and how.
+    pub(super) fn along(&self, description: &Description, way: &[usize]) -> Vec<Between> {
+        let Some(&first) = way.first() else { return Vec::new() };
+        let mut found = Vec::new();
+        for input in 0..description.links[first].fields.len() {
+            let mut reached: BTreeMap<usize, States> = BTreeMap::from([(
+                input,
+                States { least: Vec::new(), most: Some(Vec::new()), lasting: false },
+            )]);
+            for pair in way.windows(2) {
+                let Some(fields) = self.between.get(&(pair[0], pair[1])) else { return Vec::new() };
+                let mut next: BTreeMap<usize, States> = BTreeMap::new();
+                for (field, before) in &reached {
+                    for (to, periods) in fields[*field].iter().enumerate() {
+                        let Some(periods) = periods else { continue };
+                        let states = before.with(*periods);
+                        let states = match next.remove(&to) {
+                            Some(other) => other.or(states),
+                            None => states,
+                        };
+                        next.insert(to, states);
+                    }
+                }
+                reached = next;
+            }
+            found.extend(reached.into_iter().map(|(output, states)| (input, output, states)));
+        }
+        found
+    }
+}
+
+impl States {
+    /// Through one more core.
+    fn with(&self, periods: Periods) -> States {
+        let more = |before: &Vec<u32>, more| before.iter().copied().chain([more]).collect();
+        States {
+            least: more(&self.least, periods.least),
+            most: self.most.as_ref().zip(periods.most).map(|(before, most)| more(before, most)),
+            lasting: self.lasting || periods.lasting,
+        }
+    }
+
+    /// The sooner of two ways over the same links, at the least core by core.
+    fn or(self, other: States) -> States {
+        let sum = |most: &Vec<u32>| most.iter().map(|&periods| u64::from(periods)).sum::<u64>();
+        States {
+            least: self.least.iter().zip(&other.least).map(|(one, other)| *one.min(other)).collect(),
+            most: [self.most, other.most].into_iter().flatten().min_by_key(sum),
+            lasting: self.lasting || other.lasting,
+        }
+    }
+}
+
+/// When what a core writes goes onto a link.
+fn sent(description: &Description, link: &Link) -> Sent {
+    match link.kind {
+        LinkKind::Snapshot { strobe: Some(by) } | LinkKind::Fifo { push: Some(by), .. } => Sent::By(by),
+        _ if at_wait(description, link) => Sent::AtWait,
+        _ => Sent::Written,
+    }
+}
+
+/// For each field of a link to a core, the ports that change when it arrives.
+fn arriving(link: &Link) -> Vec<Vec<Register>> {
+    let status: Vec<Register> = match &link.kind {
+        LinkKind::Fifo { receiver, .. } => receiver.iter().map(|(_, register)| *register).collect(),
+        LinkKind::Wire | LinkKind::Snapshot { .. } => Vec::new(),
+    };
+    let fields = link.fields.iter().filter_map(|field| field.input);
+    fields.map(|field| [field].into_iter().chain(status.iter().copied()).collect()).collect()
+}
