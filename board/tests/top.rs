@@ -3,12 +3,12 @@
 #[path = "harness/board.rs"]
 mod harness;
 
-use harness::Ticks;
+use harness::{Ticks, refuses};
 use std::panic::AssertUnwindSafe;
 use std::path::{Path, PathBuf};
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::latency::{self, Part};
-use takt_board::protocol::{INPUTS, LinkError, OUTPUTS};
+use takt_board::protocol::{IMAGE, INPUTS, LinkError, OUTPUTS};
 use takt_board::simulation::{Simulation, Turn};
 use takt_board::tools::{NEXTPNR, Venv, YOSYS};
 use takt_board::{Board, Host, Wiring, build, routed, top, twin};
@@ -124,26 +124,36 @@ fn a_duty_shows_as_late_as_the_bound_says() {
     let wiring = Wiring::read("w.toml", &text, &board).expect("a right wiring");
     let bound = Part::sum("", &latency::ways(&wiring, (0, 0)).ways[0].outputs[0].parts);
     let pwm = &wiring.peripherals[1];
-    let (mut least, mut most) = (u64::MAX, 0);
+    // Of each pin.
+    let (mut least, mut most) = ([u64::MAX; 2], [0; 2]);
     for (old, new) in (-half..=half).flat_map(|old| (-half..=half).map(move |new| (old, new))) {
         for phase in 0..2 * half {
             let twins = [old, new].map(|duty| (twin::of(pwm.kind, &pwm.parameters).expect("a twin"), duty));
             let [mut a, mut b] = twins;
             let puts = [0, 4 * half + phase];
-            let first = (0..10 * half).find(|cycle| {
+            let mut first = [None; 2];
+            for cycle in 0..10 * half {
                 for (twin, duty) in [&mut a, &mut b] {
-                    let duty = if *cycle == puts[0] { old } else { *duty };
-                    twin.clock(&[0, 1, puts.contains(cycle).into(), duty as u32]);
+                    let duty = if cycle == puts[0] { old } else { *duty };
+                    twin.clock(&[0, 1, puts.contains(&cycle).into(), duty as u32]);
                 }
-                a.0.outputs()[0] != b.0.outputs()[0]
-            });
-            // Outputs after the clock's edge of a cycle are those of the next one. Pulses within the dead time are not seen.
-            let Some(first) = first else { continue };
-            let cycles = (first + 1 - puts[1]) as u64;
-            (least, most) = (least.min(cycles), most.max(cycles));
+                for (pin, first) in first.iter_mut().enumerate() {
+                    if a.0.outputs()[pin] != b.0.outputs()[pin] {
+                        first.get_or_insert(cycle);
+                    }
+                }
+            }
+            for (pin, first) in first.into_iter().enumerate() {
+                // Outputs after the clock's edge of a cycle are those of the next one. Pulses within the dead time are not seen.
+                let Some(first) = first else { continue };
+                let cycles = (first + 1 - puts[1]) as u64;
+                (least[pin], most[pin]) = (least[pin].min(cycles), most[pin].max(cycles));
+            }
         }
     }
-    assert_eq!((least, most), (bound.best, bound.worst));
+    assert_eq!((least[0], most[0]), (bound.best, bound.worst));
+    // The lower switch is within the same bound.
+    assert!(least[1] >= bound.best && most[1] <= bound.worst, "{least:?} {most:?} {bound:?}");
 }
 
 /// Board, wiring and program, and a folder for it.
@@ -254,6 +264,22 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     assert_eq!((exact.best, exact.worst), (cycles.into(), cycles.into()), "cycles from tick to outputs");
     assert_eq!(host.register("misses").expect("a register"), 0);
 
+    // What cannot be written is refused, as a whole: registers to read and addresses without one, ports that the program or a peripheral
+    // drives, and the last one, which the machine does not have; the image of a program that runs; a tick of its own while it is not
+    // held, with two registers before it that can be written; what the core holds.
+    let n = port(first, "n");
+    for address in [0, 2, 9, 20, 0xfff, port(first, "force"), n, INPUTS + 255, INPUTS + 256, 0x3000] {
+        refuses(&mut host, address, &[1]);
+    }
+    for (address, words) in
+        [(4, &[9999, 5, 1][..]), (12, &[1]), (IMAGE, &[1, 2, 3, 0]), (0x8000, &[7]), (0xc000, &[7])]
+    {
+        refuses(&mut host, address, words);
+    }
+    assert!((INPUTS..n + 2).contains(&port(first, "wanted")), "next to `n`");
+    refuses(&mut host, n.min(port(first, "wanted")), &[7, 7]);
+    assert_eq!(host.read(port(first, "wanted"), 1).expect("a port")[0], 52);
+
     // Hold, then one period at a time.
     host.set("control", 0b111).expect("control");
     let before = host.register("periods").expect("a register");
@@ -323,6 +349,8 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     assert!(host.status().expect("status").drives(), "after a reset");
 
     // A program that misses its deadlines, one that halts, one that makes no number.
+    host.set("control", 0).expect("control");
+    refuses(&mut host, IMAGE + 4 * top::RECORDS as u16, &[1, 2, 3, 0]);
     let instead = |what: &str| PROGRAM.replace("        iand    lit, n, 1\n", what);
     let nan = PROGRAM.replace("fmul    force, f, 0.25", "fdiv    force, zero, zero");
     for (source, cause) in

@@ -322,6 +322,13 @@ fn a_board_is_debugged() {
     let driven = debug("endless.s", "--restart --drive", "step 2\n").ok();
     assert!(driven.ends_with("the program stays held; outputs drive\n"), "{driven}");
 
+    // Beside the emulator it does not wait either, and that is what is said of it.
+    let line =
+        format!("live {port} --baud {baud} --program endless.s --machine t1 shadow wanted=1 --periods 3");
+    let shadow = folder.line(&line);
+    let says = "period 1: the program does not wait for its tick";
+    assert!(shadow.status == Some(1) && shadow.stderr.contains(says), "{shadow:?}");
+
     // Unplugged while a script waits for its next command.
     let mut host = std::process::Command::new(env!("CARGO_BIN_EXE_takt"));
     let line = format!("debug endless.s --machine t1 --board {port} --baud {baud} --restart");
