@@ -534,7 +534,7 @@ fn the_way_from_pin_to_pin_has_a_bound() {
     refused(&format!("--wiring {wiring} --board colorlight-i5"), "this wiring is for the board `ulx3s-85f`");
     refused(&format!("--wiring {wiring} --deadline 100us"), "--deadline is not for --pins");
     folder.write("none.toml", "period = 100\n");
-    refused("--wiring none.toml", "none.toml names no board: --board NAME");
+    refused("--wiring none.toml", "none.toml names no board: `--board NAME`, or a line");
     // One message, whether the board is named or would be the file's.
     folder.write("system.toml", "[core.one]\nmachine = \"t1\"\n");
     for board in ["", " --board ulx3s-85f"] {

@@ -136,12 +136,19 @@ fn answer(peripheral: &Peripheral) -> Option<(Vec<Part>, Answer)> {
     let edge = |parts| Some((parts, Answer::Edge));
     match peripheral.kind.name {
         // One cycle more of an odd pulse moves its end only, and the longest one that has an end ends with the period. A long dead time
-        // can move the beginning of the shortest pulse that it leaves, dead + 1 cycles about the middle, beyond that.
+        // can move the beginning of the shortest pulse that it leaves, dead + 1 cycles about the middle, beyond that; and, by dead / 2
+        // into the next period, the rise of the lower switch in the shortest gap that it leaves. Where one switch is to stay on, it comes
+        // on after the dead time.
         "pwm" => {
             let (half, dead) = (parameter(peripheral, "half"), parameter(peripheral, "dead"));
+            let has_low = peripheral.pins.get(1).is_some_and(Option::is_some);
+            let high = (2 * half).max(half + 1 + dead - (dead + 2) / 2);
+            let low = if has_low { 2 * half + dead.div_ceil(2) } else { 0 };
+            // A longer dead time leaves no pulse and no gap.
+            let moves = if dead < 2 * half { high.max(low) } else { 0 }.max(dead + 1);
             edge(vec![
                 Part::new("to the next period of the PWM", 2, 2 * half + 1),
-                Part::new("its first edge that moves", 1, (2 * half).max(half + 1 + dead - (dead + 2) / 2)),
+                Part::new("its first edge that moves", 1, moves),
             ])
         }
         "digital-out" => edge(vec![Part::new("to the pin", 1, 1)]),
