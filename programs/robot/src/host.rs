@@ -17,6 +17,8 @@ const LATE_TICKS: u64 = 2_000;
 const SILENT_TICKS: u64 = 10_000;
 /// Ticks in which the cores must be ready after power-up or reset: 2 s.
 const READY_TICKS: u64 = 20_000;
+/// Ticks in which the robot must say why it stands after an error: 2 s. Then nobody waits for it any more.
+const UNTOLD_TICKS: u64 = 20_000;
 
 /// What the robot does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -206,6 +208,8 @@ pub struct Host<R> {
     last_sent: u64,
     fates: BTreeMap<u32, Fate>,
     stopped: Option<Report>,
+    /// The tick since which the robot stands after an error without a word of it.
+    untold: Option<u64>,
     ready: bool,
     inputs: Inputs,
     events: Vec<(u64, Event)>,
@@ -243,6 +247,7 @@ impl<R: Robot> Host<R> {
             last_sent: 0,
             fates: BTreeMap::new(),
             stopped: None,
+            untold: None,
             ready: false,
             inputs: Inputs::default(),
             events: Vec::new(),
@@ -333,7 +338,11 @@ impl<R: Robot> Host<R> {
                 Report::decode(fields).map_err(|error: ReportError| Problem::Broken(error.to_string()))?;
             self.hear(report);
         }
-        let View { outputs, levels, .. } = self.robot.view();
+        let View { outputs, levels, mode, .. } = self.robot.view();
+        self.untold = match (mode, self.stopped) {
+            (Mode::Error, None) => self.untold.or(Some(self.ticks)),
+            _ => None,
+        };
         for bit in 0..u32::BITS {
             if (outputs ^ self.outputs.0) >> bit & 1 != 0 {
                 self.tell(News::Output(bit + 1, outputs >> bit & 1 != 0));
@@ -459,6 +468,10 @@ impl<R: Robot> Host<R> {
             if holds(self)? {
                 return Ok(());
             }
+            if self.untold.is_some_and(|since| self.ticks - since > UNTOLD_TICKS) {
+                let text = "the robot stands after an error of which no report has come; `reset` ends it";
+                return Err(Problem::Late(text.to_owned()));
+            }
             if self.ticks >= end {
                 return Err(Problem::Late(late()));
             }
@@ -506,7 +519,7 @@ impl<R: Robot> Host<R> {
         Ok((sequence, value))
     }
 
-    /// Ends the state after an error: whatever is on its way is thrown away.
+    /// Ends the state after an error: whatever is on its way is thrown away. Until the answer comes, the robot counts as stopped.
     fn reset(&mut self) -> Result<(u32, f64), Problem> {
         self.hold = None;
         self.silent = 0;
@@ -516,19 +529,19 @@ impl<R: Robot> Host<R> {
         }
         self.out.clear();
         self.fates.clear();
-        self.stopped = None;
-        self.ready = false;
+        let was_ready = std::mem::replace(&mut self.ready, false);
         let sequence = self.send(&Command::Reset);
-        let late = || "the controller did not answer the reset".to_owned();
-        // Reports that were on their way are of what is over.
+        // Reports that were on their way are of what is over: the answer clears them.
         let end = self.ticks + READY_TICKS;
         while !self.ready {
             if self.ticks >= end {
-                return Err(Problem::Late(late()));
+                self.ready = was_ready;
+                return Err(Problem::Late(
+                    "the controller did not answer the reset: try it again".to_owned(),
+                ));
             }
             self.tick()?;
         }
-        self.stopped = None;
         Ok((sequence, 0.0))
     }
 

@@ -125,6 +125,42 @@ fn faults_of_the_link_stop_the_robot() {
     }
 }
 
+/// A reset that stays unanswered leaves the robot stopped: nobody waits for it, and the next reset is the mend.
+#[test]
+fn a_reset_without_an_answer_ends() {
+    let (mut session, _) = session();
+    let mut enter = |text: &str| {
+        let error = session.enter("prompt", text, true).err().map(|mistakes| mistakes.render(false));
+        (error.unwrap_or_default(), session.host().time())
+    };
+    enter("simulate late");
+    let (error, _) = enter("move joints(30, _, _, _, _, _)");
+    assert!(error.contains("a packet was begun and did not arrive in time"), "{error}");
+    enter("simulate corrupt");
+    let (error, since) = enter("reset");
+    assert!(error.contains("the controller did not answer the reset: try it again"), "{error}");
+    let (error, time) = enter("wait done");
+    assert!(error.contains("`reset` lets it move again") && time - since < 0.1, "{time} s: {error}");
+    for text in ["reset", "move joints(10, _, _, _, _, _) in 0.2"] {
+        let (error, _) = enter(text);
+        assert_eq!(error, "", "{text}");
+    }
+}
+
+/// A robot that stands after an error and reports none is not waited for either.
+#[test]
+fn an_error_that_is_not_reported_ends_a_wait() {
+    let (mut session, robot) = session();
+    robot.mute();
+    session.enter("prompt", "start move joints(30, _, _, _, _, _) in 3", true).expect("it moves");
+    session.enter("prompt", "simulate silent", true).expect("it is one");
+    let since = session.host().time();
+    let error = session.enter("prompt", "wait done", true).expect_err("it does not come to its end");
+    assert!(error.render(false).contains("of which no report has come; `reset` ends it"));
+    assert!(session.host().time() - since < 5.0);
+    session.enter("prompt", "reset", true).expect("it is answered");
+}
+
 #[test]
 fn jogs() {
     let said = says(

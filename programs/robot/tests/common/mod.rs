@@ -37,6 +37,7 @@ struct State {
     levels: [f32; 2],
     reports: Vec<[u32; 4]>,
     packets: Vec<Kind>,
+    mute: bool,
 }
 
 impl StandIn {
@@ -55,6 +56,7 @@ impl StandIn {
             levels: [0.0; 2],
             reports: Vec::new(),
             packets: Vec::new(),
+            mute: false,
         };
         state.report(ReportKind::Ready, 0, 0, 0.0);
         StandIn(Arc::new(Mutex::new(state)))
@@ -63,6 +65,11 @@ impl StandIn {
     /// The same one, to look at.
     pub(crate) fn shared(&self) -> StandIn {
         StandIn(Arc::clone(&self.0))
+    }
+
+    /// From now on, it does not report why it stops.
+    pub(crate) fn mute(&self) {
+        self.0.lock().expect("one thread").mute = true;
     }
 
     /// Kinds of the packets that have come, but NOPs.
@@ -85,7 +92,7 @@ impl State {
     }
 
     fn stop(&mut self, sequence: u32, cause: Cause) {
-        if self.mode != Mode::Error {
+        if self.mode != Mode::Error && !self.mute {
             self.report(ReportKind::Stopped, sequence, cause.number(), 0.0);
         }
         self.mode = Mode::Error;
