@@ -7,7 +7,7 @@ use super::stops::{Stop, Test, Where};
 use std::collections::BTreeSet;
 use takt_emu::Emulator;
 use takt_isa::timing::Cycle;
-use takt_isa::{BundleAddress, Effect, Program};
+use takt_isa::{BundleAddress, Effect, Flow, Program};
 
 /// Positions that matter. Those where a period ends, inputs are set or something was set by hand always do.
 #[derive(Clone, Debug, Default)]
@@ -76,7 +76,13 @@ impl Interest {
                 instruction.writes(slot).is_some_and(|register| reads.registers.contains(&register))
                     || reads.memory && instruction.op.row().effect == Effect::Store
             });
-            if writes {
+            // Where a value is there again without being written, it may be another than the one seen last.
+            let flow = Flow::of(&instructions);
+            let enters = reads.ranges.iter().any(|(after, through)| {
+                let is_in = |address| *after < address && address <= *through;
+                !is_in(address) && (flow == Flow::Return || flow.target().is_some_and(is_in))
+            });
+            if writes || enters {
                 self.bundles.insert(address);
             }
         }
