@@ -74,7 +74,7 @@ impl Session {
         let interest = Interest::stops(&self.stops, self.program());
         let base = self.known.before(here).map_or(0, |(cycle, _)| cycle);
         let mut window = WINDOW;
-        while here - base > window && window <= NEAR {
+        while here - base > NEAR && window <= NEAR {
             self.move_to(here - window)?;
             let mut near = Watcher::new(self);
             self.watch_until(here, &interest, &mut near)?;
