@@ -38,7 +38,7 @@ pub(crate) struct Program {
 
 /// What is said of a program that was assembled, for one that comes from a pickle: there it is not assembled again.
 #[derive(Clone, FromPyObject, IntoPyObject)]
-struct Kept(String, Option<(String, String)>, Vec<(Option<String>, u32, u32)>);
+pub(crate) struct Kept(String, Option<(String, String)>, Vec<(Option<String>, u32, u32)>);
 
 /// How a source becomes a program.
 #[derive(Clone)]
@@ -53,10 +53,10 @@ struct Recipe {
 
 /// What was wished for, in words: `schedule`, `contract`, `effort`, `warnings`.
 #[derive(Clone, FromPyObject, IntoPyObject)]
-struct Wishes(String, String, Option<u32>, Vec<String>);
+pub(crate) struct Wishes(String, String, Option<u32>, Vec<String>);
 
 /// A recipe in words, for a pickle: text, name, folder, folders of includes, wishes.
-type Words = (Vec<u8>, String, PathBuf, Vec<PathBuf>, Wishes);
+pub(crate) type Words = (Vec<u8>, String, PathBuf, Vec<PathBuf>, Wishes);
 
 impl Wishes {
     fn options(&self, machine: &'static Machine) -> PyResult<Options> {

@@ -30,9 +30,9 @@ def test_a_pickled_program_is_the_program(tmp_path):
     law = takt.load(tmp_path / "law.s", schedule="on")
     (tmp_path / "law.takt").write_bytes(law.image())
     image = takt.load(tmp_path / "law.takt")
-    q = states((5, 30))
+    inputs = states((5, 30))
     for program in [law, warns, image]:
-        expected = program.run({"q": q, "qr": 1.0, "n": 3})
+        expected = program.run(inputs)
         for other in [*copies(program), *(takt_copy for one in copies(program) for takt_copy in copies(one))]:
             assert (other.machine, other.bundles, other.sources) == (program.machine, program.bundles, program.sources)
             assert (other.inputs, other.outputs, other.warnings) == (program.inputs, program.outputs, program.warnings)
@@ -40,7 +40,7 @@ def test_a_pickled_program_is_the_program(tmp_path):
             assert other.image() == program.image()
             assert other.bound() == program.bound()
             assert other._core.blocks() == program._core.blocks()
-            run = other.run({"q": q, "qr": 1.0, "n": 3})
+            run = other.run(inputs)
             assert np.array_equal(run.outputs["u"], expected.outputs["u"])
             assert np.array_equal(run.cycles, expected.cycles)
             assert str(other.analyse(name="law")) == str(program.analyse(name="law"))
@@ -79,7 +79,7 @@ def test_what_stopped_is_pickled_with_it():
     run = program.run({"i": [[0, 1], [2, 70_000]]})
     again = pickle.loads(pickle.dumps(run))
     assert [str(fault) for fault in again.faults] == [str(fault) for fault in run.faults] != []
-    assert np.array_equal(again.outputs["y"], run.outputs["y"])
+    assert np.array_equal(again.outputs["y"], run.outputs["y"], equal_nan=True)
     error = pickle.loads(pickle.dumps(takt.ModelError("no such joint", 7)))
     assert (str(error), error.line) == ("no such joint", 7)
 
@@ -107,7 +107,7 @@ def test_a_machine_that_cannot_be_pickled_says_why():
 
 
 def test_signals_are_heard_between_and_within_periods():
-    """A period of about a million cycles, a few hundred times: the handler is called often, not every 64 periods."""
+    """A period of about a million cycles, a hundred times: the handler is called often, not every 64 periods."""
     source = ".input x\n.output y\n.reg n:int\n.period\nloop: li n, 250000\nturn: isub n, n, 1\n bnz n, turn\n mov y, x\n wait loop\n"
     program = takt.assemble(source)
     calls = 0
@@ -119,12 +119,12 @@ def test_signals_are_heard_between_and_within_periods():
     before = signal.signal(signal.SIGALRM, handler)
     try:
         signal.setitimer(signal.ITIMER_REAL, 0.001, 0.001)
-        program.run({"x": np.zeros(190)})
+        program.run({"x": np.zeros(100)})
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
-    # Every 64 periods would be three times.
-    assert calls > 4
+    # Every 64 periods would be once.
+    assert calls > 3
 
 
 def batch(program):
