@@ -1,13 +1,61 @@
 //! The picture in words, for a terminal.
 
+use crate::WhatIf;
 use crate::picture::{Faster, Picture, gained};
-use crate::{Link, WhatIf};
 use std::cmp::Reverse;
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::fmt::Write;
-use takt_isa::timing::{Cause, Cycle};
+use takt_isa::timing::Cycle;
 
 /// Lines of each list of the text; the JSON has all.
 const SHOWN: usize = 12;
+
+/// What took cycles: at which issue first, how often, and how many in all.
+struct Line {
+    first: usize,
+    times: u32,
+    cycles: Cycle,
+    /// Whether each time took as many.
+    is_even: bool,
+    text: String,
+}
+
+impl Line {
+    /// Its text, and how often it is so: in a loop, once for each turn.
+    fn told(&self) -> String {
+        match self.times {
+            1 => self.text.clone(),
+            times if self.is_even => {
+                format!("{} ({times} times {})", self.text, self.cycles / Cycle::from(times))
+            }
+            times => format!("{} ({times} times)", self.text),
+        }
+    }
+}
+
+/// The longest, those that say the same taken together.
+fn longest(lines: Vec<Line>) -> Vec<Line> {
+    let mut groups: Vec<Line> = Vec::new();
+    let mut known: HashMap<String, usize> = HashMap::new();
+    for line in lines {
+        match known.entry(line.text.clone()) {
+            Entry::Occupied(group) => {
+                let group = &mut groups[*group.get()];
+                group.is_even &= group.cycles == line.cycles * Cycle::from(group.times);
+                group.times += line.times;
+                group.cycles += line.cycles;
+            }
+            Entry::Vacant(new) => {
+                new.insert(groups.len());
+                groups.push(line);
+            }
+        }
+    }
+    groups.sort_by_key(|line| (Reverse(line.cycles), line.first));
+    groups.truncate(SHOWN);
+    groups
+}
 
 impl Picture<'_> {
     /// The text.
@@ -31,16 +79,29 @@ impl Picture<'_> {
             slots.map(|(name, count)| format!("{name} {count} ({:.0} %)", share(count))).collect();
         writeln!(out, "operations by slot, and their share of the cycles: {}", slots.join(", "))?;
 
-        let mut stalls: Vec<(usize, Cause, u32)> = Vec::new();
-        for (i, issue) in issues.iter().enumerate() {
-            stalls.extend(issue.stalls.iter().map(|&(cause, cycles)| (i, cause, cycles)));
-        }
-        stalls.sort_by_key(|&(i, _, cycles)| (Reverse(cycles), i));
-        let stalled: u32 = stalls.iter().map(|(_, _, cycles)| cycles).sum();
+        let stalls = issues.iter().enumerate().flat_map(|(i, issue)| {
+            issue.stalls.iter().map(move |&(cause, cycles)| {
+                let (at, what) = (program.bundle_text(issue.address), program.cause_text(cause));
+                Line {
+                    first: i,
+                    times: 1,
+                    cycles: Cycle::from(cycles),
+                    is_even: true,
+                    text: format!("{at}: {what}"),
+                }
+            })
+        });
+        let stalls: Vec<Line> = stalls.collect();
+        let stalled: Cycle = stalls.iter().map(|line| line.cycles).sum();
         writeln!(out, "\nstalls: {}, {stalled} cycles; the longest:", stalls.len())?;
-        for &(i, cause, cycles) in stalls.iter().take(SHOWN) {
-            let (at, what) = (program.bundle_text(issues[i].address), program.cause_text(cause));
-            writeln!(out, "  {cycles:>5}  before cycle {:<5} {at}: {what}", self.cycle(i))?;
+        for line in longest(stalls) {
+            writeln!(
+                out,
+                "  {:>5}  before cycle {:<5} {}",
+                line.cycles,
+                self.cycle(line.first),
+                line.told()
+            )?;
         }
 
         let chain: Cycle = self.chain.iter().map(|link| link.cycles).sum();
@@ -48,14 +109,21 @@ impl Picture<'_> {
         for (kind, cycles) in self.chain_by_kind() {
             writeln!(out, "  {cycles:>5}  {kind}")?;
         }
-        let mut links: Vec<&Link> = self.chain.iter().filter(|link| link.cycles > 1).collect();
-        links.sort_by_key(|link| (Reverse(link.cycles), link.to));
-        links.truncate(SHOWN);
-        links.sort_by_key(|link| link.to);
-        writeln!(out, "its longest links:")?;
-        for link in links {
+        let links = self.chain.iter().filter(|link| link.cycles > 1).map(|link| {
             let (to, how) = (program.bundle_text(issues[link.to].address), self.link(link));
-            writeln!(out, "  {:>5}  to cycle {:<5} {to}: {how}", link.cycles, self.cycle(link.to))?;
+            Line {
+                first: link.to,
+                times: 1,
+                cycles: link.cycles,
+                is_even: true,
+                text: format!("{to}: {how}"),
+            }
+        });
+        let mut links = longest(links.collect());
+        links.sort_by_key(|line| line.first);
+        writeln!(out, "its longest links:")?;
+        for line in links {
+            writeln!(out, "  {:>5}  to cycle {:<5} {}", line.cycles, self.cycle(line.first), line.told())?;
         }
 
         self.write_faster(out)

@@ -5,6 +5,7 @@ use crate::files::{self, Out};
 use crate::load::Loaded;
 use crate::output::{self, Failure};
 use crate::ports;
+use crate::progress::Late;
 use crate::run::PERIOD_LIMIT;
 use anyhow::{Context, Result, bail};
 use serde_json::{Value, json};
@@ -49,6 +50,8 @@ pub(crate) struct Arguments<'a> {
     pub(crate) inputs: &'a Path,
     pub(crate) outputs: Option<&'a Path>,
     pub(crate) tick: Option<NonZeroU64>,
+    /// Cycles after which a run ends with an error.
+    pub(crate) max_cycles: Option<u64>,
     pub(crate) json: bool,
 }
 
@@ -58,7 +61,10 @@ pub(crate) fn run(arguments: &Arguments<'_>, loaded: &Loaded, color: bool, out: 
     let mut table = arguments.outputs.map(Out::create).transpose()?;
     let mut batch = Batch::new(program, inputs.len())?;
     batch.set_tick_period(arguments.tick);
-    batch.set_period_limit(PERIOD_LIMIT);
+    match arguments.max_cycles {
+        Some(most) => batch.set_cycle_limit(most),
+        None => batch.set_period_limit(PERIOD_LIMIT),
+    }
     let runs = drive(&mut batch, &inputs, table.is_some())?;
 
     if let Some(table) = &mut table {
@@ -127,6 +133,8 @@ fn drive(batch: &mut Batch, inputs: &[Inputs], keep: bool) -> Result<Vec<Ran>> {
     let registers: Vec<_> = batch.program().inputs.iter().map(|port| port.register).collect();
     let mut runs: Vec<Ran> = inputs.iter().map(|inputs| Ran::new(&inputs.name)).collect();
     let longest = inputs.iter().map(|inputs| inputs.rows.len()).max().unwrap_or(0);
+    let all = inputs.iter().map(|inputs| inputs.rows.len() as u64).sum();
+    let mut bar = Late::new(Some(all), "periods");
     for period in 0..longest {
         for (port, register) in registers.iter().enumerate() {
             let last = |inputs: &Inputs| period.min(inputs.rows.len() - 1);
@@ -134,6 +142,7 @@ fn drive(batch: &mut Batch, inputs: &[Inputs], keep: bool) -> Result<Vec<Ran>> {
             batch.set_input_bits(*register, &words).map_err(PeriodError::from)?;
         }
         batch.run_period();
+        bar.add(inputs.iter().filter(|inputs| period < inputs.rows.len()).count() as u64);
         for (lane, run) in runs.iter_mut().enumerate() {
             if period >= inputs[lane].rows.len() || run.error.is_some() {
                 continue;

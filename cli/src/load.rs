@@ -2,6 +2,7 @@
 
 use crate::files;
 use crate::output::{Failure, message};
+use crate::progress::Waiting;
 use crate::select::SourceArguments;
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
@@ -137,6 +138,7 @@ impl Load {
             Some(name) if !files::is_dash(path) => name.to_string_lossy(),
             _ => "<stdin>".into(),
         };
+        let _waiting = Waiting::new(format!("assembling {name}"));
         takt_asm::assemble_bytes(&name, bytes, &loader, &self.options())
     }
 

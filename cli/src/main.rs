@@ -40,6 +40,7 @@ mod number;
 mod output;
 mod plot;
 mod ports;
+mod progress;
 mod report;
 #[cfg(feature = "robot")]
 mod robot;
@@ -52,6 +53,7 @@ mod synthesis;
 mod system;
 mod trace;
 mod track;
+mod wrong;
 
 #[cfg(not(feature = "model"))]
 use absent::model;
@@ -159,7 +161,8 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
 
 /// What the command line asks for, or the status to end with where clap has already answered (help, version, a mistake).
 fn parse(out: &mut Out) -> Result<Arguments, ExitCode> {
-    Arguments::try_parse().map_err(|answer| {
+    Arguments::try_parse().map_err(|mut answer| {
+        wrong::suggest(&mut answer);
         if answer.use_stderr() {
             let text = answer.render();
             let color = Color::Auto.on_stderr();

@@ -3,6 +3,7 @@
 use crate::files::{self, Given, Out};
 use crate::load::Load;
 use crate::output::{self, Failure};
+use crate::progress::Waiting;
 use crate::select::{MachineArgument, suggest};
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
@@ -153,7 +154,9 @@ pub(crate) fn run(arguments: &Model, color: bool, out: &mut Out) -> Result<()> {
     files::check(&[("FILE", &arguments.file)], &writes)?;
     let machine = arguments.machine.machine;
     let delays = Delays::of(machine);
+    let waiting = Waiting::new(format!("deriving the equations of {}", files::input_name(&arguments.file)));
     let function = function(arguments, &delays)?;
+    drop(waiting);
     let source = write::source(&function);
     if let Some(path) = &arguments.output {
         files::write(path, source.as_bytes())?;

@@ -3,8 +3,9 @@
 use crate::controller::{ControllerError, bind};
 use crate::files::{self, Out};
 use crate::plot;
+use crate::progress::progress;
 use crate::run::PERIOD_LIMIT;
-use crate::track::{progress, variant};
+use crate::track::variant;
 use crate::{number, output};
 use anyhow::{Context, Result, anyhow};
 use clap::Args;

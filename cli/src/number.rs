@@ -4,6 +4,7 @@
 
 use std::num::NonZeroU64;
 use std::ops::RangeInclusive;
+use takt_emu::LONGEST_TICK;
 
 /// The baud rate of a board whose wiring does not state another.
 pub(crate) const BAUD: u32 = 115_200;
@@ -19,6 +20,9 @@ fn split(text: &str) -> (&str, &str) {
     let end = (sign + 1..=most).rev().find(|&end| is_number(end)).unwrap_or(0);
     (&text[..end], text[end..].trim_start())
 }
+
+/// Below this a whole number as binary64 is that number.
+const EXACT: f64 = 9_007_199_254_740_992.0;
 
 /// A whole number in a range.
 fn whole(text: &str, range: RangeInclusive<u64>) -> Result<u64, String> {
@@ -36,7 +40,9 @@ fn whole(text: &str, range: RangeInclusive<u64>) -> Result<u64, String> {
         Ok(_) => Err(format!("more than {last}")),
         Err(_) if number.starts_with('-') => Err(format!("less than {first}")),
         Err(_) if number.contains(|c: char| !c.is_ascii_digit() && c != '+') => {
-            Err("not a whole number in digits".to_owned())
+            let digits = number.parse::<f64>().ok().filter(|value| value.fract() == 0.0 && *value < EXACT);
+            let digits = digits.map_or(String::new(), |value| format!(" (`{value}`)"));
+            Err(format!("not a whole number in digits{digits}"))
         }
         Err(_) => Err(format!("more than {last}")),
     }
@@ -59,9 +65,6 @@ const ROBOTS: u64 = 1_000_000;
 pub(crate) fn robots(text: &str) -> Result<u64, String> {
     whole(text, 1..=ROBOTS)
 }
-
-/// The longest time between ticks, cycles: well within [`crate::run::PERIOD_LIMIT`].
-const LONGEST_TICK: u64 = 100_000_000;
 
 /// Cycles from tick to tick, for clap.
 pub(crate) fn tick(text: &str) -> Result<NonZeroU64, String> {
@@ -107,6 +110,15 @@ pub(crate) enum Time {
     Seconds(f64),
 }
 
+/// A time in the largest unit of which it is at least one.
+fn with_unit(seconds: f64) -> String {
+    let (name, size) = TIME.iter().find(|(_, size)| seconds >= *size).unwrap_or(&TIME[TIME.len() - 1]);
+    let value = seconds / size;
+    // As written, not as rounded by the division.
+    let value = format!("{value:.9}");
+    format!("{}{name}", value.trim_end_matches('0').trim_end_matches('.'))
+}
+
 /// A time with its unit, or a number of cycles, for clap.
 pub(crate) fn time(text: &str) -> Result<Time, String> {
     let (number, unit) = split(text);
@@ -114,7 +126,16 @@ pub(crate) fn time(text: &str) -> Result<Time, String> {
         return Err("neither a time (`100us`, `0.1ms`) nor a number of cycles".to_owned());
     }
     if unit.is_empty() {
-        count(text).map(Time::Cycles)
+        count(text).map(Time::Cycles).map_err(|error| match number.parse::<f64>() {
+            Ok(seconds) if number.contains(['.', 'e', 'E']) && seconds > 0.0 => {
+                let units = TIME.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+                format!(
+                    "neither a whole number of cycles nor a time with its unit ({units}): for seconds, write `{}`",
+                    with_unit(seconds)
+                )
+            }
+            _ => error,
+        })
     } else {
         quantity(text, TIME, false, 1e-9..=1e6).map(Time::Seconds)
     }
@@ -150,7 +171,7 @@ mod tests {
             ("-1", "less than 1"),
             ("-0.5", "less than 1"),
             ("1.5", "not a whole number in digits"),
-            ("1e3", "not a whole number in digits"),
+            ("1e3", "not a whole number in digits (`1000`)"),
             ("18446744073709551616", "more than 18446744073709551615"),
             ("100us", "a whole number is wanted, without a unit; `us` follows it"),
             ("-100us", "a whole number is wanted, without a unit; `us` follows it"),
@@ -217,7 +238,19 @@ mod tests {
             ("0us", "not more than 0"),
             ("0", "less than 1"),
             ("-5", "less than 1"),
-            ("1.5", "not a whole number in digits"),
+            ("-1e3", "less than 1"),
+            (
+                "1.5",
+                "neither a whole number of cycles nor a time with its unit (s, ms, us, µs, ns): for seconds, write `1.5s`",
+            ),
+            (
+                "1e-3",
+                "neither a whole number of cycles nor a time with its unit (s, ms, us, µs, ns): for seconds, write `1ms`",
+            ),
+            (
+                "0.0000125",
+                "neither a whole number of cycles nor a time with its unit (s, ms, us, µs, ns): for seconds, write `12.5us`",
+            ),
             ("100kg", "`kg` is none of the units s, ms, us, µs, ns"),
             ("100MHz", "`MHz` is none of the units s, ms, us, µs, ns"),
             ("1e400s", "not between 0.000000001 and 1000000 s"),

@@ -1,6 +1,6 @@
 //! Input ports from CSV, output ports to CSV and JSON.
 
-use crate::files;
+use crate::files::{self, Out};
 use crate::select::suggest;
 use anyhow::{Result, anyhow, bail};
 use std::io::{self, Write};
@@ -48,6 +48,34 @@ impl Inputs {
             Inputs::Table(table) => table.next().map_err(|error| anyhow!(error)),
         }
     }
+}
+
+/// Opens inputs, and outputs under their titles. Where a plant may be at the other end of both, it may wait for the titles before
+/// it sends anything: they are written before anything is read. Else nothing is written before the inputs are known to be some.
+pub(crate) fn open_both(
+    inputs: Option<&Path>,
+    ports: &[Port],
+    outputs: Option<&Path>,
+    titles: impl Iterator<Item = String>,
+) -> Result<(Inputs, Option<Out>)> {
+    let mut outputs = outputs.map(Out::create).transpose()?;
+    let titled = |outputs: &mut Option<Out>| outputs.as_mut().map_or(Ok(()), |out| write_row(out, titles));
+    if inputs.is_some_and(files::is_live) {
+        titled(&mut outputs)?;
+        outputs.as_mut().map_or(Ok(()), Out::flush)?;
+        return Ok((Inputs::open(inputs, ports)?, outputs));
+    }
+    let inputs = Inputs::open(inputs, ports)?;
+    titled(&mut outputs)?;
+    Ok((inputs, outputs))
+}
+
+/// Ends the outputs of a run that came to `result` after so many rows. Those before an error are kept, if there are any; else the
+/// file stays what it was.
+pub(crate) fn finish(outputs: Option<Out>, rows: u64, result: Result<()>) -> Result<()> {
+    let finished = outputs.filter(|_| result.is_ok() || rows > 0).map_or(Ok(()), Out::finish);
+    // The first error is the one that counts.
+    result.and(finished)
 }
 
 /// Periods that [`rows`] makes up without a CSV.

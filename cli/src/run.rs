@@ -10,6 +10,7 @@ use crate::nan::NanWrites;
 use crate::number;
 use crate::output::{self, Failure};
 use crate::ports::{self, Inputs};
+use crate::progress::{self, Late};
 use crate::select::{OptionalMachine, SourceArguments};
 use crate::system;
 use crate::trace::{Trace, TraceArguments};
@@ -45,7 +46,7 @@ pub(crate) struct Run {
     #[arg(
         long,
         value_name = "DIR|CSV",
-        conflicts_with_all = ["inputs", "periods", "max_cycles", "trace", "deny", "stats"]
+        conflicts_with_all = ["inputs", "periods", "trace", "deny", "stats"]
     )]
     batch: Option<PathBuf>,
     /// Where the output ports go, as CSV, one row for each period, with a column `cycles`; `-` is standard output, where
@@ -55,7 +56,7 @@ pub(crate) struct Run {
     /// Run at most this many periods.
     #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
     periods: Option<u64>,
-    /// Stop with an error after this many cycles [default: 1000000000 in any one period].
+    /// Stop with an error after this many cycles, with --batch each run [default: 1000000000 in any one period].
     #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
     max_cycles: Option<u64>,
     /// Cycles from tick to tick, up to 100000000 [default: the tick comes when the program is ready].
@@ -121,9 +122,9 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
     let loaded =
         Load::new(arguments.machine.machine, color).with(&arguments.source).with_source(&arguments.file)?;
     if let Some(inputs) = batch {
-        let Run { file, tick, json, .. } = arguments;
-        let outputs = arguments.outputs.as_deref();
-        let arguments = batch::Arguments { file, inputs, outputs, tick: *tick, json: *json };
+        let Run { file, tick, max_cycles, json, .. } = arguments;
+        let (outputs, max_cycles) = (arguments.outputs.as_deref(), *max_cycles);
+        let arguments = batch::Arguments { file, inputs, outputs, tick: *tick, max_cycles, json: *json };
         return batch::run(&arguments, &loaded, color, out);
     }
     let program = &loaded.program;
@@ -233,32 +234,27 @@ fn run_periods(
 ) -> Result<Periods> {
     let path = arguments.inputs.as_deref();
     let live = path.is_some_and(files::is_live);
-    let mut outputs = arguments.outputs.as_ref().map(|path| Out::create(path)).transpose()?;
-    let header = |emulator: &Emulator, outputs: &mut Option<Out>| -> Result<()> {
-        let names = emulator.program().outputs.iter().map(|port| port.name.clone());
-        let write = |outputs| ports::write_row(outputs, names.chain(["cycles".to_owned()]));
-        Ok(outputs.as_mut().map_or(Ok(()), write)?)
-    };
-    let flush = |outputs: &mut Option<Out>| outputs.as_mut().map_or(Ok(()), Out::flush);
-    if live {
-        // The other side may wait for it before it sends anything.
-        header(emulator, &mut outputs)?;
-        flush(&mut outputs)?;
-    }
-    let mut inputs = Inputs::open(path, &emulator.program().inputs)?;
-    if !live {
-        header(emulator, &mut outputs)?;
-    }
+    let program = emulator.program();
+    let titles = program.outputs.iter().map(|port| port.name.clone()).chain(["cycles".to_owned()]);
+    let (mut inputs, mut outputs) =
+        ports::open_both(path, &program.inputs, arguments.outputs.as_deref(), titles)?;
+    // Where a row appears for each period, that is progress enough.
+    let all = arguments.periods.or_else(|| progress::rows(path)).filter(|_| !live);
+    let shows_rows = arguments.outputs.as_deref().is_some_and(files::is_dash);
+    let mut bar = Late::new(all.filter(|_| !shows_rows), "periods");
     let mut periods = Periods { shortest: u64::MAX, ..Periods::default() };
-    while arguments.periods.is_none_or(|wanted| periods.count < wanted) && set_inputs(emulator, &mut inputs)?
-    {
+    let mut period = |periods: &mut Periods| -> Result<bool> {
+        if !set_inputs(emulator, &mut inputs)? {
+            return Ok(false);
+        }
         emulator.set_cycle_limit(arguments.max_cycles.unwrap_or(emulator.now() + PERIOD_LIMIT));
         let report = observers.watch.run_period(emulator, trace.as_deref_mut(), None);
         let report = report.with_context(|| format!("period {}", periods.count))?;
         if trace.as_ref().is_some_and(|trace| trace.has_failed()) {
-            break;
+            return Ok(false);
         }
         periods.count += 1;
+        bar.add(1);
         periods.shortest = periods.shortest.min(report.cycles);
         periods.longest = periods.longest.max(report.cycles);
         periods.missed += u64::from(report.missed) + report.lost;
@@ -269,11 +265,17 @@ fn run_periods(
             });
             ports::write_row(outputs, values.chain([report.cycles.to_string()]))?;
         }
-        if live {
-            flush(&mut outputs)?;
+        if let Some(outputs) = outputs.as_mut().filter(|_| live) {
+            outputs.flush()?;
         }
+        Ok(true)
+    };
+    let mut result = Ok(true);
+    while matches!(result, Ok(true)) && arguments.periods.is_none_or(|wanted| periods.count < wanted) {
+        result = period(&mut periods);
     }
-    outputs.map_or(Ok(()), Out::finish)?;
+    drop(bar);
+    ports::finish(outputs, periods.count, result.map(|_| ()))?;
     Ok(periods)
 }
 

@@ -11,11 +11,11 @@ use crate::monte_carlo::{MonteCarlo, SpreadArguments, leaves_stdout};
 use crate::nan::NanWrites;
 use crate::number;
 use crate::plot::Plot;
+use crate::progress::progress;
 use crate::select::{self, OptionalMachine, SourceArguments, suggest};
 use crate::{output, ports, report};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use std::io::Write;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
@@ -225,7 +225,14 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
     let mut closed = false;
     while !closed && totals.periods < periods {
         let record = closed_loop.next().context("the path ended early")?.with_context(|| path.clone());
-        let record = record.map_err(|error| fault::told(error, &loaded, color))?;
+        let record = match record {
+            Ok(record) => record,
+            Err(error) => {
+                // What led there is kept.
+                return ports::finish(table.map(|Table(file)| file), totals.periods, Err(error))
+                    .map_err(|error| fault::told(error, &loaded, color));
+            }
+        };
         let report = closed_loop.controller().report.as_ref().context("a period has no report")?;
         totals.add(&record, report);
         nans.add(&report.nan_writes);
@@ -422,17 +429,4 @@ pub(crate) fn program(path: &Path, load: Load) -> Result<(String, Loaded)> {
         bail!("there is no program and no file `{name}`{near} (programs: {})", names.join(", "));
     }
     Ok((name, load.with_source(path)?))
-}
-
-/// A bar on its way to `count` of `what`.
-pub(crate) fn progress(count: u64, what: &str, quiet: bool) -> ProgressBar {
-    if quiet {
-        return ProgressBar::hidden();
-    }
-    // On standard error, and only if that is a terminal.
-    let style = ProgressStyle::with_template(&format!(
-        "{{bar:40}} {{human_pos}}/{{human_len}} {what}, {{eta}} to go"
-    ))
-    .unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(count).with_style(style)
 }

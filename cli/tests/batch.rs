@@ -35,6 +35,53 @@ fn runs() -> Vec<(String, Vec<String>)> {
         .collect()
 }
 
+/// What ends a run alone ends it in a batch, at the same period.
+#[test]
+fn a_limit_of_cycles_is_as_alone() {
+    let folder = Folder::new();
+    folder.write("law.s", LAW);
+    std::fs::create_dir(folder.path().join("runs")).unwrap();
+    for (name, rows) in runs() {
+        folder.write(format!("runs/{name}.csv"), format!("x,limit\n{}\n", rows.join("\n")));
+    }
+    let mut stopped = 0;
+    for most in [90, 150, 10_000] {
+        let mut expected = String::new();
+        let mut failed = Vec::new();
+        for (name, _) in runs() {
+            let line = format!("run law.s --inputs runs/{name}.csv --outputs - --max-cycles {most}");
+            let alone = folder.line(&line);
+            let mut lines = alone.stdout.lines();
+            let header = lines.next().unwrap();
+            if expected.is_empty() {
+                expected = format!("run,{header}\n");
+            }
+            lines.for_each(|line| expected += &format!("{name},{line}\n"));
+            if alone.status != Some(0) {
+                assert!(
+                    alone.stderr.contains(&format!("limit of {most} cycles reached")),
+                    "{}",
+                    alone.stderr
+                );
+                failed.push(name);
+            }
+        }
+        stopped += failed.len();
+        let batch = folder.line(&format!("run law.s --batch runs --outputs - --max-cycles {most}"));
+        assert_eq!(batch.stdout, expected, "{most}");
+        assert_eq!(batch.status, Some(i32::from(!failed.is_empty())));
+        if let Some(first) = failed.first() {
+            let said = format!("run `{first}`, period");
+            assert!(
+                batch.stderr.contains(&said) && batch.stderr.contains(&format!("limit of {most} cycles")),
+                "{}",
+                batch.stderr
+            );
+        }
+    }
+    assert!(stopped > 10 && stopped < 3 * runs().len(), "{stopped}");
+}
+
 #[test]
 fn each_run_of_a_batch_is_as_alone() {
     let folder = Folder::new();

@@ -782,3 +782,77 @@ fn outputs_go_where_they_are_sent() {
     let done = folder.line("asm prog.s -o real --schedule on");
     assert_eq!((done.status, done.stderr.as_str()), (Some(1), "error: cannot write real: it is read-only\n"));
 }
+
+/// Rows completed before a fault are written, to a file as to a pipe; where there are none, a file stays what it was.
+#[test]
+fn what_was_completed_before_a_fault_is_kept() {
+    const TABLE: &str = ".input i:int\n.output y\n.once\n wait loop\n.period\nloop: ld y, table[i]\n wait loop\n.data\ntable: .float 1.0, 2.0\n";
+    let folder = Folder::new();
+    folder.write("table.s", TABLE);
+    folder.write("core.toml", "tick = 100\n[[core]]\nname = \"c\"\nprogram = \"table.s\"\nmachine = \"t3\"\n[[wire]]\nfrom = \"host.i\"\nto = \"c.i\"\n[[wire]]\nfrom = \"c.y\"\nto = \"host.y\"\n");
+    folder.write("faults.csv", "i\n0\n1\n0\n99999\n1\n");
+    folder.write("at-once.csv", "i\n99999\n1\n");
+    folder.write("wrong.csv", "i\n1\n0\nx\n");
+    for (program, inputs, rows) in [
+        ("table.s", "faults.csv", 3),
+        ("table.s", "wrong.csv", 2),
+        ("table.s --periods 9", "faults.csv", 3),
+        ("core.toml", "faults.csv", 3),
+        ("core.toml", "wrong.csv", 2),
+        ("table.s", "at-once.csv", 0),
+    ] {
+        folder.write("out.csv", "as it was\n");
+        let piped = folder.line(&format!("run {program} --inputs {inputs} --outputs -"));
+        let filed = folder.line(&format!("run {program} --inputs {inputs} --outputs out.csv"));
+        assert_eq!((piped.status, filed.status), (Some(1), Some(1)), "{program} {inputs}");
+        assert_eq!(piped.stderr, filed.stderr);
+        assert_eq!(piped.stdout.lines().count(), rows + 1, "{program} {inputs}: {}", piped.stdout);
+        let expected = if rows > 0 { piped.stdout } else { "as it was\n".to_owned() };
+        assert_eq!(folder.read_text("out.csv"), expected, "{program} {inputs}");
+    }
+    assert!(folder.list().iter().all(|name| !name.contains("partial")), "{:?}", folder.list());
+}
+
+/// Turns of a loop that say the same are one line with a count.
+#[test]
+fn stalls_of_a_loop_are_one_line() {
+    const LOOP: &str = ".input x\n.output y\n.reg n:int s\n.once\n wait p\n.period\np: li n, 12\n mov s, x\nturn: fmul s, s, x\n fadd s, s, x\n isub n, n, 1\n bnz n, turn\n mov y, s\n wait p\n";
+    let folder = Folder::new();
+    folder.write("loop.s", LOOP);
+    let text = folder.line("analyse loop.s").ok();
+    let (_, stalls) = text.split_once("the longest:\n").unwrap();
+    let (stalls, links) = stalls.split_once("\n\n").unwrap();
+    let (_, links) = links.split_once("its longest links:\n").unwrap();
+    let (links, _) = links.split_once("\n\n").unwrap();
+    for list in [stalls, links] {
+        let what: Vec<&str> = list.lines().map(|line| line.split_once("bundle").unwrap().1).collect();
+        let once: std::collections::BTreeSet<&&str> = what.iter().collect();
+        assert_eq!(once.len(), what.len(), "{list}");
+    }
+    assert!(stalls.contains("awaits s.1 from bundle 3 (loop.s:9) (12 times 4)\n"), "{stalls}");
+    assert!(links.contains("s.2 through add (12 times 5)"), "{links}");
+    let json: serde_json::Value = serde_json::from_str(&folder.line("analyse loop.s --json").ok()).unwrap();
+    let all: u64 =
+        stalls.lines().map(|line| line.split_whitespace().next().unwrap().parse::<u64>().unwrap()).sum();
+    let total = text.split_once("stalls: ").unwrap().1.split(' ').nth(1).unwrap();
+    assert_eq!(total.parse::<u64>().unwrap(), all, "nothing is left out: {text}");
+    assert!(json["cycles"].as_u64().unwrap() > all);
+}
+
+/// A command of another tool, or a near meaning, is answered with the one that does that.
+#[test]
+fn a_command_that_is_not_there_leads_to_one_that_is() {
+    let folder = Folder::new();
+    for (wrong, tip) in [
+        ("simulate x.s", "`takt run` runs a program on the emulator"),
+        ("--color never WCET x.s", "`takt bound` bounds the cycles of each section"),
+        ("monte-carlo", "`takt track --monte-carlo` drives robots that differ"),
+        ("analize x.s", "a similar subcommand exists: 'analyse'"),
+    ] {
+        let done = folder.line(wrong);
+        assert_eq!((done.status, done.stdout.as_str()), (Some(2), ""));
+        assert!(done.stderr.contains(&format!("tip: {tip}\n")), "{}", done.stderr);
+    }
+    let done = folder.line("board simulate");
+    assert!(!done.stderr.contains("takt run"), "{}", done.stderr);
+}

@@ -108,7 +108,12 @@ struct Running {
 impl Running {
     fn new(folder: &Folder, options: &str) -> Running {
         folder.write("echo.s", ECHO);
-        let line = format!("run echo.s --inputs - --outputs - {options}");
+        Running::of(folder, "echo.s", options)
+    }
+
+    /// Of a program or a system.
+    fn of(folder: &Folder, file: &str, options: &str) -> Running {
+        let line = format!("run {file} --inputs - --outputs - {options}");
         let mut command = folder.command(&line.split_whitespace().collect::<Vec<_>>());
         let mut child = command.stdin(Stdio::piped()).spawn().unwrap();
         let (stdin, stdout) = (child.stdin.take(), child.stdout.take().map(BufReader::new));
@@ -166,6 +171,27 @@ fn each_row_is_answered_as_it_comes() {
         }
         assert_eq!(running.end(), (Some(0), String::new(), String::new()));
     }
+}
+
+/// As with a program: whoever waits for the titles first is not kept waiting.
+#[test]
+fn a_system_answers_a_plant_too() {
+    let folder = Folder::new();
+    let system = concat!(env!("CARGO_MANIFEST_DIR"), "/../programs/systems/speed");
+    let mut running = Running::of(&folder, &format!("{system}.toml"), "");
+    // Before anything was sent.
+    let mut answers = running.line();
+    assert_eq!(answers, "u,seen.peak,seen.values\n");
+    let rows = std::fs::read_to_string(format!("{system}.csv")).unwrap();
+    let mut rows = rows.lines();
+    running.send(&format!("{}\n", rows.next().unwrap()));
+    for row in rows {
+        running.send(&format!("{row}\n"));
+        answers += &running.line();
+    }
+    assert_eq!(running.end(), (Some(0), String::new(), String::new()));
+    let alone = folder.line(&format!("run {system}.toml --inputs {system}.csv --outputs -")).ok();
+    assert_eq!(answers, alone);
 }
 
 #[test]

@@ -271,3 +271,30 @@ fn a_board_at_the_prompt() {
     terminal.ends();
     assert!(terminal.text().ends_with("the program runs; outputs drive"), "{}", terminal.text());
 }
+
+/// What takes long says how long still, and what assembles for long that it does; in a pipe nothing of it is written.
+#[test]
+fn progress_of_what_takes_long() {
+    const SLOW: &str = ".input x\n.output y\n.reg n:int\n.once\n wait p\n.period\np: li n, 100000\nturn: isub n, n, 1\n bnz n, turn\n mov y, x\n wait p\n";
+    let folder = Folder::new();
+    folder.write("slow.s", SLOW);
+    let rows = 1_000_000;
+    folder.write("in.csv", format!("run,x\n{}", "a,1\nb,2\n".repeat(rows / 2)));
+    for (line, what) in [
+        ("takt --no-jit run slow.s --batch in.csv", "1,000,000 periods,"),
+        ("takt --no-jit run slow.s --inputs in.csv --outputs out.csv", "1,000,000 periods,"),
+        ("takt --no-jit run slow.s --periods 1000000", "1,000,000 periods,"),
+        ("takt track --periods 100000", "100,000 periods,"),
+    ] {
+        let mut terminal = Terminal::new(&folder, line, 24, 100);
+        terminal.until(what, |screen| {
+            let text = screen.contents();
+            text.contains(what) && text.contains(" to go")
+        });
+        terminal.press("\x03");
+    }
+    let many = format!(".output y\n.reg a:int\n{}", " iadd a, a, 1\n".repeat(10));
+    folder.write("short.s", many + " halt\n");
+    let done = folder.line("run slow.s --periods 30");
+    assert_eq!((done.status, done.stderr.as_str()), (Some(0), ""));
+}

@@ -414,3 +414,49 @@ fn goes_to_a_period_of_a_core() {
         }
     }
 }
+
+/// Another core's values are named with the core before them; what is selected stays selected.
+#[test]
+fn names_of_another_core() {
+    let (description, programs) = calling();
+    let views = programs.iter().map(|assembled| {
+        let options = Options { names: assembled.names.clone(), ..Options::default() };
+        Session::new(&assembled.program, options).expect("it loads")
+    });
+    let mut console = SystemConsole::new(session(&description), views.collect());
+    let mut run = |line: &str| console.execute(line);
+    run("goto cycle 40").expect("it is there");
+    run("core forever").expect("it is there");
+    let own = run("print n").expect("a value");
+    run("core calling").expect("it is there");
+    assert_eq!(run("print forever.n").expect("a value"), format!("core forever: {own}"));
+    assert!(run("cores").expect("a list").contains("> calling"));
+    assert_ne!(run("print calling.n").expect("a value"), format!("core calling: {own}"));
+    assert!(run("watch forever.n > 100").expect("a stop").starts_with("core forever: stop 1; now "));
+    assert!(run("stops").expect("a list").contains("watch n > 100 of core forever"));
+    assert!(
+        run("break forever.again if forever.n == 30")
+            .expect("a stop")
+            .starts_with("core forever: stop 2 at ")
+    );
+    assert!(run("cores").expect("a list").contains("> calling"));
+    assert!(run("until forever.n == 20").expect("it holds").contains("the expression holds"));
+    assert!(run("check forever.n == 20").is_ok());
+    assert!(run("continue").expect("it stops").contains("stop 2"));
+    assert!(run("continue").expect("it stops").contains("stop 1"));
+    // What is wrong with it is said as for one's own.
+    let error = run("print forever.m, calling.n").expect_err("two cores");
+    assert!(error.contains("one command is about one core"), "{error}");
+    run("core calling").expect("it is there");
+    let error = run("print forever.k").expect_err("no such name");
+    assert!(error.starts_with("core forever: nothing is named `k`"), "{error}");
+    let error = run("print nobody.n").expect_err("no such core");
+    assert!(error.contains("nothing is named `nobody.n`"), "{error}");
+    assert!(
+        console
+            .look("print forever.n")
+            .expect("it looks")
+            .expect("a value")
+            .starts_with("core forever: n = ")
+    );
+}

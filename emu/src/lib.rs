@@ -55,4 +55,4 @@ pub use fault::{Fault, FaultKind, LoadError, ShownFault};
 pub use machine::MAX_NAN_WRITES;
 pub use standing::{At, Standing};
 pub use statistics::Statistics;
-pub use system::{Number, PeriodError, PeriodReport, PortError, Row, Rows};
+pub use system::{LONGEST_TICK, Number, PeriodError, PeriodReport, PortError, Row, Rows};

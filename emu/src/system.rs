@@ -14,6 +14,9 @@ pub type Row = Vec<(Register, u32)>;
 /// Those of one period after the other.
 pub type Rows = Vec<Row>;
 
+/// The longest time between ticks that commands and packages offer: well within the 10⁹ cycles in which a period must end.
+pub const LONGEST_TICK: Cycle = 100_000_000;
+
 /// Ticks to come and ticks that came.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Ticks {

@@ -41,6 +41,9 @@ fn compare(seed: u64, program: &Program, met: &mut Met) {
     }
     let limit = u64::from(200 + random.below(3000));
     batch.set_period_limit(limit);
+    // In some, a limit of all cycles, too.
+    let most = if random.once_in(3) { u64::from(500 + random.below(5000)) } else { u64::MAX };
+    batch.set_cycle_limit(most);
     // How many lanes differ in an input.
     let rarity = 1 + random.below(2 * lanes as u32);
     let mut was_apart = 0;
@@ -62,7 +65,7 @@ fn compare(seed: u64, program: &Program, met: &mut Met) {
         met.joined += u64::from(apart < was_apart);
         was_apart = apart;
         for (lane, single) in singles.iter_mut().enumerate() {
-            single.set_cycle_limit(single.now() + limit);
+            single.set_cycle_limit((single.now() + limit).min(most));
             let expected = single.run_period(&[]);
             let context = format!("{} seed {seed}, period {period}, lane {lane}", program.machine.name);
             let cycles = expected.as_ref().ok().map(|report| report.cycles);

@@ -31,8 +31,30 @@ pub(crate) struct Failure {
     pub(crate) text: String,
 }
 
+/// What a failure is made of, for a pickle: in the order of its fields, the message's text last.
+type Parts = (
+    (usize, usize),
+    (String, String, String),
+    (Option<u64>, Option<u32>, Option<String>),
+    (Option<String>, Option<u32>),
+);
+
+/// A failure that was pickled.
+#[pyfunction]
+pub(crate) fn restored_fault(place: Parts) -> Failure {
+    let ((run, period), (kind, message, text), (cycle, bundle, slot), (file, line)) = place;
+    Failure { run, period, kind, message, cycle, bundle, slot, file, line, text }
+}
+
 #[pymethods]
 impl Failure {
+    /// For `pickle`: what makes the same failure again.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Parts,))> {
+        let Failure { run, period, kind, message, cycle, bundle, slot, file, line, text } = self.clone();
+        let parts = ((run, period), (kind, message, text), (cycle, bundle, slot), (file, line));
+        Ok((py.import("takt._takt")?.getattr("restored_fault")?, (parts,)))
+    }
+
     fn __repr__(&self) -> String {
         let place = match (&self.file, self.line) {
             (Some(file), Some(line)) => format!("{file}:{line}: "),

@@ -3,28 +3,42 @@
 use pyo3::prelude::*;
 use std::time::{Duration, Instant};
 
+/// Cycles between two looks for Ctrl-C within one period: a few milliseconds.
+pub(crate) const SLICE: u64 = 250_000;
+
 /// Looks for signals now and then.
 pub(crate) struct Interrupt {
     last: Instant,
-    calls: u32,
+    /// Cycles that have been run since the time was asked for.
+    cycles: u64,
 }
 
 impl Interrupt {
     /// How often, at most.
-    const EVERY: Duration = Duration::from_millis(50);
+    const EVERY: Duration = Duration::from_millis(20);
+    /// What a period counts as beside its cycles: setting inputs and reading outputs takes time, too.
+    const PERIOD: u64 = 1000;
 
     pub(crate) fn new() -> Interrupt {
-        Interrupt { last: Instant::now(), calls: 0 }
+        Interrupt { last: Instant::now(), cycles: 0 }
     }
 
-    /// To be called often.
+    /// Counts the cycles of a period, or of a part of one.
+    pub(crate) fn count(&mut self, cycles: u64) {
+        self.cycles = self.cycles.saturating_add(cycles).saturating_add(Self::PERIOD);
+    }
+
+    /// To be called before each period, or further part of one, once the one before was counted.
     ///
     /// # Errors
     /// What a signal's handler has raised, as `KeyboardInterrupt`.
     pub(crate) fn check(&mut self) -> PyResult<()> {
-        self.calls = self.calls.wrapping_add(1);
         // Asking for the time takes longer than the shortest period.
-        if self.calls.is_multiple_of(64) { self.check_now() } else { Ok(()) }
+        if self.cycles < SLICE {
+            return Ok(());
+        }
+        self.cycles = 0;
+        self.check_now()
     }
 
     /// The same, for callers who come by seldom.

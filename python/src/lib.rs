@@ -24,11 +24,13 @@ mod _takt {
     #[pymodule_export]
     use crate::board::Board;
     #[pymodule_export]
-    use crate::failure::Failure;
+    use crate::failure::{Failure, restored_fault};
     #[pymodule_export]
     use crate::model::{expressions, robot, robot_functions};
     #[pymodule_export]
-    use crate::program::{Program, assemble, flag_names, load, machines, nearest_name};
+    use crate::program::{
+        Program, assemble, flag_names, load, longest_tick, machines, nearest_name, restored_program,
+    };
     #[pymodule_export]
     use crate::report::analyse;
     #[pymodule_export]

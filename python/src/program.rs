@@ -28,11 +28,17 @@ pub(crate) struct Program {
     pub(crate) sources: Arc<Vec<(String, String)>>,
     /// What is known of one that was assembled here.
     pub(crate) assembled: Option<Assembled>,
+    /// The same of one that was pickled.
+    kept: Option<Kept>,
     /// How it was assembled.
     recipe: Option<Recipe>,
     /// And of one from an image.
     debug: Option<DebugInfo>,
 }
+
+/// What is said of a program that was assembled, for one that comes from a pickle: there it is not assembled again.
+#[derive(Clone, FromPyObject, IntoPyObject)]
+pub(crate) struct Kept(String, Option<(String, String)>, Vec<(Option<String>, u32, u32)>);
 
 /// How a source becomes a program.
 #[derive(Clone)]
@@ -41,10 +47,53 @@ struct Recipe {
     name: String,
     folder: PathBuf,
     include: Vec<PathBuf>,
+    wishes: Wishes,
     options: Options,
 }
 
+/// What was wished for, in words: `schedule`, `contract`, `effort`, `warnings`.
+#[derive(Clone, FromPyObject, IntoPyObject)]
+pub(crate) struct Wishes(String, String, Option<u32>, Vec<String>);
+
+/// A recipe in words, for a pickle: text, name, folder, folders of includes, wishes.
+pub(crate) type Words = (Vec<u8>, String, PathBuf, Vec<PathBuf>, Wishes);
+
+impl Wishes {
+    fn options(&self, machine: &'static Machine) -> PyResult<Options> {
+        let Wishes(schedule, contract, effort, warnings) = self;
+        let wishes = warnings.iter().map(|wish| {
+            wish.parse::<Wish>()
+                .map_err(|reason| PyValueError::new_err(format!("warnings: `{wish}`: {reason}")))
+        });
+        Ok(Options {
+            machine,
+            schedule: choice(
+                "schedule",
+                schedule,
+                &[("source", Schedule::AsWritten), ("on", Schedule::All), ("off", Schedule::None)],
+            )?,
+            contract: choice(
+                "contract",
+                contract,
+                &[("source", Contract::AsWritten), ("on", Contract::All), ("off", Contract::None)],
+            )?,
+            effort: effort.unwrap_or(Options::default().effort),
+            levels: wishes.collect::<PyResult<Vec<_>>>()?.into_iter().collect(),
+        })
+    }
+}
+
 impl Recipe {
+    fn of((text, name, folder, include, wishes): Words, machine: &'static Machine) -> PyResult<Recipe> {
+        let options = wishes.options(machine)?;
+        Ok(Recipe { text, name, folder, include, wishes, options })
+    }
+
+    fn words(&self) -> Words {
+        let Recipe { text, name, folder, include, wishes, .. } = self.clone();
+        (text, name, folder, include, wishes)
+    }
+
     fn assemble(&self) -> Result<Assembled, Diagnostics> {
         let search = Search::new(FileLoader::new(&self.folder));
         let search = self.include.iter().fold(search, Search::folder).library(takt_programs::LIBRARY);
@@ -88,6 +137,12 @@ pub(crate) fn flag_names() -> Vec<(u8, &'static str)> {
     Flags::NAMES.iter().map(|(flag, name)| (flag.bits(), *name)).collect()
 }
 
+/// The longest time between ticks, cycles.
+#[pyfunction]
+pub(crate) fn longest_tick() -> u64 {
+    takt_emu::LONGEST_TICK
+}
+
 /// The name most like a misspelt one, if one is near enough to be meant.
 #[pyfunction]
 #[pyo3(name = "nearest")]
@@ -111,32 +166,25 @@ pub(crate) fn assemble(
     effort: Option<u32>,
     warnings: Vec<String>,
 ) -> PyResult<Program> {
-    let wishes = warnings.iter().map(|wish| {
-        wish.parse::<Wish>().map_err(|reason| PyValueError::new_err(format!("warnings: `{wish}`: {reason}")))
-    });
-    let options = Options {
-        machine: self::machine(machine)?,
-        schedule: choice(
-            "schedule",
-            schedule,
-            &[("source", Schedule::AsWritten), ("on", Schedule::All), ("off", Schedule::None)],
-        )?,
-        contract: choice(
-            "contract",
-            contract,
-            &[("source", Contract::AsWritten), ("on", Contract::All), ("off", Contract::None)],
-        )?,
-        effort: effort.unwrap_or(Options::default().effort),
-        levels: wishes.collect::<PyResult<Vec<_>>>()?.into_iter().collect(),
-    };
-    if let Some(none) = include.iter().find(|folder| !folder.is_dir()) {
+    let machine = self::machine(machine)?;
+    let wishes = Wishes(schedule.to_owned(), contract.to_owned(), effort, warnings);
+    let recipe = Recipe::of((text, name.to_owned(), folder, include, wishes), machine)?;
+    if let Some(none) = recipe.include.iter().find(|folder| !folder.is_dir()) {
         return Err(PyValueError::new_err(format!("include: there is no folder {}", none.display())));
     }
-    let recipe = Recipe { text, name: name.to_owned(), folder, include, options };
     match py.detach(|| recipe.assemble()) {
         Ok(assembled) => Program::assembled(assembled, recipe),
         Err(diagnostics) => Err(AssemblyError::new_err((diagnostics.render(false), diagnostics.to_json()))),
     }
+}
+
+/// A program that was pickled, from its image, how it was assembled, and what is said of it.
+#[pyfunction]
+pub(crate) fn restored_program(image: &[u8], recipe: Option<Words>, kept: Option<Kept>) -> PyResult<Program> {
+    let program = Program::from_image(image, Path::new("a pickled program"))?;
+    let machine = program.program.machine;
+    let recipe = recipe.map(|words| Recipe::of(words, machine)).transpose()?;
+    Ok(Program { recipe, kept, ..program })
 }
 
 /// The program in a file: an image, or `None` if that is a source, with its bytes.
@@ -179,7 +227,14 @@ impl Program {
         }
         let sources = Arc::new(assembled.debug_info().sources);
         let program = Arc::new(assembled.program.clone());
-        Ok(Program { program, sources, assembled: Some(assembled), recipe: Some(recipe), debug: None })
+        Ok(Program {
+            program,
+            sources,
+            assembled: Some(assembled),
+            kept: None,
+            recipe: Some(recipe),
+            debug: None,
+        })
     }
 
     /// The same source assembled for another machine; `None` of an image, and if it does not fit.
@@ -196,7 +251,7 @@ impl Program {
             return Err(wrong("it has no instruction".to_owned()));
         }
         let sources = Arc::new(debug.as_ref().map_or(Vec::new(), |debug| debug.sources.clone()));
-        Ok(Program { program: Arc::new(program), sources, assembled: None, recipe: None, debug })
+        Ok(Program { program: Arc::new(program), sources, assembled: None, kept: None, recipe: None, debug })
     }
 }
 
@@ -241,20 +296,24 @@ impl Program {
     /// The assembler's warnings: rendered, and as JSON.
     #[getter]
     fn warnings(&self) -> Option<(String, String)> {
+        if let Some(Kept(_, warnings, _)) = &self.kept {
+            return warnings.clone();
+        }
         let warnings = &self.assembled.as_ref()?.warnings;
         (!warnings.is_empty()).then(|| (warnings.render(false), warnings.to_json()))
     }
 
     /// Words beside the source lines that they come from; of an image, source that assembles to it.
     fn listing(&self) -> String {
-        match &self.assembled {
-            Some(assembled) => listing::listing(assembled),
-            None => disasm::disassemble(&self.program),
+        match (&self.assembled, &self.kept) {
+            (Some(assembled), _) => listing::listing(assembled),
+            (None, Some(Kept(listing, ..))) => listing.clone(),
+            (None, None) => disasm::disassemble(&self.program),
         }
     }
 
     /// The image, as `takt asm` writes it.
-    fn image(&self) -> PyResult<Vec<u8>> {
+    pub(crate) fn image(&self) -> PyResult<Vec<u8>> {
         let debug = self.assembled.as_ref().map(Assembled::debug_info).or_else(|| self.debug.clone());
         let image = image::write_with(&self.program, debug.as_ref());
         image.map_err(|error| PyValueError::new_err(format!("no image: {error}")))
@@ -262,6 +321,9 @@ impl Program {
 
     /// Of each block that the scheduler packed: label, cycles, and what no schedule can beat.
     fn blocks(&self) -> Vec<(Option<String>, u32, u32)> {
+        if let Some(Kept(_, _, blocks)) = &self.kept {
+            return blocks.clone();
+        }
         let blocks = self.assembled.iter().flat_map(|assembled| &assembled.blocks);
         blocks.map(|block| (block.label.clone(), block.cycles, block.bound.cycles())).collect()
     }
@@ -285,6 +347,28 @@ impl Program {
             (section.name, place, section.once, pair(plain), pair(in_time), pair(missed))
         });
         Ok((sections.collect(), worst))
+    }
+
+    /// For `pickle`: what makes the same program again.
+    #[allow(clippy::type_complexity)]
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>, Option<Words>, Option<Kept>))> {
+        let made = || Kept(self.listing(), self.warnings(), self.blocks());
+        let kept = (self.assembled.is_some() || self.kept.is_some()).then(made);
+        let image = PyBytes::new(py, &self.image()?);
+        let recipe = self.recipe.as_ref().map(Recipe::words);
+        Ok((py.import("takt._takt")?.getattr("restored_program")?, (image, recipe, kept)))
+    }
+
+    /// A copy: nothing changes a program, so that it is the same.
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
     }
 
     /// A machine with the program in it.

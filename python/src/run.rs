@@ -1,7 +1,7 @@
 //! Runs over arrays: one on an emulator, many in a batch.
 
 use crate::failure::{self, Failure};
-use crate::interrupt::Interrupt;
+use crate::interrupt::{Interrupt, SLICE};
 use crate::program::Program;
 use numpy::{Element, PyReadonlyArray, PyReadwriteArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -159,9 +159,6 @@ pub(crate) fn run_to_halt(
     Ok((emulator.now(), outputs, emulator.flags().bits(), failure))
 }
 
-/// Cycles between two looks for Ctrl-C within one period.
-pub(crate) const SLICE: u64 = 10_000_000;
-
 /// Runs a period, looking for Ctrl-C.
 pub(crate) fn period(
     emulator: &mut Emulator,
@@ -169,11 +166,14 @@ pub(crate) fn period(
     interrupt: &mut Interrupt,
 ) -> PyResult<Result<PeriodReport, PeriodError>> {
     emulator.set_cycle_limit(emulator.now().saturating_add(max_cycles));
-    interrupt.check()?;
     loop {
-        match emulator.run_period_until(emulator.now().saturating_add(SLICE)) {
+        interrupt.check()?;
+        let begin = emulator.now();
+        let ran = emulator.run_period_until(begin.saturating_add(SLICE));
+        interrupt.count(emulator.now().saturating_sub(begin));
+        match ran {
             Ok(Some(report)) => return Ok(Ok(report)),
-            Ok(None) => interrupt.check_now()?,
+            Ok(None) => {}
             Err(error) => return Ok(Err(error)),
         }
     }

@@ -6,7 +6,7 @@ use crate::program::{Program, kind, suggest};
 use crate::run::{loaded, misses, period, port_error};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyString};
+use pyo3::types::{PyBytes, PyDict, PyString};
 use std::collections::HashMap;
 use std::num::NonZeroU64;
 use std::sync::Arc;
@@ -14,9 +14,41 @@ use takt_emu::{Emulator, Number};
 use takt_isa::program::Port;
 use takt_isa::{Register, Type};
 
+/// Input values and periods since reset of which a machine keeps what it was given (8 bytes each).
+const HISTORY: usize = 1 << 20;
+
+/// What a machine was given since reset: what a pickle needs to bring another one to the same state.
+#[derive(Clone, Default)]
+struct History {
+    /// For each period, how many inputs were given, and then each with its number and its bits.
+    words: Vec<u32>,
+    /// Why there is none.
+    lost: Option<&'static str>,
+}
+
+impl History {
+    /// Adds a period.
+    fn add(&mut self, given: &[(usize, u32)]) {
+        if self.lost.is_some() {
+            return;
+        }
+        if self.words.len() + 2 * given.len() >= 2 * HISTORY {
+            *self = History {
+                words: Vec::new(),
+                lost: Some("it has run for so long that what it was given is no longer kept"),
+            };
+            return;
+        }
+        self.words.push(given.len() as u32);
+        self.words.extend(given.iter().flat_map(|(index, bits)| [*index as u32, *bits]));
+    }
+}
+
 /// A machine with a program in it, stepped period by period.
 #[pyclass(module = "takt._takt")]
 pub(crate) struct Sim {
+    tick: Option<NonZeroU64>,
+    history: History,
     emulator: Emulator,
     sources: Arc<Vec<(String, String)>>,
     max_cycles: u64,
@@ -45,6 +77,8 @@ impl Sim {
             Python::attach(|py| (PyString::intern(py, &port.name).unbind(), port.register, port.ty))
         };
         Ok(Sim {
+            tick,
+            history: History::default(),
             sources: Arc::clone(&program.sources),
             max_cycles: max_cycles.get(),
             given: vec![false; inputs.len()],
@@ -94,18 +128,20 @@ impl Sim {
     fn take(&mut self, inputs: &Bound<'_, PyDict>) -> PyResult<()> {
         let ports = &self.emulator.program().inputs;
         self.next.clear();
-        let mut given = Vec::new();
+        let mut given: Vec<(usize, u32)> = Vec::new();
         for (name, value) in inputs.iter() {
             let name = name.cast::<PyString>()?.to_str()?.to_owned();
             let Some(&index) = self.inputs.get(&name) else {
                 let near = suggest(&name, ports.iter().map(|port| port.name.as_str()));
                 return Err(PyValueError::new_err(format!("the program has no input `{name}`{near}")));
             };
-            self.next.push((ports[index].register, Self::bits(&ports[index], &value)?));
-            given.push(index);
+            let bits = Self::bits(&ports[index], &value)?;
+            self.next.push((ports[index].register, bits));
+            given.push((index, bits));
         }
         let missing = |(index, port): (usize, &'_ Port)| {
-            (!self.given[index] && !given.contains(&index)).then(|| format!("`{}`", port.name))
+            (!self.given[index] && given.iter().all(|(given, _)| *given != index))
+                .then(|| format!("`{}`", port.name))
         };
         if self.given.iter().any(|given| !given) {
             let missing: Vec<String> = ports.iter().enumerate().filter_map(missing).collect();
@@ -114,8 +150,36 @@ impl Sim {
                 return Err(PyValueError::new_err(text));
             }
         }
-        given.into_iter().for_each(|index| self.given[index] = true);
+        given.iter().for_each(|(index, _)| self.given[*index] = true);
+        self.history.add(&given);
         Ok(())
+    }
+
+    /// Runs a period with the inputs that it is to begin with; false if it failed.
+    fn run(&mut self, py: Python<'_>) -> PyResult<bool> {
+        for &(register, bits) in &self.next {
+            self.emulator.set_input_bits(register, bits).map_err(port_error)?;
+        }
+        let (emulator, max_cycles) = (&mut self.emulator, self.max_cycles);
+        let ran = py.detach(|| period(emulator, max_cycles, &mut Interrupt::new()));
+        let ran = ran.inspect_err(|_| {
+            self.history =
+                History { words: Vec::new(), lost: Some("a period of it was interrupted in the middle") };
+        });
+        match ran? {
+            Ok(report) => {
+                self.cycles = report.cycles;
+                self.missed = misses(&report);
+                self.periods += 1;
+                Ok(true)
+            }
+            Err(error) => {
+                let place = (0, self.periods);
+                self.failure =
+                    Some(failure::of_period(&error, place, self.emulator.program(), &self.sources));
+                Ok(false)
+            }
+        }
     }
 }
 
@@ -131,24 +195,66 @@ impl Sim {
             return Ok(None);
         }
         self.take(inputs)?;
-        for &(register, bits) in &self.next {
-            self.emulator.set_input_bits(register, bits).map_err(port_error)?;
+        if self.run(py)? { self.read(py).map(Some) } else { Ok(None) }
+    }
+
+    /// A machine in the same state, which goes on by itself.
+    fn __copy__(&self, py: Python<'_>) -> Sim {
+        let outputs = self.outputs.iter().map(|(name, register, ty)| (name.clone_ref(py), *register, *ty));
+        Sim {
+            tick: self.tick,
+            history: self.history.clone(),
+            emulator: self.emulator.clone(),
+            sources: Arc::clone(&self.sources),
+            max_cycles: self.max_cycles,
+            inputs: self.inputs.clone(),
+            given: self.given.clone(),
+            outputs: outputs.collect(),
+            next: self.next.clone(),
+            periods: self.periods,
+            cycles: self.cycles,
+            missed: self.missed,
+            failure: self.failure.clone(),
         }
-        let (emulator, max_cycles) = (&mut self.emulator, self.max_cycles);
-        match py.detach(|| period(emulator, max_cycles, &mut Interrupt::new()))? {
-            Ok(report) => {
-                self.cycles = report.cycles;
-                self.missed = misses(&report);
-                self.periods += 1;
+    }
+
+    /// For a pickle: cycles from tick to tick, cycles that a period may take, and what it was given since reset.
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<(Option<u64>, u64, Bound<'py, PyBytes>)> {
+        if let Some(why) = self.history.lost {
+            return Err(PyTypeError::new_err(format!(
+                "this Sim cannot be pickled: {why} (copy.copy copies it in this process, and reset begins anew)"
+            )));
+        }
+        let bytes: Vec<u8> = self.history.words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        Ok((self.tick.map(NonZeroU64::get), self.max_cycles, PyBytes::new(py, &bytes)))
+    }
+
+    /// Runs from reset with what another one was given, so that this one is in its state.
+    fn replay(&mut self, py: Python<'_>, history: &[u8]) -> PyResult<()> {
+        let damaged = || PyValueError::new_err("the pickled Sim is damaged");
+        if !history.len().is_multiple_of(4) {
+            return Err(damaged());
+        }
+        self.reset();
+        let mut words =
+            history.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
+        while let Some(count) = words.next() {
+            self.next.clear();
+            let mut given = Vec::new();
+            for _ in 0..count {
+                let (index, bits) = words.next().zip(words.next()).ok_or_else(damaged)?;
+                let index = index as usize;
+                let port = self.emulator.program().inputs.get(index).ok_or_else(damaged)?;
+                self.next.push((port.register, bits));
+                self.given[index] = true;
+                given.push((index, bits));
             }
-            Err(error) => {
-                let place = (0, self.periods);
-                self.failure =
-                    Some(failure::of_period(&error, place, self.emulator.program(), &self.sources));
-                return Ok(None);
+            self.history.add(&given);
+            if !self.run(py)? {
+                break;
             }
         }
-        self.read(py).map(Some)
+        Ok(())
     }
 
     /// What is on the output ports; `None` on one that was never written.
@@ -169,6 +275,7 @@ impl Sim {
     fn reset(&mut self) {
         self.emulator.reset();
         self.given.fill(false);
+        self.history = History::default();
         (self.periods, self.cycles, self.missed, self.failure) = (0, 0, 0, None);
     }
 

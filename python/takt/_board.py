@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from takt import _takt
 from takt._errors import BoardError
-from takt._ports import count_of, near, numbers, words_of
+from takt._ports import AnyPath, count_of, mapping_of, near, numbers, path_of, words_of
 
 if TYPE_CHECKING:
     from takt._program import Program
@@ -70,7 +69,7 @@ class Board:
     #: The program whose names are used. Only `load` makes sure that the board carries it.
     program: Program
 
-    def __init__(self, port: str | os.PathLike[str], program: Program, *, baud: int = 115_200) -> None:
+    def __init__(self, port: AnyPath, program: Program, *, baud: int = 115_200) -> None:
         """Opens a serial port, or the pseudo-terminal that `takt board sim` prints.
 
         Args:
@@ -85,7 +84,7 @@ class Board:
         rate = count_of("baud", baud) or 0
         if rate > _BAUD:
             raise ValueError(f"baud is {rate}: it is {_BAUD} at most")
-        self._core = _takt.Board(port, program._core, rate)
+        self._core = _takt.Board(path_of("port", port), program._core, rate)
 
     @property
     def status(self) -> BoardStatus:
@@ -123,7 +122,7 @@ class Board:
         Raises:
             BoardError: the program is not held, or does not come to its `wait`.
         """
-        self.set(inputs or {})
+        self.set(mapping_of("inputs", inputs))
         self._core.step()
         return self.read(*self.program.outputs)
 
@@ -145,7 +144,7 @@ class Board:
             ValueError: a name or value that does not fit; then nothing is set.
         """
         words: list[tuple[str, int]] = []
-        for name, value in values.items():
+        for name, value in mapping_of("values", values).items():
             port = self.program.inputs.get(name)
             if port is None:
                 raise ValueError(f"the program has no input `{name}`{near(name, list(self.program.inputs))}")

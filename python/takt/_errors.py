@@ -103,6 +103,9 @@ class ModelError(TaktError, ValueError):
         super().__init__(text)
         self.line = line
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (*self.args, self.line)
+
 
 class BoardError(TaktError, OSError):
     """A board does not answer, cannot do what is asked, or is no board."""

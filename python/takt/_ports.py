@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +18,10 @@ _DTYPES: dict[str, np.dtype[Any]] = {
     "int": np.dtype(np.int32),
     "bits": np.dtype(np.uint32),
 }
+
+
+#: A path, however it is written.
+AnyPath: TypeAlias = "str | bytes | os.PathLike[str] | os.PathLike[bytes]"
 
 
 @dataclass(frozen=True)
@@ -66,7 +72,29 @@ def first(wrong: NDArray[np.bool_]) -> str:
     return "" if not place else "[" + ", ".join(str(int(i)) for i in place) + "]"
 
 
+def mapping_of(what: str, values: Mapping[str, ArrayLike] | None) -> Mapping[str, ArrayLike]:
+    """Values by name; None is none."""
+    if values is None:
+        return {}
+    # What has names and values will do, as a table of pandas does.
+    if not (hasattr(values, "keys") and hasattr(values, "items")):
+        raise TypeError(f"{what} are values by the name of their port, as {{'x': 0.5}}, and not a {type(values).__name__}")
+    return values
+
+
+def path_of(what: str, value: AnyPath) -> Path:
+    """A path, however it is written."""
+    try:
+        return Path(os.fsdecode(value))
+    except TypeError:
+        raise TypeError(f"{what} is a path: a str, bytes or os.PathLike, not a {type(value).__name__}") from None
+
+
 def numbers(what: str, value: ArrayLike) -> NDArray[Any]:
+    if isinstance(value, np.ma.MaskedArray):
+        masked = np.ma.getmaskarray(value)
+        if masked.any():
+            raise ValueError(f"{what}{first(masked)} is masked: there is no value to run with; .filled(…) gives masked elements one")
     try:
         array = np.asarray(value)
     except ValueError as error:
@@ -109,3 +137,17 @@ def count_of(what: str, value: int | None, least: int = 1) -> int | None:
     if not least <= number < 1 << 62:
         raise ValueError(f"{what} is {number}: it is {least} at least, and less than 2**62")
     return number
+
+
+#: The longest time between ticks, cycles.
+LONGEST_TICK = _takt.longest_tick()
+
+
+def limits_of(tick: int | None, max_cycles: int, default: int) -> tuple[int | None, int]:
+    """Cycles from tick to tick, and those that a period may take."""
+    every, most = count_of("tick", tick), count_of("max_cycles", max_cycles) or default
+    if every is not None and every > LONGEST_TICK:
+        raise ValueError(f"tick is {every} cycles: it is {LONGEST_TICK} at most")
+    if every is not None and every > most:
+        raise ValueError(f"tick is {every} cycles, and max_cycles {most}: every period would end with a fault")
+    return every, most

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from takt import _takt
 from takt._errors import AssemblyWarning, Diagnostic, FaultError, diagnostics
-from takt._ports import Array, Port, count_of, near, numbers, words_of
+from takt._ports import AnyPath, Array, Port, count_of, limits_of, mapping_of, near, numbers, path_of, words_of
 from takt._results import Accuracy, Analysis, Bound, Enclosure, Largest, Model, Run, Section, Span
 from takt._sim import Sim
 
@@ -115,7 +115,7 @@ class Program:
             FaultError: the program came to a fault before.
             ValueError: there is no such period.
         """
-        given = self._by_port(inputs or {})
+        given = self._by_port(mapping_of("inputs", inputs))
         lead = self._lead({what: shape for what, shape, _ in given.values()})
         if len(lead) > 1:
             raise ValueError(f"an analysis is of one run, and the inputs have {lead[0]}")
@@ -147,7 +147,7 @@ class Program:
         Raises:
             FaultError: the program came to a fault.
         """
-        given = self._by_port(inputs)
+        given = self._by_port(mapping_of("inputs", inputs))
         self._all_given(given)
         lead = self._lead({what: shape for what, shape, _ in given.values()})
         if len(lead) > 1:
@@ -203,7 +203,7 @@ class Program:
                 dimensions behind these: (periods, 6). Numbers are rounded to binary32 once.
             periods: How many, if no input says so. Without both, the program runs to its `halt`, and outputs and cycles
                 have shape ().
-            tick: Cycles from tick to tick; without it, the tick comes when the program is ready.
+            tick: Cycles from tick to tick, 100,000,000 at most; without it, the tick comes when the program is ready.
             max_cycles: A period, or a run to `halt`, that takes more is ended by a fault.
 
         Returns:
@@ -212,8 +212,8 @@ class Program:
         Raises:
             ValueError: a name, shape or value that does not fit, with the name nearest to it.
         """
-        tick, max_cycles = count_of("tick", tick), count_of("max_cycles", max_cycles) or MAX_CYCLES
-        given = self._by_port(inputs or {})
+        tick, max_cycles = limits_of(tick, max_cycles, MAX_CYCLES)
+        given = self._by_port(mapping_of("inputs", inputs))
         self._all_given(given)
         lead = self._lead({what: shape for what, shape, _ in given.values()})
         if periods is not None:
@@ -258,10 +258,10 @@ class Program:
         """A machine with the program in it, to be stepped period by period.
 
         Args:
-            tick: Cycles from tick to tick; without it, the tick comes when the program is ready.
+            tick: Cycles from tick to tick, 100,000,000 at most; without it, the tick comes when the program is ready.
             max_cycles: A period that takes more is ended by a fault.
         """
-        return Sim(self, self._core.sim(count_of("tick", tick), count_of("max_cycles", max_cycles) or MAX_CYCLES))
+        return Sim(self, self._core.sim(*limits_of(tick, max_cycles, MAX_CYCLES)))
 
     # ---- Names and shapes.
 
@@ -326,8 +326,8 @@ def assemble(
     machine: str = DEFAULT_MACHINE,
     *,
     name: str = "program.s",
-    folder: str | os.PathLike[str] = ".",
-    include: Sequence[str | os.PathLike[str]] = (),
+    folder: AnyPath = ".",
+    include: Sequence[AnyPath] = (),
     schedule: str = "source",
     contract: str = "source",
     effort: int | None = None,
@@ -354,16 +354,16 @@ def assemble(
     if "\n" not in text and text.endswith((".s", ".takt")) and Path(text).is_file():
         raise ValueError(f"{text!r} is a file's name, not a source: takt.load({text!r}) reads it")
     core = _takt.assemble(
-        text.encode(), name, folder, list(include), machine, schedule, contract, count_of("effort", effort, 0), list(warnings)
+        text.encode(), name, path_of("folder", folder), _folders(include), machine, schedule, contract, count_of("effort", effort, 0), list(warnings)
     )
     return _warned(Program(core))
 
 
 def load(
-    path: str | os.PathLike[str],
+    path: AnyPath,
     machine: str | None = None,
     *,
-    include: Sequence[str | os.PathLike[str]] = (),
+    include: Sequence[AnyPath] = (),
     schedule: str = "source",
     contract: str = "source",
     effort: int | None = None,
@@ -380,15 +380,22 @@ def load(
         AssemblyError: the source has errors.
         ValueError: the image is damaged, or for another machine.
     """
-    path = Path(path)
+    path = path_of("path", path)
     core, text = _takt.load(path)
     if core is None:
         core = _takt.assemble(
-            text, path.name, path.parent, list(include), machine or DEFAULT_MACHINE, schedule, contract, count_of("effort", effort, 0), list(warnings)
+            text, path.name, path.parent, _folders(include), machine or DEFAULT_MACHINE, schedule, contract, count_of("effort", effort, 0), list(warnings)
         )
     elif machine is not None and machine != core.machine:
         raise ValueError(f"{path} is an image for {core.machine}, not for {machine}")
     return _warned(Program(core))
+
+
+def _folders(include: Sequence[AnyPath]) -> list[str | os.PathLike[str]]:
+    # A str is a sequence of letters, and bytes one of numbers.
+    if isinstance(include, (str, bytes, os.PathLike)):
+        raise TypeError(f"include is a list of folders: [{include!r}]")
+    return [path_of("include", folder) for folder in include]
 
 
 def _warned(program: Program) -> Program:

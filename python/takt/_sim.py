@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from takt import _takt
 from takt._errors import FaultError
-from takt._ports import near, numbers
+from takt._ports import mapping_of, near, numbers
 from takt._results import flags_of
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ class Sim:
             ValueError: a name, shape or value that does not fit.
         """
         program = self.program
-        given: dict[str, Any] = dict(inputs or {})
+        given: dict[str, Any] = dict(mapping_of("inputs", inputs))
         if program.input_arrays:
             given = self._elements(given)
         values = self._core.step(given)
@@ -121,5 +122,24 @@ class Sim:
         """The exception flags raised since reset, among `invalid`, `divide-by-zero`, `overflow`."""
         return flags_of(self._core.flags)
 
+    def __copy__(self) -> Sim:
+        """A machine in the same state, which goes on by itself."""
+        return Sim(self.program, copy.copy(self._core))
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Sim:
+        return copy.copy(self)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For `pickle`. The machine's state is made again by running what it was given since reset; a machine that has run for very
+        long, or was interrupted in the middle of a period, is none that can be pickled (TypeError)."""
+        return _restored, (self.program, *self._core.state())
+
     def __repr__(self) -> str:
         return f"<takt.Sim on {self.program.machine}: {self.periods} periods, the last {self.cycles} cycles>"
+
+
+def _restored(program: Program, tick: int | None, max_cycles: int, history: bytes) -> Sim:
+    """A machine that was pickled."""
+    core = program._core.sim(tick, max_cycles)
+    core.replay(history)
+    return Sim(program, core)

@@ -10,11 +10,10 @@ docs/model.md says how descriptions are read and what the functions compute.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from pathlib import Path
 
 from takt import _takt
+from takt._ports import AnyPath, path_of
 from takt._program import DEFAULT_MACHINE, Program, modelled
 
 #: Angles this close to a multiple of a quarter turn are rounded to it, rad.
@@ -27,7 +26,7 @@ def functions() -> dict[str, str]:
 
 
 def program(
-    robot: str | os.PathLike[str],
+    robot: AnyPath,
     function: str,
     machine: str = DEFAULT_MACHINE,
     *,
@@ -66,7 +65,7 @@ def program(
     if isinstance(robot, str) and robot.lstrip("\ufeff \t\r\n").startswith("<"):
         text, name, table = robot, "robot", False
     else:
-        path = Path(robot)
+        path = path_of("robot", robot)
         try:
             text = path.read_text("utf-8")
         except UnicodeDecodeError:

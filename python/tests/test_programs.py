@@ -1,5 +1,6 @@
 """Programs: assembled, run over arrays, in batches, stepped, bounded, and what is said of mistakes."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -337,3 +338,65 @@ def test_the_accuracy_is_that_of_binary64():
     assert abs(found.absolute.error) == pytest.approx(error.max(), rel=1e-6)
     assert sum(share for _, share in found.operations) == pytest.approx(found.absolute.error, rel=1e-6)
     assert {place.split(":")[0] for place, _ in found.operations} == {"law.s"}
+
+
+def test_masked_elements_are_no_values():
+    program = takt.assemble(GAIN)
+    x = np.ma.masked_array([1.0, 2.0, 3.0], mask=[False, True, False])
+    for call in [lambda: program.run({"x": x}), lambda: program.accuracy({"x": x}), lambda: program.analyse({"x": x})]:
+        with pytest.raises(ValueError, match=r"`x`\[1\] is masked: there is no value to run with"):
+            call()
+    with pytest.raises(ValueError, match="`x` is masked"):
+        program.run({"x": np.ma.masked})
+    none_masked = program.run({"x": np.ma.masked_array([1.0, 2.0])})
+    assert none_masked.outputs["y"].tolist() == [0.5, 1.0]
+    assert program.run({"x": x.filled(4.0)}).outputs["y"].tolist() == [0.5, 2.0, 1.5]
+
+
+def test_a_tick_that_no_period_can_wait_for():
+    program = takt.assemble(GAIN)
+    for run in [lambda tick, **most: program.run({"x": 1.0}, periods=2, tick=tick, **most), program.sim]:
+        with pytest.raises(ValueError, match="tick is 1000000000 cycles: it is 100000000 at most"):
+            run(tick=10**9)
+        with pytest.raises(ValueError, match="tick is 600 cycles, and max_cycles 500: every period would end with a fault"):
+            run(tick=600, max_cycles=500)
+        run(tick=100_000_000)
+
+
+def test_inputs_that_have_no_names():
+    program = takt.assemble(GAIN)
+    for inputs in [[1.0, 2.0], (1.0,), np.ones(3), 0.5, "x"]:
+        for call in [program.run, program.analyse, program.accuracy, program.sim().step]:
+            with pytest.raises(TypeError, match=rf"inputs are values by the name of their port, as .*, and not a {type(inputs).__name__}"):
+                call(inputs)
+
+    class Table:
+        """As a table of pandas: columns by name."""
+
+        def keys(self):
+            return ["x"]
+
+        def items(self):
+            return [("x", np.ones(3))]
+
+        def __getitem__(self, name):
+            return np.ones(3)
+
+        def __bool__(self):
+            raise ValueError("ambiguous")
+
+    assert program.run(Table()).outputs["y"].tolist() == [0.5] * 3
+
+
+def test_paths_of_bytes(tmp_path):
+    (tmp_path / "gain.s").write_text('.include "part.s"\n')
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "part.s").write_text(GAIN)
+    path, parts = os.fsencode(tmp_path / "gain.s"), os.fsencode(tmp_path / "parts")
+    assert takt.load(path, include=[parts]).run({"x": 1.0}, periods=1).outputs["y"] == 0.5
+    assert takt.assemble('.include "part.s"\n', folder=parts).bundles == takt.assemble(GAIN).bundles
+    with pytest.raises(TypeError, match="path is a path: a str, bytes or os.PathLike, not a int"):
+        takt.load(3)
+    for include in [str(tmp_path), parts, tmp_path]:
+        with pytest.raises(TypeError, match="include is a list of folders"):
+            takt.load(path, include=include)

@@ -5,7 +5,8 @@ use super::{LoadedSystem, load, told};
 use crate::account::Account;
 use crate::files::{self, Out};
 use crate::output;
-use crate::ports::{self, Inputs};
+use crate::ports;
+use crate::progress::{self, Late};
 use crate::run::PERIOD_LIMIT;
 use crate::select::SourceArguments;
 use crate::trace::TraceArguments;
@@ -94,13 +95,10 @@ pub(super) fn drive(
         let flag = "`--max-cycles` sets the limit";
         anyhow::anyhow!("the system has run for {} cycles without ending ({flag})", system.now())
     };
-    let mut inputs = Inputs::open(arguments.inputs, &columns)?;
-    let mut outputs = arguments.outputs.map(Out::create).transpose()?;
+    let titles = || host.outputs.iter().map(|output| output.name.clone());
+    let (mut inputs, mut outputs) =
+        ports::open_both(arguments.inputs, &columns, arguments.outputs, titles())?;
     let live = arguments.inputs.is_some_and(files::is_live);
-    if let Some(outputs) = &mut outputs {
-        ports::write_row(outputs, host.outputs.iter().map(|output| output.name.clone()))?;
-        outputs.flush()?;
-    }
     let start = match &mut tracer {
         Some(tracer) => tracer.run_to_start(system, limit)?,
         None => system.run_to_start(limit)?,
@@ -124,8 +122,11 @@ pub(super) fn drive(
     };
     // The host writes so early that the periods which begin at the tick read it.
     let mut next: Cycle = start - description.lead();
-    while arguments.periods.is_none_or(|most| *ticks < most) {
-        let Some(row) = inputs.next()? else { break };
+    let all = arguments.periods.or_else(|| progress::rows(arguments.inputs)).filter(|_| !live);
+    let shows_rows = arguments.outputs.is_some_and(files::is_dash);
+    let mut bar = Late::new(all.filter(|_| !shows_rows), "base ticks");
+    let mut tick = |ticks: &mut u64| -> Result<bool> {
+        let Some(row) = inputs.next()? else { return Ok(false) };
         run(system, next)?;
         *refused += host.write(system, row)?;
         next += description.tick;
@@ -134,6 +135,7 @@ pub(super) fn drive(
         }
         run(system, next)?;
         *ticks += 1;
+        bar.add(1);
         *last = host.read(system)?;
         if let Some(outputs) = &mut outputs {
             let values = host.outputs.iter().zip(&*last);
@@ -144,8 +146,14 @@ pub(super) fn drive(
                 outputs.flush()?;
             }
         }
+        Ok(true)
+    };
+    let mut result = Ok(true);
+    while matches!(result, Ok(true)) && arguments.periods.is_none_or(|most| *ticks < most) {
+        result = tick(ticks);
     }
-    outputs.map_or(Ok(()), Out::finish)
+    drop(bar);
+    ports::finish(outputs, *ticks, result.map(|_| ()))
 }
 
 impl Ran<'_> {

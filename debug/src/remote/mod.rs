@@ -60,6 +60,8 @@ pub struct RemoteSession {
     shadow: Shadow,
     /// Whether `seen` is what the machine has.
     settled: bool,
+    /// What was seen of watched values.
+    watched: Option<Search>,
 }
 
 impl RemoteSession {
@@ -79,7 +81,17 @@ impl RemoteSession {
         let seen = Standing { at: At::Reset, registers, memory, flags: Flags::NONE };
         let shadow = Shadow::placed(&base, &seen);
         let (extent, state) = (Extent::of(program), remote.state()?);
-        Ok(RemoteSession { remote, control, extent, base, state, seen, shadow, settled: false })
+        Ok(RemoteSession {
+            remote,
+            control,
+            extent,
+            base,
+            state,
+            seen,
+            shadow,
+            settled: false,
+            watched: None,
+        })
     }
 
     /// What the machine did when it was last asked.
@@ -178,6 +190,7 @@ impl RemoteSession {
     /// If it does not answer, or does not wait.
     pub fn restart(&mut self) -> Result<RemoteWhy, RemoteError> {
         self.settled = false;
+        self.watched = None;
         let restarted = self.remote.restart();
         self.state = self.remote.state()?;
         restarted?;
@@ -228,6 +241,11 @@ impl RemoteSession {
                 why = RemoteWhy::Of(view.stopped(found));
                 break;
             }
+        }
+        if let Some(Goal { search, .. }) = goal
+            && search.is_of(view)
+        {
+            self.watched = Some(search);
         }
         let extent = self.extent.clone();
         self.read(&extent.written, &extent.written_words)?;
@@ -369,7 +387,12 @@ impl RemoteSession {
         let reads = view.reads(live.as_ref());
         let search = match live {
             Some(live) => Search::value(live, view),
-            None => Search::stops(view)?,
+            None => {
+                let mut search = Search::stops(view)?;
+                // What was seen last cannot be looked for: the machine does not go back.
+                self.watched.iter().for_each(|watched| search.complete(watched));
+                search
+            }
         };
         let written = |register: &Register| self.extent.registers.binary_search(register).is_ok();
         Some(Goal {

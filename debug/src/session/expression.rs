@@ -64,6 +64,8 @@ pub(crate) struct Reads {
     pub(crate) clock: bool,
     /// What can change in every cycle in which something happens.
     pub(crate) every: bool,
+    /// Addresses between which the next bundle must be for one of its values to be there ([`Held::range`]).
+    pub(crate) ranges: Vec<(BundleAddress, BundleAddress)>,
 }
 
 /// An expression with its names resolved.
@@ -195,6 +197,7 @@ impl Live {
                 }
                 Operand::Held(value, _) => {
                     reads.registers.insert(value.register);
+                    reads.ranges.extend(value.range());
                 }
                 Operand::Memory { offset, index, .. } => {
                     reads.memory = true;
@@ -207,6 +210,23 @@ impl Live {
                 Operand::Constant(_) | Operand::Period => {}
             }
         }
+    }
+
+    /// Whether every value in it is there: one that shares its register, or is one of several of its name, is not there
+    /// everywhere.
+    pub(crate) fn is_there(&self, machine: &Machine<'_>, program: &Program) -> bool {
+        self.operands.iter().all(|(_, operand, _)| match operand {
+            Operand::Name(name, _) => match name.at(machine) {
+                Ok(At::Value(value)) => value.is_there(machine, program).is_ok(),
+                Ok(At::Constant(_)) => true,
+                Err(_) => false,
+            },
+            Operand::Held(value, _) => value.is_there(machine, program).is_ok(),
+            Operand::Memory { offset, index, .. } => {
+                offset.is_there(machine, program) && index.is_there(machine, program)
+            }
+            _ => true,
+        })
     }
 
     /// The first name in it that is not known of a machine which runs elsewhere.

@@ -7,7 +7,7 @@ use super::stops::{Stop, Test, Where};
 use std::collections::BTreeSet;
 use takt_emu::Emulator;
 use takt_isa::timing::Cycle;
-use takt_isa::{BundleAddress, Effect, Program};
+use takt_isa::{BundleAddress, Effect, Flow, Program};
 
 /// Positions that matter. Those where a period ends, inputs are set or something was set by hand always do.
 #[derive(Clone, Debug, Default)]
@@ -36,13 +36,16 @@ impl Interest {
     /// Where the value of an expression can change.
     pub(super) fn value(live: &Live, program: &Program) -> Interest {
         let mut interest = Interest::default();
-        interest.add_value(live, program);
+        let mut reads = Reads::default();
+        live.reads(&mut reads);
+        interest.add_reads(&reads, program);
         interest
     }
 
     /// Where one of these can have a reason to stop.
     pub(super) fn stops(stops: &[(u32, Stop)], program: &Program) -> Interest {
         let mut interest = Interest::default();
+        let mut reads = Reads::default();
         for (_, stop) in stops {
             match stop {
                 Stop::Break { at: Where::Bundle(address), .. } => {
@@ -54,19 +57,18 @@ impl Interest {
                 }
                 Stop::Break { at: Where::Period(_), .. } => {}
                 Stop::Watch { what, test, .. } => {
-                    what.each().iter().for_each(|what| interest.add_value(what, program));
+                    what.each().iter().for_each(|what| what.reads(&mut reads));
                     if let Test::Equals(other) | Test::Above(other) = test {
-                        interest.add_value(other, program);
+                        other.reads(&mut reads);
                     }
                 }
             }
         }
+        interest.add_reads(&reads, program);
         interest
     }
 
-    fn add_value(&mut self, live: &Live, program: &Program) {
-        let mut reads = Reads::default();
-        live.reads(&mut reads);
+    fn add_reads(&mut self, reads: &Reads, program: &Program) {
         self.clock |= reads.clock;
         self.every |= reads.every;
         for address in program.addresses() {
@@ -76,7 +78,13 @@ impl Interest {
                 instruction.writes(slot).is_some_and(|register| reads.registers.contains(&register))
                     || reads.memory && instruction.op.row().effect == Effect::Store
             });
-            if writes {
+            // Where a value is there again without being written, it may be another than the one seen last.
+            let flow = Flow::of(&instructions);
+            let enters = reads.ranges.iter().any(|(after, through)| {
+                let is_in = |address| *after < address && address <= *through;
+                !is_in(address) && (flow == Flow::Return || flow.target().is_some_and(is_in))
+            });
+            if writes || enters {
                 self.bundles.insert(address);
             }
         }

@@ -59,6 +59,14 @@ impl Held {
         self.rivals.is_empty()
     }
 
+    /// The addresses between which the next bundle must be for it to be there: above the first, up to the second. `None`:
+    /// it is there wherever the program is.
+    pub(crate) fn range(&self) -> Option<(BundleAddress, BundleAddress)> {
+        let (first, _) = self.bundles.filter(|_| self.orders.is_some() || !self.is_alone())?;
+        let rivals = self.rivals.iter().map(|(at, _)| *at).filter(|at| first < *at);
+        Some((first, rivals.min().unwrap_or(BundleAddress::new(u32::MAX))))
+    }
+
     /// Whether its register holds it, or is about to.
     ///
     /// # Errors

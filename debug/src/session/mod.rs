@@ -13,6 +13,7 @@
 
 mod expression;
 mod interest;
+mod known;
 mod meaning;
 mod number;
 mod run;
@@ -21,9 +22,11 @@ mod stops;
 
 pub(crate) use expression::Reads;
 pub use expression::{Live, Place};
+pub(crate) use known::Known;
 pub use meaning::Life;
 pub use number::{Shown, UlpDistance, hex_float, ulp_distance};
 pub(crate) use search::Search;
+use stops::Watcher;
 pub use stops::{Stop, Test, Where};
 
 use expression::Machine;
@@ -189,6 +192,8 @@ pub struct Session {
     /// By cycle, ascending.
     edits: Vec<Edit>,
     stops: Vec<(u32, Stop)>,
+    /// What was watched at positions of the run.
+    known: Known<Watcher>,
     next_id: u32,
     /// The line that a breakpoint stopped at, and the cycle.
     line: Option<(Cycle, Location)>,
@@ -221,6 +226,7 @@ impl Session {
             interval: INTERVAL,
             edits: Vec::new(),
             stops: Vec::new(),
+            known: Known::default(),
             next_id: 1,
             line: None,
             afar: false,
@@ -412,6 +418,7 @@ impl Session {
         self.core = Core { emulator, periods, boundary, report: None, edits: 0 };
         self.checkpoints.clear();
         self.edits.clear();
+        self.known.clear();
         self.checkpoints.push(self.core.clone());
     }
 
@@ -464,6 +471,7 @@ impl Session {
         let edit = Edit { cycle: self.cycle(), place, bits };
         self.edits.truncate(self.core.edits);
         self.checkpoints.retain(|checkpoint| checkpoint.emulator.now() <= edit.cycle);
+        self.known.forget_from(edit.cycle);
         self.edits.push(edit);
         self.make_edits();
         Ok(())

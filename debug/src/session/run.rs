@@ -2,7 +2,7 @@
 
 use super::expression::Machine;
 use super::interest::Interest;
-use super::stops::{Stop, Watcher, Where};
+use super::stops::{Stop, Where};
 use super::{CHECKPOINTS, Core, Cycle, End, Live, SLICE, Session, Unit, WINDOW, Why};
 use std::sync::atomic::Ordering;
 use takt_emu::{Emulator, PeriodError, Upcoming};
@@ -148,7 +148,7 @@ impl Session {
     }
 
     /// Visits the positions after this one that are of interest, up to `until`, until `visit` finds one.
-    fn scan(
+    pub(super) fn scan(
         &mut self,
         until: Cycle,
         interest: &Interest,
@@ -199,7 +199,7 @@ impl Session {
     fn backward<V: FnMut(&Session, Option<BundleAddress>) -> Option<Why>>(
         &mut self,
         interest: &Interest,
-        begin: impl Fn(&Session) -> V,
+        begin: impl Fn(&mut Session) -> Result<V, End>,
     ) -> Why {
         let from = self.cycle();
         // Positions from here on are seen, or not wanted.
@@ -214,15 +214,20 @@ impl Session {
             let start = near.max(checkpoint);
             window = window.saturating_mul(8);
             let mut found = self.go_to(start);
-            let (mut visit, mut last) = (begin(self), None);
-            let mut all = |session: &Session, issuing| {
-                if let Some(why) = visit(session, issuing) {
-                    last = Some((session.cycle(), why));
-                }
-                None
-            };
+            let mut last = None;
             if found == Why::Done {
-                found = self.scan(end - 1, interest, &mut all).unwrap_or_else(|end| end);
+                found = match begin(self) {
+                    Ok(mut visit) => {
+                        let mut all = |session: &Session, issuing| {
+                            if let Some(why) = visit(session, issuing) {
+                                last = Some((session.cycle(), why));
+                            }
+                            None
+                        };
+                        self.scan(end - 1, interest, &mut all).unwrap_or_else(|end| end)
+                    }
+                    Err(end) => end,
+                };
             }
             if found == Why::Interrupted {
                 self.go_to(from);
@@ -282,7 +287,7 @@ impl Session {
         let depth = self.core.emulator.stack().len();
         let interest = Interest::everything();
         self.backward(&interest, |_| {
-            move |session: &Session, issuing| session.ends_step(unit, depth, issuing)
+            Ok(move |session: &Session, issuing| session.ends_step(unit, depth, issuing))
         })
     }
 
@@ -305,9 +310,15 @@ impl Session {
 
     /// Runs on to the next breakpoint or watchpoint.
     pub fn resume(&mut self) -> Why {
-        let mut watcher = Watcher::new(self);
+        let mut watcher = match self.watcher() {
+            Ok(watcher) => watcher,
+            Err(end) => return end,
+        };
         let interest = Interest::stops(&self.stops, self.program());
-        let why = self.forward(&interest, move |session, issuing| watcher.visit(session, issuing));
+        let why = self.forward(&interest, |session, issuing| watcher.visit(session, issuing));
+        if matches!(why, Why::Stop { .. } | Why::Limit(_)) {
+            self.keep_watcher(watcher);
+        }
         self.stopped(why)
     }
 
@@ -327,8 +338,8 @@ impl Session {
     pub fn resume_back(&mut self) -> Why {
         let interest = Interest::stops(&self.stops, self.program());
         let why = self.backward(&interest, |session| {
-            let mut watcher = Watcher::new(session);
-            move |session: &Session, issuing| watcher.visit(session, issuing)
+            let mut watcher = session.watcher()?;
+            Ok(move |session: &Session, issuing| watcher.visit(session, issuing))
         });
         self.stopped(why)
     }
@@ -351,6 +362,11 @@ impl Session {
     pub(super) fn holds_at(&self, line: Location, live: &Live) -> bool {
         let machine = Machine { line: Some(line), ..self.machine() };
         live.evaluate(&machine, self.program()).is_ok_and(|value| !value.is_zero())
+    }
+
+    /// Whether every value in an expression is there.
+    pub(super) fn is_there(&self, live: &Live) -> bool {
+        live.is_there(&self.machine(), self.program())
     }
 
     /// Whether an expression has a value other than zero.

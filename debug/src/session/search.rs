@@ -15,7 +15,12 @@ use takt_system::InputEvent;
 pub(crate) struct Search {
     interest: Interest,
     goal: Goal,
+    /// Positions beyond the last range that matter for what happened in it; `None`: no range was asked for yet.
+    ahead: Option<BTreeSet<Cycle>>,
 }
+
+/// What happens in a cycle matters at most so many positions later; results in flight are told of when they arrive.
+const AHEAD: Cycle = if INPUT_DELAY + 1 > 3 { INPUT_DELAY + 1 } else { 3 };
 
 #[derive(Clone)]
 enum Goal {
@@ -28,33 +33,60 @@ enum Goal {
 }
 
 impl Search {
-    /// For the session's stops; `None` if it has none.
+    /// For the session's stops; `None` if it has none. It knows of watched values what there is to see where the session looks
+    /// now ([`Search::is_complete`]).
     pub(crate) fn stops(session: &Session) -> Option<Search> {
         let goal = Goal::Stops(Watcher::new(session));
         let interest = Interest::stops(&session.stops, session.program());
-        (!session.stops.is_empty()).then_some(Search { interest, goal })
+        (!session.stops.is_empty()).then_some(Search { interest, goal, ahead: None })
+    }
+
+    /// Whether it knows of each watched value what it was where it was there last.
+    pub(crate) fn is_complete(&self) -> bool {
+        self.watcher().is_none_or(Watcher::is_complete)
+    }
+
+    /// Whether it is one for the session's stops as they are now.
+    pub(crate) fn is_of(&self, session: &Session) -> bool {
+        self.watcher().is_some_and(|watcher| watcher.is_of(session))
+    }
+
+    /// Takes from a search that was made for an earlier position, or went on from one, what this one does not know.
+    pub(crate) fn complete(&mut self, earlier: &Search) {
+        if let (Goal::Stops(watcher), Some(earlier)) = (&mut self.goal, earlier.watcher()) {
+            watcher.complete(earlier);
+        }
+    }
+
+    fn watcher(&self) -> Option<&Watcher> {
+        match &self.goal {
+            Goal::Stops(watcher) => Some(watcher),
+            Goal::Holds(_) | Goal::Step { .. } => None,
+        }
     }
 
     /// For an expression that holds.
     pub(crate) fn value(live: Live, session: &Session) -> Search {
-        Search { interest: Interest::value(&live, session.program()), goal: Goal::Holds(Box::new(live)) }
+        let interest = Interest::value(&live, session.program());
+        Search { interest, goal: Goal::Holds(Box::new(live)), ahead: None }
     }
 
     /// For the end of a step from where the session looks now: by a bundle, a line, a call, or out of a subroutine.
     pub(crate) fn step(unit: Unit, session: &Session) -> Search {
         let depth = session.core.emulator.stack().len();
-        Search { interest: Interest::default(), goal: Goal::Step { unit, depth } }
+        Search { interest: Interest::default(), goal: Goal::Step { unit, depth }, ahead: None }
     }
 
-    /// The positions from `begin` to `end` that matter, given what the machine did meanwhile.
+    /// The positions from `begin` to `end` that matter, given what the machine did meanwhile; ranges follow one another. What
+    /// it did before the first of them is not known, and the first few positions of it matter.
     pub(crate) fn positions(
-        &self,
+        &mut self,
         events: &[&Event],
         inputs: &[&InputEvent],
         begin: Cycle,
         end: Cycle,
     ) -> BTreeSet<Cycle> {
-        let mut positions = BTreeSet::new();
+        let mut positions = self.ahead.take().unwrap_or_else(|| (begin..=begin + AHEAD).collect());
         if self.interest.is_each() {
             positions.extend(begin..=end);
         }
@@ -82,7 +114,8 @@ impl Search {
         let seen = inputs.iter().flat_map(|input| input.cycle..=input.cycle + INPUT_DELAY + 1);
         positions.extend(seen);
         positions.extend(self.interest.cycles(begin, end));
-        positions.into_iter().filter(|position| (begin..=end).contains(position)).collect()
+        self.ahead = Some(positions.split_off(&(end + 1)));
+        positions.split_off(&begin)
     }
 
     /// Whether it is found where the session looks now, and `issuing` is about to issue.

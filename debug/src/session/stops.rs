@@ -2,6 +2,7 @@
 
 use super::expression::{self, Live, Reads};
 use super::{Session, Why};
+use std::sync::Arc;
 use takt_asm::expr::Value;
 use takt_isa::program::{Location, Space};
 use takt_isa::timing::Cycle;
@@ -155,37 +156,69 @@ fn line_bundles(file: &str, line: u64, program: &Program) -> Result<Where, Strin
 }
 
 /// Sees from position to position whether there is a reason to stop.
+///
+/// A value that is not there everywhere, because it shares its register or is one of several of its name, is compared with
+/// what it was where it was there last. That may be long before the position at which a search begins; a watcher that does
+/// not know yet is not complete, and [`Session::watcher`] completes it.
 #[derive(Clone)]
 pub(super) struct Watcher {
-    /// For each stop, what was there before: of a watched value in each of the ways in which its names can be read.
-    before: Vec<Vec<(Live, Seen)>>,
+    /// For each stop, its number and what it watches, in each of the ways in which its names can be read.
+    watched: Vec<(u32, Vec<Watched>)>,
+}
+
+/// A watched value and what it was where it was there last; `None`: that is not known, or it was not there yet.
+#[derive(Clone)]
+struct Watched {
+    live: Arc<Live>,
+    last: Option<Seen>,
 }
 
 /// A watched value and whether it was as waited for.
-#[derive(Clone, Default)]
+#[derive(Clone, Copy, Default)]
 struct Seen {
     value: Option<Value>,
     is: bool,
 }
 
 impl Watcher {
+    /// One that knows what there is to see where the session looks now.
     pub(super) fn new(session: &Session) -> Watcher {
-        let before = |stop: &Stop| match stop {
+        let each = |stop: &Stop| match stop {
             Stop::Break { .. } => Vec::new(),
-            Stop::Watch { what, test, .. } => {
-                let seen = |live: Live| {
-                    let seen = see(session, &live, test);
-                    (live, seen)
-                };
-                what.each().into_iter().map(seen).collect()
+            Stop::Watch { what, .. } => {
+                let each = what.each().into_iter();
+                each.map(|live| Watched { live: Arc::new(live), last: None }).collect()
             }
         };
-        Watcher { before: session.stops.iter().map(|(_, stop)| before(stop)).collect() }
+        let watched = session.stops.iter().map(|(id, stop)| (*id, each(stop))).collect();
+        let mut watcher = Watcher { watched };
+        watcher.visit(session, None);
+        watcher
+    }
+
+    /// Whether it knows of each value what it was last.
+    pub(super) fn is_complete(&self) -> bool {
+        self.watched.iter().flat_map(|(_, each)| each).all(|watched| watched.last.is_some())
+    }
+
+    /// Whether it is one for the session's stops as they are now.
+    pub(super) fn is_of(&self, session: &Session) -> bool {
+        self.watched.iter().map(|(id, _)| id).eq(session.stops.iter().map(|(id, _)| id))
+    }
+
+    /// Takes from a watcher of an earlier position what this one does not know.
+    pub(super) fn complete(&mut self, earlier: &Watcher) {
+        for (id, each) in &mut self.watched {
+            let Some((_, known)) = earlier.watched.iter().find(|(known, _)| known == id) else { continue };
+            for (watched, known) in each.iter_mut().zip(known) {
+                watched.last = watched.last.or(known.last);
+            }
+        }
     }
 
     pub(super) fn visit(&mut self, session: &Session, issuing: Option<BundleAddress>) -> Option<Why> {
         let mut why = None;
-        for ((id, stop), before) in session.stops.iter().zip(&mut self.before) {
+        for ((id, stop), (_, each)) in session.stops.iter().zip(&mut self.watched) {
             match stop {
                 Stop::Break { at, condition, text } => {
                     let here = match at {
@@ -205,23 +238,19 @@ impl Watcher {
                     }
                 }
                 Stop::Watch { test, text, .. } => {
-                    for (live, before) in before {
-                        let now = see(session, live, test);
-                        let label = live.held();
-                        // That its register has gone to another value is no change of this one.
-                        if label.is_some() && now.value.is_none() {
-                            continue;
-                        }
+                    for Watched { live, last } in each {
+                        // That it is not there is no change.
+                        let Some(now) = see(session, live, test) else { continue };
+                        let before = last.replace(now).unwrap_or_default();
                         let hit = match test {
                             Test::Changed => !same(before.value, now.value),
                             _ => now.is && !before.is,
                         };
                         if hit && why.is_none() {
                             let change = Some((shown(before.value), shown(now.value)));
-                            let label = label.map_or(String::new(), |label| format!(" ({label})"));
+                            let label = live.held().map_or(String::new(), |label| format!(" ({label})"));
                             why = Some(Why::Stop { id: *id, text: format!("{text}{label}"), change });
                         }
-                        *before = now;
                     }
                 }
             }
@@ -250,7 +279,15 @@ fn shown(value: Option<Value>) -> String {
     }
 }
 
-fn see(session: &Session, what: &Live, test: &Test) -> Seen {
+/// What there is to see of a value; `None` if it, or what it is compared with, is not there.
+fn see(session: &Session, what: &Live, test: &Test) -> Option<Seen> {
+    let compared = match test {
+        Test::Equals(other) | Test::Above(other) => Some(&**other),
+        Test::Changed | Test::Nan | Test::Subnormal => None,
+    };
+    if !session.is_there(what) || !compared.is_none_or(|other| session.is_there(other)) {
+        return None;
+    }
     let value = session.evaluate(what).ok();
     let real = value.map(Value::real);
     let other = |live: &Live| session.evaluate(live).ok().map(Value::real);
@@ -261,5 +298,5 @@ fn see(session: &Session, what: &Live, test: &Test) -> Seen {
         Test::Nan => real.is_some_and(f64::is_nan),
         Test::Subnormal => real.is_some_and(|value| (value as f32).is_subnormal()),
     };
-    Seen { value, is }
+    Some(Seen { value, is })
 }

@@ -327,6 +327,35 @@ impl SystemConsole {
         Ok(self.place())
     }
 
+    /// Carries a command out whose arguments are about the selected core, or name another one's values as `core.name`. What it
+    /// says is then preceded by the core's name, and the selected one stays selected unless the session moves.
+    fn of_a_core(
+        &mut self,
+        arguments: &str,
+        run: impl Fn(&mut SystemConsole, &str) -> Result<String, String>,
+    ) -> Result<String, String> {
+        let names = self.system().description().cores.iter().map(|core| core.name.as_str());
+        let (cores, own) = core_names(arguments, &names.collect::<Vec<_>>());
+        let error = match run(self, arguments) {
+            // A name of the selected core's own program comes first.
+            Err(error) if !cores.is_empty() => error,
+            result => return result,
+        };
+        let [core] = cores[..] else {
+            return Err(format!(
+                "{error} (one command is about one core: each core's names in one of its own)"
+            ));
+        };
+        let (selected, cycle) = (self.selected, self.session.cycle());
+        self.selected = core;
+        let result = run(self, &own);
+        if result.is_err() || self.session.cycle() == cycle {
+            self.selected = selected;
+        }
+        let name = &self.system().description().cores[core].name;
+        result.map(|said| format!("core {name}: {said}")).map_err(|error| format!("core {name}: {error}"))
+    }
+
     fn step(&mut self, arguments: &str, back: bool) -> Result<String, String> {
         let (unit, count) = steps(arguments)?;
         if unit == Unit::Cycle {
@@ -421,6 +450,33 @@ impl SystemConsole {
     }
 }
 
+/// The cores whose names are before a dot in a text, each once, and the text without them: `outer.p` is `p` of core `outer`.
+fn core_names(text: &str, names: &[&str]) -> (Vec<usize>, String) {
+    let is_name = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
+    let (mut cores, mut own, mut rest) = (Vec::new(), String::new(), text);
+    while !rest.is_empty() {
+        let end = rest.find(|c| !is_name(c)).unwrap_or(rest.len());
+        let (word, behind) = rest.split_at(end);
+        let found = word.split_once('.').and_then(|(core, name)| {
+            Some((names.iter().position(|known| *known == core)?, name)).filter(|_| !name.is_empty())
+        });
+        match found {
+            Some((core, name)) => {
+                own.push_str(name);
+                if !cores.contains(&core) {
+                    cores.push(core);
+                }
+            }
+            None => own.push_str(word),
+        }
+        // What is between two words.
+        let next = behind.find(is_name).unwrap_or(behind.len());
+        own.push_str(&behind[..next]);
+        rest = &behind[next..];
+    }
+    (cores, own)
+}
+
 impl Commands for SystemConsole {
     fn execute(&mut self, line: &str) -> Result<String, String> {
         let repeated = self.last.clone();
@@ -429,11 +485,13 @@ impl Commands for SystemConsole {
         match find(name)? {
             Meant::Own(run, moves) => {
                 self.last = if moves { line.to_owned() } else { String::new() };
-                run(self, arguments)
+                self.of_a_core(arguments, |console, arguments| run(console, arguments))
             }
             Meant::Inspection(known) => {
                 self.last.clear();
-                self.views[self.selected].execute(&format!("{known} {arguments}"))
+                self.of_a_core(arguments, |console, arguments| {
+                    console.views[console.selected].execute(&format!("{known} {arguments}"))
+                })
             }
         }
     }
@@ -444,7 +502,10 @@ impl Commands for SystemConsole {
             Some(Row("help", ..)) => Some(Ok(looks_help())),
             Some(row) if LOOKS.contains(&row.0) => Some(row.4(self, arguments)),
             Some(row) => Some(Err(only_looks(row.0))),
-            None => self.views[self.selected].look(line),
+            None => Some(self.of_a_core(arguments, |console, arguments| {
+                let looked = console.views[console.selected].look(&format!("{name} {arguments}"));
+                looked.unwrap_or_else(|| Ok(String::new()))
+            })),
         }
     }
 

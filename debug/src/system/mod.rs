@@ -17,7 +17,7 @@ mod seek;
 pub use console::SystemConsole;
 pub use links::link_text;
 
-use crate::session::{self, Control, Place, RUN_LIMIT, Why};
+use crate::session::{self, Control, Known, Place, RUN_LIMIT, Why};
 use std::sync::Arc;
 use takt_emu::{Event, LoadError};
 use takt_isa::timing::Cycle;
@@ -129,6 +129,8 @@ pub struct SystemSession {
     next_id: u32,
     /// By cycle, ascending.
     edits: Vec<Edit>,
+    /// Searches for the stops of the cores' sessions that have gone through the run up to positions of it.
+    known: Known<seek::Searches>,
     /// Cycles for which a command may run.
     pub run_limit: Cycle,
 }
@@ -150,6 +152,7 @@ impl SystemSession {
             stops: Vec::new(),
             next_id: 1,
             edits: Vec::new(),
+            known: Known::default(),
             run_limit: RUN_LIMIT,
         })
     }
@@ -220,6 +223,7 @@ impl SystemSession {
         let now = self.cycle();
         self.edits.truncate(self.point.edits);
         self.checkpoints.retain(|point| point.system.now() <= now);
+        self.known.forget_from(now);
         self.edits.push(Edit { cycle: now, core, place, bits });
         make_edits(&self.edits, &mut self.point);
     }

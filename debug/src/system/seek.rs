@@ -13,6 +13,9 @@ type Found = (Cycle, usize, Why);
 /// What is looked for: positions at which to stop, with the stop's number if it is one.
 type Hits = Vec<(Cycle, Option<u32>)>;
 
+/// For each core what is looked for in its session.
+pub(super) type Searches = Vec<Option<Search>>;
+
 impl SystemSession {
     /// Goes on by a step of a core; all others go on meanwhile. `views` has a session for each core, or, for steps by cycle,
     /// bundle or period, none.
@@ -23,11 +26,11 @@ impl SystemSession {
         let why = match unit {
             Unit::Cycle => return self.go_to(self.cycle() + 1),
             _ if self.has_halted(core) => return SystemWhy::Core(core, Why::Halted),
-            Unit::Bundle | Unit::Period => self.seek(&mut [], Vec::new(), |cores, _| ends(unit, core, cores)),
+            Unit::Bundle | Unit::Period => self.seek(&mut [], &mut [], |cores, _| ends(unit, core, cores)),
             Unit::Line | Unit::Call | Unit::Out => {
-                let searches = self.step_searches(views, core, unit);
+                let mut searches = self.step_searches(views, core, unit);
                 // It may halt on the way.
-                self.seek(views, searches, |cores, _| ends(unit, core, cores))
+                self.seek(views, &mut searches, |cores, _| ends(unit, core, cores))
             }
         };
         match why {
@@ -43,12 +46,12 @@ impl SystemSession {
             (_, 0) => return SystemWhy::Start,
             (Unit::Cycle, now) => return self.go_to(now - 1),
             (Unit::Bundle | Unit::Period, _) => {
-                self.seek_back(&mut [], |_| Vec::new(), |cores, _| ends(unit, core, cores))
+                self.seek_back(&mut [], |_, _| Ok(Vec::new()), |cores, _| ends(unit, core, cores))
             }
             (Unit::Line | Unit::Call | Unit::Out, _) => {
                 // How deep it is now is what counts, not how deep it was where the search begins.
                 let wanted = self.step_searches(views, core, unit);
-                self.seek_back(views, |_| wanted.clone(), |_, _| Hits::new())
+                self.seek_back(views, |_, _| Ok(wanted.clone()), |_, _| Hits::new())
             }
         };
         match why {
@@ -58,7 +61,7 @@ impl SystemSession {
     }
 
     /// For each core what is looked for: of one, the end of its step.
-    fn step_searches(&self, views: &mut [&mut Session], core: usize, unit: Unit) -> Vec<Option<Search>> {
+    fn step_searches(&self, views: &mut [&mut Session], core: usize, unit: Unit) -> Searches {
         self.show(views);
         let search =
             |(number, view): (usize, &&mut Session)| (number == core).then(|| Search::step(unit, view));
@@ -97,18 +100,19 @@ impl SystemSession {
 
     /// Runs on to a stop: an event on a link, or one of a core's session. `views` has a session for each core, or none.
     pub fn resume(&mut self, views: &mut [&mut Session]) -> SystemWhy {
-        self.show(views);
         let stops = self.stops.clone();
-        let searches = views.iter().map(|view| Search::stops(view)).collect();
-        let why = self.seek(views, searches, |_, links| stopped(&stops, links));
+        let mut searches = match self.stop_searches(views) {
+            Ok(searches) => searches,
+            Err(end) => return end,
+        };
+        let why = self.seek(views, &mut searches, |_, links| stopped(&stops, links));
         self.arrived(views, why)
     }
 
     /// Runs back to one.
     pub fn resume_back(&mut self, views: &mut [&mut Session]) -> SystemWhy {
         let stops = self.stops.clone();
-        let searches = |views: &[&mut Session]| views.iter().map(|view| Search::stops(view)).collect();
-        let why = self.seek_back(views, searches, |_, links| stopped(&stops, links));
+        let why = self.seek_back(views, SystemSession::stop_searches, |_, links| stopped(&stops, links));
         self.arrived(views, why)
     }
 
@@ -137,9 +141,103 @@ impl SystemSession {
                 return SystemWhy::Core(core, Why::Holds);
             }
         }
-        let mut searches: Vec<Option<Search>> = views.iter().map(|_| None).collect();
+        let mut searches: Searches = views.iter().map(|_| None).collect();
         searches[core] = Some(Search::value(live, views[core]));
-        self.seek(views, searches, |_, _| Hits::new())
+        self.seek(views, &mut searches, |_, _| Hits::new())
+    }
+
+    /// The searches for the stops of the cores' sessions from this position on, which know of each watched value what it was
+    /// last, even if it is not there now. The session stays where it is.
+    ///
+    /// # Errors
+    /// If it was interrupted.
+    fn stop_searches(&mut self, views: &mut [&mut Session]) -> Result<Searches, SystemWhy> {
+        self.show(views);
+        let mut searches: Searches = views.iter().map(|view| Search::stops(view)).collect();
+        if searches.iter().flatten().all(Search::is_complete) {
+            return Ok(searches);
+        }
+        let here = self.point.clone();
+        let result = self.look_back(views, &mut searches);
+        self.point = here;
+        self.show(views);
+        result.map(|()| searches)
+    }
+
+    /// Completes this position's searches: from what there is to see since the last checkpoint, or from all of the run that is not
+    /// known yet.
+    fn look_back(
+        &mut self,
+        views: &mut [&mut Session],
+        searches: &mut [Option<Search>],
+    ) -> Result<(), SystemWhy> {
+        let is_of = |known: &Searches, views: &[&mut Session]| {
+            known.iter().zip(views).all(|(search, view)| match search {
+                Some(search) => search.is_of(view),
+                None => view.stops().is_empty(),
+            })
+        };
+        if self.known.before(Cycle::MAX).is_some_and(|(_, known)| !is_of(known, views)) {
+            self.known.clear();
+        }
+        let here = self.cycle();
+        let base = self.known.before(here).map_or(0, |(cycle, _)| cycle);
+        let mut checkpoints: Vec<Cycle> =
+            self.checkpoints.iter().map(|point| point.system.now()).filter(|cycle| *cycle < here).collect();
+        let fresh = |views: &[&mut Session]| views.iter().map(|view| Search::stops(view)).collect();
+        if let Some(&near) = checkpoints.last().filter(|near| **near > base) {
+            self.move_to(near)?;
+            self.show(views);
+            let mut found: Searches = fresh(views);
+            self.watch_until(here, views, &mut found)?;
+            complete(searches, &found);
+            if searches.iter().flatten().all(Search::is_complete) {
+                return Ok(());
+            }
+        }
+        self.move_to(base)?;
+        self.show(views);
+        let known = self.known.before(base).map(|(_, known)| known.clone());
+        let mut all = known.unwrap_or_else(|| fresh(views));
+        checkpoints.retain(|cycle| base < *cycle);
+        for cycle in checkpoints {
+            self.watch_until(cycle, views, &mut all)?;
+            self.known.add(cycle, all.clone());
+        }
+        self.watch_until(here, views, &mut all)?;
+        self.known.add(here, all.clone());
+        complete(searches, &all);
+        Ok(())
+    }
+
+    fn move_to(&mut self, cycle: Cycle) -> Result<(), SystemWhy> {
+        match self.go_to(cycle) {
+            SystemWhy::Done => Ok(()),
+            end => Err(end),
+        }
+    }
+
+    /// Runs on to a position of the run that is known, and shows searches what there is to see on the way.
+    fn watch_until(
+        &mut self,
+        until: Cycle,
+        views: &mut [&mut Session],
+        searches: &mut [Option<Search>],
+    ) -> Result<(), SystemWhy> {
+        let origin = self.cycle();
+        while self.cycle() < until {
+            let (begin, from) = (self.point.clone(), self.cycle().max(origin + 1));
+            let mut seen = Seen::default();
+            let why = self.advance((self.cycle() + STRETCH).min(until), Some(&mut seen));
+            if why != SystemWhy::Done {
+                return Err(why);
+            }
+            self.walk(begin, (from, self.cycle()), &seen, views, searches, false);
+            if self.interrupted() {
+                return Err(SystemWhy::Interrupted);
+            }
+        }
+        Ok(())
     }
 
     /// Shows the cores to their sessions.
@@ -158,7 +256,7 @@ impl SystemSession {
     fn seek(
         &mut self,
         views: &mut [&mut Session],
-        mut searches: Vec<Option<Search>>,
+        searches: &mut [Option<Search>],
         wanted: impl Fn(&[(usize, Event)], &[LinkEvent]) -> Hits,
     ) -> SystemWhy {
         let origin = self.cycle();
@@ -175,7 +273,7 @@ impl SystemSession {
             let first = hits.filter(|(cycle, _)| *cycle > origin && *cycle <= now).min();
             if let Some(begin) = begin {
                 let end = first.map_or(now, |(cycle, _)| cycle);
-                let found = self.walk(begin, (from, end), &seen, views, &mut searches, true).pop();
+                let found = self.walk(begin, (from, end), &seen, views, searches, true).pop();
                 if let Some((cycle, core, why)) = found {
                     self.go_to(cycle);
                     return SystemWhy::Core(core, why);
@@ -202,7 +300,7 @@ impl SystemSession {
     fn seek_back(
         &mut self,
         views: &mut [&mut Session],
-        begin: impl Fn(&[&mut Session]) -> Vec<Option<Search>>,
+        begin: impl Fn(&mut SystemSession, &mut [&mut Session]) -> Result<Searches, SystemWhy>,
         wanted: impl Fn(&[(usize, Event)], &[LinkEvent]) -> Hits,
     ) -> SystemWhy {
         // Looked for are positions before `end`, from a checkpoint before `before` on.
@@ -211,7 +309,10 @@ impl SystemSession {
             self.restore(before - 1);
             let start = self.cycle();
             self.show(views);
-            let mut searches = begin(views);
+            let mut searches = match begin(self, views) {
+                Ok(searches) => searches,
+                Err(end) => return end,
+            };
             let looks = searches.iter().any(Option::is_some);
             let mut hits = Hits::new();
             let mut found: Option<Found> = None;
@@ -269,7 +370,7 @@ impl SystemSession {
         let mut positions: BTreeMap<Cycle, Vec<usize>> = BTreeMap::new();
         let mut issues = BTreeMap::new();
         let mut boundaries = Vec::new();
-        for (core, search) in searches.iter().enumerate() {
+        for (core, search) in searches.iter_mut().enumerate() {
             let Some(search) = search else { continue };
             let events: Vec<&Event> =
                 seen.cores.iter().filter(|(own, _)| *own == core).map(|(_, event)| event).collect();
@@ -310,6 +411,15 @@ impl SystemSession {
         }
         self.point = here;
         found
+    }
+}
+
+/// Takes from searches of an earlier position what these do not know.
+fn complete(searches: &mut [Option<Search>], earlier: &[Option<Search>]) {
+    for (search, earlier) in searches.iter_mut().zip(earlier) {
+        if let (Some(search), Some(earlier)) = (search, earlier) {
+            search.complete(earlier);
+        }
     }
 }
 

@@ -49,8 +49,10 @@ pub(crate) struct Group {
     spare: Vec<Box<Emulator>>,
     report: Option<PeriodReport>,
     nan_writes: Vec<Vec<PortWrite>>,
-    /// Cycles that a period may take, and the cycle before which that ends each lane's present one.
+    /// Cycles that a period may take, those that all may take together, and the cycle before which that ends each lane's
+    /// present one.
     limit: Cycle,
+    most: Cycle,
     limits: [Cycle; LANES],
     /// Periods of lanes that ran on their own, at least in part.
     pub(crate) apart: u64,
@@ -82,6 +84,7 @@ impl Group {
             report: None,
             nan_writes: vec![Vec::new(); LANES],
             limit: MAX_CYCLE,
+            most: MAX_CYCLE,
             limits: [MAX_CYCLE; LANES],
             apart: 0,
             lead,
@@ -107,6 +110,11 @@ impl Group {
     /// Cycles that a period may take.
     pub(crate) fn set_period_limit(&mut self, cycles: Cycle) {
         self.limit = cycles;
+    }
+
+    /// Cycles since reset that all periods may take together.
+    pub(crate) fn set_cycle_limit(&mut self, limit: Cycle) {
+        self.most = limit.min(MAX_CYCLE);
     }
 
     /// Sets an input port, which the machine has. `values` are those of the first lanes.
@@ -199,7 +207,7 @@ impl Group {
 
     /// Runs every lane to the end of its period.
     pub(crate) fn run_period(&mut self) {
-        self.limits = std::array::from_fn(|lane| self.now(lane).saturating_add(self.limit));
+        self.limits = std::array::from_fn(|lane| self.now(lane).saturating_add(self.limit).min(self.most));
         self.rejoin();
         self.report = None;
         self.lead.report = None;

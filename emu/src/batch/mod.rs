@@ -6,13 +6,13 @@
 
 mod group;
 mod lanes;
+mod pool;
 
 use crate::emulator::CompiledRuns;
 use crate::fault::LoadError;
 use crate::system::{Number, PeriodError, PeriodReport, PortError, input_for, output_for};
 use group::Group;
 pub(crate) use lanes::{LANES, Row};
-use rayon::prelude::*;
 use std::num::NonZeroU64;
 use std::sync::Arc;
 use takt_isa::fp::Flags;
@@ -96,6 +96,12 @@ impl Batch {
         self.groups.iter_mut().for_each(|group| group.set_period_limit(cycles));
     }
 
+    /// Stops a lane with [`crate::FaultKind::CycleLimit`] once so many cycles have passed in it since reset, as
+    /// [`crate::Emulator::set_cycle_limit`].
+    pub fn set_cycle_limit(&mut self, limit: Cycle) {
+        self.groups.iter_mut().for_each(|group| group.set_cycle_limit(limit));
+    }
+
     /// Sets an input port: one value for each lane. They are seen from the next period on (and by what runs once).
     ///
     /// # Errors
@@ -129,7 +135,7 @@ impl Batch {
         if let [group] = &mut self.groups[..] {
             group.run_period();
         } else {
-            self.groups.par_iter_mut().for_each(Group::run_period);
+            pool::each(&mut self.groups, Group::run_period);
         }
     }
 

@@ -1,0 +1,337 @@
+//! Where a watchpoint stops does not depend on where a search for it begins, nor on its direction: against a walk through all
+//! positions that knows nothing of searches.
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+use takt_asm::names::{NamedValue, Names};
+use takt_asm::{Assembled, MemoryLoader, Options as AsmOptions, assemble};
+use takt_debug::session::{Live, Options, Place, Session, Stop, Test, Why};
+use takt_debug::system::{SystemConsole, SystemOptions, SystemSession, SystemWhy};
+use takt_emu::testing::Random;
+use takt_isa::{MACHINES, Machine, Program, Register};
+use takt_system::Description;
+
+/// Names that are written over and over.
+const NAMES: u32 = 40;
+/// Straight lines that write few names over and over, one after the other, in loops, passed over at times, and in a
+/// subroutine; most of what they compute is the same as before.
+fn source(seed: u64, inputs: bool) -> String {
+    let mut random = Random::new(seed);
+    let names: Vec<String> = (0..NAMES).map(|i| format!("v{i}")).collect();
+    let names = names.join(", ");
+    let mut text = format!(
+        "{} a\n.output F\n.state s, k:int\n.reg {names}\n.reg n:int, skip:int\n.once\n\
+         \x20mov s, zero\n li k, 0\n{}",
+        if inputs { ".input" } else { ".state" },
+        if inputs { "" } else { " mov a, zero\n" }
+    );
+    for i in 0..NAMES {
+        let _ = writeln!(text, " mov v{i}, zero");
+    }
+    let _ = writeln!(text, " wait p\n.period\np: iadd k, k, 1\n iand skip, k, 3\n fadd s, s, 0.5");
+    let straight = |text: &mut String, random: &mut Random, lines: usize| {
+        let _ = writeln!(text, ".schedule on");
+        for _ in 0..lines {
+            let mut name = || format!("v{}", random.below(NAMES));
+            let (to, x, y) = (name(), name(), name());
+            let op = ["fmin", "fmax", "fadd", "fmul"][random.below(4) as usize];
+            let y = if random.once_in(5) { "a".to_owned() } else { y };
+            let y = if random.once_in(12) { "s".to_owned() } else { y };
+            let _ = writeln!(text, " {op} {to}, {x}, {y}");
+        }
+        let _ = writeln!(text, ".schedule off");
+    };
+    for block in 0..4 {
+        straight(&mut text, &mut random, 240);
+        match block {
+            0 => {
+                let _ = writeln!(text, " li n, 2\nturn:");
+                straight(&mut text, &mut random, 30);
+                let _ = writeln!(text, " isub n, n, 1\n bnz n, turn");
+            }
+            1 => {
+                let _ = writeln!(text, " bnz skip, over");
+                straight(&mut text, &mut random, 60);
+                let _ = writeln!(text, "over: call sub");
+            }
+            _ => {}
+        }
+    }
+    let _ = writeln!(text, " fadd F, v0, v1\n wait p\nsub:");
+    straight(&mut text, &mut random, 40);
+    let _ = writeln!(text, " ret");
+    text
+}
+
+fn assembled(seed: u64, inputs: bool, machine: &'static Machine) -> Assembled {
+    let text = source(seed, inputs);
+    let options = AsmOptions { machine, effort: 1, ..AsmOptions::default() };
+    match assemble("a.s", &MemoryLoader::new(&[("a.s", text.as_str())]), &options) {
+        Ok(assembled) => assembled,
+        Err(errors) => panic!("{text}\n{}", errors.render(false)),
+    }
+}
+
+/// Rows of inputs, of few values, so that much is computed as it was before.
+fn rows(program: &Program, seed: u64, periods: usize) -> Vec<Vec<(Register, u32)>> {
+    let mut random = Random::new(seed);
+    let mut value = || [0.5f32, 0.5, 2.0][random.below(3) as usize].to_bits();
+    (0..periods).map(|_| program.inputs.iter().map(|port| (port.register, value())).collect()).collect()
+}
+
+/// What is watched and how.
+const WATCHES: [(&str, Kind); 5] = [
+    ("v0", Kind::Changed),
+    ("v3", Kind::Changed),
+    ("v5 * 2.0", Kind::Changed),
+    ("v7", Kind::Above("a")),
+    ("v9", Kind::Above("v4")),
+];
+
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    Changed,
+    /// Above another.
+    Above(&'static str),
+}
+
+fn stop(session: &Session, (what, kind): (&str, Kind)) -> Stop {
+    let parse = |text: &str| Box::new(session.parse(text).expect("it is an expression"));
+    let test = match kind {
+        Kind::Changed => Test::Changed,
+        Kind::Above(other) => Test::Above(parse(other)),
+    };
+    Stop::Watch { what: parse(what), test, text: what.to_owned() }
+}
+
+/// One value of a name, as the assembler tells of it.
+struct Held {
+    register: Register,
+    /// The addresses between which the next bundle must be: above the first, up to the second.
+    range: Option<(u32, u32)>,
+    /// Whether its register has other values, too.
+    shares: bool,
+}
+
+impl Held {
+    fn each(names: &Names, name: &str) -> Vec<Held> {
+        let held = |value: &NamedValue| {
+            let first = |value: &NamedValue| value.bundles.map(|(first, _)| first.get());
+            let others =
+                names.values.iter().filter(|other| other.register == value.register && *other != value);
+            let rivals: Vec<u32> = others.filter_map(first).collect();
+            let shares = !rivals.is_empty();
+            let range = first(value).filter(|_| shares || value.orders.is_some()).map(|first| {
+                (first, rivals.into_iter().filter(|rival| *rival > first).min().unwrap_or(u32::MAX))
+            });
+            Held { register: value.register, range, shares }
+        };
+        names.values.iter().filter(|value| value.name == name).map(held).collect()
+    }
+
+    /// The bits, if it is there.
+    fn bits(&self, session: &Session) -> Option<Option<u32>> {
+        let next = session.emulator().next_address().get();
+        if self.range.is_some_and(|(after, through)| next <= after || next > through)
+            || self.shares
+                && session.in_flight().iter().any(|(retire, _)| retire.register == Some(self.register))
+        {
+            return None;
+        }
+        Some(session.register(self.register))
+    }
+}
+
+/// What there is to see of the values of a watched name, each in its register, position by position.
+struct Walk {
+    values: Vec<Held>,
+    other: Option<Live>,
+    kind: Kind,
+    /// Of each value: what was there last, and whether it was above the other.
+    last: Vec<Option<(Option<u32>, bool)>>,
+    stops: Vec<u64>,
+}
+
+impl Walk {
+    fn new(session: &Session, names: &Names, (what, kind): (&str, Kind)) -> Walk {
+        let (name, _) = what.split_once(' ').unwrap_or((what, ""));
+        let values = Held::each(names, name);
+        let other = match kind {
+            Kind::Changed => None,
+            Kind::Above(other) => Some(session.parse(other).expect("it is a name")),
+        };
+        Walk { last: values.iter().map(|_| None).collect(), values, other, kind, stops: Vec::new() }
+    }
+
+    /// At position 0 there is nothing to compare with.
+    fn visit(&mut self, session: &Session, position: u64) {
+        let there = |live: &Live| Some(session.place(live).ok()??.2);
+        let real = |bits: Option<u32>| bits.map(f32::from_bits);
+        let other = self.other.as_ref().map(there);
+        let mut hit = false;
+        for (live, last) in self.values.iter().zip(&mut self.last) {
+            let Some(bits) = live.bits(session) else { continue };
+            if other == Some(None) {
+                continue;
+            }
+            let is =
+                real(bits).zip(real(other.flatten().flatten())).is_some_and(|(value, other)| value > other);
+            let (before, was) = last.replace((bits, is)).unwrap_or_default();
+            hit |= match self.kind {
+                Kind::Changed => bits != before,
+                Kind::Above(_) => is && !was,
+            };
+        }
+        if hit && position > 0 {
+            self.stops.push(position);
+        }
+    }
+}
+
+/// Stops that are looked at from each beginning, each way.
+const MOST: usize = 8;
+
+/// Positions at which a command stops that is given again and again.
+fn all(session: &mut Session, command: impl Fn(&mut Session) -> Why) -> Vec<u64> {
+    let mut positions = Vec::new();
+    while positions.len() < MOST && matches!(command(session), Why::Stop { .. }) {
+        positions.push(session.cycle());
+    }
+    positions
+}
+
+/// The stops behind and before a position.
+fn split(stops: &[u64], begin: u64) -> (Vec<u64>, Vec<u64>) {
+    let back = stops.iter().rev().copied().filter(|stop| *stop < begin);
+    (stops.iter().copied().filter(|stop| *stop > begin).take(MOST).collect(), back.take(MOST).collect())
+}
+
+#[test]
+fn stops_are_the_same_wherever_a_search_begins() {
+    let mut seen = 0;
+    for (seed, machine) in (0..2).zip(MACHINES) {
+        let Assembled { program, names, .. } = assembled(seed, true, machine);
+        let inputs = Some(Arc::new(rows(&program, seed, 9)));
+        let options = Options { inputs, names: names.clone(), ..Options::default() };
+        let fresh = || Session::new(&program, options.clone()).expect("it loads");
+        let mut random = Random::new(seed);
+        for &watch in WATCHES.iter().skip(seed as usize).step_by(2) {
+            let mut session = fresh();
+            let mut walk = Walk::new(&session, &names, watch);
+            assert!(walk.values.len() > 3 && walk.values.len() < 60, "{watch:?}: {}", walk.values.len());
+            // In half of the runs something is set by hand on the way.
+            let edit = random.once_in(2).then(|| u64::from(3000 + random.below(1000)));
+            let edited = |session: &mut Session| {
+                if let Some(edit) = edit {
+                    session.go_to(edit);
+                    let port = program.inputs[0].register;
+                    session.set(Place::Register(port), 3f32.to_bits()).expect("a port");
+                }
+            };
+            edited(&mut session);
+            session.go_to(0);
+            walk.visit(&session, 0);
+            while session.go_to(session.cycle() + 1) == Why::Done {
+                walk.visit(&session, session.cycle());
+            }
+            let (end, stops) = (session.cycle(), &walk.stops);
+            seen += stops.len();
+            let mut kept = fresh();
+            edited(&mut kept);
+            kept.add_stop(stop(&kept, watch));
+            for begin in [0, end].into_iter().chain((0..3).map(|_| u64::from(random.below(end as u32)))) {
+                let mut new = fresh();
+                edited(&mut new);
+                new.add_stop(stop(&new, watch));
+                let (forward, back) = split(stops, begin);
+                // In one that has searched before, and in one that has not.
+                for session in [&mut kept, &mut new] {
+                    let told = format!("seed {seed}, {watch:?}, edit {edit:?}, from {begin}");
+                    assert_eq!(session.go_to(begin), Why::Done);
+                    assert_eq!(all(session, Session::resume), forward, "{told}");
+                    assert_eq!(session.go_to(begin), Why::Done);
+                    assert_eq!(all(session, Session::resume_back), back, "{told}, back");
+                }
+            }
+        }
+    }
+    assert!(seen > 100, "{seen}");
+}
+
+/// Two cores with such programs.
+fn description() -> (Description, Vec<Assembled>) {
+    let programs: Vec<Assembled> =
+        (10..).zip(MACHINES).take(2).map(|(seed, machine)| assembled(seed, false, machine)).collect();
+    let core = |number: usize| {
+        let machine = MACHINES[number].name;
+        format!("[[core]]\nname = \"c{number}\"\nprogram = \"{number}.s\"\nmachine = \"{machine}\"\n")
+    };
+    let text = format!("tick = 3000\n{}{}", core(0), core(1));
+    let program = |request: &takt_system::Request<'_>| -> Result<_, takt_system::ProgramError<()>> {
+        Ok(programs[usize::from(request.path == "1.s")].program.clone())
+    };
+    let Ok(description) = takt_system::read("system.toml", &text, program) else { panic!("it is one") };
+    (description, programs)
+}
+
+/// Of a core of a system as of a single one.
+#[test]
+fn of_a_core_of_a_system_too() {
+    const END: u64 = 20_000;
+    let (description, programs) = description();
+    let fresh = || {
+        let views = programs.iter().map(|assembled| {
+            let options = Options { names: assembled.names.clone(), ..Options::default() };
+            Session::new(&assembled.program, options).expect("it loads")
+        });
+        let session = SystemSession::new(&description, SystemOptions::default()).expect("it loads");
+        let mut console = SystemConsole::new(session, views.collect());
+        console.session.run_limit = 2 * END;
+        console
+    };
+    let mut seen = 0;
+    let mut random = Random::new(3);
+    for (core, watch) in [(0, WATCHES[0]), (1, WATCHES[3])] {
+        let mut console = fresh();
+        let mut walk =
+            Walk::new(&console.core_mut(core).expect("a core").session, &programs[core].names, watch);
+        for position in 0..END {
+            console.run(|session, _| session.go_to(position));
+            walk.visit(&console.core_mut(core).expect("a core").session, position);
+        }
+        let stops = &walk.stops;
+        seen += stops.len();
+        let add = |console: &mut SystemConsole| {
+            let stop = stop(&console.core_mut(core).expect("a core").session, watch);
+            console.add_core_stop(core, stop).expect("a core");
+        };
+        let mut kept = fresh();
+        add(&mut kept);
+        for begin in [0, END - 1].into_iter().chain((0..5).map(|_| u64::from(random.below(END as u32)))) {
+            let mut new = fresh();
+            add(&mut new);
+            let (forward, back) = split(stops, begin);
+            for console in [&mut kept, &mut new] {
+                let told = format!("core {core}, {watch:?}, from {begin}");
+                console.run(|session, _| session.go_to(begin));
+                let mut found = Vec::new();
+                while found.len() < MOST
+                    && matches!(console.run(SystemSession::resume), SystemWhy::Core(..))
+                    && console.session.cycle() < END
+                {
+                    found.push(console.session.cycle());
+                }
+                assert_eq!(found, forward, "{told}");
+                console.run(|session, _| session.go_to(begin));
+                let mut found = Vec::new();
+                while found.len() < MOST
+                    && matches!(console.run(SystemSession::resume_back), SystemWhy::Core(..))
+                {
+                    found.push(console.session.cycle());
+                }
+                assert_eq!(found, back, "{told}, back");
+            }
+        }
+    }
+    assert!(seen > 50, "{seen}");
+}
