@@ -30,7 +30,7 @@ mod kernels;
 mod real;
 mod screened;
 pub mod sin;
-// Where `third_party/c99` fits and softfloat-sys has rules to build its C. The condition stands in Cargo.toml too.
+// Where `isa/c99` fits and softfloat-sys has rules to build its C. The condition stands in Cargo.toml too.
 #[cfg(all(
     feature = "softfloat",
     target_arch = "x86_64",

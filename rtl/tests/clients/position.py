@@ -22,7 +22,7 @@ def expected(n, wanted):
 
 
 def described():
-    """Addresses and records, as xtask/src/clients.rs writes them."""
+    """Addresses and records, as tools/xtask/src/clients.rs writes them."""
     return json.loads(Path("core.json").read_text())
 
 

@@ -1,4 +1,4 @@
-"""Builds each circuit in Icarus Verilog and runs its client: run.py FOLDER. What is in FOLDER: xtask/src/clients.rs."""
+"""Builds each circuit in Icarus Verilog and runs its client: run.py FOLDER. What is in FOLDER: tools/xtask/src/clients.rs."""
 
 import sys
 from pathlib import Path

@@ -1,0 +1,251 @@
+//! `docs/models.md`: what every function of every robot takes, beside CasADi, and how far it is from Pinocchio.
+//!
+//! With TAKT_BLESS the table is written, from 10,000 states each (or TAKT_STATES); otherwise a part of it is made again and compared.
+
+mod common;
+
+use common::processors::{self, PROCESSORS};
+use common::{Case, Reference, cases, numbers, robot};
+use serde_json::json;
+use std::fmt::Write;
+use std::path::Path;
+use takt_asm::{MemoryLoader, Options as Assembling, Search};
+use takt_emu::{Emulator, Number};
+use takt_isa::{Machine, T1, T3};
+use takt_model::functions::{Function, Options, What, derive};
+use takt_model::graph::{Delays, Rewrites};
+use takt_model::robot::urdf;
+use takt_model::write;
+
+/// What a program takes on a machine.
+struct Built {
+    cycles: u64,
+    bound: u64,
+    emulator: Emulator,
+}
+
+fn function(case: &Case, what: What, machine: &Machine) -> Function {
+    let options = Options {
+        rewrites: Rewrites::ALL,
+        delays: Delays::of(machine),
+        tip: Some(&case.end),
+        kp: 100.0,
+        kd: 20.0,
+    };
+    derive(&robot(case, urdf::SNAP), what, &options).expect("equations")
+}
+
+/// The program, or why it does not fit.
+fn built(function: &Function, machine: &'static Machine) -> Result<Built, String> {
+    let outputs = function.outputs.len() - write::constants(function).len();
+    if outputs > usize::from(machine.outputs_per_bank) {
+        return Err(format!("{outputs} outputs"));
+    }
+    let loader = Search::new(MemoryLoader::default()).library(takt_programs::LIBRARY);
+    let options = Assembling { machine, ..Assembling::default() };
+    let source = write::source(function).into_bytes();
+    let assembled = takt_asm::assemble_bytes("model.s", source, &loader, &options).map_err(|errors| {
+        let text = errors.render(false);
+        let first = text.lines().next().unwrap_or("it does not fit").to_owned();
+        first.split_once(": ").map_or(first.clone(), |(_, text)| text.to_owned())
+    })?;
+    let bounds = takt_analysis::bound(&assembled.program).map_err(|error| error.to_string())?;
+    let [block] = &assembled.blocks[..] else { return Err(format!("{} blocks", assembled.blocks.len())) };
+    let cycles = bounds.worst_period().unwrap_or(0);
+    Ok(Built {
+        cycles,
+        // What the period takes beyond its block no schedule changes.
+        bound: cycles - u64::from(block.cycles - block.bound.cycles()),
+        emulator: Emulator::new(&assembled.program).map_err(|error| error.to_string())?,
+    })
+}
+
+/// A row of the table.
+struct Row {
+    operations: usize,
+    casadi: u64,
+    t3: Result<Built, String>,
+    t1: Result<Built, String>,
+    /// Cycles on other processors.
+    others: Option<[u64; PROCESSORS.len()]>,
+    /// Of the equations, in binary64.
+    error: f64,
+    /// Of the machine: the worst, and what nine states of ten stay below.
+    machine: Option<(f64, f64)>,
+}
+
+fn row(reference: &mut Reference, case: &Case, what: What, states: usize) -> Row {
+    let function_t3 = function(case, what, &T3);
+    let robot = robot(case, urdf::SNAP);
+    let joints: Vec<&str> = robot.joints.iter().map(|joint| joint.name.as_str()).collect();
+    let answer = reference.ask(&json!({
+        "urdf": case.urdf, "joints": joints, "base": robot.base, "tip": case.end, "function": what.name(),
+        "states": states, "seed": 7, "kp": 100.0, "kd": 20.0, "casadi": true,
+    }));
+    let mut t3 = built(&function_t3, &T3);
+    let read = write::inputs_read(&function_t3);
+    let (mut error, mut machine) = (0.0f64, Vec::new());
+    let states = answer["inputs"]
+        .as_array()
+        .expect("states")
+        .iter()
+        .zip(answer["outputs"].as_array().expect("states"));
+    for (inputs, outputs) in states {
+        let (inputs, expected) = (numbers(inputs), numbers(outputs));
+        let size = expected.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
+        let worst = |computed: &[f64]| {
+            computed.iter().zip(&expected).map(|(x, y)| (x - y).abs() / size).fold(0.0, f64::max)
+        };
+        error = error.max(worst(&function_t3.evaluate(&inputs)));
+        let Ok(Built { emulator, .. }) = &mut t3 else { continue };
+        for ((port, value), _) in function_t3.inputs.iter().zip(&inputs).zip(&read).filter(|(_, read)| **read)
+        {
+            emulator.set_input(&port.name, Number::Float(*value as f32)).expect("a port");
+        }
+        emulator.run_period(&[]).expect("a period");
+        let computed: Vec<f64> = function_t3
+            .outputs
+            .iter()
+            .map(|(port, id)| match function_t3.graph.value(*id) {
+                Some(constant) => constant,
+                None => match emulator.output(&port.name).expect("a port") {
+                    Some(Number::Float(value)) => f64::from(value),
+                    other => panic!("{}: {other:?}", port.name),
+                },
+            })
+            .collect();
+        machine.push(worst(&computed));
+    }
+    machine.sort_by(f64::total_cmp);
+    let machine = machine.last().map(|last| (*last, machine[machine.len() * 9 / 10]));
+    let operations = function_t3.count().total();
+    let casadi = answer["operations"].as_u64().expect("a count");
+    let others = processors::cycles(&function_t3);
+    Row { operations, casadi, t3, t1: built(&function(case, what, &T1), &T1), others, error, machine }
+}
+
+fn cell(built: &Result<Built, String>) -> String {
+    match built {
+        Ok(built) => format!("{} / {}", built.cycles, built.bound),
+        Err(why) => why.clone(),
+    }
+}
+
+fn line(case: &Case, what: What, row: &Row) -> String {
+    let less = 100.0 * (1.0 - row.operations as f64 / row.casadi as f64);
+    let machine = row.machine.map_or("".to_owned(), |(worst, most)| format!("{most:.0e} / {worst:.0e}"));
+    let others = row
+        .others
+        .map_or([const { String::new() }; PROCESSORS.len()], |cycles| cycles.map(|n| n.to_string()));
+    let others = others.join(" | ");
+    format!(
+        "| {} | {} | {} | {} | {less:.0} % | {} | {} | {others} | {:.0e} | {machine} |\n",
+        case.name,
+        what.name(),
+        row.operations,
+        row.casadi,
+        cell(&row.t3),
+        cell(&row.t1),
+        row.error
+    )
+}
+
+const HEAD: &str = "\
+# Robots and what their equations take
+
+Written by `TAKT_BLESS=1 cargo test --release -p takt-model --test table`; docs/model.md says how the equations come
+about.
+
+- *operations*: sums, products, divisions, roots, sines and cosines, signs, as `takt model` prints them.
+- *CasADi*: the same function in CasADi 3.7 as the textbooks have it (`programs/model/tests/reference.py`: Newton and Euler in
+  link frames, composite bodies, articulated bodies or elimination, whichever is shorter), zeros of the geometry left
+  out, after `cse`.
+- *saved*: operations fewer than CasADi's.
+- *t3*, *t1*: cycles of a period, and the bound that no schedule can beat; or why it does not fit.
+- OTHERS: cycles of the same operations in binary32 on commercial processors, and on
+  one of the class of soft cores: models of LLVM RELEASE (`llvm-mca`), not measurements, with perfect caches. Products
+  are fused into sums; sine and cosine are polynomials in line (12 products and sums each). Rocket has no conditional
+  move: both ways of a branch count.
+- *binary64*: the largest relative error of the equations, in binary64, against Pinocchio over STATES random states. It
+  is not less where the file writes quarter turns with ten digits, which are taken for exact ones.
+- *t3's result*: the relative error of what the machine computes, in binary32: nine states of ten stay below the first
+  figure, the second is the worst. Relative to the largest output of the state.
+
+";
+
+/// The text before the rows.
+fn head(states: usize) -> String {
+    let names = PROCESSORS.each_ref().map(|processor| processor.name);
+    let text = HEAD.replace("STATES", &states.to_string()).replace("RELEASE", &processors::release());
+    let text = text.replace("OTHERS", &names.map(|name| format!("*{name}*")).join(", "));
+    let titles = ["robot", "function", "operations", "CasADi", "saved", "t3", "t1"];
+    let titles = [&titles[..], &names, &["binary64", "t3's result"]].concat();
+    format!("{text}| {} |\n|{}\n", titles.join(" | "), "---|".repeat(titles.len()))
+}
+
+#[test]
+fn the_table_is_what_comes_out() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/models.md");
+    let mut reference = Reference::start();
+    let cases = cases(&mut reference);
+    if std::env::var_os("TAKT_BLESS").is_some() {
+        let states: usize = match std::env::var("TAKT_STATES") {
+            Ok(states) => states.parse().expect("a number of states"),
+            Err(_) => 10_000,
+        };
+        let mut text = head(states);
+        for case in &cases {
+            for (what, ..) in What::ALL {
+                let row = row(&mut reference, case, what, states);
+                let _ = write!(text, "{}", line(case, what, &row));
+            }
+        }
+        std::fs::write(path, text).expect("docs/models.md");
+        return;
+    }
+    let table = std::fs::read_to_string(path).expect("docs/models.md");
+    let full = std::env::var_os("TAKT_FULL").is_some();
+    let same_models = table.contains(&format!("models of LLVM {} ", processors::release()));
+    for case in &cases {
+        for (what, ..) in What::ALL {
+            // The quick test takes the robot that everybody knows.
+            if !full && case.name != "UR5" {
+                continue;
+            }
+            let row = row(&mut reference, case, what, if full { 10_000 } else { 20 });
+            let line = line(case, what, &row);
+            // But for the errors, which depend on the number of states; another release of LLVM has other models.
+            let depends = if same_models { 4 } else { 4 + PROCESSORS.len() };
+            let fixed = line.rsplitn(depends, '|').last().expect("columns");
+            assert!(table.contains(fixed), "docs/models.md has not: {line}\nTAKT_BLESS=1 rewrites it");
+            assert!(row.error < 1e-6, "{line}");
+        }
+    }
+}
+
+/// The targets of the project: fewer operations than CasADi's, UR5 and TALOS' arm in their cycles and near the bound.
+#[test]
+fn targets_are_kept() {
+    let table = include_str!("../../../docs/models.md");
+    let rows: Vec<Vec<&str>> = table
+        .lines()
+        .filter(|line| line.starts_with("| ") && !line.starts_with("| robot"))
+        .map(|line| line.split('|').map(str::trim).collect())
+        .collect();
+    assert!(rows.len() >= 8 * What::ALL.len());
+    let number =
+        |text: &str| -> u64 { text.split(' ').next().and_then(|text| text.parse().ok()).expect("a number") };
+    for row in &rows {
+        let (operations, casadi) = (number(row[3]), number(row[4]));
+        assert!(10 * operations <= 9 * casadi, "{row:?}");
+        if row[1].starts_with("UR") || row[1] == "TALOS, left arm" {
+            let Some((cycles, bound)) = row[6].split_once(" / ") else { continue };
+            assert!(100 * number(cycles) <= 103 * number(bound), "{row:?}");
+        }
+    }
+    let cycles = |robot: &str| {
+        let row = rows.iter().find(|row| row[1] == robot && row[2] == "inverse-dynamics");
+        number(row.expect("the robot")[6])
+    };
+    assert!(cycles("UR5") <= 260 && cycles("TALOS, left arm") <= 470);
+}

@@ -1,0 +1,55 @@
+//! The peripherals in Rust: the same pins and registers, cycle by cycle, as the Verilog files of `rtl/board/verilog/`.
+//!
+//! They are what an emulated board is made of, and what the circuits are compared with (`rtl/board/tests/peripherals.rs`).
+
+mod filter;
+mod inputs;
+mod outputs;
+mod spi;
+mod system;
+
+pub use filter::Filter;
+pub use inputs::{DigitalIn, Quadrature, Step};
+pub use outputs::{DigitalOut, Pwm, SigmaDelta};
+pub use spi::Spi;
+pub use system::{Tick, UartReceive, UartSend};
+
+use crate::Kind;
+
+/// A peripheral, a cycle at a time.
+pub trait Twin {
+    /// What stands on its outputs, in the order of [`Kind::ports`].
+    fn outputs(&self) -> Vec<u32>;
+
+    /// The clock's edge, with what stands on its inputs, in the order of [`Kind::ports`].
+    fn clock(&mut self, inputs: &[u32]);
+}
+
+/// The twin of a peripheral with these parameters, in the order of its table; what is missing has its default.
+pub fn of(kind: &Kind, parameters: &[u32]) -> Option<Box<dyn Twin>> {
+    let value = |i: usize| {
+        parameters.get(i).copied().unwrap_or_else(|| kind.parameters.get(i).map_or(0, |p| p.default))
+    };
+    Some(match kind.name {
+        "quadrature" => Box::new(Quadrature::new(value(0), value(1))),
+        "step" => Box::new(Step::new(value(0))),
+        "pwm" => Box::new(Pwm::new(value(0), value(1), value(2) != 0)),
+        "sigma-delta" => Box::new(SigmaDelta::new(value(0) != 0)),
+        "spi" => {
+            Box::new(Spi::new(value(0), value(1), value(2) != 0, value(3) != 0, value(4) != 0, value(5)))
+        }
+        "digital-in" => Box::new(DigitalIn::new(value(0), value(1) != 0)),
+        "digital-out" => Box::new(DigitalOut::new(value(0) != 0)),
+        _ => return None,
+    })
+}
+
+/// Whether a signal is high.
+fn high(inputs: &[u32], at: usize) -> bool {
+    inputs.get(at).is_some_and(|&value| value != 0)
+}
+
+/// A signal of 32 bits.
+fn word(inputs: &[u32], at: usize) -> u32 {
+    inputs.get(at).copied().unwrap_or(0)
+}

@@ -1,0 +1,222 @@
+//! Boards and wirings as files: what is read from right ones, and what is said of wrong ones.
+
+use takt_asm::{MemoryLoader, Options, assemble};
+use takt_board::{Board, Mistake, Wiring};
+use takt_isa::Program;
+
+fn ulx3s() -> Board {
+    Board::from_name("ulx3s-85f").expect("it is there").expect("its file is right")
+}
+
+/// What is said of a wiring, a line each.
+fn said(text: &str) -> Vec<String> {
+    let result = Wiring::read("robot.toml", text, &ulx3s());
+    result.expect_err("a mistake").iter().map(Mistake::to_string).collect()
+}
+
+const RIGHT: &str = r#"
+board = "ulx3s-85f"
+clock = 50
+period = 400.0
+lead = 5
+autostart = true
+deadlines = 3
+host = 100
+baud = 1_000_000
+
+[signals]
+drive = "gp10"
+stop = "gn10"
+
+[peripheral.encoder]
+kind = "quadrature"
+pins = { a = "gp0", b = "gn0", index = "gp1" }
+filter = 4
+ports = { count = "n", errors = "bad" }
+
+[peripheral.motor]
+kind = "pwm"
+pins = { high = "gp2", low = "gn2" }
+half = 1000
+dead = 25
+ports = { duty = "force" }
+scale = { duty = 8 }
+"#;
+
+const PROGRAM: &str = "
+.input n:int bad:int
+.output force
+.period
+period:
+        itof    force, n
+        wait period
+";
+
+fn program(source: &str) -> Program {
+    let loader = MemoryLoader::new(&[("p.s", source)]);
+    assemble("p.s", &loader, &Options::default()).expect("the program assembles").program
+}
+
+#[test]
+fn builtin_boards_are_right() {
+    let boards = Board::builtin().expect("their files are right");
+    assert_eq!(boards.len(), Board::names().count());
+    for (board, name) in boards.iter().zip(Board::names()) {
+        assert_eq!(board.name, name);
+        assert!(!board.source.is_empty() && board.pins.len() >= 16, "{name}");
+    }
+    // Facts that stand in the sources named in the files.
+    let board = ulx3s();
+    assert_eq!((board.clock.0.as_str(), board.clock.1, board.grade), ("G2", 25.0, 6));
+    assert_eq!((board.send.as_str(), board.receive.as_str()), ("L4", "M1"));
+    assert_eq!(
+        (board.site("gp0"), board.site("gn3"), board.site("nothing")),
+        (Some("B11"), Some("C10"), None)
+    );
+}
+
+#[test]
+fn system_is_read() {
+    let wiring = Wiring::read("robot.toml", RIGHT, &ulx3s()).expect("it is right");
+    assert_eq!((wiring.clock, wiring.period, wiring.lead, wiring.baud), (50.0, 20_000, 250, 1_000_000));
+    assert_eq!((wiring.autostart, wiring.deadlines, wiring.host), (true, 3, 100));
+    assert_eq!(wiring.peripherals[0].parameters, [4, 0]);
+    assert_eq!(wiring.peripherals[1].parameters, [1000, 25, 1]);
+    assert_eq!(
+        wiring.peripherals[1].writes[0].as_ref().map(|w| (w.port.as_str(), w.scale)),
+        Some(("force", Some(3)))
+    );
+    assert_eq!(wiring.at("gn2").as_deref(), Some("motor.low"));
+    assert_eq!((wiring.at("gp10").as_deref(), wiring.at("gp9")), (Some("drive"), None));
+    wiring.check("robot.toml", RIGHT, &program(PROGRAM)).expect("the program has its ports");
+}
+
+/// One error instead of one for each of its keys.
+#[test]
+fn a_system_is_no_wiring() {
+    let said = said(include_str!("../../../programs/three/controller.toml"));
+    assert_eq!(said.len(), 1, "{said:?}");
+    assert!(said[0].contains("this is a system of several cores, and a wiring is wanted"), "{said:?}");
+}
+
+/// What takes the place of what, and what is then said.
+const WRONG: &[(&str, &str, &str)] = &[
+    (
+        "board = \"ulx3s-85f\"",
+        "board = \"icepi-zero\"",
+        "2:9: this wiring is for the board `icepi-zero`, not for `ulx3s-85f`",
+    ),
+    ("gn0", "gp0", "17:25: pin `gp0` is used twice: line 17 has it for `encoder`"),
+    ("high = \"gp2\"", "high = \"gp10\"", "23:17: pin `gp10` is used twice: line 12 has it for `drive`"),
+    (
+        "gp2",
+        "gp99",
+        "23:17: `gp99` is no pin of ulx3s-85f; it has gp0, gn0, gp1, gn1, gp2, gn2 … (56 in all: `takt board pins ulx3s-85f`)",
+    ),
+    (
+        "\"pwm\"",
+        "\"servo\"",
+        "22:8: `servo` is no kind of peripheral; there are quadrature, step, pwm, sigma-delta, spi, digital-in, digital-out",
+    ),
+    ("half = 1000", "half = 0", "24:8: `half` is to be a whole number from 1 to 65535, not 0"),
+    (
+        "dead = 25",
+        "death = 25",
+        "25:1: `death` is no key of `motor`; there are dead, half, kind, pins, ports, scale, signed",
+    ),
+    (
+        "duty = 8",
+        "duty = 10",
+        "27:18: a scale is a power of two from 2^-60 to 2^60, as 0.5, 1 or 16, not 10: multiply by the rest in the program",
+    ),
+    ("scale = { duty", "scale = { force", "27:11: `force` is no register of a pwm that a program writes"),
+    ("high = \"gp2\", ", "", "23:8: `high` is missing in [pins]"),
+    ("period = 400.0", "period = 0.1", "4:10: 0.1 µs are 5 cycles of 50 MHz; there may be 64 to 1073741824"),
+    ("lead = 5", "lead = 400", "5:8: `lead` is to be shorter than the period"),
+    (
+        "1_000_000",
+        "11_000_000",
+        "9:8: 11000000 baud are 4.55 cycles of 50 MHz; that must be 4 to 65535, within 2 % of a whole number",
+    ),
+    ("period = 400.0", "", "1:1: `period` is missing in the file"),
+    ("autostart = true", "autostart = 1", "6:13: `autostart` is to be true or false, not 1"),
+    ("clock = 50", "clock =", "3:8: "),
+];
+
+#[test]
+fn mistakes_name_their_place() {
+    for (what, by, expected) in WRONG {
+        assert!(RIGHT.contains(what), "{what}");
+        let said = said(&RIGHT.replacen(what, by, 1));
+        assert!(
+            said.iter().any(|said| said.starts_with(&format!("robot.toml:{expected}"))),
+            "{what}: {said:#?}"
+        );
+    }
+    // All of them at once, in order.
+    let text = RIGHT.replace("half = 1000", "half = 0").replace("gn0", "gp0");
+    assert_eq!(said(&text).len(), 2);
+}
+
+#[test]
+fn ports_must_be_the_programs() {
+    let wiring = Wiring::read("robot.toml", RIGHT, &ulx3s()).expect("it is right");
+    let said = |source: &str| {
+        let mistakes = wiring.check("robot.toml", RIGHT, &program(source)).expect_err("a mistake");
+        mistakes.iter().map(Mistake::to_string).collect::<Vec<_>>().join("\n")
+    };
+    assert_eq!(
+        said(&PROGRAM.replace("bad", "worse")),
+        "robot.toml:19:33: the program has no input port `bad`; there are n, worse"
+    );
+    let float = PROGRAM.replace("n:int", "n").replace("itof    force, n", "fadd force, n, n");
+    assert!(said(&float).contains("19:19: input port `n` is a float"), "{}", said(&float));
+    let integer = PROGRAM.replace("force\n", "force:int\n").replace("itof    force, n", "mov force, n");
+    assert!(
+        said(&integer).contains("26:18: output port `force` is an integer, which is not scaled"),
+        "{}",
+        said(&integer)
+    );
+    let unscaled = RIGHT.replace("scale = { duty = 8 }", "");
+    let wiring = Wiring::read("robot.toml", &unscaled, &ulx3s()).expect("it is right");
+    let mistakes = wiring.check("robot.toml", &unscaled, &program(PROGRAM)).expect_err("a mistake");
+    assert!(mistakes[0].text.contains("`scale` says how many"), "{mistakes:?}");
+}
+
+#[test]
+fn a_site_is_taken_once() {
+    let text = include_str!("../boards/icepi-zero.toml");
+    let mistakes = Board::read("mine.toml", &text.replace("gpio3 = \"R2\"", "gpio3 = \"M1\""))
+        .expect_err("M1 is the clock");
+    assert!(
+        mistakes[0].to_string().ends_with("site M1 is taken: line 14 has it for the clock"),
+        "{mistakes:?}"
+    );
+    let mistakes =
+        Board::read("mine.toml", &text.replace("\"LFE5U-25F\"", "\"iCE40\"")).expect_err("no such part");
+    assert!(
+        mistakes[0].text.contains("`iCE40` is no device; there are LFE5U-25F, LFE5U-45F, LFE5U-85F"),
+        "{mistakes:?}"
+    );
+}
+
+/// The tables in the documents are those of the code; `TAKT_BLESS=1` writes them.
+#[test]
+fn documents_have_the_tables() {
+    for (name, heading, rows) in [
+        ("board.md", "| kind | pins |", takt_board::kind::markdown()),
+        ("protocol.md", "| address | register |", takt_board::protocol::markdown()),
+    ] {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs").join(name);
+        let text = std::fs::read_to_string(&path).expect("the document");
+        let heading = text.find(heading).expect("the table's heading");
+        let begin = heading + text[heading..].match_indices('\n').nth(1).expect("its two lines").0 + 1;
+        let end = begin + text[begin..].find("\n\n").map_or(text.len() - begin, |end| end + 1);
+        if std::env::var_os("TAKT_BLESS").is_some() {
+            let text = format!("{}{rows}{}", &text[..begin], &text[end..]);
+            std::fs::write(&path, text).expect("the document can be written");
+        } else {
+            assert_eq!(text[begin..end], rows, "{name}: TAKT_BLESS=1 writes the table");
+        }
+    }
+}

@@ -1,0 +1,546 @@
+//! A system of three cores on a board, complete in Verilator: the example `programs/examples/board/axis`, with the real host at its UART.
+
+#[path = "harness/board.rs"]
+mod harness;
+
+use harness::{Ticks, refuses};
+use std::panic::AssertUnwindSafe;
+use std::path::Path;
+use takt_asm::{MemoryLoader, Options, assemble};
+use takt_board::ends::{Ends, Fifo};
+use takt_board::latency::{Part, system_ways};
+use takt_board::protocol::{IMAGE, LinkError};
+use takt_board::simulation::{Simulation, Turn};
+use takt_board::{Application, Board, Host, Wiring, top};
+use takt_isa::Program;
+use takt_system::latency::Passages;
+use takt_system::{Description, LinkKind, ProgramError, Request, System};
+
+const SYSTEM: &str = include_str!("../../../programs/examples/board/axis/axis.toml");
+const SOURCES: [(&str, &str); 3] = [
+    ("profile.s", include_str!("../../../programs/examples/board/axis/profile.s")),
+    ("servo.s", include_str!("../../../programs/examples/board/axis/servo.s")),
+    ("watch.s", include_str!("../../../programs/examples/board/axis/watch.s")),
+];
+
+/// The example's wiring, with all that makes outputs safe.
+fn wiring_text() -> String {
+    let text = include_str!("../../../programs/examples/board/axis/wiring.toml");
+    text.replace("baud = 1_000_000", "baud = 5_000_000\ndeadlines = 2")
+        .replace("host = 0 ", "host = 60 ")
+        .replace("[signals]", "[signals]\ndeadline = \"gp12\"\ntick = \"gp13\"\nstop = \"gn10\"")
+}
+
+/// Cycles of a base tick.
+const PERIOD: u32 = 5000;
+/// Half a period of the PWM, its dead time, and its steps for 1.0, in cycles.
+const PWM: (i32, i32, f32) = (1250, 25, 1024.0);
+
+fn program(name: &str, source: &str, request: &Request<'_>) -> Program {
+    let loader = MemoryLoader::new(&[(name, source)]);
+    let options = Options { machine: request.machine.expect("the file says it"), ..Options::default() };
+    assemble(name, &loader, &options).unwrap_or_else(|error| panic!("{error:?}")).program
+}
+
+/// The system, with some of its sources changed.
+fn system(change: &dyn Fn(&str, &str) -> String) -> Description {
+    let read = takt_system::read("axis.toml", SYSTEM, |request: &Request<'_>| {
+        let (name, source) = SOURCES.iter().find(|(name, _)| *name == request.path).expect("a source");
+        Ok::<_, ProgramError<()>>(program(name, &change(name, source), request))
+    });
+    read.unwrap_or_else(|_| panic!("the system is right"))
+}
+
+fn unchanged() -> Description {
+    system(&|_, source| source.to_owned())
+}
+
+fn ulx3s() -> Board {
+    Board::from_name("ulx3s-85f").expect("a board").expect("a right one")
+}
+
+fn wiring(description: &Description) -> Wiring {
+    let text = wiring_text();
+    let wiring = Wiring::read("wiring.toml", &text, &ulx3s()).expect("a right wiring");
+    wiring.check("wiring.toml", &text, description).expect("ports fit");
+    wiring
+}
+
+/// A board with the system, from power-up on.
+fn board(description: &Description, folder: &str) -> Simulation {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(folder);
+    let sim = Simulation::new(&ulx3s(), &wiring(description), description, &folder);
+    sim.unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn periods(board: &mut Simulation, count: u32) {
+    board.run(count * PERIOD, &[]).expect("it runs");
+}
+
+fn safe(board: &mut Simulation) -> bool {
+    periods(board, 1);
+    let level = |name: &str| board.output(name).expect("a pin");
+    ["signal_drive", "motor_high", "motor_low", "lamp_out"].iter().all(|name| level(name) == (false, 0))
+}
+
+/// Cycles in which the upper switch conducts in a period of the PWM.
+fn pulse(board: &mut Simulation) -> i32 {
+    board.run(2 * PWM.0 as u32, &[]).expect("it runs");
+    board.output("motor_high").expect("a pin").1 as i32
+}
+
+/// What it is to be at an error.
+fn expected(error: f32) -> i32 {
+    let duty = (error * 0.02).clamp(-1.0, 1.0);
+    PWM.0 + (duty * PWM.2).round_ties_even() as i32 - PWM.1
+}
+
+struct Names {
+    description: Description,
+    ends: Ends,
+}
+
+impl Names {
+    fn of(description: &Description) -> Names {
+        Names { description: description.clone(), ends: Ends::of(description) }
+    }
+
+    fn at(&self, name: &str) -> u16 {
+        Application::from(&self.description).find(name).unwrap_or_else(|error| panic!("{error}")).read
+    }
+
+    fn set(&self, name: &str) -> u16 {
+        Application::from(&self.description).settable(name).unwrap_or_else(|error| panic!("{error}")).0
+    }
+
+    fn fifo(&self, name: &str, to_host: bool) -> Fifo {
+        self.ends.fifo(name, to_host).unwrap_or_else(|error| panic!("{error}")).clone()
+    }
+
+    fn read(&self, host: &mut Host<Simulation>, name: &str) -> u32 {
+        host.read(self.at(name), 1).unwrap_or_else(|error| panic!("{name}: {error}"))[0]
+    }
+}
+
+fn connect(sim: Simulation) -> Host<Simulation> {
+    Host::connect(sim, 77).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn float(value: f32) -> u32 {
+    value.to_bits()
+}
+
+/// Cycles from an edge of the encoder, so many cycles before a tick, to the first one in which the PWM's pulse is not that of before.
+fn measured_of_pulse(ticks: &Ticks, board: &mut Simulation, before: u64, turn: Turn) -> u64 {
+    let period = 2 * PWM.0 as u32;
+    ticks.run_to(board, before, period);
+    let is_high = |board: &mut Simulation| {
+        board.run(1, &[]).expect("it runs");
+        board.output("motor_high").expect("a pin").1 == 1
+    };
+    let mut levels: Vec<bool> = (0..period).map(|_| is_high(board)).collect();
+    board.turns.push(turn);
+    let differs = |cycle: &usize| {
+        levels.push(is_high(board));
+        levels[cycle + period as usize] != levels[*cycle]
+    };
+    (0..4 * PERIOD as usize).find(differs).expect("the motor follows") as u64
+}
+
+/// From an edge of the encoder, which stands at 0, to the motor's and the lamp's, in many phases to the ticks.
+fn pins_follow_as_the_bound_says(host: &mut Host<Simulation>, description: &Description, pins: [usize; 2]) {
+    let bound = |core: &takt_system::Core| takt_analysis::bound(&core.program).expect("it can be bounded");
+    let bounds: Vec<_> = description.cores.iter().map(bound).collect();
+    let ways = system_ways(&wiring(description), &Passages::new(description, &bounds)).expect("few ways");
+    let [motor, lamp] = &ways.ways[..] else { panic!("{:?}", ways.ways) };
+    assert_eq!((motor.cores.join(" "), lamp.cores.join(" ")), ("servo".into(), "servo watch".into()));
+    let edge = lamp.inputs[0].parts[0].best;
+    let (ticks, mut count) = (Ticks::of(&mut host.line, PERIOD), 0);
+    // Both of the base ticks that one tick of the watch follows.
+    let mut all = |before: &[u64], measured: &dyn Fn(&mut Simulation, u64, Turn) -> u64| {
+        let phases = before.iter().flat_map(|&before| [(before, 0), (before, 1)]);
+        let cycles = phases.map(|(before, more)| {
+            // The host is there, so that outputs drive.
+            assert!(host.status().expect("status").drives());
+            periods(&mut host.line, more);
+            let by = if count == 0 { 1 } else { -1 };
+            let cycles = measured(&mut host.line, before, Turn { pins, from: count, by });
+            count += by;
+            periods(&mut host.line, 2);
+            cycles
+        });
+        let cycles: Vec<u64> = cycles.collect();
+        (*cycles.iter().min().expect("some"), *cycles.iter().max().expect("some"))
+    };
+    // Just in time for a tick, just too late, and between.
+    let total = lamp.total().expect("an edge");
+    let found = all(&[edge, edge - 1, 4999, 4000, 2600, 2500, 1234, 400, 20], &|sim, before, turn| {
+        ticks.measured(sim, before, |sim| sim.turns.push(turn), "lamp_out")
+    });
+    assert_eq!(found, (total.best, total.worst));
+    // Base ticks are a whole number of the PWM's periods apart, so that values always come at the same place of one.
+    let (fixed, pwm) =
+        (Part::sum("", motor.inputs[0].parts.iter().chain(&motor.between)), motor.total().expect("an edge"));
+    let (least, most) =
+        all(&[edge, edge - 1], &|sim, before, turn| measured_of_pulse(&ticks, sim, before, turn));
+    assert!(least >= pwm.best && most <= pwm.worst, "{least} to {most}, and not {pwm:?}");
+    assert_eq!(most - least, fixed.worst - fixed.best, "{least} to {most}");
+}
+
+#[test]
+fn a_system_runs_talks_and_fails_safe() {
+    let description = unchanged();
+    let names = Names::of(&description);
+    let mut sim = board(&description, "system-board");
+    let encoder = [sim.input("encoder_a").expect("a pin"), sim.input("encoder_b").expect("a pin")];
+
+    // From power-up, without a host: safe, then it drives, with an error of 0.
+    sim.run(1000, &[]).expect("it runs");
+    assert_eq!(sim.output("signal_drive"), Some((false, 0)), "before the first periods");
+    periods(&mut sim, 10);
+    assert_eq!(sim.output("signal_drive").map(|(level, _)| level), Some(true), "it drives");
+    assert_eq!(pulse(&mut sim), expected(0.0));
+
+    let mut host = connect(sim);
+    pins_follow_as_the_bound_says(&mut host, &description, encoder);
+
+    // The loop through the pins: the servo reads the encoder, the watch lights the lamp.
+    host.line.turns.push(Turn { pins: encoder, from: 0, by: 20 });
+    periods(&mut host.line, 3);
+    periods(&mut host.line, 3);
+    assert_eq!(pulse(&mut host.line), expected(-20.0));
+    assert_eq!(host.line.output("lamp_out").map(|(level, _)| level), Some(true));
+
+    // Ports of each core, and what the host drives.
+    assert_eq!(host.cores, 3);
+    host.fits(&description).expect("it is this system's circuit");
+    assert!((0..3).all(|core| host.status_of(core).expect("status").drives()));
+    assert_eq!(names.read(&mut host, "servo.n"), 20);
+    assert_eq!(names.read(&mut host, "n"), 20, "the wire that the encoder drives");
+    assert_eq!(names.read(&mut host, "servo.error"), float(-20.0));
+    assert_eq!(names.read(&mut host, "watch.error"), float(-20.0));
+    assert_eq!(names.read(&mut host, "seen.peak"), float(20.0));
+    assert_eq!(names.read(&mut host, "watch.limit"), 0);
+    host.write(names.set("watch.limit"), &[float(25.0)]).expect("a port");
+    periods(&mut host.line, 4);
+    assert_eq!(names.read(&mut host, "watch.limit"), float(25.0));
+    assert_eq!(host.line.output("lamp_out").map(|(level, _)| level), Some(false), "below the limit");
+
+    // FIFOs: two moves go in, where they end comes out.
+    let (moves, reached) = (names.fifo("moves", false), names.fifo("reached", true));
+    assert_eq!(host.pop(&reached).expect("a FIFO"), None);
+    for target in [10.0, 15.0] {
+        assert!(host.push(&moves, &[float(target), float(5.0)]).expect("a FIFO"));
+    }
+    periods(&mut host.line, 6);
+    assert_eq!(names.read(&mut host, "profile.wanted"), float(15.0));
+    assert_eq!(pulse(&mut host.line), expected(-5.0));
+    assert_eq!(host.fifo(&reached).expect("a FIFO").count(), 2);
+    assert_eq!(host.pop(&reached).expect("a FIFO"), Some(vec![float(10.0)]));
+    assert_eq!(host.pop(&reached).expect("a FIFO"), Some(vec![float(15.0)]));
+    assert_eq!(host.pop(&reached).expect("a FIFO"), None);
+
+    // What cannot be written is refused: registers, a core's ports, a value that the encoder drives or that a link brings, a FIFO's status
+    // and the fields of one to the host, the image of what runs.
+    let drives = names.at("n");
+    for address in [0, 15, 16, 0x102, names.at("servo.n"), drives, names.at("watch.lit"), 0x3400, 0x8000] {
+        refuses(&mut host, address, &[1]);
+    }
+    for address in [moves.address, reached.address, reached.field(0), IMAGE] {
+        refuses(&mut host, address, &[1]);
+    }
+
+    // Counters by core: the watch has every second base tick.
+    let all = |host: &mut Host<Simulation>, name: &str| {
+        [0, 1, 2].map(|core| host.register_of(core, name).expect("a register"))
+    };
+    let counted = all(&mut host, "periods");
+    assert!(counted[0].abs_diff(2 * counted[2]) <= 4 && counted[0].abs_diff(counted[1]) <= 2, "{counted:?}");
+    assert_eq!(all(&mut host, "misses"), [0; 3]);
+
+    // A stream of a core's port.
+    host.set("stream", 2 << 20 | 1 << 16 | u32::from(names.at("watch.values"))).expect("stream");
+    let mut seen = Vec::new();
+    while seen.len() < 4 {
+        if let Some(frame) = host.streamed().expect("a line") {
+            seen.push((frame.words[0], frame.words[1]));
+        }
+    }
+    assert!(seen.windows(2).all(|pair| pair[1].0 == pair[0].0 + 2 && pair[1].1 == pair[0].1 + 2), "{seen:?}");
+    assert!(seen.iter().all(|(period, values)| period == values), "periods are the watch's: {seen:?}");
+    host.set("stream", 0).expect("stream");
+
+    // Noise on the line: no entry is lost, and none goes in or comes out twice.
+    host.line.noise = 300;
+    let mut ended = Vec::new();
+    for target in 0..24 {
+        while !host.push(&moves, &[float(target as f32), float(50.0)]).expect("in spite of noise") {
+            periods(&mut host.line, 1);
+        }
+        periods(&mut host.line, 1);
+        while let Some(entry) = host.pop(&reached).expect("in spite of noise") {
+            ended.push(entry[0]);
+        }
+    }
+    host.line.noise = 0;
+    periods(&mut host.line, 6);
+    while let Some(entry) = host.pop(&reached).expect("a FIFO") {
+        ended.push(entry[0]);
+    }
+    assert_eq!(ended, (0..24).map(|target| float(target as f32)).collect::<Vec<_>>());
+    assert!(host.retries > 0, "there was no noise");
+    assert!(!host.fifo(&reached).expect("a FIFO").overflow());
+
+    // A FIFO that nobody takes from refuses, and says so; so does one that is full.
+    host.set("control", 0b111).expect("hold");
+    let pushed = (0..6).filter(|_| host.push(&moves, &[float(1.0), float(9.0)]).expect("a FIFO")).count();
+    assert_eq!(pushed, 4);
+    let status = host.fifo(&moves).expect("a FIFO");
+    assert!(status.full() && !status.overflow() && status.count() == 4, "{status:?}");
+    host.set("control", 0b101).expect("go");
+    periods(&mut host.line, 8);
+    assert!(host.fifo(&reached).expect("a FIFO").overflow(), "depth 2, four moves");
+
+    // The host is gone.
+    host.line.unplugged = true;
+    periods(&mut host.line, 70);
+    assert!(safe(&mut host.line), "without a host");
+    host.line.unplugged = false;
+    let causes = |host: &mut Host<Simulation>, core: usize| -> Vec<&'static str> {
+        host.status_of(core).expect("status").causes().collect()
+    };
+    assert_eq!(causes(&mut host, 1), ["host silent"]);
+    // A start: FIFOs and what the host had set are empty again. What is set at once waits until all is loaded.
+    host.set("control", 0x105).expect("control");
+    host.write(names.set("limit"), &[float(7.0)]).expect("a port");
+    assert_eq!(names.read(&mut host, "limit"), float(7.0));
+    assert!(host.fifo(&moves).expect("a FIFO").empty());
+    periods(&mut host.line, 6);
+    assert!(host.status().expect("status").drives());
+    assert_eq!(names.read(&mut host, "watch.limit"), float(7.0));
+
+    // The stop input; a reset in mid-period.
+    host.line.set("signal_stop", true);
+    periods(&mut host.line, 1);
+    assert!(safe(&mut host.line), "stopped");
+    host.line.set("signal_stop", false);
+    assert_eq!(causes(&mut host, 2), ["stop"]);
+    host.set("control", 0x105).expect("control");
+    periods(&mut host.line, 5);
+    host.line.run(1037, &[]).expect("it runs");
+    host.line.set("button", true);
+    host.line.run(10, &[]).expect("it runs");
+    assert!(safe(&mut host.line), "in reset");
+    host.line.set("button", false);
+    periods(&mut host.line, 6);
+    assert!(host.status().expect("status").drives(), "after a reset");
+
+    // Other programs for the same circuit: each core's fault, halt, missed deadline or NaN makes outputs safe, and says which it is.
+    let slow = "        mov     k, 9000\nagain:  isub    k, k, 1\n        bnz     k, again\n        wait    period\n";
+    let in_place = |of: &'static str, from: &'static str, to: String| {
+        system(&move |name, source| if name == of { source.replace(from, &to) } else { source.to_owned() })
+    };
+    let cases = [
+        (in_place("watch.s", "        flt     lit, limit, a\n", "        ret\n".to_owned()), 2, "fault"),
+        (in_place("profile.s", "        bnz     empty, idle\n", "        halt\n".to_owned()), 0, "halt"),
+        (
+            in_place(
+                "watch.s",
+                ".reg    a\n",
+                format!(".reg    a k:int\n{}", slow.replace("        wait    period\n", "")),
+            ),
+            2,
+            "missed deadline",
+        ),
+        (
+            in_place(
+                "servo.s",
+                "        wait    period\n",
+                "        fdiv    duty, zero, zero\n        wait    period\n".to_owned(),
+            ),
+            1,
+            "NaN output",
+        ),
+    ];
+    for (other, core, cause) in cases {
+        host.fits(&other).expect("the circuit is the same");
+        host.load(&top::image(&other).expect("it fits").records).expect("it is loaded");
+        assert!(safe(&mut host.line), "while it is loaded");
+        assert!(matches!(host.push(&moves, &[0, 0]), Err(LinkError::Stopped)), "entries would be lost");
+        host.set("control", 5).expect("control");
+        periods(&mut host.line, 12);
+        assert!(safe(&mut host.line), "{cause}");
+        for each in 0..3 {
+            let found = causes(&mut host, each);
+            assert_eq!(found.contains(&cause), each == core, "{cause}: core {each}: {found:?}");
+        }
+        let status = host.status_of(core).expect("status");
+        assert_eq!((status.fault(), status.halted()), (cause == "fault", cause == "halt"));
+        // Ports can be read of a core that has stopped, and of the others; not of one that never waits.
+        let is_late = |name: &str| cause == "missed deadline" && name == "watch.peak";
+        for name in ["profile.wanted", "servo.n", "watch.peak"].into_iter().filter(|name| !is_late(name)) {
+            names.read(&mut host, name);
+        }
+        let misses = all(&mut host, "misses");
+        // To one that has halted, every tick comes too early.
+        assert_eq!(misses[core] > 1, ["missed deadline", "halt"].contains(&cause), "{cause}: {misses:?}");
+    }
+
+    // A core that waits for an entry before its first period: the host can push, and then base ticks begin.
+    let first = "        mov     wanted, zero\n";
+    let waits = in_place("profile.s", first, format!("{first}boot:   bnz     empty, boot\n"));
+    host.load(&top::image(&waits).expect("it fits").records).expect("it is loaded");
+    host.set("control", 5).expect("control");
+    periods(&mut host.line, 6);
+    assert_eq!(all(&mut host, "periods"), [0; 3]);
+    assert!(host.push(&moves, &[float(4.0), float(4.0)]).expect("a FIFO"));
+    periods(&mut host.line, 6);
+    assert!(host.status().expect("status").drives());
+    assert_eq!(host.pop(&reached).expect("a FIFO"), Some(vec![float(4.0)]));
+
+    // Back to the first ones; and another system's are refused before anything happens.
+    host.load(&top::image(&description).expect("it fits").records).expect("it is loaded");
+    host.set("control", 5).expect("control");
+    periods(&mut host.line, 12);
+    assert!(host.status().expect("status").drives());
+    let mut other = description.clone();
+    for link in &mut other.links {
+        if let LinkKind::Fifo { depth, .. } = &mut link.kind {
+            *depth += 1;
+        }
+    }
+    assert!(matches!(host.fits(&other), Err(LinkError::OtherCircuit)));
+    let single = &description.cores[0].program;
+    assert!(matches!(host.fits(&**single), Err(LinkError::IsSystem(3))));
+}
+
+/// A base tick at a time, with the same inputs and noise on the UART: every output port of every core, what the host sees and what it pops
+/// have the same words as in the emulator, and the PWM has the pulse that belongs to them.
+fn compare(description: &Description, sim: Simulation, ticks: u32) {
+    let names = Names::of(description);
+    let mut host = connect(sim);
+    host.line.noise = 1000;
+    let encoder = ["encoder_a", "encoder_b"].map(|pin| host.line.input(pin).expect("a pin"));
+    // Held from the beginning on.
+    host.set("control", 0x107).expect("control");
+    let mut system = System::new(description).expect("it can be emulated");
+    let start = system.run_to_start(1 << 20).expect("no fault").expect("it starts");
+    let mut next = start - description.lead();
+    let (moves, reached) = (names.fifo("moves", false), names.fifo("reached", true));
+    let (mut seed, mut position) = (1_u32, 0_i32);
+    let mut chance = |most: u32| {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (seed >> 8) % most
+    };
+    let mut compared = 0;
+    for tick in 0..ticks {
+        let by = chance(25) as i32 - 12;
+        host.line.turns.push(Turn { pins: encoder, from: position, by });
+        host.line.run(3000, &[]).expect("it runs");
+        position += by;
+        let limit = float(chance(200) as f32 / 16.0);
+        host.write(names.set("limit"), &[limit]).expect("a port");
+        system.run_until(next).expect("no fault");
+        system.set_input("n", position as u32).expect("an input");
+        system.set_input("limit", limit).expect("an input");
+        if chance(3) == 0 {
+            let entry = [float(chance(99) as f32 / 4.0), float(chance(40) as f32 / 8.0 + 0.5)];
+            for (name, value) in ["moves.target", "moves.rate"].into_iter().zip(entry) {
+                system.set_input(name, value).expect("an input");
+            }
+            let room = host.push(&moves, &entry).expect("a FIFO");
+            if room {
+                assert!(system.push(moves.link).expect("a FIFO"), "tick {tick}");
+            }
+        }
+        host.set("step", 1).expect("step");
+        next += description.tick;
+        system.run_until(next).expect("no fault");
+        for (number, core) in description.cores.iter().enumerate() {
+            for port in &core.program.outputs {
+                let name = format!("{}.{}", core.name, port.name);
+                let circuit = names.read(&mut host, &name);
+                // What was never written may be anything.
+                if let Some(emulated) = system.core(number).output_bits(port.register) {
+                    assert_eq!(circuit, emulated, "tick {tick}: {name}");
+                    compared += 1;
+                }
+            }
+        }
+        let error = f32::from_bits(names.read(&mut host, "servo.error"));
+        // The PWM takes the new duty with its next period.
+        pulse(&mut host.line);
+        let pulse = pulse(&mut host.line);
+        // Outputs drive with the end of the first periods, and take on what comes after it.
+        assert!(tick == 0 || pulse == expected(error), "tick {tick}: error {error}: {pulse}");
+        for end in &names.ends.outputs {
+            let emulated = system.output(&end.name).expect("an output");
+            assert_eq!(names.read(&mut host, &end.name), emulated, "tick {tick}: {}", end.name);
+        }
+        if chance(2) == 0 {
+            let emulated = system.pop(reached.link).expect("a FIFO");
+            assert_eq!(host.pop(&reached).expect("a FIFO"), emulated, "tick {tick}");
+        }
+    }
+    assert!(compared > 6 * ticks, "{compared}");
+    // And all that each core holds in the end, in answers so long that noise would get most of them.
+    host.line.noise = 0;
+    let on_board = Application::from(description);
+    for (number, core) in description.cores.iter().enumerate() {
+        let machine = core.program.machine;
+        let emulator = system.core(number);
+        for slot in machine.slots {
+            let first = slot.bank.registers().next().expect("a bank has registers");
+            let at = on_board.register(number, first).expect("it can be read");
+            let read = host.read(at, slot.bank.depth.into()).expect("a bank");
+            for (register, bits) in slot.bank.registers().zip(read) {
+                let known = emulator.register(register).unwrap_or(bits);
+                assert_eq!(bits, known, "{}.{}", core.name, core.program.register_text(register));
+            }
+        }
+        let words = emulator.memory();
+        let read =
+            host.read(on_board.word(number, 0).expect("it can be read"), words.len()).expect("the memory");
+        let differs = words.iter().zip(&read).position(|(word, read)| word != read);
+        assert_eq!(differs, None, "{}: a data word", core.name);
+    }
+    assert!(host.retries > 0, "there was no noise");
+    for (core, name) in description.cores.iter().enumerate().map(|(number, core)| (number, &core.name)) {
+        let periods = host.register_of(core, "periods").expect("a register");
+        assert_eq!(u64::from(periods), system.periods(core).count, "{name}");
+    }
+}
+
+#[test]
+fn circuit_and_emulator_have_the_same_words() {
+    let description = unchanged();
+    compare(&description, board(&description, "system-words"), 60);
+}
+
+/// What is around the system, with one thing wrong.
+#[test]
+fn planted_faults_are_noticed() {
+    let description = unchanged();
+    let wiring = wiring(&description);
+    let circuit = top::circuit(&ulx3s(), &wiring, &description).expect("there is a circuit");
+    let faults = [
+        // A repeated request is made twice; a core has every base tick, or no offset; a float is not scaled.
+        ("board/takt_bridge.v", "repeats = has_data & known", "repeats = has_data & ~known"),
+        ("board/takt_follow.v", "turns == LAST ? 32'd0", "turns == 32'd0 ? 32'd0"),
+        ("board/takt_follow.v", "FIRST = LEAD + OFFSET - 2", "FIRST = LEAD - 2"),
+        ("board/takt_turn.v", ".exponent(EXPONENTS[10*which1 +: 10])", ".exponent(10'd0)"),
+        // A core has what another one is loaded with.
+        ("takt_peripherals.v", ".load(loads[1])", ".load(loads[0])"),
+    ];
+    for (at, from, to) in faults {
+        let mut files = circuit.files.clone();
+        let file = files.iter_mut().find(|file| file.name == at).expect("a file");
+        assert_eq!(file.text.matches(from).count(), 1, "{from}");
+        file.text = file.text.replace(from, to);
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("system-faults");
+        let sim =
+            Simulation::of(&files, &ulx3s(), &wiring, &folder).unwrap_or_else(|error| panic!("{error}"));
+        let noticed = std::panic::catch_unwind(AssertUnwindSafe(|| compare(&description, sim, 60)));
+        assert!(noticed.is_err(), "nobody noticed {to}");
+    }
+}

@@ -1,0 +1,391 @@
+//! The complete top level of a board in Verilator, with a plant behind its pins and the real host at its UART.
+
+#[path = "harness/board.rs"]
+mod harness;
+
+use harness::{Ticks, refuses};
+use std::panic::AssertUnwindSafe;
+use std::path::{Path, PathBuf};
+use takt_asm::{MemoryLoader, Options, assemble};
+use takt_board::latency::{self, Part};
+use takt_board::protocol::{IMAGE, INPUTS, LinkError, OUTPUTS};
+use takt_board::simulation::{Simulation, Turn};
+use takt_board::tools::{NEXTPNR, Venv, YOSYS};
+use takt_board::wiring::Peripheral;
+use takt_board::{Board, Host, Wiring, build, routed, top, twin};
+use takt_isa::{Program, T1};
+
+const WIRING: &str = r#"
+clock = 50
+period = 40
+baud = 5_000_000
+autostart = true
+deadlines = 2
+host = 400
+
+[signals]
+drive = "gp10"
+fault = "gp11"
+deadline = "gp12"
+tick = "gp13"
+stop = "gn10"
+
+[peripheral.encoder]
+kind = "quadrature"
+pins = { a = "gp0", b = "gn0" }
+filter = 3
+ports = { count = "n" }
+
+[peripheral.motor]
+kind = "pwm"
+pins = { high = "gp2", low = "gn2" }
+half = 250
+dead = 5
+ports = { duty = "force" }
+scale = { duty = 16 }
+
+[peripheral.lamp]
+kind = "digital-out"
+pins = { out = "gp3" }
+ports = { level = "lit" }
+"#;
+
+/// Cycles of a period, as the system has them.
+const PERIOD: u32 = 2000;
+
+/// A proportional controller with a set point that the host sets; `force` is a quarter of the difference, and the lamp is lit at odd counts.
+const PROGRAM: &str = "
+.schedule on
+.input n:int wanted:int
+.output force lit:int
+.once
+        mov     force, zero
+        mov     lit, zero
+        wait    period
+.period
+period:
+.reg    e:int f
+        isub    e, wanted, n
+        itof    f, e
+        fmul    force, f, 0.25
+        iand    lit, n, 1
+        wait    period
+";
+
+/// More work than a period has cycles for.
+const SLOW: &str = ".reg k:int
+        mov     k, 2000
+again:  isub    k, k, 1
+        bnz     k, again
+";
+
+fn program(source: &str) -> Program {
+    let loader = MemoryLoader::new(&[("p.s", source)]);
+    let options = Options { machine: &T1, ..Options::default() };
+    assemble("p.s", &loader, &options).unwrap_or_else(|e| panic!("{e:?}")).program
+}
+
+fn port(program: &Program, name: &str) -> u16 {
+    let input = program.inputs.iter().find(|port| port.name == name);
+    match input {
+        Some(port) => INPUTS + program.machine.inputs.index(port.register).expect("an input").get(),
+        None => {
+            let port = program.outputs.iter().find(|port| port.name == name).expect("a port");
+            OUTPUTS + port.register.get() % program.machine.outputs_per_bank
+        }
+    }
+}
+
+/// Runs whole periods.
+fn periods(board: &mut Simulation, count: u32) {
+    board.run(count * PERIOD, &[]).expect("it runs");
+}
+
+/// Whether the outputs are safe: nothing drives.
+fn safe(board: &mut Simulation) -> bool {
+    periods(board, 1);
+    let level = |name: &str| board.output(name).expect("a pin");
+    ["signal_drive", "motor_high", "motor_low", "lamp_out"].iter().all(|name| level(name) == (false, 0))
+}
+
+/// Cycles in which the upper switch conducts, in one period of the PWM.
+fn pulse(board: &mut Simulation) -> u32 {
+    board.run(500, &[]).expect("it runs");
+    board.output("motor_high").expect("a pin").1
+}
+
+/// Of each pin of a PWM, over every change of the duty in every phase, the least and the most cycles until the change shows.
+fn shows(pwm: &Peripheral, half: i32) -> [(u64, u64); 2] {
+    let dead = pwm.parameter("dead").cast_signed();
+    let (put, end) = (4 * half + dead, 12 * half + 4 * dead);
+    let runs = |old: i32, new: i32, put: i32| -> Vec<[u32; 2]> {
+        let mut twin = twin::of(pwm.kind, &pwm.parameters).expect("a twin");
+        let clock = |cycle: i32| {
+            let duty = if cycle < put { old } else { new };
+            twin.clock(&[0, 1, (cycle == 0 || cycle == put).into(), duty as u32]);
+            [twin.outputs()[0], twin.outputs()[1]]
+        };
+        (0..end).map(clock).collect()
+    };
+    let mut found = [(u64::MAX, 0); 2];
+    for old in -half..=half {
+        let without = runs(old, old, put);
+        for (new, phase) in (-half..=half).flat_map(|new| (0..2 * half).map(move |phase| (new, phase))) {
+            let with = runs(old, new, put + phase);
+            for (pin, (least, most)) in found.iter_mut().enumerate() {
+                let first = with.iter().zip(&without).position(|(a, b)| a[pin] != b[pin]);
+                // Outputs after the clock's edge of a cycle are those of the next one. Pulses within the dead time are not seen.
+                let Some(first) = first else { continue };
+                let cycles = (first as i32 + 1 - put - phase) as u64;
+                (*least, *most) = ((*least).min(cycles), (*most).max(cycles));
+            }
+        }
+    }
+    found
+}
+
+/// Of a PWM with any dead time, the first cycle in which a new duty shows at one of its pins.
+#[test]
+fn a_duty_shows_as_late_as_the_bound_says() {
+    let board = Board::from_name("ulx3s-85f").expect("a board").expect("a right one");
+    for (half, dead) in [(13, 3), (4, 0), (5, 1), (6, 2), (6, 7), (9, 8), (2, 5), (3, 20), (1, 9)] {
+        let bound = |pins: &str| {
+            let text = format!(
+                "period = 40\n[peripheral.encoder]\nkind = \"quadrature\"\npins = {{ a = \"gp0\", b = \"gn0\" }}\nports = {{ count = \"n\" }}\n[peripheral.motor]\nkind = \"pwm\"\npins = {{ {pins} }}\nhalf = {half}\ndead = {dead}\nports = {{ duty = \"force\" }}\n"
+            );
+            let wiring = Wiring::read("w.toml", &text, &board).expect("a right wiring");
+            let sum = Part::sum("", &latency::ways(&wiring, (0, 0)).ways[0].outputs[0].parts);
+            ((sum.best, sum.worst), wiring.peripherals[1].clone())
+        };
+        let (both, pwm) = bound("high = \"gp2\", low = \"gn2\"");
+        let (high, _) = bound("high = \"gp2\"");
+        let [upper, lower] = shows(&pwm, half);
+        assert_eq!(upper, high, "half {half}, dead time {dead}");
+        assert_eq!((upper.0.min(lower.0), upper.1.max(lower.1)), both, "half {half}, dead time {dead}");
+    }
+}
+
+/// Board, wiring and program, and a folder for it.
+fn target(folder: &str) -> (Board, Wiring, Program, PathBuf) {
+    let board = Board::from_name("ulx3s-85f").expect("a board").expect("a right one");
+    let wiring = Wiring::read("wiring.toml", WIRING, &board).expect("a right wiring");
+    let first = program(PROGRAM);
+    wiring.check("wiring.toml", WIRING, &first).expect("ports fit");
+    (board, wiring, first, Path::new(env!("CARGO_TARGET_TMPDIR")).join(folder))
+}
+
+#[test]
+fn board_runs_talks_and_fails_safe() {
+    let (board, wiring, first, folder) = target("board-wiring");
+    let sim = Simulation::new(&board, &wiring, &first, &folder).unwrap_or_else(|error| panic!("{error}"));
+    runs_talks_and_fails_safe(sim, &wiring, &first);
+}
+
+/// The same, with what nextpnr has placed and routed, from which the bitstream is made; and a fault planted there is noticed.
+///
+/// Synthesis, place and route take minutes: with `TAKT_ROUTED=1` only, as `cargo xtask test` sets it, in the tools' environment that
+/// `TAKT_VENV` names, or `.venv`.
+#[test]
+fn the_routed_design_does_the_same() {
+    if std::env::var_os("TAKT_ROUTED").is_none() {
+        return;
+    }
+    let (board, wiring, first, folder) = target("board-routed");
+    let venv = std::env::var_os("TAKT_VENV")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../.venv"), PathBuf::from);
+    let venv = Venv::with(&venv, &[YOSYS, NEXTPNR]).unwrap_or_else(|error| panic!("{error}"));
+    let options = build::Options { seed: 1, netlist: true };
+    std::fs::create_dir_all(&folder).expect("the target folder can be written");
+    build::build(&venv, &board, &wiring, &first, options, &folder, &|_| ()).unwrap_or_else(|e| panic!("{e}"));
+    let simulated = |change: &dyn Fn(&mut serde_json::Map<String, serde_json::Value>)| {
+        let files = routed::verilog(&venv, &folder, change).unwrap_or_else(|error| panic!("{error}"));
+        Simulation::of(&files, &board, &wiring, &folder.join("simulation")).unwrap_or_else(|e| panic!("{e}"))
+    };
+    runs_talks_and_fails_safe(simulated(&|_| ()), &wiring, &first);
+    // One table of the PWM's logic inverted.
+    let faulty = simulated(&|cells| {
+        let is_pwm = |(name, cell): &(&String, &mut serde_json::Value)| {
+            name.contains("u_motor") && cell["type"] == "TRELLIS_COMB" && cell["parameters"]["MODE"].is_null()
+        };
+        let (_, cell) = cells.iter_mut().find(is_pwm).expect("the PWM has logic");
+        let table = cell["parameters"]["INITVAL"].as_str().expect("a table");
+        let inverted: String = table.chars().map(|bit| if bit == '0' { '1' } else { '0' }).collect();
+        cell["parameters"]["INITVAL"] = inverted.into();
+    });
+    let noticed = std::panic::catch_unwind(AssertUnwindSafe(|| {
+        runs_talks_and_fails_safe(faulty, &wiring, &first);
+    }));
+    assert!(noticed.is_err(), "the planted fault was not noticed");
+}
+
+/// What the board has to do, from power-up on.
+fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Program) {
+    let encoder = [sim.input("encoder_a").expect("a pin"), sim.input("encoder_b").expect("a pin")];
+
+    // From power-up, without a host: safe, then it drives. The encoder stands at 0, so half of the time each way.
+    sim.run(1000, &[]).expect("it runs");
+    assert_eq!(sim.output("signal_drive"), Some((false, 0)), "before the first period");
+    periods(&mut sim, 10);
+    assert_eq!(sim.output("signal_drive").map(|(level, _)| level), Some(true), "it drives");
+    assert_eq!(pulse(&mut sim), 250 - 5, "half of the time, less the dead time");
+
+    // The loop through the pins: 40 counts forward are a force of -10, which is 160 cycles less.
+    sim.turns.push(Turn { pins: encoder, from: 0, by: 40 });
+    periods(&mut sim, 3);
+    periods(&mut sim, 3);
+    assert_eq!(pulse(&mut sim), 250 - 160 - 5);
+
+    // From pin to pin, in cycles: with an edge that is counted just before a tick, and one that is counted just after it.
+    let bounds = takt_analysis::bound(first).expect("it can be bounded");
+    let period = bounds.sections.iter().find(|section| !section.once).expect("it has a period").cycles;
+    let ways = latency::ways(wiring, (period.best, period.worst));
+    let way = &ways.ways[0];
+    let [edge, lamp] = [&way.inputs[0].parts, &way.outputs[1].parts];
+    let bound = Part::sum("", edge.iter().chain(&way.between).chain(lamp));
+    let ticks = Ticks::of(&mut sim, PERIOD);
+    for (before, from, cycles) in [(edge[0].best, 40, bound.best), (edge[0].best - 1, 41, bound.worst)] {
+        let turn = |sim: &mut Simulation| sim.turns.push(Turn { pins: encoder, from, by: 1 });
+        assert_eq!(ticks.measured(&mut sim, before, turn, "lamp_out"), cycles);
+    }
+    sim.turns.push(Turn { pins: encoder, from: 42, by: -2 });
+    periods(&mut sim, 2);
+
+    // Glitches shorter than the filter are not counted.
+    for _ in 0..5 {
+        sim.set("encoder_a", true);
+        sim.run(2, &[]).expect("it runs");
+        sim.set("encoder_a", false);
+        sim.run(7, &[]).expect("it runs");
+    }
+
+    // The host: reads ports and sets them.
+    let mut host = Host::connect(sim, 77).unwrap_or_else(|error| panic!("{error}"));
+    assert!(host.status().expect("status").drives());
+    assert_eq!(host.read(port(first, "n"), 1).expect("a port")[0], 40);
+    assert_eq!(host.read(port(first, "force"), 1).expect("a port")[0], (-10.0_f32).to_bits());
+    host.write(port(first, "wanted"), &[52]).expect("a port");
+    periods(&mut host.line, 4);
+    assert_eq!(host.read(port(first, "force"), 1).expect("a port")[0], 3.0_f32.to_bits());
+    assert_eq!(pulse(&mut host.line), 250 + 48 - 5);
+    let cycles = host.register("cycles").expect("a register");
+    // Of them the first part, the wait for the tick, is not counted.
+    let exact = Part::sum("", &way.between[1..]);
+    assert_eq!((exact.best, exact.worst), (cycles.into(), cycles.into()), "cycles from tick to outputs");
+    assert_eq!(host.register("misses").expect("a register"), 0);
+
+    // What cannot be written is refused, as a whole: registers to read and addresses without one, ports that the program or a peripheral
+    // drives, and the last one, which the machine does not have; the image of a program that runs; a tick of its own while it is not
+    // held, with two registers before it that can be written; what the core holds.
+    let n = port(first, "n");
+    for address in [0, 2, 9, 20, 0xfff, port(first, "force"), n, INPUTS + 255, INPUTS + 256, 0x3000] {
+        refuses(&mut host, address, &[1]);
+    }
+    for (address, words) in
+        [(4, &[9999, 5, 1][..]), (12, &[1]), (IMAGE, &[1, 2, 3, 0]), (0x8000, &[7]), (0xc000, &[7])]
+    {
+        refuses(&mut host, address, words);
+    }
+    assert!((INPUTS..n + 2).contains(&port(first, "wanted")), "next to `n`");
+    refuses(&mut host, n.min(port(first, "wanted")), &[7, 7]);
+    assert_eq!(host.read(port(first, "wanted"), 1).expect("a port")[0], 52);
+
+    // Hold, then one period at a time.
+    host.set("control", 0b111).expect("control");
+    let before = host.register("periods").expect("a register");
+    periods(&mut host.line, 5);
+    assert_eq!(host.register("periods").expect("a register"), before);
+    host.set("step", 1).expect("step");
+    assert_eq!(host.register("periods").expect("a register"), before + 1);
+    host.set("control", 0b101).expect("control");
+
+    // A stream: every second period, with its number.
+    host.set("stream", 2 << 20 | 1 << 16 | u32::from(port(first, "force"))).expect("stream");
+    let mut seen = Vec::new();
+    while seen.len() < 6 {
+        if let Some(frame) = host.streamed().expect("a line") {
+            assert_eq!(frame.words[1], 3.0_f32.to_bits());
+            seen.push(frame.words[0]);
+        }
+    }
+    assert!(seen.windows(2).all(|pair| pair[1] == pair[0] + 2), "{seen:?}");
+    host.set("stream", 0).expect("stream");
+
+    // Noise on the line: requests are made again, none is lost or made twice.
+    host.line.noise = 400;
+    host.set("control", 0b111).expect("control");
+    let before = host.register("periods").expect("a register");
+    for _ in 0..40 {
+        host.set("step", 1).expect("in spite of noise");
+    }
+    assert_eq!(host.register("periods").expect("a register"), before + 40);
+    host.set("control", 0b101).expect("control");
+    host.line.noise = 0;
+    assert!(host.retries > 0, "there was no noise");
+    assert!(host.register("errors").expect("a register") > 0);
+
+    // The host is gone.
+    host.line.unplugged = true;
+    periods(&mut host.line, 420);
+    assert!(safe(&mut host.line), "without a host");
+    assert!(matches!(host.register("id"), Err(LinkError::Silence(_))));
+    host.line.unplugged = false;
+    let status = host.status().expect("it is back");
+    assert_eq!(status.causes().collect::<Vec<_>>(), ["host silent"]);
+    // A start makes it drive again. What is set at once waits until the start's zeros are written.
+    host.set("control", 0x105).expect("control");
+    host.write(port(first, "wanted"), &[52]).expect("a port");
+    assert_eq!(host.read(port(first, "wanted"), 1).expect("a port")[0], 52);
+    periods(&mut host.line, 5);
+    assert!(host.status().expect("status").drives());
+
+    // The stop input.
+    host.line.set("signal_stop", true);
+    periods(&mut host.line, 1);
+    assert!(safe(&mut host.line), "stopped");
+    host.line.set("signal_stop", false);
+    assert!(safe(&mut host.line), "and it stays so");
+    assert_eq!(host.status().expect("status").causes().collect::<Vec<_>>(), ["stop"]);
+
+    // Reset in mid-period: pins are safe at once, and the machine starts from the beginning.
+    host.set("control", 0x105).expect("control");
+    periods(&mut host.line, 5);
+    host.line.run(37, &[]).expect("it runs");
+    host.line.set("button", true);
+    host.line.run(10, &[]).expect("it runs");
+    assert!(safe(&mut host.line), "in reset");
+    host.line.set("button", false);
+    periods(&mut host.line, 6);
+    assert!(host.status().expect("status").drives(), "after a reset");
+
+    // A program that misses its deadlines, one that halts, one that makes no number.
+    host.set("control", 0).expect("control");
+    refuses(&mut host, IMAGE + 4 * top::RECORDS as u16, &[1, 2, 3, 0]);
+    let instead = |what: &str| PROGRAM.replace("        iand    lit, n, 1\n", what);
+    let nan = PROGRAM.replace("fmul    force, f, 0.25", "fdiv    force, zero, zero");
+    for (source, cause) in
+        [(instead(SLOW), "missed deadline"), (instead("        halt\n"), "halt"), (nan, "NaN output")]
+    {
+        let records = top::image(&program(&source)).expect("it fits").records;
+        host.load(&records).expect("it is loaded");
+        assert!(safe(&mut host.line), "while it is loaded");
+        host.set("control", 5).expect("control");
+        periods(&mut host.line, 8);
+        assert!(safe(&mut host.line), "{cause}");
+        let status = host.status().expect("status");
+        assert!(
+            status.causes().any(|name| name == cause),
+            "{cause}: {:?}",
+            status.causes().collect::<Vec<_>>()
+        );
+    }
+    assert!(host.register("misses").expect("a register") == 0, "of this program, none");
+    // And back to the first one.
+    host.load(&top::image(first).expect("it fits").records).expect("it is loaded");
+    host.set("control", 5).expect("control");
+    periods(&mut host.line, 6);
+    assert!(host.status().expect("status").drives());
+    // A broken image: one that does not fit is refused before anything happens.
+    let record = top::image(first).expect("it fits").records[0];
+    let error = host.load(&vec![record; top::RECORDS + 1]).expect_err("too big");
+    assert_eq!(error.to_string(), "the program takes 2049 records; the board has room for 2048");
+}

@@ -1,0 +1,208 @@
+//! The circuit of every machine against the emulator.
+#![allow(clippy::print_stdout)]
+
+mod common;
+#[path = "../../../asm/tests/random_source/mod.rs"]
+mod random_source;
+
+use common::{assemble, drive, latched_model, model};
+use random_source::{Random, source};
+use std::ops::Range;
+use std::sync::OnceLock;
+use takt_asm::{MemoryLoader, Options, Schedule};
+use takt_cosim::{Lockstep, LockstepError, Simulation, random};
+use takt_isa::timing::Cause;
+use takt_isa::{Bank, Function, Instruction, MACHINES, Machine, Program, ROWS, Slot, SlotIndex, T1, T3};
+
+/// `TAKT_PROGRAMS` random programs, 200 unless stated, from seed 0 on.
+#[test]
+fn random_programs() {
+    let count: u64 = std::env::var("TAKT_PROGRAMS").map_or(200, |text| text.parse().expect("a number"));
+    let mut faults = std::collections::BTreeSet::new();
+    for machine in MACHINES {
+        let mut simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        let mut coverage = random::Coverage::default();
+        println!("{}: seeds 0 to {}", machine.name, count - 1);
+        for seed in 0..count {
+            simulation = random::run(seed, machine, simulation, &mut coverage)
+                .unwrap_or_else(|error| panic!("{} seed {seed}: {error}", machine.name));
+        }
+        let never: Vec<_> = ROWS
+            .iter()
+            .filter(|row| machine.host(row.function).is_some())
+            .map(|row| row.mnemonic)
+            .filter(|name| !coverage.operations.contains(name))
+            .collect();
+        assert_eq!(never, [""; 0], "{}: instructions that no program executed", machine.name);
+        assert_eq!(coverage.stalls, Cause::kinds_of(machine).collect(), "{}", machine.name);
+        assert!(coverage.missed > count, "{}: {} deadlines missed", machine.name, coverage.missed);
+        faults.extend(coverage.faults);
+    }
+    for fault in
+        ["data address", "illegal word", "program counter", "return stack empty", "return stack full"]
+    {
+        assert!(faults.contains(fault), "no program had the fault: {fault}");
+    }
+}
+
+/// The circuit is what the row says, and not only for the table's rows: four slots, of which two have an adder and two an ALU; two
+/// slots with iterative units, of banks of different depths that leave gaps in the register space. What the assembler makes for the
+/// first uses all that its slots share.
+#[test]
+fn rows_of_a_strangers() {
+    use takt_isa::spec::units::*;
+    let slot = |name, bank, base, depth, units| Slot { name, bank: Bank { name: bank, base, depth }, units };
+    static FOUR: OnceLock<Machine> = OnceLock::new();
+    static TWO: OnceLock<Machine> = OnceLock::new();
+    let four = FOUR.get_or_init(|| Machine {
+        name: "four",
+        slots: Vec::leak(vec![
+            slot("mul", "m", 0, 128, &[MULTIPLY, DIVROOT, SINE, ARCTANGENT]),
+            slot("add", "a", 128, 128, &[ADD, CONVERT]),
+            slot("sum", "b", 256, 128, &[ADD, ALU]),
+            slot("aux", "x", 384, 128, &[ALU, MEMORY, SEQUENCER]),
+        ]),
+        inputs: Bank { name: "i", base: 896, depth: 128 },
+        outputs_per_bank: 16,
+        ..T3
+    });
+    let two = TWO.get_or_init(|| Machine {
+        name: "two",
+        slots: Vec::leak(vec![
+            slot(
+                "mul",
+                "m",
+                0,
+                256,
+                &[MULTIPLY, Unit { interval: 16, ..RECURRENCE }, Unit { interval: 9, ..SINE }],
+            ),
+            slot("rest", "a", 256, 128, &[ADD, CONVERT, ALU_LATE, MEMORY, SEQUENCER]),
+        ]),
+        ..T3
+    });
+    for machine in [four, two] {
+        let mut simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        let mut coverage = random::Coverage::default();
+        for seed in 0..60 {
+            simulation = random::run(seed, machine, simulation, &mut coverage)
+                .unwrap_or_else(|error| panic!("{} seed {seed}: {error}", machine.name));
+        }
+        assert!(coverage.events > 10_000, "{}: only {} events", machine.name, coverage.events);
+        if machine == four {
+            let programs = scheduled(machine, simulation, 0..10);
+            for function in [Function::Add, Function::Alu] {
+                for slot in machine.hosts(function).iter() {
+                    let count = operations(&programs, function, slot);
+                    assert!(count > 20, "slot {slot} has {count} of {function:?}");
+                }
+            }
+        }
+    }
+}
+
+/// The same with latched ports, half as many.
+#[test]
+fn random_programs_with_latched_ports() {
+    let count: u64 = std::env::var("TAKT_PROGRAMS").map_or(200, |text| text.parse().expect("a number")) / 2;
+    for machine in MACHINES {
+        let model = latched_model(machine, machine.inputs.depth);
+        let mut simulation = model.start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        let mut coverage = random::Coverage::default();
+        for seed in 0..count {
+            simulation = random::run(seed, machine, simulation, &mut coverage)
+                .unwrap_or_else(|error| panic!("{} seed {seed}: {error}", machine.name));
+        }
+        assert!(coverage.missed > count, "{}: {} deadlines missed", machine.name, coverage.missed);
+    }
+}
+
+/// A circuit is for direct ports or for latched ones, and for so many of them.
+#[test]
+fn ports_of_program_and_circuit_must_agree() {
+    let program = assemble(&T1, "hybrid/tracking.s");
+    let latched = Program { latched: true, ..program.clone() };
+    assert!(latched.latched_inputs() >= 16, "{} inputs are latched", latched.latched_inputs());
+    for (program, ports) in [(&program, T1.inputs.depth), (&latched, 0), (&latched, 2)] {
+        let simulation = latched_model(&T1, ports).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        assert!(matches!(Lockstep::new(program, simulation, &[]), Err(LockstepError::Ports { .. })));
+    }
+}
+
+/// A tracking program in closed loop with the robot, a number of periods.
+fn tracking(machine: &'static Machine, source: &str, latched: bool, periods: usize) {
+    let program = Program { latched, ..assemble(machine, source) };
+    let model = latched_model(machine, program.latched_inputs());
+    let simulation = model.start(&[]).unwrap_or_else(|error| panic!("{error}"));
+    let mut lockstep = Lockstep::new(&program, simulation, &[]).unwrap_or_else(|error| panic!("{error}"));
+    drive(&program, periods, |inputs| -> Result<_, LockstepError> {
+        assert!(lockstep.run_period(inputs), "{:?}", lockstep.emulator().status());
+        lockstep.compare()?;
+        let ports = program.outputs.iter().map(|port| port.register);
+        Ok(ports.filter_map(|port| Some((port, lockstep.emulator().output_bits(port)?))).collect())
+    });
+    lockstep.finish().unwrap_or_else(|error| panic!("{}: {source}: {error}", machine.name));
+    assert!(lockstep.compared() > 300 * periods as u64, "only {} events", lockstep.compared());
+}
+
+#[test]
+fn tracking_programs() {
+    for machine in MACHINES {
+        tracking(machine, "hybrid/tracking.s", false, 100);
+        tracking(machine, "hybrid/tracking_literal.s", false, 20);
+        tracking(machine, "hybrid/tracking.s", true, 20);
+    }
+}
+
+/// What the scheduler makes of a program runs on the circuit as on the emulator, and gives what the unscheduled program gives.
+#[test]
+fn scheduled_programs() {
+    for machine in MACHINES {
+        let simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        scheduled(machine, simulation, 0..30);
+    }
+}
+
+/// Random sources on a machine, as written and scheduled. Gives the programs.
+fn scheduled(machine: &'static Machine, mut simulation: Simulation, seeds: Range<u64>) -> Vec<Program> {
+    let mut programs = Vec::new();
+    for seed in seeds {
+        let text = source(seed);
+        let mut outcomes = Vec::new();
+        for schedule in [Schedule::None, Schedule::AsWritten] {
+            let options = Options { machine, schedule, effort: 1, ..Options::default() };
+            let assembled =
+                takt_asm::assemble("random.s", &MemoryLoader::of("random.s", text.as_str()), &options);
+            let program =
+                assembled.unwrap_or_else(|errors| panic!("{text}\n{}", errors.render(false))).program;
+            let mut lockstep =
+                Lockstep::new(&program, simulation, &[]).unwrap_or_else(|error| panic!("{error}"));
+            let random = &mut Random(seed + 77);
+            let mut seen = Vec::new();
+            for _ in 0..4 {
+                let value = |random: &mut Random| (random.below(2000) as f32 / 64.0 - 10.0).to_bits();
+                let inputs: Vec<_> =
+                    program.inputs.iter().map(|port| (port.register, value(random))).collect();
+                assert!(lockstep.run_period(&inputs), "{:?}", lockstep.emulator().status());
+                lockstep.compare().unwrap_or_else(|error| panic!("seed {seed}: {error}\n{text}"));
+                let outputs = program.outputs.iter();
+                seen.extend(outputs.map(|port| lockstep.emulator().register(port.register)));
+            }
+            outcomes.push((seen, lockstep.emulator().memory().to_vec(), lockstep.emulator().flags()));
+            lockstep.finish().unwrap_or_else(|error| panic!("seed {seed}: {error}\n{text}"));
+            simulation = lockstep.into_simulation();
+            programs.push(program);
+        }
+        assert_eq!(outcomes[0], outcomes[1], "seed {seed} on {}:\n{text}", machine.name);
+    }
+    programs
+}
+
+/// How many operations of a function a slot of some programs has.
+fn operations(programs: &[Program], function: Function, slot: SlotIndex) -> usize {
+    let words = |program: &Program| {
+        let slots = program.machine.slots.len();
+        program.code.iter().skip(slot.index()).step_by(slots).copied().collect::<Vec<u64>>()
+    };
+    let decoded = programs.iter().flat_map(words).filter_map(|word| Instruction::decode(word).ok());
+    decoded.filter(|instruction| instruction.op.row().function == function).count()
+}

@@ -1,0 +1,51 @@
+//! Commands that this build leaves out, so that what runs a program compiles in half the time. Each stands in the help, and says
+//! which feature has it.
+
+use crate::output::Failure;
+use anyhow::Result;
+
+/// What to do about a command of a feature that is not in this build.
+pub(crate) fn left_out(feature: &str) -> Result<()> {
+    let text = format!(
+        "this build of takt has no feature `{feature}`: `cargo install --path tools/cli --all-features` installs takt with all of \
+         them, `cargo run --release --features {feature} -- …` runs it with this one"
+    );
+    Err(Failure::Usage(text).into())
+}
+
+/// A module in place of the one that a feature would compile: its arguments take anything, its functions say what is missing.
+macro_rules! module {
+    ($feature:literal, $module:ident, $($arguments:ident by $run:ident),+) => {
+        #[cfg(not(feature = $feature))]
+        pub(crate) mod $module {
+            $(
+            #[derive(clap::Args)]
+            #[command(about = concat!("Not in this build of takt: it takes the feature `", $feature, "`"), disable_help_flag = true)]
+            pub(crate) struct $arguments {
+                #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+                _any: Vec<std::ffi::OsString>,
+            }
+
+            pub(crate) fn $run(_: &$arguments, _: bool, _: &mut crate::files::Out) -> anyhow::Result<()> {
+                super::left_out($feature)
+            }
+            )+
+        }
+    };
+}
+
+module!("model", model, Model by run);
+module!("editor", lsp, Lsp by run);
+module!("editor", dap, Dap by run);
+module!("board", board, Boards by run);
+module!("board", live, LoadBoard by load, Live by live);
+module!("robot", robot, Robot by run);
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn what_is_left_out_says_how_to_get_it() {
+        let error = super::left_out("model").expect_err("it is not there").to_string();
+        assert!(error.contains("--all-features") && error.contains("--features model -- "), "{error}");
+    }
+}

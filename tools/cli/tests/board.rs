@@ -1,0 +1,568 @@
+//! `takt board`, `load` and `live` as commands: what they print, what they refuse, and the loop through a simulated board's pins.
+#![cfg(unix)]
+
+mod common;
+
+use common::{Folder, SimulatedBoard};
+use std::io::Write;
+use std::process::Stdio;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+use takt_asm::{MemoryLoader, Options, assemble};
+use takt_board::protocol::{ANSWER, CORE_REGISTERS, IMAGE, Line, Receiver, checksum};
+use takt_board::serial::Serial;
+use takt_board::terminal::Terminal;
+use takt_isa::T1;
+
+fn example(name: &str) -> String {
+    format!("{}/../../programs/examples/board/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The example's wiring and program, as arguments.
+fn position() -> String {
+    format!("--wiring {} --program {} --machine t1", example("position.toml"), example("position.s"))
+}
+
+#[test]
+fn boards_and_their_pins_are_listed() {
+    let folder = Folder::new();
+    let list = folder.line("board list").ok();
+    assert!(list.contains("ulx3s-85f") && list.contains("colorlight-i5"), "{list}");
+    let wiring = format!("--wiring {}", example("position.toml"));
+    let pins = folder.line(&format!("board pins ulx3s-85f {wiring}")).ok();
+    assert!(pins.contains("gp0      B11   encoder.a\n") && pins.contains("gp10"), "{pins}");
+    let pins = folder.line(&format!("board pins ulx3s-85f --json {wiring}")).ok();
+    assert!(serde_json::from_str::<serde_json::Value>(&pins).is_ok_and(|pins| pins.is_array()), "{pins}");
+}
+
+#[test]
+fn the_example_fits_its_board_and_a_circuit_is_written() {
+    let folder = Folder::new();
+    let text = folder.line(&format!("board check --board ulx3s-85f {}", position())).ok();
+    assert_eq!(
+        text,
+        "ulx3s-85f, t1: 2 peripherals, 2 of the program's ports on pins, a period of 5000 cycles at 50 MHz\n"
+    );
+    folder.line(&format!("board build --board ulx3s-85f {} --sources -o out", position())).ok();
+    let pins = folder.read_text("out/pins.lpf");
+    assert!(pins.contains("LOCATE COMP \"encoder_a\" SITE \"B11\";"), "{pins}");
+}
+
+#[test]
+fn a_program_alone_is_a_circuit_too() {
+    let folder = Folder::new();
+    let program = format!("--program {} --machine t1", example("position.s"));
+    folder.line(&format!("board build --board colorlight-i5 {program} --sources -o out")).ok();
+    // Another tool reads all of it; the device's own cells it does not know.
+    let lint = "find . -name '*.v' -exec verilator --lint-only -Wno-fatal -Wno-lint -Wno-style --top-module takt_board {} +";
+    let out = folder.path().join("out");
+    let done = std::process::Command::new("/bin/sh").args(["-c", lint]).current_dir(out).output().unwrap();
+    let text = String::from_utf8_lossy(&done.stderr);
+    let known = |line: &str| {
+        ["EHXPLLL", "MULT18X18D", "DP16KD"].iter().any(|cell| line.contains(&format!("module: '{cell}'")))
+            || line.contains("there's no search path specified")
+            || line.contains("Exiting due to")
+    };
+    let errors: Vec<&str> = text.lines().filter(|line| line.starts_with("%Error") && !known(line)).collect();
+    assert!(errors.is_empty(), "{text}");
+}
+
+#[test]
+fn wrong_boards_wirings_and_ports_are_refused() {
+    let folder = Folder::new();
+    let refused = |line: &str, says: &str| {
+        let done = folder.line(line);
+        assert_eq!(done.status, Some(1), "{line}: {done:?}");
+        assert!(done.stderr.contains(says) && done.stdout.is_empty(), "{line}: {}", done.stderr);
+    };
+    refused("board pins ulx3s", "there is no board `ulx3s`, and no file of that name");
+    refused(
+        &format!("board check --board colorlight-i5 {}", position()),
+        "position.toml:3:9: this wiring is for the board `ulx3s-85f`, not for `colorlight-i5`",
+    );
+    let twice = std::fs::read_to_string(example("position.toml")).unwrap().replace("\"gn2\"", "\"gp0\"");
+    folder.write("twice.toml", twice);
+    refused(
+        &format!("board check --board ulx3s-85f --wiring twice.toml --program {}", example("position.s")),
+        "pin `gp0` is used twice: line 16 has it for `encoder`",
+    );
+    folder.write("other.s", ".output y\n.once\n mov y, zero\n wait period\n.period\nperiod: wait period\n");
+    refused(
+        &format!("board check --board ulx3s-85f --wiring {} --program other.s", example("position.toml")),
+        "the program has no input port `n`",
+    );
+    refused("live /dev/nothing status", "cannot open /dev/nothing: is the board plugged in");
+    refused(&format!("load /dev/nothing {}", example("position.s")), "cannot open /dev/nothing");
+}
+
+#[test]
+fn the_loop_closes_through_the_pins_of_a_simulated_board() {
+    let folder = Folder::new();
+    let line = format!("board sim --board ulx3s-85f {} --axis motor,encoder,20000", position());
+    let board = SimulatedBoard::start(&line, folder.path());
+    let (port, baud) = (board.port.clone(), board.baud.clone());
+    let program = example("position.s");
+    let live = |what: &str| {
+        folder.line(&format!("live {port} --baud {baud} --program {program} --machine t1 {what}")).ok()
+    };
+    live("set wanted=30");
+    // It comes nearer by a third of the error in a millisecond of the board's time, until dead time swallows the pulses.
+    let error = || -> i32 { live("read error").trim().trim_start_matches("error = ").parse().unwrap() };
+    assert!((0..200).any(|_| error().abs() <= 2), "{}", live("read"));
+    // Frames may be lost where requests take the line: then it says so.
+    let stream = folder.line(&format!(
+        "live {port} --baud {baud} --program {program} --machine t1 stream n --every 20 --count 3"
+    ));
+    assert_eq!((stream.status, stream.stdout.lines().count()), (Some(0), 3), "{stream:?}");
+    assert!(live("status").contains("the program runs; outputs drive"), "{}", live("status"));
+    // Held, it stays where it is; a period at a time it goes on.
+    live("hold");
+    live("set wanted=-30");
+    assert!(error().abs() <= 2);
+    live("step");
+    assert!((-62..=-58).contains(&error()), "{}", live("read"));
+    // Beside the emulator, from the beginning: the program that runs there, then one that differs where the board had 0.02.
+    let same = live("shadow wanted=7 --periods 12");
+    assert_eq!(same, "12 periods, 2 input ports, 2 output ports: no difference; the board is held\n");
+    let status = live("status");
+    assert!(status.contains("the program held; outputs are safe"), "{status}");
+    let planted = std::fs::read_to_string(&program).unwrap().replace("gain = 0.02", "gain = 0.03");
+    folder.write("planted.s", planted);
+    let shadow =
+        format!("live {port} --baud {baud} --program planted.s --machine t1 shadow wanted=7 --periods 12");
+    let different = folder.line(&shadow);
+    assert_eq!((different.status, different.stdout.as_str()), (Some(1), ""), "{different:?}");
+    let says = "period 1: output port `duty` is ";
+    assert!(
+        different.stderr.contains(says) && different.stderr.contains("wanted = 7"),
+        "{}",
+        different.stderr
+    );
+    // The data memory, which this program leaves zero.
+    assert_eq!(live("read [0] [1023]"), "[0] = 0\n[1023] = 0\n");
+    let beyond =
+        folder.line(&format!("live {port} --baud {baud} --program {program} --machine t1 read [1024]"));
+    assert!(beyond.stderr.contains("no port, register or data word `[1024]`"), "{}", beyond.stderr);
+    let without = folder.line(&format!("live {port} --baud {baud} shadow"));
+    assert!(without.stderr.contains("ports have names in the program: --program FILE"), "{}", without.stderr);
+    let loaded = folder.line(&format!("load {port} --baud {baud} {program} --machine t1 --stopped")).ok();
+    assert!(loaded.contains("records loaded and compared; stopped"), "{loaded}");
+    let broken = folder.line(&format!("live {port} --baud {baud} --program {program} set nothing=1"));
+    assert_eq!(broken.status, Some(1));
+    assert!(
+        broken.stderr.contains("the program has no port, register or data word `nothing`"),
+        "{}",
+        broken.stderr
+    );
+
+    // Unplugged: the board ends while a host is at its port.
+    let mut host = std::process::Command::new(env!("CARGO_BIN_EXE_takt"));
+    let shadow =
+        format!("live {port} --baud {baud} --program {program} --machine t1 shadow --periods 1000000");
+    host.args(shadow.split_whitespace()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut host = host.spawn().unwrap();
+    wait_until_at(&mut host, &port);
+    drop(board);
+    let done = host.wait_with_output().unwrap();
+    let stderr = String::from_utf8_lossy(&done.stderr);
+    let says = "the line is gone: the port was unplugged, or the simulated board has ended";
+    assert!(done.status.code() == Some(1) && stderr.contains(says), "{done:?}");
+    assert!(done.stdout.is_empty(), "{done:?}");
+}
+
+/// A position loop that keeps its last eight errors in a ring.
+const RING: &str = "\
+.input  n:int, wanted:int
+.output duty, error:int
+.reg    at:int sum count:int x
+.const  gain = 0.02
+        mov     duty, zero
+        mov     error, zero
+        mov     at, zero
+        mov     count, zero
+        fadd    sum, zero, zero
+        wait    period
+.period
+period: isub    error, wanted, n
+        itof    x, error
+        fmul    duty, x, gain
+        fadd    sum, sum, x
+        st      ring[at], x
+        iadd    at, at, 1
+        iand    at, at, 7
+        iadd    count, count, 1
+        wait    period
+.data
+ring:   .float  0, 0, 0, 0, 0, 0, 0, 0
+";
+
+/// The debugger on a simulated board: registers, memory, moves, differences, and how it leaves what runs.
+#[test]
+fn a_board_is_debugged() {
+    let folder = Folder::new();
+    folder.write("ring.s", RING);
+    // A faster line saves time: a whole data memory is read often.
+    let wiring = std::fs::read_to_string(example("position.toml")).unwrap();
+    assert_eq!(wiring.matches("baud = 1_000_000").count(), 1);
+    folder.write("wiring.toml", wiring.replace("baud = 1_000_000", "baud = 10_000_000"));
+    let board = SimulatedBoard::start(
+        "board sim --board ulx3s-85f --wiring wiring.toml --program ring.s --machine t1 --axis motor,encoder,20000",
+        folder.path(),
+    );
+    let (port, baud) = (board.port.clone(), board.baud.clone());
+    let debug = |file: &str, more: &str, commands: &str| {
+        let line = format!("debug {file} --machine t1 --board {port} --baud {baud} {more}");
+        folder.fed(&line, commands.as_bytes())
+    };
+    let status = || folder.line(&format!("live {port} --baud {baud} status")).ok();
+    assert!(status().contains("the program runs; outputs drive"), "{}", status());
+
+    // What is shown is what the program must have computed, and agrees with the emulator all the way.
+    let same = "check error == wanted - n\ncheck x == error\ncheck abs(duty - x * gain) < 0.0001\ncheck ring[(at + 7) % 8] == x\n\
+        check count == period\ncheck at == period % 8\n";
+    let commands = format!(
+        "print count, ring[1]\n{same}step\n{same}set wanted = 7\nstep 3\n{same}check wanted == 7\nuntil at == 2\ncheck at == 2\n{same}\
+         watch at == 5\ncontinue\ncheck at == 5\nregisters\nmemory ring 8\nwhere\nquit\n"
+    );
+    let text = debug("ring.s", "", &commands).ok();
+    assert!(text.starts_with("period ") && text.contains(": waits for the tick, since bundle "), "{text}");
+    assert!(text.contains("; outputs drive\n   12  period: isub    error, wanted, n\n"), "{text}");
+    assert!(text.contains("at           r") && text.contains("    0 ring         "), "{text}");
+    assert!(text.ends_with("(takt) quit\nthe program runs; outputs drive\n"), "{text}");
+    assert!(status().contains("the program runs; outputs drive"), "{}", status());
+
+    // From the beginning, where what was never written is known; held, as was asked for.
+    let commands = format!("print x\nstep 12\n{same}check sum == 12 * x\n");
+    let text = debug("ring.s", "--restart", &commands).ok();
+    assert!(text.starts_with("period 0: waits") && text.contains("x = (never written)\n"), "{text}");
+    assert!(text.ends_with("the program stays held; outputs are safe\n"), "{text}");
+    assert!(status().contains("the program held; outputs are safe"), "{}", status());
+    let text = debug("ring.s", "", "goto start\nstep\ngo\nhold\ngo\n").ok();
+    assert!(text.ends_with("the program runs; outputs are safe\n"), "{text}");
+
+    // Another program there is no session for: its names would be others.
+    folder.write("other.s", RING.replace("itof    x, error", "itof    x, wanted"));
+    let other = debug("other.s", "", "print x\n");
+    assert_eq!((other.status, other.stdout.as_str()), (Some(1), ""));
+    assert!(
+        other.stderr.contains("the board does not carry other.s; `takt load")
+            && other.stderr.contains("of its image differs"),
+        "{}",
+        other.stderr
+    );
+    folder.write("longer.s", RING.replace("wait    period\n.data", "nop\n wait period\n.data"));
+    let longer = debug("longer.s", "", "print x\n");
+    assert!(longer.stderr.contains("its image has "), "{}", longer.stderr);
+
+    // Differences: another program runs, and the board seems to carry the right one.
+    let planted = |what: &str, by: &str, commands: &str| {
+        assert_eq!(RING.matches(what).count(), 1);
+        folder.write("planted.s", RING.replace(what, by));
+        folder.line(&format!("load {port} --baud {baud} planted.s --machine t1")).ok();
+        let liar = Liar::start(&port, baud.parse().unwrap());
+        let line = format!("debug ring.s --machine t1 --board {} --baud {baud}", liar.port);
+        folder.fed(&line, commands.as_bytes())
+    };
+    let done = planted(
+        "isub    error, wanted, n",
+        "iadd    error, wanted, n",
+        "set wanted = 900\nstep 4\nprint error\n",
+    );
+    assert_eq!(done.status, Some(1), "{done:?}");
+    let says = "output port `duty` is ";
+    assert!(
+        done.stderr.contains(says)
+            && done.stderr.contains("inputs: n = ")
+            && done.stderr.contains("wanted = 900"),
+        "{done:?}"
+    );
+    assert!(done.stdout.ends_with("the program runs; outputs drive\n"), "{done:?}");
+    let done = planted("iadd    count, count, 1", "isub    count, count, 1", "step 2\n");
+    assert!(done.stderr.contains("`count` (register r2) is -") && done.status == Some(1), "{done:?}");
+    let done = planted("st      ring[at], x", "st      ring[at], sum", "step 2\n");
+    assert!(done.stderr.contains(": data word ") && done.stderr.contains(" (`ring["), "{done:?}");
+    let done = planted("gain = 0.02", "gain = 0.03", "");
+    assert!(
+        done.stdout
+            .contains(" is 0.03 on the board, 0.02 in the emulator, and the program does not write it\n"),
+        "{done:?}"
+    );
+
+    // A program that stops.
+    folder.write(
+        "halts.s",
+        RING.replace(
+            "iadd    count, count, 1\n",
+            "iadd    count, count, 1\n isub x, count, 5\n bz x, stop\n",
+        )
+        .replace(".data", "stop: halt\n.data"),
+    );
+    folder.line(&format!("load {port} --baud {baud} halts.s --machine t1 --stopped")).ok();
+    let stopped = debug("halts.s", "", "step\ngoto start\nstep 9\ncheck count == 5\nstep\n");
+    assert!(stopped.stdout.starts_with("stopped, in reset; outputs are safe\n"), "{stopped:?}");
+    assert!(stopped.stdout.contains("the program has halted\nperiod 4: halted at bundle "), "{stopped:?}");
+    assert!(stopped.stdout.ends_with("the program has halted; outputs are safe\n"), "{stopped:?}");
+    let says = "standard input:1: the program is stopped: `goto start` starts it again\n";
+    assert!(
+        stopped.stderr.contains(says) && stopped.stderr.contains("standard input:5: the program has halted"),
+        "{stopped:?}"
+    );
+
+    // One that does not come to its `wait`, and outputs that drive while it is stepped.
+    folder.write("endless.s", RING.replace("count, 1\n", "count, 1\n bnz wanted, period\n"));
+    folder.line(&format!("load {port} --baud {baud} endless.s --machine t1")).ok();
+    let endless =
+        debug("endless.s", "--restart", "set wanted = 1\nstep\nwhere\nprint x\ngoto start\nprint x\n");
+    let says = "error: standard input:2: the program does not come to its `wait`";
+    assert!(endless.status == Some(1) && endless.stderr.contains(says), "{endless:?}");
+    assert!(endless.stdout.contains("period 0: has not come to its `wait`; bundle "), "{endless:?}");
+    assert!(endless.stderr.contains("standard input:4: the program is in a period"), "{endless:?}");
+    assert!(endless.stdout.contains("x = (never written)\nthe program stays held"), "{endless:?}");
+    let driven = debug("endless.s", "--restart --drive", "step 2\n").ok();
+    assert!(driven.ends_with("the program stays held; outputs drive\n"), "{driven}");
+
+    // Beside the emulator it does not wait either, and that is what is said of it.
+    let line =
+        format!("live {port} --baud {baud} --program endless.s --machine t1 shadow wanted=1 --periods 3");
+    let shadow = folder.line(&line);
+    let says = "period 1: the program does not wait for its tick";
+    assert!(shadow.status == Some(1) && shadow.stderr.contains(says), "{shadow:?}");
+
+    // Unplugged while a script waits for its next command.
+    let mut host = std::process::Command::new(env!("CARGO_BIN_EXE_takt"));
+    let line = format!("debug endless.s --machine t1 --board {port} --baud {baud} --restart");
+    host.args(line.split_whitespace()).current_dir(folder.path());
+    let mut host = host.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    wait_until_at(&mut host, &port);
+    drop(board);
+    // It may have ended already.
+    let _ = host.stdin.take().unwrap().write_all(b"step\nprint count\n");
+    let done = host.wait_with_output().unwrap();
+    let stderr = String::from_utf8_lossy(&done.stderr);
+    let says = "the line is gone: the port was unplugged, or the simulated board has ended";
+    assert!(done.status.code() == Some(1) && stderr.contains(says), "{done:?}");
+}
+
+/// Stands between a host and a board, and says of any image that it is RING's.
+struct Liar {
+    port: String,
+    over: Arc<AtomicBool>,
+    thread: Option<std::thread::JoinHandle<()>>,
+}
+
+impl Liar {
+    fn start(port: &str, baud: u32) -> Liar {
+        let options = Options { machine: &T1, ..Options::default() };
+        let program = assemble("ring.s", &MemoryLoader::new(&[("ring.s", RING)]), &options).unwrap().program;
+        let records = takt_board::top::image(&program).unwrap().records;
+        let image: Vec<u32> =
+            records.iter().flat_map(|[low, high, place]| [*low, *high, *place, 0]).collect();
+        let mut host = Terminal::new().unwrap();
+        let mut board = Serial::open(port.as_ref(), baud).unwrap();
+        let (port, over) = (host.path().to_str().unwrap().to_owned(), Arc::new(AtomicBool::new(false)));
+        let ends = Arc::clone(&over);
+        let thread = std::thread::spawn(move || {
+            let (mut request, mut receiver) = (Vec::new(), Receiver::default());
+            while !ends.load(Ordering::Relaxed) {
+                request.extend(host.receive().unwrap());
+                let [_, _, command, count, low, high, ..] = request[..] else {
+                    std::thread::sleep(Duration::from_millis(1));
+                    continue;
+                };
+                let data = if command == 2 { 4 * usize::from(count) } else { 0 };
+                if request.len() < 8 + data {
+                    continue;
+                }
+                board.send(&request).unwrap();
+                request.clear();
+                let frame = loop {
+                    receiver.put(&board.receive().unwrap());
+                    if let Some(frame) = receiver.frame() {
+                        break frame;
+                    }
+                };
+                let mut words = frame.words;
+                let address = u16::from_le_bytes([low, high]);
+                if (IMAGE..CORE_REGISTERS).contains(&address) {
+                    words = image[usize::from(address - IMAGE)..][..words.len()].to_vec();
+                }
+                let mut answer = vec![ANSWER, frame.number, frame.status, words.len() as u8];
+                answer.extend(words.iter().flat_map(|word| word.to_le_bytes()));
+                let sum = checksum(&answer[1..]);
+                answer.extend(sum.to_le_bytes());
+                host.send(&answer).unwrap();
+            }
+        });
+        Liar { port, over, thread: Some(thread) }
+    }
+}
+
+impl Drop for Liar {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+        let _ = self.thread.take().map(std::thread::JoinHandle::join);
+    }
+}
+
+/// Waits until a process has the port open, as Linux' list of its files says, or has ended.
+fn wait_until_at(host: &mut std::process::Child, port: &str) {
+    let open = std::path::PathBuf::from(format!("/proc/{}/fd", host.id()));
+    let is_at_the_port = || {
+        let files = std::fs::read_dir(&open).into_iter().flatten().flatten();
+        files.filter_map(|file| std::fs::read_link(file.path()).ok()).any(|file| file.as_os_str() == port)
+    };
+    while host.try_wait().unwrap().is_none() && !is_at_the_port() {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
+fn what_a_session_on_a_board_cannot_do_is_refused_first() {
+    let folder = Folder::new();
+    folder.write("ring.s", RING);
+    folder.write("typo.txt", "step\nback\n");
+    folder.write("system.toml", "");
+    for (line, status, says) in [
+        ("debug ring.s --board /dev/nothing", 1, "cannot open /dev/nothing: is the board plugged in"),
+        (
+            "debug ring.s --board /dev/nothing --script typo.txt",
+            1,
+            "typo.txt:2: `back`: a circuit does not go back",
+        ),
+        (
+            "debug system.toml --board /dev/nothing",
+            2,
+            "--board is for a single program, and system.toml is a system",
+        ),
+        ("debug ring.s --board /dev/nothing --tui", 2, "cannot be used with"),
+        ("debug ring.s --board /dev/nothing --inputs in.csv", 2, "cannot be used with"),
+        ("debug ring.s --board /dev/nothing --tick 100", 2, "cannot be used with"),
+        ("debug --track --board /dev/nothing", 2, "cannot be used with"),
+        ("debug ring.s --baud 9600", 2, "--board <PORT>"),
+        ("debug ring.s --restart", 2, "--board <PORT>"),
+        ("debug ring.s --drive", 2, "--board <PORT>"),
+    ] {
+        let done = folder.line(line);
+        assert_eq!((done.status, done.stdout.as_str()), (Some(status), ""), "{line}: {done:?}");
+        assert!(done.stderr.contains(says), "{line}: {}", done.stderr);
+    }
+}
+
+fn hybrid(name: &str) -> String {
+    format!("{}/../../programs/hybrid/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The tracking error through encoders, PWMs and UART of the complete top level is that of the emulator, and what the pins add: forces in
+/// steps of 0.5 N, a PWM's period later.
+#[test]
+fn the_hybrid_robot_closes_its_loop_through_pins() {
+    let folder = Folder::new();
+    let sim = |wiring: &str, more: &str| {
+        let program = hybrid("tracking.s");
+        folder.line(&format!(
+            "board sim --board ulx3s-85f --wiring {wiring} --program {program} --robot {more}"
+        ))
+    };
+    let wiring = std::fs::read_to_string(hybrid("board.toml")).unwrap();
+    for (what, by, says) in [
+        (
+            "start = 3572338 ",
+            "start = 3572000 ",
+            "the robot stands at 3572338 counts of `n1`, and `encoder1` starts at 3572000",
+        ),
+        ("{ count = \"n5\" }", "{}", "the wiring has no quadrature whose `count` is the port `n5`"),
+        (
+            "{ duty = \"tau5\" }\nscale = { duty = 8 }",
+            "{}",
+            "the wiring has no pwm whose `duty` is the port `tau5`",
+        ),
+        ("tick = \"gp23\"", "", "the robot needs the signal `tick` on a pin"),
+        ("period = 100 ", "period = 200 ", "the robot's period is 100 µs, the wiring's 200 µs"),
+        (", low = \"gn7\"", "", "`motor1`: a force in both directions needs a signed pwm with both pins"),
+        ("deadlines = 2", "autostart = true", "the host starts the robot: leave out `autostart`"),
+    ] {
+        assert_eq!(wiring.matches(what).count().min(1), 1, "{what}");
+        folder.write("wrong.toml", wiring.replacen(what, by, 1));
+        let done = sim("wrong.toml", "");
+        assert!(done.status == Some(1) && done.stderr.contains(says), "{by}: {done:?}");
+    }
+    let done = sim(&hybrid("board.toml"), "--periods 400");
+    assert_eq!((done.status, done.stderr.as_str()), (Some(0), "compiling the circuit …\n"));
+    let text = done.stdout;
+    assert!(
+        text.starts_with("tracking.s on ulx3s-85f, simulated: t3 at 60 MHz, 400 periods of agh.ngc"),
+        "{text}"
+    );
+    assert!(text.contains("0 deadlines missed; 0 points of the path late"), "{text}");
+    let overall = text.lines().find(|line| line.starts_with("  overall")).unwrap_or_else(|| panic!("{text}"));
+    let errors: Vec<f64> = overall.split_whitespace().skip(1).map(|error| error.parse().unwrap()).collect();
+    let [pins, alone] = errors[..] else { panic!("{text}") };
+    assert!(alone > 5.0 && (pins / alone - 1.0).abs() < 0.1, "{text}");
+}
+
+#[test]
+fn the_way_from_pin_to_pin_has_a_bound() {
+    let folder = Folder::new();
+    let program = hybrid("tracking.s");
+    let bound = |more: &str| folder.line(&format!("bound {program} --pins {more}"));
+    let wiring = hybrid("board.toml");
+    let text = bound(&format!("--wiring {wiring}")).ok();
+    for says in [
+        "  edge to `count`                                   6 ",
+        "encoder4 (n4), encoder5 (n5)\n",
+        "motor5 (tau5)\n",
+    ] {
+        assert!(text.contains(says), "{says}: {text}");
+    }
+    let json: serde_json::Value =
+        serde_json::from_str(&bound(&format!("--wiring {wiring} --json")).ok()).unwrap();
+    let way = &json["ways"][0];
+    let sum = |edge: &str| {
+        let parts = [&way["inputs"][0]["parts"], &way["between"], &way["outputs"][0]["parts"]];
+        parts
+            .iter()
+            .flat_map(|parts| parts.as_array().unwrap())
+            .map(|part| part[edge].as_u64().unwrap())
+            .sum::<u64>()
+    };
+    assert_eq!(way["total"]["best"], sum("best"));
+    assert_eq!(way["total"]["worst"], sum("worst"));
+    // Two periods of states are two more periods on the way, and what follows nothing is on none.
+    let delayed = "delayed.s";
+    folder.write(
+        delayed,
+        ".input n1:int n2:int n3:int n4:int n5:int\n.output F1 F2 F3 tau4 tau5\n.state s:int\n.state t:int\n.once\n mov s, zero\n\
+         mov t, zero\n mov F2, zero\n mov F3, zero\n mov tau5, zero\n wait p\n.period\np: itof F1, t\n mov t, s\n mov s, n1\n itof tau4, n1\n wait p\n",
+    );
+    let bound = folder.line(&format!("bound {delayed} --pins --wiring {wiring} -W allow=unused")).ok();
+    let json: serde_json::Value = serde_json::from_str(
+        &folder.line(&format!("bound {delayed} --pins --wiring {wiring} -W allow=unused --json")).ok(),
+    )
+    .unwrap();
+    assert!(bound.contains("  through 2 periods of states                  12000 "), "{bound}");
+    assert!(!bound.contains("encoder2") && !bound.contains("motor2"), "{bound}");
+    let totals: Vec<u64> =
+        json["ways"].as_array().unwrap().iter().map(|way| way["total"]["best"].as_u64().unwrap()).collect();
+    assert_eq!((totals.len(), totals[0] + 12000), (2, totals[1]), "{json}");
+    let bound = |more: &str| folder.line(&format!("bound {program} --pins {more}"));
+    let refused = |more: &str, says: &str| {
+        let done = bound(more);
+        assert!(done.status == Some(1) && done.stderr.contains(says), "{more}: {done:?}");
+    };
+    refused(&format!("--wiring {wiring} --board colorlight-i5"), "this wiring is for the board `ulx3s-85f`");
+    refused(&format!("--wiring {wiring} --deadline 100us"), "--deadline is not for --pins");
+    folder.write("none.toml", "period = 100\n");
+    refused("--wiring none.toml", "none.toml names no board: `--board NAME`, or a line");
+    // One message, whether the board is named or would be the file's.
+    folder.write("system.toml", "[core.one]\nmachine = \"t1\"\n");
+    for board in ["", " --board ulx3s-85f"] {
+        refused(
+            &format!("--wiring system.toml{board}"),
+            "system.toml:1:2: this is a system of several cores, and a wiring is wanted",
+        );
+    }
+    folder.write("broken.toml", "period = \n");
+    refused("--wiring broken.toml", "broken.toml:1:10:");
+    refused("--wiring none.toml --board ulx3s-85f", "none.toml: no path from pin to pin");
+}

@@ -1,0 +1,719 @@
+//! `takt lsp` as clients meet it: over standard input and output, and with Neovim's own client.
+
+mod common;
+
+use common::protocol::Client;
+use common::{Folder, source};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::process::Command;
+
+/// A session with documents in a folder.
+struct Session {
+    client: Client,
+    folder: Folder,
+    versions: BTreeMap<String, i64>,
+}
+
+impl Session {
+    fn new(files: &[(&str, &str)]) -> Session {
+        let folder = Folder::new();
+        for (name, text) in files {
+            folder.write(name, text);
+        }
+        let mut client = Client::start(&folder, "lsp");
+        let root = format!("file://{}", folder.path().display());
+        let capabilities = json!({
+            "workspace": { "inlayHint": { "refreshSupport": true } },
+            "experimental": { "takt/counted": true },
+        });
+        let answer = client.ask(
+            "initialize",
+            json!({ "capabilities": capabilities, "workspaceFolders": [{ "uri": root, "name": "test" }] }),
+        );
+        assert_eq!(answer["result"]["capabilities"]["positionEncoding"], "utf-16");
+        client.notify("initialized", json!({}));
+        Session { client, folder, versions: BTreeMap::new() }
+    }
+
+    fn uri(&self, name: &str) -> String {
+        format!("file://{}", self.folder.path().join(name).display())
+    }
+
+    fn open(&mut self, name: &str, text: &str) -> Vec<Value> {
+        let uri = self.uri(name);
+        self.versions.insert(name.to_owned(), 1);
+        let document = json!({ "uri": uri, "languageId": "takt", "version": 1, "text": text });
+        self.client.notify("textDocument/didOpen", json!({ "textDocument": document }));
+        self.told(name)
+    }
+
+    /// Replaces a text that occurs once.
+    fn edit(&mut self, name: &str, text: &str, from: &str, to: &str) -> String {
+        assert_eq!(text.matches(from).count(), 1, "{from}");
+        let (start, end) = (position(text, from, 0), position(text, from, from.len()));
+        let version = self.versions.get_mut(name).unwrap();
+        *version += 1;
+        let change = json!({ "range": { "start": start, "end": end }, "text": to });
+        let document = json!({ "uri": self.uri(name), "version": self.versions[name] });
+        self.client.notify(
+            "textDocument/didChange",
+            json!({ "textDocument": document, "contentChanges": [change] }),
+        );
+        text.replace(from, to)
+    }
+
+    /// The next diagnostics of a document.
+    fn told(&mut self, name: &str) -> Vec<Value> {
+        let uri = self.uri(name);
+        let message = self.client.wait(|message| {
+            message["method"] == "textDocument/publishDiagnostics" && message["params"]["uri"] == *uri
+        });
+        message["params"]["diagnostics"].as_array().unwrap().clone()
+    }
+
+    fn at(&self, name: &str, text: &str, of: &str) -> Value {
+        json!({ "textDocument": { "uri": self.uri(name) }, "position": position(text, of, 0) })
+    }
+
+    fn ask(&mut self, method: &str, params: Value) -> Value {
+        let answer = self.client.ask(method, params);
+        assert!(answer.get("error").is_none(), "{method}: {answer}");
+        answer["result"].clone()
+    }
+
+    fn rename(&mut self, name: &str, text: &str, of: &str, to: &str) -> Value {
+        let mut params = self.at(name, text, of);
+        params["newName"] = to.into();
+        self.client.ask("textDocument/rename", params)
+    }
+
+    /// The texts after a workspace edit.
+    fn applied(&self, answer: &Value, files: &[(&str, &str)]) -> Vec<String> {
+        assert!(answer.get("error").is_none(), "{answer}");
+        let changes = answer["result"]["changes"].as_object().unwrap();
+        files
+            .iter()
+            .map(|(name, text)| {
+                let mut lines: Vec<String> = text.split('\n').map(str::to_owned).collect();
+                let mut edits = changes
+                    .get(&self.uri(name))
+                    .map_or(Vec::new(), |edits| edits.as_array().unwrap().clone());
+                let start = |edit: &Value| {
+                    (
+                        edit["range"]["start"]["line"].as_u64().unwrap(),
+                        edit["range"]["start"]["character"].as_u64().unwrap(),
+                    )
+                };
+                edits.sort_by_key(|edit| std::cmp::Reverse(start(edit)));
+                for edit in edits {
+                    let (line, from) = start(&edit);
+                    let to = edit["range"]["end"]["character"].as_u64().unwrap();
+                    // These texts are ASCII.
+                    lines[line as usize]
+                        .replace_range(from as usize..to as usize, edit["newText"].as_str().unwrap());
+                }
+                lines.join("\n")
+            })
+            .collect()
+    }
+
+    fn end(mut self) {
+        self.ask("shutdown", Value::Null);
+        self.client.notify("exit", Value::Null);
+        let (status, stderr) = self.client.end();
+        assert_eq!((status, stderr.as_str()), (Some(0), ""));
+    }
+}
+
+/// Where a text stands first, and so many bytes behind.
+fn position(text: &str, of: &str, more: usize) -> Value {
+    let at = text.find(of).unwrap_or_else(|| panic!("{of}")) + more;
+    let start = text[..at].rfind('\n').map_or(0, |at| at + 1);
+    json!({ "line": text[..at].matches('\n').count(), "character": text[start..at].encode_utf16().count() })
+}
+
+/// What `takt asm` says of a file: code, message and first place of each.
+fn told_by_asm(folder: &Folder, file: &str) -> Vec<(String, String, u64, u64)> {
+    let done = folder.line(&format!("asm {file} --check --json"));
+    let json: Value = serde_json::from_str(&done.stdout).unwrap();
+    let messages = json["messages"].as_array().unwrap_or_else(|| panic!("{json}"));
+    let place = |message: &Value, what: &str| message["places"][0][what].as_u64().unwrap_or(1);
+    let one = |message: &Value| {
+        let text = |what: &str| message[what].as_str().unwrap().to_owned();
+        (text("code"), text("message"), place(message, "line"), place(message, "column"))
+    };
+    messages.iter().map(one).collect()
+}
+
+/// What the server tells of a text, as [`told_by_asm`] has it.
+fn shown(told: &[Value], text: &str) -> Vec<(String, String, u64, u64)> {
+    let one = |told: &Value| {
+        let start = &told["range"]["start"];
+        let message = told["message"].as_str().unwrap().lines().next().unwrap().to_owned();
+        let line = start["line"].as_u64().unwrap();
+        // Columns of `takt asm` count characters.
+        let of_line = text.lines().nth(line as usize).unwrap_or("");
+        let units: Vec<u16> =
+            of_line.encode_utf16().take(start["character"].as_u64().unwrap() as usize).collect();
+        let column = String::from_utf16(&units).unwrap().chars().count() as u64;
+        (told["code"].as_str().unwrap().to_owned(), message, line + 1, column + 1)
+    };
+    let mut list: Vec<_> = told.iter().map(one).collect();
+    list.sort();
+    list
+}
+
+/// Every mistake of the assembler's own tests, as the server and as `takt asm` tell it.
+#[test]
+fn diagnostics_are_those_of_the_assembler() {
+    let mistakes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../asm/tests/mistakes");
+    let mut session = Session::new(&[]);
+    let (mut compared, mut later) = (0, 0);
+    for entry in std::fs::read_dir(mistakes).unwrap() {
+        let path = entry.unwrap().path();
+        let Ok(text) = std::fs::read_to_string(&path) else { continue };
+        // Those for another machine are assembled for this one: the mistakes are others, as the server's.
+        let name = format!("{compared}/main.s");
+        std::fs::create_dir(session.folder.path().join(compared.to_string())).unwrap();
+        session.folder.write(&name, &text);
+        let mut expected = told_by_asm(&session.folder, &name);
+        expected.sort();
+        for message in &mut expected {
+            message.1 = message.1.lines().next().unwrap().to_owned();
+        }
+        let mut told = shown(&session.open(&name, &text), &text);
+        if told != expected {
+            // What comes first is of what the assembler says; the scheduler's comes when it is done.
+            assert!(
+                told.iter().all(|one| expected.contains(one)),
+                "{}: {told:?} {expected:?}",
+                path.display()
+            );
+            told = shown(&session.told(&name), &text);
+            assert_eq!(told, expected, "{}", path.display());
+            later += 1;
+        }
+        session
+            .client
+            .notify("textDocument/didClose", json!({ "textDocument": { "uri": session.uri(&name) } }));
+        compared += 1;
+    }
+    assert!(compared > 40 && later > 3);
+    session.end();
+}
+
+const PART: &str = "\
+.const  K = 0.25
+.macro  scale to, by
+.reg    tmp
+        fmul    tmp, to, by*K
+        mov     to, tmp
+.endm
+.macro  never a
+        fadd    a, a, K
+.endm
+";
+
+const MAIN: &str = "\
+.include \"part.s\"
+.input  x, n:int
+.output F
+.schedule on
+.period
+period:
+.rep i, 1, 3
+.reg    p{i}
+        fmul    p{i}, x, i*K
+        scale   p{i}, 2
+.endr
+        fadd    F, p1, p2
+        wait    period
+";
+
+#[test]
+fn names_are_followed_through_macros_repetitions_and_includes() {
+    let files = [("main.s", MAIN), ("part.s", PART)];
+    let mut session = Session::new(&files);
+    let warnings = session.open("main.s", MAIN);
+    assert_eq!(warnings.len(), 2, "{warnings:?}");
+    session.open("part.s", PART);
+
+    let declared = session.ask("textDocument/definition", session.at("main.s", MAIN, "K\n"));
+    assert_eq!(declared[0]["uri"], session.uri("part.s"));
+    assert_eq!(declared[0]["range"]["start"], position(PART, "K", 0));
+    let mut params = session.at("part.s", PART, "K");
+    params["context"] = json!({ "includeDeclaration": false });
+    let references = session.ask("textDocument/references", params);
+    assert_eq!(references.as_array().unwrap().len(), 2, "{references}");
+
+    // The constant: in both files, and in the macro that nothing uses.
+    let answer = session.rename("main.s", MAIN, "K\n", "gain");
+    let texts = session.applied(&answer, &files);
+    assert_eq!(texts, [MAIN.replace('K', "gain"), PART.replace('K', "gain")]);
+    // A family of registers, from the use of one.
+    let answer = session.rename("main.s", MAIN, "p{i}, x", "pos{i}");
+    let texts = session.applied(&answer, &files);
+    assert_eq!(texts[0], MAIN.replace("p{i}", "pos{i}").replace("p1, p2", "pos1, pos2"));
+    assert_eq!(texts[1], PART);
+    // A parameter and a local, in the macro only; the macro, in both.
+    for (of, to) in [("to, by", "target"), ("tmp, to", "t"), ("scale", "times")] {
+        let old = of.split(',').next().unwrap();
+        let answer = session.rename("part.s", PART, of, to);
+        let texts = session.applied(&answer, &files);
+        let (again, main) = (PART.replace(old, to), MAIN.replace(old, to));
+        assert_eq!(texts, [if old == "scale" { main } else { MAIN.to_owned() }, again], "{of}");
+    }
+    // What would change the program is refused, and says why.
+    for (of, to, why) in [
+        ("K\n", "x", "would not stay the same"),
+        ("p{i}, x", "x{i}x", "must end in `{i}`"),
+        ("x, n", "1x", "is not a name"),
+        ("fadd", "fsub", "no name here"),
+    ] {
+        let answer = session.rename("main.s", MAIN, of, to);
+        let message = answer["error"]["message"].as_str().unwrap_or_else(|| panic!("{answer}"));
+        assert!(message.contains(why), "{message}");
+    }
+    session.end();
+}
+
+const EQUATIONS: &str = "\
+.input  x, y
+.output F, G
+.macro  halve r, a
+        fmul    r, a, 0.5
+.endm
+.period
+.reg    v[3] t
+period:
+        .rep i, 1, 3
+        v[i] = i*x + y
+        .endr
+        t = sum(k, 1, 3, k*v[k])
+        F, G = t - halve(x*y), v[2] > 0 ? t : y
+        wait    period
+";
+
+#[test]
+fn names_of_equations_and_arrays_are_followed() {
+    let files = [("main.s", EQUATIONS)];
+    let mut session = Session::new(&files);
+    assert_eq!(session.open("main.s", EQUATIONS), Vec::<Value>::new());
+    for (of, to, from, into) in [
+        ("v[3]", "w", "v[", "w["),
+        ("t = sum", "total", "t ", "total "),
+        ("k, 1", "index", "(k, 1, 3, k*v[k]", "(index, 1, 3, index*v[index]"),
+        ("halve(", "half", "halve", "half"),
+        ("x*y", "speed", "x", "speed"),
+    ] {
+        let answer = session.rename("main.s", EQUATIONS, of, to);
+        let texts = session.applied(&answer, &files);
+        let expected = match of {
+            "t = sum" => EQUATIONS
+                .replace(" t\n", " total\n")
+                .replace("t = ", "total = ")
+                .replace("= t ", "= total ")
+                .replace("? t ", "? total "),
+            _ => EQUATIONS.replace(from, into),
+        };
+        assert_eq!(texts, [expected], "{of}");
+    }
+    // As `takt fmt` leaves it.
+    assert_eq!(session.folder.line("fmt --check main.s").status, Some(0));
+    session.end();
+}
+
+#[test]
+fn an_included_file_is_read_as_it_is_open() {
+    let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
+    session.open("main.s", MAIN);
+    session.open("part.s", PART);
+    // Unsaved: the file on the disk is as it was.
+    let edited = session.edit("part.s", PART, ".const  K", ".const  L");
+    let told = session.told("main.s");
+    assert!(
+        told.iter().any(|one| one["message"].as_str().unwrap().starts_with("`K` is not declared")),
+        "{told:?}"
+    );
+    session.edit("part.s", &edited, ".const  L", ".const  K");
+    let told = session.told("main.s");
+    assert!(told.iter().all(|one| one["severity"] == 2), "{told:?}");
+    session.end();
+}
+
+#[test]
+fn a_misspelt_name_is_mended_as_advised() {
+    let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
+    session.open("main.s", MAIN);
+    let edited = session.edit("main.s", MAIN, "fadd ", "fadf ");
+    let told = session.told("main.s");
+    let wrong = told.iter().find(|one| one["code"] == "unknown-instruction").unwrap();
+    assert!(wrong["message"].as_str().unwrap().contains("help: did you mean `fadd`?"));
+    let params = json!({ "textDocument": { "uri": session.uri("main.s") }, "range": wrong["range"], "context": { "diagnostics": [] } });
+    let actions = session.ask("textDocument/codeAction", params);
+    let fix = actions.as_array().unwrap().iter().find(|action| action["title"] == "write `fadd`").unwrap();
+    let texts = session.applied(&json!({ "result": fix["edit"] }), &[("main.s", &edited)]);
+    assert_eq!(texts, [MAIN]);
+    session.end();
+}
+
+/// What the assembler's help says is offered as a fix, and mends it.
+#[test]
+fn what_is_advised_is_a_fix() {
+    let cases = [
+        (".input n:int\n.output y\n.period\np: y = n*2.0\n wait p\n", "n*", "write `itof(n)`"),
+        (
+            ".include \"math.s\"\n.output y\n.period\np: mov y, zero\n wait p\n",
+            ".inc",
+            "write `.include <math.s>`",
+        ),
+        ("; about\n.output y\n.period\np: fadd y, x, 1.0\n wait p\n", "x, 1", "add `.input x`"),
+        (".input x\n.period\np: fadd y, x, 1.0\n wait p\n", "y, x", "add `.output y`"),
+        ("; about\n.input x\n.output y\n.period\np: exp y, x\n wait p\n", "exp", "add `.include <math.s>`"),
+    ];
+    let mut session = Session::new(&[]);
+    for (number, (text, at, title)) in cases.into_iter().enumerate() {
+        let name = format!("{number}.s");
+        assert!(session.open(&name, text).iter().any(|one| one["severity"] == 1), "{text}");
+        let at = position(text, at, 0);
+        let params = json!({ "textDocument": { "uri": session.uri(&name) }, "range": { "start": at, "end": at }, "context": { "diagnostics": [] } });
+        let actions = session.ask("textDocument/codeAction", params);
+        let fix = actions.as_array().unwrap().iter().find(|action| action["title"] == title);
+        let fix = fix.unwrap_or_else(|| panic!("{title}: {actions}"));
+        let mended = session.applied(&json!({ "result": fix["edit"] }), &[(&name, text)]).remove(0);
+        session.folder.write(&name, &mended);
+        assert_eq!(session.folder.line(&format!("asm {name} --check")).status, Some(0), "{title}:\n{mended}");
+    }
+    session.end();
+}
+
+/// Cycles beside the lines and above the section, and where they go when lines are added.
+#[test]
+fn cycles_stand_beside_the_lines() {
+    let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
+    session.open("main.s", MAIN);
+    session.client.wait(|message| message["method"] == "workspace/inlayHint/refresh");
+    let uri = session.uri("main.s");
+    let range = json!({ "start": { "line": 0, "character": 0 }, "end": { "line": 99, "character": 0 } });
+    let params = json!({ "textDocument": { "uri": uri }, "range": range });
+    let lines = |hints: &Value| -> Vec<(u64, String)> {
+        let hint = |hint: &Value| {
+            (hint["position"]["line"].as_u64().unwrap(), hint["label"].as_str().unwrap().to_owned())
+        };
+        hints.as_array().unwrap().iter().map(hint).collect()
+    };
+    let before = lines(&session.ask("textDocument/inlayHint", params.clone()));
+    let wait = before.iter().find(|(line, _)| *line == 12).unwrap();
+    assert!(wait.1.contains(" · aux"), "{before:?}");
+    let lenses = session.ask("textDocument/codeLens", json!({ "textDocument": { "uri": uri } }));
+    let bound = session.folder.line("bound main.s --json").stdout;
+    let bound: Value = serde_json::from_str(&bound).unwrap();
+    let cycles = &bound["sections"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|section| section["name"] == "period")
+        .unwrap()["cycles"];
+    let title = lenses[0]["command"]["title"].as_str().unwrap();
+    assert!(title.starts_with(&format!("period: {} cycles, bound ", cycles["worst"])), "{title}");
+    assert_eq!(lenses[0]["range"]["start"]["line"], 5);
+
+    // Two lines more, above; what is counted moves with its line until it is counted again.
+    session.edit("main.s", MAIN, ".schedule on\n", "\n\n.schedule on\n");
+    let after = lines(&session.ask("textDocument/inlayHint", params));
+    let moved: Vec<_> = before.iter().map(|(line, text)| (line + 2, text.clone())).collect();
+    assert_eq!(after, moved);
+    session.end();
+}
+
+/// A program that another one includes is one all the same: its own cycles stand above its section. A mistake while it is
+/// written changes nothing of that; without its section it is a part of the other.
+#[test]
+fn a_program_that_another_includes_has_its_own_cycles() {
+    let inner = ".input  x\n.output y\n.period\nperiod: fadd    y, x, x\n.if macro.longer\n        longer  y\n\
+                 .endif\n        wait    period\n";
+    let outer =
+        ".macro  longer y\n        fmul    y, y, y\n        fmul    y, y, y\n.endm\n.include \"inner.s\"\n";
+    let mut session = Session::new(&[("inner.s", inner), ("outer.s", outer)]);
+    let lens = |session: &mut Session| {
+        session.client.wait(|message| message["method"] == "workspace/inlayHint/refresh");
+        let document = json!({ "textDocument": { "uri": session.uri("inner.s") } });
+        let lenses = session.ask("textDocument/codeLens", document);
+        lenses[0]["command"]["title"].as_str().unwrap().to_owned()
+    };
+    session.open("inner.s", inner);
+    let own = lens(&mut session);
+    let wrong = session.edit("inner.s", inner, "fadd", "fadf");
+    assert!(session.told("inner.s").iter().any(|one| one["code"] == "unknown-instruction"));
+    session.edit("inner.s", &wrong, "fadf", "fadd");
+    assert_eq!(lens(&mut session), own);
+    for (file, cycles) in [("inner.s", own.as_str()), ("outer.s", "period: 20 cycles")] {
+        let bound: Value =
+            serde_json::from_str(&session.folder.line(&format!("bound {file} --json")).stdout).unwrap();
+        let sections = bound["sections"].as_array().unwrap();
+        let worst = &sections.iter().find(|section| section["name"] == "period").unwrap()["cycles"]["worst"];
+        assert!(cycles.contains(&format!("period: {worst} cycles")), "{file}: {cycles}, {worst}");
+    }
+    session.end();
+}
+
+/// The view of the pipeline: the cycles of the inlay hints, and lines that follow what is written.
+#[test]
+fn the_picture_has_each_operation_at_its_line() {
+    let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
+    session.open("main.s", MAIN);
+    let told = session.client.wait(|message| message["method"] == "takt/counted");
+    assert_eq!(told["params"]["uri"], session.uri("main.s"));
+    let params = json!({ "textDocument": { "uri": session.uri("main.s") } });
+    let picture = session.ask("takt/pipeline", params.clone());
+    let trace = session.folder.line("analyse main.s --json").stdout;
+    let trace: Value = serde_json::from_str(&trace).unwrap();
+    let of_period = |bundle: &&Value| bundle["from"] == "period";
+    let bundles = picture["bundles"].as_array().unwrap();
+    // What stands in the same straight line issues as it ran, from its first bundle on.
+    let ran = trace["bundles"].as_array().unwrap();
+    let first = ran[0]["cycle"].as_u64().unwrap();
+    let mut compared = 0;
+    for (bundle, ran) in bundles.iter().filter(of_period).zip(ran) {
+        assert_eq!(bundle["address"], ran["address"]);
+        assert_eq!(bundle["cycle"].as_u64().unwrap() - 1, ran["cycle"].as_u64().unwrap() - first, "{bundle}");
+        for (operation, ran) in
+            bundle["operations"].as_array().unwrap().iter().zip(ran["operations"].as_array().unwrap())
+        {
+            for part in ["slot", "unit", "text", "latency"] {
+                assert_eq!(operation[part], ran[part], "{part}");
+            }
+            let file = operation["file"].as_u64().unwrap() as usize;
+            let uri = picture["files"][file].as_str().unwrap();
+            let place =
+                format!("{}:{}", uri.rsplit('/').next().unwrap(), operation["line"].as_u64().unwrap() + 1);
+            assert_eq!(place, ran["place"].as_str().unwrap());
+            compared += 1;
+        }
+    }
+    assert!(compared > 3, "{picture:#}");
+    session.edit("main.s", MAIN, ".schedule on\n", "\n\n.schedule on\n");
+    let moved = session.ask("takt/pipeline", params);
+    let line = |picture: &Value| {
+        let all = picture["bundles"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .flat_map(|bundle| bundle["operations"].as_array().unwrap());
+        let here = session.uri("main.s");
+        let lines = all.filter(|one| picture["files"][one["file"].as_u64().unwrap() as usize] == *here);
+        lines.map(|one| one["line"].as_u64().unwrap()).collect::<Vec<_>>()
+    };
+    assert_eq!(line(&moved), line(&picture).iter().map(|line| line + 2).collect::<Vec<_>>());
+    session.end();
+}
+
+#[test]
+fn completion_knows_what_an_operand_can_be() {
+    let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
+    session.open("main.s", MAIN);
+    let mut labels = |from: &str, to: &str| -> Vec<String> {
+        let text = session.edit("main.s", MAIN, from, to);
+        let marked = to.trim_end();
+        let at = json!({ "textDocument": { "uri": session.uri("main.s") }, "position": position(&text, marked, marked.len()) });
+        let items = session.ask("textDocument/completion", at)["items"].as_array().unwrap().clone();
+        session.edit("main.s", &text, to, from);
+        items.iter().map(|item| item["label"].as_str().unwrap().to_owned()).collect()
+    };
+    let has = |labels: &[String], yes: &[&str], no: &[&str]| {
+        let is = |name: &&&str| labels.iter().any(|label| label == **name);
+        let (missing, wrong): (Vec<_>, Vec<_>) =
+            (yes.iter().filter(|name| !is(name)).collect(), no.iter().filter(is).collect());
+        assert!(missing.is_empty() && wrong.is_empty(), "{labels:?}: missing {missing:?}, wrong {wrong:?}");
+    };
+    has(&labels("        fadd    F, p1, p2\n", "        fa\n"), &["fadd", "scale", ".reg"], &["p1", "K"]);
+    has(&labels("fadd    F, p1", "fadd    F"), &["F", "p1"], &["x", "K", "fadd", "period"]);
+    has(
+        &labels("F, p1, p2\n", "F, p1, p\n"),
+        &["p2", "x", "K", "sqrt", "pi"],
+        &["i", "period", "tmp", "fadd"],
+    );
+    has(&labels("p{i}, 2\n", "p{i}, \n"), &["i", "p2", "K"], &["fadd"]);
+    has(&labels("wait    period\n", "wait    pe\n"), &["period"], &["p1", "K"]);
+    has(&labels("n:int\n", "n:i\n"), &["int", "float", "bits"], &["p1"]);
+    has(&labels(".schedule on\n", ".schedule o\n"), &["on", "off"], &["p1"]);
+    has(&labels(".include \"part.s\"\n", ".include <\n"), &["math.s"], &["part.s"]);
+    session.end();
+}
+
+#[test]
+fn a_document_is_laid_out_as_by_fmt() {
+    let mut session = Session::new(&[]);
+    let messy = ".input x;\u{b5}\n.output F\n.period\np: fmul F,x , 2 ;twice\n  wait p\n\n\n";
+    session.folder.write("messy.s", messy);
+    session.open("messy.s", messy);
+    let params = json!({ "textDocument": { "uri": session.uri("messy.s") }, "options": { "tabSize": 8, "insertSpaces": true } });
+    let edits = session.ask("textDocument/formatting", params);
+    let mut lines: Vec<String> = messy.split('\n').map(str::to_owned).collect();
+    for edit in edits.as_array().unwrap().iter().rev() {
+        let (start, end) = (&edit["range"]["start"], &edit["range"]["end"]);
+        let (first, last) =
+            (start["line"].as_u64().unwrap() as usize, end["line"].as_u64().unwrap() as usize);
+        let cut = |line: &str, at: &Value, head: bool| {
+            let units: Vec<u16> = line.encode_utf16().collect();
+            let at = at["character"].as_u64().unwrap() as usize;
+            String::from_utf16(if head { &units[..at] } else { &units[at..] }).unwrap()
+        };
+        let new = cut(&lines[first], start, true)
+            + edit["newText"].as_str().unwrap()
+            + &cut(&lines[last], end, false);
+        lines.splice(first..=last, new.split('\n').map(str::to_owned));
+    }
+    session.folder.line("fmt messy.s").ok();
+    assert_eq!(lines.join("\n"), session.folder.read_text("messy.s"));
+    assert_eq!(session.folder.line("fmt --check messy.s").status, Some(0));
+    session.folder.write("messy.s", messy);
+    let done = session.folder.line("fmt --check messy.s");
+    assert_eq!((done.status, done.stdout.as_str()), (Some(1), "messy.s\n"));
+    assert_eq!(session.folder.read_text("messy.s"), messy);
+    session.end();
+}
+
+/// What is no message, no method, no document: each is told, and the session goes on.
+#[test]
+fn nonsense_is_told_and_survived() {
+    let folder = Folder::new();
+    let mut client = Client::start(&folder, "lsp");
+    let code = |answer: &Value| answer["error"]["code"].as_i64().unwrap_or_else(|| panic!("{answer}"));
+    assert_eq!(code(&client.ask("textDocument/hover", json!({}))), -32002, "before it is initialised");
+    client.ask("initialize", json!({ "capabilities": {} }));
+    client.raw(b"Content-Length: 7\r\n\r\n{{not]}");
+    assert_eq!(code(&client.receive()), -32700);
+    client.send(&json!({ "jsonrpc": "2.0", "result": [] }));
+    assert_eq!(code(&client.receive()), -32600);
+    client.send(&json!([]));
+    assert_eq!(code(&client.receive()), -32600);
+    assert_eq!(code(&client.ask("initialize", json!({ "capabilities": {} }))), -32600);
+    assert_eq!(code(&client.ask("textDocument/dance", json!({}))), -32601);
+    assert_eq!(code(&client.ask("textDocument/hover", json!({ "position": 7 }))), -32602);
+    let nowhere = json!({ "textDocument": { "uri": "file:///nowhere/x.s" }, "position": { "line": 0, "character": 0 } });
+    let answer = client.ask("textDocument/hover", nowhere.clone());
+    assert_eq!(answer["error"]["message"], "`file:///nowhere/x.s` is not open");
+    let change =
+        json!({ "textDocument": { "uri": "file:///nowhere/x.s", "version": 2 }, "contentChanges": [] });
+    client.notify("textDocument/didChange", change);
+    let logged = client.wait(|message| message["method"] == "window/logMessage");
+    assert!(logged["params"]["message"].as_str().unwrap().contains("is not open"));
+    client.notify("textDocument/didOpen", json!("what?"));
+    client.wait(|message| message["method"] == "window/logMessage");
+
+    // A document that lies nowhere, and one that is on no disk.
+    for uri in ["untitled:Untitled-1", "file:///nowhere/new.s"] {
+        let document =
+            json!({ "uri": uri, "languageId": "takt", "version": 1, "text": ".period\np: wait q\n" });
+        client.notify("textDocument/didOpen", json!({ "textDocument": document }));
+        let told = client.wait(|message| message["params"]["uri"] == uri);
+        assert_eq!(told["params"]["diagnostics"][0]["code"], "unknown-name", "{told}");
+    }
+    // Positions beyond the text, in every request that has one.
+    for method in ["hover", "completion", "definition", "documentHighlight", "prepareRename"] {
+        let params = json!({ "textDocument": { "uri": "untitled:Untitled-1" }, "position": { "line": 4_000_000, "character": 4_000_000 } });
+        let answer = client.ask(&format!("textDocument/{method}"), params);
+        assert!(answer.get("result").is_some() || code(&answer) == -32803, "{answer}");
+    }
+    // Larger than the assembler reads: 65 MiB.
+    let huge = "; \n".repeat((65 << 20) / 3);
+    let document = json!({ "uri": "untitled:huge", "languageId": "takt", "version": 1, "text": huge });
+    client.notify("textDocument/didOpen", json!({ "textDocument": document }));
+    let told = client.wait(|message| message["params"]["uri"] == "untitled:huge");
+    let text = told["params"]["diagnostics"][0]["message"].as_str().unwrap().to_owned();
+    assert!(text.contains("more than the 67108864 bytes"), "{text}");
+
+    assert_eq!(client.ask("shutdown", Value::Null)["result"], Value::Null);
+    assert_eq!(code(&client.ask("textDocument/hover", nowhere)), -32600);
+    client.notify("exit", Value::Null);
+    assert_eq!(client.end(), (Some(0), String::new()));
+
+    // A stream that is none, and one that ends: no success, and no panic.
+    let mut client = Client::start(&folder, "lsp");
+    client.raw(b"GET / HTTP/1.1\n");
+    let (status, stderr) = client.end();
+    assert_eq!(status, Some(1));
+    assert!(stderr.contains("begins with `Content-Length: …`") || stderr.contains("header"), "{stderr}");
+}
+
+/// What is asked and cancelled before it is answered.
+#[test]
+fn cancelled_requests_are_not_answered() {
+    let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
+    session.open("main.s", MAIN);
+    let hover = |id: i64| {
+        json!({ "jsonrpc": "2.0", "id": id, "method": "textDocument/hover", "params": session.at("main.s", MAIN, "fadd") }).to_string()
+    };
+    let cancel =
+        json!({ "jsonrpc": "2.0", "method": "$/cancelRequest", "params": { "id": 900 } }).to_string();
+    // In one write, so that both are there when the first is looked at, behind one that takes its time.
+    let frames: String = [hover(899), hover(900), cancel]
+        .iter()
+        .map(|text| format!("Content-Length: {}\r\n\r\n{text}", text.len()))
+        .collect();
+    session.client.raw(frames.as_bytes());
+    let answer = session.client.wait(|message| message["id"] == 900);
+    // It may be answered before the second frame is read; otherwise it is cancelled.
+    assert!(answer["error"]["code"] == -32800 || answer.get("result").is_some(), "{answer}");
+    session.end();
+}
+
+/// Neovim's own client, from the first keystroke to the end.
+#[test]
+fn neovim_works_with_it() {
+    let folder = Folder::new();
+    for name in ["tracking.s", "robot.s"] {
+        folder.write(name, std::fs::read(source(name)).unwrap());
+    }
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/clients/nvim_lsp.lua");
+    let output = Command::new("nvim")
+        .args(["--headless", "--clean", "-n", "-c", &format!("luafile {script}")])
+        .env("TAKT", env!("CARGO_BIN_EXE_takt"))
+        .env("FILE", folder.path().join("tracking.s"))
+        .env("OUT", folder.path().join("found.json"))
+        .env("XDG_STATE_HOME", folder.path())
+        .env("XDG_CACHE_HOME", folder.path())
+        .output()
+        .expect("nvim is there: `cargo xtask test` installs it");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    let found: Value = serde_json::from_str(&folder.read_text("found.json")).unwrap();
+    assert_eq!(found.get("problem"), None, "{found}\n{stderr}");
+    let text = |name: &str| found[name].as_str().unwrap_or_else(|| panic!("{name}: {found}")).to_owned();
+    assert!(text("hover").contains("slot `mul`, unit `multiply`, latency 5, interval 1"));
+    assert_eq!(found["diagnostic"]["code"], "unknown-instruction");
+    assert!(found["diagnostic"]["message"].as_str().unwrap().contains("did you mean `fmul`?"));
+    assert_eq!(
+        (text("fix"), text("fixed")),
+        ("write `fmul`".to_owned(), "        fmul    zz, z, z".to_owned())
+    );
+    assert_eq!(text("definition"), "robot.s");
+    assert!(found["symbols"].as_u64().unwrap() > 50 && found["folds"].as_u64().unwrap() > 10);
+    let lenses = found["lenses"].as_array().unwrap();
+    let period = lenses.iter().filter_map(Value::as_str).find(|title| title.starts_with("period: ")).unwrap();
+    assert!(period.contains("cycles, bound ") && period.contains(", deadline kept by 12,"), "{period}");
+    assert!(found["hints"].as_u64().unwrap() > 80);
+    assert!(text("hint").ends_with(" · mul"), "{found}");
+    assert!(text("refused").contains("is declared already"), "{found}");
+    assert_eq!(text("formatted"), "        fmul    zz, z, z");
+    assert_eq!(found["stopped"], true);
+    // What it wrote assembles to the same program.
+    let code = |file: &str| -> Vec<String> {
+        let done = folder.line(&format!("asm {file} --strip --readmemh memory -l -"));
+        assert_eq!(done.status, Some(0), "{}", done.stderr);
+        let mut files = std::fs::read_dir(folder.path().join("memory"))
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+            .collect::<Vec<_>>();
+        files.sort();
+        files.iter().map(|file| std::fs::read_to_string(file).unwrap()).collect()
+    };
+    let renamed = folder.read_text("tracking.s");
+    assert!(
+        renamed.contains("pos{i}")
+            && renamed.contains("slider")
+            && folder.read_text("robot.s").contains("slider")
+    );
+    assert_eq!(code("tracking.s"), code(&source("tracking.s")));
+}

@@ -1,0 +1,150 @@
+//! `takt model`.
+
+mod common;
+
+use common::Folder;
+
+const UR5: &str = include_str!("../../../programs/model/tests/data/ur5.urdf");
+
+fn folder() -> Folder {
+    let folder = Folder::new();
+    folder.write("ur5.urdf", UR5);
+    folder
+}
+
+#[test]
+fn a_robot_becomes_a_program_that_runs() {
+    let folder = folder();
+    let text = folder.line("model ur5.urdf -f gravity -o gravity.s").ok();
+    assert!(text.starts_with("gravity of ur5: joint forces that hold the robot at rest\n"), "{text}");
+    assert!(text.contains("  link 3: elbow_joint, on link 2: origin 0.425 0 0 m, axis 0 0 1\n"), "{text}");
+    assert!(
+        text.contains("\noperations: 21 (sums 5, products 10, divisions and roots 0, trigonometric 6"),
+        "{text}"
+    );
+    assert!(text.contains(" cycles on t3, bound "), "{text}");
+    let source = folder.read_text("gravity.s");
+    assert!(source.contains("\n.output tau_elbow ; force of elbow_joint, N m\n"), "{source}");
+    // The arm straight up but for the wrist, and at an angle: what Pinocchio says, to what binary32 has.
+    folder.write("q.csv", "q_shoulder_lift,q_elbow,q_wrist_1,q_wrist_2\n-1.5707964,0,0,0\n0,0.5,-0.25,1\n");
+    let rows = folder.line("run gravity.s --inputs q.csv --outputs -").ok();
+    let rows: Vec<Vec<&str>> = rows.lines().map(|line| line.split(',').collect()).collect();
+    let column = rows[0].iter().position(|name| *name == "tau_shoulder_lift").expect("the port");
+    let tau: Vec<f64> = rows[1..].iter().map(|row| row[column].parse().expect("a number")).collect();
+    assert!((tau[0] - TAU[0]).abs() < 1e-4 && (tau[1] - TAU[1]).abs() < 1e-4, "{tau:?}");
+}
+
+/// `pinocchio.computeGeneralizedGravity` for the two states.
+const TAU: [f64; 2] = [-0.174_463_92, -57.207_66];
+
+#[test]
+fn output_goes_where_it_is_told() {
+    let folder = folder();
+    let source = folder.line("model ur5.urdf -f inverse-dynamics -o -").ok();
+    assert!(
+        source.starts_with("; inverse-dynamics of ur5") && source.ends_with("wait    period\n"),
+        "{source}"
+    );
+    let json = folder.line("model ur5.urdf -f jacobian --tip tool0 --json -m t1").ok();
+    let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!(json["machine"], "t1");
+    assert_eq!(json["operations"], 65);
+    assert!(
+        json["cycles"].as_u64() >= json["bound"].as_u64() && json["bound"].as_u64() >= json["chain"].as_u64()
+    );
+    assert_eq!(json["constants"].as_array().expect("a list").len(), 10);
+}
+
+#[test]
+fn rewrites_can_be_switched_off() {
+    let folder = folder();
+    let operations = |options: &str| {
+        let json = folder.line(&format!("model ur5.urdf -f gravity --json {options}")).ok();
+        let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+        json["operations"].as_u64().expect("a number")
+    };
+    let all = operations("");
+    for option in ["fold", "identities", "share", "signs", "strength", "factor", "balance", "scale"] {
+        assert!(operations(&format!("--no-{option}")) >= all, "{option}");
+    }
+    assert!(operations("--exact") > all && operations("--no-scale") > all);
+    for (name, _) in takt_model::graph::Rewrites::NAMES {
+        folder.line(&format!("model ur5.urdf -f gravity --no-{name}")).ok();
+    }
+}
+
+#[test]
+fn expressions_become_programs() {
+    let folder = Folder::new();
+    let list = r#"{"format": "takt-expressions 1", "name": "f", "inputs": [{"name": "x", "rows": 2, "columns": 1}],
+ "outputs": [{"name": "y", "rows": 1, "columns": 1}],
+ "code": [
+  {"op": "input", "to": 0, "port": [0, 0]},
+  {"op": "input", "to": 1, "port": [0, 1]},
+  {"op": "OP", "to": 2, "of": [0, 1]},
+  {"op": "output", "of": [2], "port": [0, 0]}
+]}"#;
+    folder.write("f.json", list.replace("OP", "atan2"));
+    assert!(folder.line("model f.json -o f.s").ok().contains("operations: 1 ("));
+    assert!(folder.read_text("f.s").contains("        y = atan2(x_1, x_2)\n"));
+    // What is no instruction comes from the library.
+    folder.write("e.json", list.replace("OP", "exp").replace("\"of\": [0, 1]", "\"of\": [0]"));
+    assert!(folder.line("model e.json -o e.s").ok().contains("operations: 1 ("));
+    assert!(folder.read_text("e.s").contains(".include <math.s>\n"));
+    folder.write("e.csv", "x_1\n1\n-2.5\n");
+    folder.line("run e.s --inputs e.csv --outputs y.csv").ok();
+    let values: Vec<f64> = folder
+        .read_text("y.csv")
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').next().unwrap().parse().unwrap())
+        .collect();
+    assert_eq!(values.len(), 2);
+    for (y, x) in values.into_iter().zip([1_f64, -2.5]) {
+        assert!((y / x.exp() - 1.0).abs() < 1e-7, "{y}");
+    }
+    folder.write("f.json", list.replace("OP", "erf"));
+    let done = folder.line("model f.json");
+    assert_eq!(done.status, Some(1));
+    assert!(
+        done.stderr.contains("f.json:6: operation `erf` has no meaning here; in `erf(x_1, x_2)`"),
+        "{}",
+        done.stderr
+    );
+}
+
+#[test]
+fn mistakes_have_one_message() {
+    let folder = folder();
+    folder.write("floating.urdf", UR5.replacen("type=\"revolute\"", "type=\"floating\"", 1));
+    folder.write("robot.txt", UR5);
+    folder.write("f.json", "{");
+    for (line, status, expected) in [
+        ("model ur5.urdf", 2, "say with --function what to compute: forward-kinematics, jacobian,"),
+        ("model ur5.urdf -f gravty", 2, "there is no such function; did you mean `gravity`?"),
+        (
+            "model ur5.urdf -f gravity --tip wrist",
+            1,
+            "ur5.urdf: --tip: there is no link `wrist`; the links are",
+        ),
+        ("model floating.urdf -f gravity", 1, "floating.urdf:12: `shoulder_pan_joint`: a floating joint:"),
+        (
+            "model robot.txt -f gravity",
+            1,
+            "robot.txt: the format is determined by the extension, which must be .urdf, .xml, .csv or .json",
+        ),
+        ("model none.urdf -f gravity", 1, "cannot open none.urdf"),
+        (
+            "model f.json -f gravity",
+            2,
+            "--function applies to robot descriptions, but f.json contains expressions",
+        ),
+        ("model f.json", 1, "f.json:1: this is no list of instructions: EOF while parsing an object"),
+        ("model ur5.urdf -f gravity --snap 1", 2, "between 0 and 0.01 rad"),
+        ("model ur5.urdf -f computed-torque --kp -1", 2, "a gain is finite and not negative"),
+    ] {
+        let done = folder.line(line);
+        assert!(done.status == Some(status) && done.stderr.contains(expected), "{line}: {}", done.stderr);
+        assert_eq!(done.stderr.matches("error:").count(), 1, "{line}: {}", done.stderr);
+    }
+}

@@ -1,0 +1,239 @@
+//! A plant of one's own: `takt run` as the controller at the other end of two pipes.
+
+mod common;
+
+use common::{Done, Folder};
+use std::f64::consts::TAU;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::num::NonZeroU64;
+use std::path::PathBuf;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::mpsc;
+use std::thread;
+use std::time::Duration;
+use takt_asm::{FileLoader, Options};
+use takt_emu::{Emulator, Number};
+
+fn example() -> PathBuf {
+    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../programs/examples/plant"))
+}
+
+/// The motor of `plant.py`.
+#[derive(Default)]
+struct Motor {
+    angle: f64,
+    speed: f64,
+}
+
+impl Motor {
+    fn run(&mut self, current: f64, time: f64) {
+        let (torque, inertia, viscous, dry) = (0.05, 2e-5, 1e-5, 2e-3);
+        let torque = torque * current - viscous * self.speed;
+        if self.speed == 0.0 && torque.abs() <= dry {
+            return;
+        }
+        let forward = self.speed > 0.0 || (self.speed == 0.0 && torque > 0.0);
+        let torque = torque - if forward { dry } else { -dry };
+        let speed = self.speed + torque / inertia * time;
+        self.speed = if speed * self.speed < 0.0 { 0.0 } else { speed };
+        self.angle += self.speed * time;
+    }
+}
+
+/// The controller in this process: encoder to current.
+fn controller() -> impl FnMut(i32) -> f64 {
+    let options = Options::default();
+    let assembled = takt_asm::assemble("servo.s", &FileLoader::new(example()), &options).unwrap();
+    let mut emulator = Emulator::new(&assembled.program).unwrap();
+    emulator.set_tick_period(NonZeroU64::new(125_000));
+    move |counts| {
+        let inputs = [("n", Number::Integer(counts)), ("ref", Number::Float(2.0))];
+        let report = emulator.run_period(&inputs).unwrap();
+        assert!(!report.missed);
+        let Some(Number::Float(current)) = emulator.output("current").unwrap() else { panic!("no current") };
+        // Through text, as it goes through the pipe: the shortest decimal of a binary32 is not that binary32 in binary64.
+        format!("{current:?}").parse().unwrap()
+    }
+}
+
+#[test]
+fn the_example_converges_and_equals_a_loop_without_pipes() {
+    // Where no answer comes both sides wait for ever.
+    let mut command = Command::new("timeout");
+    command
+        .args([&PATIENCE.as_secs().to_string(), "python3"])
+        .arg(example().join("plant.py"))
+        .arg(env!("CARGO_BIN_EXE_takt"));
+    let text = Done::of(command).ok();
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some("time,angle,current"));
+    let rows: Vec<Vec<f64>> =
+        lines.map(|line| line.split(',').map(|field| field.parse().unwrap()).collect()).collect();
+    assert_eq!(rows.len(), 600);
+    let (mut motor, mut control) = (Motor::default(), controller());
+    for (period, row) in rows.iter().enumerate() {
+        let current = control((motor.angle * (4096.0 / TAU)).floor() as i32);
+        assert_eq!((row[1], row[2]), (motor.angle, current), "period {period}");
+        for _ in 0..20 {
+            motor.run(current, 1e-3 / 20.0);
+        }
+    }
+    let count = TAU / 4096.0;
+    assert!(rows.iter().any(|row| (row[1] - 2.0).abs() > 1.0), "it has to move");
+    assert!(rows[500..].iter().all(|row| (row[1] - 2.0).abs() < 2.0 * count), "within two counts of 2 rad");
+    assert!(rows.iter().any(|row| row[2] == 2.0) && rows.iter().all(|row| row[2].abs() <= 2.0), "limited");
+}
+
+const ECHO: &str = "\
+.input a, n:int
+.output F, k:int
+.once
+        wait period
+.period
+period: fdiv F, 1.0, a
+        iadd k, n, 1
+        wait period
+";
+
+/// After which what hangs is taken to hang.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A running `takt run`.
+struct Running {
+    child: Child,
+    stdin: Option<ChildStdin>,
+    stdout: Option<BufReader<ChildStdout>>,
+}
+
+impl Running {
+    fn new(folder: &Folder, options: &str) -> Running {
+        folder.write("echo.s", ECHO);
+        Running::of(folder, "echo.s", options)
+    }
+
+    /// Of a program or a system.
+    fn of(folder: &Folder, file: &str, options: &str) -> Running {
+        let line = format!("run {file} --inputs - --outputs - {options}");
+        let mut command = folder.command(&line.split_whitespace().collect::<Vec<_>>());
+        let mut child = command.stdin(Stdio::piped()).spawn().unwrap();
+        let (stdin, stdout) = (child.stdin.take(), child.stdout.take().map(BufReader::new));
+        Running { child, stdin, stdout }
+    }
+
+    fn send(&mut self, text: &str) {
+        self.stdin.as_mut().unwrap().write_all(text.as_bytes()).unwrap();
+    }
+
+    /// The next line, which must not need more input to come.
+    fn line(&mut self) -> String {
+        let mut stdout = self.stdout.take().unwrap();
+        let (sender, answer) = mpsc::channel();
+        thread::spawn(move || {
+            let mut line = String::new();
+            stdout.read_line(&mut line).unwrap();
+            sender.send((line, stdout))
+        });
+        let Ok((line, stdout)) = answer.recv_timeout(PATIENCE) else {
+            self.child.kill().unwrap();
+            panic!("there is no answer")
+        };
+        self.stdout = Some(stdout);
+        line
+    }
+
+    /// Status, what is still to come on standard output, standard error.
+    fn end(mut self) -> (Option<i32>, String, String) {
+        drop(self.stdin.take());
+        let mut rest = String::new();
+        self.stdout.take().map(|mut stdout| stdout.read_to_string(&mut rest));
+        let done = Done::from(self.child.wait_with_output().unwrap());
+        (done.status, rest, done.stderr)
+    }
+}
+
+#[test]
+fn each_row_is_answered_as_it_comes() {
+    let folder = Folder::new();
+    for end in ["\n", "\r\n"] {
+        let mut running = Running::new(&folder, "");
+        // Before anything was sent; columns in any order, and more than there are ports.
+        assert_eq!(running.line(), "F,k,cycles\n");
+        running.send(&format!("n,time,a{end}"));
+        for n in 0..5 {
+            running.send(&format!("{n},now,4{end}"));
+            assert_eq!(running.line(), format!("0.25,{},12\n", n + 1));
+        }
+        // In pieces, and several at once.
+        running.send("5,no");
+        running.send(&format!("w,4{end}6,now,4{end}7,now,4{end}"));
+        for n in 5..8 {
+            assert_eq!(running.line(), format!("0.25,{},12\n", n + 1));
+        }
+        assert_eq!(running.end(), (Some(0), String::new(), String::new()));
+    }
+}
+
+/// As with a program: whoever waits for the titles first is not kept waiting.
+#[test]
+fn a_system_answers_a_plant_too() {
+    let folder = Folder::new();
+    let system = concat!(env!("CARGO_MANIFEST_DIR"), "/../../programs/systems/speed");
+    let mut running = Running::of(&folder, &format!("{system}.toml"), "");
+    // Before anything was sent.
+    let mut answers = running.line();
+    assert_eq!(answers, "u,seen.peak,seen.values\n");
+    let rows = std::fs::read_to_string(format!("{system}.csv")).unwrap();
+    let mut rows = rows.lines();
+    running.send(&format!("{}\n", rows.next().unwrap()));
+    for row in rows {
+        running.send(&format!("{row}\n"));
+        answers += &running.line();
+    }
+    assert_eq!(running.end(), (Some(0), String::new(), String::new()));
+    let alone = folder.line(&format!("run {system}.toml --inputs {system}.csv --outputs -")).ok();
+    assert_eq!(answers, alone);
+}
+
+#[test]
+fn a_row_that_is_wrong_ends_the_run() {
+    let folder = Folder::new();
+    let mut running = Running::new(&folder, "");
+    running.send("a,n\n4,1\n4,x\n4,2\n");
+    assert_eq!((running.line(), running.line()), ("F,k,cycles\n".to_owned(), "0.25,2,12\n".to_owned()));
+    let error = "error: standard input:3: column n: `x` is no integer between -2147483648 and 2147483647\n";
+    assert_eq!(running.end(), (Some(1), String::new(), error.to_owned()));
+    // A plant that says nothing at all.
+    let running = Running::new(&folder, "");
+    let error = "error: standard input is empty: it needs a header with a column for each input port\n";
+    assert_eq!(running.end(), (Some(1), "F,k,cycles\n".to_owned(), error.to_owned()));
+}
+
+#[test]
+fn a_plant_that_stops_reading_ends_the_run() {
+    let folder = Folder::new();
+    for (options, status) in [("", 0), ("--tick 10 --deny missed", 3), ("--tick 100 --deny missed", 0)] {
+        let mut running = Running::new(&folder, options);
+        running.send("a,n\n4,1\n");
+        assert_eq!((running.line(), running.line().is_empty()), ("F,k,cycles\n".to_owned(), false));
+        drop(running.stdout.take());
+        // It finds out when it answers.
+        running.send("4,2\n");
+        let (ended, _, stderr) = running.end();
+        assert_eq!(
+            (ended, stderr.contains("denied: deadline missed")),
+            (Some(status), status == 3),
+            "{stderr}"
+        );
+    }
+}
+
+/// Warnings and statistics go elsewhere.
+#[test]
+fn standard_output_has_rows_only() {
+    let folder = Folder::new();
+    folder.write("nan.s", ECHO.replace("1.0, a", "zero, a"));
+    let done = folder.fed("run nan.s --inputs - --outputs - --stats", b"a,n\n0,1\n");
+    assert_eq!((done.status, done.stdout.as_str()), (Some(0), "F,k,cycles\nNaN,2,12\n"));
+    assert!(done.stderr.contains("warning: NaN written to F"), "{}", done.stderr);
+    assert!(done.stderr.contains("1 period on t3") && done.stderr.contains("operations:"), "{}", done.stderr);
+}

@@ -1,0 +1,300 @@
+//! `takt debug` on a terminal: a pseudo-terminal on one side, a terminal's screen on the other.
+
+mod common;
+
+use common::{Folder, SUM};
+use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
+use std::io::{Read, Write};
+use std::num::NonZeroU16;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+/// Runs for as long as anybody lets it.
+const ENDLESS: &str = ".output n:int\n        mov n, zero\nloop:   iadd n, n, 1\n        jmp loop\n";
+
+/// How long anything may take to show.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// `takt` on a terminal.
+struct Terminal {
+    master: Box<dyn MasterPty + Send>,
+    keys: Box<dyn Write + Send>,
+    child: Box<dyn Child + Send + Sync>,
+    output: Receiver<Vec<u8>>,
+    parser: vt100::Parser,
+}
+
+impl Terminal {
+    /// A shell's line on a terminal of this size, in a folder, with state in that folder.
+    fn new(folder: &Folder, line: &str, rows: u16, cols: u16) -> Terminal {
+        let size = PtySize { rows, cols, ..PtySize::default() };
+        let pair = native_pty_system().openpty(size).unwrap();
+        let mut command = CommandBuilder::new("/bin/sh");
+        command.args(["-c", &line.replace("takt ", concat!(env!("CARGO_BIN_EXE_takt"), " "))]);
+        command.cwd(folder.path());
+        command.env("TERM", "xterm-256color");
+        command.env("XDG_STATE_HOME", folder.path().join("state"));
+        command.env_remove("NO_COLOR");
+        let child = pair.slave.spawn_command(command).unwrap();
+        let mut reader = pair.master.try_clone_reader().unwrap();
+        let (sender, output) = channel();
+        std::thread::spawn(move || {
+            let mut bytes = [0; 4096];
+            while let Ok(count @ 1..) = reader.read(&mut bytes) {
+                if sender.send(bytes[..count].to_vec()).is_err() {
+                    return;
+                }
+            }
+        });
+        let [height, width] = [rows, cols].map(|size| NonZeroU16::new(size).unwrap());
+        let parser = vt100::Parser::new(height, width, 0);
+        Terminal { keys: pair.master.take_writer().unwrap(), master: pair.master, child, output, parser }
+    }
+
+    fn text(&self) -> String {
+        self.parser.screen().contents()
+    }
+
+    fn press(&mut self, keys: &str) {
+        self.keys.write_all(keys.as_bytes()).unwrap();
+        self.keys.flush().unwrap();
+    }
+
+    /// Waits until the screen is as wanted.
+    #[track_caller]
+    fn until(&mut self, what: &str, is: impl Fn(&vt100::Screen) -> bool) {
+        let end = Instant::now() + PATIENCE;
+        while !is(self.parser.screen()) {
+            match self.output.recv_timeout(end.saturating_duration_since(Instant::now())) {
+                Ok(bytes) => {
+                    self.parser.process(&bytes);
+                    // A terminal answers when it is asked where its cursor is.
+                    if bytes.windows(4).any(|window| window == b"\x1b[6n") {
+                        self.press("\x1b[1;1R");
+                    }
+                }
+                Err(_) => panic!("no {what}:\n{}", self.text()),
+            }
+        }
+    }
+
+    /// Waits until a text is on the screen.
+    #[track_caller]
+    fn shows(&mut self, text: &str) {
+        self.until(text, |screen| screen.contents().contains(text));
+    }
+
+    /// Waits for the prompt, then types a line.
+    #[track_caller]
+    fn line(&mut self, line: &str) {
+        self.until("prompt", |screen| screen.contents().trim_end().ends_with("(takt)"));
+        self.press(line);
+    }
+
+    /// Waits for the end, which must be a success.
+    #[track_caller]
+    fn ends(&mut self) {
+        let end = Instant::now() + PATIENCE;
+        loop {
+            while let Ok(bytes) = self.output.recv_timeout(Duration::from_millis(10)) {
+                self.parser.process(&bytes);
+            }
+            if let Some(status) = self.child.try_wait().unwrap() {
+                // What it wrote last may still be on its way; the end of file comes behind it.
+                while let Ok(bytes) = self.output.recv_timeout(PATIENCE) {
+                    self.parser.process(&bytes);
+                }
+                assert!(status.success(), "{status}:\n{}", self.text());
+                return;
+            }
+            if Instant::now() > end {
+                let _ = self.child.kill();
+                panic!("it does not end:\n{}", self.text());
+            }
+        }
+    }
+
+    /// Changes the size, and waits for something to be drawn.
+    fn resize(&mut self, rows: u16, cols: u16) {
+        self.master.resize(PtySize { rows, cols, ..PtySize::default() }).unwrap();
+        let [height, width] = [rows, cols].map(|size| NonZeroU16::new(size).unwrap());
+        self.parser.set_size(height, width);
+        let bytes = self.output.recv_timeout(PATIENCE).unwrap();
+        self.parser.process(&bytes);
+    }
+}
+
+#[test]
+fn full_screen() {
+    let folder = Folder::new();
+    folder.write("sum.s", SUM);
+    let line = "takt debug sum.s --tui; echo status $?; stty -a";
+    let mut terminal = Terminal::new(&folder, line, 24, 80);
+    terminal.until("the alternate screen", vt100::Screen::alternate_screen);
+    terminal.shows("cycle 0, period 0");
+    terminal.press("s");
+    terminal.shows("(takt) step");
+    // A command line, completed: history and completion are the prompt's.
+    terminal.press(":break ad\t if i == 1\r");
+    terminal.shows("stop 1 at bundle");
+    terminal.press("c");
+    terminal.shows("stop 1: break add if i == 1");
+    terminal.press(":display su\t\r");
+    terminal.shows("sum = 0.5");
+    terminal.press(":\x1b[A\x1b[A\r");
+    terminal.shows("stop 2 at bundle");
+    terminal.press(":prnt\r");
+    terminal.shows("no command `prnt`");
+    terminal.press("?");
+    terminal.shows("Run on to a breakpoint");
+    terminal.press("\x1b");
+    terminal.until("the help gone", |screen| !screen.contents().contains("Run on to"));
+    for (rows, cols) in [(1, 1), (5, 20), (40, 120), (2, 200), (24, 80)] {
+        terminal.resize(rows, cols);
+    }
+    terminal.shows("in flight");
+    terminal.shows("cycle 46, period 0");
+    terminal.press("q");
+    terminal.ends();
+    // The screen, the cursor, and the terminal's way with keys are as they were.
+    let screen = terminal.parser.screen();
+    assert!(!screen.alternate_screen() && !screen.hide_cursor());
+    let text = terminal.text();
+    assert!(text.contains("status 0\n"), "{text}");
+    assert!(text.contains("isig icanon iexten echo "), "{text}");
+}
+
+#[test]
+fn a_long_run_is_interrupted_full_screen() {
+    let folder = Folder::new();
+    folder.write("endless.s", ENDLESS);
+    let mut terminal = Terminal::new(&folder, "echo before; takt debug endless.s --tui; echo after", 24, 80);
+    terminal.shows("cycle 0, period 0");
+    terminal.press(":until n < 0\r");
+    terminal.shows("Ctrl-C stops");
+    terminal.press("\x03");
+    terminal.shows("interrupted");
+    terminal.press(":echo alive\r");
+    terminal.shows("\nalive");
+    terminal.press("\x04");
+    terminal.ends();
+    assert_eq!(terminal.text(), "before\nafter");
+}
+
+#[test]
+fn full_screen_wants_a_terminal() {
+    let folder = Folder::new();
+    folder.write("sum.s", SUM);
+    let done = folder.line("debug sum.s --tui");
+    assert_eq!((done.status, done.stdout.as_str()), (Some(2), ""));
+    assert!(done.stderr.contains("--tui needs a terminal"), "{}", done.stderr);
+    let mut terminal = Terminal::new(&folder, "takt debug sum.s --tui | cat", 24, 80);
+    terminal.shows("--tui needs a terminal");
+    terminal.ends();
+}
+
+#[test]
+fn the_prompt() {
+    let folder = Folder::new();
+    folder.write("sum.s", SUM);
+    let mut terminal = Terminal::new(&folder, "takt debug sum.s", 40, 100);
+    // Commands, labels and registers complete.
+    terminal.line("disp\t cou\t\r");
+    terminal.shows("count = (never written)");
+    terminal.line("break ad\t if i == 1\r");
+    terminal.shows("stop 1 at bundle");
+    terminal.line("continue\r");
+    terminal.shows("stop 1: break add if i == 1");
+    terminal.line("print sum +\r");
+    terminal.shows("^");
+    terminal.line("echo al");
+    terminal.shows("(takt) echo al");
+    terminal.press("\x03");
+    terminal.until("another prompt", |screen| screen.contents().contains("(takt) echo al\n(takt)"));
+    terminal.line("echo still here\r");
+    terminal.shows("\nstill here");
+    terminal.line("\x04");
+    terminal.ends();
+
+    // The next session has the commands of this one.
+    let mut terminal = Terminal::new(&folder, "takt debug sum.s", 40, 100);
+    terminal.line("\x1b[A\r");
+    terminal.shows("\nstill here");
+    terminal.line("\x1b[A\x1b[A\x1b[A\x1b[A\r");
+    terminal.shows("stop 1 at bundle");
+    terminal.line("quit\r");
+    terminal.ends();
+    let history = folder.read_text("state/takt/history");
+    assert!(history.contains("echo still here\n") && history.ends_with("quit\n"), "{history}");
+}
+
+#[test]
+fn a_long_run_is_interrupted() {
+    let folder = Folder::new();
+    folder.write("endless.s", ENDLESS);
+    let mut terminal = Terminal::new(&folder, "exec takt debug endless.s", 24, 100);
+    terminal.line("until n < 0\r");
+    terminal.shows("Ctrl-C stops");
+    terminal.press("\x03");
+    terminal.shows("interrupted");
+    terminal.line("echo alive\r");
+    terminal.shows("\nalive");
+    terminal.line("\x04");
+    terminal.ends();
+}
+
+/// A board that runs freely is held by Ctrl-C, and an endless search ended by it; the board is left as it was found.
+#[cfg(unix)]
+#[test]
+fn a_board_at_the_prompt() {
+    let folder = Folder::new();
+    let example = |name: &str| format!("{}/../../programs/examples/board/{name}", env!("CARGO_MANIFEST_DIR"));
+    let program = format!("{} --machine t1", example("position.s"));
+    let wiring = example("position.toml");
+    let board = format!("board sim --board ulx3s-85f --wiring {wiring} --program {program}");
+    let board = common::SimulatedBoard::start(&board, folder.path());
+    let line = format!("exec takt debug {program} --board {} --baud {}", board.port, board.baud);
+    let mut terminal = Terminal::new(&folder, &line, 40, 100);
+    terminal.shows("waits for the tick, since bundle");
+    terminal.line("unt\t err\t == 1000\r");
+    terminal.shows("until error == 1000");
+    terminal.shows("in period ");
+    terminal.press("\x03");
+    terminal.shows("interrupted\nperiod ");
+    terminal.line("cont\t\r");
+    terminal.until("a long run", |screen| screen.contents().matches("Ctrl-C stops").count() == 1);
+    terminal.press("\x03");
+    terminal.until("another stop", |screen| screen.contents().matches("interrupted\nperiod ").count() == 2);
+    terminal.line("print error == wanted - n\r");
+    terminal.shows("\nerror == wanted - n = 1");
+    terminal.line("\x04");
+    terminal.ends();
+    assert!(terminal.text().ends_with("the program runs; outputs drive"), "{}", terminal.text());
+}
+
+/// What takes long says how long still, and what assembles for long that it does; in a pipe nothing of it is written.
+#[test]
+fn progress_of_what_takes_long() {
+    const SLOW: &str = ".input x\n.output y\n.reg n:int\n.once\n wait p\n.period\np: li n, 100000\nturn: isub n, n, 1\n bnz n, turn\n mov y, x\n wait p\n";
+    let folder = Folder::new();
+    folder.write("slow.s", SLOW);
+    let rows = 1_000_000;
+    folder.write("in.csv", format!("run,x\n{}", "a,1\nb,2\n".repeat(rows / 2)));
+    for (line, what) in [
+        ("takt --no-jit run slow.s --batch in.csv", "1,000,000 periods,"),
+        ("takt --no-jit run slow.s --inputs in.csv --outputs out.csv", "1,000,000 periods,"),
+        ("takt --no-jit run slow.s --periods 1000000", "1,000,000 periods,"),
+        ("takt track --periods 100000", "100,000 periods,"),
+    ] {
+        let mut terminal = Terminal::new(&folder, line, 24, 100);
+        terminal.until(what, |screen| {
+            let text = screen.contents();
+            text.contains(what) && text.contains(" to go")
+        });
+        terminal.press("\x03");
+    }
+    let many = format!(".output y\n.reg a:int\n{}", " iadd a, a, 1\n".repeat(10));
+    folder.write("short.s", many + " halt\n");
+    let done = folder.line("run slow.s --periods 30");
+    assert_eq!((done.status, done.stderr.as_str()), (Some(0), ""));
+}

@@ -1,0 +1,18 @@
+// Bundles the extension and the script of its view; with --tests, the tests.
+import { build } from 'esbuild';
+import { copyFileSync, readdirSync } from 'node:fs';
+
+const tests = process.argv.includes('--tests');
+const common = { bundle: true, target: 'es2022', logLevel: 'warning', minify: !tests };
+const extension = { platform: 'node', format: 'cjs', external: ['vscode'] };
+const view = { ...common, entryPoints: ['src/view.ts'], outfile: 'dist/view.js', platform: 'browser', format: 'iife' };
+
+await build(view);
+if (tests) {
+  const entryPoints = readdirSync('test').filter((name) => name.endsWith('.test.ts')).map((name) => `test/${name}`);
+  await build({ ...common, ...extension, entryPoints, outdir: 'dist-tests' });
+} else {
+  // The package carries it.
+  copyFileSync('../../../LICENSE-MIT', 'LICENSE.txt');
+  await build({ ...common, ...extension, entryPoints: ['src/extension.ts'], outfile: 'dist/extension.js' });
+}

@@ -1,0 +1,40 @@
+//! The extension module of the Python package `takt`: programs, runs and models for the Python code in `tools/python/takt`, which
+//! gives them names, shapes and types of NumPy. docs/python.md is about the package.
+//!
+//! What comes from Python is checked here as well as there: no argument makes it panic. Long work releases the interpreter
+//! and looks for Ctrl-C.
+
+mod accuracy;
+mod board;
+mod failure;
+mod interrupt;
+mod model;
+mod program;
+mod report;
+mod run;
+mod sim;
+
+use pyo3::prelude::*;
+
+/// The extension module of the package `takt`; use that one.
+#[pymodule]
+mod _takt {
+    #[pymodule_export]
+    use crate::accuracy::{accuracy, enclose};
+    #[pymodule_export]
+    use crate::board::Board;
+    #[pymodule_export]
+    use crate::failure::{Failure, restored_fault};
+    #[pymodule_export]
+    use crate::model::{expressions, robot, robot_functions};
+    #[pymodule_export]
+    use crate::program::{
+        Program, assemble, flag_names, load, longest_tick, machines, nearest_name, restored_program,
+    };
+    #[pymodule_export]
+    use crate::report::analyse;
+    #[pymodule_export]
+    use crate::run::{run, run_to_halt};
+    #[pymodule_export]
+    use crate::sim::Sim;
+}

@@ -1,0 +1,124 @@
+"""Programs from models, against what CasADi, SymPy and Pinocchio compute in binary64."""
+
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+import pytest
+import sympy as sp
+
+import takt
+import takt.casadi
+import takt.sympy
+import takt.urdf
+
+UR5 = Path(__file__).parents[3] / "programs/model/tests/data/ur5.urdf"
+# Relative to the largest output of a state; docs/models.md has the errors that were measured.
+CLOSE = 1e-5
+
+
+def random(shape, seed=3):
+    return np.random.default_rng(seed).uniform(-2, 2, shape)
+
+
+def assert_close(ours, theirs):
+    theirs = np.asarray(theirs)
+    largest = np.abs(theirs).reshape(len(theirs), -1).max(axis=1)
+    error = np.abs(ours - theirs).reshape(len(theirs), -1).max(axis=1)
+    assert (error <= CLOSE * largest).all(), (error / largest).max()
+
+
+def test_a_casadi_function_keeps_names_and_shapes():
+    x, a, u = ca.SX.sym("x", 3), ca.SX.sym("A", 2, 3), ca.SX.sym("u")
+    y = ca.mtimes(a, ca.sin(x)) * ca.if_else(u > 0, u, 1 - u)
+    m = ca.SX(2, 2)
+    m[0, 1], m[1, 0] = ca.atan2(x[0], x[1]), 2.5
+    f = ca.Function("f", [x, a, u], [y, m, ca.fmin(u, x[2])], ["x", "A", "u"], ["y", "M", "least"])
+    program = takt.casadi.program(f)
+    given = {"x": random((40, 3)), "A": random((40, 2, 3)), "u": random(40)}
+    run = program.run(given)
+    expected = [f(*(value[k] for value in given.values())) for k in range(40)]
+    assert run.outputs["y"].shape == (40, 2) and run.outputs["M"].shape == (40, 2, 2)
+    for index, name in enumerate(["y", "M", "least"]):
+        values = np.array([np.array(outputs[index]) for outputs in expected])
+        assert_close(run.outputs[name], values.reshape(run.outputs[name].shape))
+    # A structural zero and a constant have no port.
+    assert sorted(program.outputs) == ["M_1_2", "least", "y_1", "y_2"]
+    step = program.sim().step({name: value[0] for name, value in given.items()})
+    for name, value in step.items():
+        np.testing.assert_array_equal(value, run.outputs[name][0])
+
+
+def test_mx_and_the_errors_of_expressions():
+    x = ca.MX.sym("x", 2)
+    program = takt.casadi.program(ca.Function("f", [x], [ca.sumsqr(x)], ["x"], ["y"]), "t1")
+    assert program.machine == "t1" and program.run({"x": [[3.0, 4.0]]}).outputs["y"].tolist() == [25.0]
+    x = ca.SX.sym("x")
+    with pytest.raises(takt.ModelError, match=r"f:\d+: operation `erf` has no meaning here") as raised:
+        takt.casadi.program(ca.Function("f", [x], [ca.erf(x)], ["x"], ["y"]))
+    assert raised.value.line is not None
+    with pytest.raises(takt.ModelError, match="it does not fit: it has 40 outputs, t3 has 32 output ports"):
+        takt.casadi.program(ca.Function("f", [x], [x * ca.DM(range(2, 42))], ["x"], ["y"]))
+    with pytest.raises(TypeError, match="a casadi.Function is needed, not SX"):
+        takt.casadi.program(x)
+    with pytest.raises(ValueError, match="no rewriting `facter`; did you mean `factor`"):
+        takt.casadi.program(ca.Function("f", [x], [x], ["x"], ["y"]), without=["facter"])
+
+
+def test_sympy_expressions():
+    a, b, c = sp.symbols("a b c")
+    outputs = {"y": sp.sin(a + b) * c**2, "M": sp.Matrix([[a, b * c], [sp.sqrt(c), sp.Max(a, b)]])}
+    program = takt.sympy.program({"p": [a, b], "c": c}, outputs)
+    p, values = random((30, 2)), 2.5 + random(30)
+    run = program.run({"p": p, "c": values})
+    assert_close(run.outputs["y"], np.sin(p.sum(axis=1)) * values**2)
+    expected = [[[x, y * z], [z**0.5, max(x, y)]] for (x, y), z in zip(p, values)]
+    assert_close(run.outputs["M"], expected)
+    with pytest.raises(ValueError, match="the symbol b is no input"):
+        takt.sympy.program({"a": a}, {"y": a + b})
+
+
+def test_a_robot_against_pinocchio():
+    model = pin.buildModelFromUrdf(str(UR5))
+    data = model.createData()
+    q, qd, qdd = random((50, 6), 1), random((50, 6), 2), random((50, 6), 3)
+    dynamics = takt.urdf.program(UR5, "inverse-dynamics")
+    assert dynamics.model.joints == tuple(model.names[1:])
+    tau = np.array([pin.rnea(model, data, *state).copy() for state in zip(q, qd, qdd)])
+    assert_close(dynamics.run({"q": q, "qd": qd, "qdd": qdd}).outputs["tau"], tau)
+    # The first joint's angle has no effect, and so no port.
+    assert dynamics.input_arrays[0].elements[0] is None and "q_shoulder_pan" not in dynamics.inputs
+
+    def inertia(state):
+        whole = np.triu(pin.crba(model, data, state))
+        return whole + np.triu(whole, 1).T
+
+    mass = takt.urdf.program(UR5.read_text(), "mass-matrix").run({"q": q}).outputs["M"]
+    assert_close(mass, np.array([inertia(state) for state in q]))
+    place = takt.urdf.program(UR5, "forward-kinematics", tip="tool0").run({"q": q})
+    frame = model.getFrameId("tool0")
+
+    def pose(state):
+        pin.framesForwardKinematics(model, data, state)
+        return data.oMf[frame].copy()
+
+    assert_close(place.outputs["R"], np.array([pose(state).rotation for state in q]))
+    assert_close(place.outputs["p"], np.array([pose(state).translation for state in q]))
+
+
+def test_errors_of_robots(tmp_path):
+    with pytest.raises(ValueError, match="there is no function `gravty` of a robot; did you mean `gravity`"):
+        takt.urdf.program(UR5, "gravty")
+    with pytest.raises(takt.ModelError, match="there is no link `wrist`"):
+        takt.urdf.program(UR5, "gravity", tip="wrist")
+    with pytest.raises(takt.ModelError, match="ur5.urdf:12: `shoulder_pan_joint`: a floating joint") as raised:
+        (tmp_path / "ur5.urdf").write_text(UR5.read_text().replace('type="revolute"', 'type="floating"', 1))
+        takt.urdf.program(tmp_path / "ur5.urdf", "gravity")
+    assert raised.value.line == 12
+    with pytest.raises(ValueError, match="kp is -1: a gain is finite and not negative"):
+        takt.urdf.program(UR5, "computed-torque", kp=-1)
+    with pytest.raises(ValueError, match=r"`q` has shape \(4, 5\); an array of shape \(6,\) is needed"):
+        takt.urdf.program(UR5, "gravity").run({"q": np.zeros((4, 5))})
+    with pytest.raises(FileNotFoundError):
+        takt.urdf.program("missing.urdf", "gravity")

@@ -1,0 +1,358 @@
+//! The documentation as one searchable site: `docs/` in mdbook, the crates' documentation, and the playground, in which every
+//! listing opens.
+
+use crate::{cargo, root, run, web};
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use miniz_oxide::deflate::compress_to_vec_zlib;
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::{Component, Path, PathBuf};
+use std::process::Command;
+use takt_programs::listings::listings;
+
+/// What goes into it.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Leave out the crates' documentation, which takes longest.
+    #[arg(long)]
+    no_rustdoc: bool,
+    /// Take the playground as it was built last, if it was.
+    #[arg(long)]
+    no_web: bool,
+    /// Open it in a headless browser: the search, and every listing in the playground.
+    #[arg(long)]
+    test: bool,
+}
+
+/// The version of mdbook that the site is written for.
+const MDBOOK: &str = "0.5.4";
+/// Where it is installed.
+const TOOLS: &str = "target/tools";
+/// What mdbook is given, and what it makes.
+const SOURCE: &str = "target/book/source";
+const SITE: &str = "target/book/site";
+
+/// The order of the documents, by part. Those that are in none come last.
+const PARTS: &[(&str, &[&str])] = &[
+    (
+        "Writing programs",
+        &[
+            "language",
+            "examples",
+            "library",
+            "fast-code",
+            "scheduling",
+            "analysis",
+            "accuracy",
+            "editors",
+            "playground",
+        ],
+    ),
+    ("Running them", &["debugging", "traces", "batch", "plant", "python", "system"]),
+    ("The processor", &["isa", "timing", "trig", "image", "machine-choice"]),
+    ("The circuit", &["hardware", "headers", "board", "protocol", "synthesis"]),
+    (
+        "Robots",
+        &["robot", "friction", "generation", "arm", "controller", "robot-commands", "model", "models"],
+    ),
+    ("Reference", &["glossary", "speed", "reach"]),
+];
+/// The part of the others.
+const FURTHER: &str = "Further";
+
+pub(crate) fn book(arguments: &Arguments) -> Result<()> {
+    let mdbook = mdbook()?;
+    if !arguments.no_web || !root().join(web::PAGE).join("index.html").exists() {
+        web::build()?;
+    }
+    let (source, site) = (root().join(SOURCE), root().join(SITE));
+    for folder in [&source, &site] {
+        if folder.exists() {
+            std::fs::remove_dir_all(folder).with_context(|| format!("cannot empty {}", folder.display()))?;
+        }
+    }
+    write_source(&source)?;
+    run(Command::new(mdbook).arg("build").arg(&source).arg("--dest-dir").arg(&site))?;
+    copy(&root().join(web::PAGE), &site.join("playground"))?;
+    if !arguments.no_rustdoc {
+        // The libraries; what only works on the project has no reader.
+        let excluded = ["xtask", "unify", "takt-benches", "takt"];
+        let excluded = excluded.iter().flat_map(|package| ["--exclude", package]);
+        run(cargo().args(["doc", "--workspace", "--no-deps", "--lib", "--release"]).args(excluded))?;
+        copy(&root().join("target/doc"), &site.join("api"))?;
+    }
+    let (pages, links) = check_links(&site)?;
+    println!(
+        "{pages} pages in {SITE}, {links} links checked: `python3 -m http.server -d {SITE}` serves them"
+    );
+    if arguments.test { web::in_browser("test/book.test.mjs", &[("TAKT_BOOK", &site)]) } else { Ok(()) }
+}
+
+/// mdbook in the version that is written down: the one installed, or else one made here.
+fn mdbook() -> Result<PathBuf> {
+    let is_it = |program: &Path| {
+        let output = Command::new(program).arg("--version").output();
+        output.is_ok_and(|output| {
+            String::from_utf8_lossy(&output.stdout).trim().ends_with(&format!("v{MDBOOK}"))
+        })
+    };
+    let own = root().join(TOOLS).join("bin/mdbook");
+    for program in [PathBuf::from("mdbook"), own.clone()] {
+        if is_it(&program) {
+            return Ok(program);
+        }
+    }
+    eprintln!("mdbook {MDBOOK} is missing: installing it into {TOOLS}");
+    // It runs for a second: what it takes to compile counts.
+    let install = ["install", "mdbook", "--version", MDBOOK, "--locked", "--debug", "--root", TOOLS];
+    run(cargo().args(install).args(["--no-default-features", "--features", "search"]))?;
+    Ok(own)
+}
+
+/// What mdbook is given: the documents with their links and listings made the site's.
+fn write_source(folder: &Path) -> Result<()> {
+    let docs = root().join("docs");
+    let chapters = folder.join("src");
+    std::fs::create_dir_all(&chapters)?;
+    let (mut titles, mut texts) = (BTreeMap::new(), Vec::new());
+    for entry in std::fs::read_dir(&docs).context("cannot read docs/")? {
+        let path = entry?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let Some(stem) = name.strip_suffix(".md") else { continue };
+        let text = std::fs::read_to_string(&path).with_context(|| format!("cannot read docs/{name}"))?;
+        let title = text.lines().find_map(|line| line.strip_prefix("# ")).unwrap_or(stem).to_owned();
+        titles.insert(stem.to_owned(), title);
+        texts.push((name, text));
+    }
+    for (name, text) in texts {
+        std::fs::write(chapters.join(&name), titled(&chapter(&name, &text, &chapters)?, &titles))?;
+    }
+    copy(&docs.join("pictures"), &chapters.join("pictures"))?;
+    let mut summary = "# Summary\n\n[Takt](takt.md)\n".to_owned();
+    let mut contents = String::new();
+    let mut put = |part: &str, chapters: Vec<(String, String)>| {
+        if !chapters.is_empty() {
+            let list =
+                chapters.iter().map(|(name, title)| format!("- [{title}]({name}.md)\n")).collect::<String>();
+            let _ = write!(summary, "\n# {part}\n\n{list}");
+            let _ = write!(contents, "\n## {part}\n\n{list}");
+        }
+    };
+    for (part, names) in PARTS {
+        put(part, names.iter().filter_map(|name| titles.remove_entry(*name)).collect());
+    }
+    put(FURTHER, titles.into_iter().collect());
+    let front = format!(
+        "# Takt\n\nA floating-point processor for robot control: its language, its timing, its circuit, and the tools.\n\n\
+         <a href=\"playground/index.html\"><b>Open the playground</b></a>: write, assemble and run programs in this browser, \
+         without installing anything.\n\nThe crates' documentation: <a href=\"api/takt_isa/index.html\">API</a>.\n{contents}"
+    );
+    std::fs::write(chapters.join("takt.md"), front)?;
+    std::fs::write(chapters.join("SUMMARY.md"), summary)?;
+    std::fs::write(folder.join("takt.css"), CSS)?;
+    std::fs::write(folder.join("book.toml"), CONFIGURATION)?;
+    Ok(())
+}
+
+const CONFIGURATION: &str = "\
+[book]
+title = \"Takt\"
+language = \"en\"
+
+[output.html]
+additional-css = [\"takt.css\"]
+no-section-label = true
+
+[output.html.search]
+limit-results = 40
+";
+
+const CSS: &str = "\
+:root { --content-max-width: 980px; }
+.playground-link { display: block; text-align: right; font-size: 0.85em; margin: -1em 0 1.2em; }
+.content main table { font-size: 0.95em; }
+";
+
+/// A document as a chapter: a link to the playground below each listing; files outside `docs/` beside the book.
+fn chapter(name: &str, text: &str, folder: &Path) -> Result<String> {
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    for listing in listings(text) {
+        let at = listing.text.as_ptr() as usize - rest.as_ptr() as usize;
+        let end = at + listing.text.len();
+        let fence = rest[end..].find('\n').map_or(rest.len(), |offset| end + offset + 1);
+        out.push_str(&rest[..fence]);
+        let stem = name.trim_end_matches(".md");
+        let program = json!({ "name": format!("{stem}.s"), "source": listing.program });
+        let _ = write!(
+            out,
+            "\n<a class=\"playground-link\" href=\"playground/index.html#{}\">Open in the playground</a>\n",
+            fragment(&program.to_string())
+        );
+        rest = &rest[fence..];
+    }
+    out.push_str(rest);
+    outside(name, &out, folder)
+}
+
+/// Links that show a document's file name, `[glossary.md](glossary.md)`, show its title: a book has no files.
+fn titled(text: &str, titles: &BTreeMap<String, String>) -> String {
+    let link = |text: String, (stem, title): (&String, &String)| {
+        let shown = format!("[{stem}.md]({stem}.md");
+        text.replace(&shown, &format!("[{title}]({stem}.md"))
+    };
+    titles.iter().fold(text.to_owned(), link)
+}
+
+/// The part of an address behind `#` that the playground unpacks (`tools/web/page/src/link.js`).
+fn fragment(program: &str) -> String {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
+    let mut text = "p1=".to_owned();
+    for chunk in compress_to_vec_zlib(program.as_bytes(), 9).chunks(3) {
+        let group =
+            chunk.iter().fold(0u32, |group, byte| group << 8 | u32::from(*byte)) << (8 * (3 - chunk.len()));
+        for digit in 0..=chunk.len() {
+            text.push(char::from(DIGITS[(group >> (18 - 6 * digit)) as usize & 63]));
+        }
+    }
+    text
+}
+
+/// Links to files outside `docs/`: the files are put beside the book. Folders and what is not there keep their text only.
+fn outside(name: &str, text: &str, folder: &Path) -> Result<String> {
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(at) = rest.find("](../") {
+        let (before, link) = rest.split_at(at + 2);
+        let end = link.find(')').with_context(|| format!("docs/{name}: a link does not end"))?;
+        let target = link[..end].split('#').next().unwrap_or_default();
+        let inner = normal(&Path::new("docs").join(target));
+        let file = root().join(&inner);
+        if file.is_file() {
+            out.push_str(before);
+            let copied = folder.join("files").join(&inner);
+            std::fs::create_dir_all(copied.parent().unwrap_or(folder))?;
+            // As a text: a browser shows it, and mdbook takes it for no chapter.
+            let shown = format!("{}.txt", copied.display());
+            std::fs::copy(&file, &shown)?;
+            let _ = write!(out, "files/{}.txt", inner.display());
+        } else if file.is_dir() {
+            // `[text](` becomes `text (folder`.
+            let open = before.rfind('[').with_context(|| format!("docs/{name}: a link does not begin"))?;
+            let _ = write!(out, "{}{} (`{}`", &before[..open], &before[open + 1..at], inner.display());
+        } else {
+            bail!("docs/{name}: there is no {}", inner.display());
+        }
+        rest = &link[end..];
+    }
+    out.push_str(rest);
+    Ok(out)
+}
+
+/// A path without `..`.
+fn normal(path: &Path) -> PathBuf {
+    let mut out = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::ParentDir => drop(out.pop()),
+            Component::CurDir => {}
+            part => out.push(part),
+        }
+    }
+    out
+}
+
+fn copy(from: &Path, to: &Path) -> Result<()> {
+    std::fs::create_dir_all(to)?;
+    for entry in std::fs::read_dir(from).with_context(|| format!("cannot read {}", from.display()))? {
+        let path = entry?.path();
+        let target = to.join(path.file_name().unwrap_or_default());
+        if path.is_dir() {
+            copy(&path, &target)?;
+        } else {
+            std::fs::copy(&path, &target).with_context(|| format!("cannot copy {}", path.display()))?;
+        }
+    }
+    Ok(())
+}
+
+/// Values of an attribute in a page.
+fn attributes<'p>(page: &'p str, name: &str) -> Vec<&'p str> {
+    let pattern = format!(" {name}=\"");
+    page.split(pattern.as_str()).skip(1).filter_map(|rest| rest.split('"').next()).collect()
+}
+
+/// Follows every link of the book's own pages: the file is there, and the place in it. How many pages and links there are.
+fn check_links(site: &Path) -> Result<(usize, usize)> {
+    let mut pages = BTreeMap::new();
+    for entry in std::fs::read_dir(site)? {
+        let path = entry?.path();
+        if path.extension().is_some_and(|extension| extension == "html") {
+            pages.insert(path.clone(), std::fs::read_to_string(&path)?);
+        }
+    }
+    let has_api = site.join("api").exists();
+    let (mut broken, mut count) = (Vec::new(), 0);
+    for (path, page) in &pages {
+        let page_name = path.file_name().unwrap_or_default().to_string_lossy();
+        let links = attributes(page, "href").into_iter().chain(attributes(page, "src"));
+        for link in links.filter(|link| !link.contains(':') && !link.starts_with("//") && !link.is_empty()) {
+            let link = link.replace("&amp;", "&");
+            let (file, place) = link.split_once('#').unwrap_or((&link, ""));
+            let target =
+                if file.is_empty() { path.clone() } else { normal(&site.join(file.trim_start_matches('/'))) };
+            if target.starts_with(site.join("api")) && !has_api {
+                continue;
+            }
+            count += 1;
+            if !target.exists() {
+                broken.push(format!("{page_name}: {link}: there is no such file"));
+            } else if let Some(other) = pages.get(&target).filter(|_| !place.is_empty())
+                && !attributes(other, "id").contains(&place)
+            {
+                broken.push(format!("{page_name}: {link}: there is no such place"));
+            }
+        }
+    }
+    if !broken.is_empty() {
+        bail!("broken links:\n{}", broken.join("\n"));
+    }
+    Ok((pages.len(), count))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn listings_get_a_link() {
+        let text = "# T\n\n<!-- around:\n.period\n...\n-->\n```asm\na\n```\n\nend\n";
+        let chapter = chapter("x.md", text, Path::new("/nowhere")).expect("no link leads outside");
+        let (before, link) = chapter.split_once("#p1=").expect("it has a link");
+        assert!(before.contains("```asm\na\n```\n"), "{before}");
+        assert!(link.ends_with("\">Open in the playground</a>\n\nend\n"), "{link}");
+    }
+
+    #[test]
+    fn links_show_titles() {
+        let titles = BTreeMap::from([("glossary".to_owned(), "Glossary".to_owned())]);
+        assert_eq!(
+            titled("([glossary.md](glossary.md#ulp), [x](glossary.md), [isa.md](isa.md))", &titles),
+            "([Glossary](glossary.md#ulp), [x](glossary.md), [isa.md](isa.md))"
+        );
+    }
+
+    #[test]
+    fn fragments_are_base_64_for_addresses() {
+        let fragment = fragment("{}");
+        let packed = fragment.strip_prefix("p1=").expect("it says how it is packed");
+        assert!(packed.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_".contains(&byte)), "{packed}");
+    }
+
+    #[test]
+    fn attributes_are_found() {
+        assert_eq!(attributes("<a href=\"x#y\" id=\"z\"><b href=\"w\">", "href"), ["x#y", "w"]);
+    }
+}

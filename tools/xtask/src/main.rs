@@ -1,0 +1,358 @@
+//! Project automation. `cargo xtask --help` lists what there is.
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
+mod book;
+mod clients;
+mod dist;
+mod docs;
+mod formal;
+mod litex;
+mod python;
+mod reach;
+mod share;
+mod synth;
+mod times;
+mod venv;
+mod web;
+
+use anyhow::{Context, Result, bail};
+use clap::{Parser, Subcommand};
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode, Stdio};
+use takt_isa::MACHINES;
+
+/// Project automation for Takt.
+#[derive(Parser)]
+#[command(name = "cargo xtask")]
+struct Arguments {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Install what the tests need and is not there, then run formal verification's share and every test, optimised, those of the
+    /// Python package included.
+    Test {
+        /// Exhaustive: all 2³² operands of every operation of one operand (about ten minutes on two cores).
+        #[arg(long)]
+        full: bool,
+        /// Passed on to `cargo test`, which then runs alone.
+        #[arg(last = true)]
+        rest: Vec<String>,
+    },
+    /// Write the generated documents, or with --check fail if one is stale.
+    Docs {
+        /// Change nothing; fail if a generated file differs from the specification.
+        #[arg(long)]
+        check: bool,
+    },
+    /// Format, lints, generated files: what CI checks before the tests.
+    Lint,
+    /// Synthesise a machine or units, place and route them, and record clock and resources in docs/synthesis.md.
+    Synth(synth::Arguments),
+    /// Prove for every program, up to a stated number of cycles, that the core keeps the rules of issue, and that its decoders are total.
+    Formal(formal::Arguments),
+    /// Compile for aarch64 Linux, macOS, Windows and wasm32, and run the core crates' tests on aarch64 (installs what it lacks).
+    Reach(reach::Arguments),
+    /// Build the playground, a page for any file server, in target/playground (installs what it lacks); --test opens it in a browser.
+    Web(web::Arguments),
+    /// Verify the core's bus slaves and a board's UART with clients that other projects wrote, in Icarus Verilog, and the core in a
+    /// SoC of LiteX, in Verilator (a share of `test`; installs what it lacks).
+    Clients {
+        /// The SoC of LiteX alone.
+        #[arg(long)]
+        litex: bool,
+    },
+    /// Write an archive for each machine, target/dist/takt-*.tar.gz: its Verilog, a FuseSoC core, headers, the data sheet as PDF.
+    Dist(dist::Arguments),
+    /// Write the documentation as a site, in target/book/site: docs/, the crates' documentation, the playground (installs mdbook).
+    Book(book::Arguments),
+    /// Measure how fast emulator, assembler and lockstep are beside native code, GNU `as` and one another; print it and write
+    /// docs/speed.md (a few minutes on an idle machine).
+    Speed,
+    /// Build the Python package's wheel, for every Python from 3.10 on (installs maturin in .venv).
+    Wheel(python::Arguments),
+    /// Build the extension for VS Code, editors/vscode/dist/takt.vsix, with its tests (installs with npm what it lacks).
+    Extension {
+        /// Install it in VS Code's workbench, in a headless browser, and use it there (installs 300 MB with npm, once).
+        #[arg(long)]
+        workbench: bool,
+        /// Keep pictures of the workbench in this folder.
+        #[arg(long, value_name = "FOLDER", requires = "workbench")]
+        screenshots: Option<PathBuf>,
+    },
+    /// Fuzz the assembler and the image loader, one after the other (installs cargo-fuzz if it is not there).
+    Fuzz {
+        /// Minutes for each target.
+        #[arg(long, default_value_t = 10)]
+        minutes: u32,
+    },
+    /// Run the tests of a target for cargo, and write down how long they take.
+    #[command(hide = true)]
+    Timed(times::Arguments),
+}
+
+fn main() -> Result<ExitCode> {
+    let done = match Arguments::parse().task {
+        Task::Test { full, rest } => test(full, &rest),
+        Task::Docs { check } => docs::run(&root(), check),
+        Task::Lint => lint(),
+        Task::Formal(arguments) => formal::formal(&arguments),
+        Task::Synth(arguments) => synth::synth(&arguments),
+        Task::Reach(arguments) => reach::reach(&arguments),
+        Task::Web(arguments) => web::web(&arguments),
+        Task::Clients { litex } => {
+            install()?;
+            if !litex {
+                clients::test()?;
+            }
+            litex::test()
+        }
+        Task::Dist(arguments) => dist::dist(&arguments),
+        Task::Book(arguments) => book::book(&arguments),
+        Task::Speed => speed(),
+        Task::Wheel(arguments) => python::wheel(&arguments),
+        Task::Extension { workbench, screenshots } => {
+            extension()?;
+            if workbench { self::workbench(screenshots.as_deref()) } else { Ok(()) }
+        }
+        Task::Fuzz { minutes } => fuzz(minutes),
+        Task::Timed(arguments) => return times::timed(&arguments),
+    };
+    done.map(|()| ExitCode::SUCCESS)
+}
+
+/// The project's folder.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .ancestors()
+        .nth(2)
+        .expect("xtask lies in the project's tools")
+        .to_owned()
+}
+
+fn run(command: &mut Command) -> Result<()> {
+    let text = format!("{command:?}").replace('"', "");
+    eprintln!("$ {text}");
+    let status = command.status().with_context(|| format!("cannot start `{text}`"))?;
+    if !status.success() {
+        bail!("`{text}` failed ({status})");
+    }
+    Ok(())
+}
+
+/// The features with which takt has all its commands.
+const EVERYTHING: &str = "takt/full";
+
+fn cargo() -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.current_dir(root());
+    command
+}
+
+fn works(program: &str, argument: &str) -> bool {
+    Command::new(program).arg(argument).output().is_ok_and(|output| output.status.success())
+}
+
+/// What the tests call, how to ask whether it works, and the Debian package that has it.
+const TOOLS: [(&str, &str, &str); 10] = [
+    // Berkeley SoftFloat, the reference arithmetic, is C.
+    ("cc", "--version", "gcc"),
+    // The circuit runs in Verilator, which builds with make and a C++ compiler, and in Icarus Verilog.
+    ("c++", "--version", "g++"),
+    ("make", "--version", "make"),
+    ("verilator", "--version", "verilator"),
+    ("llvm-mca", "--version", "llvm"),
+    ("iverilog", "-V", "iverilog"),
+    // The language server is used by the client of an editor.
+    ("nvim", "--version", "neovim"),
+    // The debug adapter by another one, in JavaScript.
+    ("node", "--version", "nodejs"),
+    ("npm", "--version", "npm"),
+    // The page of `takt analyse` and the extension's view are opened in a browser.
+    ("chromium", "--version", "chromium"),
+];
+
+/// Installs with apt-get what the tests call and is not there.
+fn install() -> Result<()> {
+    let missing = TOOLS.iter().filter(|(tool, ask, _)| !works(tool, ask));
+    let mut packages: Vec<&str> = missing.map(|(_, _, package)| *package).collect();
+    // The debug adapter's third client is Emacs's.
+    let emacs = Command::new("emacs").args(["--batch", "--eval", "(require 'dap-mode)"]).output();
+    if !emacs.is_ok_and(|output| output.status.success()) {
+        packages.extend(["emacs-nox", "elpa-dap-mode"]);
+    }
+    if packages.is_empty() {
+        return Ok(());
+    }
+    packages.push("libc6-dev");
+    apt_install(&packages)
+}
+
+/// Installs Debian packages.
+fn apt_install(packages: &[&str]) -> Result<()> {
+    eprintln!("installing {} with apt-get", packages.join(" "));
+    run(Command::new("apt-get").args(["update", "-qq"]))?;
+    let mut install = Command::new("apt-get");
+    install.args(["install", "-y", "-qq", "--no-install-recommends"]).args(packages);
+    run(install.env("DEBIAN_FRONTEND", "noninteractive"))
+}
+
+/// Installs with npm what a folder's package-lock.json writes down.
+fn npm_install(folder: &Path) -> Result<()> {
+    if folder.join("node_modules").is_dir() {
+        return Ok(());
+    }
+    run(Command::new("npm").args(["ci", "--no-audit", "--no-fund", "--ignore-scripts"]).current_dir(folder))
+}
+
+/// Checks, tests and packs the extension for VS Code.
+fn extension() -> Result<()> {
+    install()?;
+    let folder = root().join("tools/editors/vscode");
+    npm_install(&folder)?;
+    for script in ["check", "test", "package"] {
+        run(Command::new("npm").args(["run", "--silent", script]).current_dir(&folder))?;
+    }
+    Ok(())
+}
+
+/// Uses the extension in VS Code's workbench, as the package code-server has it. Of its native modules only the terminal's is
+/// compiled, which tasks run in: the others would take minutes.
+fn workbench(screenshots: Option<&Path>) -> Result<()> {
+    let folder = root().join("tools/editors/vscode/workbench");
+    npm_install(&folder)?;
+    let code = folder.join("node_modules/code-server/lib/vscode");
+    for part in [code.clone(), code.join("extensions")] {
+        if !part.join("node_modules").is_dir() {
+            let install = ["install", "--omit=dev", "--no-audit", "--no-fund", "--ignore-scripts"];
+            run(Command::new("npm").args(install).current_dir(part))?;
+        }
+    }
+    let terminal = code.join("node_modules/node-pty/build/Release/pty.node");
+    if !terminal.is_file() {
+        // Its last step asks npx for a package.
+        let mut rebuild = Command::new("npm");
+        rebuild.args(["rebuild", "node-pty"]).env("npm_config_yes", "true").current_dir(&code);
+        run(&mut rebuild).context("the terminal's module could not be compiled")?;
+    }
+    run(cargo().args(["build", "--release", "--package", "takt", "--features", EVERYTHING]))?;
+    let mut tests = Command::new("node");
+    tests.args(["--test", "--test-reporter=spec", "workbench.test.mjs"]).current_dir(folder);
+    tests.env("TAKT", root().join("target/release/takt"));
+    if let Some(folder) = screenshots {
+        tests.env("TAKT_SCREENSHOTS", std::path::absolute(folder)?);
+    }
+    run(&mut tests)
+}
+
+fn test(full: bool, rest: &[String]) -> Result<()> {
+    install()?;
+    venv::Venv::with(&venv::MODELS)?;
+    // The debug adapter's client.
+    npm_install(&root().join("tools/cli/tests/clients/dap"))?;
+    if rest.is_empty() {
+        extension()?;
+        formal::formal(&formal::Arguments::SHARE)?;
+        clients::test()?;
+        litex::test()?;
+        dist::test()?;
+    }
+    let mut tests = cargo();
+    tests.arg("test").args(times::watch()?);
+    tests.args(["--workspace", "--features", EVERYTHING, "--no-fail-fast", "--release"]).args(rest);
+    tests.env("TAKT_ROUTED", "1");
+    if full {
+        tests.env("TAKT_FULL", "1");
+    }
+    let tested = run(&mut tests);
+    eprint!("{}", times::slowest()?);
+    tested?;
+    if rest.is_empty() { python::test() } else { Ok(()) }
+}
+
+/// Measures, prints, writes docs/speed.md.
+fn speed() -> Result<()> {
+    install()?;
+    if !works("customasm", "--version") {
+        eprintln!("customasm is missing: installing it");
+        run(cargo().args(["install", "customasm", "--locked", "--version", "0.14.2"]))?;
+    }
+    let mut measure = cargo();
+    measure.args(["run", "--release", "--package", "takt-benches", "--features", "jit", "--bin", "speed"]);
+    let output = measure.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
+    if !output.status.success() {
+        bail!("measuring failed ({})", output.status);
+    }
+    let text = String::from_utf8(output.stdout).context("what was measured is no text")?;
+    print!("{text}");
+    let path = root().join("docs/speed.md");
+    std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
+}
+
+fn lint() -> Result<()> {
+    run(cargo().args(["fmt", "--all", "--check"]))?;
+    let workspace = ["--workspace", "--all-targets", "--features", EVERYTHING, "--release"];
+    run(cargo().arg("clippy").args(workspace).args(["--", "-D", "warnings"]))?;
+    // What `cargo run` compiles: takt with fewer commands.
+    run(cargo().args(["clippy", "--release", "-p", "takt", "--", "-D", "warnings"]))?;
+    // isa, asm and emu stand without C: SoftFloat is a feature.
+    run(cargo().args([
+        "check",
+        "--release",
+        "--no-default-features",
+        "-p",
+        "takt-isa",
+        "-p",
+        "takt-asm",
+        "-p",
+        "takt-emu",
+    ]))?;
+    share::check()?;
+    docs::run(&root(), true)
+}
+
+fn fuzz(minutes: u32) -> Result<()> {
+    if !works("cargo-fuzz", "--version") {
+        eprintln!("cargo-fuzz is missing: installing it");
+        run(cargo().args(["install", "cargo-fuzz", "--locked"]))?;
+    }
+    seed()?;
+    for target in ["assemble", "image"] {
+        // cargo-fuzz needs unstable compiler flags; the variable admits them on the stable compiler.
+        run(cargo()
+            .env("RUSTC_BOOTSTRAP", "1")
+            .args(["fuzz", "run", "--fuzz-dir", "asm/fuzz", target, "--"])
+            .args([
+                format!("-max_total_time={}", 60 * minutes),
+                "-max_len=65536".to_owned(),
+                "-rss_limit_mb=4096".to_owned(),
+                "-timeout=60".to_owned(),
+            ]))?;
+    }
+    Ok(())
+}
+
+/// What fuzzing starts from: the sources there are, and images of the programs.
+fn seed() -> Result<()> {
+    let (sources, images) = (root().join("asm/fuzz/corpus/assemble"), root().join("asm/fuzz/corpus/image"));
+    std::fs::create_dir_all(&sources)?;
+    std::fs::create_dir_all(&images)?;
+    for folder in ["programs/hybrid", "asm/tests/accepted", "asm/tests/mistakes", "asm/tests/kernels"] {
+        for entry in
+            std::fs::read_dir(root().join(folder)).with_context(|| format!("cannot read {folder}"))?
+        {
+            let path = entry?.path();
+            if let Some(name) = path.file_name().filter(|_| path.is_file()) {
+                std::fs::copy(&path, sources.join(name))?;
+            }
+        }
+    }
+    for machine in MACHINES.iter().map(|machine| machine.name) {
+        let image = images.join(format!("{machine}.takt"));
+        let source = "programs/hybrid/tracking.s";
+        run(cargo().args(["run", "--release", "-q", "--", "asm", source, "-m", machine, "-o"]).arg(image))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,62 @@
+//! The Python package: its wheel, and its tests, which use it as it is installed.
+
+use crate::venv::{MODELS, Venv};
+use crate::{root, run};
+use anyhow::{Context, Result, bail};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Builds wheels. (In the environment, `pip install .` would ask for one of its own.)
+const MATURIN: &str = "maturin==1.16.0";
+/// What the tests of the package need beside [`MODELS`].
+const TESTS: [&str; 3] = ["numpy==2.4.6", "pytest==9.2.0", "mypy==2.4.1"];
+
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// The folder of the wheel.
+    #[arg(long, default_value = "target/wheels")]
+    out: PathBuf,
+}
+
+/// Builds the wheel, in the profile of takt and the tests, so that what they have in common is compiled once.
+pub(crate) fn wheel(arguments: &Arguments) -> Result<()> {
+    let wheel = build(&Venv::with(&[MATURIN])?, &root().join(&arguments.out))?;
+    println!("{}", wheel.display());
+    Ok(())
+}
+
+fn build(venv: &Venv, out: &Path) -> Result<PathBuf> {
+    std::fs::create_dir_all(out).with_context(|| format!("cannot make the folder {}", out.display()))?;
+    // A folder of its own: there is one wheel in it.
+    let fresh = out.join(format!(".{}", std::process::id()));
+    let mut command = Command::new(venv.tool("maturin"));
+    command.args(["build", "--release", "--interpreter"]).arg(venv.tool("python3"));
+    let built = run(command.arg("--out").arg(&fresh).current_dir(root())).and_then(|()| {
+        let found = std::fs::read_dir(&fresh)?.collect::<Result<Vec<_>, _>>()?;
+        let [wheel] = &found[..] else { bail!("maturin built {} wheels", found.len()) };
+        let place = out.join(wheel.file_name());
+        std::fs::rename(wheel.path(), &place)?;
+        Ok(place)
+    });
+    // If it stays, it is in nobody's way.
+    let _ = std::fs::remove_dir_all(&fresh);
+    built
+}
+
+/// Builds the package, installs it in the environment, and tests it there.
+pub(crate) fn test() -> Result<()> {
+    let packages: Vec<&str> = [MATURIN].into_iter().chain(TESTS).chain(MODELS).collect();
+    let venv = Venv::with(&packages)?;
+    let wheel = build(&venv, &root().join("target/wheels"))?;
+    let python = || {
+        let mut command = Command::new(venv.tool("python3"));
+        command.current_dir(root()).args(["-I", "-m"]);
+        command
+    };
+    let install =
+        ["pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps", "--force-reinstall"];
+    run(python().args(install).arg(&wheel))?;
+    let checked = ["tools/python/takt", "tools/python/examples"];
+    run(python().args(["mypy", "--strict", "--cache-dir", "target/mypy"]).args(checked))?;
+    run(python().args(["pytest", "-q", "-p", "no:cacheprovider", "tools/python/tests"]))
+}

@@ -1,0 +1,88 @@
+//! The playground: compiled for browsers, bundled, and tested in one.
+
+use crate::reach::{Toolchain, WASM};
+use crate::{apt_install, root, run, works};
+use anyhow::{Context, Result};
+use clap::Args;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// What to do with it.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Open it in a headless browser and test it.
+    #[arg(long)]
+    test: bool,
+    /// Measure the controller's speed in the browser (with --test).
+    #[arg(long, requires = "test")]
+    bench: bool,
+    /// Keep pictures of the page in this folder (with --test).
+    #[arg(long, value_name = "FOLDER", requires = "test")]
+    screenshots: Option<PathBuf>,
+}
+
+/// Where the page is built; any file server can serve it.
+pub(crate) const PAGE: &str = "target/playground";
+/// What is compiled on the way.
+const TARGET: &str = "target/web";
+
+pub(crate) fn web(arguments: &Arguments) -> Result<()> {
+    build()?;
+    if arguments.test {
+        test(arguments)?;
+    }
+    Ok(())
+}
+
+/// Builds the page.
+pub(crate) fn build() -> Result<()> {
+    let mut compile = Toolchain::find(&[WASM])?.cargo("build", WASM, TARGET);
+    compile.args(["--release", "-p", "takt-web"]);
+    run(&mut compile)?;
+    let page = packages()?;
+    let mut bundle = Command::new("node");
+    let compiled = root().join(format!("{TARGET}/{WASM}/release/takt_web.wasm"));
+    run(bundle.arg("build.mjs").arg(compiled).arg(root().join(PAGE)).current_dir(page))?;
+    eprintln!(
+        "the playground is in {PAGE}: `python3 -m http.server -d {PAGE}` serves it on http://localhost:8000"
+    );
+    Ok(())
+}
+
+/// The page's folder, with what it needs from npm in the versions that are written down.
+fn packages() -> Result<PathBuf> {
+    if !works("node", "--version") || !works("npm", "--version") {
+        apt_install(&["nodejs", "npm"])?;
+    }
+    let page = root().join("tools/web/page");
+    let lock = |path: &Path| std::fs::metadata(path).and_then(|about| about.modified()).ok();
+    let installed = lock(&page.join("node_modules/.package-lock.json"));
+    if installed.is_none() || installed < lock(&page.join("package-lock.json")) {
+        run(Command::new("npm").args(["ci", "--no-audit", "--no-fund"]).current_dir(&page))?;
+    }
+    Ok(page)
+}
+
+fn test(arguments: &Arguments) -> Result<()> {
+    let page = root().join(PAGE);
+    let mut environment = vec![("TAKT_PAGE", page.as_path())];
+    if arguments.bench {
+        environment.push(("TAKT_BENCH", Path::new("1")));
+    }
+    let folder = arguments.screenshots.as_ref().map(std::path::absolute).transpose()?;
+    if let Some(folder) = &folder {
+        std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+        environment.push(("TAKT_SCREENSHOTS", folder));
+    }
+    in_browser("test/page.test.mjs", &environment)
+}
+
+/// Runs a test of the page's folder that uses a headless browser.
+pub(crate) fn in_browser(test: &str, environment: &[(&str, &Path)]) -> Result<()> {
+    if !works("chromium", "--version") {
+        apt_install(&["chromium"])?;
+    }
+    let mut tests = Command::new("node");
+    tests.args(["--test", "--test-reporter=spec", test]).current_dir(packages()?);
+    run(tests.envs(environment.iter().copied()))
+}
