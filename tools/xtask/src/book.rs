@@ -36,6 +36,7 @@ const SITE: &str = "target/book/site";
 
 /// The order of the documents, by part. Those that are in none come last.
 const PARTS: &[(&str, &[&str])] = &[
+    ("Start", &["first-controller", "tour", "what-fits", "figures"]),
     (
         "Writing programs",
         &[
@@ -120,7 +121,8 @@ fn write_source(folder: &Path) -> Result<()> {
     for entry in std::fs::read_dir(&docs).context("cannot read docs/")? {
         let path = entry?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let Some(stem) = name.strip_suffix(".md") else { continue };
+        // The index of the folder: the book has its own.
+        let Some(stem) = name.strip_suffix(".md").filter(|stem| *stem != "README") else { continue };
         let text = std::fs::read_to_string(&path).with_context(|| format!("cannot read docs/{name}"))?;
         let title = text.lines().find_map(|line| line.strip_prefix("# ")).unwrap_or(stem).to_owned();
         titles.insert(stem.to_owned(), title);
