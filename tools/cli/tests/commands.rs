@@ -247,7 +247,7 @@ add:    iadd    x, p, i
         ld      x, 0[x]
         fadd    sum, sum, x
         ret
-        fadd    never, sum, sum
+_never: fadd    never, sum, sum
 .data
 table:  .float  0.5, 0.25, -1.75
 ";
