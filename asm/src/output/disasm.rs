@@ -92,7 +92,7 @@ impl<'p> Writer<'p> {
             self.line(format_args!(".preset @{place} = 0x{bits:08x}  ; {value:?}"));
         }
         for range in &self.program.ranges {
-            // A name with indices is no name for a directive; a place has no type.
+            // An element is named by its place, and a place has no type.
             let named = inputs.iter().chain(outputs).chain(registers).find(|port| {
                 port.register == range.register && port.ty == range.ty && !port.name.contains('[')
             });

@@ -36,7 +36,7 @@ pub fn statement(word: &str, rest: &str) -> Option<String> {
             named("i")
         ),
         "int" => format!("declare it with `.reg {}:int`, then write what it is", named("n")),
-        "let" | "var" | "float" | "double" if named("") != "" => {
+        "let" | "var" | "float" | "double" if !named("").is_empty() => {
             format!("declare it with `.reg {}`, then write what it is", named("u"))
         }
         _ => return None,
@@ -224,7 +224,7 @@ impl<'s> Line<'_, '_, 's> {
         {
             let (span, symbol) = self.part(index..index + width);
             // A register may have such a name.
-            if self.word(index) != ""
+            if !self.word(index).is_empty()
                 && at != span
                 && Some(at) != self.tokens.get(index + 1).map(|token| token.1)
             {
