@@ -540,7 +540,7 @@ fn the_way_from_pin_to_pin_has_a_bound() {
         &folder.line(&format!("bound {delayed} --pins --wiring {wiring} -W allow=unused --json")).ok(),
     )
     .unwrap();
-    assert!(bound.contains("  through 2 periods of states                  12000 "), "{bound}");
+    assert!(bound.contains("  through 2 periods of states                   12000 "), "{bound}");
     assert!(!bound.contains("encoder2") && !bound.contains("motor2"), "{bound}");
     let totals: Vec<u64> =
         json["ways"].as_array().unwrap().iter().map(|way| way["total"]["best"].as_u64().unwrap()).collect();

@@ -148,3 +148,47 @@ fn mistakes_have_one_message() {
         assert_eq!(done.stderr.matches("error:").count(), 1, "{line}: {}", done.stderr);
     }
 }
+
+/// Parsers that call themselves for what is within something else stop at a depth, in every format that others write.
+#[test]
+fn what_is_nested_without_end_has_one_message() {
+    const DEEP: usize = 200_000;
+    let folder = folder();
+    let nested =
+        |head: &str, open: &str, close: &str| format!("{head}{}{}", open.repeat(DEEP), close.repeat(DEEP));
+    folder.write("deep.urdf", nested("", "<a>", "</a>"));
+    folder.write("array.json", nested("{\"format\": ", "[", "]"));
+    folder.write("object.json", nested("{\"inputs\": [{\"name\": ", "{\"a\":", "}"));
+    folder.write("array.toml", nested("tick = ", "[", "]\n"));
+    folder.write("table.toml", nested("tick = ", "{a=", "}\n"));
+    folder.write("key.toml", format!("{}a = 1\n", "a.".repeat(DEEP)));
+    folder.write("head.toml", format!("[{}a]\n", "a.".repeat(DEEP)));
+    folder.write("moves.robot", nested("x = ", "(", ")\n"));
+    folder.write("sum.s", nested(".output y\n.period\np: y = ", "(", ")\n wait p\n"));
+    folder.write("path.ngc", nested("", "(", ")\n"));
+    let tracking = format!("{}/../programs/hybrid/tracking.s", env!("CARGO_MANIFEST_DIR"));
+    let mut lines: Vec<(String, &str)> = vec![
+        (
+            "model deep.urdf -f gravity".to_owned(),
+            "deep.urdf:1: more than 64 elements are within one another here",
+        ),
+        ("model array.json".to_owned(), "array.json:1: this is no list of instructions"),
+        ("model object.json".to_owned(), "object.json:1: this is no list of instructions"),
+        ("asm sum.s".to_owned(), "sum.s"),
+        ("track --gcode path.ngc".to_owned(), "path.ngc:1:"),
+        ("robot --check moves.robot".to_owned(), "moves.robot"),
+    ];
+    for name in ["array", "table", "key", "head"] {
+        lines.push((format!("run {name}.toml"), "recur"));
+        lines.push((format!("bound {tracking} --pins --wiring {name}.toml --board ulx3s-85f"), "recur"));
+    }
+    for (line, says) in lines {
+        let done = folder.line(&line);
+        let told = &done.stderr[..done.stderr.len().min(500)];
+        assert!(
+            matches!(done.status, Some(1 | 2)) && done.stderr.contains(says),
+            "{line}: {:?} {told}",
+            done.status
+        );
+    }
+}

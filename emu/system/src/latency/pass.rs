@@ -55,7 +55,7 @@ pub struct Route {
     pub least: Vec<u32>,
     /// After how many it does at most; none if branches or addresses can put it off without end.
     pub most: Option<Vec<u32>>,
-    /// Whether states carry the input on to later periods.
+    /// Whether states carry an input on to later periods.
     pub lasting: bool,
 }
 
@@ -212,7 +212,15 @@ impl<'a> Passages<'a> {
         let cores: Vec<usize> = links.iter().filter_map(core).collect();
         let phases = cores.iter().try_fold(1, |all, core| lcm(all, self.description.cores[*core].every))?;
         let mut outputs: BTreeMap<(usize, States), BTreeSet<usize>> = BTreeMap::new();
-        for (input, output, states) in self.carried.along(self.description, &links) {
+        let mut lasting = BTreeSet::new();
+        for (input, output, States { least, most, lasting: lasts }) in
+            self.carried.along(self.description, &links)
+        {
+            // It is told of all together.
+            let states = States { least, most, lasting: false };
+            if lasts {
+                lasting.insert(states.clone());
+            }
             outputs.entry((input, states)).or_default().insert(output);
         }
         let mut inputs: BTreeMap<(States, BTreeSet<usize>), Vec<usize>> = BTreeMap::new();
@@ -220,7 +228,8 @@ impl<'a> Passages<'a> {
             inputs.entry((states, outputs)).or_default().push(input);
         }
         let route = |((states, outputs), inputs): ((States, BTreeSet<usize>), Vec<usize>)| {
-            let States { least, most, lasting } = states;
+            let lasting = lasting.contains(&states);
+            let States { least, most, .. } = states;
             let (links, cores, outputs) = (links.clone(), cores.clone(), outputs.into_iter().collect());
             Route { links, cores, phases, inputs, outputs, least, most, lasting }
         };

@@ -143,15 +143,27 @@ pub(super) fn write_ways(
     }
     writeln!(out, "\nfrom a command of the host to an output's first response")?;
     let alike = |a: &Latency, b: &Latency| {
-        let key = |way: &Latency| (way.best, way.worst, way.lasting);
+        let key = |way: &Latency| (way.best, way.worst);
         (&a.cores, key(a), &a.queues) == (&b.cores, key(b), &b.queues)
             && (&a.least_states, &a.most_states) == (&b.least_states, &b.most_states)
     };
     let groups = grouped(
         ways.iter().cloned(),
         alike,
-        (|way| &way.inputs, |way, other| way.inputs.extend(other.inputs)),
-        (|way| &way.outputs, |way, other| way.outputs.extend(other.outputs)),
+        (
+            |way| &way.inputs,
+            |way, other| {
+                way.inputs.extend(other.inputs);
+                way.lasting |= other.lasting;
+            },
+        ),
+        (
+            |way| &way.outputs,
+            |way, other| {
+                way.outputs.extend(other.outputs);
+                way.lasting |= other.lasting;
+            },
+        ),
     );
     for way in groups {
         let cores: Vec<&str> = way.cores.iter().map(|core| description.cores[*core].name.as_str()).collect();
@@ -201,9 +213,9 @@ fn states_text(way: &Latency, cores: &[&str]) -> Option<String> {
     let through: Vec<String> = cores.iter().enumerate().filter_map(through).collect();
     let states = format!("through states: {}", through.join(", "));
     match (through.is_empty(), way.most_states.is_some()) {
-        (true, true) => {
-            way.lasting.then(|| "the direct path; states carry the command on to later periods".to_owned())
-        }
+        (true, true) => way
+            .lasting
+            .then(|| "the direct path; states can carry the command on to later periods".to_owned()),
         (false, true) => Some(states),
         (true, false) => {
             Some("directly or through states, as branches and addresses of data memory have it".to_owned())
