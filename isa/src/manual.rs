@@ -291,6 +291,9 @@ pub fn markdown() -> String {
     out
 }
 
+/// What is counted, and how much of it a machine has.
+type Capacity = (&'static str, fn(&Machine) -> String);
+
 /// The capacities of the machines as Markdown: `docs/what-fits.md`.
 pub fn capacities() -> String {
     let mut out = String::from(
@@ -300,11 +303,11 @@ pub fn capacities() -> String {
          prints what a program takes, `--symbols -` where everything lies.\n\n|",
     );
     let machines = manual().machines;
-    let rows: [(&str, &dyn Fn(&Machine) -> String); 7] = [
-        ("operations a cycle (slots)", &|machine| machine.slots.len().to_string()),
-        ("bundles of program memory", &|machine| machine.code_depth.to_string()),
-        ("words of data memory", &|machine| machine.data_depth.to_string()),
-        ("registers, of which each slot writes its own bank", &|machine| {
+    let rows: [Capacity; 7] = [
+        ("operations a cycle (slots)", |machine| machine.slots.len().to_string()),
+        ("bundles of program memory", |machine| machine.code_depth.to_string()),
+        ("words of data memory", |machine| machine.data_depth.to_string()),
+        ("registers, of which each slot writes its own bank", |machine| {
             let banks: Vec<String> = machine
                 .slots
                 .iter()
@@ -312,9 +315,9 @@ pub fn capacities() -> String {
                 .collect();
             banks.join(", ")
         }),
-        ("output ports, the last registers of each bank", &|machine| machine.outputs_per_bank.to_string()),
-        ("input ports", &|machine| (machine.inputs.depth - 1).to_string()),
-        ("subroutine calls inside one another", &|machine| machine.stack_depth.to_string()),
+        ("output ports, the last registers of each bank", |machine| machine.outputs_per_bank.to_string()),
+        ("input ports", |machine| (machine.inputs.depth - 1).to_string()),
+        ("subroutine calls inside one another", |machine| machine.stack_depth.to_string()),
     ];
     for machine in machines {
         let _ = write!(out, " | {}", machine.name);

@@ -2,6 +2,7 @@
 //! comparison of every statement of an [`Enclosure`] with what the run does.
 //!
 //! `TAKT_PROGRAMS=10000 cargo test --release -p takt-analysis --test enclosures` is the campaign; `TAKT_SEED` moves its seeds.
+#![allow(clippy::print_stdout)]
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;

@@ -133,10 +133,8 @@ pub(crate) fn relieve(
     let best = near.into_iter().chain(spilled).chain(written).min_by_key(Relieved::cycles);
     let Some(best) = best else {
         // What is missing is told of the order that is short of least.
-        if let Some((unfit, missing)) = unfit
-            && missing < room.shortage()
-        {
-            *ir = unfit;
+        if let Some(unfit) = unfit.filter(|unfit| unfit.missing < room.shortage()) {
+            *ir = *unfit.program;
         }
         return Err(why);
     };
@@ -145,16 +143,18 @@ pub(crate) fn relieve(
     Ok(best.spills)
 }
 
+/// A program in an order in which not all values have room.
+struct Unfit {
+    program: Box<Ir>,
+    /// Registers that it lacks.
+    missing: usize,
+}
+
 /// By an order near to that of the source.
 ///
 /// # Errors
 /// If not all values have room in it: the program, and how many registers it lacks; none if it breaks a demand.
-fn by_order(
-    source: &Ir,
-    before: &Report,
-    effort: u32,
-    order: Order,
-) -> Result<Relieved, Option<(Ir, usize)>> {
+fn by_order(source: &Ir, before: &Report, effort: u32, order: Order) -> Result<Relieved, Option<Unfit>> {
     let mut ir = source.clone();
     let mut sink = Sink::default();
     let mut report = schedule::schedule(&mut ir, effort, order, &mut sink);
@@ -163,7 +163,7 @@ fn by_order(
         return Err(None);
     }
     if !room.has_all() {
-        return Err(Some((ir, room.shortage())));
+        return Err(Some(Unfit { missing: room.shortage(), program: Box::new(ir) }));
     }
     for (block, free) in report.blocks.iter_mut().zip(&before.blocks) {
         block.bound = free.bound.clone();

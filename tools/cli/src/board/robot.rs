@@ -208,7 +208,7 @@ impl<'a> Drive<'a> {
         }
         host.set("control", protocol::RUN | protocol::ENABLE)?;
         let stands = std::iter::repeat_n(first, STANDS);
-        let bar = track::progress((STANDS + samples.len()) as u64, "periods", false);
+        let bar = crate::progress::progress((STANDS + samples.len()) as u64, "periods", false);
         let fed = host.feed(stands.chain(samples).map(row).inspect(|_| bar.inc(1)));
         bar.finish_and_clear();
         let fed = fed?;

@@ -4,7 +4,7 @@ pub(crate) mod system;
 
 use crate::files::Out;
 use crate::live::{find, shown};
-use crate::track::progress;
+use crate::progress::progress;
 use anyhow::{Context, Result, bail};
 use std::fmt::Write as _;
 use std::io::Write;

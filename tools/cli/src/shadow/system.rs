@@ -3,7 +3,7 @@
 use super::find;
 use crate::files::Out;
 use crate::live::shown;
-use crate::track::progress;
+use crate::progress::progress;
 use anyhow::{Context, Result, bail};
 use indicatif::ProgressFinish;
 use std::fmt::Write as _;

@@ -485,7 +485,7 @@ impl Commands for SystemConsole {
         match find(name)? {
             Meant::Own(run, moves) => {
                 self.last = if moves { line.to_owned() } else { String::new() };
-                self.of_a_core(arguments, |console, arguments| run(console, arguments))
+                self.of_a_core(arguments, run)
             }
             Meant::Inspection(known) => {
                 self.last.clear();
