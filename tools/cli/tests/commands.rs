@@ -856,3 +856,31 @@ fn a_command_that_is_not_there_leads_to_one_that_is() {
     let done = folder.line("board simulate");
     assert!(!done.stderr.contains("takt run"), "{}", done.stderr);
 }
+
+/// A state that does not begin in its range is told, and decides the status; so do hazards.
+#[test]
+fn what_is_not_shown_decides_the_status_of_accuracy() {
+    let folder = Folder::new();
+    let program = |once: &str, period: &str| {
+        format!(
+            ".input x\n.range x = 0, 4\n.output y\n.state s\n.range s = -1, 1\n.once\n{once}\n wait p\n.period\n\
+             p: {period}\n mov y, s\n mov s, 0.5\n wait p\n"
+        )
+    };
+    folder.write("holds.s", program(" mov s, 1.0", "nop"));
+    let holds = folder.line("accuracy holds.s");
+    assert_eq!((holds.status, holds.stderr.as_str()), (Some(0), ""));
+    assert!(holds.stdout.contains("no conversion out of range is possible\n"), "{}", holds.stdout);
+
+    folder.write("first.s", program(" mov s, 2.0", "nop"));
+    let first = folder.line("accuracy first.s");
+    let text = "then nothing above holds\n  s: [-1.000000e0, 1.000000e0], begins in [2.000000e0, 2.000000e0]\n";
+    assert_eq!((first.status, first.stdout.ends_with(text)), (Some(1), true), "{}", first.stdout);
+    let json: serde_json::Value = serde_json::from_str(&folder.line("accuracy first.s --json").stdout).unwrap();
+    assert_eq!(json["assumed"][0]["when"], "first period begins");
+
+    folder.write("fits.s", program(".reg n:int\n mov s, 0.0", "fmul s, x, 1e9\n ftoi n, s"));
+    let fits = folder.line("accuracy fits.s");
+    assert_eq!(fits.status, Some(1));
+    assert!(fits.stdout.contains(": the result may not fit a 32-bit integer: s in ["), "{}", fits.stdout);
+}
