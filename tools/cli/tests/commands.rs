@@ -874,9 +874,11 @@ fn what_is_not_shown_decides_the_status_of_accuracy() {
 
     folder.write("first.s", program(" mov s, 2.0", "nop"));
     let first = folder.line("accuracy first.s");
-    let text = "then nothing above holds\n  s: [-1.000000e0, 1.000000e0], begins in [2.000000e0, 2.000000e0]\n";
+    let text =
+        "then nothing above holds\n  s: [-1.000000e0, 1.000000e0], begins in [2.000000e0, 2.000000e0]\n";
     assert_eq!((first.status, first.stdout.ends_with(text)), (Some(1), true), "{}", first.stdout);
-    let json: serde_json::Value = serde_json::from_str(&folder.line("accuracy first.s --json").stdout).unwrap();
+    let json: serde_json::Value =
+        serde_json::from_str(&folder.line("accuracy first.s --json").stdout).unwrap();
     assert_eq!(json["assumed"][0]["when"], "first period begins");
 
     folder.write("fits.s", program(".reg n:int\n mov s, 0.0", "fmul s, x, 1e9\n ftoi n, s"));
