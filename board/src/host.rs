@@ -5,7 +5,9 @@ use crate::ends::Fifo;
 use crate::protocol::{self, Frame, Line, LinkError, PAGE, Receiver, WORDS, address};
 use crate::top::{self, RECORDS};
 use std::collections::VecDeque;
+use std::time::Duration;
 use takt_isa::fp::Flags;
+use takt_system::MAX_CORES;
 
 /// The registers that count: of a program's periods since its start, and of the line's frames since power-up.
 pub const COUNTERS: [&str; 6] = ["periods", "misses", "cycles", "most_cycles", "errors", "lost"];
@@ -15,6 +17,19 @@ const ATTEMPTS: u32 = 8;
 
 /// Bytes among which an answer is looked for until the request is made again: many times the longest answer.
 const BYTES: usize = 4096;
+
+/// Times as long as usual for which the last attempt listens where the request waits for the program: the board refuses it after 2²²
+/// cycles, which a simulated one takes long for.
+const GRANT: u32 = 60;
+
+/// Records that are written before they are read back.
+const PART: usize = 64;
+
+/// The time that a request may take, with all its attempts.
+const LIMIT: Duration = Duration::from_secs(90);
+
+/// Times that a program is asked whether it has come to its `wait`, a pause of the line between two of them.
+const ASKED: u32 = 30;
 
 /// A board that answers.
 #[derive(Debug)]
@@ -162,6 +177,9 @@ impl<L: Line> Host<L> {
             protocol::SYSTEM_ID => {
                 let system = host.register("system")?;
                 (host.cores, host.room) = ((system & 0xffff) as usize, (system >> 16) as usize);
+                if !(1..=MAX_CORES).contains(&host.cores) {
+                    return Err(LinkError::Cores(host.cores));
+                }
             }
             other => return Err(LinkError::Stranger(other)),
         }
@@ -184,31 +202,58 @@ impl<L: Line> Host<L> {
         }
     }
 
-    fn request(&mut self, bytes: &[u8], number: u8) -> Result<Frame, LinkError> {
-        for attempt in 0..ATTEMPTS {
-            self.retries += u64::from(attempt > 0);
+    /// Makes a request until it is answered with so many words, so often and so long as is allowed.
+    fn request(
+        &mut self,
+        bytes: &[u8],
+        number: u8,
+        address: u16,
+        wanted: usize,
+    ) -> Result<Vec<u32>, LinkError> {
+        let until = self.line.time() + LIMIT;
+        let mut error = LinkError::Silence(ATTEMPTS);
+        for attempt in 1..=ATTEMPTS {
+            self.retries += u64::from(attempt > 1);
             self.line.send(bytes)?;
-            // A line brings an answer in as many pieces as it likes; what counts is how long it is silent. Noise and a stream
-            // can come without end.
-            let (mut silent, mut bytes) = (0, 0);
-            while silent < self.line.patience() && bytes < BYTES {
-                let received = self.line.receive()?;
-                silent = if received.is_empty() { silent + 1 } else { 0 };
-                bytes += received.len();
-                self.receiver.put(&received);
-                while let Some(frame) = self.receiver.frame() {
-                    match frame {
-                        Frame { stream: true, .. } => self.stream.push_back(frame),
-                        Frame { status: 2, number: of, .. } if of == number => return Err(LinkError::Busy),
-                        Frame { number: of, .. } if of == number => return Ok(frame),
-                        // An answer to a request that was given up.
-                        _ => {}
-                    }
+            let long = attempt == ATTEMPTS && protocol::waits(address);
+            let patience = self.line.patience() * if long { GRANT } else { 1 };
+            let Some(frame) = self.listen(number, patience, until)? else { continue };
+            match frame.status {
+                protocol::DONE if frame.words.len() == wanted => return Ok(frame.words),
+                protocol::DONE => {
+                    error = LinkError::Words { wanted, came: frame.words.len(), attempts: ATTEMPTS };
+                }
+                protocol::BUSY => return Err(LinkError::Busy),
+                protocol::READ_ONLY => {
+                    let words = usize::from(bytes.get(3).copied().unwrap_or(0));
+                    return Err(LinkError::ReadOnly { address, words });
+                }
+                status => return Err(LinkError::Status(status)),
+            }
+        }
+        Err(error)
+    }
+
+    /// Listens for an answer until the line has been silent for so long. A line brings an answer in as many pieces as it likes; noise
+    /// and a stream can come without end.
+    fn listen(&mut self, number: u8, patience: u32, until: Duration) -> Result<Option<Frame>, LinkError> {
+        let (mut silent, mut bytes) = (0, 0);
+        while silent < patience && bytes < BYTES && self.line.time() < until {
+            let received = self.line.receive()?;
+            silent = if received.is_empty() { silent + 1 } else { 0 };
+            bytes += received.len();
+            self.receiver.put(&received);
+            while let Some(frame) = self.receiver.frame() {
+                match frame {
+                    Frame { stream: true, .. } => self.stream.push_back(frame),
+                    Frame { number: of, .. } if of == number => return Ok(Some(frame)),
+                    // An answer to a request that was given up.
+                    _ => {}
                 }
             }
-            self.receiver.give_up();
         }
-        Err(LinkError::Silence(ATTEMPTS))
+        self.receiver.give_up();
+        Ok(None)
     }
 
     /// Reads words.
@@ -220,11 +265,9 @@ impl<L: Line> Host<L> {
         while words.len() < count {
             let some = (count - words.len()).min(WORDS);
             self.number = self.number.wrapping_add(1);
-            let bytes = protocol::read(self.number, address.wrapping_add(words.len() as u16), some as u8);
-            let frame = self.request(&bytes, self.number)?;
-            if frame.words.len() == some {
-                words.extend(frame.words);
-            }
+            let at = address.wrapping_add(words.len() as u16);
+            let bytes = protocol::read(self.number, at, some as u8);
+            words.extend(self.request(&bytes, self.number, at, some)?);
         }
         Ok(words)
     }
@@ -236,8 +279,9 @@ impl<L: Line> Host<L> {
     pub fn write(&mut self, address: u16, words: &[u32]) -> Result<(), LinkError> {
         for (i, some) in words.chunks(WORDS).enumerate() {
             self.number = self.number.wrapping_add(1);
-            let bytes = protocol::write(self.number, address.wrapping_add((WORDS * i) as u16), some);
-            self.request(&bytes, self.number)?;
+            let at = address.wrapping_add((WORDS * i) as u16);
+            let bytes = protocol::write(self.number, at, some);
+            self.request(&bytes, self.number, at, 0)?;
         }
         Ok(())
     }
@@ -296,6 +340,32 @@ impl<L: Line> Host<L> {
         Ok(Status(self.register_of(core, "status")?))
     }
 
+    /// Waits until the program, or every core of a system, is between two periods or has stopped. Unlike a read of what it holds, this
+    /// asks again and again, so that a program that never waits is soon known.
+    ///
+    /// # Errors
+    /// [`LinkError::Busy`] if that does not happen soon, or the board does not answer.
+    pub fn settle(&mut self) -> Result<(), LinkError> {
+        if self.register("control")? & protocol::RUN == 0 {
+            return Ok(());
+        }
+        for _ in 0..ASKED {
+            let mut waits = true;
+            for core in 0..self.cores.max(1) {
+                let status = self.status_of(core)?;
+                if status.fault() {
+                    return Ok(());
+                }
+                waits &= !status.in_reset() && (status.waiting() || status.halted());
+            }
+            if waits {
+                return Ok(());
+            }
+            self.hear()?;
+        }
+        Err(LinkError::Busy)
+    }
+
     /// What a FIFO tells about itself.
     ///
     /// # Errors
@@ -343,6 +413,18 @@ impl<L: Line> Host<L> {
     /// # Errors
     /// If the image is too big or comes back different, or the board does not answer: it is then stopped.
     pub fn load(&mut self, records: &[[u32; 3]]) -> Result<(), LinkError> {
+        self.load_with(records, |_| ())
+    }
+
+    /// As [`Host::load`]; `loaded` is told how many more records have been written and compared.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn load_with(
+        &mut self,
+        records: &[[u32; 3]],
+        mut loaded: impl FnMut(usize),
+    ) -> Result<(), LinkError> {
         if records.len() > self.room {
             return Err(LinkError::TooBig(records.len(), self.room));
         }
@@ -353,12 +435,16 @@ impl<L: Line> Host<L> {
                 self.set("page", page as u32)?;
             }
             // Four words of address for each record, of which the last is not there.
-            let words: Vec<u32> =
-                some.iter().flat_map(|[low, high, place]| [*low, *high, *place, 0]).collect();
-            self.write(protocol::IMAGE, &words)?;
-            let back = self.read(protocol::IMAGE, words.len())?;
-            if let Some(at) = words.iter().zip(&back).position(|(a, b)| a != b) {
-                return Err(LinkError::Image(PAGE * page + at / 4));
+            for (part, some) in some.chunks(PART).enumerate() {
+                let words: Vec<u32> =
+                    some.iter().flat_map(|[low, high, place]| [*low, *high, *place, 0]).collect();
+                let at = protocol::IMAGE + (4 * PART * part) as u16;
+                self.write(at, &words)?;
+                let back = self.read(at, words.len())?;
+                if let Some(at) = words.iter().zip(&back).position(|(a, b)| a != b) {
+                    return Err(LinkError::Image(PAGE * page + PART * part + at / 4));
+                }
+                loaded(some.len());
             }
         }
         self.set("records", records.len() as u32)
@@ -414,65 +500,23 @@ impl<L: Line> Host<L> {
     /// If the line is gone.
     pub fn streamed(&mut self) -> Result<Option<Frame>, LinkError> {
         if self.stream.is_empty() {
-            let received = self.line.receive()?;
-            self.receiver.put(&received);
-            while let Some(frame) = self.receiver.frame() {
-                if frame.stream {
-                    self.stream.push_back(frame);
-                }
-            }
+            self.hear()?;
         }
         Ok(self.stream.pop_front())
+    }
+
+    /// Takes what stands in the line, or comes within a little while: frames of the stream.
+    fn hear(&mut self) -> Result<(), LinkError> {
+        let received = self.line.receive()?;
+        self.receiver.put(&received);
+        while let Some(frame) = self.receiver.frame() {
+            if frame.stream {
+                self.stream.push_back(frame);
+            }
+        }
+        Ok(())
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::protocol::ID;
-
-    /// A board that brings a byte at a time, or noise for ever.
-    #[derive(Debug)]
-    struct Slow {
-        bytes: VecDeque<u8>,
-        noise: bool,
-        sent: u32,
-    }
-
-    impl Line for Slow {
-        fn send(&mut self, request: &[u8]) -> std::io::Result<()> {
-            self.sent += 1;
-            if !self.noise {
-                self.bytes = protocol::answer(request[1], &[ID]).into();
-            }
-            Ok(())
-        }
-
-        fn receive(&mut self) -> std::io::Result<Vec<u8>> {
-            Ok(if self.noise { vec![0x11; 16] } else { self.bytes.pop_front().into_iter().collect() })
-        }
-
-        fn patience(&self) -> u32 {
-            2
-        }
-    }
-
-    #[test]
-    fn flags_of_a_status() {
-        let all = [(7, Flags::OVERFLOW), (8, Flags::DIVIDE_BY_ZERO), (9, Flags::INVALID)];
-        assert!(all.iter().all(|(bit, flag)| Status(1 << bit | 5).flags() == *flag));
-        assert_eq!((Status(6 << 4 | 4).flags(), Status(6 << 4 | 4).fault_slot()), (Flags::NONE, 6));
-    }
-
-    #[test]
-    fn an_answer_may_come_in_any_number_of_pieces() {
-        let host = Host::connect(Slow { bytes: VecDeque::new(), noise: false, sent: 0 }, 1).unwrap();
-        assert_eq!((host.retries, host.line.sent), (0, 1));
-    }
-
-    #[test]
-    fn noise_without_end_is_no_answer() {
-        let error = Host::connect(Slow { bytes: VecDeque::new(), noise: true, sent: 0 }, 1).unwrap_err();
-        assert!(matches!(error, LinkError::Silence(ATTEMPTS)), "{error}");
-    }
-}
+mod tests;

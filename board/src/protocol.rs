@@ -1,6 +1,8 @@
 //! What goes over the UART between host and board: frames, and the registers behind them. docs/protocol.md has it in words.
 
+use std::time::Duration;
 use takt_rtl::bench::LoadRecord;
+use takt_system::MAX_CORES;
 use thiserror::Error;
 
 /// What the register `id` says: "TAKT".
@@ -41,6 +43,18 @@ pub const REQUEST: u8 = 0xa5;
 pub const ANSWER: u8 = 0x5a;
 /// First byte of a frame that the board sends by itself.
 pub const STREAM: u8 = 0x3c;
+
+/// Status of an answer: it is done.
+pub const DONE: u8 = 0;
+/// Status of an answer: an address of the write is not one that can be written now, and nothing was written.
+pub const READ_ONLY: u8 = 1;
+/// Status of an answer: the program did not wait.
+pub const BUSY: u8 = 2;
+
+/// Whether a request to this address waits until the program is between two periods.
+pub const fn waits(address: u16) -> bool {
+    matches!(address >> 12, 1..=3 | 8..)
+}
 
 /// A register of the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -144,7 +158,7 @@ pub struct Frame {
     pub stream: bool,
     /// The request's number; of the stream, a number that goes up by one with each frame sent.
     pub number: u8,
-    /// 0: done; 2: refused, for the program did not wait.
+    /// [`DONE`], [`READ_ONLY`] or [`BUSY`].
     pub status: u8,
     /// What was read.
     pub words: Vec<u32>,
@@ -169,10 +183,10 @@ fn request(number: u8, command: u8, count: u8, address: u16, words: &[u32]) -> V
     bytes
 }
 
-/// What a board answers to a request that reads `words`.
+/// What a board answers: a status, and the words that were read.
 #[cfg(test)]
-pub(crate) fn answer(number: u8, words: &[u32]) -> Vec<u8> {
-    let mut bytes = vec![ANSWER, number, 0, words.len() as u8];
+pub(crate) fn answer(number: u8, status: u8, words: &[u32]) -> Vec<u8> {
+    let mut bytes = vec![ANSWER, number, status, words.len() as u8];
     bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
     let sum = checksum(&bytes[1..]);
     bytes.extend(sum.to_le_bytes());
@@ -254,6 +268,9 @@ pub trait Line {
 
     /// How often in a row nothing may come until a request is made again.
     fn patience(&self) -> u32;
+
+    /// Time that has passed on the line since any beginning: what comes without end on it is heard no longer than a request may take.
+    fn time(&self) -> Duration;
 }
 
 /// Why the board did not do what was asked.
@@ -267,6 +284,34 @@ pub enum LinkError {
         "no answer in {0} attempts: is this the right port, with the right baud rate, and the board's bitstream loaded?"
     )]
     Silence(u32),
+    /// Answers came, but with another number of words each time.
+    #[error(
+        "the board answers with {came} words where {wanted} were asked for, in {attempts} attempts: its circuit is not one of `takt board build`, or of another version"
+    )]
+    Words {
+        /// Words that were to be read; of a write 0.
+        wanted: usize,
+        /// Words of the last answer.
+        came: usize,
+        /// How often it was asked.
+        attempts: u32,
+    },
+    /// An address that cannot be written.
+    #[error(
+        "the board refuses to write {words} words from address {address:#06x} on: an address of them is read only, a peripheral drives it, or it can be written only while the program is stopped, or held (docs/protocol.md)"
+    )]
+    ReadOnly {
+        /// The address of the first word.
+        address: u16,
+        /// Words that were to be written.
+        words: usize,
+    },
+    /// A status that the protocol does not have.
+    #[error("the board answers with status {0}, which docs/protocol.md does not have")]
+    Status(u8),
+    /// More cores than a system can have, or none.
+    #[error("the board says that it carries a system of {0} cores; a system has 1 to {MAX_CORES}")]
+    Cores(usize),
     /// The program does not wait.
     #[error(
         "the program does not wait for its tick, so there is no time between periods to read or set anything of it; `takt live PORT stop` stops it"
@@ -320,11 +365,11 @@ mod tests {
     #[test]
     fn frames_are_found_between_noise() {
         let mut line = vec![1, ANSWER, 200];
-        line.extend(answer(7, &[0x5a5a_5a5a, 2]));
-        let mut broken = answer(8, &[3]);
+        line.extend(answer(7, 0, &[0x5a5a_5a5a, 2]));
+        let mut broken = answer(8, 0, &[3]);
         broken[5] ^= 4;
         line.extend(broken);
-        line.extend(answer(9, &[]));
+        line.extend(answer(9, 0, &[]));
         let mut receiver = Receiver::default();
         let mut found = Vec::new();
         for byte in line {

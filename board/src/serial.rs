@@ -4,10 +4,11 @@ use crate::protocol::Line;
 use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 /// An open serial port.
 #[derive(Debug)]
-pub struct Serial(File);
+pub struct Serial(File, Instant);
 
 impl Serial {
     /// Opens a port with this baud rate, 8 data bits, no parity, one stop bit.
@@ -25,7 +26,7 @@ impl Serial {
         settings.special_codes[SpecialCodeIndex::VMIN] = 0;
         settings.special_codes[SpecialCodeIndex::VTIME] = 1;
         termios::tcsetattr(&file, OptionalActions::Flush, &settings)?;
-        Ok(Serial(file))
+        Ok(Serial(file, Instant::now()))
     }
 
     /// Not on this system: there is none whose settings are known how to make.
@@ -77,5 +78,9 @@ impl Line for Serial {
 
     fn patience(&self) -> u32 {
         5
+    }
+
+    fn time(&self) -> Duration {
+        self.1.elapsed()
     }
 }

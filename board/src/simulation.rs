@@ -11,6 +11,7 @@ use std::fs;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::time::Duration;
 use takt_rtl::export::DesignFile;
 use thiserror::Error;
 
@@ -122,6 +123,16 @@ impl Simulation {
         self.inputs.iter().position(|(input, _)| input == name)
     }
 
+    /// The inputs by name, each with its level.
+    pub fn inputs(&self) -> impl Iterator<Item = (&str, bool)> {
+        self.inputs.iter().map(|(name, level)| (name.as_str(), *level != 0))
+    }
+
+    /// The outputs' names.
+    pub fn outputs(&self) -> &[String] {
+        &self.outputs
+    }
+
     /// Sets an input.
     pub fn set(&mut self, name: &str, level: bool) {
         if let Some(at) = self.input(name) {
@@ -191,6 +202,11 @@ impl Line for Simulation {
 
     fn patience(&self) -> u32 {
         40
+    }
+
+    /// A microsecond a cycle.
+    fn time(&self) -> Duration {
+        Duration::from_micros(self.cycles)
     }
 }
 

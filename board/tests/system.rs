@@ -3,13 +3,13 @@
 #[path = "harness/board.rs"]
 mod harness;
 
-use harness::Ticks;
+use harness::{Ticks, refuses};
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::ends::{Ends, Fifo};
 use takt_board::latency::{Part, system_ways};
-use takt_board::protocol::LinkError;
+use takt_board::protocol::{IMAGE, LinkError};
 use takt_board::simulation::{Simulation, Turn};
 use takt_board::{Application, Board, Host, Wiring, top};
 use takt_isa::Program;
@@ -173,13 +173,14 @@ fn pins_follow_as_the_bound_says(host: &mut Host<Simulation>, description: &Desc
         (*cycles.iter().min().expect("some"), *cycles.iter().max().expect("some"))
     };
     // Just in time for a tick, just too late, and between.
-    let total = lamp.total();
+    let total = lamp.total().expect("an edge");
     let found = all(&[edge, edge - 1, 4999, 4000, 2600, 2500, 1234, 400, 20], &|sim, before, turn| {
         ticks.measured(sim, before, |sim| sim.turns.push(turn), "lamp_out")
     });
     assert_eq!(found, (total.best, total.worst));
     // Base ticks are a whole number of the PWM's periods apart, so that values always come at the same place of one.
-    let (fixed, pwm) = (Part::sum("", motor.inputs[0].parts.iter().chain(&motor.between)), motor.total());
+    let (fixed, pwm) =
+        (Part::sum("", motor.inputs[0].parts.iter().chain(&motor.between)), motor.total().expect("an edge"));
     let (least, most) =
         all(&[edge, edge - 1], &|sim, before, turn| measured_of_pulse(&ticks, sim, before, turn));
     assert!(least >= pwm.best && most <= pwm.worst, "{least} to {most}, and not {pwm:?}");
@@ -238,6 +239,16 @@ fn a_system_runs_talks_and_fails_safe() {
     assert_eq!(host.pop(&reached).expect("a FIFO"), Some(vec![float(10.0)]));
     assert_eq!(host.pop(&reached).expect("a FIFO"), Some(vec![float(15.0)]));
     assert_eq!(host.pop(&reached).expect("a FIFO"), None);
+
+    // What cannot be written is refused: registers, a core's ports, a value that the encoder drives or that a link brings, a FIFO's status
+    // and the fields of one to the host, the image of what runs.
+    let drives = names.at("n");
+    for address in [0, 15, 16, 0x102, names.at("servo.n"), drives, names.at("watch.lit"), 0x3400, 0x8000] {
+        refuses(&mut host, address, &[1]);
+    }
+    for address in [moves.address, reached.address, reached.field(0), IMAGE] {
+        refuses(&mut host, address, &[1]);
+    }
 
     // Counters by core: the watch has every second base tick.
     let all = |host: &mut Host<Simulation>, name: &str| {

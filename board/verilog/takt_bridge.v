@@ -4,7 +4,9 @@
 //   A frame that comes in whole, with the right checksum, is a request: so many reads or writes of words, at an address and those that
 //   follow. All are made, without a pause, or none. It is answered when they are done. Other frames are dropped and counted in errors;
 //   a gap of 20 bytes within a frame ends it.
-//   A write whose number is that of the request before is answered, not made again.
+//   Before a write, each of its addresses stands for a few cycles: if writable is 0 for one of them CHECK cycles later, nothing is
+//   written (status 1).
+//   A write whose number is that of the request before is answered as that one was, not made again.
 //   Bus: address and bus_value, or bus_write, stand for a cycle; what is read is on bus_read READ cycles later. Accesses to addresses
 //   1000 to 3fff and from 8000 on (hexadecimal) wait for grant, which may depend on address, but not longer than 2^PATIENCE cycles:
 //   then they are refused (status 2).
@@ -23,6 +25,7 @@ module takt_bridge #(
     output reg         bus_write,
     output reg  [31:0] bus_value,
     input  wire [31:0] bus_read,
+    input  wire        writable,
     input  wire        grant,
     input  wire        due,
     input  wire [15:0] periods_at,
@@ -33,7 +36,7 @@ module takt_bridge #(
     output reg  [31:0] lost
 );
 
-    localparam [2:0] READ = 3'd4;
+    localparam [2:0] READ = 3'd4, CHECK = 3'd2;
     localparam [7:0] REQUEST = 8'ha5, ANSWER = 8'h5a, STREAM = 8'h3c;
 
     // CRC-16/CCITT-FALSE of one byte more.
@@ -137,11 +140,11 @@ module takt_bridge #(
     // ---- what is done
 
     reg  [31:0] out_words [0:15];
-    reg  [2:0]  state;       // 0 rest, 1 waits for grant, 2 writes, 3 reads, 4 sends
+    reg  [2:0]  state;       // 0 rest, 1 waits for grant, 2 writes, 3 reads, 4 sends, 5 checks addresses
     reg  [4:0]  i, words;
     reg  [2:0]  cycles;
     reg  [PATIENCE-1:0] patience;
-    reg  [7:0]  status, last_sequence, kind, number, stream_number;
+    reg  [7:0]  status, last_status, last_sequence, kind, number, stream_number;
     reg         known, streams;
     wire        port   = at[15:12] != 4'd0 & at[15:14] != 2'd1;
     wire        repeats = has_data & known & request == last_sequence;
@@ -168,8 +171,12 @@ module takt_bridge #(
                 if (whole & ~answered) begin
                     address <= at;
                     heard <= 1'b1;
-                    state <= repeats ? 3'd4 : 3'd1;
+                    state <= repeats ? 3'd4 : has_data ? 3'd5 : 3'd1;
                     sends <= repeats;
+                    known <= 1'b1;
+                    last_sequence <= request;
+                    if (repeats) status <= last_status;
+                    else last_status <= 8'd0;
                 end else if (due) begin
                     address       <= periods_at;
                     streams       <= 1'b1;
@@ -185,13 +192,11 @@ module takt_bridge #(
                 patience <= patience + 1'b1;
                 if (grant | ~port) state <= has_data ? 3'd2 : 3'd3;
                 else if (&patience) begin
-                    status <= 8'd2;
+                    {status, last_status} <= {2{8'd2}};
                     words  <= 5'd0;
                     sends  <= 1'b1;
                     state  <= 3'd4;
                 end
-                known         <= 1'b1;
-                last_sequence <= request;
             end
             3'd2: begin
                 // A word in two cycles.
@@ -212,6 +217,20 @@ module takt_bridge #(
                 if (i + 5'd1 == words) begin
                     sends <= 1'b1;
                     state <= 3'd4;
+                end
+            end
+            3'd5: if (cycles == CHECK) begin
+                cycles  <= 3'd0;
+                address <= address + 16'd1;
+                i       <= i + 5'd1;
+                if (~writable) begin
+                    {status, last_status} <= {2{8'd1}};
+                    sends <= 1'b1;
+                    state <= 3'd4;
+                end else if (i + 5'd1 == count) begin
+                    address <= at;
+                    i       <= 5'd0;
+                    state   <= 3'd1;
                 end
             end
             default: if (sent) begin

@@ -322,6 +322,13 @@ fn a_board_is_debugged() {
     let driven = debug("endless.s", "--restart --drive", "step 2\n").ok();
     assert!(driven.ends_with("the program stays held; outputs drive\n"), "{driven}");
 
+    // Beside the emulator it does not wait either, and that is what is said of it.
+    let line =
+        format!("live {port} --baud {baud} --program endless.s --machine t1 shadow wanted=1 --periods 3");
+    let shadow = folder.line(&line);
+    let says = "period 1: the program does not wait for its tick";
+    assert!(shadow.status == Some(1) && shadow.stderr.contains(says), "{shadow:?}");
+
     // Unplugged while a script waits for its next command.
     let mut host = std::process::Command::new(env!("CARGO_BIN_EXE_takt"));
     let line = format!("debug endless.s --machine t1 --board {port} --baud {baud} --restart");
@@ -527,7 +534,7 @@ fn the_way_from_pin_to_pin_has_a_bound() {
     refused(&format!("--wiring {wiring} --board colorlight-i5"), "this wiring is for the board `ulx3s-85f`");
     refused(&format!("--wiring {wiring} --deadline 100us"), "--deadline is not for --pins");
     folder.write("none.toml", "period = 100\n");
-    refused("--wiring none.toml", "none.toml names no board: --board NAME");
+    refused("--wiring none.toml", "none.toml names no board: `--board NAME`, or a line");
     // One message, whether the board is named or would be the file's.
     folder.write("system.toml", "[core.one]\nmachine = \"t1\"\n");
     for board in ["", " --board ulx3s-85f"] {

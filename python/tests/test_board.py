@@ -16,7 +16,7 @@ import takt
 
 GAIN = ".input x n:int\n.output y m:int\n.once\n mov y, zero\n mov m, zero\n wait loop\n.period\nloop: fmul y, x, 0.5\n iadd m, n, 1\n wait loop\n"
 INPUTS, OUTPUTS, IMAGE, REGISTERS, DATA = 0x1000, 0x2000, 0x4000, 0x8000, 0xC000
-CONTROL, STATUS, STEP, PERIODS, STREAM = 1, 2, 6, 9, 13
+CONTROL, STATUS, PERIOD, LEAD, STEP, PERIODS, RECORDS, STREAM = 1, 2, 4, 5, 6, 9, 12, 13
 RUN, HOLD = 1, 2
 
 
@@ -38,7 +38,8 @@ class FakeBoard(threading.Thread):
         tty.setraw(slave)
         self.port = os.ttyname(slave)
         self.slave = slave
-        self.repeats, self.last = 0, None
+        # The last write's number and the status of its answer; input ports that a peripheral drives.
+        self.last, self.status, self.driven = None, 0, set()
 
     def run(self):
         pending = b""
@@ -55,8 +56,8 @@ class FakeBoard(threading.Thread):
                 assert frame[0] == 0xA5 and crc(frame[1:-2]) == struct.unpack("<H", frame[-2:])[0]
                 self.answer(frame)
 
-    def send(self, kind, number, words):
-        body = bytes([number, 0, len(words)]) + struct.pack(f"<{len(words)}I", *words)
+    def send(self, kind, number, words, status=0):
+        body = bytes([number, status, len(words)]) + struct.pack(f"<{len(words)}I", *words)
         os.write(self.fd, self.noise + bytes([kind]) + body + struct.pack("<H", crc(body)))
         self.noise = b""
 
@@ -70,15 +71,24 @@ class FakeBoard(threading.Thread):
             words = [self.words.get(at + i, at + i if at >= REGISTERS else 0) for i in range(count)]
             return self.send(0x5A, number, words)
         if number != self.last:
-            for i, word in enumerate(struct.unpack(f"<{count}I", frame[6:-2])):
+            self.status = 0 if all(self.writable(at + i) for i in range(count)) else 1
+            for i, word in enumerate(struct.unpack(f"<{count}I", frame[6:-2]) if self.status == 0 else []):
                 self.words[at + i] = word
                 if at + i == STEP:
                     self.period()
         self.last = number
-        self.send(0x5A, number, [])
+        self.send(0x5A, number, [], self.status)
         if self.words.get(STREAM, 0) >> 20:
             for _ in range(3):
                 self.period()
+
+    def writable(self, at):
+        control = self.words[CONTROL]
+        if at == STEP:
+            return bool(control & HOLD)
+        if at == RECORDS or IMAGE <= at < REGISTERS:
+            return not control & RUN
+        return at in (CONTROL, PERIOD, LEAD, STREAM) or INPUTS <= at < OUTPUTS and at not in self.driven
 
     def period(self):
         x, n = (self.words.get(INPUTS + i, 0) for i in range(2))
@@ -122,11 +132,21 @@ def test_ports_are_read_and_set(fake):
     assert simulated.words[CONTROL] == 0 and not board.status.drives
 
 
+def test_a_port_that_a_peripheral_drives_is_read_only(fake):
+    simulated, program = fake
+    board = takt.Board(simulated.port, program)
+    simulated.driven = {INPUTS + 1}
+    board.set({"x": 2.0})
+    with pytest.raises(takt.BoardError, match="refuses to write 2 words from address 0x1000"):
+        board.set({"x": 3.0, "n": 4})
+    assert simulated.words[INPUTS] == 0x40000000, "all or none"
+
+
 def test_a_program_is_loaded_and_compared(fake):
     simulated, program = fake
     board = takt.Board(simulated.port, program)
     board.load()
-    records = simulated.words[12]
+    records = simulated.words[RECORDS]
     assert records > 0 and all(IMAGE + 4 * i + 2 in simulated.words for i in range(records))
     # Behind noise an answer is still found.
     simulated.noise = b"\x00\x5a\x01\xff\xa5"

@@ -26,7 +26,7 @@ pub(super) fn around(
     let number = |direction: Direction, name: &str| {
         Application::Program(program).connect(direction, name).ok().map(|found| found.number)
     };
-    let (mut nets, mut parts) = (String::new(), String::new());
+    let (mut nets, mut parts, mut driven) = (String::new(), String::new(), String::new());
     let (mut inputs, mut outputs, mut taken, mut settings) =
         (String::new(), String::new(), String::new(), String::new());
     let (mut in_count, mut out_count) = (0, 0);
@@ -43,6 +43,8 @@ pub(super) fn around(
                 inputs,
                 "            8'd{in_count}: {{in_index, in_value}} <= {{{input_bits}'d{index}, {net}}};"
             );
+            let _ =
+                writeln!(driven, "            16'd{}: writable <= 1'b0;", protocol::INPUTS + index as u16);
             in_count += 1;
             connected.push(register.name);
         }
@@ -84,6 +86,7 @@ pub(super) fn around(
         ("OUT_COUNT", out_count.to_string()),
         ("NETS", nets.trim_end().to_owned()),
         ("INPUTS", inputs),
+        ("DRIVEN", driven),
         ("OUTPUTS", outputs),
         ("SETTINGS", settings),
         ("TAKEN", taken),

@@ -106,7 +106,10 @@ impl<'a> Around<'a> {
     /// The host's ends: what is declared, written and read.
     fn ends(&self) -> Values {
         let (mut nets, mut acts, mut writes) = (String::new(), String::new(), String::new());
-        let (mut resets, mut reads) = (String::new(), String::new());
+        let (mut resets, mut reads, mut writable) = (String::new(), String::new(), String::new());
+        let mut can = |address: u16| {
+            let _ = writeln!(writable, "            16'd{address}: writable <= 1'b1;");
+        };
         for (i, driven) in self.driven.iter().enumerate() {
             let at = Ends::input(i);
             match driven {
@@ -116,6 +119,7 @@ impl<'a> Around<'a> {
                 None => {
                     let _ = writeln!(nets, "    reg  [31:0] drive{i};");
                     let _ = writeln!(writes, "            16'd{at}: drive{i} <= bus_value;");
+                    can(at);
                     let _ = writeln!(resets, "        if (starts) drive{i} <= 32'd0;");
                 }
             }
@@ -132,6 +136,7 @@ impl<'a> Around<'a> {
             let _ = writeln!(nets, "    wire [{}:0] fifo{n}_count;", count - 1);
             let _ =
                 writeln!(nets, "    wire fifo{n}_empty, fifo{n}_full, fifo{n}_overflow, fifo{n}_underflow;");
+            can(fifo.act());
             let _ = writeln!(acts, "        fifo{n}_acts <= bus_write & address == 16'd{};", fifo.act());
             let _ = writeln!(
                 reads,
@@ -146,6 +151,7 @@ impl<'a> Around<'a> {
                 let _ = writeln!(reads, "            16'd{at}: end_value <= fifo{n}_{i};");
                 if !fifo.to_host {
                     let _ = writeln!(writes, "            16'd{at}: fifo{n}_{i} <= bus_value;");
+                    can(at);
                 }
             }
         }
@@ -155,6 +161,7 @@ impl<'a> Around<'a> {
             ("END_WRITES", writes),
             ("END_RESETS", resets),
             ("END_READS", reads),
+            ("WRITABLE", writable),
         ])
     }
 

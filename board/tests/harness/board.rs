@@ -1,6 +1,37 @@
-//! What tests of complete boards share: measuring from pin to pin.
+//! What tests of complete boards share: measuring from pin to pin, and writes that a board must refuse.
+// Each test uses a part of it.
+#![allow(dead_code)]
 
+use takt_board::Host;
+use takt_board::protocol::{self, Line, LinkError, Receiver};
 use takt_board::simulation::Simulation;
+
+/// Checks that a write is refused, that nothing of it is written, and that a repetition of the same request is answered alike.
+pub(crate) fn refuses(host: &mut Host<Simulation>, address: u16, words: &[u32]) {
+    let was = host.read(address, words.len()).expect("it can be read");
+    let error = host.write(address, words).expect_err("it cannot be written");
+    assert!(
+        matches!(error, LinkError::ReadOnly { address: at, .. } if at == address),
+        "{address:#x}: {error}"
+    );
+    let (mut receiver, mut answers) = (Receiver::default(), Vec::new());
+    for _ in 0..2 {
+        host.line.send(&protocol::write(0x5f, address, words)).expect("a line");
+        for _ in 0..40 {
+            receiver.put(&host.line.receive().expect("a line"));
+            answers.extend(std::iter::from_fn(|| receiver.frame()).map(|frame| frame.status));
+        }
+    }
+    assert_eq!(answers, [protocol::READ_ONLY; 2], "{address:#x}");
+    if is_constant(address) {
+        assert_eq!(host.read(address, words.len()).expect("it can be read"), was, "{address:#x}");
+    }
+}
+
+/// Whether a running program leaves what is there as it is.
+fn is_constant(address: u16) -> bool {
+    !matches!(address, 2..=3 | 7..=11 | 19 | 0x102 | 0x3400..)
+}
 
 /// The ticks of a board that shows them at a pin.
 pub(crate) struct Ticks {
@@ -11,7 +42,7 @@ pub(crate) struct Ticks {
 }
 
 /// Cycles that are looked through in one go.
-const STRETCH: u32 = 1000;
+pub(crate) const STRETCH: u32 = 1000;
 
 impl Ticks {
     pub(crate) fn of(board: &mut Simulation, period: u32) -> Ticks {

@@ -23,9 +23,6 @@ use takt_isa::{BundleAddress, Program, Register};
 const GAP: u16 = 4;
 /// Time between two looks at a board that runs.
 const POLL: Duration = Duration::from_millis(50);
-/// How many times a board is asked whether its period has ended, and the time between two of them.
-const ASKED: u32 = 100;
-const AGAIN: Duration = Duration::from_millis(10);
 /// The exit status after Ctrl-C, by the shells' convention.
 const INTERRUPTED: i32 = 130;
 
@@ -139,16 +136,10 @@ impl<L: Line> Board<L> {
 
     /// Waits until the program is between two periods, or has stopped.
     fn settle(&mut self) -> Result<(), RemoteError> {
-        for _ in 0..ASKED {
-            let status = self.host.status().map_err(failed)?;
-            if status.waiting() || status.halted() || status.fault() {
-                // The read of any register also waits until the peripherals have the outputs.
-                let any = self.program.machine.slots.iter().flat_map(|slot| slot.bank.registers()).next();
-                return self.registers(any.as_slice()).map(drop);
-            }
-            thread::sleep(AGAIN);
-        }
-        Err(RemoteError::Busy)
+        self.host.settle().map_err(failed)?;
+        // The read of any register also waits until the peripherals have the outputs.
+        let any = self.program.machine.slots.iter().flat_map(|slot| slot.bank.registers()).next();
+        self.registers(any.as_slice()).map(drop)
     }
 
     /// Addresses of ports, by their names.

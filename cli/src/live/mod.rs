@@ -7,6 +7,7 @@ use crate::files::{self, Out};
 use crate::number;
 use crate::select::{OptionalMachine, SourceArguments};
 use crate::shadow;
+use crate::track::progress;
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::{Args, Subcommand};
 use std::io::Write;
@@ -70,7 +71,10 @@ pub(crate) fn load(arguments: &LoadBoard, color: bool, out: &mut Out) -> Result<
     let records = image(carried.application())?.records;
     let mut host = arguments.port.open()?;
     host.fits(carried.application())?;
-    host.load(&records)?;
+    let bar = progress(records.len() as u64, "records", false);
+    let loaded = host.load_with(&records, |more| bar.inc(more as u64));
+    bar.finish_and_clear();
+    loaded?;
     if !arguments.stopped {
         host.set("control", RUN | ENABLE)?;
     }

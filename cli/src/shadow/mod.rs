@@ -4,6 +4,7 @@ pub(crate) mod system;
 
 use crate::files::Out;
 use crate::live::{find, shown};
+use crate::track::progress;
 use anyhow::{Context, Result, bail};
 use std::fmt::Write as _;
 use std::io::Write;
@@ -57,9 +58,11 @@ fn compare<L: Line>(
     outputs: &[Watched<'_>],
 ) -> Result<()> {
     // A port is read once the program waits: the step before this one is then over, too.
+    host.settle()?;
     read(host, outputs)?;
     let before = host.register("periods")?;
     host.set("step", 1)?;
+    host.settle()?;
     let live = read(host, outputs)?;
     // Between two ticks nothing changes these: they are what the period had.
     let given = read(host, inputs)?;
@@ -103,9 +106,16 @@ fn compare<L: Line>(
 pub(crate) fn run<L: Line>(host: &mut Host<L>, program: &Program, periods: u32, out: &mut Out) -> Result<()> {
     let mut emulator = Emulator::new(program)?;
     let (inputs, outputs) = (watched(program, &program.inputs)?, watched(program, &program.outputs)?);
+    let bar = progress(periods.into(), "periods", false);
     for period in 1..=periods {
-        compare(host, &mut emulator, &inputs, &outputs).with_context(|| format!("period {period}"))?;
+        let same = compare(host, &mut emulator, &inputs, &outputs);
+        if same.is_err() {
+            bar.finish_and_clear();
+        }
+        same.with_context(|| format!("period {period}"))?;
+        bar.inc(1);
     }
+    bar.finish_and_clear();
     writeln!(
         out,
         "{periods} periods, {} input ports, {} output ports: no difference; the board is held",

@@ -3,7 +3,9 @@
 use super::find;
 use crate::files::Out;
 use crate::live::shown;
+use crate::track::progress;
 use anyhow::{Context, Result, bail};
+use indicatif::ProgressFinish;
 use std::fmt::Write as _;
 use std::io::Write;
 use takt_board::Host;
@@ -65,8 +67,12 @@ pub(crate) fn run<L: Line>(
     let snapshots = snapshots.filter(|(_, link)| link.is_snapshot() && link.from == End::Host);
     let snapshots: Vec<usize> = snapshots.map(|(number, _)| number).collect();
     let mut next = start - description.lead();
+    host.settle()?;
+    // A bar that is dropped is cleared.
+    let bar = progress(ticks.into(), "base ticks", false).with_finish(ProgressFinish::AndClear);
     for tick in 1..=ticks {
         host.set("step", 1)?;
+        host.settle().with_context(|| format!("base tick {tick}"))?;
         let mut live = Vec::with_capacity(outputs.len());
         for together in outputs.chunk_by(|a, b| a.address + 1 == b.address) {
             live.extend(host.read(together[0].address, together.len())?);
@@ -117,7 +123,9 @@ pub(crate) fn run<L: Line>(
                 );
             }
         }
+        bar.inc(1);
     }
+    bar.finish_and_clear();
     let inputs = ends.inputs.len();
     writeln!(
         out,
