@@ -3,11 +3,12 @@
 #[path = "harness/board.rs"]
 mod harness;
 
-use harness::Ticks;
+use harness::{STRETCH, Ticks};
 use std::path::Path;
 use takt_asm::{MemoryLoader, Options, assemble};
-use takt_board::latency::{Way, system_ways};
-use takt_board::simulation::Simulation;
+use takt_board::kind::KINDS;
+use takt_board::latency::{Answer, Part, Way, system_ways, ways};
+use takt_board::simulation::{Simulation, Turn};
 use takt_board::{Board, Wiring};
 use takt_isa::T1;
 use takt_system::latency::Passages;
@@ -216,7 +217,7 @@ fn bound_and_measured<const N: usize>(
                 cycles.push(ticks.measured(&mut sim, before, switch, &format!("{output}_out")));
             }
         }
-        let total = way.total();
+        let total = way.total().expect("an edge");
         let found = (*cycles.iter().min().expect("some"), *cycles.iter().max().expect("some"));
         assert!(found.0 >= total.best && found.1 <= total.worst, "{output}: {found:?}, and not {total:?}");
         [(total.best, total.worst), found]
@@ -241,4 +242,186 @@ fn a_slow_link_beside_a_fast_one_is_within_the_bound() {
     let outputs = ["direct", "slow", "far", "other", "delayed"];
     let [direct, .., delayed] = bound_and_measured([system, wiring], "board-pins-slow", outputs);
     assert!(direct[1].0 < delayed[0].0, "{direct:?} {delayed:?}");
+}
+
+/// Every register of every input peripheral that states a bound, each with a lamp that shows its lowest bit, and a stream.
+const KINDS_WIRING: &str = r#"
+clock = 50
+period = 40
+autostart = true
+[signals]
+drive = "gp10"
+tick = "gp13"
+[peripheral.encoder]
+kind = "quadrature"
+pins = { a = "gp0", b = "gn0", index = "gp1" }
+filter = 4
+ports = { count = "count", at_index = "at_index", indices = "indices", errors = "errors" }
+[peripheral.stepper]
+kind = "step"
+pins = { step = "gp2", direction = "gn2" }
+filter = 5
+ports = { count = "steps" }
+[peripheral.switch]
+kind = "digital-in"
+pins = { in = "gp3" }
+hold = 7
+ports = { level = "level", rises = "rises" }
+[peripheral.lamp0]
+kind = "digital-out"
+pins = { out = "gp4" }
+ports = { level = "l0" }
+[peripheral.lamp1]
+kind = "digital-out"
+pins = { out = "gp5" }
+ports = { level = "l1" }
+[peripheral.lamp2]
+kind = "digital-out"
+pins = { out = "gp6" }
+ports = { level = "l2" }
+[peripheral.lamp3]
+kind = "digital-out"
+pins = { out = "gp7" }
+ports = { level = "l3" }
+[peripheral.lamp4]
+kind = "digital-out"
+pins = { out = "gp8" }
+ports = { level = "l4" }
+[peripheral.lamp5]
+kind = "digital-out"
+pins = { out = "gp9" }
+ports = { level = "l5" }
+[peripheral.lamp6]
+kind = "digital-out"
+pins = { out = "gp11" }
+ports = { level = "l6" }
+[peripheral.full]
+kind = "sigma-delta"
+pins = { out = "gp12" }
+signed = 0
+ports = { value = "full" }
+[peripheral.faint]
+kind = "sigma-delta"
+pins = { out = "gn12" }
+signed = 0
+ports = { value = "faint" }
+"#;
+
+/// The level also makes the stream `full` all ones, and `faint` a pulse in 32768 cycles.
+const KINDS_PROGRAM: &str = "
+.schedule on
+.input count:int at_index:int indices:int errors:int steps:int level:int rises:int
+.output l0:int l1:int l2:int l3:int l4:int l5:int l6:int full:int faint:int
+.once
+        l0, l1, l2, l3, l4, l5, l6, full, faint = 0, 0, 0, 0, 0, 0, 0, 0, 0
+        wait    period
+.period
+period: l0, l1, l2, l3 = count & 1, at_index & 1, indices & 1, errors & 1
+        l4, l5, l6 = steps & 1, level, rises & 1
+        full, faint = level << 16, level << 1
+        wait    period
+";
+
+/// What each kind of peripheral states is what the complete top level does: an edge just in time for a tick shows at the lamp after the best
+/// case, one that comes a cycle later after the worst case.
+#[test]
+fn each_kind_keeps_what_it_states() {
+    const PERIOD: u32 = 2000;
+    let options = Options { machine: &T1, ..Options::default() };
+    let program = assemble("kinds.s", &MemoryLoader::new(&[("kinds.s", KINDS_PROGRAM)]), &options);
+    let program = program.unwrap_or_else(|error| panic!("{}", error.render(false))).program;
+    let board = Board::from_name("ulx3s-85f").expect("a board").expect("a right one");
+    let wiring = Wiring::read("w.toml", KINDS_WIRING, &board).expect("a right wiring");
+    wiring.check("w.toml", KINDS_WIRING, &program).expect("ports fit");
+    let bounds = takt_analysis::bound(&program).expect("it can be bounded");
+    let period = bounds.sections.iter().find(|section| !section.once).expect("a period").cycles;
+    let ways = ways(&wiring, (period.best, period.worst));
+    let way = &ways.ways[0];
+    // A kind that is not here has no pin to state a bound of (`spi`), or has a test of its own (`pwm`, in top.rs).
+    for kind in KINDS.iter().filter(|kind| !["spi", "pwm"].contains(&kind.name)) {
+        assert!(wiring.peripherals.iter().any(|known| known.kind == kind), "{} is not tried", kind.name);
+    }
+
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("board-kinds");
+    let mut sim = Simulation::new(&board, &wiring, &program, &folder).unwrap_or_else(|e| panic!("{e}"));
+    sim.run(20 * PERIOD, &[]).expect("it runs");
+    assert_eq!(sim.output("signal_drive").map(|(level, _)| level), Some(true), "it drives");
+    let ticks = Ticks::of(&mut sim, PERIOD);
+    let encoder = ["encoder_a", "encoder_b"].map(|name| sim.input(name).expect("a pin"));
+    let mut at = 0;
+    let mut turn = |sim: &mut Simulation, by: i32| {
+        sim.turns.push(Turn { pins: encoder, from: at, by });
+        at += by;
+    };
+    for (end, lamp) in way.inputs.iter().zip(0..) {
+        let lamp = format!("lamp{lamp}");
+        let out = way.outputs.iter().find(|output| output.peripheral == lamp).expect("a lamp");
+        assert_eq!(out.answer, Answer::Edge);
+        let bound = Part::sum("", end.parts.iter().chain(&way.between).chain(&out.parts));
+        for (before, expected) in [(end.parts[0].best, bound.best), (end.parts[0].best - 1, bound.worst)] {
+            // Pins at rest, long enough for every filter; the pulse of an index is at an odd count, and then at an even one.
+            for pin in ["encoder_index", "stepper_step"] {
+                sim.set(pin, false);
+            }
+            match &*end.port {
+                "rises" => sim.set("switch_in", false),
+                "at_index" => turn(&mut sim, 1),
+                _ => {}
+            }
+            sim.run(2 * PERIOD, &[]).expect("it runs");
+            let change = |sim: &mut Simulation| match &*end.port {
+                "count" => turn(sim, 1),
+                "at_index" | "indices" => sim.set("encoder_index", true),
+                // Both pins at once.
+                "errors" => turn(sim, 2),
+                "steps" => sim.set("stepper_step", true),
+                "level" => {
+                    let (_, level) = sim.inputs().find(|(name, _)| *name == "switch_in").expect("a pin");
+                    sim.set("switch_in", !level);
+                }
+                _ => sim.set("switch_in", true),
+            };
+            let measured = ticks.measured(&mut sim, before, change, &format!("{lamp}_out"));
+            assert_eq!(
+                measured, expected,
+                "{} of {}, {before} cycles before the tick",
+                end.port, end.peripheral
+            );
+        }
+    }
+
+    // A stream: the modulator takes its value on as stated, which only a value of ones alone shows at once: with the next bit. The first bit
+    // of a small value comes any time later, so that no bound of the pin is stated.
+    for stream in ["full", "faint"] {
+        let out = way.outputs.iter().find(|output| output.peripheral == stream).expect("a stream");
+        assert_eq!(out.answer, Answer::Density);
+    }
+    let level = way.inputs.iter().find(|end| end.port == "level").expect("an input");
+    let full = way.outputs.iter().find(|output| output.peripheral == "full").expect("a stream");
+    let bound = Part::sum("", level.parts.iter().chain(&way.between).chain(&full.parts));
+    let total = way.total_to_modulator().expect("streams");
+    assert!(total.best <= bound.best && bound.worst <= total.worst, "{total:?}");
+    let edge = level.parts[0].best;
+    for (before, expected) in [(edge, bound.best), (edge - 1, bound.worst)] {
+        sim.set("switch_in", false);
+        // All pulses of a small value are over.
+        sim.run(2 * PERIOD + (1 << 16), &[]).expect("it runs");
+        let on = |sim: &mut Simulation| sim.set("switch_in", true);
+        // The bit that the modulator makes of its value is at the pin one cycle later.
+        assert_eq!(ticks.measured(&mut sim, before, on, "full_out"), expected + 1);
+    }
+    let mut silent = 0;
+    while sim.output("faint_out").expect("a pin").1 == 0 {
+        sim.run(STRETCH, &[]).expect("it runs");
+        silent += u64::from(STRETCH);
+        assert!(silent <= 1 << 16, "a pulse comes");
+    }
+    assert!(silent > total.worst, "{silent}");
+    // Over any stretch, the pin is 1 for as many cycles as the value says, less or more than one.
+    for cycles in [100_000, 65_536, 12_345] {
+        sim.run(cycles, &[]).expect("it runs");
+        let high = sim.output("faint_out").expect("a pin").1;
+        let expected = f64::from(cycles) * 2.0 / 65536.0;
+        assert!((f64::from(high) - expected).abs() < 1.0, "{high} {expected}");
+    }
 }

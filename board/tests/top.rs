@@ -3,14 +3,15 @@
 #[path = "harness/board.rs"]
 mod harness;
 
-use harness::Ticks;
+use harness::{Ticks, refuses};
 use std::panic::AssertUnwindSafe;
 use std::path::{Path, PathBuf};
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::latency::{self, Part};
-use takt_board::protocol::{INPUTS, LinkError, OUTPUTS};
+use takt_board::protocol::{IMAGE, INPUTS, LinkError, OUTPUTS};
 use takt_board::simulation::{Simulation, Turn};
 use takt_board::tools::{NEXTPNR, Venv, YOSYS};
+use takt_board::wiring::Peripheral;
 use takt_board::{Board, Host, Wiring, build, routed, top, twin};
 use takt_isa::{Program, T1};
 
@@ -113,37 +114,55 @@ fn pulse(board: &mut Simulation) -> u32 {
     board.output("motor_high").expect("a pin").1
 }
 
-/// Of a PWM, in every phase, the first cycle in which a new duty shows.
-#[test]
-fn a_duty_shows_as_late_as_the_bound_says() {
-    let (half, dead) = (13, 3);
-    let text = format!(
-        "period = 40\n[peripheral.encoder]\nkind = \"quadrature\"\npins = {{ a = \"gp0\", b = \"gn0\" }}\nports = {{ count = \"n\" }}\n[peripheral.motor]\nkind = \"pwm\"\npins = {{ high = \"gp2\", low = \"gn2\" }}\nhalf = {half}\ndead = {dead}\nports = {{ duty = \"force\" }}\n"
-    );
-    let board = Board::from_name("ulx3s-85f").expect("a board").expect("a right one");
-    let wiring = Wiring::read("w.toml", &text, &board).expect("a right wiring");
-    let bound = Part::sum("", &latency::ways(&wiring, (0, 0)).ways[0].outputs[0].parts);
-    let pwm = &wiring.peripherals[1];
-    let (mut least, mut most) = (u64::MAX, 0);
-    for (old, new) in (-half..=half).flat_map(|old| (-half..=half).map(move |new| (old, new))) {
-        for phase in 0..2 * half {
-            let twins = [old, new].map(|duty| (twin::of(pwm.kind, &pwm.parameters).expect("a twin"), duty));
-            let [mut a, mut b] = twins;
-            let puts = [0, 4 * half + phase];
-            let first = (0..10 * half).find(|cycle| {
-                for (twin, duty) in [&mut a, &mut b] {
-                    let duty = if *cycle == puts[0] { old } else { *duty };
-                    twin.clock(&[0, 1, puts.contains(cycle).into(), duty as u32]);
-                }
-                a.0.outputs()[0] != b.0.outputs()[0]
-            });
-            // Outputs after the clock's edge of a cycle are those of the next one. Pulses within the dead time are not seen.
-            let Some(first) = first else { continue };
-            let cycles = (first + 1 - puts[1]) as u64;
-            (least, most) = (least.min(cycles), most.max(cycles));
+/// Of each pin of a PWM, over every change of the duty in every phase, the least and the most cycles until the change shows.
+fn shows(pwm: &Peripheral, half: i32) -> [(u64, u64); 2] {
+    let dead = pwm.parameter("dead").cast_signed();
+    let (put, end) = (4 * half + dead, 12 * half + 4 * dead);
+    let runs = |old: i32, new: i32, put: i32| -> Vec<[u32; 2]> {
+        let mut twin = twin::of(pwm.kind, &pwm.parameters).expect("a twin");
+        let clock = |cycle: i32| {
+            let duty = if cycle < put { old } else { new };
+            twin.clock(&[0, 1, (cycle == 0 || cycle == put).into(), duty as u32]);
+            [twin.outputs()[0], twin.outputs()[1]]
+        };
+        (0..end).map(clock).collect()
+    };
+    let mut found = [(u64::MAX, 0); 2];
+    for old in -half..=half {
+        let without = runs(old, old, put);
+        for (new, phase) in (-half..=half).flat_map(|new| (0..2 * half).map(move |phase| (new, phase))) {
+            let with = runs(old, new, put + phase);
+            for (pin, (least, most)) in found.iter_mut().enumerate() {
+                let first = with.iter().zip(&without).position(|(a, b)| a[pin] != b[pin]);
+                // Outputs after the clock's edge of a cycle are those of the next one. Pulses within the dead time are not seen.
+                let Some(first) = first else { continue };
+                let cycles = (first as i32 + 1 - put - phase) as u64;
+                (*least, *most) = ((*least).min(cycles), (*most).max(cycles));
+            }
         }
     }
-    assert_eq!((least, most), (bound.best, bound.worst));
+    found
+}
+
+/// Of a PWM with any dead time, the first cycle in which a new duty shows at one of its pins.
+#[test]
+fn a_duty_shows_as_late_as_the_bound_says() {
+    let board = Board::from_name("ulx3s-85f").expect("a board").expect("a right one");
+    for (half, dead) in [(13, 3), (4, 0), (5, 1), (6, 2), (6, 7), (9, 8), (2, 5), (3, 20), (1, 9)] {
+        let bound = |pins: &str| {
+            let text = format!(
+                "period = 40\n[peripheral.encoder]\nkind = \"quadrature\"\npins = {{ a = \"gp0\", b = \"gn0\" }}\nports = {{ count = \"n\" }}\n[peripheral.motor]\nkind = \"pwm\"\npins = {{ {pins} }}\nhalf = {half}\ndead = {dead}\nports = {{ duty = \"force\" }}\n"
+            );
+            let wiring = Wiring::read("w.toml", &text, &board).expect("a right wiring");
+            let sum = Part::sum("", &latency::ways(&wiring, (0, 0)).ways[0].outputs[0].parts);
+            ((sum.best, sum.worst), wiring.peripherals[1].clone())
+        };
+        let (both, pwm) = bound("high = \"gp2\", low = \"gn2\"");
+        let (high, _) = bound("high = \"gp2\"");
+        let [upper, lower] = shows(&pwm, half);
+        assert_eq!(upper, high, "half {half}, dead time {dead}");
+        assert_eq!((upper.0.min(lower.0), upper.1.max(lower.1)), both, "half {half}, dead time {dead}");
+    }
 }
 
 /// Board, wiring and program, and a folder for it.
@@ -254,6 +273,22 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     assert_eq!((exact.best, exact.worst), (cycles.into(), cycles.into()), "cycles from tick to outputs");
     assert_eq!(host.register("misses").expect("a register"), 0);
 
+    // What cannot be written is refused, as a whole: registers to read and addresses without one, ports that the program or a peripheral
+    // drives, and the last one, which the machine does not have; the image of a program that runs; a tick of its own while it is not
+    // held, with two registers before it that can be written; what the core holds.
+    let n = port(first, "n");
+    for address in [0, 2, 9, 20, 0xfff, port(first, "force"), n, INPUTS + 255, INPUTS + 256, 0x3000] {
+        refuses(&mut host, address, &[1]);
+    }
+    for (address, words) in
+        [(4, &[9999, 5, 1][..]), (12, &[1]), (IMAGE, &[1, 2, 3, 0]), (0x8000, &[7]), (0xc000, &[7])]
+    {
+        refuses(&mut host, address, words);
+    }
+    assert!((INPUTS..n + 2).contains(&port(first, "wanted")), "next to `n`");
+    refuses(&mut host, n.min(port(first, "wanted")), &[7, 7]);
+    assert_eq!(host.read(port(first, "wanted"), 1).expect("a port")[0], 52);
+
     // Hold, then one period at a time.
     host.set("control", 0b111).expect("control");
     let before = host.register("periods").expect("a register");
@@ -323,6 +358,8 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     assert!(host.status().expect("status").drives(), "after a reset");
 
     // A program that misses its deadlines, one that halts, one that makes no number.
+    host.set("control", 0).expect("control");
+    refuses(&mut host, IMAGE + 4 * top::RECORDS as u16, &[1, 2, 3, 0]);
     let instead = |what: &str| PROGRAM.replace("        iand    lit, n, 1\n", what);
     let nan = PROGRAM.replace("fmul    force, f, 0.25", "fdiv    force, zero, zero");
     for (source, cause) in

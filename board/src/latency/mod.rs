@@ -35,6 +35,16 @@ impl Part {
     }
 }
 
+/// What a pin answers with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Answer {
+    /// An edge: the parts of the way end with it.
+    Edge,
+    /// A stream of pulses whose density is the value: one pulse says nothing, and the first that differs can come at any time. The parts
+    /// of the way end where the modulator takes the value on.
+    Density,
+}
+
 /// The parts between a register and its pin.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct End {
@@ -44,6 +54,8 @@ pub struct End {
     pub port: String,
     /// What happens between.
     pub parts: Vec<Part>,
+    /// Of an output, what its pin answers with.
+    pub answer: Answer,
 }
 
 /// A way from pins to pins: from each of its inputs to each of its outputs.
@@ -65,15 +77,25 @@ pub struct Way {
 }
 
 impl Way {
-    /// From pin to pin, over all inputs and outputs.
-    pub fn total(&self) -> Part {
+    /// From pin to pin, over all inputs and all outputs that answer with an edge; `None` if there are no such outputs.
+    pub fn total(&self) -> Option<Part> {
+        self.total_to(Answer::Edge, "from pin to pin")
+    }
+
+    /// From pin to the modulators of all outputs that answer with a density; `None` if there are none.
+    pub fn total_to_modulator(&self) -> Option<Part> {
+        self.total_to(Answer::Density, "from pin to modulator")
+    }
+
+    fn total_to(&self, answer: Answer, text: &str) -> Option<Part> {
+        let outputs = self.outputs.iter().filter(|end| end.answer == answer);
+        let outputs: Vec<Part> = outputs.map(|end| Part::sum("", &end.parts)).collect();
+        let inputs: Vec<Part> = self.inputs.iter().map(|end| Part::sum("", &end.parts)).collect();
         let all = |edge: fn(&Part) -> u64, pick: fn(u64, u64) -> u64| {
-            let ends = [&self.inputs, &self.outputs].map(|ends| {
-                ends.iter().map(|end| edge(&Part::sum("", &end.parts))).reduce(pick).unwrap_or(0)
-            });
-            ends.iter().sum::<u64>() + edge(&self.periods)
+            let [input, output] = [&inputs, &outputs].map(|ends| ends.iter().map(edge).reduce(pick));
+            Some(input? + output? + edge(&self.periods))
         };
-        Part::new("from pin to pin", all(|part| part.best, u64::min), all(|part| part.worst, u64::max))
+        Some(Part::new(text, all(|part| part.best, u64::min)?, all(|part| part.worst, u64::max)?))
     }
 }
 
@@ -109,20 +131,29 @@ fn edge_in(peripheral: &Peripheral, register: &str) -> Option<Vec<Part>> {
     Some(vec![Part::new(format!("edge to `{register}`"), cycles, cycles)])
 }
 
-/// From the register to the pin's edge.
-fn edge_out(peripheral: &Peripheral) -> Option<Vec<Part>> {
+/// From the register to what the pin answers with.
+fn answer(peripheral: &Peripheral) -> Option<(Vec<Part>, Answer)> {
+    let edge = |parts| Some((parts, Answer::Edge));
     match peripheral.kind.name {
         // One cycle more of an odd pulse moves its end only, and the longest one that has an end ends with the period. A long dead time
-        // can move the beginning of the shortest pulse that it leaves, dead + 1 cycles about the middle, beyond that.
+        // can move the beginning of the shortest pulse that it leaves, dead + 1 cycles about the middle, beyond that; and, by dead / 2
+        // into the next period, the rise of the lower switch in the shortest gap that it leaves. Where one switch is to stay on, it comes
+        // on after the dead time.
         "pwm" => {
             let (half, dead) = (parameter(peripheral, "half"), parameter(peripheral, "dead"));
-            Some(vec![
+            let has_low = peripheral.pins.get(1).is_some_and(Option::is_some);
+            let high = (2 * half).max(half + 1 + dead - (dead + 2) / 2);
+            let low = if has_low { 2 * half + dead.div_ceil(2) } else { 0 };
+            // A longer dead time leaves no pulse and no gap.
+            let moves = if dead < 2 * half { high.max(low) } else { 0 }.max(dead + 1);
+            edge(vec![
                 Part::new("to the next period of the PWM", 2, 2 * half + 1),
-                Part::new("its first edge that moves", 1, (2 * half).max(half + 1 + dead - (dead + 2) / 2)),
+                Part::new("its first edge that moves", 1, moves),
             ])
         }
-        "digital-out" => Some(vec![Part::new("to the pin", 1, 1)]),
-        "sigma-delta" => Some(vec![Part::new("to the stream's first bit", 2, 2)]),
+        "digital-out" => edge(vec![Part::new("to the pin", 1, 1)]),
+        "sigma-delta" => Some((vec![Part::new("to the modulator", 1, 1)], Answer::Density)),
+        // A converter's frames begin at ticks, or with the outputs, whatever their values.
         _ => None,
     }
 }
@@ -132,18 +163,19 @@ fn inputs(peripheral: &Peripheral) -> impl Iterator<Item = (&str, Option<End>)> 
     let registers = peripheral.kind.reads.iter().zip(&peripheral.reads);
     registers.filter_map(|(register, port)| {
         let port = port.as_deref()?;
-        Some((port, edge_in(peripheral, register.name).map(|parts| end(peripheral, port, parts))))
+        let parts = edge_in(peripheral, register.name);
+        Some((port, parts.map(|parts| end(peripheral, port, (parts, Answer::Edge)))))
     })
 }
 
 fn outputs(peripheral: &Peripheral) -> impl Iterator<Item = (&str, Option<End>)> {
     peripheral.writes.iter().flatten().map(|write| {
-        (write.port.as_str(), edge_out(peripheral).map(|parts| end(peripheral, &write.port, parts)))
+        (write.port.as_str(), answer(peripheral).map(|answer| end(peripheral, &write.port, answer)))
     })
 }
 
-fn end(peripheral: &Peripheral, port: &str, parts: Vec<Part>) -> End {
-    End { peripheral: peripheral.name.clone(), port: port.to_owned(), parts }
+fn end(peripheral: &Peripheral, port: &str, (parts, answer): (Vec<Part>, Answer)) -> End {
+    End { peripheral: peripheral.name.clone(), port: port.to_owned(), parts, answer }
 }
 
 /// Peripherals of a wiring with no port that is an end of a way.

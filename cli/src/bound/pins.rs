@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use std::io::Write;
 use std::path::Path;
 use takt_analysis::Bounds;
-use takt_board::latency::{End, Part, Way, Ways, system_ways, ways};
+use takt_board::latency::{Answer, End, Part, Way, Ways, system_ways, ways};
 use takt_board::{Application, Board, Wiring};
 use takt_isa::Program;
 use takt_system::Description;
@@ -148,10 +148,18 @@ impl Found<'_> {
             ends.iter().map(end).collect::<Vec<_>>()
         };
         let way = |way: &Way| {
-            json!({
+            let mut value = json!({
                 "inputs": ends(&way.inputs), "between": parts(&way.between), "outputs": ends(&way.outputs),
-                "total": part(&way.total()),
-            })
+                "total": way.total().as_ref().map(part),
+                "total_to_modulator": way.total_to_modulator().as_ref().map(part),
+            });
+            for (end, output) in way.outputs.iter().enumerate() {
+                value["outputs"][end]["answer"] = json!(match output.answer {
+                    Answer::Edge => "edge",
+                    Answer::Density => "density",
+                });
+            }
+            value
         };
         let ways = &self.ways.ways;
         let mut value = match self.application {
@@ -235,16 +243,20 @@ impl Group {
         between.iter().try_for_each(|part| line(part, table, out))?;
         ends(&self.way.outputs, table, out)?;
         writeln!(out, "in all")?;
-        line(&self.way.total(), table, out)
+        let totals = [self.way.total(), self.way.total_to_modulator()];
+        totals.iter().flatten().try_for_each(|total| line(total, table, out))
     }
 }
 
 fn ends(ends: &[End], table: Table, out: &mut Out) -> Result<()> {
-    for same in ends.chunk_by(|a, b| a.parts == b.parts) {
+    for same in ends.chunk_by(|a, b| (&a.parts, a.answer) == (&b.parts, b.answer)) {
         let names: Vec<String> =
             same.iter().map(|end| format!("{} ({})", end.peripheral, end.port)).collect();
         writeln!(out, "{}", names.join(", "))?;
         same[0].parts.iter().try_for_each(|part| line(part, table, out))?;
+        if same[0].answer == Answer::Density {
+            writeln!(out, "  then the pin: a density of ones, with no bound for any one pulse")?;
+        }
     }
     Ok(())
 }
