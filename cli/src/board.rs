@@ -2,10 +2,12 @@
 
 pub(crate) mod carried;
 #[cfg(unix)]
+mod pins;
+#[cfg(unix)]
 mod robot;
+mod sim;
 
 use crate::files::{self, Out};
-use crate::number;
 use crate::output::{self, Failure};
 use crate::select::{OptionalMachine, SourceArguments};
 use anyhow::{Context, Result, anyhow, bail, ensure};
@@ -14,7 +16,6 @@ use clap::{Args, Subcommand};
 use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use takt_board::simulation::{Simulation, Turn};
 use takt_board::tools::{NEXTPNR, Venv, YOSYS};
 use takt_board::{Application, Board, Mistake, Wiring};
 
@@ -31,7 +32,7 @@ enum Command {
     Pins(Pins),
     Check(Check),
     Build(Build),
-    Sim(Sim),
+    Sim(sim::Sim),
 }
 
 /// List the boards.
@@ -45,8 +46,9 @@ struct List {
 /// List a board's pins by name, with the sites of the device; with --wiring, what is at each.
 #[derive(Args)]
 struct Pins {
-    /// A name from `takt board list`, or a file of the same form (docs/board.md).
-    board: String,
+    /// A name from `takt board list`, or a file of the same form (docs/board.md) [default: the one that the wiring names].
+    #[arg(required_unless_present = "wiring")]
+    board: Option<String>,
     /// Wiring whose peripherals are at the pins.
     #[arg(long, value_name = "TOML")]
     wiring: Option<PathBuf>,
@@ -83,44 +85,16 @@ struct Build {
 
 const BUILD: &str = "\
 Example:
-  takt board build --board ulx3s-85f --wiring robot.toml --program robot.s -o out
+  takt board build --wiring robot.toml --program robot.s -o out     on the board that robot.toml names
   takt board build --board ulx3s-85f --wiring axis.toml --program system.toml -o out   several cores
   openFPGALoader --board ulx3s out/takt.bit";
-
-/// Run the complete top level in Verilator, with its UART on a pseudo-terminal that replaces a board's serial port.
-///
-/// `takt load` and `takt live` talk to the port that is printed. It runs slower than a board: a second of it takes minutes.
-#[derive(Args)]
-struct Sim {
-    #[command(flatten)]
-    target: Target,
-    /// A motor that turns an encoder: the peripherals' names, and counts per second at full duty; may be repeated.
-    #[arg(long, value_name = "PWM,QUADRATURE,SPEED")]
-    axis: Vec<String>,
-    /// Put the hybrid robot behind the pins and drive it along a tool path, this command being the host at the UART: the tracking
-    /// error through the pins beside that of `takt track`.
-    #[arg(long, conflicts_with_all = ["axis", "cycles"])]
-    robot: bool,
-    /// With --robot: tool path in G-code [default: the letters AGH].
-    #[arg(long, value_name = "FILE", requires = "robot")]
-    gcode: Option<PathBuf>,
-    /// With --robot: periods to drive, from the path's beginning.
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = number::count, requires = "robot", allow_hyphen_values = true)]
-    periods: u64,
-    /// Flip one in N bits on the UART, in either direction; 0 flips none.
-    #[arg(long, default_value_t = 0, value_name = "N")]
-    noise: u32,
-    /// End after N cycles; without it, when it is interrupted.
-    #[arg(long, value_name = "N")]
-    cycles: Option<u64>,
-}
 
 /// A program or a system, a wiring and a board.
 #[derive(Args)]
 pub(crate) struct Target {
-    /// A name from `takt board list`, or a file of the same form (docs/board.md).
-    #[arg(long)]
-    pub(crate) board: String,
+    /// A name from `takt board list`, or a file of the same form (docs/board.md) [default: the one that the wiring names].
+    #[arg(long, required_unless_present = "wiring")]
+    pub(crate) board: Option<String>,
     /// Which peripherals are at which pins, and which ports are their registers (docs/board.md). Without it there are none: the
     /// host reads and writes ports, the clock is the board's own, and a period takes 100 µs.
     #[arg(long, value_name = "TOML")]
@@ -172,9 +146,9 @@ impl Target {
         let mut reads: Vec<(&str, &Path)> = vec![("--program", &self.program)];
         reads.extend(self.wiring.as_deref().map(|path| ("--wiring", path)));
         files::check(&reads, &[])?;
-        let board = find(&self.board, color)?;
         let load = || Carried::load(&self.program, &self.machine, &self.source, color);
         let Some(path) = &self.wiring else {
+            let board = find(self.board.as_deref().context("a board: --board NAME")?, color)?;
             let carried = load()?;
             let wiring = Wiring::none(&board, carried.application());
             if let Application::System(description) = carried.application() {
@@ -184,14 +158,31 @@ impl Target {
             return Ok((board, wiring, carried));
         };
         let (name, text) = text(path)?;
-        let wiring = right(Wiring::read(&name, &text, &board), color)?;
+        let (board, wiring) = placed(&name, &text, self.board.as_deref(), color)?;
         let carried = load()?;
         right(wiring.check(&name, &text, carried.application()), color)?;
         Ok((board, wiring, carried))
     }
 }
 
-/// The wiring of a file for a program or a system, and its board: the one that is named, else the one that it names itself.
+/// A wiring's text as a wiring, and its board: the one that is named, else the one that the wiring names itself.
+fn placed(name: &str, text: &str, board: Option<&str>, color: bool) -> Result<(Board, Wiring)> {
+    let board = match board {
+        Some(board) => board.to_owned(),
+        None => right(Wiring::board(name, text), color)?.with_context(|| {
+            let names: Vec<&str> = Board::names().collect();
+            format!(
+                "{name} names no board: `--board NAME`, or a line `board = \"NAME\"` at its beginning; there are {}",
+                names.join(", ")
+            )
+        })?,
+    };
+    let board = find(&board, color)?;
+    let wiring = right(Wiring::read(name, text, &board), color)?;
+    Ok((board, wiring))
+}
+
+/// The wiring of a file for a program or a system, and its board, as [`placed`] finds it.
 pub(crate) fn wired(
     path: &Path,
     board: Option<&str>,
@@ -199,13 +190,7 @@ pub(crate) fn wired(
     color: bool,
 ) -> Result<(Board, Wiring)> {
     let (name, text) = text(path)?;
-    let board = match board {
-        Some(board) => board.to_owned(),
-        None => right(Wiring::board(&name, &text), color)?
-            .with_context(|| format!("{name} names no board: --board NAME"))?,
-    };
-    let board = find(&board, color)?;
-    let wiring = right(Wiring::read(&name, &text, &board), color)?;
+    let (board, wiring) = placed(&name, &text, board, color)?;
     right(wiring.check(&name, &text, application), color)?;
     Ok((board, wiring))
 }
@@ -214,7 +199,7 @@ pub(crate) fn run(arguments: &Boards, color: bool, out: &mut Out) -> Result<()> 
     match &arguments.command {
         Command::List(list) => self::list(list, color, out),
         Command::Build(build) => self::build(build, color, out),
-        Command::Sim(sim) => self::sim(sim, color, out),
+        Command::Sim(sim) => sim::run(sim, color, out),
         Command::Pins(pins) => self::pins(pins, color, out),
         Command::Check(check) => {
             let (board, wiring, carried) = check.target.read(color)?;
@@ -271,12 +256,13 @@ fn list(arguments: &List, color: bool, out: &mut Out) -> Result<()> {
 }
 
 fn pins(arguments: &Pins, color: bool, out: &mut Out) -> Result<()> {
-    let board = find(&arguments.board, color)?;
-    let wiring = match &arguments.wiring {
-        None => None,
+    let named = arguments.board.as_deref();
+    let (board, wiring) = match &arguments.wiring {
+        None => (find(named.context("a board")?, color)?, None),
         Some(path) => {
             let (name, text) = text(path)?;
-            Some(right(Wiring::read(&name, &text, &board), color)?)
+            let (board, wiring) = placed(&name, &text, named, color)?;
+            (board, Some(wiring))
         }
     };
     let used = |pin: &str| wiring.as_ref().and_then(|wiring| wiring.at(pin));
@@ -326,100 +312,4 @@ fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
     }
     writeln!(out, "programs: {} records of {} in block RAM", report.records, report.room)?;
     Ok(())
-}
-
-/// A motor and its encoder.
-struct Axis {
-    motor: String,
-    pins: [usize; 2],
-    half: f64,
-    /// Counts per cycle at full duty.
-    speed: f64,
-    position: f64,
-    counts: i32,
-}
-
-impl Axis {
-    fn new(text: &str, wiring: &Wiring, sim: &Simulation) -> Result<Axis> {
-        let wrong = || anyhow!("--axis {text}: expected PWM,QUADRATURE,SPEED, as in motor,encoder,20000");
-        let [motor, encoder, speed] = text.split(',').collect::<Vec<_>>()[..] else { return Err(wrong()) };
-        let find = |name: &str, kind: &str| {
-            let mut all = wiring.peripherals.iter();
-            all.find(|p| p.name == name && p.kind.name == kind)
-                .ok_or_else(|| anyhow!("--axis {text}: the wiring has no {kind} `{name}`"))
-        };
-        let half = find(motor, "pwm")?.parameters[0];
-        find(encoder, "quadrature")?;
-        let speed: f64 = speed.parse().map_err(|_| wrong())?;
-        let pins = ["a", "b"].map(|pin| sim.input(&format!("{encoder}_{pin}")));
-        let [Some(a), Some(b)] = pins else { return Err(wrong()) };
-        let speed = speed / (wiring.clock * 1e6);
-        Ok(Axis { motor: motor.to_owned(), pins: [a, b], half: half.into(), speed, position: 0.0, counts: 0 })
-    }
-
-    /// After a PWM period: the force of that one moves it in the next.
-    fn moves(&mut self, sim: &mut Simulation, cycles: u32) {
-        let high = sim.output(&format!("{}_high", self.motor)).map_or(0, |(_, high)| high);
-        let drives = sim.output(&format!("{}_low", self.motor)).is_none_or(|(_, low)| low + high > 0);
-        let duty = if drives { f64::from(high) / self.half - 1.0 } else { 0.0 };
-        self.position += duty * self.speed * f64::from(cycles);
-        let counts = self.position.round() as i32;
-        sim.turns.push(Turn { pins: self.pins, from: self.counts, by: counts.wrapping_sub(self.counts) });
-        self.counts = counts;
-    }
-}
-
-#[cfg(unix)]
-fn sim(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
-    let (board, wiring, carried) = arguments.target.read(color)?;
-    let folder = takt_cosim::cache_folder().join(format!("board-{}", std::process::id()));
-    let simulation = || {
-        output::message("compiling the circuit …");
-        Simulation::new(&board, &wiring, carried.application(), &folder)
-    };
-    let mut run = || -> Result<()> {
-        if arguments.robot {
-            let program = carried.program("--robot")?;
-            let drive = robot::Drive::new(program, &wiring, arguments.gcode.as_deref(), arguments.periods)?;
-            let mut sim = simulation()?;
-            sim.noise = arguments.noise;
-            return drive.run(&board.name, sim, out);
-        }
-        serve(arguments, &wiring, simulation()?, out)
-    };
-    let ended = run();
-    let _ = std::fs::remove_dir_all(&folder);
-    ended
-}
-
-#[cfg(unix)]
-fn serve(arguments: &Sim, wiring: &Wiring, mut sim: Simulation, out: &mut Out) -> Result<()> {
-    let axes = arguments.axis.iter().map(|text| Axis::new(text, wiring, &sim));
-    let mut axes = axes.collect::<Result<Vec<Axis>>>()?;
-    // Pulses are measured over whole periods of the PWM.
-    let slice = axes.iter().map(|axis| 2 * axis.half as u32).max().unwrap_or(2000);
-    let mut terminal = takt_board::terminal::Terminal::new()?;
-    writeln!(out, "{} {}", terminal.path().display(), wiring.baud)?;
-    out.flush()?;
-    sim.noise = arguments.noise;
-    while arguments.cycles.is_none_or(|most| sim.cycles < most) {
-        let bytes = terminal.receive()?;
-        for axis in &mut axes {
-            axis.moves(&mut sim, slice);
-        }
-        sim.run(slice, &bytes)?;
-        let received = sim.take_received();
-        if !received.is_empty() {
-            terminal.send(&received)?;
-        }
-    }
-    for axis in &axes {
-        writeln!(out, "{}: {} counts", axis.motor, axis.counts)?;
-    }
-    Ok(())
-}
-
-#[cfg(not(unix))]
-fn sim(_: &Sim, _: bool, _: &mut Out) -> Result<()> {
-    bail!("a simulated board needs pseudo-terminals, which this system does not have")
 }

@@ -84,25 +84,7 @@ impl Table {
     /// # Errors
     /// If it has not one column for each port.
     pub fn new(name: String, source: Box<dyn Read>, ports: &[Port]) -> Result<Table, String> {
-        let source = Rationed { source, left: ROW_LIMIT };
-        // Rows of another length are found here, with a better message.
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(source);
-        let header = reader.headers().map_err(|error| explain(&name, error))?.clone();
-        if header.is_empty() {
-            return Err(format!("{name} is empty: it needs a header with a column for each input port"));
-        }
-        let columns = |port: &Port| -> Vec<usize> {
-            header.iter().enumerate().filter(|(_, title)| *title == port.name).map(|(i, _)| i).collect()
-        };
-        let mut found = Vec::new();
-        let mut missing = Vec::new();
-        for port in ports {
-            match columns(port)[..] {
-                [column] => found.push((port.clone(), column)),
-                [] => missing.push(port.name.as_str()),
-                _ => return Err(format!("{name}: two columns are named `{}`", port.name)),
-            }
-        }
+        let Begun { reader, header, found, missing } = Begun::of(&name, source, ports)?;
         if let [first, ..] = missing[..] {
             // A column that is a port's is not another's misspelt.
             let near =
@@ -111,8 +93,33 @@ impl Table {
             let separator = separator(&header);
             return Err(format!("{name}: no column for the {ports} {}{near}{separator}", missing.join(", ")));
         }
+        Ok(Table::with(name, reader, &header, found))
+    }
+
+    /// Reads the header of a table that has columns for some of the ports, and no others; errors call it `name`.
+    ///
+    /// # Errors
+    /// If a column is no port's, or there is none.
+    pub fn of_some(name: String, source: Box<dyn Read>, ports: &[Port]) -> Result<Table, String> {
+        let Begun { reader, header, found, .. } = Begun::of(&name, source, ports)?;
+        if let Some(other) = header.iter().find(|title| ports.iter().all(|port| port.name != **title)) {
+            let names = ports.iter().map(|port| port.name.as_str());
+            let (near, separator) = (suggest(other, names.clone()), separator(&header));
+            let names = names.collect::<Vec<_>>().join(", ");
+            let other = shown(other);
+            return Err(format!("{name}: a column `{other}`{near}; there can be {names}{separator}"));
+        }
+        Ok(Table::with(name, reader, &header, found))
+    }
+
+    fn with(
+        name: String,
+        reader: csv::Reader<Rationed>,
+        header: &csv::StringRecord,
+        ports: Vec<(Port, usize)>,
+    ) -> Table {
         let (record, row) = (csv::StringRecord::new(), Row::new());
-        Ok(Table { name, reader, record, width: header.len(), ports: found, row, begins: true })
+        Table { name, reader, record, width: header.len(), ports, row, begins: true }
     }
 
     /// What errors call it.
@@ -125,6 +132,11 @@ impl Table {
         // It was read before.
         let titles = self.reader.headers().map(|header| header.iter().map(str::to_owned).collect());
         titles.unwrap_or_default()
+    }
+
+    /// Where the last row is: the table's name and the line.
+    pub fn place(&self) -> String {
+        place(&self.name, &self.record)
     }
 
     /// A field of the last row.
@@ -146,7 +158,7 @@ impl Table {
             return Ok(None);
         }
         self.begins = false;
-        let place = || format!("{}:{}", self.name, self.record.position().map_or(0, csv::Position::line));
+        let place = || place(&self.name, &self.record);
         if self.record.len() != self.width {
             let (width, separator) = (self.width, separator(&self.record));
             return Err(format!(
@@ -163,6 +175,45 @@ impl Table {
             self.row.push((port.register, bits));
         }
         Ok(Some(&self.row))
+    }
+}
+
+/// The line of a row.
+fn place(name: &str, record: &csv::StringRecord) -> String {
+    format!("{name}:{}", record.position().map_or(0, csv::Position::line))
+}
+
+/// A table whose header was read.
+struct Begun<'a> {
+    reader: csv::Reader<Rationed>,
+    header: csv::StringRecord,
+    /// Ports with their columns.
+    found: Vec<(Port, usize)>,
+    /// Names of ports without one.
+    missing: Vec<&'a str>,
+}
+
+impl<'a> Begun<'a> {
+    fn of(name: &str, source: Box<dyn Read>, ports: &'a [Port]) -> Result<Begun<'a>, String> {
+        let source = Rationed { source, left: ROW_LIMIT };
+        // Rows of another length are found later, with a better message.
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(source);
+        let header = reader.headers().map_err(|error| explain(name, error))?.clone();
+        if header.is_empty() {
+            return Err(format!("{name} is empty: it needs a header with a column for each input port"));
+        }
+        let (mut found, mut missing) = (Vec::new(), Vec::new());
+        for port in ports {
+            let titles = header.iter().enumerate();
+            let columns: Vec<usize> =
+                titles.filter(|(_, title)| *title == port.name).map(|(i, _)| i).collect();
+            match columns[..] {
+                [column] => found.push((port.clone(), column)),
+                [] => missing.push(port.name.as_str()),
+                _ => return Err(format!("{name}: two columns are named `{}`", port.name)),
+            }
+        }
+        Ok(Begun { reader, header, found, missing })
     }
 }
 

@@ -208,7 +208,10 @@ impl<'a> Drive<'a> {
         }
         host.set("control", protocol::RUN | protocol::ENABLE)?;
         let stands = std::iter::repeat_n(first, STANDS);
-        let fed = host.feed(stands.chain(samples).map(row))?;
+        let bar = track::progress((STANDS + samples.len()) as u64, "periods", false);
+        let fed = host.feed(stands.chain(samples).map(row).inspect(|_| bar.inc(1)));
+        bar.finish_and_clear();
+        let fed = fed?;
         let (cycles, misses) = (host.register("most_cycles")?, host.register("misses")?);
         let causes: Vec<&str> = host.status()?.causes().collect();
         ensure!(causes.is_empty(), "the drive has stopped: {}", causes.join(", "));

@@ -1,0 +1,216 @@
+//! What drives the pins of a simulated board, the board that a wiring names, and what is bounded of pins that answer with a density.
+#![cfg(unix)]
+
+mod common;
+
+use common::{Done, Folder};
+use std::io::{BufRead, BufReader, Write};
+use std::process::{Command, Stdio};
+
+const WIRING: &str = r#"board = "ulx3s-85f"
+clock = 50
+period = 100
+baud = 1_000_000
+autostart = true
+
+[peripheral.limit]
+kind = "digital-in"
+pins = { in = "gp0" }
+ports = { level = "at_end" }
+
+[peripheral.encoder]
+kind = "quadrature"
+pins = { a = "gp3", b = "gn3" }
+start = 5
+ports = { count = "n" }
+
+[peripheral.motor]
+kind = "pwm"
+pins = { high = "gp2" }
+half = 1250
+ports = { duty = "duty" }
+scale = { duty = 1024 }
+
+[peripheral.lamp]
+kind = "digital-out"
+pins = { out = "gp1" }
+ports = { level = "lit" }
+"#;
+
+/// Drives towards a limit switch and lights a lamp there; faster once the encoder has turned.
+const PROGRAM: &str = "\
+.schedule on
+.input  at_end:int, n:int
+.output duty, lit:int
+.once
+        duty, lit = 0, 0
+        wait    period
+.period
+period: duty = at_end ? 0 : n > 10 ? 1 : 0.5
+        lit = at_end
+        wait    period
+";
+
+fn folder() -> Folder {
+    let folder = Folder::new();
+    folder.write("limit.toml", WIRING);
+    folder.write("limit.s", PROGRAM);
+    folder
+}
+
+const TARGET: &str = "--wiring limit.toml --program limit.s --machine t1";
+
+/// A simulation, which Verilator needs more memory for than other tests have.
+fn sim(folder: &Folder, more: &str, input: &str) -> Done {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_takt"));
+    let line = format!("board sim {TARGET} {more}");
+    command.args(line.split_whitespace()).current_dir(folder.path());
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    // It may well end before it has read everything.
+    let _ = child.stdin.take().unwrap().write_all(input.as_bytes());
+    Done::from(child.wait_with_output().unwrap())
+}
+
+#[test]
+fn the_wiring_names_the_board() {
+    let folder = folder();
+    let text = folder.line(&format!("board check {TARGET}")).ok();
+    assert!(text.starts_with("ulx3s-85f, t1: 4 peripherals"), "{text}");
+    assert_eq!(folder.line(&format!("board check --board ulx3s-85f {TARGET}")).ok(), text);
+    folder.line(&format!("board build {TARGET} --sources -o out")).ok();
+    let pins = folder.line("board pins --wiring limit.toml").ok();
+    assert!(pins.contains("limit.in"), "{pins}");
+    // Where neither names one, what to write is said.
+    folder.write("limit.toml", WIRING.split_once('\n').unwrap().1);
+    for line in [
+        &format!("board check {TARGET}"),
+        "board pins --wiring limit.toml",
+        "bound --pins --wiring limit.toml limit.s",
+    ] {
+        let done = folder.line(line);
+        let says = "limit.toml names no board: `--board NAME`, or a line `board = \"NAME\"` at its beginning; \
+            there are ulx3s-85f";
+        assert!(done.status == Some(1) && done.stderr.contains(says), "{line}: {done:?}");
+    }
+    let done = folder.line("board check --program limit.s");
+    assert!(done.status == Some(2) && done.stderr.contains("--board"), "{done:?}");
+}
+
+/// A limit switch, from a script in a file and from standard input; the host at the UART sees it, too.
+#[test]
+fn a_script_drives_a_limit_switch() {
+    let folder = folder();
+    let script = "set limit=0   # not there yet\nwait 1ms\nshow\n\nset limit.in=1\nwait 50000\nshow\nquit\n";
+    folder.write("script.txt", script);
+    let shown = |done: Done| {
+        assert_eq!((done.status, done.stderr.as_str()), (Some(0), "compiling the circuit …\n"));
+        let (_, shown) = done.stdout.split_once('\n').unwrap();
+        shown.to_owned()
+    };
+    let text = shown(sim(&folder, "--script script.txt", ""));
+    let (before, after) = text.split_once("2.000 ms\n").unwrap();
+    assert!(before.starts_with("1.000 ms\n") && before.contains("  limit.in = 0\n"), "{text}");
+    assert!(before.contains("  lamp.out = 0 (output)\n"), "{text}");
+    assert!(after.contains("  limit.in = 1\n") && after.contains("  lamp.out = 1 (output)\n"), "{text}");
+    // A level from power-up on, and commands as they come.
+    let done = sim(&folder, "--script - --set limit=1", "wait 1ms\nshow\nfly\n");
+    assert!(done.stdout.ends_with("  lamp.out = 1 (output)\n"), "{done:?}");
+    assert!(done.status == Some(1) && done.stderr.contains("standard input:3: no command `fly`"), "{done:?}");
+
+    // What is wrong is said before the circuit is compiled; of standard input, with the line.
+    for (line, text, says) in [
+        ("--set limt=1", "", "--set no input pin `limt`; did you mean `limit`?; there are "),
+        ("--set limit", "", "--set `limit` is not `pin=level`"),
+        ("--set limit=7", "", "--set `limit=7`: a pin's level is 0 or 1"),
+        ("--set lamp.out=1", "", "`lamp.out` is an output pin, which the board drives"),
+        ("--axis motor,encoder,1 --set encoder.a=1", "", "no input pin `encoder.a`"),
+        ("--script bad.txt", "wait 1ms\nwait 3 parsecs\n", "bad.txt:2: `wait 3 parsecs`: `parsecs` is none"),
+        ("--script bad.txt", "jump\n", "bad.txt:1: no command `jump`; there are `set pin=level …`"),
+        ("--script bad.txt", "set\n", "bad.txt:1: `set` wants `pin=level`"),
+        ("--script bad.txt", "quit now\n", "bad.txt:1: `quit` stands alone; `now` follows it"),
+    ] {
+        folder.write("bad.txt", if text.is_empty() { "show\n" } else { text });
+        let done = sim(&folder, line, "");
+        assert!(done.status == Some(1) && done.stderr.contains(says), "{line}: {done:?}");
+        assert!(!done.stderr.contains("compiling"), "{line}: {done:?}");
+    }
+    for line in
+        ["--inputs in.csv --script s", "--outputs -", "--robot --set limit=1", "--inputs - --axis a,b,1"]
+    {
+        assert_eq!(sim(&folder, line, "").status, Some(2), "{line}");
+    }
+}
+
+/// A plant at two pipes: it answers the motor's pulses with an encoder's counts, and has a limit switch at its end.
+#[test]
+fn a_plant_closes_the_loop_at_the_pins() {
+    let folder = folder();
+    let mut command = Command::new("timeout");
+    command.args(["300", env!("CARGO_BIN_EXE_takt"), "board", "sim", "--inputs", "-", "--outputs", "-"]);
+    command.args(TARGET.split_whitespace()).current_dir(folder.path());
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    let mut rows = BufReader::new(child.stdout.take().unwrap()).lines();
+    let mut row = || rows.next().unwrap().unwrap();
+    assert_eq!(row(), "motor.high,lamp.out");
+    let mut stdin = child.stdin.take().unwrap();
+    writeln!(stdin, "limit,encoder").unwrap();
+    let (mut position, mut fastest, mut lit) = (5.0, 0.0_f64, 0.0);
+    for _ in 0..60 {
+        let limit = u8::from(position >= 20.0);
+        writeln!(stdin, "{limit},{}", position as i32).unwrap();
+        let values: Vec<f64> = row().split(',').map(|field| field.parse().unwrap()).collect();
+        (fastest, lit) = (fastest.max(values[0]), values[1]);
+        // Safe before the program drives, and then one half stands for 0.
+        position += (4.0 * (values[0] - 0.5)).max(0.0);
+        if lit == 1.0 {
+            break;
+        }
+    }
+    drop(stdin);
+    let done = Done::from(child.wait_with_output().unwrap());
+    assert_eq!(done.status, Some(0), "{done:?}");
+    let mut said = done.stderr.lines();
+    assert!(said.any(|line| line.starts_with("/dev/") && line.ends_with(" 1000000")), "the port: {done:?}");
+    // Of half a period, 0.5 of full duty are 512 of 1250 cycles; beyond 10 counts all of it, 1024.
+    assert!(lit == 1.0 && position >= 20.0, "it has come to its end: {position}");
+    assert!((fastest - (1250.0 + 1024.0) / 2500.0).abs() < 1e-9, "{fastest}");
+
+    // From a file, whose rows are answered up to one that cannot be read.
+    folder.write("in.csv", "limit\n1\n1\n1\n1\n1\n1\n1\n1\n2\n");
+    let done = sim(&folder, "--inputs in.csv --outputs -", "");
+    let says = "in.csv:10: column limit.in: a pin's level is 0 or 1, not 2";
+    assert!(done.status == Some(1) && done.stderr.contains(says), "{done:?}");
+    assert!(done.stdout.lines().count() == 9 && done.stdout.ends_with("0.5,1\n"), "{done:?}");
+    for (text, says) in [
+        ("limt\n1\n", "in.csv: a column `limt`; did you mean `limit`?; there can be "),
+        ("limit;encoder\n1;2\n", "columns are separated by `,`"),
+    ] {
+        folder.write("in.csv", text);
+        let done = sim(&folder, "--inputs in.csv", "");
+        assert!(done.status == Some(1) && done.stderr.contains(says), "{text}: {done:?}");
+        assert!(!done.stderr.contains("compiling"), "{text}: {done:?}");
+    }
+}
+
+/// A pin with a stream of pulses has no bound; what is bounded is the way to its modulator.
+#[test]
+fn a_density_has_no_bound_at_its_pin() {
+    let folder = folder();
+    let stream = "kind = \"sigma-delta\"\npins = { out = \"gp2\" }\nports = { value = \"duty\" }\nscale = { value = 64 }\n";
+    let (rest, lamp) = WIRING.split_once("[peripheral.lamp]").unwrap();
+    let (rest, _) = rest.split_once("[peripheral.motor]").unwrap();
+    let lamp = format!("[peripheral.lamp]{lamp}");
+    folder.write("both.toml", format!("{rest}[peripheral.analog]\n{stream}{lamp}"));
+    folder.write("alone.toml", format!("{rest}[peripheral.analog]\n{stream}"));
+    let bound = |wiring: &str, more: &str| {
+        folder.line(&format!("bound --pins --wiring {wiring} limit.s --machine t1 {more}")).ok()
+    };
+    insta::assert_snapshot!(bound("both.toml", "") + &bound("alone.toml", ""));
+    let json: serde_json::Value = serde_json::from_str(&bound("alone.toml", "--json")).unwrap();
+    assert!(json["total"].is_null() && json["total_to_modulator"]["worst"].is_u64(), "{json}");
+    assert_eq!(json["outputs"][0]["answer"], "density");
+    let json: serde_json::Value = serde_json::from_str(&bound("both.toml", "--json")).unwrap();
+    assert!(json["total"]["worst"].is_u64() && json["outputs"][1]["answer"] == "edge", "{json}");
+}
