@@ -133,10 +133,10 @@ pub(crate) fn relieve(
     let best = near.into_iter().chain(spilled).chain(written).min_by_key(Relieved::cycles);
     let Some(best) = best else {
         // What is missing is told of the order that is short of least.
-        if let Some((unfit, missing)) = unfit
-            && missing < room.shortage()
+        if let Some(unfit) = unfit
+            && unfit.1 < room.shortage()
         {
-            *ir = unfit;
+            *ir = unfit.0;
         }
         return Err(why);
     };
@@ -154,7 +154,7 @@ fn by_order(
     before: &Report,
     effort: u32,
     order: Order,
-) -> Result<Relieved, Option<(Ir, usize)>> {
+) -> Result<Relieved, Option<Box<(Ir, usize)>>> {
     let mut ir = source.clone();
     let mut sink = Sink::default();
     let mut report = schedule::schedule(&mut ir, effort, order, &mut sink);
@@ -163,7 +163,7 @@ fn by_order(
         return Err(None);
     }
     if !room.has_all() {
-        return Err(Some((ir, room.shortage())));
+        return Err(Some(Box::new((ir, room.shortage()))));
     }
     for (block, free) in report.blocks.iter_mut().zip(&before.blocks) {
         block.bound = free.bound.clone();
