@@ -43,7 +43,7 @@ pub fn grammar_text() -> String {
         name: "takt",
         rules: Ordered(rules::rules()),
         extras: json!([
-            { "type": "PATTERN", "value": "[ \\t\\r\\f]" },
+            { "type": "PATTERN", "value": "[ \\t\\f]" },
             { "type": "SYMBOL", "name": "comment" }
         ]),
         conflicts: rules::conflicts(),

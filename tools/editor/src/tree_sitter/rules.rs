@@ -42,7 +42,7 @@ impl In {
 /// What no text can be: a token that takes every letter and digit there is, then a digit.
 const NEVER: &str = "_never";
 
-const NEWLINE: &str = "\n";
+const NEWLINE: &str = "_newline";
 
 /// What tree-sitter may follow in two ways until a later token decides.
 pub(super) fn conflicts() -> Vec<Vec<String>> {
@@ -92,11 +92,12 @@ fn operands(directive: Directive) -> Option<Rule> {
     let name = || In::Line.any_name();
     let named = || field("name", name());
     let assigned = || seq([text("="), field("value", expression())]);
+    let indices = || seq([text("["), commas(field("index", expression())), text("]")]);
     Some(match directive {
         Once | Period | Data => blank(),
         Reg | State | Input | Output => blanks(symbol("declaration")),
         Const => seq([named(), assigned()]),
-        Preset => seq([optional(text("@")), named(), assigned()]),
+        Preset => seq([optional(text("@")), named(), optional(indices()), assigned()]),
         Float | Word => commas(expression()),
         Space | LoopBound => expression(),
         Include => choice([
@@ -112,7 +113,7 @@ fn operands(directive: Directive) -> Option<Rule> {
         Deadline => seq([blanks(name()), assigned()]),
         Range => seq([
             optional(text("@")),
-            blanks(field("name", name())),
+            blanks(seq([named(), optional(indices())])),
             text("="),
             field("least", expression()),
             text(","),
@@ -144,14 +145,17 @@ fn lines(add: &mut impl FnMut(&str, Rule)) {
             &rule("_line"),
             choice([symbol("_plain_line"), seq([optional(symbol("_label")), choice(block)])]),
         );
-        add(&rule("_lines"), repeat1(choice([text(NEWLINE), seq([symbol(rule("_line")), text(NEWLINE)])])));
+        add(
+            &rule("_lines"),
+            repeat1(choice([symbol(NEWLINE), seq([symbol(rule("_line")), symbol(NEWLINE)])])),
+        );
         // The lines of a block; a label may stand before what closes it.
         let lines = symbol(rule("_lines"));
         add(&rule("_body"), choice([seq([lines, optional(symbol("_label"))]), symbol("_label")]));
         let body = || optional(alias(symbol(rule("_body")), "body"));
         let branch = |directive: Directive, condition: Option<Rule>| match condition {
-            Some(condition) => seq([end(directive), field("condition", condition), text(NEWLINE), body()]),
-            None => seq([end(directive), text(NEWLINE), body()]),
+            Some(condition) => seq([end(directive), field("condition", condition), symbol(NEWLINE), body()]),
+            None => seq([end(directive), symbol(NEWLINE), body()]),
         };
         add(&rule("_elif"), branch(Directive::Elif, Some(expression())));
         add(&rule("_else"), branch(Directive::Else, None));
@@ -173,7 +177,7 @@ fn lines(add: &mut impl FnMut(&str, Rule)) {
             text(Directive::Macro.name()),
             name("name"),
             repeat(seq([optional(text(",")), name("parameter")])),
-            text(NEWLINE),
+            symbol(NEWLINE),
             body(),
             end(Directive::EndMacro),
         ]),
@@ -187,7 +191,7 @@ fn lines(add: &mut impl FnMut(&str, Rule)) {
             field("first", expression()),
             text(","),
             field("last", expression()),
-            text(NEWLINE),
+            symbol(NEWLINE),
             body(),
             end(Directive::EndRep),
         ]),
@@ -221,7 +225,7 @@ fn operations(add: &mut impl FnMut(&str, Rule)) {
     let operation = choice([symbol("operation"), symbol("raw_operation"), unknown]);
     add("bundle", separated(symbol("_bars"), operation));
     // A line that ends in bars continues on the next.
-    add("_bars", seq([text("||"), repeat(text(NEWLINE))]));
+    add("_bars", seq([text("||"), repeat(symbol(NEWLINE))]));
     let operand = || symbol("_operand");
     add("operation", seq([field("mnemonic", name()), optional(commas(field("operand", operand())))]));
     add(
@@ -357,8 +361,9 @@ fn tokens(add: &mut impl FnMut(&str, Rule)) {
     let part = choice(tokens.chain(signs).chain(operators).chain([symbol("_bars"), symbol(NEVER), slashes]));
     add("library", seq([text(Operator::Lt.text()), repeat1(part), text(closing)]));
 
-    add("comment", pattern(";[^\\n]*"));
-    add("text", pattern("\"([^\"\\\\\\n]|\\\\[^\\n])*\""));
+    add(NEWLINE, pattern("\\r?\\n|\\r"));
+    add("comment", pattern(";[^\\r\\n]*"));
+    add("text", pattern("\"([^\"\\\\\\r\\n]|\\\\[^\\r\\n])*\""));
     add("directive_name", pattern("\\.[A-Za-z_][A-Za-z0-9_]*"));
     add("identifier", pattern("[A-Za-z_][A-Za-z0-9_.]*"));
     add("template_begin", pattern("([A-Za-z_][A-Za-z0-9_.]*)?\\{"));

@@ -109,7 +109,7 @@ impl Writer<'_> {
         };
         // Within a name with braces no blank may stand behind the closing one.
         if joins(self.text.chars().last(), token.chars().next()) || self.chance(3) {
-            let blank = self.random.pick(&[" ", " ", "  ", "\t", " \r", "\u{c}"]);
+            let blank = self.random.pick(&[" ", " ", "  ", "\t", "\u{c}"]);
             self.text.push_str(blank);
         }
         self.text.push_str(token);
@@ -205,6 +205,15 @@ impl Writer<'_> {
     fn put_of(&mut self, tokens: &[&str]) {
         let token = self.random.pick(tokens);
         self.put(token);
+    }
+
+    /// Those of an element of an array, now and then.
+    fn indices(&mut self) {
+        if self.chance(3) {
+            self.put("[");
+            self.commas(1, |writer| writer.expression(In::Line, 1));
+            self.put("]");
+        }
     }
 
     fn element(&mut self, kind: In, least: u64, depth: u32) {
@@ -364,6 +373,7 @@ impl Writer<'_> {
                     self.put("@");
                 }
                 self.name(In::Line, 1);
+                self.indices();
                 self.assigned();
             }
             Float | Word => self.commas(1, |writer| writer.expression(In::Line, 2)),
@@ -464,7 +474,7 @@ impl Writer<'_> {
             if self.chance(6) {
                 self.put("; \"it is\" so || \u{e9}");
             }
-            self.put_of(&["\n", "\n", "\r\n", "\n\n"]);
+            self.put_of(&["\n", "\n", "\r\n", "\n\n", "\r"]);
         }
     }
 }
