@@ -6,8 +6,9 @@ use anyhow::{Result, anyhow, bail};
 use std::io::{self, Write};
 use std::path::Path;
 use takt_debug::inputs::Table;
-use takt_emu::{Row, Rows};
+use takt_emu::{Fault, Row, Rows};
 use takt_isa::program::Port;
+use takt_system::SystemFault;
 
 /// A value as CSV and as JSON have it.
 pub(crate) use takt_debug::value::{json, text as format};
@@ -70,10 +71,13 @@ pub(crate) fn open_both(
     Ok((inputs, outputs))
 }
 
-/// Ends the outputs of a run that came to `result` after so many rows. Those before an error are kept, if there are any; else the
-/// file stays what it was.
+/// Ends the outputs of a run that came to `result` after so many rows. If a fault of the program ended it, those before it are kept:
+/// they show how it came to that. Where there are none, and after any other error, the file stays what it was.
 pub(crate) fn finish(outputs: Option<Out>, rows: u64, result: Result<()>) -> Result<()> {
-    let finished = outputs.filter(|_| result.is_ok() || rows > 0).map_or(Ok(()), Out::finish);
+    let is_fault =
+        |error: &anyhow::Error| error.chain().any(|cause| cause.is::<Fault>() || cause.is::<SystemFault>());
+    let keeps = result.as_ref().err().is_none_or(|error| rows > 0 && is_fault(error));
+    let finished = outputs.filter(|_| keeps).map_or(Ok(()), Out::finish);
     // The first error is the one that counts.
     result.and(finished)
 }

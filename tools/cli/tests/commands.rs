@@ -783,7 +783,8 @@ fn outputs_go_where_they_are_sent() {
     assert_eq!((done.status, done.stderr.as_str()), (Some(1), "error: cannot write real: it is read-only\n"));
 }
 
-/// Rows completed before a fault are written, to a file as to a pipe; where there are none, a file stays what it was.
+/// Rows completed before a fault are written, to a file as to a pipe; where there are none, and after a mistake in the inputs, a
+/// file stays what it was.
 #[test]
 fn what_was_completed_before_a_fault_is_kept() {
     const TABLE: &str = ".input i:int\n.output y\n.once\n wait loop\n.period\nloop: ld y, table[i]\n wait loop\n.data\ntable: .float 1.0, 2.0\n";
@@ -793,13 +794,15 @@ fn what_was_completed_before_a_fault_is_kept() {
     folder.write("faults.csv", "i\n0\n1\n0\n99999\n1\n");
     folder.write("at-once.csv", "i\n99999\n1\n");
     folder.write("wrong.csv", "i\n1\n0\nx\n");
-    for (program, inputs, rows) in [
-        ("table.s", "faults.csv", 3),
-        ("table.s", "wrong.csv", 2),
-        ("table.s --periods 9", "faults.csv", 3),
-        ("core.toml", "faults.csv", 3),
-        ("core.toml", "wrong.csv", 2),
-        ("table.s", "at-once.csv", 0),
+    // A program with its inputs, the rows that it completes, and whether they are kept.
+    for (program, inputs, rows, keeps) in [
+        ("table.s", "faults.csv", 3, true),
+        ("table.s", "wrong.csv", 2, false),
+        ("table.s --periods 9", "faults.csv", 3, true),
+        ("table.s --max-cycles 40", "faults.csv", 3, true),
+        ("core.toml", "faults.csv", 3, true),
+        ("core.toml", "wrong.csv", 2, false),
+        ("table.s", "at-once.csv", 0, false),
     ] {
         folder.write("out.csv", "as it was\n");
         let piped = folder.line(&format!("run {program} --inputs {inputs} --outputs -"));
@@ -807,7 +810,7 @@ fn what_was_completed_before_a_fault_is_kept() {
         assert_eq!((piped.status, filed.status), (Some(1), Some(1)), "{program} {inputs}");
         assert_eq!(piped.stderr, filed.stderr);
         assert_eq!(piped.stdout.lines().count(), rows + 1, "{program} {inputs}: {}", piped.stdout);
-        let expected = if rows > 0 { piped.stdout } else { "as it was\n".to_owned() };
+        let expected = if keeps { piped.stdout } else { "as it was\n".to_owned() };
         assert_eq!(folder.read_text("out.csv"), expected, "{program} {inputs}");
     }
     assert!(folder.list().iter().all(|name| !name.contains("partial")), "{:?}", folder.list());

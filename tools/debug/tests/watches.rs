@@ -10,6 +10,7 @@ use takt_debug::system::{SystemConsole, SystemOptions, SystemSession, SystemWhy}
 use takt_emu::testing::Random;
 use takt_isa::{MACHINES, Machine, Program, Register};
 use takt_system::Description;
+use takt_system::testing::random_description;
 
 /// Names that are written over and over.
 const NAMES: u32 = 40;
@@ -334,4 +335,60 @@ fn of_a_core_of_a_system_too() {
         }
     }
     assert!(seen > 50, "{seen}");
+}
+
+/// What happens at the end of a stretch that is searched matters a few positions later: an input port of a random system.
+#[test]
+fn an_input_is_seen_over_the_end_of_a_stretch() {
+    const END: u64 = 9000;
+    let mut seen = 0;
+    for seed in 0..16 {
+        let description = random_description(seed, MACHINES);
+        let cores = || description.cores.iter();
+        let views = || cores().map(|core| Session::new(&core.program, Options::default()).expect("it loads"));
+        let console = || {
+            let session = SystemSession::new(&description, SystemOptions::default()).expect("it loads");
+            let mut console = SystemConsole::new(session, views().collect());
+            console.session.run_limit = 2 * END;
+            console
+        };
+        let Some(port) = description.cores[1].program.inputs.first() else { continue };
+        let value = |console: &mut SystemConsole| {
+            console.core_mut(1).expect("a core").session.register(port.register)
+        };
+        let mut walking = console();
+        let mut stops = Vec::new();
+        let mut before = value(&mut walking);
+        for position in 1..END {
+            if walking.run(|session, _| session.go_to(position)) != SystemWhy::Done {
+                break;
+            }
+            let now = value(&mut walking);
+            if std::mem::replace(&mut before, now) != now {
+                stops.push(position);
+            }
+        }
+        seen += stops.len();
+        // Stretches that end just before a change, with it, and behind it.
+        for stop in stops.iter().filter(|stop| **stop > 4200).take(3) {
+            for begin in stop - 4096 - 4..=stop - 4096 + 4 {
+                let mut watching = console();
+                let what = watching.core_mut(1).expect("a core").session.parse(&format!("{}:int", port.name));
+                let what = Box::new(what.expect("it is a name"));
+                let stop = Stop::Watch { what, test: Test::Changed, text: String::new() };
+                watching.add_core_stop(1, stop);
+                watching.run(|session, _| session.go_to(begin));
+                let mut found = Vec::new();
+                while watching.run(SystemSession::resume) != SystemWhy::Done
+                    && watching.session.cycle() < 4300 + begin
+                {
+                    found.push(watching.session.cycle());
+                }
+                let expected: Vec<u64> =
+                    stops.iter().copied().filter(|stop| *stop > begin && *stop < 4300 + begin).collect();
+                assert_eq!(found, expected, "seed {seed}, from {begin}");
+            }
+        }
+    }
+    assert!(seen > 20, "{seen}");
 }
