@@ -4,6 +4,7 @@ use super::MAX_NODES;
 use super::dominators::dominators;
 use crate::error::{BoundError, Refusal};
 use crate::graph::{Graph, Node};
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::ops::Range;
 use takt_isa::spec::units::MAX_LATENCY;
@@ -111,15 +112,13 @@ impl Flat {
         let (mut found, mut left) = (BTreeMap::new(), targets(&unfolded(&graph, BundleAddress::RESET)?));
         let mut nodes = 0;
         while let Some(address) = left.pop() {
-            if !found.contains_key(&address) {
-                let bundles = unfolded(&graph, address)?;
-                nodes += bundles.len();
-                if nodes > MAX_NODES {
-                    return Ok(None);
-                }
-                left.extend(targets(&bundles));
-                found.insert(address, bundles);
+            let Entry::Vacant(place) = found.entry(address) else { continue };
+            let bundles = place.insert(unfolded(&graph, address)?);
+            nodes += bundles.len();
+            if nodes > MAX_NODES {
+                return Ok(None);
             }
+            left.extend(targets(bundles));
         }
         keep_repeating(&mut found);
         let mut places = Places::new(&graph, &found);
