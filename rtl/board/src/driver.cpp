@@ -31,8 +31,9 @@ struct Encoder {
     int32_t difference;
 };
 
-int main() {
+int main(int argc, char **argv) {
     VerilatedContext context;
+    context.commandArgs(argc, argv);
     context.randReset(2);
     context.randSeed(1);
     Vtop top(&context);

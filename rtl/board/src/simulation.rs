@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::Duration;
 use takt_rtl::export::DesignFile;
+use takt_rtl::verilator::{self, Sources, VerilatorError};
 use thiserror::Error;
 
 const DRIVER: &str = include_str!("driver.cpp");
@@ -24,11 +25,11 @@ pub enum SimulationError {
     /// There is no circuit.
     #[error(transparent)]
     Top(#[from] TopError),
-    /// Verilator failed.
-    #[error("verilator failed:\n{0}")]
-    Verilator(String),
-    /// Verilator cannot be started, or a file not be written.
-    #[error("{0}: {1}; on Debian: apt-get install verilator g++ make")]
+    /// Verilator is missing or failed.
+    #[error(transparent)]
+    Verilator(#[from] VerilatorError),
+    /// The simulation cannot be started, or a file not be written.
+    #[error("{0}: {1}")]
     Start(String, io::Error),
     /// The simulation ended.
     #[error("the simulation ended: {0}")]
@@ -81,7 +82,8 @@ impl Simulation {
         Simulation::of(&top::circuit(board, wiring, application)?.files, board, wiring, folder)
     }
 
-    /// Builds a board from files, of which the top level is [`TOP`] with the wiring's pins, in a folder, and starts it.
+    /// Builds a board from files, of which the top level is [`TOP`] with the wiring's pins, and starts it in a folder, where memory images
+    /// are written. What was built before is found in the user's cache folder.
     ///
     /// # Errors
     /// If Verilator is missing or fails.
@@ -91,10 +93,25 @@ impl Simulation {
         wiring: &Wiring,
         folder: &Path,
     ) -> Result<Simulation, SimulationError> {
+        Simulation::with_fault(files, board, wiring, folder, 0)
+    }
+
+    /// As [`Simulation::of`], with one of the faults that [`verilator::plant`] has planted in the files; 0: with none.
+    ///
+    /// # Errors
+    /// If Verilator is missing or fails.
+    pub fn with_fault(
+        files: &[DesignFile],
+        board: &Board,
+        wiring: &Wiring,
+        folder: &Path,
+        fault: usize,
+    ) -> Result<Simulation, SimulationError> {
         let (built, inputs, outputs) = build(files, board, wiring, folder)?;
         let start = |error| SimulationError::Start(built.display().to_string(), error);
         let mut process = Command::new(&built)
             .current_dir(folder)
+            .arg(format!("+fault={fault}"))
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
@@ -225,13 +242,15 @@ fn build(
     wiring: &Wiring,
     folder: &Path,
 ) -> Result<Pins, SimulationError> {
-    let write = |name: &str, text: &str| {
-        let path = folder.join(name);
-        let parent = path.parent().unwrap_or(folder);
-        fs::create_dir_all(parent)
-            .and_then(|()| fs::write(&path, text))
-            .map_err(|error| SimulationError::Start(path.display().to_string(), error))
-    };
+    // What a simulation reads.
+    for file in files.iter().filter(|file| !file.name.ends_with(".v")) {
+        let path = folder.join(&file.name);
+        fs::create_dir_all(path.parent().unwrap_or(folder))
+            .and_then(|()| fs::write(&path, &file.text))
+            .map_err(|error| SimulationError::Start(path.display().to_string(), error))?;
+    }
+    fs::create_dir_all(folder)
+        .map_err(|error| SimulationError::Start(folder.display().to_string(), error))?;
     let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
     if let Some(reset) = &board.reset {
         inputs.push(("button".to_owned(), u32::from(!reset.level)));
@@ -260,24 +279,21 @@ fn build(
         }
         let _ = writeln!(header, "    (void)top; (void)pins;\n}}");
     }
-    write("pins.h", &header)?;
-    write("driver.cpp", DRIVER)?;
-    write("EHXPLLL.v", PLL)?;
-    for file in files {
-        write(&file.name, &file.text)?;
-    }
-    let mut command = Command::new("verilator");
-    command.current_dir(folder).args(["--cc", "--exe", "--build", "-O3", "-Wno-fatal"]);
-    command.args(["--x-assign", "unique", "--x-initial", "unique", "--prefix", "Vtop", "--top-module", TOP]);
-    command.args(["-CFLAGS", "-O1 -std=gnu++17", "-MAKEFLAGS", "OPT_FAST=-O1 OPT_SLOW=-O0 OPT_GLOBAL=-O1"]);
-    command.args(["driver.cpp", "EHXPLLL.v"]);
-    command.args(files.iter().map(|file| &file.name).filter(|name| name.ends_with(".v")));
-    let output = command.output().map_err(|error| SimulationError::Start("verilator".to_owned(), error))?;
-    if !output.status.success() {
-        let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
-        return Err(SimulationError::Verilator(text.into_owned()));
-    }
-    Ok((folder.join("obj_dir/Vtop"), inputs, outputs))
+    let verilog = files.iter().filter(|file| file.name.ends_with(".v"));
+    let verilog = verilog.map(|file| (file.name.as_str(), file.text.as_str()));
+    let sources = Sources {
+        name: TOP,
+        top: TOP,
+        prefix: "Vtop",
+        files: [("EHXPLLL.v", PLL)].into_iter().chain(verilog).collect(),
+        driver: DRIVER,
+        headers: vec![("pins.h", &header)],
+        arguments: vec!["-Wno-fatal".to_owned()],
+        defines: Vec::new(),
+        optimise: "-O1",
+        trace: false,
+    };
+    Ok((sources.build(&verilator::cache_folder())?, inputs, outputs))
 }
 
 const _: () = assert!(protocol::WORDS == 16, "takt_bridge keeps 16 words");

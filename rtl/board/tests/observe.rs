@@ -8,6 +8,7 @@ use takt_board::simulation::Simulation;
 use takt_board::{Application, Board, Host, Wiring, top};
 use takt_emu::{Emulator, Status};
 use takt_isa::{Program, Register, T3};
+use takt_rtl::verilator;
 
 /// All slots write registers, with the longest latencies just before the `wait`; a table changes from period to period.
 const PROGRAM: &str = "
@@ -110,10 +111,8 @@ fn registers_and_data_are_the_emulators() {
     let wiring = wiring(&first);
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("board-observe");
     let circuit = top::circuit(&board(), &wiring, &first).expect("there is a circuit");
-    let of = |files: &[takt_rtl::export::DesignFile]| {
-        Simulation::of(files, &board(), &wiring, &folder).unwrap_or_else(|error| panic!("{error}"))
-    };
-    let mut host = connect(of(&circuit.files));
+    let sim = Simulation::of(&circuit.files, &board(), &wiring, &folder);
+    let mut host = connect(sim.unwrap_or_else(|error| panic!("{error}")));
     compare(&mut host, &first, 12);
 
     // Between two ticks of a program that runs by itself, and of one that has stopped, with the same names.
@@ -168,19 +167,19 @@ fn registers_and_data_are_the_emulators() {
 
     // What is wrong in the copies is noticed.
     let faults = [
+        ("index <= loads ? load_address[INDEX-1:0] : retired[INDEX-1:0]", "index <= load_address[INDEX-1:0]"),
         (
-            "index <= loads ? load_address[INDEX-1:0] : retired[INDEX-1:0];",
-            "index <= load_address[INDEX-1:0];",
+            "words[stored_address[DATA-1:0]] <= stored_value",
+            "words[stored_address[DATA-1:0]] <= issued ? stored_value : words[stored_address[DATA-1:0]]",
         ),
-        ("if (stored) words", "if (stored & issued) words"),
     ];
-    for (from, to) in faults {
-        let mut files = circuit.files.clone();
-        let file = files.iter_mut().find(|file| file.text.contains(from));
-        let Some(file) = file else { panic!("{from}") };
-        file.text = file.text.replace(from, to);
-        let sim = of(&files);
+    let faults = faults.map(|(from, to)| ("board/takt_observe.v", from, to));
+    let mut files = circuit.files.clone();
+    verilator::plant(&mut files, top::TOP, &faults).unwrap_or_else(|error| panic!("{error}"));
+    for fault in 0..=faults.len() {
+        let sim = Simulation::with_fault(&files, &board(), &wiring, &folder, fault);
+        let sim = sim.unwrap_or_else(|error| panic!("{error}"));
         let noticed = std::panic::catch_unwind(AssertUnwindSafe(|| compare(&mut connect(sim), &first, 12)));
-        assert!(noticed.is_err(), "nobody noticed {to}");
+        assert_eq!(noticed.is_err(), fault > 0, "{:?}", fault.checked_sub(1).map(|fault| faults[fault]));
     }
 }

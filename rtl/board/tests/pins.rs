@@ -156,7 +156,7 @@ period: iand    o, i, n
 const THIRD: &str = "
 .input i:int q:int
 .output o:int p:int pop:int
-.reg first:int x
+.reg first:int queued:int x
 .once
         mov     o, zero
         mov     p, zero
@@ -165,11 +165,12 @@ const THIRD: &str = "
         wait    period
 .period
 period: mov     first, i
+        iand    queued, q, zero                 ; it is read, but its value has no effect
 .rep n, 1, 120
         fdiv    x, x, 1.0
 .endr
         mov     p, first
-        mov     o, i
+        ior     o, i, queued
         wait    period
 ";
 

@@ -13,6 +13,7 @@ use takt_board::protocol::{IMAGE, LinkError};
 use takt_board::simulation::{Simulation, Turn};
 use takt_board::{Application, Board, Host, Wiring, top};
 use takt_isa::Program;
+use takt_rtl::verilator;
 use takt_system::latency::Passages;
 use takt_system::{Description, LinkKind, ProgramError, Request, System};
 
@@ -525,22 +526,20 @@ fn planted_faults_are_noticed() {
     let circuit = top::circuit(&ulx3s(), &wiring, &description).expect("there is a circuit");
     let faults = [
         // A repeated request is made twice; a core has every base tick, or no offset; a float is not scaled.
-        ("board/takt_bridge.v", "repeats = has_data & known", "repeats = has_data & ~known"),
-        ("board/takt_follow.v", "turns == LAST ? 32'd0", "turns == 32'd0 ? 32'd0"),
-        ("board/takt_follow.v", "FIRST = LEAD + OFFSET - 2", "FIRST = LEAD - 2"),
-        ("board/takt_turn.v", ".exponent(EXPONENTS[10*which1 +: 10])", ".exponent(10'd0)"),
+        ("board/takt_bridge.v", "has_data & known", "has_data & ~known"),
+        ("board/takt_follow.v", "turns == LAST ? 32'd0 : turns + 32'd1", "32'd0"),
+        ("board/takt_follow.v", "begins ? FIRST : left - 32'd1", "begins ? LEAD - 2 : left - 32'd1"),
+        ("board/takt_turn.v", "EXPONENTS[10*which1 +: 10]", "10'd0"),
         // A core has what another one is loaded with.
-        ("takt_peripherals.v", ".load(loads[1])", ".load(loads[0])"),
+        ("takt_peripherals.v", "loads[1]", "loads[0]"),
     ];
-    for (at, from, to) in faults {
-        let mut files = circuit.files.clone();
-        let file = files.iter_mut().find(|file| file.name == at).expect("a file");
-        assert_eq!(file.text.matches(from).count(), 1, "{from}");
-        file.text = file.text.replace(from, to);
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("system-faults");
-        let sim =
-            Simulation::of(&files, &ulx3s(), &wiring, &folder).unwrap_or_else(|error| panic!("{error}"));
+    let mut files = circuit.files.clone();
+    verilator::plant(&mut files, top::TOP, &faults).unwrap_or_else(|error| panic!("{error}"));
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("system-faults");
+    for fault in 0..=faults.len() {
+        let sim = Simulation::with_fault(&files, &ulx3s(), &wiring, &folder, fault);
+        let sim = sim.unwrap_or_else(|error| panic!("{error}"));
         let noticed = std::panic::catch_unwind(AssertUnwindSafe(|| compare(&description, sim, 60)));
-        assert!(noticed.is_err(), "nobody noticed {to}");
+        assert_eq!(noticed.is_err(), fault > 0, "{:?}", fault.checked_sub(1).map(|fault| faults[fault]));
     }
 }

@@ -12,4 +12,5 @@ pub mod system;
 
 pub use compare::Difference;
 pub use lockstep::{Lockstep, LockstepError, circuit_stops};
-pub use model::{CircuitEvent, EventKind, Model, ModelError, Pin, Simulation, cache_folder};
+pub use model::{CircuitEvent, EventKind, Model, ModelError, Pin, Simulation};
+pub use takt_rtl::verilator::cache_folder;

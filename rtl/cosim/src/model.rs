@@ -1,18 +1,15 @@
 //! A core in Verilator: built once for each design and kept, run as a process.
 
-use std::collections::hash_map::DefaultHasher;
 use std::ffi::OsStr;
-use std::fs;
-use std::hash::{Hash, Hasher};
-use std::io::{ErrorKind, Read, Write};
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
-use std::sync::{Mutex, PoisonError};
 use takt_isa::timing::Cycle;
 use takt_isa::{Program, Register};
 use takt_rtl::Design;
 use takt_rtl::bench::{LoadRecord, Space, load_records};
 use takt_rtl::export::RESET_CYCLES;
+use takt_rtl::verilator::{Sources, VerilatorError};
 use thiserror::Error;
 
 /// The other half of [`Simulation`].
@@ -23,22 +20,9 @@ const SHARED: &str = include_str!("driver.h");
 /// Why the circuit cannot be simulated.
 #[derive(Debug, Error)]
 pub enum ModelError {
-    /// A tool is not there.
-    #[error("{tool} is not installed; on Debian: apt-get install {package}")]
-    Missing {
-        /// The program.
-        tool: &'static str,
-        /// Debian's package that has it.
-        package: &'static str,
-    },
-    /// A tool failed.
-    #[error("{tool} failed:\n{text}")]
-    Tool {
-        /// The program.
-        tool: &'static str,
-        /// What it said.
-        text: String,
-    },
+    /// There is no program.
+    #[error(transparent)]
+    Verilator(#[from] VerilatorError),
     /// A file cannot be written or read.
     #[error("{path}: {source}")]
     File {
@@ -64,28 +48,6 @@ pub struct Model {
     latched: u16,
 }
 
-/// Where compiled designs are kept: `takt` in the user's cache folder.
-pub fn cache_folder() -> PathBuf {
-    let from = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
-    from("XDG_CACHE_HOME")
-        .or_else(|| from("HOME").map(|home| home.join(".cache")))
-        .unwrap_or_else(std::env::temp_dir)
-        .join("takt")
-}
-
-fn run(tool: &'static str, package: &'static str, command: &mut Command) -> Result<String, ModelError> {
-    let output = command.output().map_err(|error| match error.kind() {
-        ErrorKind::NotFound => ModelError::Missing { tool, package },
-        _ => ModelError::Tool { tool, text: error.to_string() },
-    })?;
-    let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
-    if output.status.success() {
-        Ok(text.into_owned())
-    } else {
-        Err(ModelError::Tool { tool, text: text.into_owned() })
-    }
-}
-
 /// What the driver must know of the machine.
 fn ports(design: &Design) -> String {
     let slots = design.machine.slots;
@@ -106,79 +68,17 @@ fn ports(design: &Design) -> String {
     text
 }
 
-/// What a simulation is compiled of.
-pub(crate) struct Sources<'a> {
-    /// The top's module.
-    pub(crate) top: &'a str,
-    /// Verilog.
-    pub(crate) files: Vec<(&'a str, &'a str)>,
-    /// The program around it, in C++.
-    pub(crate) driver: &'a str,
-    /// The prefix of the classes that Verilator makes.
-    pub(crate) prefix: &'static str,
-    /// What the driver includes.
-    pub(crate) header: (&'static str, String),
-    /// Further arguments for Verilator.
-    pub(crate) arguments: Vec<String>,
-}
-
-impl Sources<'_> {
-    /// Compiles them, or finds them in the folder as they were compiled before. With `trace` the program can write waveforms.
-    pub(crate) fn build(&self, folder: &Path, trace: bool) -> Result<PathBuf, ModelError> {
-        // Threads that need the same design build it once.
-        static ONE: Mutex<()> = Mutex::new(());
-        let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
-        let version = run("verilator", "verilator", Command::new("verilator").arg("--version"))?;
-        let mut hasher = DefaultHasher::new();
-        (version, SHARED, self.driver, &self.header, &self.arguments, trace).hash(&mut hasher);
-        self.files.hash(&mut hasher);
-        let name = format!("{}-{:016x}", self.top, hasher.finish());
-        let program = folder.join(&name);
-        if program.exists() {
-            return Ok(program);
-        }
-        let work = folder.join(format!("{name}.{}.partial", std::process::id()));
-        let compiled = self
-            .compile(&work, trace)
-            .and_then(|built| fs::rename(built, &program).map_err(file_error(&program)));
-        let _ = fs::remove_dir_all(&work);
-        compiled.map(|()| program)
-    }
-
-    fn compile(&self, work: &Path, trace: bool) -> Result<PathBuf, ModelError> {
-        let write = |name: &str, text: &str| {
-            let path = work.join(name);
-            let parent = path.parent().unwrap_or(work);
-            fs::create_dir_all(parent).map_err(file_error(parent))?;
-            fs::write(&path, text).map_err(file_error(&path))?;
-            Ok(path)
-        };
-        let mut sources = Vec::new();
-        for (name, text) in &self.files {
-            sources.push(write(name, text)?);
-        }
-        let driver = write("driver.cpp", self.driver)?;
-        write("driver.h", SHARED)?;
-        write(self.header.0, &self.header.1)?;
-        // X becomes random: what the circuit does not initialise must not matter.
-        let mut command = Command::new("verilator");
-        command.args(["--cc", "--exe", "--build", "-O3", "--x-assign", "unique", "--x-initial", "unique"]);
-        command.args(["--prefix", self.prefix, "--top-module", self.top, "-o", "simulation"]);
-        command.args(&self.arguments);
-        command.args([
-            "-CFLAGS",
-            "-O1 -std=gnu++17",
-            "-MAKEFLAGS",
-            "OPT_FAST=-O1 OPT_SLOW=-O0 OPT_GLOBAL=-O1",
-        ]);
-        if trace {
-            command.args(["--trace", "-CFLAGS", "-DTRACE"]);
-        }
-        command.arg("-CFLAGS").arg(format!("-I{}", work.display()));
-        command.arg("--Mdir").arg(work.join("obj")).arg(driver).args(sources);
-        run("verilator", "verilator", &mut command)?;
-        Ok(work.join("obj/simulation"))
-    }
+/// What a simulation is made of, from its Verilog, its driver and what that includes.
+pub(crate) fn sources<'a>(
+    (top, prefix): (&'a str, &'static str),
+    files: Vec<(&'a str, &'a str)>,
+    driver: &'a str,
+    header: (&'a str, &'a str),
+    trace: bool,
+) -> Sources<'a> {
+    let headers = vec![("driver.h", SHARED), header];
+    let (arguments, defines) = (Vec::new(), Vec::new());
+    Sources { name: top, top, prefix, files, driver, headers, arguments, defines, optimise: "-O1", trace }
 }
 
 impl Model {
@@ -187,15 +87,11 @@ impl Model {
     /// # Errors
     /// If Verilator or a C++ compiler is missing or fails.
     pub fn build(design: &Design, folder: &Path, trace: bool) -> Result<Model, ModelError> {
-        let sources = Sources {
-            top: &design.top,
-            files: design.files.iter().map(|file| (file.name.as_str(), file.text.as_str())).collect(),
-            driver: DRIVER,
-            prefix: "Vcore",
-            header: ("ports.h", ports(design)),
-            arguments: vec![format!("-GLATCHED={}", design.latched)],
-        };
-        Ok(Model { program: sources.build(folder, trace)?, latched: design.latched })
+        let files = design.files.iter().map(|file| (file.name.as_str(), file.text.as_str())).collect();
+        let ports = ports(design);
+        let mut sources = sources((&design.top, "Vcore"), files, DRIVER, ("ports.h", &ports), trace);
+        sources.arguments.push(format!("-GLATCHED={}", design.latched));
+        Ok(Model { program: sources.build(folder)?, latched: design.latched })
     }
 
     /// Starts a simulation. A model that can trace writes its waveform to the first argument; others are Verilog's plusargs.

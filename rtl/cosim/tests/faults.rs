@@ -12,6 +12,7 @@ use takt_isa::spec::units::ADDMUL;
 use takt_isa::{Machine, Shape, T1, T3};
 use takt_rtl::plan::names::{decode, net};
 use takt_rtl::plan::{ControlBit, Plan, Stage};
+use takt_rtl::verilator;
 use takt_rtl::verilog::{Expr, any, number, repeat};
 use takt_rtl::{Design, Library, export};
 
@@ -149,28 +150,10 @@ fn faults_are_found(
 ) {
     let design = export(machine, &Library::builtin()).expect("every machine has a circuit");
     let mut design = Design { latched, ..design };
-    let top = design.top.clone();
     let made = generated(&design.plan);
     let made = made.iter().map(|(module, from, to)| (module.as_str(), from.as_str(), to.as_str()));
     let faults: Vec<(&str, &str, &str)> = faults.iter().copied().chain(made).collect();
-    for (number, (module, from, to)) in faults.iter().enumerate() {
-        let own = format!("{module}.v");
-        let file = design.files.iter_mut().find(|file| file.name.rsplit('/').next() == Some(&own));
-        let file = file.unwrap_or_else(|| panic!("no module {module}"));
-        // An assignment is a statement of its own.
-        let (head, from) = from.split_once("<= ").map_or(("", *from), |(head, from)| (head, from));
-        let to = to.split_once("<= ").map_or(*to, |(_, to)| to);
-        let place = if head.is_empty() { from.to_owned() } else { format!("{head}<= {from}") };
-        assert_eq!(file.text.matches(&place).count(), 1, "`{place}` must occur once in {module}");
-        let head = if head.is_empty() { String::new() } else { format!("{head}<= ") };
-        let choice = format!("{head}({top}.planted == {} ? ({to}) : ({from}))", number + 1);
-        file.text = file.text.replace(&place, &choice);
-    }
-    let core = design.files.iter_mut().find(|file| file.name == format!("{top}.v")).expect("the core");
-    let planted =
-        ");\n\n    integer planted;\n    initial if (!$value$plusargs(\"fault=%d\", planted)) planted = 0;\n";
-    core.text = core.text.replacen(");\n", planted, 1);
-
+    verilator::plant(&mut design.files, &design.top, &faults).unwrap_or_else(|error| panic!("{error}"));
     let model = Model::build(&design, &folder(), false).unwrap_or_else(|error| panic!("{error}"));
     let mut survivors = Vec::new();
     for number in 0..=faults.len() {

@@ -1,16 +1,14 @@
 //! Units in simulation: builds a unit's Verilog with Verilator into a small program and passes operations through it.
 //! `rtl/tests/README.md` says how to use it.
 
-use std::collections::hash_map::DefaultHasher;
 use std::fs;
-use std::hash::{Hash, Hasher};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use takt_isa::fp::{Flags, Reference, SIN_IDENTITY, SIN_LIMIT, Value};
 use takt_isa::{Effect, Op, Row, Type, Unit, compute};
+use takt_rtl::verilator::{Sources, VerilatorError};
 use takt_rtl::{Circuit, Library};
 
 #[path = "../../../isa/tests/fp_common/mod.rs"]
@@ -109,48 +107,6 @@ impl Drop for Folder {
     }
 }
 
-/// Verilator's run-time library, compiled once for all units.
-fn runtime() -> Result<PathBuf, String> {
-    static RUNTIME: OnceLock<Result<PathBuf, String>> = OnceLock::new();
-    let build = || {
-        let root = run(Command::new("verilator").args(["--getenv", "VERILATOR_ROOT"]))?;
-        let include = Path::new(root.trim()).join("include");
-        let version = run(Command::new("verilator").arg("--version"))?;
-        let mut hasher = DefaultHasher::new();
-        version.hash(&mut hasher);
-        let folder =
-            Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("verilated-{:016x}", hasher.finish()));
-        let done = folder.join("include");
-        if done.exists() {
-            return Ok(folder);
-        }
-        fs::create_dir_all(&folder).expect("the target folder can be written");
-        for part in ["verilated", "verilated_threads"] {
-            // Under a name of its own first, for other tests do the same at the same time.
-            let object = folder.join(format!("{part}.{}.o", std::process::id()));
-            run(Command::new("g++")
-                .args(COMPILE)
-                .arg("-c")
-                .arg(include.join(format!("{part}.cpp")))
-                .arg("-o")
-                .arg(&object)
-                .args(includes(&include)))?;
-            fs::rename(object, folder.join(format!("{part}.o"))).expect("both are in one folder");
-        }
-        fs::write(&done, include.to_string_lossy().as_bytes()).expect("the target folder can be written");
-        Ok(folder)
-    };
-    RUNTIME.get_or_init(build).clone()
-}
-
-/// Flags with which everything of a simulation is compiled.
-const COMPILE: &[&str] =
-    &["-std=gnu++17", "-O2", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TRACE=0", "-faligned-new", "-pthread"];
-
-fn includes(include: &Path) -> [String; 2] {
-    [format!("-I{}", include.display()), format!("-I{}", include.join("vltstd").display())]
-}
-
 /// A unit that runs in a process of its own.
 pub(crate) struct Simulation {
     pub(crate) circuit: Circuit,
@@ -173,17 +129,7 @@ pub(crate) struct Request {
 impl Simulation {
     /// Builds a circuit and starts it. The program stays in the target folder until something of it changes.
     pub(crate) fn new(library: &Library, circuit: &Circuit) -> Result<Simulation, String> {
-        let texts: Vec<_> = circuit.files.iter().map(|name| library.text(name)).collect();
-        let mut hasher = DefaultHasher::new();
-        (texts, DRIVER, COMPILE, circuit.unit.latency, circuit.unit.interval).hash(&mut hasher);
-        let program = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!(
-            "{}-{:016x}",
-            circuit.unit.name,
-            hasher.finish()
-        ));
-        if !program.exists() {
-            compile(library, circuit, &program)?;
-        }
+        let program = compile(library, circuit).map_err(|error| error.to_string())?;
         let mut process = Command::new(&program)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -380,50 +326,33 @@ fn mismatch(request: &Request, expected: Value, got: Value) -> String {
     )
 }
 
-fn compile(library: &Library, circuit: &Circuit, program: &Path) -> Result<(), String> {
-    let runtime = runtime()?;
-    let include = fs::read_to_string(runtime.join("include")).expect("written with the run-time library");
-    let folder = Folder::new(circuit, "build");
-    let (work, unit) = (&folder.0, &circuit.unit);
-    fs::write(work.join("driver.cpp"), DRIVER).expect("the target folder can be written");
-    // X becomes random: what a circuit does not initialise must not matter.
-    run(Command::new("verilator")
-        .args([
-            "--cc",
-            "-Wno-fatal",
-            "-O3",
-            "--x-assign",
-            "unique",
-            "--x-initial",
-            "unique",
-            "--prefix",
-            "Vdut",
-        ])
-        .args(WAIVERS)
-        .args(["--top-module", unit.rtl])
-        .args(circuit.parameters().map(|(name, value)| format!("-G{name}={value}")))
-        .arg("--Mdir")
-        .arg(work)
-        .args(folder.write(library, circuit)))?;
-    let written =
-        fs::read_dir(work).expect("Verilator has written it").map(|entry| entry.expect("readable").path());
-    let sources = written.filter(|path| path.extension().is_some_and(|extension| extension == "cpp"));
-    let built = work.join("simulation");
-    let mut command = Command::new("g++");
-    command.args(COMPILE).args(includes(Path::new(&include))).arg(format!("-I{}", work.display()));
-    command.args([
+fn compile(library: &Library, circuit: &Circuit) -> Result<PathBuf, VerilatorError> {
+    let unit = &circuit.unit;
+    let text = |name: &'_ String| library.text(name).expect("the circuit's files are those of the library");
+    let names: Vec<String> = circuit.files.iter().map(|name| name.replace('/', "-")).collect();
+    let files = names.iter().map(String::as_str).zip(circuit.files.iter().map(text)).collect();
+    let parameters = circuit.parameters().map(|(name, value)| format!("-G{name}={value}"));
+    let waivers = WAIVERS.iter().copied().chain(["-Wno-fatal"]).map(str::to_owned);
+    let mut defines = vec![
         format!("-DLATENCY={}", unit.latency),
         format!("-DINTERVAL={}", unit.interval),
         format!("-DOPERANDS={}", circuit.operands),
-    ]);
-    if circuit.op_bits > 0 {
-        command.arg(format!("-DOP={}", circuit.op_bits));
-    }
-    command.args(sources).arg(runtime.join("verilated.o")).arg(runtime.join("verilated_threads.o"));
-    run(command.arg("-o").arg(&built))?;
-    // Others may have built the same in the meantime.
-    fs::rename(&built, program).expect("both are in the target folder");
-    Ok(())
+    ];
+    defines.extend((circuit.op_bits > 0).then(|| format!("-DOP={}", circuit.op_bits)));
+    let sources = Sources {
+        name: unit.name,
+        top: unit.rtl,
+        prefix: "Vdut",
+        files,
+        driver: DRIVER,
+        headers: Vec::new(),
+        arguments: parameters.chain(waivers).collect(),
+        defines,
+        // Millions of operations go through.
+        optimise: "-O2",
+        trace: false,
+    };
+    sources.build(Path::new(env!("CARGO_TARGET_TMPDIR")))
 }
 
 /// Operands for an instruction, by the types of its sources.

@@ -1,5 +1,6 @@
 //! The core's bus slaves and a board's UART against clients that other projects wrote, in Icarus Verilog: rtl/tests/clients/.
 
+use crate::passed::Inputs;
 use crate::{root, run, venv::Venv};
 use anyhow::{Context, Result, anyhow};
 use serde_json::{Map, Value, json};
@@ -100,10 +101,15 @@ fn board(program: &Program, folder: &Path) -> Result<()> {
     write(folder, "board.json", &description.to_string())
 }
 
-/// Writes the circuits and runs every client.
-pub(crate) fn test() -> Result<()> {
-    let venv = Venv::with(&CLIENTS)?;
-    let folder = root().join("target/clients");
+/// Where the circuits are written.
+const FOLDER: &str = "target/clients/circuits";
+
+/// Writes the circuits. What the clients' tests are about, and by what they are run.
+pub(crate) fn inputs() -> Result<Inputs> {
+    let folder = root().join(FOLDER);
+    if folder.exists() {
+        fs::remove_dir_all(&folder)?;
+    }
     let options = Options { machine: MACHINE, ..Options::default() };
     let source = fs::read_to_string(root().join(PROGRAM))?;
     let loader = MemoryLoader::new(&[(PROGRAM, source.as_str())]);
@@ -111,6 +117,12 @@ pub(crate) fn test() -> Result<()> {
         assemble(PROGRAM, &loader, &options).map_err(|error| anyhow!("{PROGRAM}: {error:?}"))?.program;
     core(&program, &folder.join("core"))?;
     board(&program, &folder.join("board"))?;
+    Inputs::default().and(CLIENTS).tool("iverilog", "-V").files(FOLDER)?.files("rtl/tests/clients")
+}
+
+/// Runs every client, on the circuits that [`inputs`] has written.
+pub(crate) fn test() -> Result<()> {
+    let venv = Venv::with(&CLIENTS)?;
     let mut client = Command::new(venv.tool("python3"));
-    run(client.arg(root().join("rtl/tests/clients/run.py")).arg(&folder))
+    run(client.arg(root().join("rtl/tests/clients/run.py")).arg(root().join(FOLDER)))
 }

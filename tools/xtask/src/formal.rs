@@ -5,6 +5,7 @@
 //! which bundles are at fault. The properties are the rules of `docs/timing.md`, stated for one register of each bank, an
 //! arbitrary one, and so for all.
 
+use crate::passed::Inputs;
 use crate::root;
 use crate::venv::{Venv, YOSYS, Z3};
 use anyhow::{Context, Result, bail, ensure};
@@ -36,6 +37,19 @@ pub(crate) struct Arguments {
 impl Arguments {
     /// What runs with the tests: every machine, to a depth that takes seconds.
     pub(crate) const SHARE: Arguments = Arguments { machine: None, depth: 9 };
+}
+
+/// What the proofs are about, and by what.
+pub(crate) fn inputs(arguments: &Arguments) -> Result<Inputs> {
+    let library = Library::load(&root().join("rtl/units"))?;
+    let own = Inputs::default().and((include_str!("formal.rs"), YOSYS, Z3, arguments.depth));
+    MACHINES.iter().try_fold(own, |inputs, machine| {
+        let design = export(machine, &library)?;
+        let texts = |files: &[DesignFile]| {
+            files.iter().map(|file| (file.name.clone(), file.text.clone())).collect::<Vec<_>>()
+        };
+        Ok(inputs.and((machine.name, texts(&design.files), texts(&design.ecp5))))
+    })
 }
 
 /// `cargo xtask formal`.

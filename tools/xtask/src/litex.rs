@@ -2,6 +2,7 @@
 
 use crate::clients::write;
 use crate::dist::{self, periods};
+use crate::passed::Inputs;
 use crate::{apt_install, root, run, venv::Venv, works};
 use anyhow::{Context, Result};
 use serde_json::json;
@@ -81,7 +82,20 @@ fn prepare(folder: &Path) -> Result<()> {
     write(folder, "expected.json", &json!(expected).to_string())
 }
 
-/// Writes what the SoC needs, installs LiteX and the wrapper, simulates.
+/// Where what the SoC needs is written.
+const FOLDER: &str = "target/clients/litex";
+
+/// Writes what the SoC needs. What its simulation is about, and by what.
+pub(crate) fn inputs() -> Result<Inputs> {
+    let folder = root().join(FOLDER);
+    if folder.exists() {
+        fs::remove_dir_all(&folder)?;
+    }
+    prepare(&folder)?;
+    Inputs::default().and((LITEX, RISCV)).tool("verilator", "--version").files(FOLDER)?.files("tools/python/litex")
+}
+
+/// Installs LiteX and the wrapper, simulates what [`inputs`] has written.
 pub(crate) fn test() -> Result<()> {
     let (compiler, ask, package) = RISCV;
     if !works(compiler, ask) {
@@ -89,14 +103,9 @@ pub(crate) fn test() -> Result<()> {
     }
     let venv = Venv::with(&LITEX)?;
     let python = || Command::new(venv.tool("python3"));
-    let folder = root().join("target/clients/litex");
-    if folder.exists() {
-        fs::remove_dir_all(&folder)?;
-    }
-    prepare(&folder)?;
     // As a user installs it; its dependencies are there.
     let install =
         ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps", "--force-reinstall"];
     run(python().args(install).arg(root().join("tools/python/litex")))?;
-    run(python().arg("-I").arg(root().join("tools/python/litex/tests/run.py")).arg(&folder))
+    run(python().arg("-I").arg(root().join("tools/python/litex/tests/run.py")).arg(root().join(FOLDER)))
 }

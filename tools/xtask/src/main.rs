@@ -7,6 +7,7 @@ mod dist;
 mod docs;
 mod formal;
 mod litex;
+mod passed;
 mod python;
 mod reach;
 mod share;
@@ -34,7 +35,8 @@ enum Task {
     /// Install what the tests need and is not there, then run formal verification's share and every test, optimised, those of the
     /// Python package included.
     Test {
-        /// Exhaustive: all 2³² operands of every operation of one operand (about ten minutes on two cores).
+        /// Exhaustive: all 2³² operands of every operation of one operand (about ten minutes on two cores), and the checks that have passed
+        /// with the same files before (formal verification, the clients of other makers, the placed and routed board).
         #[arg(long)]
         full: bool,
         /// Passed on to `cargo test`, which then runs alone.
@@ -105,8 +107,10 @@ fn main() -> Result<ExitCode> {
         Task::Clients { litex } => {
             install()?;
             if !litex {
+                clients::inputs()?;
                 clients::test()?;
             }
+            litex::inputs()?;
             litex::test()
         }
         Task::Dist(arguments) => dist::dist(&arguments),
@@ -247,29 +251,85 @@ fn workbench(screenshots: Option<&Path>) -> Result<()> {
     run(&mut tests)
 }
 
-fn test(full: bool, rest: &[String]) -> Result<()> {
-    install()?;
-    venv::Venv::with(&venv::MODELS)?;
-    // The debug adapter's client.
-    npm_install(&root().join("tools/cli/tests/clients/dap"))?;
-    if rest.is_empty() {
-        extension()?;
-        formal::formal(&formal::Arguments::SHARE)?;
-        clients::test()?;
-        litex::test()?;
-        dist::test()?;
-    }
+/// `cargo test` of everything, with these arguments before its own.
+fn cargo_test(arguments: &[&str], watched: &[String; 2]) -> Command {
     let mut tests = cargo();
-    tests.arg("test").args(times::watch()?);
-    tests.args(["--workspace", "--features", EVERYTHING, "--no-fail-fast", "--release"]).args(rest);
-    tests.env("TAKT_ROUTED", "1");
+    tests.arg("test").args(watched).args([
+        "--workspace",
+        "--features",
+        EVERYTHING,
+        "--no-fail-fast",
+        "--release",
+    ]);
+    tests.args(arguments);
+    tests
+}
+
+/// What is no test of cargo's. Installs what it needs, and what the tests need.
+fn beside_tests(full: bool) -> Result<()> {
+    extension()?;
+    let share = formal::Arguments::SHARE;
+    passed::once("formal", &formal::inputs(&share)?, full, || formal::formal(&share))?;
+    passed::once("clients", &clients::inputs()?, full, clients::test)?;
+    passed::once("litex", &litex::inputs()?, full, litex::test)?;
+    dist::test()
+}
+
+/// What decides about the placed and routed board: circuits, what writes them, the tools, the test.
+fn routed() -> Result<passed::Inputs> {
+    let tools = passed::Inputs::default().and((venv::YOSYS, takt_board::tools::NEXTPNR));
+    let folders =
+        ["rtl/units", "rtl/core", "rtl/ecp5", "rtl/src", "rtl/board/verilog", "rtl/board/src", "isa/src/spec"];
+    let files = folders
+        .iter()
+        .chain(&["rtl/board/tests/top.rs", "rtl/board/boards"])
+        .filter(|path| root().join(path).exists());
+    files.into_iter().try_fold(tools, |inputs, path| inputs.files(path))
+}
+
+fn test(full: bool, rest: &[String]) -> Result<()> {
+    let watched = times::watch()?;
+    // Compiling needs no more than a C compiler; all else is installed, and what is no test of cargo's runs, while cargo compiles.
+    if !works("cc", "--version") {
+        install()?;
+    }
+    let mut compiling = match rest {
+        [] => Some(cargo_test(&["--no-run"], &watched).spawn().context("cannot start cargo")?),
+        _ => None,
+    };
+    let beside = || {
+        install()?;
+        venv::Venv::with(&venv::MODELS)?;
+        // The debug adapter's client.
+        npm_install(&root().join("tools/cli/tests/clients/dap"))?;
+        if rest.is_empty() { beside_tests(full) } else { Ok(()) }
+    };
+    let beside = beside();
+    if let Some(compiling) = &mut compiling {
+        let status = compiling.wait().context("cargo is lost")?;
+        anyhow::ensure!(status.success(), "the tests do not compile ({status})");
+    }
+    beside?;
+    let mut tests = cargo_test(&[], &watched);
+    tests.args(rest);
+    let routed = routed()?;
+    let is_routed = full || !passed::has_passed("routed", &routed);
+    if is_routed {
+        tests.env("TAKT_ROUTED", "1");
+    }
     if full {
         tests.env("TAKT_FULL", "1");
     }
     let tested = run(&mut tests);
     eprint!("{}", times::slowest()?);
     tested?;
-    if rest.is_empty() { python::test() } else { Ok(()) }
+    if rest.is_empty() {
+        if is_routed {
+            passed::passes("routed", &routed)?;
+        }
+        python::test()?;
+    }
+    Ok(())
 }
 
 /// Measures, prints, writes docs/speed.md.

@@ -112,14 +112,13 @@ impl Flat {
         let (mut found, mut left) = (BTreeMap::new(), targets(&unfolded(&graph, BundleAddress::RESET)?));
         let mut nodes = 0;
         while let Some(address) = left.pop() {
-            let Entry::Vacant(section) = found.entry(address) else { continue };
-            let bundles = unfolded(&graph, address)?;
+            let Entry::Vacant(place) = found.entry(address) else { continue };
+            let bundles = place.insert(unfolded(&graph, address)?);
             nodes += bundles.len();
             if nodes > MAX_NODES {
                 return Ok(None);
             }
-            left.extend(targets(&bundles));
-            section.insert(bundles);
+            left.extend(targets(bundles));
         }
         keep_repeating(&mut found);
         let mut places = Places::new(&graph, &found);

@@ -1,11 +1,11 @@
 //! Peripherals in Verilator: all of them in one simulation, each compared with its twin in every cycle.
 
 use std::fmt::Write as _;
-use std::fs;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use takt_board::twin::Twin;
+use takt_rtl::verilator::Sources;
 
 /// A module under test.
 pub(crate) struct Part {
@@ -83,33 +83,27 @@ fn wrapper(parts: &[Part]) -> (String, usize, usize) {
     (text, takes, drives)
 }
 
-fn run(command: &mut Command) -> String {
-    let output = command.output().unwrap_or_else(|error| {
-        panic!("{command:?}: {error}: `cargo xtask test` installs what the tests need")
-    });
-    let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{command:?}:\n{text}");
-    text.into_owned()
-}
-
 /// Builds all parts from these files.
 fn build(name: &str, files: &[(&str, String)], parts: &[Part]) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("parts-{name}-{}", std::process::id()));
-    fs::create_dir_all(&folder).expect("the target folder can be written");
-    let write = |name: &str, text: &str| fs::write(folder.join(name), text).expect("it can be written");
     let (top, takes, drives) = wrapper(parts);
-    write("parts.v", &top);
-    write("driver.cpp", &format!("#define TAKES {takes}\n#define DRIVES {drives}\n{DRIVER}"));
-    for (name, text) in files {
-        write(name, text);
-    }
-    let mut command = Command::new("verilator");
-    command.current_dir(&folder).args(["--cc", "--exe", "--build", "-O3", "--x-assign", "unique"]);
-    command.args(["--x-initial", "unique", "-Wno-fatal", "--prefix", "Vparts", "--top-module", "parts"]);
-    command.args(["-CFLAGS", "-O1", "-MAKEFLAGS", "OPT_FAST=-O1 OPT_SLOW=-O0 OPT_GLOBAL=-O1"]);
-    command.args(["driver.cpp", "parts.v"]).args(files.iter().map(|(name, _)| *name));
-    run(&mut command);
-    folder
+    let driver = format!("#define TAKES {takes}\n#define DRIVES {drives}\n{DRIVER}");
+    let own = files.iter().map(|(name, text)| (*name, text.as_str()));
+    let sources = Sources {
+        name: &format!("parts-{name}"),
+        top: "parts",
+        prefix: "Vparts",
+        files: [("parts.v", top.as_str())].into_iter().chain(own).collect(),
+        driver: &driver,
+        headers: Vec::new(),
+        arguments: vec!["-Wno-fatal".to_owned()],
+        defines: Vec::new(),
+        optimise: "-O1",
+        trace: false,
+    };
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    sources
+        .build(folder)
+        .unwrap_or_else(|error| panic!("{error}: `cargo xtask test` installs what the tests need"))
 }
 
 /// Runs so many cycles and says of each part in which cycle it first differed from its twin, and how.
@@ -119,8 +113,7 @@ pub(crate) fn compare(
     parts: &mut [Part],
     cycles: u32,
 ) -> Vec<Option<String>> {
-    let folder = build(name, files, parts);
-    let mut process = Command::new(folder.join("obj_dir/Vparts"))
+    let mut process = Command::new(build(name, files, parts))
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()
@@ -161,6 +154,5 @@ pub(crate) fn compare(
             part.twin.clock(inputs);
         }
     }
-    fs::remove_dir_all(&folder).expect("the target folder can be written");
     differences
 }

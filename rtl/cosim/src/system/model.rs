@@ -1,7 +1,7 @@
 //! A system in Verilator: compiled once for each circuit, run as a process with a memory image.
 
 use super::probe::{self, PROBE};
-use crate::model::{CircuitEvent, EVENT_WORDS, ModelError, Process, Sources, circuit_event};
+use crate::model::{CircuitEvent, EVENT_WORDS, ModelError, Process, circuit_event, sources};
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -55,16 +55,11 @@ impl SystemModel {
         let module = probe::module(design);
         let name = format!("{PROBE}.v");
         let files = design.files.iter().map(|file| (file.name.as_str(), file.text.as_str()));
-        let sources = Sources {
-            top: PROBE,
-            files: files.chain([(name.as_str(), module.as_str())]).collect(),
-            driver: DRIVER,
-            prefix: "Vsystem",
-            header: ("system.h", probe::header(design)),
-            arguments: Vec::new(),
-        };
+        let (files, header) =
+            (files.chain([(name.as_str(), module.as_str())]).collect(), probe::header(design));
+        let sources = sources((PROBE, "Vsystem"), files, DRIVER, ("system.h", &header), trace);
         Ok(SystemModel {
-            program: sources.build(folder, trace)?,
+            program: sources.build(folder)?,
             folder: folder.to_owned(),
             image: design.image.name.clone(),
             pins: design.plan.pins().len(),

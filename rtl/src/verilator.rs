@@ -1,0 +1,270 @@
+//! Verilator: a circuit in Verilog and a driver in C++ become a program, which is kept by a hash of everything that it is made of.
+//!
+//! Verilator's run-time library is compiled once for all programs; with each it would take longer than most circuits.
+
+use std::collections::BTreeMap;
+use std::collections::hash_map::DefaultHasher;
+use std::fs;
+use std::hash::{Hash, Hasher};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use thiserror::Error;
+
+/// Why there is no program.
+#[derive(Debug, Error)]
+pub enum VerilatorError {
+    /// A tool is not there.
+    #[error("{tool} is not installed; on Debian: apt-get install {package}")]
+    Missing {
+        /// The program.
+        tool: &'static str,
+        /// Debian's package that has it.
+        package: &'static str,
+    },
+    /// A tool failed.
+    #[error("{tool} failed:\n{text}")]
+    Tool {
+        /// The program.
+        tool: &'static str,
+        /// What it said.
+        text: String,
+    },
+    /// A file cannot be written or read.
+    #[error("{path}: {source}")]
+    File {
+        /// The file.
+        path: String,
+        /// Why.
+        source: std::io::Error,
+    },
+}
+
+/// Where programs are kept: `takt` in the user's cache folder.
+pub fn cache_folder() -> PathBuf {
+    let from = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    from("XDG_CACHE_HOME")
+        .or_else(|| from("HOME").map(|home| home.join(".cache")))
+        .unwrap_or_else(std::env::temp_dir)
+        .join("takt")
+}
+
+/// What a program is made of.
+#[derive(Debug)]
+pub struct Sources<'a> {
+    /// The beginning of the program's name.
+    pub name: &'a str,
+    /// The top's module.
+    pub top: &'a str,
+    /// The prefix of the classes that Verilator makes.
+    pub prefix: &'static str,
+    /// Verilog.
+    pub files: Vec<(&'a str, &'a str)>,
+    /// The program around it, in C++.
+    pub driver: &'a str,
+    /// What the driver includes.
+    pub headers: Vec<(&'a str, &'a str)>,
+    /// Further arguments for Verilator.
+    pub arguments: Vec<String>,
+    /// Further arguments for the driver's compiler.
+    pub defines: Vec<String>,
+    /// How much the C++ compiler optimises: `-O1`, where it is run for seconds; `-O2`.
+    pub optimise: &'static str,
+    /// Whether the program can write waveforms; the driver is then compiled with `TRACE` defined.
+    pub trace: bool,
+}
+
+fn file_error(path: &Path) -> impl FnOnce(std::io::Error) -> VerilatorError {
+    let path = path.display().to_string();
+    move |source| VerilatorError::File { path, source }
+}
+
+fn run(tool: &'static str, package: &'static str, command: &mut Command) -> Result<String, VerilatorError> {
+    let output = command.output().map_err(|error| match error.kind() {
+        ErrorKind::NotFound => VerilatorError::Missing { tool, package },
+        _ => VerilatorError::Tool { tool, text: error.to_string() },
+    })?;
+    let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    if output.status.success() {
+        Ok(text.into_owned())
+    } else {
+        Err(VerilatorError::Tool { tool, text: text.into_owned() })
+    }
+}
+
+fn verilator() -> Command {
+    Command::new("verilator")
+}
+
+/// Runs `make` where `path` is not there yet: once in this process, whoever asks; others may do the same at the same time, so what is made
+/// gets its name when it is whole.
+fn once(
+    path: &Path,
+    make: impl FnOnce(&Path) -> Result<(), VerilatorError>,
+) -> Result<PathBuf, VerilatorError> {
+    static BEING_MADE: Mutex<BTreeMap<PathBuf, Arc<Mutex<()>>>> = Mutex::new(BTreeMap::new());
+    static NUMBER: AtomicU64 = AtomicU64::new(0);
+    let own = {
+        let mut all = BEING_MADE.lock().unwrap_or_else(PoisonError::into_inner);
+        Arc::clone(all.entry(path.to_owned()).or_default())
+    };
+    let _one = own.lock().unwrap_or_else(PoisonError::into_inner);
+    if path.exists() {
+        return Ok(path.to_owned());
+    }
+    let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+    let partial = format!("{}.{}.{number}.partial", path.display(), std::process::id());
+    let partial = Path::new(&partial);
+    fs::create_dir_all(partial).map_err(file_error(partial))?;
+    let made = make(partial).and_then(|()| fs::rename(partial.join("made"), path).map_err(file_error(path)));
+    let _ = fs::remove_dir_all(partial);
+    made.map(|()| path.to_owned())
+}
+
+/// The options of everything that is compiled in C++, which must agree between a circuit and the library.
+fn options(include: &Path, optimise: &str, trace: bool) -> Vec<String> {
+    let trace = u8::from(trace);
+    let mut options = vec![optimise.to_owned(), "-std=gnu++17".to_owned(), "-faligned-new".to_owned()];
+    options.extend(["-pthread".to_owned(), "-w".to_owned()]);
+    options.extend(
+        ["VERILATOR=1", "VM_COVERAGE=0", "VM_SC=0", "VM_TRACE_FST=0"].map(|name| format!("-D{name}")),
+    );
+    options.extend([format!("-DVM_TRACE={trace}"), format!("-DVM_TRACE_VCD={trace}")]);
+    options.extend([include.to_owned(), include.join("vltstd")].map(|path| format!("-I{}", path.display())));
+    options
+}
+
+impl Sources<'_> {
+    /// The program, in a folder: compiled, or as it was compiled before.
+    ///
+    /// # Errors
+    /// If Verilator, make or a C++ compiler is missing or fails.
+    pub fn build(&self, folder: &Path) -> Result<PathBuf, VerilatorError> {
+        let version = run("verilator", "verilator", verilator().arg("--version"))?;
+        let mut hasher = DefaultHasher::new();
+        (&version, self.top, self.prefix, &self.files, self.driver, &self.headers).hash(&mut hasher);
+        (&self.arguments, &self.defines, self.optimise, self.trace).hash(&mut hasher);
+        let program = folder.join(format!("{}-{:016x}", self.name, hasher.finish()));
+        once(&program, |work| self.compile(work, folder, &version))
+    }
+
+    fn compile(&self, work: &Path, folder: &Path, version: &str) -> Result<(), VerilatorError> {
+        let write = |name: &str, text: &str| {
+            let path = work.join(name);
+            let parent = path.parent().unwrap_or(work);
+            fs::create_dir_all(parent).map_err(file_error(parent))?;
+            fs::write(&path, text).map_err(file_error(&path))
+        };
+        for (name, text) in self.files.iter().chain(&self.headers) {
+            write(name, text)?;
+        }
+        write("driver.cpp", self.driver)?;
+        // X becomes random: what the circuit does not initialise must not matter.
+        let mut command = verilator();
+        command.current_dir(work).args(["--cc", "-O3", "--x-assign", "unique", "--x-initial", "unique"]);
+        command.args(["--prefix", self.prefix, "--top-module", self.top, "--Mdir", "obj"]);
+        command.args(self.trace.then_some("--trace")).args(&self.arguments);
+        command.args(self.files.iter().map(|(name, _)| name).filter(|name| name.ends_with(".v")));
+        run("verilator", "verilator", &mut command)?;
+        let (objects, library) = (work.join("obj"), format!("{}__ALL.a", self.prefix));
+        let mut make = Command::new("make");
+        make.current_dir(&objects).args(["-s", "-j2", "-f", &format!("{}.mk", self.prefix), &library]);
+        make.args([format!("OPT_FAST={}", self.optimise), "OPT_SLOW=-O0".to_owned()]);
+        run("make", "make", make.env_remove("MAKEFLAGS"))?;
+
+        let root = run("verilator", "verilator", verilator().args(["--getenv", "VERILATOR_ROOT"]))?;
+        let include = Path::new(root.trim()).join("include");
+        let options = options(&include, self.optimise, self.trace);
+        let classes = objects.join(format!("{}_classes.mk", self.prefix));
+        let classes = fs::read_to_string(&classes).map_err(file_error(&classes))?;
+        let mut compiler = Command::new("c++");
+        compiler.current_dir(work).args(&options).args(&self.defines).args(["-I.", "-Iobj"]);
+        compiler.args(self.trace.then_some("-DTRACE")).args(["driver.cpp", &format!("obj/{library}")]);
+        for part in globals(&classes) {
+            compiler.arg(runtime(folder, version, &include, part, &options)?);
+        }
+        run("c++", "g++", compiler.args(["-o", "made"]))?;
+        Ok(())
+    }
+}
+
+/// The parts of the run-time library that a program needs, as Verilator's makefile lists them.
+fn globals(classes: &str) -> impl Iterator<Item = &str> {
+    let mut listed = false;
+    classes.lines().filter_map(move |line| {
+        let line = line.trim();
+        if let Some((name, _)) = line.split_once("+=") {
+            listed = name.trim().starts_with("VM_GLOBAL_");
+            return None;
+        }
+        let part = line.trim_end_matches('\\').trim();
+        (listed && !part.is_empty() && !part.starts_with('#')).then_some(part)
+    })
+}
+
+/// A part of the run-time library, compiled once.
+fn runtime(
+    folder: &Path,
+    version: &str,
+    include: &Path,
+    part: &str,
+    options: &[String],
+) -> Result<PathBuf, VerilatorError> {
+    let mut hasher = DefaultHasher::new();
+    (version, options).hash(&mut hasher);
+    once(&folder.join(format!("{part}-{:016x}.o", hasher.finish())), |work| {
+        let mut compiler = Command::new("c++");
+        compiler.current_dir(work).args(options).arg("-c").arg(include.join(format!("{part}.cpp")));
+        run("c++", "g++", compiler.args(["-o", "made"])).map(drop)
+    })
+}
+
+/// A fault for a circuit: a file, an expression or a statement's right side that occurs once in it, and what takes its place.
+pub type Fault<'a> = (&'a str, &'a str, &'a str);
+
+/// Plants faults in a circuit, all of them in one: a simulation chooses one by the argument `+fault=`, from 1; without it, the circuit is
+/// as it was. `top` is the top's module, and what it is called is one of the files.
+///
+/// # Errors
+/// In words, if an expression does not occur once.
+pub fn plant(files: &mut [crate::export::DesignFile], top: &str, faults: &[Fault<'_>]) -> Result<(), String> {
+    for (number, (name, from, to)) in (1..).zip(faults) {
+        let own = |file: &&mut crate::export::DesignFile| {
+            file.name == *name || file.name.rsplit('/').next() == Some(&format!("{name}.v"))
+        };
+        let file = files.iter_mut().find(own).ok_or_else(|| format!("there is no file {name}"))?;
+        // An assignment is a statement of its own.
+        let (head, from) = from.split_once("<= ").map_or(("", *from), |(head, from)| (head, from));
+        let to = to.split_once("<= ").map_or(*to, |(_, to)| to);
+        let head = if head.is_empty() { String::new() } else { format!("{head}<= ") };
+        let place = format!("{head}{from}");
+        if file.text.matches(&place).count() != 1 {
+            return Err(format!("`{place}` must occur once in {name}"));
+        }
+        let choice = format!("{head}({top}.planted == {number} ? ({to}) : ({from}))");
+        file.text = file.text.replace(&place, &choice);
+    }
+    let module = format!("module {top} ");
+    let own = |file: &&mut crate::export::DesignFile| file.text.contains(&module);
+    let file = files.iter_mut().find(own).ok_or_else(|| format!("there is no module {top}"))?;
+    let planted =
+        ");\n\n    integer planted;\n    initial if (!$value$plusargs(\"fault=%d\", planted)) planted = 0;\n";
+    let at = file.text.find(&module).unwrap_or(0);
+    let (before, own) = file.text.split_at(at);
+    file.text = format!("{before}{}", own.replacen(");\n", planted, 1));
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::globals;
+
+    #[test]
+    fn parts_of_the_library_are_listed() {
+        let text = "VM_CLASSES_FAST += \\\n\tVtop \\\n\nVM_GLOBAL_FAST += \\\n\tverilated \\\n\tverilated_threads \\\n\n\
+                    # Generated\nVM_GLOBAL_SLOW += \\\n\n";
+        assert_eq!(globals(text).collect::<Vec<_>>(), ["verilated", "verilated_threads"]);
+    }
+}
