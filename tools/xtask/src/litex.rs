@@ -92,7 +92,11 @@ pub(crate) fn inputs() -> Result<Inputs> {
         fs::remove_dir_all(&folder)?;
     }
     prepare(&folder)?;
-    Inputs::default().and((LITEX, RISCV)).tool("verilator", "--version").files(FOLDER)?.files("tools/python/litex")
+    Inputs::default()
+        .and((LITEX, RISCV))
+        .tool("verilator", "--version")
+        .files(FOLDER)?
+        .files("tools/python/litex")
 }
 
 /// Installs LiteX and the wrapper, simulates what [`inputs`] has written.

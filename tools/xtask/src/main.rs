@@ -278,8 +278,15 @@ fn beside_tests(full: bool) -> Result<()> {
 /// What decides about the placed and routed board: circuits, what writes them, the tools, the test.
 fn routed() -> Result<passed::Inputs> {
     let tools = passed::Inputs::default().and((venv::YOSYS, takt_board::tools::NEXTPNR));
-    let folders =
-        ["rtl/units", "rtl/core", "rtl/ecp5", "rtl/src", "rtl/board/verilog", "rtl/board/src", "isa/src/spec"];
+    let folders = [
+        "rtl/units",
+        "rtl/core",
+        "rtl/ecp5",
+        "rtl/src",
+        "rtl/board/verilog",
+        "rtl/board/src",
+        "isa/src/spec",
+    ];
     let files = folders
         .iter()
         .chain(&["rtl/board/tests/top.rs", "rtl/board/boards"])
