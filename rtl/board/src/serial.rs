@@ -51,10 +51,21 @@ impl Serial {
         true
     }
 
-    /// An error of a port that is gone, in words.
+    /// An error of a port that is gone, in words. While a pseudo-terminal is being closed it can still be asked for, and fails.
     fn named(&self, error: io::Error) -> io::Error {
-        if self.is_there() { error } else { gone() }
+        if self.is_there() && !is_failure(&error) { error } else { gone() }
     }
+}
+
+/// Whether the device failed, as it does when it is pulled out.
+#[cfg(unix)]
+fn is_failure(error: &io::Error) -> bool {
+    error.raw_os_error() == Some(rustix::io::Errno::IO.raw_os_error())
+}
+
+#[cfg(not(unix))]
+fn is_failure(_: &io::Error) -> bool {
+    false
 }
 
 fn gone() -> io::Error {

@@ -866,8 +866,8 @@ fn what_is_not_shown_decides_the_status_of_accuracy() {
     let folder = Folder::new();
     let program = |once: &str, period: &str| {
         format!(
-            ".input x\n.range x = 0, 4\n.output y\n.state s\n.range s = -1, 1\n.once\n{once}\n wait p\n.period\n\
-             p: {period}\n mov y, s\n mov s, 0.5\n wait p\n"
+            ".input x\n.range x = 0, 4\n.output y, z\n.state s\n.range s = -1, 1\n.once\n{once}\n wait p\n.period\n\
+             p: {period}\n mov y, s\n mov z, x\n mov s, 0.5\n wait p\n"
         )
     };
     folder.write("holds.s", program(" mov s, 1.0", "nop"));

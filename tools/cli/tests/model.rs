@@ -166,7 +166,7 @@ fn what_is_nested_without_end_has_one_message() {
     folder.write("moves.robot", nested("x = ", "(", ")\n"));
     folder.write("sum.s", nested(".output y\n.period\np: y = ", "(", ")\n wait p\n"));
     folder.write("path.ngc", nested("", "(", ")\n"));
-    let tracking = format!("{}/../programs/hybrid/tracking.s", env!("CARGO_MANIFEST_DIR"));
+    let tracking = format!("{}/../../programs/hybrid/tracking.s", env!("CARGO_MANIFEST_DIR"));
     let mut lines: Vec<(String, &str)> = vec![
         (
             "model deep.urdf -f gravity".to_owned(),
