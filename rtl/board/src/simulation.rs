@@ -242,8 +242,10 @@ fn build(
     wiring: &Wiring,
     folder: &Path,
 ) -> Result<Pins, SimulationError> {
-    // What a simulation reads.
-    for file in files.iter().filter(|file| !file.name.ends_with(".v")) {
+    // Verilog, which is compiled, and files that a simulation reads when it runs.
+    let (verilog, read): (Vec<_>, Vec<_>) =
+        files.iter().partition(|file| [".v", ".vh"].iter().any(|end| file.name.ends_with(end)));
+    for file in read {
         let path = folder.join(&file.name);
         fs::create_dir_all(path.parent().unwrap_or(folder))
             .and_then(|()| fs::write(&path, &file.text))
@@ -279,8 +281,7 @@ fn build(
         }
         let _ = writeln!(header, "    (void)top; (void)pins;\n}}");
     }
-    let verilog = files.iter().filter(|file| file.name.ends_with(".v"));
-    let verilog = verilog.map(|file| (file.name.as_str(), file.text.as_str()));
+    let verilog = verilog.into_iter().map(|file| (file.name.as_str(), file.text.as_str()));
     let sources = Sources {
         name: TOP,
         top: TOP,

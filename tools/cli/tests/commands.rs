@@ -887,5 +887,5 @@ fn what_is_not_shown_decides_the_status_of_accuracy() {
     folder.write("fits.s", program(".reg n:int\n mov s, 0.0", "fmul s, x, 1e9\n ftoi n, s"));
     let fits = folder.line("accuracy fits.s");
     assert_eq!(fits.status, Some(1));
-    assert!(fits.stdout.contains(": the result may not fit a 32-bit integer: s in ["), "{}", fits.stdout);
+    assert!(fits.stdout.contains(": the result may not fit a 32-bit integer: s.1 in ["), "{}", fits.stdout);
 }
