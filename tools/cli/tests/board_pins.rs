@@ -209,14 +209,16 @@ fn a_density_has_no_bound_at_its_pin() {
     };
     insta::assert_snapshot!(bound("both.toml", "") + &bound("alone.toml", ""));
     let json: serde_json::Value = serde_json::from_str(&bound("alone.toml", "--json")).unwrap();
-    let ways = json["ways"].as_array().unwrap();
-    assert_eq!(ways.len(), 2, "{json}");
-    for way in ways {
-        assert!(way["total"].is_null() && way["total_to_modulator"]["worst"].is_u64(), "{json}");
-        assert_eq!(way["outputs"][0]["answer"], "density");
-    }
+    let way = &json["ways"][0];
+    assert!(way["total"].is_null() && way["total_to_modulator"]["worst"].is_u64(), "{json}");
+    assert_eq!(way["outputs"][0]["answer"], "density");
+    // A way has a total if one of its pins answers with an edge.
     let json: serde_json::Value = serde_json::from_str(&bound("both.toml", "--json")).unwrap();
-    let edges = json["ways"].as_array().unwrap().iter().filter(|way| way["total"]["worst"].is_u64());
-    let answers: Vec<&str> = edges.map(|way| way["outputs"][0]["answer"].as_str().unwrap()).collect();
-    assert_eq!(answers, ["edge"], "{json}");
+    let mut totals = 0;
+    for way in json["ways"].as_array().unwrap() {
+        let edge = way["outputs"].as_array().unwrap().iter().any(|output| output["answer"] == "edge");
+        assert_eq!(way["total"]["worst"].is_u64(), edge, "{json}");
+        totals += u32::from(edge);
+    }
+    assert_eq!(totals, 1, "{json}");
 }
