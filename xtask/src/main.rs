@@ -107,11 +107,9 @@ fn main() -> Result<ExitCode> {
         Task::Clients { litex } => {
             install()?;
             if !litex {
-                clients::inputs()?;
-                clients::test()?;
+                passed::once("clients", &clients::inputs()?, true, clients::test)?;
             }
-            litex::inputs()?;
-            litex::test()
+            passed::once("litex", &litex::inputs()?, true, litex::test)
         }
         Task::Dist(arguments) => dist::dist(&arguments),
         Task::Book(arguments) => book::book(&arguments),
