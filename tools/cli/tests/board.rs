@@ -127,15 +127,16 @@ fn the_loop_closes_through_the_pins_of_a_simulated_board() {
     assert_eq!(same, "12 periods, 2 input ports, 2 output ports: no difference; the board is held\n");
     let status = live("status");
     assert!(status.contains("the program held; outputs are safe"), "{status}");
+    // Elsewhere than where it may stand already: between restart and hold a slow host leaves it time to get there.
     let planted = std::fs::read_to_string(&program).unwrap().replace("gain = 0.02", "gain = 0.03");
     folder.write("planted.s", planted);
     let shadow =
-        format!("live {port} --baud {baud} --program planted.s --machine t1 shadow wanted=7 --periods 12");
+        format!("live {port} --baud {baud} --program planted.s --machine t1 shadow wanted=15 --periods 12");
     let different = folder.line(&shadow);
     assert_eq!((different.status, different.stdout.as_str()), (Some(1), ""), "{different:?}");
     let says = "period 1: output port `duty` is ";
     assert!(
-        different.stderr.contains(says) && different.stderr.contains("wanted = 7"),
+        different.stderr.contains(says) && different.stderr.contains("wanted = 15"),
         "{}",
         different.stderr
     );
