@@ -191,5 +191,5 @@ def enclose(
 ) -> tuple[
     list[OutputBound],
     list[tuple[str, str, list[tuple[str, tuple[float, float] | None]]]],
-    list[tuple[str, tuple[float, float], tuple[float, float] | None]],
+    list[tuple[str, tuple[float, float], bool, tuple[float, float] | None]],
 ]: ...
