@@ -618,7 +618,7 @@ fn placed_registers_are_written_by_their_slot() {
     }
 }
 
-/// What is loaded from a table has the type of its words, with an index or without; a store of another type is counted.
+/// A load has the type of its table's words, with an index or without; a store of another type is counted.
 #[test]
 fn what_is_loaded_has_the_type_of_its_table() {
     let source = |load: &str, equation: &str| {

@@ -291,7 +291,7 @@ pub fn markdown() -> String {
     out
 }
 
-/// What is counted, and how much of it a machine has.
+/// A capacity: its name, and its amount on a machine.
 type Capacity = (&'static str, fn(&Machine) -> String);
 
 /// The capacities of the machines as Markdown: `docs/what-fits.md`.

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
-/// Whether a character would do something to a terminal, or change the order in which others are shown, rather than be shown.
+/// True if a character would do something to a terminal, or change the order in which others are shown, rather than be shown.
 /// A line break or a tab, which text consists of, counts as shown.
 pub const fn is_hidden(c: char) -> bool {
     match c {

@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use thiserror::Error;
 
-/// Why there is no program.
+/// An error that leaves no program.
 #[derive(Debug, Error)]
 pub enum VerilatorError {
     /// A tool is not there.
@@ -29,7 +29,7 @@ pub enum VerilatorError {
     Tool {
         /// The program.
         tool: &'static str,
-        /// What it said.
+        /// Its output.
         text: String,
     },
     /// A file cannot be written or read.
@@ -42,7 +42,7 @@ pub enum VerilatorError {
     },
 }
 
-/// Where programs are kept: `takt` in the user's cache folder.
+/// The folder in which programs are kept: `takt` in the user's cache folder.
 pub fn cache_folder() -> PathBuf {
     let from = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
     from("XDG_CACHE_HOME")
@@ -51,7 +51,7 @@ pub fn cache_folder() -> PathBuf {
         .join("takt")
 }
 
-/// What a program is made of.
+/// The sources and options of a program.
 #[derive(Debug)]
 pub struct Sources<'a> {
     /// The beginning of the program's name.
@@ -64,15 +64,15 @@ pub struct Sources<'a> {
     pub files: Vec<(&'a str, &'a str)>,
     /// The program around it, in C++.
     pub driver: &'a str,
-    /// What the driver includes.
+    /// The driver's headers.
     pub headers: Vec<(&'a str, &'a str)>,
     /// Further arguments for Verilator.
     pub arguments: Vec<String>,
     /// Further arguments for the driver's compiler.
     pub defines: Vec<String>,
-    /// How much the C++ compiler optimises: `-O1`, where it is run for seconds; `-O2`.
+    /// The C++ compiler's level of optimisation: `-O1`, where the program runs for seconds; `-O2`.
     pub optimise: &'static str,
-    /// Whether the program can write waveforms; the driver is then compiled with `TRACE` defined.
+    /// True if the program can write waveforms; the driver is then compiled with `TRACE` defined.
     pub trace: bool,
 }
 

@@ -51,7 +51,7 @@ pub(super) fn check(context: &mut Context, ir: &Ir) {
         let ends = |index: &usize| seen[*index] || end(&ir.bundles[index - 1]).is_some();
         dead = start..(start + 1..seen.len()).find(ends).unwrap_or(seen.len());
         piece(context, ir, dead.clone(), labels.get(&start).map_or(&[], Vec::as_slice));
-        // What it leads to would run if it did.
+        // Code behind it would run if it did.
         follow(ir, start as u32, &mut seen);
     }
 }

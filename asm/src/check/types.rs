@@ -445,7 +445,7 @@ fn wrong_source(
         }
         _ => String::new(),
     };
-    // What compares integers has a counterpart for floats: to round them first would compare others.
+    // An integer comparison has a counterpart for floats: rounding first would compare other values.
     let instead = match comparison(operation.row(), ty) {
         Some(other) => {
             format!("compare {} with `{other}`, ", if ty == Type::F { "floats" } else { "integers" })

@@ -76,7 +76,7 @@ pub(crate) struct Room {
     homeless: Vec<usize>,
 }
 
-/// How many values a bank must hold at a time at most, and the first bundle where it must.
+/// The register pressure of a bank: the most live values at a time, and the first bundle with so many.
 #[derive(Clone, Copy, Default)]
 struct Peak {
     values: usize,
@@ -98,14 +98,14 @@ impl Room {
         !self.holds_values() && self.missing.is_empty() && self.homeless.is_empty()
     }
 
-    /// How many registers are missing.
+    /// The number of registers that are missing.
     pub(crate) fn shortage(&self) -> usize {
         let peaks = self.peaks();
         let values = peaks.iter().zip(&self.free).map(|(peak, free)| peak.values.saturating_sub(*free));
         values.sum::<usize>() + self.missing.len() + self.homeless.len()
     }
 
-    /// Whether everything has its place.
+    /// True if everything has its place.
     pub(crate) fn has_all(&self) -> bool {
         self.missing.is_empty() && self.homeless.is_empty() && self.holds_values()
     }
@@ -390,14 +390,14 @@ fn share(ir: &Ir, room: &mut Room) -> Vec<bool> {
     shared
 }
 
-/// What the registers of a bank are needed for.
+/// The demand on a bank's registers, by purpose.
 struct Fill {
     constants: usize,
     /// States, and what more than one block uses.
     lasting: usize,
     /// Values that only one block uses, at a time.
     values: usize,
-    /// Where one of the constants is used.
+    /// A place where one of the constants is used.
     constant: Option<Span>,
 }
 
@@ -459,7 +459,7 @@ fn report(ir: &Ir, room: &Room, peaks: &[Peak], why: Option<&str>, sink: &mut Si
             values: peak.values,
             constant: constants.last().map(|index| ir.registers[*index].span),
         };
-        // Where constants find no room, neither do values: that is the same mistake.
+        // If constants find no room, neither do values: that is the same mistake.
         if lasts(first) || homeless.is_empty() {
             sink.push(full(ir, room, (first, slot), &fill, peak, available, why));
         }
@@ -558,7 +558,7 @@ fn full(
     }
 }
 
-/// Where a constant can be if not in a register.
+/// The advice for constants that fill a bank.
 const CONSTANTS_ELSEWHERE: &str = "load rarely used constants with `li`, or keep them in data memory";
 
 /// The first names of a list.

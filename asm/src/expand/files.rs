@@ -39,7 +39,7 @@ pub(crate) enum Unread {
 fn text_of(bytes: Vec<u8>) -> Result<String, Unread> {
     String::from_utf8(bytes).map_err(|error| {
         let offset = error.utf8_error().valid_up_to();
-        // What precedes is text.
+        // The bytes before are text.
         let before = std::str::from_utf8(&error.as_bytes()[..offset]).unwrap_or_default();
         let lines = Lines::of(before);
         let index = lines.index(offset as u32);

@@ -278,7 +278,7 @@ pub struct Label {
 }
 
 impl Label {
-    /// Whether it begins a table of data memory. One whose name begins with `_` stands within the table before it.
+    /// True if it begins a table of data memory. A label whose name begins with `_` stands within the table before it.
     pub(crate) fn is_table(&self) -> bool {
         let name = self.name.rsplit('.').next().unwrap_or(&self.name);
         self.space == Space::Data && !name.starts_with('_')

@@ -174,13 +174,13 @@ impl Resolver<'_> {
             return kind;
         }
         match operation.row().effect {
-            // What is loaded has the type of its table, whatever type the index has.
+            // A load has the type of its table, whatever type the index has.
             Effect::Load => self.table_kind(operation).map_or(Kind::Any, |(_, kind)| kind),
             _ => self.forms.result(operation.op, |which| self.source_kind(operation, which)),
         }
     }
 
-    /// What is known of the type of a source of an operation.
+    /// The type of a source of an operation, as far as it is known.
     fn source_kind(&self, operation: &Operation, which: usize) -> Kind {
         use crate::ir::given::{Given, Part};
         match self.context.declared.given.get(operation, Part::Source(which as u8)) {

@@ -189,9 +189,9 @@ pub(crate) struct Resolver<'c> {
     pub(crate) cast: Option<Type>,
     /// Words of data memory that the source declares.
     pub(crate) data_words: u32,
-    /// Whether that is more than the machine has, which is reported.
+    /// True, and reported, if that is more than the machine has.
     pub(crate) is_full: bool,
-    /// What is known of the types of tables, as far as the program is read.
+    /// The types of tables, as far as the program is read.
     pub(crate) tables: HashMap<LabelId, Kind>,
     /// What equations write for instructions.
     forms: Forms,

@@ -294,7 +294,7 @@ impl Block {
         Block { problem, origins }
     }
 
-    /// What became of the block, a run that begins at an address now.
+    /// The outcome for the block, a run that begins at an address now.
     fn report(
         &self,
         ir: &Ir,

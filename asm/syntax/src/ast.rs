@@ -519,12 +519,12 @@ impl Operator {
     pub const COMPARISONS: &[Operator] =
         &[Operator::Eq, Operator::Ne, Operator::Lt, Operator::Le, Operator::Gt, Operator::Ge];
 
-    /// Whether it compares two values: its result is 1 or 0.
+    /// True if it compares two values: its result is 1 or 0.
     pub const fn compares(self) -> bool {
         self.precedence() == Operator::Eq.precedence()
     }
 
-    /// Whether it joins conditions, and other integers, bit by bit.
+    /// True if it joins conditions, and other integers, bit by bit.
     pub const fn joins(self) -> bool {
         matches!(self, Operator::And | Operator::Or)
     }

@@ -8,7 +8,7 @@ use crate::report::source::Span;
 
 type Tokens<'t> = &'t [(Token, Span)];
 
-/// What a statement of another language is written as, given its first word and what follows that.
+/// The form here of a statement of another language, given its first word and the text after it.
 pub fn statement(word: &str, rest: &str) -> Option<String> {
     let rest = rest.trim().trim_end_matches([':', '{']).trim_end();
     let condition = if rest.is_empty() { "c" } else { rest };
@@ -67,7 +67,7 @@ pub(crate) fn range(before: &[Option<(&str, Span)>], text: &str, span: Span) -> 
     )
 }
 
-/// What a line that the grammar does not take would be in another language. `at` is the token where the grammar stopped.
+/// The form here of a line that the grammar rejects and another language has. `at` is the token where the grammar stopped.
 pub(crate) fn describe<'s>(
     tokens: Tokens<'_>,
     at: usize,
@@ -123,7 +123,7 @@ impl<'s> Line<'_, '_, 's> {
         self.part(0..self.tokens.len())
     }
 
-    /// Whether two tokens stand together, without a blank.
+    /// True if two tokens stand together, without a blank.
     fn touch(&self, index: usize) -> bool {
         matches!(self.tokens.get(index..index + 2), Some([first, second]) if first.1.end == second.1.start)
     }
@@ -251,7 +251,7 @@ impl<'s> Line<'_, '_, 's> {
         }
     }
 
-    /// Whether bars cannot separate operations: in an equation or a directive, behind which no operation stands.
+    /// True if bars cannot separate operations: in an equation or a directive, behind which no operation stands.
     fn is_or(&self, index: usize, is_equation: bool) -> bool {
         match self.token(0) {
             Some(Token::Directive(directive)) => {

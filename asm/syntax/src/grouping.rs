@@ -71,7 +71,7 @@ impl Tree<'_> {
         format!("{left} {} {right}", infix.operator.text())
     }
 
-    /// Where the left operand ends and the right one begins, parentheses included.
+    /// The end of the left operand and the beginning of the right one, parentheses included.
     fn gap(&self, infix: &Infix) -> (u32, u32) {
         let [(left, _), (right, _)] = infix.operands;
         let (from, to) = (self.nodes[left as usize].span.end, self.nodes[right as usize].span.start);
@@ -121,7 +121,7 @@ impl Tree<'_> {
         text
     }
 
-    /// Where the first (0) or the last (1) of the operators stands that join an operand's parts.
+    /// The place of the first (0) or the last (1) of the operators that join an operand's parts.
     fn join(&self, mut joined: Infix, side: usize) -> (u32, u32) {
         while let Some(inner) = self.joined(joined.operands[side]) {
             joined = inner;
@@ -180,7 +180,7 @@ mod tests {
     use crate::parse::parse;
     use crate::report::source::Sources;
 
-    /// What is offered in the place of a line's expression, and the places of all warnings.
+    /// The expression that is offered for a line's, and the places of all warnings.
     fn offered(line: &str) -> Vec<String> {
         let (mut sources, mut sink) = (Sources::default(), Sink::default());
         sources.add("test.s", format!("{line}\n"));

@@ -11,12 +11,12 @@ use takt_isa::timing::Cycle;
 /// Lines of each list of the text; the JSON has all.
 const SHOWN: usize = 12;
 
-/// What took cycles: at which issue first, how often, and how many in all.
+/// A cause of stalls: the first issue that it held up, how often it did, and the cycles in all.
 struct Line {
     first: usize,
     times: u32,
     cycles: Cycle,
-    /// Whether each time took as many.
+    /// True if each time took as many.
     is_even: bool,
     text: String,
 }

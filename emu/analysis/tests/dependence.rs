@@ -158,7 +158,7 @@ fn a_port_that_another_one_sends() {
     assert_eq!(sent_by(" fdiv o:float, i:float, 3.0\n mov q, 1").map(|periods| periods.most), Some(None));
 }
 
-/// Whether a random program shows a response at all, and how many of its pairs of ports were claimed to have none before later periods.
+/// Counts of a random program: responses that show, and pairs of ports that were claimed to have none before later periods.
 fn compare(seed: u64, program: &Program, met: &mut [u64; 3]) {
     let Ok(dependence) = Dependence::new(program, &BTreeSet::new()) else { return };
     let mut random = Random::new(!seed);

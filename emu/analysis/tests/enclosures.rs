@@ -391,7 +391,7 @@ impl Run<'_> {
         }
     }
 
-    /// Whether the statements hold after this period, too: while states are in their ranges.
+    /// True as long as the states are in their ranges: then the statements hold for the next period, too.
     fn states(&self, emulator: &Emulator, checked: &mut Checked) -> bool {
         let mut kept = true;
         for range in self.program.ranges.iter().filter(|range| !self.program.machine.is_input(range.register))

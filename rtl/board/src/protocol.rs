@@ -51,7 +51,7 @@ pub const READ_ONLY: u8 = 1;
 /// Status of an answer: the program did not wait.
 pub const BUSY: u8 = 2;
 
-/// Whether a request to this address waits until the program is between two periods.
+/// True if a request to this address waits until the program is between two periods.
 pub const fn waits(address: u16) -> bool {
     matches!(address >> 12, 1..=3 | 8..)
 }
@@ -183,7 +183,7 @@ fn request(number: u8, command: u8, count: u8, address: u16, words: &[u32]) -> V
     bytes
 }
 
-/// What a board answers: a status, and the words that were read.
+/// The bytes of a board's answer: a status, and the words that were read.
 #[cfg(test)]
 pub(crate) fn answer(number: u8, status: u8, words: &[u32]) -> Vec<u8> {
     let mut bytes = vec![ANSWER, number, status, words.len() as u8];
@@ -293,7 +293,7 @@ pub enum LinkError {
         wanted: usize,
         /// Words of the last answer.
         came: usize,
-        /// How often it was asked.
+        /// The number of attempts.
         attempts: u32,
     },
     /// An address that cannot be written.

@@ -57,7 +57,7 @@ impl Serial {
     }
 }
 
-/// Whether the device failed, as it does when it is pulled out.
+/// True if the device failed, as it does when it is pulled out.
 #[cfg(unix)]
 fn is_failure(error: &io::Error) -> bool {
     error.raw_os_error() == Some(rustix::io::Errno::IO.raw_os_error())

@@ -68,7 +68,7 @@ fn ports(design: &Design) -> String {
     text
 }
 
-/// What a simulation is made of, from its Verilog, its driver and what that includes.
+/// The sources of a simulation, from its Verilog, its driver and the driver's headers.
 pub(crate) fn sources<'a>(
     (top, prefix): (&'a str, &'static str),
     files: Vec<(&'a str, &'a str)>,

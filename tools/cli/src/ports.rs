@@ -51,22 +51,22 @@ impl Inputs {
     }
 }
 
-/// Opens inputs, and outputs under their titles. Where a plant may be at the other end of both, it may wait for the titles before
-/// it sends anything: they are written before anything is read. Else nothing is written before the inputs are known to be some.
-pub(crate) fn open_both(
+/// Opens inputs by `open`, and outputs under their titles. Where a plant may be at the other end of both, it may wait for the titles
+/// before it sends anything: they are written before anything is read. Else nothing is written before the inputs are known to be some.
+pub(crate) fn open_both<I>(
     inputs: Option<&Path>,
-    ports: &[Port],
+    open: impl FnOnce() -> Result<I>,
     outputs: Option<&Path>,
     titles: impl Iterator<Item = String>,
-) -> Result<(Inputs, Option<Out>)> {
+) -> Result<(I, Option<Out>)> {
     let mut outputs = outputs.map(Out::create).transpose()?;
     let titled = |outputs: &mut Option<Out>| outputs.as_mut().map_or(Ok(()), |out| write_row(out, titles));
     if inputs.is_some_and(files::is_live) {
         titled(&mut outputs)?;
         outputs.as_mut().map_or(Ok(()), Out::flush)?;
-        return Ok((Inputs::open(inputs, ports)?, outputs));
+        return Ok((open()?, outputs));
     }
-    let inputs = Inputs::open(inputs, ports)?;
+    let inputs = open()?;
     titled(&mut outputs)?;
     Ok((inputs, outputs))
 }

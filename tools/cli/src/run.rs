@@ -236,8 +236,8 @@ fn run_periods(
     let live = path.is_some_and(files::is_live);
     let program = emulator.program();
     let titles = program.outputs.iter().map(|port| port.name.clone()).chain(["cycles".to_owned()]);
-    let (mut inputs, mut outputs) =
-        ports::open_both(path, &program.inputs, arguments.outputs.as_deref(), titles)?;
+    let open = || Inputs::open(path, &program.inputs);
+    let (mut inputs, mut outputs) = ports::open_both(path, open, arguments.outputs.as_deref(), titles)?;
     // Where a row appears for each period, that is progress enough.
     let all = arguments.periods.or_else(|| progress::rows(path)).filter(|_| !live);
     let shows_rows = arguments.outputs.as_deref().is_some_and(files::is_dash);

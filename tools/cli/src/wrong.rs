@@ -38,7 +38,7 @@ const INSTEAD: &[(&[&str], &str, &str)] = &[
     (&["language-server"], "lsp", "is the language server"),
 ];
 
-/// What to write instead of a command that there is not, and what that does.
+/// The command to write instead of one that there is not, and its purpose.
 fn instead(name: &str) -> Option<(&'static str, &'static str)> {
     let name = name.to_ascii_lowercase();
     let row = INSTEAD.iter().find(|(names, ..)| names.contains(&name.as_str()))?;

@@ -35,7 +35,7 @@ fn runs() -> Vec<(String, Vec<String>)> {
         .collect()
 }
 
-/// What ends a run alone ends it in a batch, at the same period.
+/// A limit that ends a run alone ends it in a batch, at the same period.
 #[test]
 fn a_limit_of_cycles_is_as_alone() {
     let folder = Folder::new();

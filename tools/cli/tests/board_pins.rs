@@ -1,4 +1,4 @@
-//! What drives the pins of a simulated board, the board that a wiring names, and what is bounded of pins that answer with a density.
+//! Pins of a simulated board and their drivers, the board that a wiring names, and bounds of pins that answer with a density.
 #![cfg(unix)]
 
 mod common;

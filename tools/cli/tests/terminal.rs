@@ -272,7 +272,7 @@ fn a_board_at_the_prompt() {
     assert!(terminal.text().ends_with("the program runs; outputs drive"), "{}", terminal.text());
 }
 
-/// What takes long says how long still, and what assembles for long that it does; in a pipe nothing of it is written.
+/// Long work shows its time to go, and long assembling that it goes on; in a pipe nothing of it is written.
 #[test]
 fn progress_of_what_takes_long() {
     const SLOW: &str = ".input x\n.output y\n.reg n:int\n.once\n wait p\n.period\np: li n, 100000\nturn: isub n, n, 1\n bnz n, turn\n mov y, x\n wait p\n";

@@ -134,7 +134,7 @@ impl Table {
         titles.unwrap_or_default()
     }
 
-    /// Where the last row is: the table's name and the line.
+    /// The place of the last row: the table's name and the line.
     pub fn place(&self) -> String {
         place(&self.name, &self.record)
     }

@@ -1,4 +1,4 @@
-//! Where a watchpoint stops does not depend on where a search for it begins, nor on its direction: against a walk through all
+//! Watchpoints stop at the same places wherever a search for them begins, and in both directions: against a walk through all
 //! positions that knows nothing of searches.
 
 use std::fmt::Write as _;
@@ -80,7 +80,7 @@ fn rows(program: &Program, seed: u64, periods: usize) -> Vec<Vec<(Register, u32)
     (0..periods).map(|_| program.inputs.iter().map(|port| (port.register, value())).collect()).collect()
 }
 
-/// What is watched and how.
+/// A watched name and its test.
 const WATCHES: [(&str, Kind); 5] = [
     ("v0", Kind::Changed),
     ("v3", Kind::Changed),
@@ -110,7 +110,7 @@ struct Held {
     register: Register,
     /// The addresses between which the next bundle must be: above the first, up to the second.
     range: Option<(u32, u32)>,
-    /// Whether its register has other values, too.
+    /// True if its register has other values, too.
     shares: bool,
 }
 
@@ -143,7 +143,7 @@ impl Held {
     }
 }
 
-/// What there is to see of the values of a watched name, each in its register, position by position.
+/// The visible values of a watched name, each in its register, position by position.
 struct Walk {
     values: Vec<Held>,
     other: Option<Live>,
@@ -337,7 +337,7 @@ fn of_a_core_of_a_system_too() {
     assert!(seen > 50, "{seen}");
 }
 
-/// What happens at the end of a stretch that is searched matters a few positions later: an input port of a random system.
+/// An event at the end of a searched stretch matters a few positions later: an input port of a random system.
 #[test]
 fn an_input_is_seen_over_the_end_of_a_stretch() {
     const END: u64 = 9000;

@@ -31,7 +31,7 @@ pub(crate) struct Failure {
     pub(crate) text: String,
 }
 
-/// What a failure is made of, for a pickle: in the order of its fields, the message's text last.
+/// The parts of a failure, for a pickle: in the order of its fields, the message's text last.
 type Parts = (
     (usize, usize),
     (String, String, String),

@@ -16,7 +16,7 @@ pub(crate) struct Interrupt {
 impl Interrupt {
     /// How often, at most.
     const EVERY: Duration = Duration::from_millis(20);
-    /// What a period counts as beside its cycles: setting inputs and reading outputs takes time, too.
+    /// The cycles that a period counts as beside its own: setting inputs and reading outputs takes time, too.
     const PERIOD: u64 = 1000;
 
     pub(crate) fn new() -> Interrupt {

@@ -36,7 +36,7 @@ pub(crate) struct Program {
     debug: Option<DebugInfo>,
 }
 
-/// What is said of a program that was assembled, for one that comes from a pickle: there it is not assembled again.
+/// The assembler's messages of a program, for one that comes from a pickle: there it is not assembled again.
 #[derive(Clone, FromPyObject, IntoPyObject)]
 pub(crate) struct Kept(String, Option<(String, String)>, Vec<(Option<String>, u32, u32)>);
 
@@ -51,7 +51,7 @@ struct Recipe {
     options: Options,
 }
 
-/// What was wished for, in words: `schedule`, `contract`, `effort`, `warnings`.
+/// The options in words: `schedule`, `contract`, `effort`, `warnings`.
 #[derive(Clone, FromPyObject, IntoPyObject)]
 pub(crate) struct Wishes(String, String, Option<u32>, Vec<String>);
 

@@ -17,12 +17,12 @@ use takt_isa::{Register, Type};
 /// Input values and periods since reset of which a machine keeps what it was given (8 bytes each).
 const HISTORY: usize = 1 << 20;
 
-/// What a machine was given since reset: what a pickle needs to bring another one to the same state.
+/// The inputs of a machine since reset: with them a pickle brings another one to the same state.
 #[derive(Clone, Default)]
 struct History {
     /// For each period, how many inputs were given, and then each with its number and its bits.
     words: Vec<u32>,
-    /// Why there is none.
+    /// The reason if there is none.
     lost: Option<&'static str>,
 }
 

@@ -108,7 +108,7 @@ def test_a_machine_that_cannot_be_pickled_says_why():
 
 def test_signals_are_heard_between_and_within_periods():
     """A period of about a million cycles, a hundred times: the handler is called often, not every 64 periods."""
-    source = ".input x\n.output y\n.reg n:int\n.period\nloop: li n, 250000\nturn: isub n, n, 1\n bnz n, turn\n mov y, x\n wait loop\n"
+    source = ".input x\n.output y\n.reg n:int\n.period\nloop: li n, 100000\nturn: isub n, n, 1\n bnz n, turn\n mov y, x\n wait loop\n"
     program = takt.assemble(source)
     calls = 0
 
@@ -118,13 +118,13 @@ def test_signals_are_heard_between_and_within_periods():
 
     before = signal.signal(signal.SIGALRM, handler)
     try:
-        signal.setitimer(signal.ITIMER_REAL, 0.001, 0.001)
+        signal.setitimer(signal.ITIMER_REAL, 0.05, 0.01)
         program.run({"x": np.zeros(100)})
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
     # Every 64 periods would be once.
-    assert calls > 3
+    assert calls > 5
 
 
 def batch(program):

@@ -101,7 +101,7 @@ fn board(program: &Program, folder: &Path) -> Result<()> {
     write(folder, "board.json", &description.to_string())
 }
 
-/// Where the circuits are written.
+/// The folder into which the circuits are written.
 const FOLDER: &str = "target/clients/circuits";
 
 /// Writes the circuits. What the clients' tests are about, and by what they are run.

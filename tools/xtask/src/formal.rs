@@ -39,7 +39,7 @@ impl Arguments {
     pub(crate) const SHARE: Arguments = Arguments { machine: None, depth: 9 };
 }
 
-/// What the proofs are about, and by what.
+/// The proofs' inputs: circuits, depth, tools.
 pub(crate) fn inputs(arguments: &Arguments) -> Result<Inputs> {
     let library = Library::load(&root().join("rtl/units"))?;
     let own = Inputs::default().and((include_str!("formal.rs"), YOSYS, Z3, arguments.depth));

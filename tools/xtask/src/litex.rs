@@ -82,7 +82,7 @@ fn prepare(folder: &Path) -> Result<()> {
     write(folder, "expected.json", &json!(expected).to_string())
 }
 
-/// Where what the SoC needs is written.
+/// The folder into which the SoC's files are written.
 const FOLDER: &str = "target/clients/litex";
 
 /// Writes what the SoC needs. What its simulation is about, and by what.

@@ -263,7 +263,7 @@ fn cargo_test(arguments: &[&str], watched: &[String; 2]) -> Command {
     tests
 }
 
-/// What is no test of cargo's. Installs what it needs, and what the tests need.
+/// Runs the checks that are no tests of cargo's, and installs the packages that they need.
 fn beside_tests(full: bool) -> Result<()> {
     extension()?;
     let share = formal::Arguments::SHARE;
@@ -273,21 +273,19 @@ fn beside_tests(full: bool) -> Result<()> {
     dist::test()
 }
 
-/// What decides about the placed and routed board: circuits, what writes them, the tools, the test.
+/// The inputs of the test of the placed and routed board: circuits, their generators, the tools, the test itself.
 fn routed() -> Result<passed::Inputs> {
     let tools = passed::Inputs::default().and((venv::YOSYS, takt_board::tools::NEXTPNR));
-    let folders = [
-        "rtl/units",
-        "rtl/core",
-        "rtl/ecp5",
-        "rtl/src",
-        "rtl/board/verilog",
-        "rtl/board/src",
-        "isa/src/spec",
-    ];
+    let folders =
+        ["rtl/units", "rtl/core", "rtl/ecp5", "rtl/src", "rtl/board/verilog", "rtl/board/src", "isa/src"];
     let files = folders
         .iter()
-        .chain(&["rtl/board/tests/top.rs", "rtl/board/boards"])
+        .chain(&[
+            "rtl/board/tests/top.rs",
+            "rtl/board/tests/harness",
+            "rtl/board/boards",
+            "programs/examples/board",
+        ])
         .filter(|path| root().join(path).exists());
     files.into_iter().try_fold(tools, |inputs, path| inputs.files(path))
 }

@@ -12,7 +12,7 @@ use std::hash::{Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What is hashed of a check: all that it reads, and the tools that it runs.
+/// The hash of a check's inputs: all files that it reads, and the tools that it runs.
 #[derive(Default)]
 pub(crate) struct Inputs(DefaultHasher);
 
@@ -23,7 +23,7 @@ impl Inputs {
         self
     }
 
-    /// What a program says about itself, such as its version.
+    /// A program's own words about itself, such as its version.
     pub(crate) fn tool(self, program: &str, ask: &str) -> Inputs {
         let said = Command::new(program).arg(ask).output().map(|output| output.stdout);
         self.and((program, said.unwrap_or_default()))
@@ -67,7 +67,7 @@ fn cached(name: &str, hash: &str) -> PathBuf {
     takt_rtl::verilator::cache_folder().join("passed").join(format!("{name}-{hash}"))
 }
 
-/// Whether a check has passed with these inputs.
+/// True if a check has passed with these inputs.
 pub(crate) fn has_passed(name: &str, inputs: &Inputs) -> bool {
     let hash = inputs.text();
     let passed = listed().get(name) == Some(&hash) || cached(name, &hash).is_file();

@@ -1,4 +1,4 @@
-//! Whether the tests find every crate that takt with all features compiled: `tools/unify`'s purpose.
+//! Checks that the tests find every crate that takt with all features compiled: `tools/unify`'s purpose.
 
 use crate::cargo;
 use anyhow::{Context, Result, bail};

@@ -93,7 +93,7 @@ impl Relieved {
 /// was scheduled.
 ///
 /// # Errors
-/// Why it cannot be done; the program is in its order or in that of the source, whichever lacks fewer registers.
+/// The reason if it cannot be done; the program is then in its order or in that of the source, whichever lacks fewer registers.
 pub(crate) fn relieve(
     ir: &mut Ir,
     report: &mut Report,
@@ -132,7 +132,7 @@ pub(crate) fn relieve(
     }
     let best = near.into_iter().chain(spilled).chain(written).min_by_key(Relieved::cycles);
     let Some(best) = best else {
-        // What is missing is told of the order that is short of least.
+        // The message speaks of the order that lacks the fewest registers.
         if let Some(unfit) = unfit.filter(|unfit| unfit.missing < room.shortage()) {
             *ir = *unfit.program;
         }

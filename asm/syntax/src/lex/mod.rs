@@ -273,7 +273,7 @@ impl TokenError {
     }
 }
 
-/// What to say of a range where a number is read, given the line's tokens before it.
+/// The message for a range where a number is read, given the line's tokens before it.
 fn range_before(before: &[(Token, Span)], names: &Interner, text: &str, span: Span) -> Option<Diagnostic> {
     let name = |(token, span): &(Token, Span)| match token {
         Token::Name(name) => Some((names.text(*name), *span)),

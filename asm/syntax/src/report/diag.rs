@@ -362,7 +362,7 @@ impl<'s> Shown<'s> {
         Shown { name, lines: Lines::of(&text), text: text.into(), moved }
     }
 
-    /// Where a byte of the source is shown.
+    /// The place at which a byte of the source is shown.
     fn place(&self, byte: usize) -> usize {
         let before = self.moved.partition_point(|(written, _)| *written <= byte);
         let (written, shown) = before.checked_sub(1).map_or((0, 0), |last| self.moved[last]);
@@ -384,7 +384,7 @@ struct View<'s> {
     sources: &'s Sources,
     /// The lines of sources, as they are written.
     lines: HashMap<usize, Lines>,
-    /// What is shown of those that a diagnostic points into.
+    /// The shown text of the sources that a diagnostic points into.
     shown: HashMap<usize, Shown<'s>>,
     /// File, line index and visible bytes of what is shown, where a line is cut.
     windows: Vec<(usize, usize, Range<usize>)>,

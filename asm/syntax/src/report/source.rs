@@ -24,7 +24,7 @@ pub fn line_feeds(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Where carriage returns stand that no line feed follows.
+/// The places of carriage returns that no line feed follows.
 fn lone_returns(text: &str) -> impl Iterator<Item = usize> + '_ {
     let bytes = text.as_bytes();
     text.match_indices('\r').map(|(at, _)| at).filter(|at| bytes.get(at + 1) != Some(&b'\n'))

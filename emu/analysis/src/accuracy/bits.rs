@@ -182,7 +182,7 @@ fn scaled(float: &Number, by: &Number) -> Option<Number> {
     })
 }
 
-/// Whether an integer may be a multiple of 2²³, so that adding it to a float's bits scales the float.
+/// True if an integer may be a multiple of 2²³, so that adding it to a float's bits scales the float.
 fn may_scale(by: &Number) -> bool {
     (by.actual.high / NORMAL).floor() * NORMAL >= by.actual.low
 }
@@ -238,7 +238,7 @@ pub(super) fn difference(a: &Value, b: &Value) -> Value {
     Value::Integer(Rc::new(added(&a.whole(), &negated(&other))))
 }
 
-/// What remains of a positive float whose exponent, counted from a base, is taken off: from the base to the next float of its fraction.
+/// The fraction of a positive float: its exponent, counted from a base, is taken off, so that it lies between the base and twice that.
 fn fraction(float: &Number, offset: &Offset) -> Option<Number> {
     if float.actual.low < power(LEAST_EXPONENT) {
         return None;

@@ -5,6 +5,7 @@
 
 use super::affine::Affine;
 use super::bits;
+use super::enclosure::{Assumed, Enclosure, Hazard, Moment, OutputBound};
 use super::interval::Interval;
 use super::value::{MAX_PATTERNS, Number, Operand, Problem, Value};
 use super::{LARGEST_ROUNDED, ROUNDERS, fixed, is_rounder, ulp};
@@ -24,85 +25,6 @@ pub const MAX_BUNDLES: u64 = 1 << 18;
 /// Words of data memory that a load may read at most, where its address is not known for certain.
 const MAX_WORDS: usize = 4096;
 
-/// The bound of an output's error.
-#[derive(Clone, Debug, PartialEq)]
-pub struct OutputBound {
-    /// Its name.
-    pub name: String,
-    /// Its register.
-    pub register: Register,
-    /// What it may be; `None` if a problem leaves that open.
-    pub range: Option<Interval>,
-    /// The magnitude of its error at most.
-    pub error: Option<f64>,
-    /// What each operation's rounding adds to that at most, by word, the largest first.
-    pub parts: Vec<(u32, f64)>,
-}
-
-impl OutputBound {
-    /// The bound in ulps of the output's largest value.
-    pub fn ulps(&self) -> Option<f64> {
-        Some(self.error? / ulp(self.range?.magnitude()))
-    }
-}
-
-/// What may go wrong at an operation.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Hazard {
-    /// Index into [`Program::code`].
-    pub word: u32,
-    /// What.
-    pub problem: Problem,
-    /// What the operation reads: its registers, and what they may hold as numbers, where that is known.
-    pub operands: Vec<(Register, Option<Interval>)>,
-}
-
-/// The moment at which a state must lie in its range.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Moment {
-    /// The first period begins: the base of the induction over periods.
-    First,
-    /// A period ends that began with all states in their ranges: its step.
-    Later,
-}
-
-/// A state that was not shown to be in its range.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Assumed {
-    /// The state.
-    pub range: Range,
-    /// The moment.
-    pub moment: Moment,
-    /// Where it may be then; `None` if that is not known as a number.
-    pub found: Option<Interval>,
-}
-
-/// What holds for every period whose inputs and states begin it within their ranges, the states free of error.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Enclosure {
-    /// The outputs that carry binary32 and that a period writes.
-    pub outputs: Vec<OutputBound>,
-    /// Operations that may have no number as their result, or convert a number that fits no integer; of those that depend on such an
-    /// operation, the first. If there are none: no NaN, no overflow, no division by zero, no conversion out of range.
-    pub hazards: Vec<Hazard>,
-    /// States whose range is promised by the source and not proved, at one of the two moments of an induction over periods.
-    pub assumed: Vec<Assumed>,
-    /// Operations gone through.
-    pub operations: u64,
-}
-
-impl Enclosure {
-    /// States not shown to begin the first period in their range: where there is one, the rest need not hold.
-    pub fn first(&self) -> impl Iterator<Item = &Assumed> {
-        self.assumed.iter().filter(|state| state.moment == Moment::First)
-    }
-
-    /// States not shown to end a period in their range.
-    pub fn later(&self) -> impl Iterator<Item = &Assumed> {
-        self.assumed.iter().filter(|state| state.moment == Moment::Later)
-    }
-}
-
 /// Encloses what every period of a program computes; of a program without periods, the run to its `halt`.
 ///
 /// # Errors
@@ -119,6 +41,7 @@ pub fn enclose(program: &Program) -> Result<Enclosure, BoundError> {
         first: BTreeSet::new(),
         needed: BTreeSet::new(),
         fixed: fixed(program),
+        float_outputs: float_outputs(program).map(|port| port.register).collect(),
         left: BTreeMap::new(),
         bundles: 0,
         operations: 0,
@@ -179,6 +102,8 @@ struct Explorer<'p> {
     needed: BTreeSet<Register>,
     /// Constants for good: [`fixed`].
     fixed: BTreeMap<Register, u32>,
+    /// The output ports that carry binary32.
+    float_outputs: BTreeSet<Register>,
     /// The states' values at the end of a period.
     left: BTreeMap<Register, Value>,
     bundles: u64,
@@ -439,8 +364,7 @@ impl Explorer<'_> {
         for ((number, slot), instruction) in machine.numbered_slots().zip(&instructions) {
             let value = self.operation(address, number, instruction, state)?;
             if let (Some(register), Some(value)) = (instruction.writes(slot), value) {
-                let floats = |port: &Port| port.register == register && port.ty == Type::F;
-                if self.program.outputs.iter().any(floats)
+                if self.float_outputs.contains(&register)
                     && value.float().is_err_and(|problem| problem != Problem::Told)
                 {
                     self.hazards
@@ -601,16 +525,14 @@ impl Explorer<'_> {
         let rounder = |register: &Register| self.fixed.get(register).is_some_and(|bits| is_rounder(*bits));
         let terms = terms.filter(|_| instruction.reads().iter().any(rounder));
         let (may_decide, may_round) = terms.map_or((false, true), decides);
-        let decided = may_decide.then(|| bits::nearest(&number, self.symbol(None)));
-        let rounded = match may_round {
-            true => Some(self.rounded(word, instruction.op.row(), number, operands)?),
-            false => None,
+        let row = instruction.op.row();
+        let result = if !may_decide {
+            self.rounded(word, row, number, operands)?
+        } else {
+            let decided = bits::nearest(&number, self.symbol(None));
+            if may_round { decided.join(&self.rounded(word, row, number, operands)?) } else { decided }
         };
-        let both = match (decided, rounded) {
-            (Some(decided), Some(rounded)) => decided.join(&rounded),
-            (decided, rounded) => decided.or(rounded).ok_or(Problem::Overflow)?,
-        };
-        Ok(Value::Float(Rc::new(both)))
+        Ok(Value::Float(Rc::new(result)))
     }
 
     /// The same where its rounding counts as an error.
@@ -658,10 +580,9 @@ impl Explorer<'_> {
 
     /// A period ends.
     fn end(&mut self, state: &State) {
-        let ports = self.program.outputs.iter().filter(|port| port.ty == Type::F);
-        for Port { register, .. } in ports {
-            if let Some(value) = state.registers.get(register).filter(|value| **value != Value::Unknown) {
-                join_into(&mut self.outputs, *register, value);
+        for register in self.float_outputs.clone() {
+            if let Some(value) = state.registers.get(&register).filter(|value| **value != Value::Unknown) {
+                join_into(&mut self.outputs, register, value);
             }
         }
         // On to the next period, which may read it.
@@ -710,7 +631,7 @@ impl Explorer<'_> {
             });
             first.into_iter().chain(later)
         };
-        let outputs = self.program.outputs.iter().filter(|port| port.ty == Type::F).filter_map(output);
+        let outputs = float_outputs(self.program).filter_map(output);
         let hazard = |((word, problem), operands): (&(u32, Problem), &Vec<_>)| Hazard {
             word: *word,
             problem: *problem,
@@ -725,6 +646,11 @@ impl Explorer<'_> {
     }
 }
 
+/// The output ports that carry binary32.
+fn float_outputs(program: &Program) -> impl Iterator<Item = &Port> {
+    program.outputs.iter().filter(|port| port.ty == Type::F)
+}
+
 /// A state's value as its range takes it: as binary32 or as an integer.
 fn held(range: &Range, value: &Value) -> Option<Interval> {
     match range.ty {
@@ -733,7 +659,7 @@ fn held(range: &Range, value: &Value) -> Option<Interval> {
     }
 }
 
-/// Whether a state is known to be in its range.
+/// True if a state is known to be in its range.
 fn shown(range: &Range, value: Option<&Value>) -> bool {
     let (low, high) = range.ends();
     let found = value.and_then(|value| held(range, value));
@@ -745,7 +671,7 @@ fn join_into(values: &mut BTreeMap<Register, Value>, register: Register, value: 
     values.insert(register, joined);
 }
 
-/// Whether a sum of these terms may be, and may not be, a decision for the nearest integer: one term is a number beyond which binary32
+/// Tells if a sum of these terms may be, and may not be, a decision for the nearest integer: one term is a number beyond which binary32
 /// has no fraction, and the other is small. [`Shadow`](super::Shadow) takes the same decisions by the terms of the run.
 fn decides(terms: [Interval; 2]) -> (bool, bool) {
     let [a, b] = terms;

@@ -6,6 +6,7 @@
 mod affine;
 mod bits;
 mod enclose;
+mod enclosure;
 mod interval;
 mod probe;
 mod shadow;
@@ -14,7 +15,8 @@ mod value;
 use std::collections::BTreeMap;
 use takt_isa::{Instruction, Program, Register};
 
-pub use enclose::{Assumed, Enclosure, Hazard, MAX_BUNDLES, Moment, OutputBound, enclose};
+pub use enclose::{MAX_BUNDLES, enclose};
+pub use enclosure::{Assumed, Enclosure, Hazard, Moment, OutputBound};
 pub use interval::Interval;
 pub use shadow::{Decision, Lost, OperationAccuracy, OutputAccuracy, Part, Shadow, Worst};
 pub use value::Problem;

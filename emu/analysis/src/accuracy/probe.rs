@@ -24,7 +24,7 @@ impl Probe {
         Probe { value, bits, sum: None, whole: None, carried: None }
     }
 
-    /// Whether its exact value as a float is not the run's.
+    /// True if its exact value as a float is not the run's.
     fn carries(self) -> bool {
         let exact = self.whole.unwrap_or(self.value);
         !exact.is_nan() && exact != f64::from(f32::from_bits(self.bits))

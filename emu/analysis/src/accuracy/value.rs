@@ -174,7 +174,7 @@ impl Value {
         }
     }
 
-    /// Whether it is binary32 with an error, so that its bits are not those of the exact value.
+    /// True if it is binary32 with an error, so that its bits are not those of the exact value.
     pub(super) fn carries(&self) -> bool {
         match self {
             Value::Float(number) => !number.error.is_zero(),

@@ -13,7 +13,7 @@ pub(super) struct Cell {
     least: u16,
     /// On every way to here there is a dependence on a read of at most so many periods ago.
     most: u16,
-    /// Whether the value may depend on a read of an earlier period.
+    /// True if the value may depend on a read of an earlier period.
     lasting: bool,
 }
 
@@ -39,7 +39,7 @@ impl Cell {
         Cell { most: self.most.max(other.most), ..self.with(other) }
     }
 
-    /// What a condition may have decided: it adds to what is possible, and nothing to what is certain.
+    /// Joins a control dependence: it adds to the possible reads, and nothing to the certain ones.
     pub(super) fn under(self, condition: Cell) -> Cell {
         Cell { most: self.most, ..self.with(condition) }
     }

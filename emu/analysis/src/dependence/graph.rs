@@ -13,7 +13,7 @@ use takt_isa::{BundleAddress, Effect, Flow, Instruction, Program, Register, Slot
 /// The number of a place: of a register that is written or an input, of a data word, and of what else keeps a value.
 pub(super) type Place = usize;
 
-/// Where a value comes from.
+/// The origin of a value.
 #[derive(Clone, Debug)]
 pub(super) enum Reads {
     /// These places.
@@ -22,7 +22,7 @@ pub(super) enum Reads {
     Memory(Vec<Place>),
 }
 
-/// Where a value goes.
+/// The destination of a value.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Writes {
     /// A place.
@@ -41,14 +41,14 @@ pub(super) struct Step {
     pub(super) sends: Vec<(Place, Place)>,
 }
 
-/// Where the ways that a branch parts have met again.
+/// The immediate post-dominator of a branch: there the ways that it parts have met again.
 #[derive(Clone, Debug)]
 pub(super) struct Gate {
     /// The block with the branch.
     pub(super) branch: usize,
-    /// Whether every way to here leads over the branch.
+    /// True if every way to here leads over the branch.
     pub(super) always: bool,
-    /// What is written on the ways.
+    /// The places that are written on the ways.
     pub(super) written: Vec<Place>,
 }
 
@@ -62,7 +62,7 @@ pub(super) struct Block {
     /// The blocks whose branches decide whether it is executed.
     pub(super) under: Vec<usize>,
     pub(super) gates: Vec<Gate>,
-    /// Whether its last bundle is a `wait`.
+    /// True if its last bundle is a `wait`.
     pub(super) waits: bool,
 }
 
@@ -296,7 +296,7 @@ impl Places {
         registers.iter().filter_map(|register| self.registers.get(register).copied()).collect()
     }
 
-    /// What a bundle does.
+    /// The effect of a bundle on dependences.
     fn step(&self, instructions: &[Instruction], slots: &[Slot]) -> Step {
         let mut step = Step::default();
         for (instruction, slot) in instructions.iter().zip(slots) {
@@ -464,7 +464,7 @@ fn section(
     Section { blocks, gates: end_gates, next: next.into_iter().collect() }
 }
 
-/// Whether each way to `block` leads over `over`.
+/// Dominance: true if each way to `block` leads over `over`.
 fn is_over(dominators: &[Option<usize>], over: usize, mut block: usize) -> bool {
     while let Some(next) = dominators[block].filter(|&next| next != block) {
         if next == over {

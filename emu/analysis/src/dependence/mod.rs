@@ -32,7 +32,7 @@ pub struct Periods {
     pub least: u32,
     /// It does after so many at most, whatever the branches and addresses; `None` if these can put it off without end.
     pub most: Option<u32>,
-    /// Whether states carry the dependence on to later periods.
+    /// True if states carry the dependence on to later periods.
     pub lasting: bool,
 }
 
@@ -87,13 +87,13 @@ impl Dependence {
         Dependence { flat: None }
     }
 
-    /// What depends on an input port.
+    /// The dependences on an input port.
     pub fn on(&self, input: Register) -> Dependents<'_> {
         Dependents { solved: self.flat.as_ref().map(|flat| Solved::new(flat, input)) }
     }
 }
 
-/// What depends on an input port.
+/// The dependences on an input port.
 #[derive(Debug)]
 pub struct Dependents<'a> {
     solved: Option<Solved<'a>>,

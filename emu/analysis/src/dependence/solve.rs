@@ -5,7 +5,7 @@ use super::graph::{Flat, Gate, Place, Reads, Section, Step, Writes};
 use super::{MAX_ROUNDS, Periods, Sent};
 use takt_isa::Register;
 
-/// What every place depends on.
+/// The dependences of every place.
 type State = Vec<Cell>;
 
 /// The ends of a section, whichever way leads there.
@@ -17,11 +17,11 @@ struct Ends {
     any: State,
 }
 
-/// What depends on one input.
+/// The dependences on one input.
 #[derive(Debug)]
 pub(super) struct Solved<'a> {
     flat: &'a Flat,
-    /// Whether the rounds came to an end.
+    /// True if the rounds reached a fixed point.
     whole: bool,
     before: State,
     after: State,
@@ -213,12 +213,12 @@ impl Flat {
     }
 }
 
-/// What depends on all of these places.
+/// The join of the dependences of these places.
 fn of_all(places: &[Place], state: &State) -> Cell {
     places.iter().fold(Cell::NONE, |all, &place| all.with(state[place]))
 }
 
-/// What depends on a branch because the ways that it parts write differently.
+/// Control dependences: the places that depend on a branch because the ways that it parts write differently.
 fn open(gates: &[Gate], tested: &[Cell], state: &mut State, any: &mut State) {
     for Gate { branch, always, written } in gates {
         let test = tested[*branch];

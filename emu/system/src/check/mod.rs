@@ -30,7 +30,7 @@ pub struct Request<'a> {
     pub machine: Option<&'static Machine>,
 }
 
-/// Why there is no program.
+/// An error that leaves no program.
 #[derive(Debug)]
 pub enum ProgramError<E> {
     /// It is not there, or cannot be read: a mistake of the system's file.

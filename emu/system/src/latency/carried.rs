@@ -9,20 +9,20 @@ use takt_isa::Register;
 /// Of each field of one link, and each of another: whether and when the second follows the first.
 type Fields = Vec<Vec<Option<Periods>>>;
 
-/// What every core of a system passes on.
+/// The dependences within every core of a system.
 #[derive(Clone, Debug)]
 pub(super) struct Carried {
     between: BTreeMap<(usize, usize), Fields>,
 }
 
-/// What of a way's last link follows what of its first.
+/// The fields of a way's last link that follow fields of its first.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct States {
     /// For each core in between, the least number of its periods.
     pub(super) least: Vec<u32>,
     /// So many at most, if that is certain of every core.
     pub(super) most: Option<Vec<u32>>,
-    /// Whether states carry the value on to later periods.
+    /// True if states carry the value on to later periods.
     pub(super) lasting: bool,
 }
 

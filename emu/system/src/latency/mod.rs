@@ -38,7 +38,7 @@ pub struct Latency {
     pub least_states: Vec<u32>,
     /// Through how many at most; none if branches, or addresses of data memory, can put the response off without end.
     pub most_states: Option<Vec<u32>>,
-    /// Whether states carry the value on to periods after the first response.
+    /// True if states carry the value on to periods after the first response.
     pub lasting: bool,
     /// The FIFOs among the links. They are taken to be empty.
     pub queues: Vec<usize>,

@@ -55,7 +55,7 @@ pub struct Route {
     pub least: Vec<u32>,
     /// After how many it does at most; none if branches or addresses can put it off without end.
     pub most: Option<Vec<u32>>,
-    /// Whether states carry an input on to later periods.
+    /// True if states carry an input on to later periods.
     pub lasting: bool,
 }
 

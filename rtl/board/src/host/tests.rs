@@ -3,7 +3,7 @@
 use super::*;
 use crate::protocol::{BUSY, DONE, ID, READ_ONLY, SYSTEM_ID};
 
-/// What a board answers to a request: status and words, from the request's bytes.
+/// A board's answer to a request: status and words, from the request's bytes.
 type Answers = fn(&[u8]) -> Option<(u8, Vec<u32>)>;
 
 /// A board that brings a byte at a time, or noise for ever.

@@ -39,7 +39,7 @@ impl Part {
     }
 }
 
-/// What a pin answers with.
+/// The kind of a pin's answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
     /// An edge: the parts of the way end with it.
@@ -234,7 +234,11 @@ pub fn program_ways(wiring: &Wiring, program: &Program, span: (u64, u64)) -> Way
             let latest = most.unwrap_or(least);
             let mut between = way.between.clone();
             if let Some(text) = states_text(least, latest) {
-                between.insert(3, Part::new(text, u64::from(least) * period, u64::from(latest) * period));
+                // Behind the program, before the output registers.
+                between.insert(
+                    between.len() - 1,
+                    Part::new(text, u64::from(least) * period, u64::from(latest) * period),
+                );
             }
             let periods = Part::sum("", &between);
             let [inputs, outputs] = [of(&way.inputs, &inputs), of(&way.outputs, &outputs)];

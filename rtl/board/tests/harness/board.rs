@@ -1,4 +1,4 @@
-//! What tests of complete boards share: measuring from pin to pin, and writes that a board must refuse.
+//! Helpers for tests of complete boards: measuring from pin to pin, and writes that a board must refuse.
 // Each test uses a part of it.
 #![allow(dead_code)]
 
@@ -28,7 +28,7 @@ pub(crate) fn refuses(host: &mut Host<Simulation>, address: u16, words: &[u32]) 
     }
 }
 
-/// Whether a running program leaves what is there as it is.
+/// True if a running program leaves the word at an address as it is.
 fn is_constant(address: u16) -> bool {
     !matches!(address, 2..=3 | 7..=11 | 19 | 0x102 | 0x3400..)
 }

@@ -175,7 +175,7 @@ impl Command {
     }
 }
 
-/// Where commands come from.
+/// The source of commands.
 enum Source {
     File(VecDeque<Command>),
     /// Standard input: lines as they come, and the number of the last one.
@@ -307,7 +307,7 @@ pub(super) struct Plant<'a> {
     pub(super) outputs: Option<&'a Path>,
 }
 
-/// What a column drives.
+/// The target of a column.
 enum Column<'a> {
     Pin(&'a Pin),
     /// An encoder's pins as numbers of inputs, and its last count.
@@ -322,25 +322,19 @@ impl Plant<'_> {
         cycles: Option<u64>,
         out: &mut Out,
     ) -> Result<()> {
-        let live = files::is_live(self.inputs);
-        let mut outputs = self.outputs.map(Out::create).transpose()?;
-        let flush = |outputs: &mut Option<Out>| outputs.as_mut().map_or(Ok(()), Out::flush);
-        if let Some(outputs) = &mut outputs {
-            ports::write_row(outputs, self.pins.outputs.iter().map(|pin| pin.name.clone()))?;
-        }
-        if live {
-            // The other side may wait for it before it sends anything.
-            flush(&mut outputs)?;
-        }
         let names = self.pins.inputs.iter().map(|pin| (pin.name.clone(), Type::B));
         let counts = self.pins.encoders.iter().map(|encoder| (encoder.name.clone(), Type::I));
         let (shorts, short_pins) = self.pins.shorts();
         let ports = names.chain(counts).chain(shorts).enumerate();
         let ports = ports.filter_map(|(i, (name, ty))| Some(Port { name, register: Register::new(i)?, ty }));
         let ports: Vec<Port> = ports.collect();
-        let name = files::input_name(self.inputs);
-        let mut table =
-            Table::of_some(name, files::open(self.inputs)?, &ports).map_err(|error| anyhow!(error))?;
+        let open = || {
+            let name = files::input_name(self.inputs);
+            Table::of_some(name, files::open(self.inputs)?, &ports).map_err(|error| anyhow!(error))
+        };
+        let titles = self.pins.outputs.iter().map(|pin| pin.name.clone());
+        let (mut table, mut outputs) = ports::open_both(Some(self.inputs), open, self.outputs, titles)?;
+        let live = files::is_live(self.inputs);
 
         let mut sim = simulation()?;
         let mut columns: Vec<Column<'_>> = self.pins.inputs.iter().map(Column::Pin).collect();
@@ -396,9 +390,9 @@ impl Plant<'_> {
                     (f64::from(high) / f64::from(period)).to_string()
                 };
                 ports::write_row(outputs, self.pins.outputs.iter().map(part))?;
-            }
-            if live {
-                flush(&mut outputs)?;
+                if live {
+                    outputs.flush()?;
+                }
             }
         }
         outputs.map_or(Ok(()), Out::finish)

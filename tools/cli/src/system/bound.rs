@@ -44,11 +44,11 @@ pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
     if verdict { Ok(()) } else { Err(Failure::Reported.into()) }
 }
 
-/// What a first response is held against.
+/// The deadline that a first response is held against.
 #[derive(Clone, Copy)]
 pub(super) struct Deadline {
     cycles: u64,
-    /// Whether FIFOs are empty when the command comes.
+    /// True if FIFOs are empty when the command comes.
     empty: bool,
 }
 

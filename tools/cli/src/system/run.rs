@@ -96,8 +96,8 @@ pub(super) fn drive(
         anyhow::anyhow!("the system has run for {} cycles without ending ({flag})", system.now())
     };
     let titles = || host.outputs.iter().map(|output| output.name.clone());
-    let (mut inputs, mut outputs) =
-        ports::open_both(arguments.inputs, &columns, arguments.outputs, titles())?;
+    let open = || ports::Inputs::open(arguments.inputs, &columns);
+    let (mut inputs, mut outputs) = ports::open_both(arguments.inputs, open, arguments.outputs, titles())?;
     let live = arguments.inputs.is_some_and(files::is_live);
     let start = match &mut tracer {
         Some(tracer) => tracer.run_to_start(system, limit)?,

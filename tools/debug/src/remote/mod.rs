@@ -60,7 +60,7 @@ pub struct RemoteSession {
     shadow: Shadow,
     /// Whether `seen` is what the machine has.
     settled: bool,
-    /// What was seen of watched values.
+    /// The watched values as they were seen last.
     watched: Option<Search>,
 }
 

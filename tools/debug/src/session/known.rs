@@ -10,7 +10,7 @@ use takt_isa::timing::Cycle;
 /// Positions near the beginning of a search that are looked through first.
 const NEAR: Cycle = 1 << 12;
 
-/// What is known by cycle, for at most [`CHECKPOINTS`] of them: if there are more, every other one goes.
+/// Values by cycle, for at most [`CHECKPOINTS`] cycles: if there are more, every other one goes.
 #[derive(Clone, Debug)]
 pub(crate) struct Known<T>(BTreeMap<Cycle, T>);
 

@@ -192,7 +192,7 @@ pub struct Session {
     /// By cycle, ascending.
     edits: Vec<Edit>,
     stops: Vec<(u32, Stop)>,
-    /// What was watched at positions of the run.
+    /// The watched values at positions of the run.
     known: Known<Watcher>,
     next_id: u32,
     /// The line that a breakpoint stopped at, and the cycle.

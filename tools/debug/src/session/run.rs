@@ -364,7 +364,7 @@ impl Session {
         live.evaluate(&machine, self.program()).is_ok_and(|value| !value.is_zero())
     }
 
-    /// Whether every value in an expression is there.
+    /// True if every value in an expression is there.
     pub(super) fn is_there(&self, live: &Live) -> bool {
         live.is_there(&self.machine(), self.program())
     }

@@ -19,7 +19,7 @@ pub(crate) struct Search {
     ahead: Option<BTreeSet<Cycle>>,
 }
 
-/// What happens in a cycle matters at most so many positions later; results in flight are told of when they arrive.
+/// An event of a cycle matters at most so many positions later; results in flight are told of when they arrive.
 const AHEAD: Cycle = if INPUT_DELAY + 1 > 3 { INPUT_DELAY + 1 } else { 3 };
 
 #[derive(Clone)]
@@ -41,12 +41,12 @@ impl Search {
         (!session.stops.is_empty()).then_some(Search { interest, goal, ahead: None })
     }
 
-    /// Whether it knows of each watched value what it was where it was there last.
+    /// True if it knows each watched value as it was where it was there last.
     pub(crate) fn is_complete(&self) -> bool {
         self.watcher().is_none_or(Watcher::is_complete)
     }
 
-    /// Whether it is one for the session's stops as they are now.
+    /// True if it is one for the session's stops as they are now.
     pub(crate) fn is_of(&self, session: &Session) -> bool {
         self.watcher().is_some_and(|watcher| watcher.is_of(session))
     }

@@ -196,12 +196,12 @@ impl Watcher {
         watcher
     }
 
-    /// Whether it knows of each value what it was last.
+    /// True if it knows each value as it was last.
     pub(super) fn is_complete(&self) -> bool {
         self.watched.iter().flat_map(|(_, each)| each).all(|watched| watched.last.is_some())
     }
 
-    /// Whether it is one for the session's stops as they are now.
+    /// True if it is one for the session's stops as they are now.
     pub(super) fn is_of(&self, session: &Session) -> bool {
         self.watched.iter().map(|(id, _)| id).eq(session.stops.iter().map(|(id, _)| id))
     }
@@ -279,7 +279,7 @@ fn shown(value: Option<Value>) -> String {
     }
 }
 
-/// What there is to see of a value; `None` if it, or what it is compared with, is not there.
+/// The visible state of a value; `None` if it, or the value that it is compared with, is not there.
 fn see(session: &Session, what: &Live, test: &Test) -> Option<Seen> {
     let compared = match test {
         Test::Equals(other) | Test::Above(other) => Some(&**other),
