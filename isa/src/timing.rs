@@ -16,7 +16,6 @@
 
 use crate::encode::Instruction;
 use crate::number::{BundleAddress, Register, SlotIndex};
-use crate::spec::instructions::Function;
 use crate::spec::machines::Machine;
 use crate::spec::units::MAX_LATENCY;
 
@@ -163,7 +162,7 @@ impl Bundle {
         let mut bundle = Bundle::default();
         for ((s, slot), instruction) in machine.numbered_slots().zip(instructions) {
             let row = instruction.op.row();
-            let Some(u) = slot.unit_for(row.function).filter(|_| row.function != Function::Idle) else {
+            let Some(u) = slot.unit_for(row.function) else {
                 continue;
             };
             bundle.operations.push(Operation {
