@@ -1,8 +1,8 @@
 //! The top: what is around the cores, and how it is connected.
 
-use super::core::{LOAD_INPUT, STATUS, arrives, port_name, values, watched};
+use super::core::{LOAD_INPUT, arrives, port_name, values, watched};
 use super::image::Record;
-use super::plan::Driver;
+use super::plan::{DUE, Driver, STATUS};
 use super::{SystemPlan, links};
 use crate::export::RESET_CYCLES;
 use crate::plan::names::net;
@@ -10,7 +10,6 @@ use crate::verilog::{Direction, Expr, Instance, Module, ModuleError, Net, Parame
 use takt_isa::system::{End, LinkKind};
 
 const RUNNING: Net = Net::bit("running");
-pub(super) const DUE: Net = Net::bit("due");
 const STARTS: Net = Net::bit("starts");
 /// Reset of cores and links: the loader's.
 const RESET: Net = Net::bit("reset");

@@ -323,7 +323,10 @@ impl Places {
                 },
                 Effect::ReadFlags => (Reads::Places(self.flags.into_iter().collect()), to.map(Writes::Place)),
                 Effect::ClearFlags => (Reads::Places(Vec::new()), self.flags.map(Writes::Place)),
-                _ => continue,
+                // These write nothing.
+                Effect::Nothing | Effect::Wait | Effect::Halt => continue,
+                Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => continue,
+                Effect::Call | Effect::Return => continue,
             };
             step.moves.extend(to.map(|to| (from, to)));
         }
