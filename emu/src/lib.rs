@@ -37,7 +37,7 @@ mod fault;
 mod io;
 #[cfg(all(feature = "jit", target_arch = "x86_64"))]
 mod jit;
-/// Where there is no compiler, blocks are interpreted.
+/// Without a compiler for the host, blocks are interpreted.
 #[cfg(not(all(feature = "jit", target_arch = "x86_64")))]
 #[path = "jit/absent.rs"]
 mod jit;

@@ -1,6 +1,6 @@
 //! A group of lanes that go through the program together, and those that have left it for a while.
 //!
-//! What all lanes have in common stands once, in an ordinary [`Emulator`]: cycles, fetch, ticks, the bundles issued of late,
+//! The common part of all lanes stands once, in an ordinary [`Emulator`]: cycles, fetch, ticks, the bundles issued of late,
 //! which registers were written, the return stack, which results are in flight. Of its own values it keeps none; those
 //! are rows of [`Lanes`]. A lane that branches differently from most, or is about to fault, is taken out: with its values and
 //! the common timeline it is an ordinary emulator, which runs to the end of the period and knows nothing of the batch. At
@@ -23,7 +23,7 @@ use takt_isa::{BundleAddress, Flow, Program, Register};
 /// Runs of one emulator that take as long as a run of all lanes, about.
 const RUN: u64 = 4;
 
-/// Where a lane is.
+/// The place of a lane.
 enum Place {
     /// With the others.
     Present,
@@ -40,9 +40,9 @@ pub(crate) struct Group {
     lanes: Lanes,
     places: Vec<Place>,
     present: Mask,
-    /// How much later each lane's cycles are than the timeline's.
+    /// The cycles by which each lane is later than the timeline.
     offsets: [i64; LANES],
-    /// What a lane has written before it joined.
+    /// The registers that a lane has written before it joined.
     written: Vec<RegisterSet>,
     published: Vec<RegisterSet>,
     /// Emulators without a lane.
@@ -59,7 +59,7 @@ pub(crate) struct Group {
     pub(crate) apart: u64,
 }
 
-/// What comes after a stretch of the common run.
+/// The continuation after a stretch of the common run.
 enum Next {
     More,
     /// The period has ended, or nobody is present any more.
@@ -103,7 +103,7 @@ impl Group {
         }
     }
 
-    /// How often compiled blocks ran.
+    /// The number of runs of compiled blocks.
     pub(crate) fn compiled_runs(&self) -> CompiledRuns {
         self.lead.compiled_runs
     }
@@ -140,7 +140,7 @@ impl Group {
 
     // ---- What there is to see.
 
-    /// How a lane's last period ended; `None` before the first.
+    /// The outcome of a lane's last period; `None` before the first.
     pub(crate) fn outcome(&self, lane: usize) -> Option<Result<PeriodReport, PeriodError>> {
         match &self.places[lane] {
             Place::Away(_, outcome) => outcome.clone(),
@@ -338,7 +338,7 @@ impl Group {
         })
     }
 
-    /// What a block that has run leaves behind; its last bundle.
+    /// Completes a block that has run; returns its last bundle.
     fn after_block(&mut self, id: u32, last: Cycle) -> BundleAddress {
         let Group { lead, lanes, offsets, .. } = self;
         let entered = lead.front.delivered;
@@ -369,7 +369,7 @@ impl Group {
                     }
                 }
             }
-            // What the timeline's branch looks at.
+            // The register that the timeline's branch looks at.
             self.lead.state.registers[register.index()] = u32::from(!most);
         }
         self.lead.follow(flow, address, last, &mut None);
@@ -515,7 +515,7 @@ impl Group {
         Ok(())
     }
 
-    /// How much later than the common timeline another one is that is otherwise the same; `None` if it differs.
+    /// The cycles by which another timeline that is otherwise the same is later than the common one; `None` if it differs.
     fn distance(&mut self, other: &mut Emulator) -> Option<i64> {
         let lead = &mut self.lead;
         let (Status::Waiting { since, .. }, Status::Waiting { since: others_since, .. }) =

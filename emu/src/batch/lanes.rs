@@ -43,11 +43,11 @@ pub(crate) struct Lanes {
     undo: Undo,
 }
 
-/// What a block that may fault has changed.
+/// The undo log of a block that may fault.
 #[derive(Clone, Debug, Default)]
 struct Undo {
     registers: Vec<(Register, Row)>,
-    /// Whether it may fault.
+    /// True if it may fault.
     kept: bool,
     /// Rows of memory before a store.
     stored: Vec<(usize, Row)>,

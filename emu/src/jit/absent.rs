@@ -12,7 +12,7 @@ pub(crate) enum Code {}
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Words;
 
-/// Whether blocks can be compiled.
+/// True if blocks can be compiled.
 pub(crate) fn is_available() -> bool {
     false
 }

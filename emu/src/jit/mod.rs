@@ -33,7 +33,7 @@ struct Parts {
     watches: Box<[u32]>,
 }
 
-/// What the code leaves: the words loaded by late results, by their number, and what went to watched ports.
+/// The output of the code: the words loaded by late results, by their number, and what went to watched ports.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Words(Vec<u32>);
 
@@ -43,10 +43,10 @@ impl std::fmt::Debug for Code {
     }
 }
 
-/// Whether this process is to do without the compiler.
+/// True if this process is to do without the compiler.
 static SWITCHED_OFF: AtomicBool = AtomicBool::new(false);
 
-/// Whether blocks can be compiled for this host.
+/// True if blocks can be compiled for this host.
 pub(crate) fn is_available() -> bool {
     !SWITCHED_OFF.load(Ordering::Relaxed) && native::target().is_some()
 }
@@ -84,7 +84,7 @@ impl std::fmt::Debug for LaneCode {
     }
 }
 
-/// What the code for lanes leaves, and what it needs to be undone.
+/// The output of the code for lanes, and what it needs to be undone.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Rows {
     rows: Vec<Row>,

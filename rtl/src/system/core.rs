@@ -7,7 +7,7 @@ use crate::plan::names::net;
 use crate::verilog::{Direction, Expr, Instance, Module, ModuleError, Net, Port, choose, concat, decimal};
 use takt_isa::{Bank, BankIndex, Register};
 
-/// Whether the loader writes an input port of this core.
+/// 1 if the loader writes an input port of this core.
 pub(super) const LOAD_INPUT: Net = Net::bit("load_input");
 
 /// Ports of a core's module that a board looks at, in whose top they have the names of [`SystemPlan::board_port`]: first the one that it
@@ -36,7 +36,7 @@ fn told(own: &Plan) -> Vec<Net> {
     ]
 }
 
-/// Which mailboxes have a value that arrives.
+/// The mailboxes that have a value that arrives.
 pub(super) fn arrives(mailboxes: usize) -> Net {
     Net::bus("arrives", mailboxes as u32)
 }
@@ -215,7 +215,7 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
     m.finish()
 }
 
-/// What the names of an output port begin with in the core's module.
+/// The beginning of an output port's names in the core's module.
 pub(super) fn port_name(name: &str) -> String {
     format!("port_{name}")
 }

@@ -63,12 +63,12 @@ pub(super) fn module(plan: &SystemPlan, records: &[Record]) -> Result<String, Mo
     m.finish()
 }
 
-/// Whether the top uses what a core tells: everything but its `ended`, which is for some links.
+/// True if the top uses an output of a core: everything but its `ended`, which is for some links.
 fn shown(plan: &SystemPlan, core: usize, status: &Net) -> bool {
     *status != net::ENDED || plan.driver == Driver::Board || plan.is_waited_for(core)
 }
 
-/// What each core tells, with the pin of the top that has it of all cores, core 0 lowest.
+/// The outputs of each core, with the pin of the top that has it of all cores, core 0 lowest.
 fn told(plan: &SystemPlan) -> Vec<(Net, Net)> {
     let ended = match plan.driver {
         Driver::Itself => None,
@@ -203,7 +203,7 @@ fn ticks_of(cores: u32) -> Net {
     Net::bus("ticks", cores)
 }
 
-/// When the cores take their snapshots.
+/// Times the cores' taking of snapshots.
 fn takes_of(cores: u32) -> Net {
     Net::bus("takes", cores)
 }
