@@ -7,7 +7,7 @@
 
 use crate::check::{dest_span, source_span, text};
 use crate::context::{Context, ScopeId, type_name, words};
-use crate::ir::given::{self, Given, GivenTypes, Kind, Part, What};
+use crate::ir::given::{self, Given, GivenTypes, Kind, OperandPosition, TypeOrigin};
 use crate::ir::runs::Run;
 use crate::ir::{Ir, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::report::diag::Diagnostic;
@@ -21,7 +21,7 @@ use takt_isa::{Effect, ROWS, Row, Type};
 
 #[derive(Clone, Copy, Debug)]
 struct Origin {
-    what: What,
+    what: TypeOrigin,
     span: Span,
     scope: ScopeId,
 }
@@ -142,7 +142,8 @@ impl<'i, V: Known> Types<'i, V> {
             entry.push(match (is_declared, register.kind) {
                 (_, RegisterKind::Constant(_) | RegisterKind::Zero) => any(),
                 (true, _) => {
-                    let origin = Origin { what: What::Declared, span: register.span, scope: ScopeId::ROOT };
+                    let origin =
+                        Origin { what: TypeOrigin::Declared, span: register.span, scope: ScopeId::ROOT };
                     V::new(Kind::of(register.ty), Some(origin))
                 }
                 (false, _) if opaque => any(),
@@ -230,7 +231,7 @@ impl<'i, V: Known> Types<'i, V> {
     /// What an operation reads as one of its sources.
     #[inline]
     fn source(&self, run: u32, operation: &Operation, which: usize) -> V {
-        match self.given.get(operation, Part::Source(which as u8)) {
+        match self.given.get(operation, OperandPosition::Source(which as u8)) {
             Some(Given::Cast(ty)) => V::new(Kind::of(ty), None),
             Some(Given::Literal { kind, what, span }) => literal(operation, kind, what, span),
             _ => {
@@ -251,18 +252,18 @@ impl<'i, V: Known> Types<'i, V> {
     fn result(&self, run: u32, operation: &Operation) -> V {
         let row = operation.row();
         let result = |ty| {
-            let what = What::Result(row.mnemonic);
+            let what = TypeOrigin::Result(row.mnemonic);
             let origin = Origin { what, span: operation.span, scope: ScopeId(operation.expansion) };
             V::new(Kind::of(ty), Some(origin))
         };
-        if let Some(Given::Cast(ty)) = self.given.get(operation, Part::Dest) {
+        if let Some(Given::Cast(ty)) = self.given.get(operation, OperandPosition::Dest) {
             return result(ty);
         }
         if row.result_type() != Type::B {
             return result(row.result_type());
         }
         match row.effect {
-            Effect::Immediate => match self.given.get(operation, Part::Immediate) {
+            Effect::Immediate => match self.given.get(operation, OperandPosition::Immediate) {
                 Some(Given::Literal { kind, what, span }) => literal(operation, kind, what, span),
                 _ => any(),
             },
@@ -277,7 +278,7 @@ impl<'i, V: Known> Types<'i, V> {
 
     /// The table that an operation's memory operand lies in, if that is known.
     fn table(&self, operation: &Operation) -> Option<LabelId> {
-        match self.given.get(operation, Part::Table) {
+        match self.given.get(operation, OperandPosition::Table) {
             Some(Given::Table(label)) if self.tables.contains_key(&label) => Some(label),
             _ => None,
         }
@@ -350,7 +351,7 @@ fn any<V: Known>() -> V {
     V::new(Kind::Any, None)
 }
 
-fn literal<V: Known>(operation: &Operation, kind: Kind, what: What, span: Span) -> V {
+fn literal<V: Known>(operation: &Operation, kind: Kind, what: TypeOrigin, span: Span) -> V {
     V::new(kind, Some(Origin { what, span, scope: ScopeId(operation.expansion) }))
 }
 
@@ -358,7 +359,7 @@ fn literal<V: Known>(operation: &Operation, kind: Kind, what: What, span: Span) 
 fn tables<V: Known>(ir: &Ir, types: &[Type]) -> HashMap<LabelId, V> {
     let typed = |(label, kind): (LabelId, Kind)| {
         let span = ir.labels[label.0 as usize].span;
-        (label, V::new(kind, Some(Origin { what: What::Table, span, scope: ScopeId::ROOT })))
+        (label, V::new(kind, Some(Origin { what: TypeOrigin::Table, span, scope: ScopeId::ROOT })))
     };
     given::tables(&ir.labels, types).into_iter().map(typed).collect()
 }
@@ -381,11 +382,11 @@ fn explained(warning: Diagnostic, ty: Type, origin: Option<Origin>) -> Diagnosti
     warning.also(
         span,
         match what {
-            What::Declared => format!("declared here, as {is}"),
-            What::Result(mnemonic) => format!("`{mnemonic}` gives {is}"),
-            What::Table => format!("each word here is {is}"),
-            What::Address => "an address is an integer".to_owned(),
-            What::Literal(_) => is.to_owned(),
+            TypeOrigin::Declared => format!("declared here, as {is}"),
+            TypeOrigin::Result(mnemonic) => format!("`{mnemonic}` gives {is}"),
+            TypeOrigin::Table => format!("each word here is {is}"),
+            TypeOrigin::Address => "an address is an integer".to_owned(),
+            TypeOrigin::Literal(_) => is.to_owned(),
         },
     )
 }
@@ -413,7 +414,7 @@ fn wrong_source(
 ) {
     let name = text(ir, ir.register(operation.sources[which]));
     let place = source_span(context, operation, which);
-    if let Some(Origin { what: What::Literal(value), span, scope }) = source.origin {
+    if let Some(Origin { what: TypeOrigin::Literal(value), span, scope }) = source.origin {
         let (shown, instead) = shown(value, wanted);
         let message = format!("{shown} in `{name}` is read as {}", words(wanted));
         let warning = Diagnostic::warning("types", span, message)
@@ -438,7 +439,7 @@ fn wrong_source(
     let written = if written.contains('[') { &name } else { written };
     let declare = match source.origin {
         // Not where another's value was passed on to it.
-        Some(Origin { what: What::Declared, span, .. })
+        Some(Origin { what: TypeOrigin::Declared, span, .. })
             if span == ir.register(operation.sources[which]).span =>
         {
             format!("declare `{name}:{}` if it is {}, ", type_name(wanted), words(wanted))
@@ -479,7 +480,9 @@ fn either(context: &mut Context, operation: &Operation, int: (usize, Typed), flo
     let message = format!("`{mnemonic}` gives an integer or a float");
     let warning = Diagnostic::warning("types", here, message).here("an integer").also(there, "a float");
     let help = match int.1.origin.map(|origin| origin.what) {
-        Some(What::Literal(value)) => shown(value, Type::F).1.map(|instead| format!("write `{instead}`")),
+        Some(TypeOrigin::Literal(value)) => {
+            shown(value, Type::F).1.map(|instead| format!("write `{instead}`"))
+        }
         _ => None,
     };
     let written = bare(context.reports.sources.text(here));
@@ -488,7 +491,7 @@ fn either(context: &mut Context, operation: &Operation, int: (usize, Typed), flo
     });
     // A flag that is kept in a state of no type.
     let help = match float.1.origin {
-        Some(Origin { what: What::Declared, span, .. }) => {
+        Some(Origin { what: TypeOrigin::Declared, span, .. }) => {
             let declared = context.reports.sources.text(span);
             format!("{help}, or declare `{declared}:int` if it is an integer")
         }
@@ -508,7 +511,7 @@ fn wrong_register(
 ) {
     let (name, wanted) = (text(ir, register), register.ty);
     let declare = format!("declare `{name}:{}` if it is {}", type_name(ty), words(ty));
-    if let Some(Origin { what: What::Literal(value), span, scope }) = result.origin {
+    if let Some(Origin { what: TypeOrigin::Literal(value), span, scope }) = result.origin {
         let (shown, instead) = shown(value, wanted);
         let message = format!("{shown} goes to `{name}`, which is {}", words(wanted));
         let warning = Diagnostic::warning("types", span, message).also(register.span, "declared here");

@@ -5,7 +5,7 @@
 
 mod choose;
 
-use crate::homes;
+use crate::banks;
 use crate::ir::matching;
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, runs};
 use foldhash::{HashMap, HashSet};
@@ -192,13 +192,13 @@ fn has_place(ir: &Ir, (bundle, number): Where, fusion: &Fusion) -> bool {
         || operations.iter().enumerate().filter(|(other, _)| *other != number).map(|(_, other)| other);
     let mut slots: Vec<Slots> =
         others().filter(|other| other.slot.is_some()).map(|other| other.slots).collect();
-    slots.push(dest.map_or_else(Slots::default, |dest| homes::able(ir, dest, fusion.fused)));
+    slots.push(dest.map_or_else(Slots::default, |dest| banks::able(ir, dest, fusion.fused)));
     // A branch on what its own bundle computes cannot wait for a copy.
     let branches =
         others().any(|other| other.redirects() && dest.is_some_and(|dest| other.reads().contains(&dest)));
     // Nor does it go anywhere but where the source puts the sum.
     let named =
-        dest.is_some_and(|dest| operations[number].slots != homes::able(ir, dest, operations[number].op));
+        dest.is_some_and(|dest| operations[number].slots != banks::able(ir, dest, operations[number].op));
     !branches && !named && matching::is_possible(&slots)
 }
 
@@ -206,7 +206,7 @@ fn has_place(ir: &Ir, (bundle, number): Where, fusion: &Fusion) -> bool {
 fn fuse(ir: &mut Ir, product: Where, sum: Where, fusion: Fusion) -> Contraction {
     let first = *at(ir, product);
     let second = *at(ir, sum);
-    let slots = second.dest.map_or_else(Slots::default, |dest| homes::able(ir, dest, fusion.fused));
+    let slots = second.dest.map_or_else(Slots::default, |dest| banks::able(ir, dest, fusion.fused));
     let [a, b, _] = first.sources;
     let sources = [a, b, second.sources[1 - fusion.source]];
     // No operand of the tree is one of its own: messages point at the sum.

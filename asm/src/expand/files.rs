@@ -1,7 +1,7 @@
 //! Source files: reading them, and `.include`. A part of [`expand`](crate::expand).
 
 use crate::context::{At, Reported};
-use crate::expand::load::{LoadError, Loader, Place, include_path};
+use crate::expand::load::{IncludePath, LoadError, Loader, include_path};
 use crate::expand::{Expander, FrameKind};
 use crate::limits;
 use crate::report::diag::Diagnostic;
@@ -183,7 +183,7 @@ impl Expander<'_> {
     fn not_found(&self, path: &str, span: Span) -> Diagnostic {
         let message = format!("`{path}` cannot be read: {}", LoadError::NotFound);
         let error = Diagnostic::error("load", span, message);
-        let (folders, libraries): (Vec<&Place>, Vec<&Place>) =
+        let (folders, libraries): (Vec<&IncludePath>, Vec<&IncludePath>) =
             self.loader.places().iter().partition(|place| place.takes_quoted());
         if libraries.iter().any(|library| library.load(path).is_ok()) {
             let instead = format!(".include <{path}>");
@@ -198,7 +198,7 @@ impl Expander<'_> {
     /// There is no file for `.include <path>`.
     fn not_in_library(&self, path: &str, span: Span) -> Diagnostic {
         let error = Diagnostic::error("load", span, format!("there is no `<{path}>`"));
-        let mut names: Vec<String> = self.loader.places().iter().flat_map(Place::names).collect();
+        let mut names: Vec<String> = self.loader.places().iter().flat_map(IncludePath::names).collect();
         names.sort();
         names.dedup();
         let meant = nearest(path, names.iter().map(String::as_str));

@@ -41,57 +41,57 @@ pub trait Loader {
     }
 
     /// Where `.include` looks beyond the project, in this order.
-    fn places(&self) -> &[Place] {
+    fn places(&self) -> &[IncludePath] {
         &[]
     }
 }
 
 /// A place beyond the project where `.include` looks: a folder, or a library in memory.
 #[derive(Clone, Debug)]
-pub struct Place(PlaceKind);
+pub struct IncludePath(IncludePathKind);
 
 #[derive(Clone, Debug)]
-enum PlaceKind {
+enum IncludePathKind {
     /// What stands before the path of a file in it, and the folder.
     Folder(String, FileLoader),
     Library(MemoryLoader),
 }
 
-impl Place {
+impl IncludePath {
     /// Whether it is searched for `"name"` too, not only for `<name>`.
     pub(crate) fn takes_quoted(&self) -> bool {
-        matches!(self.0, PlaceKind::Folder(..))
+        matches!(self.0, IncludePathKind::Folder(..))
     }
 
     /// A file in it as diagnostics, listings and the debugger name it: unlike any path within the project.
     pub(crate) fn name_of(&self, path: &str) -> String {
         match &self.0 {
-            PlaceKind::Folder(prefix, _) => format!("{prefix}{path}"),
-            PlaceKind::Library(_) => format!("<{path}>"),
+            IncludePathKind::Folder(prefix, _) => format!("{prefix}{path}"),
+            IncludePathKind::Library(_) => format!("<{path}>"),
         }
     }
 
     /// The names that can be asked for; of a folder, its own sources.
     pub(crate) fn names(&self) -> Vec<String> {
         match &self.0 {
-            PlaceKind::Folder(_, folder) => folder.names(),
-            PlaceKind::Library(files) => files.files.keys().cloned().collect(),
+            IncludePathKind::Folder(_, folder) => folder.names(),
+            IncludePathKind::Library(files) => files.files.keys().cloned().collect(),
         }
     }
 }
 
-impl Loader for Place {
+impl Loader for IncludePath {
     fn load(&self, path: &str) -> Result<Vec<u8>, LoadError> {
         match &self.0 {
-            PlaceKind::Folder(_, folder) => folder.load(path),
-            PlaceKind::Library(files) => files.load(path),
+            IncludePathKind::Folder(_, folder) => folder.load(path),
+            IncludePathKind::Library(files) => files.load(path),
         }
     }
 
     fn text(&self, path: &str) -> Option<Arc<String>> {
         match &self.0 {
-            PlaceKind::Folder(_, folder) => folder.text(path),
-            PlaceKind::Library(files) => files.text(path),
+            IncludePathKind::Folder(_, folder) => folder.text(path),
+            IncludePathKind::Library(files) => files.text(path),
         }
     }
 }
@@ -100,7 +100,7 @@ impl Loader for Place {
 #[derive(Clone, Debug)]
 pub struct Search<L> {
     project: L,
-    places: Vec<Place>,
+    places: Vec<IncludePath>,
 }
 
 impl<L: Loader> Search<L> {
@@ -121,7 +121,7 @@ impl<L: Loader> Search<L> {
         if !prefix.ends_with('/') {
             prefix.push('/');
         }
-        self.places.push(Place(PlaceKind::Folder(prefix, FileLoader::new(folder))));
+        self.places.push(IncludePath(IncludePathKind::Folder(prefix, FileLoader::new(folder))));
         self
     }
 
@@ -129,7 +129,7 @@ impl<L: Loader> Search<L> {
     #[must_use]
     pub fn with_open(mut self, open: &Open) -> Search<L> {
         for place in &mut self.places {
-            if let PlaceKind::Folder(_, folder) = &mut place.0 {
+            if let IncludePathKind::Folder(_, folder) = &mut place.0 {
                 folder.open = Arc::clone(open);
             }
         }
@@ -139,7 +139,7 @@ impl<L: Loader> Search<L> {
     /// A library in memory, each file a name and its text, searched after the places there are for `<name>` only.
     #[must_use]
     pub fn library<'s>(mut self, files: impl IntoIterator<Item = &'s (&'s str, &'s str)>) -> Search<L> {
-        self.places.push(Place(PlaceKind::Library(MemoryLoader::new(files))));
+        self.places.push(IncludePath(IncludePathKind::Library(MemoryLoader::new(files))));
         self
     }
 }
@@ -153,7 +153,7 @@ impl<L: Loader> Loader for Search<L> {
         self.project.text(path)
     }
 
-    fn places(&self) -> &[Place] {
+    fn places(&self) -> &[IncludePath] {
         &self.places
     }
 }
@@ -249,7 +249,7 @@ impl Loader for First<'_> {
         if path == self.name { self.source.text() } else { self.rest.text(path) }
     }
 
-    fn places(&self) -> &[Place] {
+    fn places(&self) -> &[IncludePath] {
         self.rest.places()
     }
 }

@@ -1,13 +1,13 @@
 //! The program between names and words: bundles of operations on virtual registers.
 //!
-//! [`resolve`](crate::resolve) makes it, a scheduler may rearrange it, [`place`](crate::emit::place) gives its registers
+//! [`resolve`](crate::resolve) makes it, a scheduler may rearrange it, [`allocate`](crate::emit::allocate) gives its registers
 //! addresses and `emit` its words. What holds at every stage:
 //!
 //! * a bundle has at least one operation and no two that claim one slot; on a machine with one slot it has exactly one;
 //! * all operations of a bundle read before any writes; bundles execute in the order of [`Ir::bundles`], and
 //!   [`Operation::redirects`] says where that order ends;
 //! * every register that is written is written from one slot only; which slot executes an operation that several may
-//!   ([`Operation::slots`]) is chosen first by [`choose`](crate::homes::slots::choose), and again by the scheduler;
+//!   ([`Operation::slots`]) is chosen first by [`assign`](crate::banks::slots::assign), and again by the scheduler;
 //! * bundles of `once` precede those of `period`; a label stands before the bundle at its position, or at the end.
 //!
 //! Whoever moves bundles must move [`Label::position`]s, [`LoopBound::position`]s and [`Ir::period`] along, and leave alone, as fences, bundles that
@@ -318,7 +318,7 @@ pub enum DemandKind {
     Late(u32),
 }
 
-/// A value of a name that has a register of its own ([`values`](crate::homes::values)).
+/// A value of a name that has a register of its own ([`webs`](crate::banks::webs)).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Version {
     /// The register that the source names.

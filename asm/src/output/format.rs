@@ -47,7 +47,7 @@ pub fn format(text: &str) -> String {
             out.push_str(bare);
         } else {
             let start = line.as_ptr() as usize - text.as_ptr() as usize;
-            let laid = Line { text, start, tokens: &tokens, continues }.lay_out();
+            let laid = CodeLine { text, start, tokens: &tokens, continues }.lay_out();
             out.push_str(laid.trim_end_matches([' ', '\t']));
         }
         out.push_str(ending);
@@ -69,7 +69,7 @@ pub fn format(text: &str) -> String {
 }
 
 /// A line that could be read.
-struct Line<'t> {
+struct CodeLine<'t> {
     text: &'t str,
     start: usize,
     tokens: &'t [Token],
@@ -77,7 +77,7 @@ struct Line<'t> {
     continues: bool,
 }
 
-impl Line<'_> {
+impl CodeLine<'_> {
     fn lay_out(&self) -> String {
         let (code, comment) = match self.tokens {
             [code @ .., comment] if comment.kind == TokenKind::Comment => (code, Some(comment)),

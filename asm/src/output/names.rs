@@ -7,7 +7,7 @@
 
 use crate::context::{Context, ScopeId};
 use crate::emit::Emitted;
-use crate::emit::place::Placement;
+use crate::emit::allocate::Allocation;
 use crate::ir::{Ir, RegisterId};
 use crate::report::source::{Lines, Sources, Span};
 use crate::syntax::expr::Value;
@@ -125,9 +125,9 @@ pub(crate) fn parts(sources: &Sources, emitted: &Emitted) -> Vec<(u32, Columns)>
 }
 
 /// What the names of a program stand for.
-pub(crate) fn names(context: &mut Context, ir: &Ir, placement: &Placement, emitted: &mut Emitted) -> Names {
+pub(crate) fn names(context: &mut Context, ir: &Ir, allocation: &Allocation, emitted: &mut Emitted) -> Names {
     let (positions, scopes) = positions(context, ir, emitted);
-    Names { positions, scopes, values: values(ir, placement, emitted) }
+    Names { positions, scopes, values: values(ir, allocation, emitted) }
 }
 
 fn positions(context: &mut Context, ir: &Ir, emitted: &mut Emitted) -> (Vec<Option<Position>>, Vec<Scope>) {
@@ -171,7 +171,7 @@ fn positions(context: &mut Context, ir: &Ir, emitted: &mut Emitted) -> (Vec<Opti
     (positions, scopes)
 }
 
-fn values(ir: &Ir, placement: &Placement, emitted: &Emitted) -> Vec<NamedValue> {
+fn values(ir: &Ir, allocation: &Allocation, emitted: &Emitted) -> Vec<NamedValue> {
     // By the register that the source names: the values with registers of their own.
     type Values = Vec<(RegisterId, Option<(u32, u32)>)>;
     let mut split: BTreeMap<RegisterId, Values> = BTreeMap::new();
@@ -182,7 +182,7 @@ fn values(ir: &Ir, placement: &Placement, emitted: &Emitted) -> Vec<NamedValue> 
             .push((version.register, Some((version.after, version.through))));
     }
     let made: HashSet<RegisterId> = ir.versions.iter().map(|version| version.register).collect();
-    let shared = (0..ir.registers.len()).filter(|index| placement.shared[*index]).map(RegisterId::new);
+    let shared = (0..ir.registers.len()).filter(|index| allocation.shared[*index]).map(RegisterId::new);
     for id in shared.filter(|id| !made.contains(id)) {
         split.entry(id).or_default();
     }
@@ -201,8 +201,8 @@ fn values(ir: &Ir, placement: &Placement, emitted: &Emitted) -> Vec<NamedValue> 
             continue;
         }
         for (id, orders) in versions {
-            let Some(register) = placement.addresses[id.index()] else { continue };
-            let shared = placement.shared[id.index()];
+            let Some(register) = allocation.addresses[id.index()] else { continue };
+            let shared = allocation.shared[id.index()];
             let own = own_names.get(&register).filter(|_| !shared);
             let label = own.map_or_else(|| ir.register(id).name.clone(), |own| (*own).to_owned());
             let lives = orders.is_some() || shared;

@@ -11,9 +11,9 @@ use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::resolve::Resolver;
+use crate::resolve::common_subexpressions::Key;
 use crate::resolve::fast::Chain;
 use crate::resolve::forms::Meaning;
-use crate::resolve::sharing::Key;
 use crate::syntax::ast::*;
 use crate::syntax::expr::Value;
 use smallvec::SmallVec;
@@ -22,7 +22,7 @@ use takt_isa::{Effect, Op, Slots, Type};
 
 /// What a part of an equation is.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Part {
+pub(super) enum TermForm {
     /// A constant, and its expression.
     Constant(Value, ExprId),
     /// A register and what is known of its type.
@@ -34,28 +34,28 @@ pub(super) enum Part {
 /// A part of an equation, and where it stands.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Term {
-    pub(super) part: Part,
+    pub(super) form: TermForm,
     pub(super) span: Span,
 }
 
 impl Term {
     pub(super) fn value(&self) -> Option<Value> {
-        match self.part {
-            Part::Constant(value, _) => Some(value),
-            Part::Register(..) | Part::Chain(..) => None,
+        match self.form {
+            TermForm::Constant(value, _) => Some(value),
+            TermForm::Register(..) | TermForm::Chain(..) => None,
         }
     }
 
     pub(super) fn kind(&self) -> Option<Kind> {
-        match self.part {
-            Part::Register(_, kind) | Part::Chain(_, kind) => Some(kind),
-            Part::Constant(..) => None,
+        match self.form {
+            TermForm::Register(_, kind) | TermForm::Chain(_, kind) => Some(kind),
+            TermForm::Constant(..) => None,
         }
     }
 }
 
 /// The equation at hand.
-pub(super) struct Line {
+pub(super) struct CurrentEquation {
     location: Attribution,
     scheduled: bool,
     /// What its operations have computed so far: where the value is, the bundle, and the part.
@@ -74,8 +74,8 @@ impl Resolver<'_> {
         let location = self.location(item, (equation.span, number), 0, 1);
         let piece = item.piece.map(|piece| self.flat.pieces[piece as usize].clone());
         let (argument, results) = piece.map_or((None, Results::default()), |p| (p.argument, p.results));
-        self.sharing.next();
-        let mut line = Line {
+        self.subexpressions.next();
+        let mut line = CurrentEquation {
             location,
             scheduled: item.scheduled,
             computed: Vec::new(),
@@ -164,13 +164,13 @@ impl Resolver<'_> {
 
     /// The type of what an operation writes.
     pub(super) fn result_kind(&self, operation: &Operation) -> Kind {
-        use crate::ir::given::{Given, Part};
+        use crate::ir::given::{Given, OperandPosition};
         let given = |part| match self.context.declared.given.get(operation, part) {
             Some(Given::Cast(ty)) => Some(Kind::of(ty)),
             Some(Given::Literal { kind, .. }) => Some(kind),
             _ => None,
         };
-        if let Some(kind) = given(Part::Dest).or_else(|| given(Part::Immediate)) {
+        if let Some(kind) = given(OperandPosition::Dest).or_else(|| given(OperandPosition::Immediate)) {
             return kind;
         }
         match operation.row().effect {
@@ -182,8 +182,8 @@ impl Resolver<'_> {
 
     /// The type of a source of an operation, as far as it is known.
     fn source_kind(&self, operation: &Operation, which: usize) -> Kind {
-        use crate::ir::given::{Given, Part};
-        match self.context.declared.given.get(operation, Part::Source(which as u8)) {
+        use crate::ir::given::{Given, OperandPosition};
+        match self.context.declared.given.get(operation, OperandPosition::Source(which as u8)) {
             Some(Given::Cast(ty)) => return Kind::of(ty),
             Some(Given::Literal { kind, .. }) => return kind,
             _ => {}
@@ -197,8 +197,8 @@ impl Resolver<'_> {
 
     /// The table that a load or store names, and what is known of the type of its words.
     fn table_kind(&self, operation: &Operation) -> Option<(LabelId, Kind)> {
-        use crate::ir::given::{Given, Part};
-        match self.context.declared.given.get(operation, Part::Table) {
+        use crate::ir::given::{Given, OperandPosition};
+        match self.context.declared.given.get(operation, OperandPosition::Table) {
             Some(Given::Table(label)) => self.tables.get(&label).map(|kind| (label, *kind)),
             _ => None,
         }
@@ -218,7 +218,7 @@ impl Resolver<'_> {
     fn assign(
         &mut self,
         at: At,
-        line: &mut Line,
+        line: &mut CurrentEquation,
         targets: &[(RegisterId, Kind, Span)],
         terms: &[Term],
     ) -> Result<(), Reported> {
@@ -234,9 +234,9 @@ impl Resolver<'_> {
         for (index, ((target, wanted, _), term)) in targets.iter().zip(terms).enumerate() {
             let others = terms.iter().enumerate().filter(|(other, _)| *other != index).map(|(_, term)| term);
             let is_other = |id: RegisterId| {
-                others.clone().any(|other| matches!(other.part, Part::Register(used, _) if used == id))
+                others.clone().any(|other| matches!(other.form, TermForm::Register(used, _) if used == id))
             };
-            if let Part::Register(value, kind) = term.part
+            if let TermForm::Register(value, kind) = term.form
                 && let Some(place) = line.computed.iter().position(|(register, ..)| *register == value)
                 && !is_other(value)
                 && !is_other(*target)
@@ -258,9 +258,9 @@ impl Resolver<'_> {
                     let register = &self.context.declared.registers[target.index()];
                     let lasts = matches!(register.kind, RegisterKind::Plain | RegisterKind::State);
                     if lasts && register.pinned.is_none() {
-                        self.sharing.insert(key, *target, bundle as u32);
+                        self.subexpressions.insert(key, *target, bundle as u32);
                     } else {
-                        self.sharing.remove(&key);
+                        self.subexpressions.remove(&key);
                     }
                     continue;
                 }
@@ -269,14 +269,14 @@ impl Resolver<'_> {
         }
         // A register that is read and written is kept where it is read after it is written.
         for index in 0..left.len() {
-            let Part::Register(value, kind) = left[index].2.part else { continue };
+            let TermForm::Register(value, kind) = left[index].2.form else { continue };
             let written = left[..index].iter().any(|(target, ..)| *target == value)
                 || targets.iter().any(|(target, ..)| *target == value)
                     && left.iter().all(|(target, ..)| *target != value);
             if written {
                 let span = left[index].2.span;
                 let kept = self.copy(at, line, left[index].2, Type::B, None)?;
-                left[index].2 = Term { part: Part::Register(kept, kind), span };
+                left[index].2 = Term { form: TermForm::Register(kept, kind), span };
             }
         }
         for (target, wanted, term) in left {
@@ -294,7 +294,7 @@ impl Resolver<'_> {
 
     fn written(&mut self, target: RegisterId, kind: Kind) {
         self.set_kind(target, kind);
-        self.sharing.write(target);
+        self.subexpressions.write(target);
     }
 
     /// Whether a value may go to a register.
@@ -333,16 +333,16 @@ impl Resolver<'_> {
     fn copy(
         &mut self,
         at: At,
-        line: &mut Line,
+        line: &mut CurrentEquation,
         term: Term,
         ty: Type,
         target: Option<RegisterId>,
     ) -> Result<RegisterId, Reported> {
-        let source = match term.part {
-            Part::Register(register, _) => register,
+        let source = match term.form {
+            TermForm::Register(register, _) => register,
             // An expression's value is computed.
-            Part::Chain(..) => return Err(Reported),
-            Part::Constant(value, expr) => self.holding(at, value, expr, term.span, ty)?,
+            TermForm::Chain(..) => return Err(Reported),
+            TermForm::Constant(value, expr) => self.holding(at, value, expr, term.span, ty)?,
         };
         let Some(Meaning { op, .. }) = self.forms.get("", 1).first() else { return Err(Reported) };
         let op = *op;
@@ -378,7 +378,7 @@ impl Resolver<'_> {
     pub(super) fn emit(
         &mut self,
         at: At,
-        line: &Line,
+        line: &CurrentEquation,
         op: Op,
         slots: Slots,
         sources: [RegisterId; 3],

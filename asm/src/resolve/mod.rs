@@ -2,6 +2,7 @@
 
 mod address;
 mod advice;
+mod common_subexpressions;
 pub(crate) mod equation;
 mod expression;
 mod fast;
@@ -9,7 +10,6 @@ pub(crate) mod forms;
 mod mismatch;
 mod operand;
 pub(crate) mod serialise;
-mod sharing;
 mod slots;
 
 use crate::context::{Array, At, Binding, Context, Reported, ScopeId};
@@ -22,8 +22,8 @@ use crate::ir::{
 };
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
+use crate::resolve::common_subexpressions::CommonSubexpressions;
 use crate::resolve::forms::Forms;
-use crate::resolve::sharing::Sharing;
 use crate::syntax::ast::*;
 use foldhash::HashMap;
 use smallvec::SmallVec;
@@ -96,7 +96,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         cast: None,
         forms: Forms::new(),
         kinds: Vec::new(),
-        sharing: Sharing::default(),
+        subexpressions: CommonSubexpressions::default(),
         turns: 0,
         has_equations,
     };
@@ -198,7 +198,7 @@ pub(crate) struct Resolver<'c> {
     /// What was last written to each register, above the line at hand.
     kinds: Vec<Kind>,
     /// What is computed already.
-    sharing: Sharing,
+    subexpressions: CommonSubexpressions,
     /// Turns of all sums.
     turns: usize,
     /// Whether there are equations at all: what is above one counts for nothing else.
@@ -209,7 +209,7 @@ impl Resolver<'_> {
     /// Resolves the bundles of a section, and moves the section's labels from statements to bundles.
     fn section(&mut self, section: Section, items: &[Item]) {
         self.label = 0;
-        self.sharing.cut();
+        self.subexpressions.cut();
         let mut bounds = self.flat.loop_bounds.clone();
         bounds.retain(|bound| bound.section == section);
         let mut bounds = bounds.into_iter().peekable();
@@ -220,7 +220,7 @@ impl Resolver<'_> {
             }
             if let Some(expand::LoopBound { most, .. }) = bounds.next_if(|bound| bound.item == index as u32) {
                 self.ir.loop_bounds.push(LoopBound { position: self.ir.bundles.len() as u32, most });
-                self.sharing.cut();
+                self.subexpressions.cut();
             }
             self.item(item);
             self.ir.contracted.resize(self.ir.bundles.len(), item.contracted);
@@ -237,7 +237,7 @@ impl Resolver<'_> {
                 }
                 label.position = self.ir.bundles.len() as u32;
                 if section != Section::Data {
-                    self.sharing.cut();
+                    self.subexpressions.cut();
                 }
             }
             self.label += 1;
@@ -301,12 +301,12 @@ impl Resolver<'_> {
 
     /// Refuses jumps by number to where an equation counts on what was computed above.
     fn entered(&mut self) {
-        if self.sharing.stretches.is_empty() {
+        if self.subexpressions.stretches.is_empty() {
             return;
         }
         // How many stretches begin, and less how many end, before each bundle.
         let mut steps = vec![0i64; self.ir.bundles.len() + 2];
-        for (computed, used) in &self.sharing.stretches {
+        for (computed, used) in &self.subexpressions.stretches {
             steps[*computed as usize + 1] += 1;
             steps[*used as usize + 1] -= 1;
         }
@@ -350,10 +350,10 @@ impl Resolver<'_> {
             if let Some(dest) = operation.dest {
                 let kind = self.result_kind(operation);
                 self.set_kind(dest, kind);
-                self.sharing.write(dest);
+                self.subexpressions.write(dest);
             }
             if is_opaque || operation.redirects() || operation.row().effect.drains() {
-                self.sharing.cut();
+                self.subexpressions.cut();
             }
         }
     }

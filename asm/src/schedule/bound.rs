@@ -1,7 +1,7 @@
 //! What no schedule of a problem can be shorter than.
 
-use super::pass::Chains;
-use super::problem::{Part, Problem, Task};
+use super::list::Chains;
+use super::problem::{Problem, ResourceUse, Task};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use takt_isa::{Machine, SlotIndex, Slots};
@@ -106,8 +106,8 @@ impl Bound {
 }
 
 /// The units that an operation's choices use; none if one choice needs none.
-fn units_of<'p>(parts: impl Iterator<Item = &'p Part>) -> BTreeSet<usize> {
-    parts.map(|part| part.unit).collect::<Option<BTreeSet<usize>>>().unwrap_or_default()
+fn units_of<'p>(uses: impl Iterator<Item = &'p ResourceUse>) -> BTreeSet<usize> {
+    uses.map(|usage| usage.unit).collect::<Option<BTreeSet<usize>>>().unwrap_or_default()
 }
 
 /// Sets, and the unions of those that have members in common.
@@ -140,14 +140,14 @@ pub(super) fn bound(problem: &Problem, chains: &Chains) -> Bound {
             let units = units_of(task.operation(index));
             // An idle operation takes what slot is left.
             if !units.is_empty() {
-                let slots = task.operation(index).map(|part| part.slot).collect();
+                let slots = task.operation(index).map(|usage| usage.slot).collect();
                 by_slots.entry(slots).or_default().push(i);
                 by_units.entry(units).or_default().push(i);
             }
         }
-        for part in &task.parts {
-            if let Some(unit) = part.unit {
-                intervals[unit] = part.interval;
+        for usage in &task.uses {
+            if let Some(unit) = usage.unit {
+                intervals[unit] = usage.interval;
             }
         }
     }

@@ -4,15 +4,15 @@
 //! its last. What must keep its order is an edge between two operations (see [`Block`]); everything else may move.
 //! `docs/scheduling.md` says what that means for who writes a program.
 
-mod banks;
 mod bound;
 mod demand;
+mod domains;
+mod exact;
+mod list;
 mod memory;
-mod pass;
 mod problem;
 mod solve;
-mod squeeze;
-mod windows;
+mod time_windows;
 
 pub use crate::ir::DemandKind;
 pub use bound::{Bound, Resources, SharedBound};
@@ -23,11 +23,11 @@ use crate::ir::matching;
 use crate::ir::runs;
 use crate::ir::{Bundle, Ir, Operation, RegisterId, RegisterKind};
 use crate::report::diag::Sink;
-use banks::Banks;
 use demand::Demands;
+use domains::Domains;
+use list::Plan;
 use memory::Memory;
-use pass::Plan;
-use problem::{Edge, Part, Problem, Task};
+use problem::{Edge, Problem, ResourceUse, Task};
 use smallvec::{SmallVec, smallvec};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use takt_isa::program::{Location, Space};
@@ -88,7 +88,7 @@ pub fn schedule(ir: &mut Ir, effort: u32, order: Order, sink: &mut Sink) -> Repo
     let fixed_registers = memory::fixed(ir);
     let runs = runs::runs(ir);
     let demands = demand::assign(ir, &runs, sink);
-    let mut banks = Banks::new(ir, &runs, fixed);
+    let mut domains = Domains::new(ir, &runs, fixed);
     let mut report = Report::default();
     let mut bundles: Vec<Bundle> = Vec::with_capacity(ir.bundles.len());
     // New address of each block's start, by its old one.
@@ -104,7 +104,7 @@ pub fn schedule(ir: &mut Ir, effort: u32, order: Order, sink: &mut Sink) -> Repo
         }
         let demands = Demands::new(ir, old, demands);
         let moves = scheduled && order != Order::Written;
-        let mut block = Block::new(ir, &fixed_registers, old, moves.then_some(&banks));
+        let mut block = Block::new(ir, &fixed_registers, old, moves.then_some(&domains));
         if !moves {
             let start = block.problem.as_written();
             report.timing.extend(demands.check(&block, &start, None, scheduled && moves, sink));
@@ -126,7 +126,7 @@ pub fn schedule(ir: &mut Ir, effort: u32, order: Order, sink: &mut Sink) -> Repo
         let solution = solve::solve(&block.problem, effort);
         report.timing.extend(demands.check(&block, &solution.plan.start, solution.window, scheduled, sink));
         let packed = block.pack(old, &solution.plan);
-        banks.settle(&packed);
+        domains.settle(&packed);
         let bound = bound.unwrap_or(solution.bound);
         report.blocks.push(block.report(ir, *run, address, packed.len(), solution.length, bound));
         bundles.extend(packed);
@@ -143,7 +143,7 @@ pub(crate) fn as_written(ir: &Ir, bundles: &[Bundle]) -> Vec<u32> {
 
 /// Cycles from an operation's issue to the earliest one of an operation that reads its result.
 pub(crate) fn latency(machine: &Machine, operation: &Operation) -> u32 {
-    part(machine, operation, operation.slot).writes.unwrap_or(0)
+    resource_use(machine, operation, operation.slot).writes.unwrap_or(0)
 }
 
 fn label_at(ir: &Ir, position: u32) -> Option<String> {
@@ -154,7 +154,7 @@ fn label_at(ir: &Ir, position: u32) -> Option<String> {
 }
 
 /// Which unit of a machine an operation uses on a slot.
-fn part(machine: &Machine, operation: &Operation, slot: Option<SlotIndex>) -> Part {
+fn resource_use(machine: &Machine, operation: &Operation, slot: Option<SlotIndex>) -> ResourceUse {
     let function = operation.row().function;
     let slot = slot.unwrap_or(SlotIndex::FIRST).index();
     let before: usize = machine.slots[..slot].iter().map(|slot| slot.units.len()).sum();
@@ -162,9 +162,9 @@ fn part(machine: &Machine, operation: &Operation, slot: Option<SlotIndex>) -> Pa
         Some(unit) => {
             let row = &machine.slots[slot].units[unit];
             let writes = operation.dest.map(|_| row.latency);
-            Part { slot, unit: Some(before + unit), interval: row.interval, writes }
+            ResourceUse { slot, unit: Some(before + unit), interval: row.interval, writes }
         }
-        None => Part { slot, unit: None, interval: 1, writes: None },
+        None => ResourceUse { slot, unit: None, interval: 1, writes: None },
     }
 }
 
@@ -195,7 +195,7 @@ struct Block {
 impl Block {
     /// The problem of a run of bundles: as they are written, or if `banks` says where registers may lie, for a schedule, which has
     /// no use for fillers. `fixed` holds the bits of registers that never change ([`memory::fixed`]).
-    fn new(ir: &Ir, fixed: &[Option<u32>], bundles: &[Bundle], banks: Option<&Banks>) -> Block {
+    fn new(ir: &Ir, fixed: &[Option<u32>], bundles: &[Bundle], domains: Option<&Domains>) -> Block {
         let machine = ir.machine;
         let is_output = |id: RegisterId| ir.register(id).kind == RegisterKind::Output;
         let mut problem = Problem {
@@ -213,17 +213,17 @@ impl Block {
         let mut outputs: BTreeMap<RegisterId, (usize, usize)> = BTreeMap::new();
         for (b, bundle) in bundles.iter().enumerate() {
             let effects = || bundle.operations.iter().map(|operation| operation.row().effect);
-            if banks.is_some() && !bundle.explicit && effects().all(|effect| effect == Effect::Nothing) {
+            if domains.is_some() && !bundle.explicit && effects().all(|effect| effect == Effect::Nothing) {
                 continue;
             }
             let to = problem.tasks.len();
             origins.push(b);
             let mut task = Task {
                 operations: bundle.operations.len(),
-                parts: choices(ir, bundle, banks)
+                uses: choices(ir, bundle, domains)
                     .iter()
                     .flat_map(|slots| bundle.operations.iter().zip(slots))
-                    .map(|(operation, slot)| part(machine, operation, *slot))
+                    .map(|(operation, slot)| resource_use(machine, operation, *slot))
                     .collect(),
                 ..Task::default()
             };
@@ -353,9 +353,9 @@ impl Block {
         plan: &Plan,
         task: usize,
     ) -> impl Iterator<Item = Operation> + use<'_, 'b> {
-        let parts = self.problem.tasks[task].choice(plan.choice[task]);
-        old[self.origins[task]].operations.iter().zip(parts).map(|(operation, part)| {
-            let slot = operation.slot.and_then(|_| SlotIndex::new(part.slot));
+        let uses = self.problem.tasks[task].choice(plan.choice[task]);
+        old[self.origins[task]].operations.iter().zip(uses).map(|(operation, usage)| {
+            let slot = operation.slot.and_then(|_| SlotIndex::new(usage.slot));
             Operation { slot, ..*operation }
         })
     }
@@ -365,11 +365,11 @@ impl Block {
 const CHOICES: usize = 120;
 
 /// The ways to give the operations of a bundle slots, the present one first; the only one, if nothing says where registers may lie.
-fn choices(ir: &Ir, bundle: &Bundle, banks: Option<&Banks>) -> Vec<Vec<Option<SlotIndex>>> {
+fn choices(ir: &Ir, bundle: &Bundle, domains: Option<&Domains>) -> Vec<Vec<Option<SlotIndex>>> {
     let present: Vec<Option<SlotIndex>> = bundle.operations.iter().map(|operation| operation.slot).collect();
-    let Some(banks) = banks else { return vec![present] };
+    let Some(domains) = domains else { return vec![present] };
     let placed = || bundle.operations.iter().filter(|operation| operation.slot.is_some());
-    let sets: Vec<Slots> = placed().map(|operation| banks.able(ir, operation)).collect();
+    let sets: Vec<Slots> = placed().map(|operation| domains.able(ir, operation)).collect();
     if sets.iter().copied().eq(present.iter().flatten().map(|slot| Slots::of(*slot))) {
         return vec![present];
     }

@@ -1,13 +1,13 @@
 //! The scheduling problem of one block, without the language around it: tasks with latencies on slots, units and write ports.
 
 use super::bound::Bound;
-use super::pass::{Chains, Graph, Plan, Reservations};
+use super::list::{Chains, Graph, Plan, Reservations};
 use std::cmp::Reverse;
 use takt_isa::{SlotIndex, Slots};
 
 /// One operation of a task on one of the slots that may execute it, as the resources see it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Part {
+pub(super) struct ResourceUse {
     /// The issue slot.
     pub(super) slot: usize,
     /// The unit: an index over all units of the machine; `None` for idle operations.
@@ -24,7 +24,7 @@ pub(super) struct Task {
     /// How many operations it has.
     pub(super) operations: usize,
     /// Its operations, once for each choice of their slots.
-    pub(super) parts: Vec<Part>,
+    pub(super) uses: Vec<ResourceUse>,
     /// Cycles from its issue to its last write of an output port, if it writes one.
     pub(super) output: Option<u32>,
     /// The last cycle in which it may issue.
@@ -36,34 +36,34 @@ pub(super) struct Task {
 impl Task {
     /// How many choices of slots there are.
     pub(super) fn choices(&self) -> usize {
-        self.parts.len().checked_div(self.operations).unwrap_or(1)
+        self.uses.len().checked_div(self.operations).unwrap_or(1)
     }
 
     /// Its operations on the slots of a choice.
     #[inline]
-    pub(super) fn choice(&self, choice: u8) -> &[Part] {
+    pub(super) fn choice(&self, choice: u8) -> &[ResourceUse] {
         let first = usize::from(choice) * self.operations;
-        &self.parts[first..first + self.operations]
+        &self.uses[first..first + self.operations]
     }
 
     /// One operation, on the slots of each choice.
-    pub(super) fn operation(&self, index: usize) -> impl Iterator<Item = &Part> {
-        self.parts.iter().skip(index).step_by(self.operations.max(1))
+    pub(super) fn operation(&self, index: usize) -> impl Iterator<Item = &ResourceUse> {
+        self.uses.iter().skip(index).step_by(self.operations.max(1))
     }
 
     /// The slots that may execute an operation.
     pub(super) fn slots(&self, index: usize) -> Slots {
-        self.operation(index).filter_map(|part| SlotIndex::new(part.slot)).collect()
+        self.operation(index).filter_map(|usage| SlotIndex::new(usage.slot)).collect()
     }
 
     /// Cycles from its issue to the write of an operation's result, on the quickest of its slots.
     pub(super) fn written(&self, index: usize) -> Option<u32> {
-        self.operation(index).filter_map(|part| part.writes).min()
+        self.operation(index).filter_map(|usage| usage.writes).min()
     }
 
     /// Whether the latency of an operation depends on the choice of its slot.
     pub(super) fn varies(&self, index: usize) -> bool {
-        self.operation(index).any(|part| part.writes != self.written(index))
+        self.operation(index).any(|usage| usage.writes != self.written(index))
     }
 }
 
@@ -134,7 +134,11 @@ impl Problem {
 
     /// The tasks that `keep` tells, and after them one more, the moment in which those of `ends` that are kept have written,
     /// each so many cycles after its issue. Also gives each kept task's index in this problem.
-    pub(super) fn part(&self, keep: &[bool], ends: impl Fn(usize) -> Option<u32>) -> (Problem, Vec<usize>) {
+    pub(super) fn subproblem(
+        &self,
+        keep: &[bool],
+        ends: impl Fn(usize) -> Option<u32>,
+    ) -> (Problem, Vec<usize>) {
         let kept: Vec<usize> = (0..self.tasks.len()).filter(|&i| keep[i]).collect();
         let mut index = vec![None; self.tasks.len()];
         for (new, &old) in kept.iter().enumerate() {

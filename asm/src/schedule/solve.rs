@@ -8,9 +8,9 @@
 //! write. The same problem always has the same solution.
 
 use super::bound::{self, Bound};
-use super::pass::{Direction, Graph, Lean, Plan, Reservations};
+use super::exact::{self, ExactResult};
+use super::list::{Direction, Graph, Plan, Reservations, SlotPreference};
 use super::problem::{Problem, Task};
-use super::squeeze::{self, Squeezed};
 
 /// A schedule.
 #[derive(Clone, Debug)]
@@ -68,9 +68,9 @@ const TASKS_PER_EFFORT: u64 = 200_000;
 impl Problem {
     /// Which tasks decide how long inputs that are read late are under way: for each, whether it is late, and the distance
     /// from its issue to an output that depends on a late task.
-    fn watched(&self) -> Window {
+    fn watched(&self) -> LateWindow {
         if !self.tasks.iter().any(|task| task.late) {
-            return Window::default();
+            return LateWindow::default();
         }
         let after = self.after(|i| self.tasks[i].late);
         let late = (0..self.tasks.len()).filter(|&i| self.tasks[i].late).collect();
@@ -78,20 +78,20 @@ impl Problem {
         let before = self.before(|i| ends(i).is_some());
         let outputs = (0..self.tasks.len()).filter_map(|i| Some((i, ends(i)?))).collect();
         let keep: Vec<bool> = after.iter().zip(before).map(|(after, before)| *after && before).collect();
-        let bound = self.part(&keep, ends).0.bound().cycles() - 1;
-        Window { late, outputs, bound }
+        let bound = self.subproblem(&keep, ends).0.bound().cycles() - 1;
+        LateWindow { late, outputs, bound }
     }
 }
 
 /// From the first task that reads an input late to the last write of an output that depends on one.
 #[derive(Default)]
-struct Window {
+struct LateWindow {
     late: Vec<usize>,
     outputs: Vec<(usize, u32)>,
     bound: u32,
 }
 
-impl Window {
+impl LateWindow {
     fn first_read(&self, start: &[u32]) -> u32 {
         self.late.iter().map(|&i| start[i]).min().unwrap_or(0)
     }
@@ -107,7 +107,7 @@ impl Window {
 struct Search<'p> {
     graph: Graph<'p>,
     bound: Bound,
-    window: Window,
+    window: LateWindow,
     table: Reservations,
     random: Random,
     /// Tasks that may still be placed.
@@ -139,11 +139,11 @@ impl Search<'_> {
 
     /// A schedule from priorities (small first), and its improvement forward and backward until two rounds bring nothing. Late
     /// tasks issue in cycle `release` or later. Returns whether the budget lasts for more.
-    fn descend(&mut self, (mut key, lean): (Vec<u64>, Lean), release: u32) -> bool {
+    fn descend(&mut self, (mut key, lean): (Vec<u64>, SlotPreference), release: u32) -> bool {
         let n = self.graph.problem.tasks.len();
         let (mut plan, mut start) = (Plan::new(self.graph.problem), vec![0; n]);
         let forward = |task: &Task| if task.late { release } else { 0 };
-        self.graph.pass(Direction::Forward, &key, &lean, forward, &mut self.table, &mut plan);
+        self.graph.list_schedule(Direction::Forward, &key, &lean, forward, &mut self.table, &mut plan);
         let (mut spent, mut settled, mut least) = (0, 0, None);
         loop {
             let length = self.graph.issue(&plan, &mut self.table, &mut start);
@@ -160,9 +160,9 @@ impl Search<'_> {
             }
             key = start.iter().map(|start| u64::from(u32::MAX - start)).collect();
             let backward = |task: &Task| task.latest.map_or(0, |latest| (length - 1).saturating_sub(latest));
-            self.graph.pass(Direction::Backward, &key, &lean, backward, &mut self.table, &mut plan);
+            self.graph.list_schedule(Direction::Backward, &key, &lean, backward, &mut self.table, &mut plan);
             key = plan.start.iter().map(|start| u64::from(u32::MAX - start)).collect();
-            self.graph.pass(Direction::Forward, &key, &lean, forward, &mut self.table, &mut plan);
+            self.graph.list_schedule(Direction::Forward, &key, &lean, forward, &mut self.table, &mut plan);
             spent += 2;
         }
         // Where an operation has very many to wait for, that is the work.
@@ -174,7 +174,7 @@ impl Search<'_> {
 
     /// Priorities for a round: most urgent first, with noise; by turns the best schedule's own order, with noise. Also the slots
     /// that tasks lean toward.
-    fn priorities(&mut self, round: usize) -> (Vec<u64>, Lean) {
+    fn priorities(&mut self, round: usize) -> (Vec<u64>, SlotPreference) {
         let best = self.best.as_ref().filter(|_| round % 2 == 1);
         let (urgency, noise): (Vec<i64>, u64) = match best {
             Some((_, best)) => {
@@ -196,8 +196,9 @@ impl Search<'_> {
 
     /// Toward which slots the tasks of a round lean: first toward those that others do not depend on, then by turns toward those
     /// of the best schedule, but for a few tasks; and how much.
-    fn lean(&mut self, round: usize) -> Lean {
-        let mut lean = Lean { toward: self.lightest.clone(), quarters: 0, due: [Vec::new(), Vec::new()] };
+    fn lean(&mut self, round: usize) -> SlotPreference {
+        let mut lean =
+            SlotPreference { toward: self.lightest.clone(), quarters: 0, due: [Vec::new(), Vec::new()] };
         let Some((cost, best)) = self.best.as_ref().filter(|_| self.has_choices) else { return lean };
         lean.quarters = QUARTERS[round / 8 % QUARTERS.len()];
         let last = i64::from(cost.length) - 1;
@@ -215,10 +216,10 @@ impl Search<'_> {
     }
 
     /// Looks for what priorities have not found, and for a proof that there is nothing.
-    fn squeeze(&mut self, effort: u32) {
+    fn exact(&mut self, effort: u32) {
         let Some((cost, _)) = self.best.as_ref().filter(|(cost, _)| cost.tardy == 0) else { return };
-        let squeezed = squeeze::squeeze(&self.graph, self.bound.cycles(), cost.length, effort);
-        let Some(Squeezed { bound, start }) = squeezed else { return };
+        let result = exact::search(&self.graph, self.bound.cycles(), cost.length, effort);
+        let Some(ExactResult { bound, start }) = result else { return };
         if bound > self.bound.cycles() {
             self.bound.windows = bound;
         }
@@ -284,7 +285,7 @@ pub(super) fn solve(problem: &Problem, effort: u32) -> Solution {
             break;
         }
     }
-    search.squeeze(effort);
+    search.exact(effort);
     if !search.window.late.is_empty() {
         search.delay(effort);
     }

@@ -73,7 +73,7 @@ pub(crate) fn describe<'s>(
     at: usize,
     text: &dyn Fn(Span) -> &'s str,
 ) -> Option<Diagnostic> {
-    let line = Line { tokens: body(tokens), text };
+    let line = ForeignLine { tokens: body(tokens), text };
     line.statement().or_else(|| line.assignment()).or_else(|| line.operator(tokens[at].1))
 }
 
@@ -93,12 +93,12 @@ fn body(tokens: Tokens<'_>) -> Tokens<'_> {
     }
 }
 
-struct Line<'t, 'f, 's> {
+struct ForeignLine<'t, 'f, 's> {
     tokens: Tokens<'t>,
     text: &'f dyn Fn(Span) -> &'s str,
 }
 
-impl<'s> Line<'_, '_, 's> {
+impl<'s> ForeignLine<'_, '_, 's> {
     fn token(&self, index: usize) -> Option<Token> {
         self.tokens.get(index).map(|token| token.0)
     }

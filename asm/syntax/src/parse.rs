@@ -6,7 +6,7 @@
 use crate::ast::*;
 use crate::blocks;
 use crate::explain::describe;
-use crate::grammar::{self, Body, Builder, Line};
+use crate::grammar::{self, Body, Builder, ParsedLine};
 use crate::grouping;
 use crate::intern::Interner;
 use crate::lex::{Chunk, Lexer, LineTokens, Token};
@@ -143,7 +143,7 @@ pub(crate) fn is_equation(tokens: &[(Token, Span)]) -> bool {
 
 /// Adds a parsed line to the tree.
 fn add(
-    parsed: Line,
+    parsed: ParsedLine,
     line: &LineTokens,
     tokens: &[(Token, Span)],
     source: &Source,

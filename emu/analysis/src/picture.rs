@@ -11,7 +11,7 @@ use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
 
 /// What a faster unit would bring: to the program as it is, and assembled for a machine that has it.
-pub struct Faster {
+pub struct Speedup {
     /// In which unit, and what to the program as it is.
     pub what: WhatIf,
     /// To the program assembled for a machine that has it, if that was tried.
@@ -39,7 +39,7 @@ pub struct Picture<'p> {
     /// The chain that sets its time.
     pub chain: Vec<Link>,
     /// What faster units would bring.
-    pub faster: Vec<Faster>,
+    pub faster: Vec<Speedup>,
     /// What its lines do to accuracy, as `takt accuracy --json` has it.
     pub accuracy: Option<Value>,
 }
@@ -198,7 +198,7 @@ impl<'p> Picture<'p> {
                 "from": link.from, "to": link.to, "cycles": link.cycles, "through": through, "register": register,
             })
         };
-        let faster = |faster: &Faster| {
+        let faster = |faster: &Speedup| {
             let reassembled = faster.reassembled.as_ref();
             json!({
                 "unit": self.unit(faster.what.unit),

@@ -153,7 +153,7 @@ pub struct WhatIf {
 pub type Stalls = [i64; Cause::KINDS.len()];
 
 /// An operation as the rules see it.
-struct Part {
+struct OperationTiming {
     slot: SlotIndex,
     unit: u8,
     latency: Cycle,
@@ -165,7 +165,8 @@ impl Trace {
     /// The chain of issues from the first to the last in which each could not have been earlier because of the one before: its cycles add up to
     /// those between the first and the last issue. Of several reasons that hold alike, a result that came just in time counts before the order of issue.
     pub fn critical_path(&self, program: &Program) -> Vec<Link> {
-        let parts: Vec<Vec<Part>> = self.issues.iter().map(|issue| parts(program, issue.address)).collect();
+        let parts: Vec<Vec<OperationTiming>> =
+            self.issues.iter().map(|issue| parts(program, issue.address)).collect();
         let mut chain = Vec::new();
         let mut to = self.issues.len().saturating_sub(1);
         while to > 0 {
@@ -177,10 +178,10 @@ impl Trace {
         chain
     }
 
-    fn link(&self, parts: &[Vec<Part>], to: usize) -> Link {
+    fn link(&self, parts: &[Vec<OperationTiming>], to: usize) -> Link {
         let issue = &self.issues[to];
         let link = |from: usize, kind| Link { from, to, kind, cycles: issue.cycle - self.issues[from].cycle };
-        let earlier = |wanted: &dyn Fn(&Part, Cycle) -> bool| {
+        let earlier = |wanted: &dyn Fn(&OperationTiming, Cycle) -> bool| {
             (0..to).rev().find(|&from| parts[from].iter().any(|part| wanted(part, self.issues[from].cycle)))
         };
         let just_written = |register: Register| {
@@ -291,12 +292,12 @@ impl Trace {
 }
 
 /// The operations of a bundle that use a unit.
-fn parts(program: &Program, address: BundleAddress) -> Vec<Part> {
+fn parts(program: &Program, address: BundleAddress) -> Vec<OperationTiming> {
     let instructions: Vec<Instruction> = program.bundle(address).and_then(Result::ok).unwrap_or_default();
     let part = |((s, slot), instruction): ((SlotIndex, &Slot), &Instruction)| {
         let function = instruction.op.row().function;
         let unit = slot.unit_for(function).filter(|_| function != Function::Idle)?;
-        Some(Part {
+        Some(OperationTiming {
             slot: s,
             unit: unit as u8,
             latency: slot.units[unit].latency.into(),

@@ -30,7 +30,7 @@ pub(crate) type Tokens<'t> = MappedInput<'t, Token, Span, &'t [(Token, Span)]>;
 
 /// A parsed line.
 #[derive(Clone, Debug)]
-pub(crate) struct Line {
+pub(crate) struct ParsedLine {
     pub(crate) label: Option<Name>,
     pub(crate) body: Body,
 }

@@ -102,7 +102,7 @@ impl<'s> Lexer<'s> {
         if self.done {
             return false;
         }
-        let mut line = Line::new(0, self.line, self.base + self.lexer.span().end as u32);
+        let mut line = LineState::new(0, self.line, self.base + self.lexer.span().end as u32);
         loop {
             let raw = self.lexer.next();
             let range = self.lexer.span();
@@ -139,7 +139,7 @@ impl<'s> Lexer<'s> {
                     if self.done || tokens.len() >= size {
                         return true;
                     }
-                    line = Line::new(tokens.len(), self.line, span.end);
+                    line = LineState::new(tokens.len(), self.line, span.end);
                     continue;
                 }
                 // Of a line that is too long nothing more is kept.
@@ -198,7 +198,7 @@ impl<'s> Lexer<'s> {
 }
 
 /// The line being read.
-struct Line {
+struct LineState {
     /// Its first token.
     start: usize,
     number: u32,
@@ -217,15 +217,15 @@ struct Line {
     joins: usize,
 }
 
-impl Line {
-    fn new(start: usize, number: u32, from: u32) -> Line {
+impl LineState {
+    fn new(start: usize, number: u32, from: u32) -> LineState {
         let (bad, continued, unknown, long) = (false, false, false, false);
-        Line { start, number, from, bad, continued, unknown, long, nesting: 0, compares: 0, joins: 0 }
+        LineState { start, number, from, bad, continued, unknown, long, nesting: 0, compares: 0, joins: 0 }
     }
 
     fn end(&self, end: usize) -> LineTokens {
         let nested = self.nesting > limits::EXPRESSION_DEPTH || end - self.start > limits::EXPRESSION_NODES;
-        let Line { number, bad, continued, compares, joins, .. } = *self;
+        let LineState { number, bad, continued, compares, joins, .. } = *self;
         let compared = compares > 0 && compares + joins > 1;
         LineTokens { end: end as u32, number, bad, continued, nested, compared }
     }

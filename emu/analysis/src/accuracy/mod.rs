@@ -18,7 +18,7 @@ use takt_isa::{Instruction, Program, Register};
 pub use enclose::{MAX_BUNDLES, enclose};
 pub use enclosure::{Assumed, Enclosure, Hazard, Moment, OutputBound};
 pub use interval::Interval;
-pub use shadow::{Decision, Lost, OperationAccuracy, OutputAccuracy, Part, Shadow, Worst};
+pub use shadow::{Decision, ErrorShare, Lost, OperationAccuracy, OutputAccuracy, Shadow, Worst};
 pub use value::Problem;
 
 /// Numbers that are added to round to integers: binary32 has no fraction there.

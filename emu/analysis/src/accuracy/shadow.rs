@@ -12,7 +12,7 @@ use takt_isa::{BundleAddress, Effect, Instruction, Program, Register, Type, comp
 
 /// An operation's share of an error: the word of the program and what it adds, with its sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Part {
+pub struct ErrorShare {
     /// Index into [`Program::code`].
     pub word: u32,
     /// Its share, in the unit of the value.
@@ -46,7 +46,7 @@ pub struct OutputAccuracy {
     /// The largest as a part of the exact value, which is not zero then.
     pub relative: Option<Worst>,
     /// Where the largest absolute error comes from: the shares add up to it. The largest first.
-    pub parts: Vec<Part>,
+    pub parts: Vec<ErrorShare>,
     /// Periods at whose end it was compared.
     pub periods: u64,
 }
@@ -94,7 +94,7 @@ struct Cell {
     bits: u32,
     real: f64,
     /// By word, ascending.
-    parts: Rc<[Part]>,
+    parts: Rc<[ErrorShare]>,
 }
 
 /// The same program in binary64, beside a run.
@@ -121,7 +121,7 @@ pub struct Shadow {
 struct Outcome {
     bits: u32,
     /// The value in binary64 and where the difference comes from; `None` if there is none.
-    shadow: Option<(f64, Vec<Part>)>,
+    shadow: Option<(f64, Vec<ErrorShare>)>,
 }
 
 impl Outcome {
@@ -135,7 +135,7 @@ struct Operand {
     bits: u32,
     value: f64,
     real: f64,
-    parts: Rc<[Part]>,
+    parts: Rc<[ErrorShare]>,
 }
 
 impl Operand {
@@ -325,7 +325,7 @@ impl Shadow {
             return Outcome::exact(bits);
         }
         // One operand after the other from its value in the run to that in binary64: the steps add up to the whole.
-        let mut parts: Vec<Part> = Vec::new();
+        let mut parts: Vec<ErrorShare> = Vec::new();
         let mut before = plain.value;
         for (i, operand) in operands.iter().enumerate().filter(|(_, operand)| !operand.parts.is_empty()) {
             let after = evaluate(i + 1).map_or(before, |probe| probe.value);
@@ -336,7 +336,7 @@ impl Shadow {
             before = after;
         }
         if local != 0.0 {
-            parts = merge(&parts, &[Part { word, error: local }], 1.0);
+            parts = merge(&parts, &[ErrorShare { word, error: local }], 1.0);
         }
         Outcome { bits, shadow: Some((exact, parts)) }
     }
@@ -377,7 +377,7 @@ impl Shadow {
     }
 
     /// A register that holds a finite number: its value, that in binary64, and where the difference comes from.
-    pub fn value(&self, emulator: &Emulator, register: Register) -> Option<(f64, f64, Rc<[Part]>)> {
+    pub fn value(&self, emulator: &Emulator, register: Register) -> Option<(f64, f64, Rc<[ErrorShare]>)> {
         let operand = Operand::of(self.registers.get(&register), emulator.register(register)?);
         operand.value.is_finite().then_some((operand.value, operand.real, operand.parts))
     }
@@ -481,11 +481,12 @@ fn lose(lost: &mut BTreeMap<u32, Lost>, word: u32, period: u64, infinite: bool) 
 }
 
 /// One list of parts and a multiple of another, both by word.
-fn merge(a: &[Part], b: &[Part], factor: f64) -> Vec<Part> {
+fn merge(a: &[ErrorShare], b: &[ErrorShare], factor: f64) -> Vec<ErrorShare> {
     let mut merged = Vec::with_capacity(a.len() + b.len());
     let (mut i, mut j) = (0, 0);
     loop {
-        let (x, y) = (a.get(i).copied(), b.get(j).map(|part| Part { error: part.error * factor, ..*part }));
+        let (x, y) =
+            (a.get(i).copied(), b.get(j).map(|part| ErrorShare { error: part.error * factor, ..*part }));
         let take = match (x, y) {
             (None, None) => return merged,
             (Some(x), Some(y)) => x.word.cmp(&y.word),
@@ -494,11 +495,11 @@ fn merge(a: &[Part], b: &[Part], factor: f64) -> Vec<Part> {
         };
         i += usize::from(take != Ordering::Greater);
         j += usize::from(take != Ordering::Less);
-        let error = |part: Option<Part>| part.map_or(0.0, |part| part.error);
+        let error = |part: Option<ErrorShare>| part.map_or(0.0, |part| part.error);
         let part = match take {
             Ordering::Less => x,
             Ordering::Greater => y,
-            Ordering::Equal => x.map(|part| Part { error: part.error + error(y), ..part }),
+            Ordering::Equal => x.map(|part| ErrorShare { error: part.error + error(y), ..part }),
         };
         merged.extend(part);
     }

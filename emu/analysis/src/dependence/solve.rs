@@ -1,7 +1,7 @@
 //! The fixed point of the data flow for one input, period by period.
 
 use super::cell::Cell;
-use super::graph::{Flat, Gate, Place, Reads, Section, Step, Writes};
+use super::graph::{Flat, Gate, Reads, Section, Step, Storage, Writes};
 use super::{MAX_ROUNDS, Periods, Sent};
 use takt_isa::Register;
 
@@ -214,7 +214,7 @@ impl Flat {
 }
 
 /// The join of the dependences of these places.
-fn of_all(places: &[Place], state: &State) -> Cell {
+fn of_all(places: &[Storage], state: &State) -> Cell {
     places.iter().fold(Cell::NONE, |all, &place| all.with(state[place]))
 }
 

@@ -1,6 +1,6 @@
 //! Schedule generation: tasks in an order of priority, each in the first cycle that has room, forward or backward.
 
-use super::problem::{Edge, Part, Problem, Task};
+use super::problem::{Edge, Problem, ResourceUse, Task};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -89,28 +89,28 @@ impl Reservations {
         }
     }
 
-    pub(super) fn fits(&self, parts: &[Part], cycle: usize, direction: Direction) -> bool {
-        parts.iter().all(|part| {
-            !self.slots[part.slot].is_set(cycle)
-                && part.unit.is_none_or(|unit| {
+    pub(super) fn fits(&self, uses: &[ResourceUse], cycle: usize, direction: Direction) -> bool {
+        uses.iter().all(|usage| {
+            !self.slots[usage.slot].is_set(cycle)
+                && usage.unit.is_none_or(|unit| {
                     // A unit is held for `interval` cycles of the pass from the issue on. In a backward pass the hold
                     // runs the other way, which forbids the same pairs of cycles.
-                    (0..part.interval as usize).all(|k| !self.units[unit].is_set(cycle + k))
+                    (0..usage.interval as usize).all(|k| !self.units[unit].is_set(cycle + k))
                 })
-                && part.writes.is_none_or(|latency| {
-                    !self.ports[part.slot].is_set(Self::port_cycle(direction, cycle, latency))
+                && usage.writes.is_none_or(|latency| {
+                    !self.ports[usage.slot].is_set(Self::port_cycle(direction, cycle, latency))
                 })
         })
     }
 
-    /// The first cycle from one on in which all parts fit.
-    fn first_fit(&mut self, parts: &[Part], mut cycle: usize, direction: Direction) -> usize {
+    /// The first cycle from one on in which all uses fit.
+    fn first_fit(&mut self, uses: &[ResourceUse], mut cycle: usize, direction: Direction) -> usize {
         loop {
             let before = cycle;
-            for part in parts {
-                cycle = self.slots[part.slot].free_from(cycle);
-                if let Some(unit) = part.unit {
-                    for k in 0..part.interval as usize {
+            for usage in uses {
+                cycle = self.slots[usage.slot].free_from(cycle);
+                if let Some(unit) = usage.unit {
+                    for k in 0..usage.interval as usize {
                         // What is taken within the interval is behind it.
                         let free = self.units[unit].free_from(cycle + k);
                         if free != cycle + k {
@@ -119,9 +119,9 @@ impl Reservations {
                         }
                     }
                 }
-                if let Some(latency) = part.writes {
+                if let Some(latency) = usage.writes {
                     let port = Self::port_cycle(direction, cycle, latency);
-                    cycle += self.ports[part.slot].free_from(port) - port;
+                    cycle += self.ports[usage.slot].free_from(port) - port;
                 }
             }
             if cycle == before {
@@ -130,16 +130,16 @@ impl Reservations {
         }
     }
 
-    pub(super) fn reserve(&mut self, parts: &[Part], cycle: usize, direction: Direction) {
-        for part in parts {
-            self.slots[part.slot].set(cycle);
-            if let Some(unit) = part.unit {
-                for k in 0..part.interval as usize {
+    pub(super) fn reserve(&mut self, uses: &[ResourceUse], cycle: usize, direction: Direction) {
+        for usage in uses {
+            self.slots[usage.slot].set(cycle);
+            if let Some(unit) = usage.unit {
+                for k in 0..usage.interval as usize {
                     self.units[unit].set(cycle + k);
                 }
             }
-            if let Some(latency) = part.writes {
-                self.ports[part.slot].set(Self::port_cycle(direction, cycle, latency));
+            if let Some(latency) = usage.writes {
+                self.ports[usage.slot].set(Self::port_cycle(direction, cycle, latency));
             }
         }
     }
@@ -176,7 +176,7 @@ impl Plan {
 
 /// Which choice of slots each task takes, of several that have room.
 #[derive(Clone, Debug)]
-pub(super) struct Lean {
+pub(super) struct SlotPreference {
     /// The one that it leans toward.
     pub(super) toward: Vec<u8>,
     /// How much longer it waits for that: so many quarters of the time until it is due. None: it takes that of two as early.
@@ -185,7 +185,7 @@ pub(super) struct Lean {
     pub(super) due: [Vec<i64>; 2],
 }
 
-impl Lean {
+impl SlotPreference {
     /// How many cycles later the choice that a task leans toward may be than another that has room in a cycle.
     #[inline]
     fn patience(&self, direction: Direction, task: usize, cycle: u32) -> u32 {
@@ -232,10 +232,10 @@ impl<'p> Graph<'p> {
     pub(super) fn lightest(&self) -> Vec<u8> {
         let mut demand = vec![0u32; self.problem.slots];
         for task in self.problem.tasks.iter().filter(|task| task.choices() == 1) {
-            task.parts.iter().for_each(|part| demand[part.slot] += 1);
+            task.uses.iter().for_each(|usage| demand[usage.slot] += 1);
         }
         let lightest = |task: &Task| {
-            let load = |choice: &u8| task.choice(*choice).iter().map(|part| demand[part.slot]).sum::<u32>();
+            let load = |choice: &u8| task.choice(*choice).iter().map(|usage| demand[usage.slot]).sum::<u32>();
             (0..task.choices() as u8).min_by_key(load).unwrap_or(0)
         };
         self.problem.tasks.iter().map(lightest).collect()
@@ -273,11 +273,11 @@ impl<'p> Graph<'p> {
     /// Places every task, in an order that respects the edges and otherwise follows `key` (small first), in the first
     /// cycle that has room and is not before its `release`; of several choices of slots, that which has its results first,
     /// unless it leans toward another.
-    pub(super) fn pass(
+    pub(super) fn list_schedule(
         &self,
         direction: Direction,
         key: &[u64],
-        lean: &Lean,
+        lean: &SlotPreference,
         release: impl Fn(&Task) -> u32,
         table: &mut Reservations,
         plan: &mut Plan,
@@ -309,12 +309,12 @@ impl<'p> Graph<'p> {
                     };
                     plan.start[other] + distance
                 };
-                let parts = task.choice(choice);
+                let uses = task.choice(choice);
                 let earliest = preds[i].iter().map(after).fold(release(task), u32::max);
-                let cycle = table.first_fit(parts, earliest as usize, direction) as u32;
+                let cycle = table.first_fit(uses, earliest as usize, direction) as u32;
                 // What is quicker may issue later. (Backward, the distances have seen to that.)
                 let written = match direction {
-                    Direction::Forward => parts.iter().filter_map(|part| part.writes).max().unwrap_or(0),
+                    Direction::Forward => uses.iter().filter_map(|usage| usage.writes).max().unwrap_or(0),
                     Direction::Backward => 0,
                 };
                 let done = cycle + written;
@@ -358,11 +358,11 @@ impl<'p> Graph<'p> {
                 };
                 cycle = earlier.map(after).fold(cycle, u32::max);
             }
-            while !tasks().all(|(_, parts)| table.fits(parts, cycle as usize, Direction::Forward)) {
+            while !tasks().all(|(_, uses)| table.fits(uses, cycle as usize, Direction::Forward)) {
                 cycle += 1;
             }
-            for (i, parts) in tasks() {
-                table.reserve(parts, cycle as usize, Direction::Forward);
+            for (i, uses) in tasks() {
+                table.reserve(uses, cycle as usize, Direction::Forward);
                 start[i] = cycle;
             }
             cycle += 1;
@@ -376,24 +376,24 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn part() -> impl Strategy<Value = Part> {
+    fn resource_use() -> impl Strategy<Value = ResourceUse> {
         (0..2usize, prop::option::of(0..3usize), 1..5u32, prop::option::of(1..4u32))
-            .prop_map(|(slot, unit, interval, writes)| Part { slot, unit, interval, writes })
+            .prop_map(|(slot, unit, interval, writes)| ResourceUse { slot, unit, interval, writes })
     }
 
     proptest! {
         /// The first cycle that fits is the one that trying each finds, however the table was filled.
         #[test]
         fn the_first_fit_is_the_first(
-            tasks in prop::collection::vec((prop::collection::vec(part(), 1..3), 0..20usize), 1..60),
+            tasks in prop::collection::vec((prop::collection::vec(resource_use(), 1..3), 0..20usize), 1..60),
             backward in any::<bool>(),
         ) {
             let direction = if backward { Direction::Backward } else { Direction::Forward };
             let mut table = Reservations::new(&Problem { slots: 2, units: 3, ..Problem::default() });
-            for (parts, earliest) in &tasks {
-                let tried = (*earliest..).find(|cycle| table.fits(parts, *cycle, direction));
-                prop_assert_eq!(Some(table.first_fit(parts, *earliest, direction)), tried);
-                table.reserve(parts, tried.unwrap_or(0), direction);
+            for (uses, earliest) in &tasks {
+                let tried = (*earliest..).find(|cycle| table.fits(uses, *cycle, direction));
+                prop_assert_eq!(Some(table.first_fit(uses, *earliest, direction)), tried);
+                table.reserve(uses, tried.unwrap_or(0), direction);
             }
         }
     }

@@ -26,7 +26,7 @@ struct Known {
 }
 
 #[derive(Default)]
-pub(crate) struct Sharing {
+pub(crate) struct CommonSubexpressions {
     known: HashMap<Key, Known>,
     /// How often each register was written, by index.
     writes: Vec<u32>,
@@ -35,7 +35,7 @@ pub(crate) struct Sharing {
     pub(crate) stretches: Vec<(u32, u32)>,
 }
 
-impl Sharing {
+impl CommonSubexpressions {
     /// What is known ends.
     pub(crate) fn cut(&mut self) {
         self.known.clear();

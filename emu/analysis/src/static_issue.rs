@@ -6,7 +6,7 @@ use takt_isa::{BundleAddress, Flow, Instruction, Program, Register};
 
 /// When a bundle issues.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct StraightIssue {
+pub struct StaticIssue {
     /// Its address.
     pub address: BundleAddress,
     /// The bundle from which cycles count: the first of a section, one that is jumped to, or one behind a bundle that jumps.
@@ -21,7 +21,7 @@ pub struct StraightIssue {
 }
 
 /// The issue of each bundle of a program, by address. A bundle that is none ends the list.
-pub fn straight(program: &Program) -> Vec<StraightIssue> {
+pub fn static_issue(program: &Program) -> Vec<StaticIssue> {
     let machine = program.machine;
     let mut entries: BTreeSet<BundleAddress> = program.sections.iter().map(|section| section.start).collect();
     entries.extend(program.loop_bounds.iter().map(|bound| bound.address));
@@ -44,7 +44,7 @@ pub fn straight(program: &Program) -> Vec<StraightIssue> {
         let awaits = awaits.collect();
         let issue: Issue = scoreboard.issue(&bundle, address, earliest);
         let stalls = issue.stalls().to_vec();
-        issues.push(StraightIssue { address, from, cycle: issue.cycle, stalls, awaits });
+        issues.push(StaticIssue { address, from, cycle: issue.cycle, stalls, awaits });
         match Flow::of(instructions) {
             Flow::Next => earliest = timing::after_sequential(issue.cycle),
             Flow::Branch { .. } => earliest = timing::after_not_taken(machine, issue.cycle),

@@ -5,7 +5,7 @@
 //! that matters: where the scheduler may move the operations (the reuse of a name then orders nothing), and for names that
 //! operations of different slots write. Of these the last value, too, where it does not lie in the name's home.
 
-use crate::homes::Homes;
+use crate::banks::BankAssignment;
 use crate::ir::runs;
 use crate::ir::{Ir, RegisterId, RegisterKind, Version, VirtualRegister, numbered};
 
@@ -24,7 +24,7 @@ pub(crate) fn contested(ir: &Ir) -> Vec<bool> {
 
 /// What a run makes of a register.
 #[derive(Clone, Copy, Default)]
-struct Name {
+struct Renaming {
     /// Operations of the run that are still to write it.
     left: u32,
     /// Values that have got a register of their own.
@@ -37,7 +37,7 @@ struct Name {
 
 /// A value that is to be copied to the register that it is a value of.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Copy {
+pub(crate) struct BankCopy {
     /// The bundle that computes it, and which of its operations.
     pub(crate) at: (usize, usize),
     /// The register that it lies in.
@@ -47,17 +47,17 @@ pub(crate) struct Copy {
 }
 
 /// Splits names into values where that matters. Returns the values that are still to be copied home, in order.
-pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
+pub(crate) fn split(ir: &mut Ir, assignment: &mut BankAssignment) -> Vec<BankCopy> {
     let mut copies = Vec::new();
-    if homes.of.iter().all(Option::is_none) && !ir.scheduled {
+    if assignment.of.iter().all(Option::is_none) && !ir.scheduled {
         return copies;
     }
-    let mut names = vec![Name::default(); ir.registers.len()];
+    let mut names = vec![Renaming::default(); ir.registers.len()];
     let mut touched: Vec<usize> = Vec::new();
     for (number, run) in runs::runs(ir).into_iter().enumerate() {
         for operation in ir.bundles[run.start..run.end].iter().flat_map(|bundle| &bundle.operations) {
             let Some(id) = operation.dest else { continue };
-            if homes.get(id).is_some() || (run.scheduled && is_free(ir.register(id))) {
+            if assignment.get(id).is_some() || (run.scheduled && is_free(ir.register(id))) {
                 names[id.index()].left += 1;
                 touched.push(id.index());
             }
@@ -82,7 +82,7 @@ pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
                     versions[name.version].through = operation.order;
                 }
                 let original = &registers[dest.index()];
-                let home = homes.get(dest);
+                let home = assignment.get(dest);
                 let is_home = home.is_none_or(|home| operation.slot == Some(home.slot));
                 // A port shows every value, another register the run's last.
                 let settles = name.left == 0 || original.kind == RegisterKind::Output;
@@ -100,7 +100,7 @@ pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
                 };
                 let id = RegisterId::new(registers.len());
                 if home.is_some() && (settles || !is_free(original)) {
-                    homes.quiet.insert(id);
+                    assignment.quiet.insert(id);
                 }
                 registers.push(fresh);
                 name.version = versions.len();
@@ -108,8 +108,8 @@ pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
                 versions.push(Version { name: dest, register: id, after, through });
                 name.current = Some(id);
                 operation.dest = Some(id);
-                if settles && homes.is_live(dest, number) {
-                    copies.push(Copy { at: (at, which), from: id, to: dest });
+                if settles && assignment.is_live(dest, number) {
+                    copies.push(BankCopy { at: (at, which), from: id, to: dest });
                 }
             }
         }
@@ -118,7 +118,7 @@ pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
             if names[index].current.is_some() {
                 versions[names[index].version].through = last;
             }
-            names[index] = Name { made: names[index].made, ..Name::default() };
+            names[index] = Renaming { made: names[index].made, ..Renaming::default() };
         }
     }
     copies

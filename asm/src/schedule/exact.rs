@@ -1,14 +1,14 @@
 //! What the search by priorities leaves open, of blocks that are not too long: whether there is a shorter schedule.
 //!
-//! For one length after the other, windows ([`Windows`]) are narrowed, and narrowed further by supposing that a task issues
+//! For one length after the other, windows ([`TimeWindows`]) are narrowed, and narrowed further by supposing that a task issues
 //! at an end of its window: if that leaves another task nowhere to go, the end is cut off. If nothing is left, no schedule has
 //! this length, which raises the bound. Otherwise a schedule is searched for: in the order of time, the most urgent task
 //! that can issue does; where that leaves a task nowhere to go, the search goes back to the last choice and lets that task issue
 //! later, and the task that was in the way is preferred from then on. A search that has gone through all choices is a proof, too.
 
-use super::pass::{Direction, Graph, Reservations};
+use super::list::{Direction, Graph, Reservations};
 use super::solve::Random;
-use super::windows::{Empty, Propagation, Windows};
+use super::time_windows::{Empty, Propagation, TimeWindows};
 
 /// Tasks of a block up to which it is tried.
 const TASKS: usize = 2000;
@@ -20,7 +20,7 @@ const WORK_PER_EFFORT: u64 = 8_000_000;
 const DEAD_ENDS: u64 = 64;
 
 /// What came of it.
-pub(super) struct Squeezed {
+pub(super) struct ExactResult {
     /// No schedule is shorter.
     pub(super) bound: u32,
     /// The shortest schedule that was found, if one was: for each task its cycle.
@@ -47,7 +47,7 @@ enum Found {
 
 /// Looks for schedules shorter than `length`, down to `least`. Tasks that have a choice of slots, or a unit that does not take an operation
 /// every cycle, are not what the windows know: then it does nothing.
-pub(super) fn squeeze(graph: &Graph<'_>, least: u32, length: u32, effort: u32) -> Option<Squeezed> {
+pub(super) fn search(graph: &Graph<'_>, least: u32, length: u32, effort: u32) -> Option<ExactResult> {
     let tasks = &graph.problem.tasks;
     let known = tasks.iter().all(|task| task.choices() <= 1);
     if !known || tasks.len() > TASKS || effort == 0 || least >= length {
@@ -56,51 +56,51 @@ pub(super) fn squeeze(graph: &Graph<'_>, least: u32, length: u32, effort: u32) -
     let allowed = u64::from(effort) * WORK_PER_EFFORT;
     // Where deadlines had a part in it, that there is none says nothing of schedules that miss them.
     let timeless = tasks.iter().all(|task| task.latest.is_none());
-    let mut squeeze = Squeeze {
+    let mut exact = ExactSearch {
         graph,
         propagation: Propagation::new(graph),
         allowed: allowed / 8,
         random: Random::new(),
         weights: vec![0; tasks.len()],
     };
-    let mut squeezed = Squeezed { bound: least, start: None };
-    while squeezed.bound < length && !squeeze.may_be(squeezed.bound) {
-        squeezed.bound += 1;
+    let mut result = ExactResult { bound: least, start: None };
+    while result.bound < length && !exact.is_feasible(result.bound) {
+        result.bound += 1;
     }
-    squeeze.allowed = allowed / 3;
+    exact.allowed = allowed / 3;
     let mut length = length;
-    while squeezed.bound < length {
-        match squeeze.search(squeezed.bound, Branch::Narrowest) {
+    while result.bound < length {
+        match exact.search(result.bound, Branch::Narrowest) {
             Found::Schedule(start) => {
                 length = start.iter().max().map_or(0, |last| last + 1);
-                squeezed.start = Some(start);
+                result.start = Some(start);
             }
-            Found::Nothing if timeless => squeezed.bound += 1,
+            Found::Nothing if timeless => result.bound += 1,
             Found::Nothing | Found::Unknown => break,
         }
     }
     // What was in the way of a proof is not what is in the way here.
-    (squeeze.allowed, squeeze.random) = (allowed, Random::new());
-    squeeze.weights.fill(0);
-    while squeezed.bound < length {
-        match squeeze.search(length - 1, Branch::Earliest) {
+    (exact.allowed, exact.random) = (allowed, Random::new());
+    exact.weights.fill(0);
+    while result.bound < length {
+        match exact.search(length - 1, Branch::Earliest) {
             Found::Schedule(start) => {
                 length = start.iter().max().map_or(0, |last| last + 1);
-                squeezed.start = Some(start);
+                result.start = Some(start);
             }
             Found::Nothing => {
                 if timeless {
-                    squeezed.bound = length;
+                    result.bound = length;
                 }
                 break;
             }
             Found::Unknown => break,
         }
     }
-    Some(squeezed)
+    Some(result)
 }
 
-struct Squeeze<'g, 'p> {
+struct ExactSearch<'g, 'p> {
     graph: &'g Graph<'p>,
     propagation: Propagation<'g, 'p>,
     /// Work up to which it goes on.
@@ -110,19 +110,19 @@ struct Squeeze<'g, 'p> {
     weights: Vec<i64>,
 }
 
-impl Squeeze<'_, '_> {
+impl ExactSearch<'_, '_> {
     fn is_spent(&self) -> bool {
         self.propagation.work >= self.allowed
     }
 
     /// Whether nothing shows that no schedule has so many cycles.
-    fn may_be(&mut self, length: u32) -> bool {
-        let mut windows = Windows::new(length, self.graph.problem.tasks.iter().map(|_| None));
+    fn is_feasible(&mut self, length: u32) -> bool {
+        let mut windows = TimeWindows::new(length, self.graph.problem.tasks.iter().map(|_| None));
         self.propagation.narrow(&mut windows).and_then(|()| self.shave(&mut windows, self.allowed)).is_ok()
     }
 
     /// Cuts off the ends of windows where no schedule has a task, until so much work is done.
-    fn shave(&mut self, windows: &mut Windows, allowed: u64) -> Result<(), Empty> {
+    fn shave(&mut self, windows: &mut TimeWindows, allowed: u64) -> Result<(), Empty> {
         let mut tasks: Vec<usize> = (0..windows.first.len()).collect();
         tasks.sort_by_key(|&task| windows.last[task] - windows.first[task]);
         loop {
@@ -161,7 +161,7 @@ impl Squeeze<'_, '_> {
     /// A schedule of at most so many cycles.
     fn search(&mut self, length: u32, branch: Branch) -> Found {
         let latest = self.graph.problem.tasks.iter().map(|task| task.latest);
-        let mut root = Windows::new(length, latest);
+        let mut root = TimeWindows::new(length, latest);
         let third = self.propagation.work + self.allowed.saturating_sub(self.propagation.work) / 3;
         if self.propagation.narrow(&mut root).and_then(|()| self.shave(&mut root, third)).is_err() {
             return Found::Nothing;
@@ -178,10 +178,10 @@ impl Squeeze<'_, '_> {
     }
 
     /// One search, with noise in what is urgent, until it has met so many dead ends.
-    fn descend(&mut self, mut windows: Windows, branch: Branch, dead_ends: u64, noise: u64) -> Found {
+    fn descend(&mut self, mut windows: TimeWindows, branch: Branch, dead_ends: u64, noise: u64) -> Found {
         let mut left = dead_ends;
         // Before each choice: the windows, and the task that was chosen.
-        let mut choices: Vec<(Windows, usize)> = Vec::new();
+        let mut choices: Vec<(TimeWindows, usize)> = Vec::new();
         let scatter: Vec<i64> =
             self.weights.iter().map(|_| self.random.next(16 * noise + 1) as i64).collect();
         loop {
@@ -221,8 +221,8 @@ impl Squeeze<'_, '_> {
         let problem = self.graph.problem;
         let mut table = Reservations::new(problem);
         problem.tasks.iter().zip(start).all(|(task, &cycle)| {
-            let fits = table.fits(&task.parts, cycle as usize, Direction::Forward);
-            table.reserve(&task.parts, cycle as usize, Direction::Forward);
+            let fits = table.fits(&task.uses, cycle as usize, Direction::Forward);
+            table.reserve(&task.uses, cycle as usize, Direction::Forward);
             fits
         })
     }
@@ -230,7 +230,7 @@ impl Squeeze<'_, '_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::problem::{Edge, Part, Problem, Task};
+    use super::super::problem::{Edge, Problem, ResourceUse, Task};
     use super::*;
     use proptest::prelude::*;
 
@@ -241,11 +241,10 @@ mod tests {
         (0..length).any(|cycle| {
             let mut table = Reservations::new(problem);
             for (task, &cycle) in problem.tasks.iter().zip(&*start) {
-                table.reserve(&task.parts, cycle as usize, Direction::Forward);
+                table.reserve(&task.uses, cycle as usize, Direction::Forward);
             }
             let waits = |edge: &Edge| edge.to != placed || cycle >= start[edge.from] + edge.distance;
-            if !problem.edges.iter().all(waits)
-                || !table.fits(&task.parts, cycle as usize, Direction::Forward)
+            if !problem.edges.iter().all(waits) || !table.fits(&task.uses, cycle as usize, Direction::Forward)
             {
                 return false;
             }
@@ -259,7 +258,7 @@ mod tests {
     fn problem() -> impl Strategy<Value = Problem> {
         let task = (0..2usize, 1..4u32).prop_map(|(slot, latency)| Task {
             operations: 1,
-            parts: vec![Part { slot, unit: Some(slot), interval: 1, writes: Some(latency) }],
+            uses: vec![ResourceUse { slot, unit: Some(slot), interval: 1, writes: Some(latency) }],
             ..Task::default()
         });
         let tasks = prop::collection::vec(task, 2..7);
@@ -284,9 +283,9 @@ mod tests {
             let graph = Graph::new(&problem);
             let long = problem.tasks.len() as u32 * 4;
             let shortest = (1..=long).find(|length| exists(&problem, *length, &mut Vec::new()));
-            let squeezed = squeeze(&graph, 1, long, 20).expect("it is looked into");
-            prop_assert_eq!(Some(squeezed.bound), shortest);
-            let start = squeezed.start.expect("the longest was longer than need be");
+            let result = search(&graph, 1, long, 20).expect("it is looked into");
+            prop_assert_eq!(Some(result.bound), shortest);
+            let start = result.start.expect("the longest was longer than need be");
             prop_assert_eq!(start.iter().max().map(|last| last + 1), shortest);
         }
     }

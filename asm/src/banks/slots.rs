@@ -1,13 +1,13 @@
 //! A slot for each operation that several may execute.
 //!
 //! Within a bundle each operation takes a slot of its own, and all that write one register should take the same, whose bank the
-//! register then lies in: what does not is copied ([`homes`](crate::homes)). Where a bundle or a register leaves no choice, that
+//! register then lies in: what does not is copied ([`banks`](crate::banks)). Where a bundle or a register leaves no choice, that
 //! is settled first and what follows from it; where there is one, in the order of the source, for the first slot. A bundle that
 //! cannot do as its registers would have it goes its own way: `resolve` has seen to it that there is one.
 //!
 //! The scheduler chooses the slots again of what it packs, as long as a register stays in one bank.
 
-use crate::homes;
+use crate::banks;
 use crate::ir::flow::Flow;
 use crate::ir::matching;
 use crate::ir::runs::{self, Run};
@@ -20,7 +20,7 @@ use takt_isa::{SlotIndex, Slots};
 type At = (usize, usize);
 
 /// Chooses a slot for each operation.
-pub(crate) fn choose(ir: &mut Ir) {
+pub(crate) fn assign(ir: &mut Ir) {
     if !ir.has_choices || ir.operations().all(|operation| operation.slots.len() < 2) {
         return;
     }
@@ -63,7 +63,7 @@ impl Choice {
                     choice.bundles.push(several);
                 }
                 if let Some(dest) = operation.dest
-                    && (used.contains(&dest) || !homes::is_initial(ir, &flow, b, operation))
+                    && (used.contains(&dest) || !banks::is_initial(ir, &flow, b, operation))
                 {
                     writers.entry(dest).or_default().push((b, o));
                 }

@@ -1,14 +1,14 @@
-//! Homes: in which bank a register lies that operations of several slots write, and what becomes of those whose slot writes
+//! BankAssignment: in which bank a register lies that operations of several slots write, and what becomes of those whose slot writes
 //! another bank.
 //!
 //! A slot writes its own bank only. A value that must outlive its straight run, or that an output port shows, has to come
 //! to one place, the register's home. What another slot computes gets there in the cheapest of three ways: a constant that is
 //! there from the start is loaded with the program, a constant that comes later is computed by an operation of the right
-//! slot, and anything else is copied by an operation that copies bits ([`copies`](crate::homes::copies)).
+//! slot, and anything else is copied by an operation that copies bits ([`copies`](crate::banks::copies)).
 
 pub(crate) mod copies;
 pub(crate) mod slots;
-pub(crate) mod values;
+pub(crate) mod webs;
 
 use crate::ir::flow::{self, Flow};
 use crate::ir::runs::{self, Run};
@@ -32,16 +32,16 @@ pub struct Adjustment {
     /// Where it stands.
     pub location: Option<Location>,
     /// What became of it.
-    pub made: Made,
+    pub transfer: Transfer,
 }
 
 /// What became of an operation whose slot does not write the bank of its destination.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Made {
+pub enum Transfer {
     /// The loader sets the register to these bits; the operation is gone.
     Preset(u32),
     /// An operation of the right slot, by name, gives the same bits.
-    Operation(&'static str),
+    Rematerialised(&'static str),
     /// Its value is copied.
     Copy {
         /// The bundle that copies.
@@ -53,12 +53,12 @@ pub enum Made {
     },
 }
 
-impl std::fmt::Display for Made {
+impl std::fmt::Display for Transfer {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Made::Preset(bits) => write!(f, "loaded with the program, {}", listing::shown(*bits)),
-            Made::Operation(mnemonic) => write!(f, "becomes `{mnemonic}`"),
-            Made::Copy { address, alone, cycles } => {
+            Transfer::Preset(bits) => write!(f, "loaded with the program, {}", listing::shown(*bits)),
+            Transfer::Rematerialised(mnemonic) => write!(f, "becomes `{mnemonic}`"),
+            Transfer::Copy { address, alone, cycles } => {
                 match alone {
                     true => write!(f, "copied in a bundle of its own, {address}")?,
                     false => write!(f, "copied in a free slot of bundle {address}")?,
@@ -76,7 +76,7 @@ impl std::fmt::Display for Made {
 
 /// The home of a register, for those that need to be given one.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Home {
+pub(crate) struct HomeBank {
     /// The slot that writes it.
     pub(crate) slot: SlotIndex,
     /// What copies bits there, if anything.
@@ -85,21 +85,21 @@ pub(crate) struct Home {
 
 /// A register that has no home that all who write it can reach, and what to do.
 #[derive(Clone, Debug)]
-pub(crate) struct Homeless {
+pub(crate) struct BankConflict {
     pub(crate) register: RegisterId,
     pub(crate) help: String,
     /// What stands in the way, and where.
     pub(crate) because: Option<(Span, String)>,
 }
 
-/// What is known of the homes of a program's registers.
+/// What is known of the assignment of a program's registers.
 #[derive(Default)]
-pub(crate) struct Homes {
+pub(crate) struct BankAssignment {
     /// By register.
-    pub(crate) of: Vec<Option<Home>>,
+    pub(crate) of: Vec<Option<HomeBank>>,
     /// For registers that have a home: by run, whether the value that the run leaves is wanted.
     pub(crate) live: Vec<(RegisterId, Vec<bool>)>,
-    pub(crate) homeless: Vec<Homeless>,
+    pub(crate) conflicts: Vec<BankConflict>,
     /// Registers that the source writes in `.once`, if only to write them again before they are read.
     pub(crate) set_once: HashSet<RegisterId>,
     /// Registers made for values that nothing need read.
@@ -109,14 +109,14 @@ pub(crate) struct Homes {
     pub(crate) copied: Vec<(usize, RegisterId)>,
 }
 
-impl Homes {
-    pub(crate) fn get(&self, register: RegisterId) -> Option<Home> {
+impl BankAssignment {
+    pub(crate) fn get(&self, register: RegisterId) -> Option<HomeBank> {
         self.of.get(register.index()).copied().flatten()
     }
 
     /// What there is to say of a register that has no home.
-    pub(crate) fn homeless(&self, register: RegisterId) -> Option<&Homeless> {
-        self.homeless.iter().find(|homeless| homeless.register == register)
+    pub(crate) fn conflict(&self, register: RegisterId) -> Option<&BankConflict> {
+        self.conflicts.iter().find(|conflict| conflict.register == register)
     }
 
     /// Whether what a run leaves in a register may be read after it, or is shown by a port.
@@ -145,12 +145,12 @@ struct Write {
 const OPERATION: u64 = 1;
 const COPY: u64 = 4;
 
-/// Chooses homes. Constants come home here; what is to be copied still writes the register.
-pub(crate) fn choose(ir: &mut Ir) -> Homes {
-    let contested = values::contested(ir);
-    let mut homes = Homes { of: vec![None; ir.registers.len()], ..Homes::default() };
+/// Chooses assignment. Constants come home here; what is to be copied still writes the register.
+pub(crate) fn assign(ir: &mut Ir) -> BankAssignment {
+    let contested = webs::contested(ir);
+    let mut assignment = BankAssignment { of: vec![None; ir.registers.len()], ..BankAssignment::default() };
     if !contested.contains(&true) {
-        return homes;
+        return assignment;
     }
     let runs = runs::runs(ir);
     let flow = Flow::new(ir, &runs);
@@ -162,7 +162,7 @@ pub(crate) fn choose(ir: &mut Ir) -> Homes {
         }
         let mut once = ir.bundles[..ir.period as usize].iter().flat_map(|bundle| &bundle.operations);
         if once.any(|operation| operation.dest == Some(id)) {
-            homes.set_once.insert(id);
+            assignment.set_once.insert(id);
         }
         let live = if ir.register(id).kind == RegisterKind::Output {
             vec![true; runs.len()]
@@ -170,26 +170,26 @@ pub(crate) fn choose(ir: &mut Ir) -> Homes {
             let (reads, writes) = flow::uses(ir, &runs, id);
             flow.live_after(&reads, &writes)
         };
-        let writes = coming_home(ir, &runs, &flow, id, &live);
-        match best(ir, &flow, &writes, ir.register(id).pinned) {
+        let writes = bank_writes(ir, &runs, &flow, id, &live);
+        match best_bank(ir, &flow, &writes, ir.register(id).pinned) {
             Some(slot) => {
-                let home = Home { slot, copier: copier(ir.machine, slot) };
-                homes.of[index] = Some(home);
-                homes.live.push((id, live));
+                let home = HomeBank { slot, copier: copier(ir.machine, slot) };
+                assignment.of[index] = Some(home);
+                assignment.live.push((id, live));
                 for write in writes.iter().filter(|write| write.live && write.slot != slot) {
-                    homes.adjustments.extend(bring(ir, id, slot, write));
+                    assignment.adjustments.extend(transfer_constant(ir, id, slot, write));
                 }
             }
             None => {
-                homes.homeless.push(homeless(ir, &flow, id, &writes));
+                assignment.conflicts.push(conflict(ir, &flow, id, &writes));
             }
         }
     }
-    homes
+    assignment
 }
 
 /// The writes of a register that may have to come home.
-fn coming_home(ir: &Ir, runs: &[Run], flow: &Flow, id: RegisterId, live: &[bool]) -> Vec<Write> {
+fn bank_writes(ir: &Ir, runs: &[Run], flow: &Flow, id: RegisterId, live: &[bool]) -> Vec<Write> {
     let output = ir.register(id).kind == RegisterKind::Output;
     let fixed = runs::jumps_to_numbers(ir);
     let mut writes = Vec::new();
@@ -231,7 +231,7 @@ fn branch_that_reads(ir: &Ir, at: usize) -> Option<&Operation> {
 }
 
 /// The slot whose bank is the home that costs least. Where the register is `pinned`, the bank is given.
-fn best(ir: &Ir, flow: &Flow, writes: &[Write], pinned: Option<Register>) -> Option<SlotIndex> {
+fn best_bank(ir: &Ir, flow: &Flow, writes: &[Write], pinned: Option<Register>) -> Option<SlotIndex> {
     let machine = ir.machine;
     // Of equals that of the first write.
     let live = || writes.iter().filter(|write| write.live);
@@ -244,7 +244,7 @@ fn best(ir: &Ir, flow: &Flow, writes: &[Write], pinned: Option<Register>) -> Opt
             let weight = flow.weights[write.bundle];
             let cost = match write.constant {
                 Some(_) if write.initial => 0,
-                Some(bits) if is_free(ir, write, slot) && giving(machine, slot, bits).is_some() => {
+                Some(bits) if is_free(ir, write, slot) && materialise(machine, slot, bits).is_some() => {
                     OPERATION * weight
                 }
                 _ if write.copied && copier.is_some() => COPY * weight,
@@ -265,16 +265,16 @@ fn is_free(ir: &Ir, write: &Write, slot: SlotIndex) -> bool {
 }
 
 /// Brings a constant home.
-fn bring(ir: &mut Ir, id: RegisterId, slot: SlotIndex, write: &Write) -> Option<Adjustment> {
+fn transfer_constant(ir: &mut Ir, id: RegisterId, slot: SlotIndex, write: &Write) -> Option<Adjustment> {
     let bits = write.constant?;
     let old = ir.bundles[write.bundle].operations[write.number];
-    let made = if write.initial {
+    let transfer = if write.initial {
         ir.registers[id.index()].preset = Some(bits);
         // Taken out of its bundle once nothing counts on its place.
         ir.bundles[write.bundle].operations[write.number] = Operation { made: true, ..old.idle() };
-        Made::Preset(bits)
+        Transfer::Preset(bits)
     } else if is_free(ir, write, slot) {
-        let (op, sources) = giving(ir.machine, slot, bits)?;
+        let (op, sources) = materialise(ir.machine, slot, bits)?;
         let slots = able(ir, id, op);
         let mut new = Operation { op, slots, slot: Some(slot), dest: Some(id), made: true, ..old.idle() };
         (new.attribution, new.expansion) = (old.attribution, old.expansion);
@@ -282,16 +282,16 @@ fn bring(ir: &mut Ir, id: RegisterId, slot: SlotIndex, write: &Write) -> Option<
             Effect::Immediate => new.constant = Constant::Value(bits),
             _ => {
                 for (source, bits) in new.sources.iter_mut().zip(sources) {
-                    *source = holding(ir, bits, old.span);
+                    *source = constant_register(ir, bits, old.span);
                 }
             }
         }
         ir.bundles[write.bundle].operations[write.number] = new;
-        Made::Operation(op.row().mnemonic)
+        Transfer::Rematerialised(op.row().mnemonic)
     } else {
         return None;
     };
-    Some(adjustment(ir, id, slot, &old, made))
+    Some(adjustment(ir, id, slot, &old, transfer))
 }
 
 pub(crate) fn adjustment(
@@ -299,14 +299,14 @@ pub(crate) fn adjustment(
     id: RegisterId,
     slot: SlotIndex,
     from: &Operation,
-    made: Made,
+    transfer: Transfer,
 ) -> Adjustment {
     Adjustment {
         register: ir.register(id).name.clone(),
         bank: ir.machine.slot(slot).bank.name,
         mnemonic: from.row().mnemonic,
         location: ir.location(from),
-        made,
+        transfer,
     }
 }
 
@@ -353,7 +353,7 @@ fn constant(ir: &Ir, operation: &Operation) -> Option<u32> {
 
 /// An operation of a slot that gives these bits and raises no flag, and the bits of its sources: the quickest, with the
 /// simplest sources.
-fn giving(machine: &Machine, slot: SlotIndex, bits: u32) -> Option<(Op, [u32; 2])> {
+fn materialise(machine: &Machine, slot: SlotIndex, bits: u32) -> Option<(Op, [u32; 2])> {
     let palette = [0, bits, (-0.0f32).to_bits(), 1.0f32.to_bits()];
     let sources = |row: &Row| {
         let pairs = || palette.iter().flat_map(|&a| palette.iter().map(move |&b| [a, b]));
@@ -374,7 +374,7 @@ fn giving(machine: &Machine, slot: SlotIndex, bits: u32) -> Option<(Op, [u32; 2]
 }
 
 /// The register that holds these bits.
-fn holding(ir: &mut Ir, bits: u32, span: Span) -> RegisterId {
+fn constant_register(ir: &mut Ir, bits: u32, span: Span) -> RegisterId {
     let holds = |register: &VirtualRegister| match register.kind {
         RegisterKind::Zero => bits == 0,
         RegisterKind::Constant(other) => other == bits,
@@ -397,11 +397,11 @@ fn holding(ir: &mut Ir, bits: u32, span: Span) -> RegisterId {
 }
 
 /// Why a register has no home, and what to do.
-fn homeless(ir: &Ir, flow: &Flow, register: RegisterId, writes: &[Write]) -> Homeless {
+fn conflict(ir: &Ir, flow: &Flow, register: RegisterId, writes: &[Write]) -> BankConflict {
     let found = ir.register(register);
-    let because_of = |help: String, because| Homeless { register, help, because };
+    let because_of = |help: String, because| BankConflict { register, help, because };
     if found.pinned.is_some()
-        && let Some(slot) = best(ir, flow, writes, None)
+        && let Some(slot) = best_bank(ir, flow, writes, None)
     {
         let bank = ir.machine.slot(slot).bank.name;
         let help = format!("leave its place to the assembler, or place it in bank {bank}");

@@ -15,7 +15,7 @@ pub const PERIODS: u64 = 2;
 
 /// Why a period cannot be looked at.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum FollowError {
+pub enum PeriodRunError {
     /// The program does not fit its machine.
     #[error(transparent)]
     Load(#[from] LoadError),
@@ -53,7 +53,7 @@ pub enum FollowError {
 
 /// A period that was looked at.
 #[derive(Clone)]
-pub struct Followed {
+pub struct PeriodRun {
     /// When everything happened.
     pub trace: Trace,
     /// Which period; 0 is what runs once.
@@ -66,16 +66,16 @@ pub struct Followed {
 /// inputs of each period.
 ///
 /// # Errors
-/// See [`FollowError`].
-pub fn follow(
+/// See [`PeriodRunError`].
+pub fn run_to_period(
     program: &Program,
     rows: &[Vec<(Register, u32)>],
     wanted: Option<u64>,
-) -> Result<Followed, FollowError> {
+) -> Result<PeriodRun, PeriodRunError> {
     let given = wanted.is_some();
     let wanted = wanted.unwrap_or(rows.len() as u64);
     let mut emulator = Emulator::new(program)?;
-    let set = |emulator: &mut Emulator, period: u64| -> Result<(), FollowError> {
+    let set = |emulator: &mut Emulator, period: u64| -> Result<(), PeriodRunError> {
         for &(register, bits) in rows.get(period.saturating_sub(1) as usize).into_iter().flatten() {
             emulator.set_input_bits(register, bits)?;
         }
@@ -84,23 +84,23 @@ pub fn follow(
     };
     set(&mut emulator, 0)?;
     let mut before = emulator.clone();
-    let mut found = trace(&mut emulator).map_err(FollowError::Once)?;
+    let mut found = trace(&mut emulator).map_err(PeriodRunError::Once)?;
     let mut period = 0;
     while period < wanted && !matches!(emulator.status(), Status::Halted { .. }) {
         period += 1;
         set(&mut emulator, period)?;
         if period < wanted {
-            emulator.run_period(&[]).map_err(|source| FollowError::Period { period, source })?;
+            emulator.run_period(&[]).map_err(|source| PeriodRunError::Period { period, source })?;
         } else {
             before = emulator.clone();
-            found = trace(&mut emulator).map_err(|source| FollowError::Trace { period, source })?;
+            found = trace(&mut emulator).map_err(|source| PeriodRunError::Trace { period, source })?;
         }
     }
     if period < wanted && (given || period > 0) {
-        return Err(FollowError::Halted { wanted, halted: period });
+        return Err(PeriodRunError::Halted { wanted, halted: period });
     }
     let mut shadow = Shadow::new(program);
     // It goes through what has been traced without a fault.
     let _ = shadow.run_period(&mut before);
-    Ok(Followed { trace: found, period, shadow })
+    Ok(PeriodRun { trace: found, period, shadow })
 }

@@ -6,12 +6,12 @@
 //! that all be different, after López-Ortiz, Quimper, Tromp and van Beek (IJCAI 2003). Both rules are applied until nothing changes. What
 //! they leave out is in no schedule of that length, so that a window that is empty proves that there is none.
 
-use super::pass::Graph;
+use super::list::Graph;
 use super::problem::Problem;
 
 /// The cycles in which each task may issue; both ends are included.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Windows {
+pub(super) struct TimeWindows {
     pub(super) first: Vec<i32>,
     pub(super) last: Vec<i32>,
 }
@@ -22,13 +22,13 @@ pub(super) struct Empty {
     pub(super) task: usize,
 }
 
-impl Windows {
+impl TimeWindows {
     /// Those of a schedule of `length` cycles in which each task's own `last` cycle is given.
-    pub(super) fn new(length: u32, latest: impl Iterator<Item = Option<u32>>) -> Windows {
+    pub(super) fn new(length: u32, latest: impl Iterator<Item = Option<u32>>) -> TimeWindows {
         let end = length as i32 - 1;
         let last: Vec<i32> =
             latest.map(|latest| latest.map_or(end, |latest| end.min(latest as i32))).collect();
-        Windows { first: vec![0; last.len()], last }
+        TimeWindows { first: vec![0; last.len()], last }
     }
 
     /// Whether a task's cycle is known.
@@ -42,7 +42,7 @@ impl Windows {
 }
 
 /// Tasks that use a slot or a write port, so many cycles after their issue.
-struct Row {
+struct Resource {
     members: Vec<(usize, i32)>,
     /// Indices into the members: by the first cycle, and by the last, when they were looked at last.
     by_first: Vec<usize>,
@@ -52,26 +52,26 @@ struct Row {
 /// What of a problem narrows windows.
 pub(super) struct Propagation<'g, 'p> {
     graph: &'g Graph<'p>,
-    rows: Vec<Row>,
-    different: Different,
+    resources: Vec<Resource>,
+    different: AllDifferent,
     /// Edges and members looked at: the work so far.
     pub(super) work: u64,
 }
 
 impl<'g, 'p> Propagation<'g, 'p> {
     pub(super) fn new(graph: &'g Graph<'p>) -> Propagation<'g, 'p> {
-        let rows = rows(graph.problem);
-        Propagation { graph, rows, different: Different::default(), work: 0 }
+        let resources = resources(graph.problem);
+        Propagation { graph, resources, different: AllDifferent::default(), work: 0 }
     }
 
     /// Narrows the windows until nothing changes.
-    pub(super) fn narrow(&mut self, windows: &mut Windows) -> Result<(), Empty> {
+    pub(super) fn narrow(&mut self, windows: &mut TimeWindows) -> Result<(), Empty> {
         loop {
             self.order(windows)?;
             let mut changed = false;
-            for row in &mut self.rows {
-                self.work += 4 * row.members.len() as u64;
-                changed |= self.different.narrow(row, windows)?;
+            for resource in &mut self.resources {
+                self.work += 4 * resource.members.len() as u64;
+                changed |= self.different.narrow(resource, windows)?;
             }
             if !changed {
                 return Ok(());
@@ -80,8 +80,8 @@ impl<'g, 'p> Propagation<'g, 'p> {
     }
 
     /// By the edges alone.
-    fn order(&mut self, windows: &mut Windows) -> Result<(), Empty> {
-        let Windows { first, last } = &mut *windows;
+    fn order(&mut self, windows: &mut TimeWindows) -> Result<(), Empty> {
+        let TimeWindows { first, last } = &mut *windows;
         for (i, arcs) in self.graph.preds.iter().enumerate() {
             for arc in arcs {
                 first[i] = first[i].max(first[arc.task as usize] + arc.distance as i32);
@@ -102,22 +102,22 @@ impl<'g, 'p> Propagation<'g, 'p> {
 
 /// The slots and the write ports, each with the tasks that can use no other. A port whose writes all come as late after their issue
 /// says no more than its slot.
-fn rows(problem: &Problem) -> Vec<Row> {
+fn resources(problem: &Problem) -> Vec<Resource> {
     let mut slots: Vec<Vec<(usize, i32)>> = vec![Vec::new(); problem.slots];
     let mut ports = slots.clone();
     for (index, task) in problem.tasks.iter().enumerate().filter(|(_, task)| task.choices() == 1) {
-        for part in task.parts.iter().filter(|part| part.unit.is_some()) {
-            slots[part.slot].push((index, 0));
-            ports[part.slot].extend(part.writes.map(|latency| (index, latency as i32)));
+        for usage in task.uses.iter().filter(|usage| usage.unit.is_some()) {
+            slots[usage.slot].push((index, 0));
+            ports[usage.slot].extend(usage.writes.map(|latency| (index, latency as i32)));
         }
     }
     ports.retain(|members| members.iter().any(|(_, latency)| *latency != members[0].1));
-    let rows = slots.into_iter().chain(ports).filter(|members| members.len() > 1);
-    let row = |members: Vec<(usize, i32)>| {
+    let resources = slots.into_iter().chain(ports).filter(|members| members.len() > 1);
+    let resource = |members: Vec<(usize, i32)>| {
         let by_first: Vec<usize> = (0..members.len()).collect();
-        Row { by_last: by_first.clone(), by_first, members }
+        Resource { by_last: by_first.clone(), by_first, members }
     };
-    rows.map(row).collect()
+    resources.map(resource).collect()
 }
 
 /// Sorts what is nearly sorted.
@@ -135,7 +135,7 @@ fn settle(order: &mut [usize], key: impl Fn(usize) -> i32) {
 
 /// Room for the algorithm: the names are those of the paper.
 #[derive(Default)]
-struct Different {
+struct AllDifferent {
     first: Vec<i32>,
     last: Vec<i32>,
     bounds: Vec<i32>,
@@ -146,10 +146,10 @@ struct Different {
     last_rank: Vec<usize>,
 }
 
-impl Different {
-    /// Whether a window of one of a row's tasks has become narrower.
-    fn narrow(&mut self, row: &mut Row, windows: &mut Windows) -> Result<bool, Empty> {
-        let Row { members, by_first, by_last } = row;
+impl AllDifferent {
+    /// Whether a window of one of a resource's tasks has become narrower.
+    fn narrow(&mut self, resource: &mut Resource, windows: &mut TimeWindows) -> Result<bool, Empty> {
+        let Resource { members, by_first, by_last } = resource;
         let mut changed = false;
         // First the beginnings; then the ends, which are the beginnings with time running backwards.
         for sign in [1, -1] {
@@ -194,7 +194,7 @@ impl Different {
     /// Raises `first` where a Hall interval begins at or before it and `last` lies beyond. `Err` of a member if too many lie in one.
     fn raise(&mut self, by_first: &[usize], by_last: &[usize]) -> Result<bool, usize> {
         self.rank(by_first, by_last);
-        let Different { first, bounds, tree, differences, hall, first_rank, last_rank, .. } = self;
+        let AllDifferent { first, bounds, tree, differences, hall, first_rank, last_rank, .. } = self;
         let mut changed = false;
         for &member in by_last {
             let (x, y) = (first_rank[member], last_rank[member]);
@@ -228,7 +228,7 @@ impl Different {
 
     /// The different ends of the intervals, ascending, and which of them each member has.
     fn rank(&mut self, by_first: &[usize], by_last: &[usize]) {
-        let Different { first, last, bounds, tree, differences, hall, first_rank, last_rank } = self;
+        let AllDifferent { first, last, bounds, tree, differences, hall, first_rank, last_rank } = self;
         first_rank.resize(first.len(), 0);
         last_rank.resize(first.len(), 0);
         bounds.clear();
@@ -306,15 +306,15 @@ mod tests {
             ways(&windows, &mut Vec::new(), &mut all);
             let order: Vec<usize> = (0..windows.len()).collect();
             let members = order.iter().map(|&member| (member, 0)).collect();
-            let mut row = Row { members, by_first: order.clone(), by_last: order };
-            let mut narrowed = Windows {
+            let mut resource = Resource { members, by_first: order.clone(), by_last: order };
+            let mut narrowed = TimeWindows {
                 first: windows.iter().map(|window| window.0).collect(),
                 last: windows.iter().map(|window| window.1).collect(),
             };
-            let mut different = Different::default();
+            let mut different = AllDifferent::default();
             let mut result = Ok(true);
             while result == Ok(true) {
-                result = different.narrow(&mut row, &mut narrowed);
+                result = different.narrow(&mut resource, &mut narrowed);
             }
             prop_assert_eq!(result.is_err(), all.is_empty());
             if result.is_ok() {

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use takt_isa::{SlotIndex, Slots};
 
 /// For registers that several operations write, the slots that all of these may have.
-pub(super) struct Banks {
+pub(super) struct Domains {
     of: HashMap<RegisterId, Slots>,
 }
 
@@ -27,13 +27,13 @@ struct Writers {
     slot: SlotIndex,
 }
 
-impl Banks {
+impl Domains {
     /// What the source leaves open. Where it says what the bundles are (all of them, if `fixed`), or one choice would have to
     /// suit several operations of a block or of a bundle, it is the slot that the operations have.
-    pub(super) fn new(ir: &Ir, runs: &[Run], fixed: bool) -> Banks {
+    pub(super) fn new(ir: &Ir, runs: &[Run], fixed: bool) -> Domains {
         let mut of = HashMap::new();
         if ir.operations().all(|operation| operation.slots.len() < 2) {
-            return Banks { of };
+            return Domains { of };
         }
         let mut registers: HashMap<RegisterId, Writers> = HashMap::new();
         for (number, run) in runs.iter().enumerate() {
@@ -56,7 +56,7 @@ impl Banks {
             let stay = writers.stay || writers.bundled;
             of.insert(*register, if stay { Slots::of(writers.slot) } else { writers.able });
         }
-        Banks { of }
+        Domains { of }
     }
 
     /// The slots that may execute an operation. One that writes an output port is executed where that takes least time: the
@@ -67,7 +67,7 @@ impl Banks {
         if ir.register(dest).kind != RegisterKind::Output || slots.len() < 2 {
             return slots;
         }
-        let latency = |slot: &SlotIndex| super::part(ir.machine, operation, Some(*slot)).writes;
+        let latency = |slot: &SlotIndex| super::resource_use(ir.machine, operation, Some(*slot)).writes;
         let least = slots.iter().map(|slot| latency(&slot)).min();
         slots.iter().filter(|slot| Some(latency(slot)) == least).collect()
     }
