@@ -1,9 +1,10 @@
 //! What no schedule of a problem can be shorter than.
 
-use super::list::Chains;
-use super::problem::{Problem, ResourceUse, Task};
+use super::graph::{Chains, Graph};
+use super::problem::{Edge, Problem, Task};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
+use takt_isa::timing::Reservation;
 use takt_isa::{Machine, SlotIndex, Slots};
 
 /// Thresholds that the bound of a resource tries.
@@ -106,12 +107,12 @@ impl Bound {
 }
 
 /// The units that an operation's choices use; none if one choice needs none.
-fn units_of<'p>(uses: impl Iterator<Item = &'p ResourceUse>) -> BTreeSet<usize> {
-    uses.map(|usage| usage.unit).collect::<Option<BTreeSet<usize>>>().unwrap_or_default()
+fn units_of<'p>(uses: impl Iterator<Item = &'p Reservation>) -> BTreeSet<usize> {
+    uses.map(|usage| usage.unit.map(usize::from)).collect::<Option<BTreeSet<usize>>>().unwrap_or_default()
 }
 
 /// Sets, and the unions of those that have members in common.
-fn unions(sets: impl Iterator<Item = BTreeSet<usize>>) -> Vec<BTreeSet<usize>> {
+pub(super) fn unions(sets: impl Iterator<Item = BTreeSet<usize>>) -> Vec<BTreeSet<usize>> {
     let mut all: Vec<BTreeSet<usize>> = Vec::new();
     for set in sets.collect::<BTreeSet<_>>() {
         let overlapping = all.iter().filter(|other| !other.is_disjoint(&set));
@@ -126,7 +127,22 @@ fn unions(sets: impl Iterator<Item = BTreeSet<usize>>) -> Vec<BTreeSet<usize>> {
     all
 }
 
-/// The bound of a problem with these longest chains.
+impl Problem {
+    /// The lower bound of a schedule's length.
+    pub(super) fn bound(&self) -> Bound {
+        bound(self, &Graph::new(self).chains())
+    }
+
+    /// Keeps every task behind those that stand `reach` tasks or more before it. Returns the bound without that.
+    pub(super) fn keep_near(&mut self, reach: usize) -> Bound {
+        let bound = self.bound();
+        let edge = |to: usize| Edge { from: to - reach, to, distance: 0, latency_of: None, demanded: false };
+        self.edges.extend((reach..self.tasks.len()).map(edge));
+        bound
+    }
+}
+
+/// The bound of a problem with these critical-path lengths.
 pub(super) fn bound(problem: &Problem, chains: &Chains) -> Bound {
     let tasks = &problem.tasks;
     let critical_path =
@@ -140,14 +156,14 @@ pub(super) fn bound(problem: &Problem, chains: &Chains) -> Bound {
             let units = units_of(task.operation(index));
             // An idle operation takes what slot is left.
             if !units.is_empty() {
-                let slots = task.operation(index).map(|usage| usage.slot).collect();
+                let slots = task.operation(index).map(|usage| usage.slot.index()).collect();
                 by_slots.entry(slots).or_default().push(i);
                 by_units.entry(units).or_default().push(i);
             }
         }
         for usage in &task.uses {
             if let Some(unit) = usage.unit {
-                intervals[unit] = usage.interval;
+                intervals[usize::from(unit)] = usage.interval;
             }
         }
     }

@@ -265,8 +265,8 @@ impl<'a> Demands<'a> {
         sink: &mut Sink,
     ) -> bool {
         let keep = block.problem.before(|i| i == last.task);
-        let (usage, kept) = block.problem.subproblem(&keep, |i| (i == last.task).then_some(last.after));
-        let bound = usage.bound();
+        let (cone, kept) = block.problem.subproblem(&keep, |i| (i == last.task).then_some(last.after));
+        let bound = cone.bound();
         if bound.cycles() <= limit {
             return true;
         }
@@ -277,7 +277,8 @@ impl<'a> Demands<'a> {
                 .here(format!("demanded in cycle {limit}"));
         let operation = |task: usize| self.bundles[block.origins[kept[task]]].operations.first();
         if bound.critical_path == cycles {
-            let chain: Vec<usize> = usage.chain().into_iter().filter(|&task| task < kept.len()).collect();
+            let chain: Vec<usize> =
+                cone.critical_path().into_iter().filter(|&task| task < kept.len()).collect();
             error = error.note(format!("a chain of {} dependent operations leads there", chain.len()));
             // Of a long chain its first and its last, which bring what is computed and what for.
             let (head, tail) = (SHOWN / 2, chain.len().saturating_sub(SHOWN / 2));
@@ -294,7 +295,7 @@ impl<'a> Demands<'a> {
                 (None, None) => shared().map(|shared| shared.resources.clone()),
             };
             if let Some(resources) = resources {
-                let count = Bound::operations(&usage, &resources);
+                let count = Bound::operations(&cone, &resources);
                 let text = resources.text(self.ir.machine);
                 let (kind, names) = text.split_once(' ').unwrap_or_default();
                 let (has, how) = match kind.strip_suffix('s') {

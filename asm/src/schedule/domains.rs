@@ -67,7 +67,7 @@ impl Domains {
         if ir.register(dest).kind != RegisterKind::Output || slots.len() < 2 {
             return slots;
         }
-        let latency = |slot: &SlotIndex| super::resource_use(ir.machine, operation, Some(*slot)).writes;
+        let latency = |slot: &SlotIndex| super::reservation(ir.machine, operation, Some(*slot)).writeback;
         let least = slots.iter().map(|slot| latency(&slot)).min();
         slots.iter().filter(|slot| Some(latency(slot)) == least).collect()
     }

@@ -6,8 +6,9 @@
 //! that can issue does; where that leaves a task nowhere to go, the search goes back to the last choice and lets that task issue
 //! later, and the task that was in the way is preferred from then on. A search that has gone through all choices is a proof, too.
 
-use super::list::{Direction, Graph, Reservations};
-use super::solve::Random;
+use super::graph::Graph;
+use super::random::Random;
+use super::reservations::{Direction, Reservations};
 use super::time_windows::{Empty, Propagation, TimeWindows};
 
 /// Tasks of a block up to which it is tried.
@@ -230,9 +231,11 @@ impl ExactSearch<'_, '_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::problem::{Edge, Problem, ResourceUse, Task};
+    use super::super::problem::{Edge, Problem, Task};
     use super::*;
     use proptest::prelude::*;
+    use takt_isa::SlotIndex;
+    use takt_isa::timing::Reservation;
 
     /// Whether the tasks from the `placed`th on can all issue before `length`: every cycle is tried.
     fn exists(problem: &Problem, length: u32, start: &mut Vec<u32>) -> bool {
@@ -255,10 +258,16 @@ mod tests {
         })
     }
 
+    fn reservation(slot: usize, latency: u32) -> Reservation {
+        let unit = Some(slot as u16);
+        let slot = SlotIndex::new(slot).expect("it is below 8");
+        Reservation { slot, unit, interval: 1, writeback: Some(latency) }
+    }
+
     fn problem() -> impl Strategy<Value = Problem> {
         let task = (0..2usize, 1..4u32).prop_map(|(slot, latency)| Task {
             operations: 1,
-            uses: vec![ResourceUse { slot, unit: Some(slot), interval: 1, writes: Some(latency) }],
+            uses: vec![reservation(slot, latency)],
             ..Task::default()
         });
         let tasks = prop::collection::vec(task, 2..7);

@@ -1,163 +1,11 @@
-//! Schedule generation: tasks in an order of priority, each in the first cycle that has room, forward or backward.
+//! List scheduler with resource reservation: tasks are placed in an order of priority, each in the first cycle in which its
+//! resources are free, in a forward or a backward pass over the precedence graph.
 
-use super::problem::{Edge, Problem, ResourceUse, Task};
+use super::graph::{Arc, Graph};
+use super::problem::{Problem, Task};
+use super::reservations::{Direction, Reservations};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-
-/// Longest chains: before each task (cycles from the block's start), and after it (cycles to the last task's issue).
-pub(super) struct Chains {
-    pub(super) head: Vec<u32>,
-    pub(super) tail: Vec<u32>,
-}
-
-/// Sets of cycles, one for each resource.
-pub(super) struct Reservations {
-    slots: Vec<Row>,
-    units: Vec<Row>,
-    ports: Vec<Row>,
-}
-
-/// The cycles in which a resource is taken. For each cycle it has itself if that is free, else a later one that is not after the
-/// next free one: where a resource is taken for long, its next free cycle is still found in few steps. Beyond, all are free.
-#[derive(Clone, Default)]
-struct Row(Vec<u32>);
-
-impl Row {
-    #[inline]
-    fn is_set(&self, cycle: usize) -> bool {
-        self.0.get(cycle).is_some_and(|next| *next as usize != cycle)
-    }
-
-    fn set(&mut self, cycle: usize) {
-        if self.0.len() <= cycle {
-            self.0.extend(self.0.len() as u32..(cycle as u32 + 1).next_power_of_two());
-        }
-        self.0[cycle] = cycle as u32 + 1;
-    }
-
-    fn clear(&mut self) {
-        (0..).zip(&mut self.0).for_each(|(cycle, next)| *next = cycle);
-    }
-
-    /// The first free cycle from one on.
-    #[inline]
-    fn free_from(&mut self, cycle: usize) -> usize {
-        let mut free = cycle;
-        while let Some(next) = self.0.get(free).map(|next| *next as usize)
-            && next != free
-        {
-            free = next;
-        }
-        // Whoever comes this way again is there at once.
-        let mut at = cycle;
-        while at < free {
-            at = std::mem::replace(&mut self.0[at], free as u32) as usize;
-        }
-        free
-    }
-}
-
-/// Time runs backward in a backward pass: cycle `c` of the pass is cycle `-c` of the schedule, offset so that write ports,
-/// which are used *after* issue, stay at positive indices.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Direction {
-    Forward,
-    Backward,
-}
-
-const PORT_OFFSET: usize = takt_isa::spec::units::MAX_LATENCY as usize;
-
-impl Reservations {
-    pub(super) fn new(problem: &Problem) -> Reservations {
-        Reservations {
-            slots: vec![Row::default(); problem.slots],
-            units: vec![Row::default(); problem.units],
-            ports: vec![Row::default(); problem.slots],
-        }
-    }
-
-    fn clear(&mut self) {
-        for row in self.slots.iter_mut().chain(&mut self.units).chain(&mut self.ports) {
-            row.clear();
-        }
-    }
-
-    fn port_cycle(direction: Direction, cycle: usize, latency: u32) -> usize {
-        match direction {
-            Direction::Forward => cycle + latency as usize + PORT_OFFSET,
-            Direction::Backward => cycle + PORT_OFFSET - latency as usize,
-        }
-    }
-
-    pub(super) fn fits(&self, uses: &[ResourceUse], cycle: usize, direction: Direction) -> bool {
-        uses.iter().all(|usage| {
-            !self.slots[usage.slot].is_set(cycle)
-                && usage.unit.is_none_or(|unit| {
-                    // A unit is held for `interval` cycles of the pass from the issue on. In a backward pass the hold
-                    // runs the other way, which forbids the same pairs of cycles.
-                    (0..usage.interval as usize).all(|k| !self.units[unit].is_set(cycle + k))
-                })
-                && usage.writes.is_none_or(|latency| {
-                    !self.ports[usage.slot].is_set(Self::port_cycle(direction, cycle, latency))
-                })
-        })
-    }
-
-    /// The first cycle from one on in which all uses fit.
-    fn first_fit(&mut self, uses: &[ResourceUse], mut cycle: usize, direction: Direction) -> usize {
-        loop {
-            let before = cycle;
-            for usage in uses {
-                cycle = self.slots[usage.slot].free_from(cycle);
-                if let Some(unit) = usage.unit {
-                    for k in 0..usage.interval as usize {
-                        // What is taken within the interval is behind it.
-                        let free = self.units[unit].free_from(cycle + k);
-                        if free != cycle + k {
-                            cycle = free;
-                            break;
-                        }
-                    }
-                }
-                if let Some(latency) = usage.writes {
-                    let port = Self::port_cycle(direction, cycle, latency);
-                    cycle += self.ports[usage.slot].free_from(port) - port;
-                }
-            }
-            if cycle == before {
-                return cycle;
-            }
-        }
-    }
-
-    pub(super) fn reserve(&mut self, uses: &[ResourceUse], cycle: usize, direction: Direction) {
-        for usage in uses {
-            self.slots[usage.slot].set(cycle);
-            if let Some(unit) = usage.unit {
-                for k in 0..usage.interval as usize {
-                    self.units[unit].set(cycle + k);
-                }
-            }
-            if let Some(latency) = usage.writes {
-                self.ports[usage.slot].set(Self::port_cycle(direction, cycle, latency));
-            }
-        }
-    }
-}
-
-/// An edge, seen from one of its ends.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Arc {
-    /// The other end.
-    pub(super) task: u32,
-    /// Its distance, or the least if that depends on a choice.
-    pub(super) distance: u32,
-    /// [`Edge::latency_of`], or `FIXED`.
-    latency_of: u32,
-}
-
-/// What [`Arc::latency_of`] is where the distance depends on no choice.
-const FIXED: u32 = u32::MAX;
 
 /// When each task issues, and on which slots.
 #[derive(Clone, Debug)]
@@ -197,79 +45,7 @@ impl SlotPreference {
     }
 }
 
-/// The problem with its edges sorted by either end.
-pub(super) struct Graph<'p> {
-    pub(super) problem: &'p Problem,
-    pub(super) preds: Vec<Vec<Arc>>,
-    pub(super) succs: Vec<Vec<Arc>>,
-}
-
-impl<'p> Graph<'p> {
-    pub(super) fn new(problem: &'p Problem) -> Graph<'p> {
-        let mut graph = Graph {
-            problem,
-            preds: vec![Vec::new(); problem.tasks.len()],
-            succs: vec![Vec::new(); problem.tasks.len()],
-        };
-        for &Edge { from, to, distance, latency_of, .. } in &problem.edges {
-            let latency_of = latency_of.map_or(FIXED, |index| index as u32);
-            graph.preds[to].push(Arc { task: from as u32, distance, latency_of });
-            graph.succs[from].push(Arc { task: to as u32, distance, latency_of });
-        }
-        graph
-    }
-
-    /// The distance of an edge from a task on the slots of a choice.
-    #[inline]
-    fn distance(&self, from: usize, choice: u8, arc: &Arc) -> u32 {
-        match arc.latency_of {
-            FIXED => arc.distance,
-            index => self.problem.tasks[from].choice(choice)[index as usize].writes.unwrap_or(arc.distance),
-        }
-    }
-
-    /// For each task the choice whose slots fewest operations depend on that have no other.
-    pub(super) fn lightest(&self) -> Vec<u8> {
-        let mut demand = vec![0u32; self.problem.slots];
-        for task in self.problem.tasks.iter().filter(|task| task.choices() == 1) {
-            task.uses.iter().for_each(|usage| demand[usage.slot] += 1);
-        }
-        let lightest = |task: &Task| {
-            let load = |choice: &u8| task.choice(*choice).iter().map(|usage| demand[usage.slot]).sum::<u32>();
-            (0..task.choices() as u8).min_by_key(load).unwrap_or(0)
-        };
-        self.problem.tasks.iter().map(lightest).collect()
-    }
-
-    pub(super) fn chains(&self) -> Chains {
-        let n = self.problem.tasks.len();
-        let (mut head, mut tail) = (vec![0; n], vec![0; n]);
-        for i in 0..n {
-            let ends = self.preds[i].iter().map(|arc| head[arc.task as usize] + arc.distance);
-            head[i] = ends.max().unwrap_or(0);
-        }
-        for i in (0..n).rev() {
-            let ends = self.succs[i].iter().map(|arc| tail[arc.task as usize] + arc.distance);
-            tail[i] = ends.max().unwrap_or(0);
-        }
-        Chains { head, tail }
-    }
-
-    /// For each task the cycle in which it must issue for the schedule to have `length` cycles and for deadlines to be met
-    /// `spare` cycles early; negative where that cannot be.
-    pub(super) fn due(&self, length: u32, spare: u32) -> Vec<i64> {
-        let mut due = vec![i64::from(length) - 1; self.problem.tasks.len()];
-        for i in (0..due.len()).rev() {
-            if let Some(latest) = self.problem.tasks[i].latest {
-                due[i] = due[i].min(i64::from(latest) - i64::from(spare));
-            }
-            for arc in &self.succs[i] {
-                due[i] = due[i].min(due[arc.task as usize] - i64::from(arc.distance));
-            }
-        }
-        due
-    }
-
+impl Graph<'_> {
     /// Places every task, in an order that respects the edges and otherwise follows `key` (small first), in the first
     /// cycle that has room and is not before its `release`; of several choices of slots, that which has its results first,
     /// unless it leans toward another.
@@ -314,7 +90,7 @@ impl<'p> Graph<'p> {
                 let cycle = table.first_fit(uses, earliest as usize, direction) as u32;
                 // What is quicker may issue later. (Backward, the distances have seen to that.)
                 let written = match direction {
-                    Direction::Forward => uses.iter().filter_map(|usage| usage.writes).max().unwrap_or(0),
+                    Direction::Forward => uses.iter().filter_map(|usage| usage.writeback).max().unwrap_or(0),
                     Direction::Backward => 0,
                 };
                 let done = cycle + written;
@@ -371,30 +147,13 @@ impl<'p> Graph<'p> {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    fn resource_use() -> impl Strategy<Value = ResourceUse> {
-        (0..2usize, prop::option::of(0..3usize), 1..5u32, prop::option::of(1..4u32))
-            .prop_map(|(slot, unit, interval, writes)| ResourceUse { slot, unit, interval, writes })
-    }
-
-    proptest! {
-        /// The first cycle that fits is the one that trying each finds, however the table was filled.
-        #[test]
-        fn the_first_fit_is_the_first(
-            tasks in prop::collection::vec((prop::collection::vec(resource_use(), 1..3), 0..20usize), 1..60),
-            backward in any::<bool>(),
-        ) {
-            let direction = if backward { Direction::Backward } else { Direction::Forward };
-            let mut table = Reservations::new(&Problem { slots: 2, units: 3, ..Problem::default() });
-            for (uses, earliest) in &tasks {
-                let tried = (*earliest..).find(|cycle| table.fits(uses, *cycle, direction));
-                prop_assert_eq!(Some(table.first_fit(uses, *earliest, direction)), tried);
-                table.reserve(uses, tried.unwrap_or(0), direction);
-            }
-        }
+impl Problem {
+    /// The cycles in which the tasks issue if each is a bundle, in the order in which they stand.
+    pub(super) fn as_written(&self) -> Vec<u32> {
+        let mut plan = Plan::new(self);
+        plan.start = (0..self.tasks.len() as u32).collect();
+        let mut start = vec![0; self.tasks.len()];
+        Graph::new(self).issue(&plan, &mut Reservations::new(self), &mut start);
+        start
     }
 }

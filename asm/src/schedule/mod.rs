@@ -8,9 +8,12 @@ mod bound;
 mod demand;
 mod domains;
 mod exact;
+mod graph;
 mod list;
 mod memory;
 mod problem;
+mod random;
+mod reservations;
 mod solve;
 mod time_windows;
 
@@ -27,11 +30,12 @@ use demand::Demands;
 use domains::Domains;
 use list::Plan;
 use memory::Memory;
-use problem::{Edge, Problem, ResourceUse, Task};
+use problem::{Edge, Problem, Task};
 use smallvec::{SmallVec, smallvec};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use takt_isa::program::{Location, Space};
-use takt_isa::{BundleAddress, Effect, Function, Machine, SlotIndex, Slots};
+use takt_isa::timing::Reservation;
+use takt_isa::{BundleAddress, Effect, Machine, SlotIndex, Slots};
 
 /// How long the scheduler searches unless told otherwise.
 pub const DEFAULT_EFFORT: u32 = 20;
@@ -143,7 +147,7 @@ pub(crate) fn as_written(ir: &Ir, bundles: &[Bundle]) -> Vec<u32> {
 
 /// Cycles from an operation's issue to the earliest one of an operation that reads its result.
 pub(crate) fn latency(machine: &Machine, operation: &Operation) -> u32 {
-    resource_use(machine, operation, operation.slot).writes.unwrap_or(0)
+    reservation(machine, operation, operation.slot).writeback.unwrap_or(0)
 }
 
 fn label_at(ir: &Ir, position: u32) -> Option<String> {
@@ -153,19 +157,10 @@ fn label_at(ir: &Ir, position: u32) -> Option<String> {
         .map(|label| label.name.clone())
 }
 
-/// Which unit of a machine an operation uses on a slot.
-fn resource_use(machine: &Machine, operation: &Operation, slot: Option<SlotIndex>) -> ResourceUse {
-    let function = operation.row().function;
-    let slot = slot.unwrap_or(SlotIndex::FIRST).index();
-    let before: usize = machine.slots[..slot].iter().map(|slot| slot.units.len()).sum();
-    match machine.slots[slot].unit_for(function).filter(|_| function != Function::Idle) {
-        Some(unit) => {
-            let row = &machine.slots[slot].units[unit];
-            let writes = operation.dest.map(|_| row.latency);
-            ResourceUse { slot, unit: Some(before + unit), interval: row.interval, writes }
-        }
-        None => ResourceUse { slot, unit: None, interval: 1, writes: None },
-    }
+/// The reservation table of an operation on a slot; an idle one may have none, and takes the first.
+fn reservation(machine: &Machine, operation: &Operation, slot: Option<SlotIndex>) -> Reservation {
+    let slot = slot.unwrap_or(SlotIndex::FIRST);
+    Reservation::new(machine, slot, operation.row().function, operation.dest.is_some())
 }
 
 /// What one task must wait for of another.
@@ -223,7 +218,7 @@ impl Block {
                 uses: choices(ir, bundle, domains)
                     .iter()
                     .flat_map(|slots| bundle.operations.iter().zip(slots))
-                    .map(|(operation, slot)| resource_use(machine, operation, *slot))
+                    .map(|(operation, slot)| reservation(machine, operation, *slot))
                     .collect(),
                 ..Task::default()
             };
@@ -355,7 +350,7 @@ impl Block {
     ) -> impl Iterator<Item = Operation> + use<'_, 'b> {
         let uses = self.problem.tasks[task].choice(plan.choice[task]);
         old[self.origins[task]].operations.iter().zip(uses).map(|(operation, usage)| {
-            let slot = operation.slot.and_then(|_| SlotIndex::new(usage.slot));
+            let slot = operation.slot.map(|_| usage.slot);
             Operation { slot, ..*operation }
         })
     }

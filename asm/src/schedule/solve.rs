@@ -9,8 +9,11 @@
 
 use super::bound::{self, Bound};
 use super::exact::{self, ExactResult};
-use super::list::{Direction, Graph, Plan, Reservations, SlotPreference};
+use super::graph::Graph;
+use super::list::{Plan, SlotPreference};
 use super::problem::{Problem, Task};
+use super::random::Random;
+use super::reservations::{Direction, Reservations};
 
 /// A schedule.
 #[derive(Clone, Debug)]
@@ -35,22 +38,6 @@ struct Cost {
     excess: u32,
     window: u32,
     length: u32,
-}
-
-/// A small generator with a fixed seed (xorshift64*), so that the search is the same on every machine.
-pub(super) struct Random(u64);
-
-impl Random {
-    pub(super) fn new() -> Random {
-        Random(0x9e37_79b9_7f4a_7c15)
-    }
-
-    pub(super) fn next(&mut self, below: u64) -> u64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) % below.max(1)
-    }
 }
 
 /// By turns, how long a task waits for the slots that it leans toward, in quarters of the time until it is due.

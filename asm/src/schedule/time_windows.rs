@@ -6,7 +6,7 @@
 //! that all be different, after López-Ortiz, Quimper, Tromp and van Beek (IJCAI 2003). Both rules are applied until nothing changes. What
 //! they leave out is in no schedule of that length, so that a window that is empty proves that there is none.
 
-use super::list::Graph;
+use super::graph::Graph;
 use super::problem::Problem;
 
 /// The cycles in which each task may issue; both ends are included.
@@ -107,8 +107,8 @@ fn resources(problem: &Problem) -> Vec<Resource> {
     let mut ports = slots.clone();
     for (index, task) in problem.tasks.iter().enumerate().filter(|(_, task)| task.choices() == 1) {
         for usage in task.uses.iter().filter(|usage| usage.unit.is_some()) {
-            slots[usage.slot].push((index, 0));
-            ports[usage.slot].extend(usage.writes.map(|latency| (index, latency as i32)));
+            slots[usage.slot.index()].push((index, 0));
+            ports[usage.slot.index()].extend(usage.writeback.map(|latency| (index, latency as i32)));
         }
     }
     ports.retain(|members| members.iter().any(|(_, latency)| *latency != members[0].1));
