@@ -62,7 +62,7 @@ pub use syntax::ast::{Directive, Operator};
 pub use syntax::limits;
 pub use syntax::{Expression, expr, read, tokens};
 
-/// What the assembler is to do.
+/// Options of the assembler.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
     /// The machine to assemble for.
@@ -71,9 +71,9 @@ pub struct Options {
     pub schedule: Schedule,
     /// Which products are fused into sums.
     pub contract: Contract,
-    /// How long it searches; 0 is one pass.
+    /// The effort of the scheduler's search; 0 is one pass.
     pub effort: u32,
-    /// What becomes of warnings.
+    /// The level of each warning.
     pub levels: Levels,
 }
 
@@ -124,24 +124,24 @@ pub struct Assembled {
     pub sources: Arc<Sources>,
     /// Named constants and their values, in the order of the source.
     pub constants: Vec<(String, expr::Value)>,
-    /// What became of each block that the scheduler packed, in order.
+    /// A report of each block that the scheduler packed, in order.
     pub blocks: Vec<schedule::BlockReport>,
-    /// What is demanded of ports (`.deadline`, `.order`, `.late`) and how it is met.
+    /// The timing demands on ports (`.deadline`, `.order`, `.late`) and the times that meet them.
     pub timing: Vec<schedule::TimingReport>,
     /// Products that were fused into sums (`.contract on`), in the order of the sums.
     pub contractions: Vec<Contraction>,
-    /// What was done about registers that operations of several slots write.
+    /// Transfers of values to the home banks of their registers.
     pub adjustments: Vec<Adjustment>,
-    /// What it cost that blocks have more values at a time than registers.
+    /// The cost of high register pressure, by block.
     pub spills: Vec<Spills>,
     /// Words that a macro, a repetition or the assembler itself made: indices into the program's code, ascending.
     pub expanded: Vec<u32>,
-    /// What the source's names stand for, bundle by bundle.
+    /// The bindings of the source's names, for debuggers, bundle by bundle.
     pub names: names::Names,
 }
 
 impl Assembled {
-    /// What a debugger needs to know of the program: for [`image::write_with`].
+    /// The debugging information of the program, for [`image::write_with`].
     pub fn debug_info(&self) -> names::DebugInfo {
         let files = self.sources.files().iter();
         names::DebugInfo {
@@ -178,7 +178,7 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
 pub struct Checked {
     context: context::Context,
     ir: ir::Ir,
-    /// Where values live, and what was contracted. None if the program cannot fit, which is reported.
+    /// The bank assignment and the contractions; `None` if the program cannot fit, which is reported.
     assignment: Option<(banks::BankAssignment, Vec<Contraction>)>,
     effort: u32,
     index: index::Index,
@@ -202,10 +202,10 @@ fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, op
         ir.scheduled = options.schedule == Schedule::All;
         ir.bundles.iter_mut().for_each(|bundle| bundle.scheduled = options.schedule == Schedule::All);
     }
-    // Of a program with mistakes they are not wanted.
+    // A program with errors is not checked further.
     let mut runs = (context.reports.sink.errors == 0).then(|| ir::runs::runs(&ir));
     check::types::check(&mut context, &ir, runs.as_deref().unwrap_or_default());
-    // Of a program that cannot fit nothing else is worth its time.
+    // If the program cannot fit, further checks are not worth their time.
     let assignment = if emit::is_too_long(&ir) {
         emit::limits(&ir, &mut context.reports.sink);
         None
@@ -222,7 +222,7 @@ fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, op
         let mut assignment = banks::assign(&mut ir);
         assignment.quiet.extend(contracted.gone);
         let values = webs::split(&mut ir, &mut assignment);
-        // What a fused operation or a preset has taken the place of goes.
+        // Operations that fused operations or presets have replaced are removed.
         if !(values.is_empty() && contracted.contractions.is_empty() && assignment.adjustments.is_empty()) {
             copies::insert(&mut ir, &mut assignment, &values);
             runs = None;
@@ -258,13 +258,13 @@ impl Checked {
         let Checked { mut context, mut ir, assignment, effort, runs, .. } = self;
         let mut sink = std::mem::take(&mut context.reports.sink);
         let sources = Arc::new(std::mem::take(&mut context.reports.sources));
-        // What follows would only report what follows from the errors there are.
+        // With errors, later stages would only report consequences of these.
         let Some((assignment, contractions)) = assignment.filter(|_| sink.errors == 0) else {
             return Err(sink.finish(sources));
         };
-        // Nobody asks any more how it was written: what follows has this memory.
+        // The trees are not needed any more: later stages get their memory.
         context.asts = Vec::new();
-        // For another order, should registers run out.
+        // Another schedule may be tried if registers run out.
         let source = ir.scheduled.then(|| ir.clone());
         let mut report = schedule::schedule(&mut ir, effort, schedule::Order::Free, &mut sink);
         if sink.errors > 0 {
@@ -276,7 +276,7 @@ impl Checked {
         };
         drop(source);
         let schedule::Report { blocks, timing } = report;
-        // Of a program that is too long, registers are not worth counting.
+        // A program that is too long gets no register allocation.
         if ir.bundles.len() > ir.machine.code_depth as usize {
             emit::limits(&ir, &mut sink);
             return Err(sink.finish(sources));

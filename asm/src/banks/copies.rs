@@ -1,5 +1,5 @@
-//! Values that several slots compute for one register, copied to its home: in slots that the source leaves free, else in
-//! bundles of their own.
+//! Copies between banks: an operation that copies a value to the bank of its register, if another slot computes it. It goes into a
+//! slot that the source leaves free, else into a bundle of its own.
 
 use crate::banks::webs::BankCopy;
 use crate::banks::{self, Adjustment, BankAssignment, Transfer};
@@ -9,7 +9,7 @@ use crate::schedule;
 use smallvec::SmallVec;
 use takt_isa::{BundleAddress, Effect, Op};
 
-/// A bundle of a run that copies are put into.
+/// A bundle of a run with copies inserted.
 #[derive(Clone)]
 struct RunBundle {
     bundle: Bundle,
@@ -17,7 +17,7 @@ struct RunBundle {
     origin: Option<usize>,
 }
 
-/// Whether a preset or a fused operation has taken the place of an operation.
+/// True if a preset or a fused operation has replaced an operation.
 fn is_gone(operation: &Operation) -> bool {
     operation.made && operation.op == Op::nop
 }
@@ -53,7 +53,7 @@ pub(crate) fn insert(ir: &mut Ir, assignment: &mut BankAssignment, copies: &[Ban
             let limit = limit(ir, run, copy, &here[index + 1..]);
             let cycles = put(ir, &mut places, run, copy, operation, limit);
             assignment.copied.push((assignment.adjustments.len(), copy.from));
-            // Where it issues is known when everything is scheduled.
+            // Its address is known after scheduling.
             let transfer = Transfer::Copy { address: BundleAddress::RESET, alone: true, cycles };
             assignment.adjustments.push(banks::adjustment(ir, copy.to, home.slot, &from, transfer));
         }
@@ -71,7 +71,7 @@ pub(crate) fn insert(ir: &mut Ir, assignment: &mut BankAssignment, copies: &[Ban
     ir.replace_bundles(bundles, |position: u32| moved.get(position as usize).copied().unwrap_or(position));
 }
 
-/// The bundle of a run before which a value must be home: where control leaves, and for an output port also the next write
+/// The bundle of a run before which a value must be copied: where control leaves, and for an output port also the next write
 /// and the next access to memory, which may fault. `later` are the copies of the run that follow.
 fn limit(ir: &Ir, run: Run, copy: &BankCopy, later: &[BankCopy]) -> usize {
     let output = ir.register(copy.to).kind == RegisterKind::Output;
@@ -84,7 +84,7 @@ fn limit(ir: &Ir, run: Run, copy: &BankCopy, later: &[BankCopy]) -> usize {
     end.unwrap_or(run.end).min(next.unwrap_or(run.end))
 }
 
-/// Puts a copy into a run, before a bundle. Returns how many cycles the run takes longer for it, if its bundles stay as they are.
+/// Inserts a copy into a run, before a bundle. Returns the cycles that it costs the run, if the bundles are not scheduled.
 fn put(
     ir: &Ir,
     places: &mut Vec<RunBundle>,
@@ -138,14 +138,14 @@ fn put(
         shared[at].bundle.operations.push(operation);
         shared
     });
-    // Of equals the first: one that shares a bundle.
+    // The first minimum shares a bundle if any does.
     let best = shared.chain([alone]).min_by_key(|places| length(places))?;
     let longer = length(&best).saturating_sub(before);
     *places = best;
     Some(longer)
 }
 
-/// What was done about registers that several slots write, now that every operation has its bundle.
+/// The adjustments, with the final addresses of the copies.
 pub(crate) fn report(ir: &Ir, assignment: BankAssignment) -> Vec<Adjustment> {
     let BankAssignment { mut adjustments, copied, .. } = assignment;
     for (at, bundle) in (0u32..).zip(&ir.bundles) {

@@ -1,9 +1,10 @@
-//! Values to registers: a name that a straight run of bundles computes several times can stand for several registers.
-//!
-//! In `fmul t, a, b` and then `fadd t, t, c` the name `t` stands for two values, which on a machine with several banks even
-//! lie in different ones. Each value but the run's last, which may be read elsewhere, gets a register of its own wherever
-//! that matters: where the scheduler may move the operations (the reuse of a name then orders nothing), and for names that
-//! operations of different slots write. Of these the last value, too, where it does not lie in the name's home.
+//! Webs: register renaming within straight runs of bundles, so that each definition of a name and its uses have a virtual register
+//! of their own (Muchnick, Advanced Compiler Design and Implementation, 1997, §16.3).
+//! 
+//! In `fmul t, a, b` and then `fadd t, t, c` the name `t` stands for two values, which on a machine with several banks may even
+//! lie in different ones. Each value but the run's last, which may be live after it, is renamed where that matters: where the
+//! scheduler may move the operations (renaming removes anti- and output dependences), and for names that operations of different
+//! slots write. Of these the last value, too, if its slot does not write the name's home bank.
 
 use crate::banks::BankAssignment;
 use crate::ir::runs;
@@ -22,7 +23,7 @@ pub(crate) fn contested(ir: &Ir) -> Vec<bool> {
     contested
 }
 
-/// What a run makes of a register.
+/// Renaming of a register within a run.
 #[derive(Clone, Copy, Default)]
 struct Renaming {
     /// Operations of the run that are still to write it.
@@ -35,7 +36,7 @@ struct Renaming {
     version: usize,
 }
 
-/// A value that is to be copied to the register that it is a value of.
+/// A value to be copied to the home bank of its name.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BankCopy {
     /// The bundle that computes it, and which of its operations.
@@ -46,7 +47,7 @@ pub(crate) struct BankCopy {
     pub(crate) to: RegisterId,
 }
 
-/// Splits names into values where that matters. Returns the values that are still to be copied home, in order.
+/// Renames values. Returns those that are still to be copied to their home banks, in order.
 pub(crate) fn split(ir: &mut Ir, assignment: &mut BankAssignment) -> Vec<BankCopy> {
     let mut copies = Vec::new();
     if assignment.of.iter().all(Option::is_none) && !ir.scheduled {
@@ -70,7 +71,7 @@ pub(crate) fn split(ir: &mut Ir, assignment: &mut BankAssignment) -> Vec<BankCop
             for operation in &mut bundle.operations {
                 let count = operation.row().shape.sources();
                 for source in &mut operation.sources[..count] {
-                    // A register made here is beyond the table, and is never read under another name.
+                    // A register made here is beyond the table and is not renamed again.
                     *source = names.get(source.index()).and_then(|name| name.current).unwrap_or(*source);
                 }
             }
@@ -114,7 +115,7 @@ pub(crate) fn split(ir: &mut Ir, assignment: &mut BankAssignment) -> Vec<BankCop
             }
         }
         for index in touched.drain(..) {
-            // A value that is copied home is what the name means to the end of the run.
+            // A value that is copied to its home bank is the name's value to the end of the run.
             if names[index].current.is_some() {
                 versions[names[index].version].through = last;
             }
@@ -124,7 +125,7 @@ pub(crate) fn split(ir: &mut Ir, assignment: &mut BankAssignment) -> Vec<BankCop
     copies
 }
 
-/// Whether the register of a name may be any, and another for each value.
+/// True if the values of a name may have registers of their own.
 fn is_free(register: &VirtualRegister) -> bool {
     register.kind == RegisterKind::Plain && register.pinned.is_none() && register.preset.is_none()
 }

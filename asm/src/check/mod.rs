@@ -1,4 +1,4 @@
-//! What a program must keep to beyond each line's own rules: who writes a register, and whether anyone does.
+//! Checks of the whole program: registers that are read and never written, written by several slots, or never read.
 
 mod reach;
 pub(crate) mod types;
@@ -16,20 +16,20 @@ use takt_isa::{Effect, Field, Operand, ROWS, SlotIndex};
 /// An operation's place in the program: its bundle, and its index there.
 type Where = (u32, u32);
 
-/// How a register is used.
+/// The uses of a register.
 #[derive(Clone, Copy, Default, Debug)]
 struct Use {
     /// The first operation that reads it, and as which of its sources.
     read: Option<(Where, usize)>,
     /// The first operation that writes it, and its slot.
     written: Option<(Where, SlotIndex)>,
-    /// Whether an operation of `.once` writes it.
+    /// True if an operation of `.once` writes it.
     once: bool,
     /// Slots, by bit, that write it though another does.
     conflicts: u64,
 }
 
-/// Checks a resolved program, whose registers have their assignment.
+/// Checks a resolved program whose registers have their banks.
 pub(crate) fn check(context: &mut Context, ir: &Ir, assignment: &BankAssignment) {
     // Operations with mistakes are not in the program: what then seems unused need not be.
     let complete = context.reports.sink.errors == 0;
@@ -52,7 +52,7 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, assignment: &BankAssignment)
             match found.written {
                 None => {
                     found.written = Some(((index, number), slot));
-                    // Of one without a home that is the mistake.
+                    // A register without a home bank is reported below.
                     if assignment.conflict(dest).is_none() {
                         reach(context, ir, operation, dest, slot);
                     }
@@ -86,7 +86,7 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, assignment: &BankAssignment)
     for place in beyond {
         leaves(context, at(ir, place), end);
     }
-    // What a mistake leaves unused is no mistake of its own.
+    // A name may be unused because of an error that is reported already.
     if context.reports.sink.errors > 0 {
         return;
     }
@@ -234,7 +234,7 @@ fn unused(context: &mut Context, register: &VirtualRegister, found: &Use) {
     }
 }
 
-/// Whether a register gets a value: from an operation or the loader.
+/// True if a register gets a value, from an operation or the loader.
 fn is_written(register: &VirtualRegister, found: &Use) -> bool {
     found.written.is_some() || register.preset.is_some()
 }

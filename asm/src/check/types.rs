@@ -1,4 +1,4 @@
-//! Whether values are of the type that operations read them as.
+//! Type check: an abstract interpretation that warns of an operand whose value is certainly of another type than the operation reads.
 //!
 //! The instruction table gives every operand a type. A value has the type of the result that wrote it, of its declaration (ports, states,
 //! registers with a type or a preset), of its literal, or of its table in data memory; what takes any bits passes the type
@@ -26,8 +26,7 @@ struct Origin {
     scope: ScopeId,
 }
 
-/// What is known of a value: its [`Kind`], which is enough to find whether there is a mistake, or also where that comes from,
-/// for the report.
+/// Abstract value: its [`Kind`], which is enough to find that there is a mistake, or also the origin of that, for the report.
 trait Known: Copy {
     /// A value of this kind from there.
     fn new(kind: Kind, origin: Option<Origin>) -> Self;
@@ -105,11 +104,11 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, runs: &[Run]) {
 struct Types<'i, V> {
     ir: &'i Ir,
     given: &'i GivenTypes,
-    /// What each register has where a run begins.
+    /// The value of each register at the start of a run.
     entry: Vec<V>,
-    /// Whether that is said by its declaration.
+    /// True if its declaration gives that.
     declared: Vec<bool>,
-    /// What each register has now, and in which run that was written.
+    /// The present value of each register, and the run that wrote it.
     now: Vec<(u32, V)>,
     /// The tables of data memory, by label.
     tables: HashMap<LabelId, V>,
@@ -117,7 +116,7 @@ struct Types<'i, V> {
     passed: Vec<SmallVec<[usize; 2]>>,
     /// Registers whose type at the beginning of a run, as it was so far, has been read.
     read: Vec<Cell<bool>>,
-    /// What was read has changed since.
+    /// A value has changed since it was read: the fixed point is not reached.
     changed: bool,
     /// Something is read, or goes to a register of, another type than its own.
     mistaken: bool,
@@ -182,7 +181,7 @@ impl<'i, V: Known> Types<'i, V> {
         self.tables.values_mut().for_each(|table| *table = any());
     }
 
-    /// Whether an operation reads what it follows now as another type than it is, or choose between two.
+    /// True if an operation now reads a value as another type than its own, or chooses between two types.
     #[inline]
     fn is_mistaken(&self, run: u32, operation: &Operation) -> bool {
         let (mut int, mut float) = (false, false);
@@ -228,7 +227,7 @@ impl<'i, V: Known> Types<'i, V> {
         }
     }
 
-    /// What an operation reads as one of its sources.
+    /// The value of one of an operation's sources.
     #[inline]
     fn source(&self, run: u32, operation: &Operation, which: usize) -> V {
         match self.given.get(operation, OperandPosition::Source(which as u8)) {
@@ -247,7 +246,7 @@ impl<'i, V: Known> Types<'i, V> {
         }
     }
 
-    /// What an operation writes.
+    /// The value of an operation's result.
     #[inline]
     fn result(&self, run: u32, operation: &Operation) -> V {
         let row = operation.row();
@@ -284,7 +283,7 @@ impl<'i, V: Known> Types<'i, V> {
         }
     }
 
-    /// What a store leaves in its table.
+    /// Joins the value of a store into that of its table.
     fn store(&mut self, run: u32, operation: &Operation) {
         if operation.row().effect == Effect::Store
             && let Some(label) = self.table(operation)

@@ -1,12 +1,13 @@
-//! Registers to places.
-//!
-//! A register lies in the bank of the slot whose operations write it; one that nothing writes, a constant above all, lies
-//! in the bank with most room. Within a bank registers follow one another in the order of their declaration, around those
-//! that the source has placed. Inputs lie in the input bank. An output has a number, which the source gives or which is the
-//! first that is free, and lies at that place of the output window of the bank of the slot that writes it.
-//!
-//! A register that only one straight run of bundles uses, and writes before it reads, is needed from its first write to its
-//! last use: it takes a register that is free for so long. While there are enough, each gets one of its own.
+//! Register allocation: an address for each virtual register.
+//! 
+//! A virtual register lies in the bank of the slot whose operations write it; one that nothing writes, such as a constant, lies
+//! in the bank with the most free registers. Within a bank addresses follow the order of declaration, around those that the
+//! source gives. Inputs lie in the input bank. An output has a number, which the source gives or which is the first that is free,
+//! and lies at that place of the output window of the bank of the slot that writes it.
+//! 
+//! A virtual register that only one straight run of bundles uses, and writes before it reads, has a live range from its first write
+//! to its last use. Live ranges are allocated by linear scan (Poletto, Sarkar, TOPLAS 1999), which reuses a register only after all
+//! others of the bank. Too many live values at a time are spilled ([`spill`](super::spill)).
 
 use crate::ir::runs::Run;
 use crate::ir::{Ir, Operation, RegisterId, RegisterKind, VirtualRegister};
@@ -15,12 +16,12 @@ use crate::report::source::Span;
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use takt_isa::{Bank, Register, SlotIndex};
 
-/// Where each register of a program lies, by index; `None` for those that nothing uses.
+/// The address of each virtual register, by index; `None` for those that nothing uses.
 #[derive(Clone, Debug)]
 pub(crate) struct Allocation {
     /// The addresses.
     pub addresses: Vec<Option<Register>>,
-    /// Whether another register has the same address, at another time.
+    /// True if another virtual register has the same address, at another time.
     pub shared: Vec<bool>,
 }
 
@@ -61,12 +62,11 @@ impl Space {
     }
 }
 
-/// What registers need when those that only one run uses ([`Pressure::ranges`]) have no place yet.
+/// Register pressure: the allocation of all virtual registers except the live ranges within one run ([`Pressure::ranges`]).
 pub(crate) struct Pressure {
     /// The slot that writes each register.
     pub(crate) writer: Vec<Option<SlotIndex>>,
-    /// For registers that one run of bundles writes before it reads, and no other uses: the bundles of the first write and the last
-    /// use, if they are still without a place.
+    /// Live ranges within one run, still without an address: the bundles of the first write and the last use.
     pub(crate) ranges: Vec<Option<(u32, u32)>>,
     /// By slot, the registers of its bank that are left for these.
     pub(crate) free: Vec<usize>,
@@ -84,7 +84,7 @@ struct Peak {
 }
 
 impl Pressure {
-    /// By slot, how many values its bank must hold at a time at most.
+    /// By slot, the peak of live values in its bank.
     fn peaks(&self) -> Vec<Peak> {
         peaks(&self.ranges, &self.writer, self.free.len())
     }
@@ -93,19 +93,19 @@ impl Pressure {
         self.peaks().iter().zip(&self.free).all(|(peak, free)| peak.values <= *free)
     }
 
-    /// Whether a bank has too few registers for values that are needed at the same time, and all else has its place.
+    /// True if only values that are live at the same time lack registers.
     pub(crate) fn is_short(&self) -> bool {
         !self.holds_values() && self.missing.is_empty() && self.unplaced.is_empty()
     }
 
-    /// The number of registers that are missing.
+    /// The number of missing registers.
     pub(crate) fn shortage(&self) -> usize {
         let peaks = self.peaks();
         let values = peaks.iter().zip(&self.free).map(|(peak, free)| peak.values.saturating_sub(*free));
         values.sum::<usize>() + self.missing.len() + self.unplaced.len()
     }
 
-    /// True if everything has its place.
+    /// True if everything has a register.
     pub(crate) fn has_all(&self) -> bool {
         self.missing.is_empty() && self.unplaced.is_empty() && self.holds_values()
     }
@@ -115,7 +115,7 @@ fn peaks(ranges: &[Option<(u32, u32)>], writer: &[Option<SlotIndex>], slots: usi
     let mut changes: Vec<BTreeMap<u32, i64>> = vec![BTreeMap::new(); slots];
     for (range, writer) in ranges.iter().zip(writer) {
         if let (Some((first, last)), Some(slot)) = (*range, *writer) {
-            // What is never read needs its register for a moment.
+            // A value that is never read is live for one cycle.
             let last = last.max(first + 1);
             *changes[slot.index()].entry(first).or_default() += 1;
             *changes[slot.index()].entry(last).or_default() -= 1;
@@ -135,8 +135,7 @@ fn peaks(ranges: &[Option<(u32, u32)>], writer: &[Option<SlotIndex>], slots: usi
     changes.iter().map(most).collect()
 }
 
-/// Gives every register that is used a place. `why` is what has been found of values that find none: why they cannot be kept
-/// elsewhere.
+/// Allocates every virtual register that is used. `why` is the reason that values without a register could not be spilled.
 pub(crate) fn allocate(ir: &Ir, runs: &[Run], why: Option<&str>, sink: &mut Sink) -> Allocation {
     let mut pressure = pressure(ir, runs, sink);
     let peaks = pressure.peaks();
@@ -145,8 +144,8 @@ pub(crate) fn allocate(ir: &Ir, runs: &[Run], why: Option<&str>, sink: &mut Sink
     Allocation { addresses: pressure.addresses, shared }
 }
 
-/// Places all registers but those of short-lived values. While there are enough, constants leave room for all of these; if not,
-/// for as many as are needed at a time.
+/// Allocates all virtual registers except live ranges within one run. Constants leave a register for each of these if there are
+/// enough, else as many as are live at a time.
 pub(crate) fn pressure(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Pressure {
     let pressure = pressure_with(ir, runs, false, sink);
     if pressure.has_all() {
@@ -156,7 +155,7 @@ pub(crate) fn pressure(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Pressure {
     if closer.shortage() < pressure.shortage() { closer } else { pressure }
 }
 
-/// The same. Where it is `close`, constants leave the registers that short-lived values need at a time, and no more.
+/// The same; if `close`, constants leave only as many registers as are live at a time.
 fn pressure_with(ir: &Ir, runs: &[Run], close: bool, sink: &mut Sink) -> Pressure {
     let machine = ir.machine;
     // The slot that writes each register, and whether an operation uses it at all.
@@ -179,7 +178,7 @@ fn pressure_with(ir: &Ir, runs: &[Run], close: bool, sink: &mut Sink) -> Pressur
     outputs(ir, &writer, &mut space, &mut addresses, sink);
     let mut ranges = ranges(ir, runs);
     let is_local = |index: usize| ranges[index].is_some() && addresses[index].is_none();
-    // The registers that short-lived values need in each bank: room that constants leave if they can.
+    // The registers that live ranges within one run need in each bank: constants leave these if they can.
     let mut wanted_by_locals = vec![0; machine.slots.len()];
     if close {
         let local =
@@ -240,7 +239,7 @@ fn pressure_with(ir: &Ir, runs: &[Run], close: bool, sink: &mut Sink) -> Pressur
     Pressure { writer, ranges, free, space, addresses, missing, unplaced }
 }
 
-/// Gives every output its place.
+/// Allocates the outputs.
 fn outputs(
     ir: &Ir,
     writer: &[Option<SlotIndex>],
@@ -251,7 +250,7 @@ fn outputs(
     let machine = ir.machine;
     let count = machine.outputs_per_bank;
     let given: HashMap<RegisterId, u16> = ir.numbers.iter().map(|(number, id)| (*id, *number)).collect();
-    // What the source writes at an output's place without a name has its number.
+    // An unnamed register that the source writes at an output's address has that number.
     let unnamed = |number| {
         let mut places =
             machine.slots.iter().filter_map(|slot| machine.output_registers(slot).nth(usize::from(number)));
@@ -297,10 +296,10 @@ fn outputs(
     }
 }
 
-/// For each register that one run of bundles writes before it reads, and no other uses: the bundles of its first write and
-/// its last use.
+/// The live range of each virtual register that one run of bundles writes before it reads, and no other uses: the bundles of its
+/// first write and its last use.
 fn ranges(ir: &Ir, runs: &[Run]) -> Vec<Option<(u32, u32)>> {
-    /// What is known of a register so far.
+    /// The uses of a register so far.
     #[derive(Clone, Copy)]
     enum Seen {
         Nowhere,
@@ -353,8 +352,8 @@ fn ranges(ir: &Ir, runs: &[Run]) -> Vec<Option<(u32, u32)>> {
     seen.iter().map(range).collect()
 }
 
-/// Places short-lived values, in the order of their first writes, in what room there is. A register is taken again only after
-/// all others of its bank have been; the bundle of a value's last read may write the next one, for it reads first.
+/// Linear scan over the live ranges, in the order of their first writes. A register is reused only after all others of its bank;
+/// the bundle of a value's last read may write the next value, because it reads first.
 fn linear_scan(ir: &Ir, pressure: &mut Pressure) -> Vec<bool> {
     let Pressure { writer, ranges, space, addresses, missing, .. } = pressure;
     let mut shared = vec![false; ir.registers.len()];

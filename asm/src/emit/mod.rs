@@ -1,4 +1,4 @@
-//! Placed registers to words: the last stage, where the program becomes what the machine loads.
+//! Code emission: encodes the operations, with their allocated registers, as the program that the machine loads.
 
 pub(crate) mod allocate;
 pub(crate) mod spill;
@@ -35,7 +35,7 @@ pub(crate) fn emit(ir: &mut Ir, allocation: &Allocation, sink: &mut Sink) -> Emi
     let mut origins = vec![None; ir.bundles.len() * slots];
     for (address, bundle) in ir.bundles.iter().enumerate() {
         let words = address * slots..(address + 1) * slots;
-        // What any slot takes goes to the first that no other operation of the bundle claims.
+        // An idle operation goes to the first slot that no other operation of the bundle claims.
         let claims = |slot: SlotIndex| bundle.operations.iter().any(|other| other.slot == Some(slot));
         let mut free = ir.machine.numbered_slots().map(|(slot, _)| slot).filter(|slot| !claims(*slot));
         for operation in &bundle.operations {
@@ -107,7 +107,7 @@ fn word(ir: &Ir, operation: &Operation, slot: SlotIndex, allocation: &Allocation
     }
 }
 
-/// Whether no packing of the operations fits the program memory.
+/// True if no packing of the operations fits the program memory.
 pub(crate) fn is_too_long(ir: &Ir) -> bool {
     let depth = ir.machine.code_depth as usize;
     // A bundle has no more operations that need a slot than there are slots.

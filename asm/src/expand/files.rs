@@ -19,7 +19,7 @@ pub(crate) struct FileId {
     pub(crate) path: String,
 }
 
-/// Why a file cannot be read.
+/// The reason that a file cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Unread {
     #[error("{0}")]
@@ -49,7 +49,7 @@ fn text_of(bytes: Vec<u8>) -> Result<String, Unread> {
 }
 
 impl Expander<'_> {
-    /// Whether a tree is that of a file of the library in memory.
+    /// True if a tree is that of a file of the library in memory.
     pub(crate) fn is_in_library(&self, ast: u32) -> bool {
         let place = self.origins.get(ast as usize).and_then(|origin| origin.place);
         place.is_some_and(|place| !self.loader.places()[place].takes_quoted())
@@ -137,7 +137,7 @@ impl Expander<'_> {
         let candidates: Vec<FileId> = Some(beside).filter(|_| !library).into_iter().chain(further).collect();
         for id in candidates {
             if let Some((_, file)) = self.files.get(&id).copied() {
-                // What several files need of the library is there once.
+                // A library file that several files include is read once.
                 if library {
                     self.note_include(span, file);
                     return Ok(());

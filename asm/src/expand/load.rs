@@ -1,4 +1,4 @@
-//! Where sources come from. The assembler assumes no file system: it asks a [`Loader`].
+//! Loaders of sources. The assembler assumes no file system: it asks a [`Loader`].
 
 use crate::limits;
 use std::collections::BTreeMap;
@@ -6,7 +6,7 @@ use std::io::Read as _;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-/// Why a source cannot be had.
+/// The reason that a source cannot be loaded.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum LoadError {
     /// There is none of that name.
@@ -40,7 +40,7 @@ pub trait Loader {
         None
     }
 
-    /// Where `.include` looks beyond the project, in this order.
+    /// The places beyond the project in which `.include` searches, in this order.
     fn places(&self) -> &[IncludePath] {
         &[]
     }
@@ -52,13 +52,13 @@ pub struct IncludePath(IncludePathKind);
 
 #[derive(Clone, Debug)]
 enum IncludePathKind {
-    /// What stands before the path of a file in it, and the folder.
+    /// The prefix of paths in it, and the folder.
     Folder(String, FileLoader),
     Library(MemoryLoader),
 }
 
 impl IncludePath {
-    /// Whether it is searched for `"name"` too, not only for `<name>`.
+    /// True if it is searched for `"name"` too, not only for `<name>`.
     pub(crate) fn takes_quoted(&self) -> bool {
         matches!(self.0, IncludePathKind::Folder(..))
     }
@@ -318,7 +318,7 @@ impl Loader for FileLoader {
         if !relative.components().all(|part| matches!(part, Component::Normal(_))) {
             return Err(LoadError::Outside);
         }
-        // What is open need not be on the disk.
+        // A file that is open in an editor need not be on the disk.
         if let Some(text) = self.open.get(&self.root.join(relative)) {
             return Ok(text.as_bytes().to_vec());
         }
@@ -379,7 +379,7 @@ mod tests {
         assert_eq!(files.load("a.s"), Ok(shared.as_bytes().to_vec()));
         assert_eq!((files.text("b.s"), files.load("b.s")), (None, Ok(vec![0x6e, 0xff])));
         assert_eq!((files.text("c.s"), files.load("c.s")), (None, Err(LoadError::NotFound)));
-        // What is asked through a search is shared too.
+        // A text that a search finds is shared, too.
         assert!(Search::new(files).text("a.s").is_some_and(|again| Arc::ptr_eq(&shared, &again)));
     }
 

@@ -1,4 +1,4 @@
-//! What the source says of the types of operations' parts, where the instruction leaves them open.
+//! Types that the source gives to operands whose type the instruction leaves open.
 
 use crate::ir::{Label, LabelId, Operation};
 use crate::report::source::Span;
@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 use takt_isa::Type;
 use takt_isa::program::Space;
 
-/// What is known of a value's type.
+/// The known type of a value: an abstract value of the type check.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Kind {
     /// Nothing is written yet.
@@ -63,7 +63,7 @@ pub(crate) fn tables(labels: &[Label], types: &[Type]) -> HashMap<LabelId, Kind>
     labels.map(table).collect()
 }
 
-/// A part of an operation that the source says something of.
+/// An operand of an operation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum OperandPosition {
     Dest,
@@ -73,7 +73,7 @@ pub(crate) enum OperandPosition {
     Table,
 }
 
-/// What the source says of it.
+/// The evidence of a type in the source.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Given {
     /// It is taken as this type.
@@ -106,7 +106,7 @@ impl Given {
 /// An operation: the tree that it is written in, its number there, and the expansion.
 type OperationKey = (u32, u32, u32);
 
-/// What the source says of the parts of operations: by tree, operation of the tree, and expansion.
+/// The evidence for operands, by tree, operation of the tree, and expansion.
 #[derive(Default)]
 pub(crate) struct GivenTypes(HashMap<OperationKey, SmallVec<[(OperandPosition, Given); 1]>>);
 
@@ -131,7 +131,7 @@ impl GivenTypes {
     }
 }
 
-/// Where a value's type comes from.
+/// The origin of a value's type.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum TypeOrigin {
     Literal(Value),

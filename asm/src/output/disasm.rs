@@ -22,16 +22,16 @@ pub fn disassemble(program: &Program) -> String {
     writer.text
 }
 
-/// What the source says of where a bundle's operations come from.
+/// The source lines of a bundle's operations.
 #[derive(Clone, PartialEq, Eq)]
 enum BundleOrigin {
-    /// All from one place.
+    /// All operations have the same.
     One(Option<SourcePart>),
-    /// Each from its own.
+    /// Each operation has its own.
     Each(Vec<Option<SourcePart>>),
 }
 
-/// A line, and what part of it.
+/// A line, and a part of it.
 type SourcePart = (Location, Option<Columns>);
 
 struct Writer<'p> {

@@ -1,4 +1,4 @@
-//! What a program became: the listing, the symbol map, and its memories as `$readmemh` files.
+//! Listing of a program, its symbol map, and its memories as `$readmemh` files.
 
 use crate::Assembled;
 use crate::report::source::Lines;
@@ -89,7 +89,7 @@ impl<'a> Lister<'a> {
             let range = first..first + slots.len();
             let mut words = String::new();
             for (word, line) in program.code[range.clone()].iter().zip(&program.lines[range]) {
-                // What fills a slot is left blank.
+                // Fillers are left blank.
                 let blank = *word == self.filler && line.is_none();
                 let _ = write!(words, "{:<14}", if blank { "-".to_owned() } else { format!("{word:012x}") });
             }
@@ -279,7 +279,7 @@ pub struct Register {
     /// Of a port: its number.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub number: Option<u16>,
-    /// How its bits are shown.
+    /// The type as which its bits are shown.
     #[serde(rename = "type")]
     pub ty: Type,
 }

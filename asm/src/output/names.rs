@@ -1,9 +1,9 @@
-//! What the names of a source stand for, for who looks at a running program: the assembler may give the values that one name
-//! takes registers of their own, the scheduler moves what computes them, and a macro's names are other ones in each use.
+//! Bindings of a source's names in the assembled program, for debuggers: the assembler may give the values of one name registers
+//! of their own, the scheduler moves the operations that compute them, and a macro's names are others in each use.
 //!
-//! The order of the source is what says which value a name means: a line reads what the line before it in the source wrote,
-//! wherever the two ended up. So each word has the [`Position`] of its line, and each value the stretch of that order in which
-//! its name means it.
+//! The source's order decides which value a name means: a line reads the value that the line before it in the source wrote,
+//! wherever the two were scheduled. So each word has the [`Position`] of its line, and each value the range of that order in
+//! which it is the name's.
 
 use crate::context::{Context, ScopeId};
 use crate::emit::Emitted;
@@ -16,18 +16,18 @@ use std::num::NonZeroU32;
 use takt_isa::program::Columns;
 use takt_isa::{BundleAddress, Register, Type};
 
-/// What a debugger knows of a program beyond what the machine loads: an image carries it, unless it is stripped.
+/// Debugging information of a program: an image has it, unless it is stripped.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DebugInfo {
     /// Sources: the names that the program has for them, and their texts.
     pub sources: Vec<(String, String)>,
     /// Named constants, in the order of the source.
     pub constants: Vec<(String, Value)>,
-    /// What names stand for.
+    /// The bindings of names.
     pub names: Names,
 }
 
-/// What names stand for.
+/// The bindings of names.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Names {
     /// Of each word of the code that has a source line, parallel to it. Empty if nothing is known.
@@ -47,7 +47,7 @@ impl Names {
     }
 }
 
-/// Where a line stands in the source written out.
+/// The position of a line in the source, macros and repetitions written out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Position {
     /// Its place in the order of the source, macros and repetitions written out.
@@ -77,7 +77,7 @@ impl Default for Position {
 /// A use of a macro.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Scope {
-    /// What stands before the names declared in it, with a point between: the macro and which of its uses, `limit.2`.
+    /// Prefix of the names declared in it: the macro and the number of its use, `limit.2`. A point follows.
     pub name: String,
     /// Its parameters that stand for registers, and the names of those.
     pub parameters: Vec<(String, String)>,
@@ -92,7 +92,7 @@ pub struct NamedValue {
     pub label: String,
     /// Its register.
     pub register: Register,
-    /// How its bits are read.
+    /// The type as which its bits are read.
     pub ty: Type,
     /// The name means it for lines with an order above the first and up to the second. `None`: for all lines for which it means
     /// no other value.
@@ -124,7 +124,7 @@ pub(crate) fn parts(sources: &Sources, emitted: &Emitted) -> Vec<(u32, Columns)>
     parts
 }
 
-/// What the names of a program stand for.
+/// The bindings of a program's names.
 pub(crate) fn names(context: &mut Context, ir: &Ir, allocation: &Allocation, emitted: &mut Emitted) -> Names {
     let (positions, scopes) = positions(context, ir, emitted);
     Names { positions, scopes, values: values(ir, allocation, emitted) }
@@ -196,7 +196,7 @@ fn values(ir: &Ir, allocation: &Allocation, emitted: &Emitted) -> Vec<NamedValue
     for (original, mut versions) in split {
         versions.push((original, None));
         let name = &ir.register(original).name;
-        // What an equation computes on its way has none.
+        // Intermediate values of equations have no name.
         if name.is_empty() {
             continue;
         }

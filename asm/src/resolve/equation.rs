@@ -1,6 +1,6 @@
-//! Equations to operations: each operator and function becomes the instruction that the table says, on registers without
-//! names, in the order in which the equation is written ([`expression`](crate::resolve::expression)). Each operation has the part
-//! of the line that it computes as its span. Here is what becomes of the values: where they go, and what types they have.
+//! Code generation for equations: each operator and function becomes the instruction that the table gives, on unnamed virtual
+//! registers, in the order in which the equation is written ([`expression`](crate::resolve::expression)). The span of an operation
+//! is the part of the line that it computes. This file assigns the values to their targets and checks their types.
 
 use crate::context::{At, Reported, Wanted, type_name, words};
 use crate::expand::equation::Results;
@@ -20,7 +20,7 @@ use smallvec::SmallVec;
 use std::rc::Rc;
 use takt_isa::{Effect, Op, Slots, Type};
 
-/// What a part of an equation is.
+/// The form of an operand in an equation.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum TermForm {
     /// A constant, and its expression.
@@ -31,7 +31,7 @@ pub(super) enum TermForm {
     Chain(usize, Kind),
 }
 
-/// A part of an equation, and where it stands.
+/// An operand in an equation, and its place.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Term {
     pub(super) form: TermForm,
@@ -54,14 +54,14 @@ impl Term {
     }
 }
 
-/// The equation at hand.
+/// The equation being compiled.
 pub(super) struct CurrentEquation {
     location: Attribution,
     scheduled: bool,
-    /// What its operations have computed so far: where the value is, the bundle, and the part.
+    /// The subexpressions computed so far: register, bundle, and key.
     pub(super) computed: Vec<(RegisterId, usize, Key)>,
     pub(super) results: Results,
-    /// What `.fast` allows.
+    /// The transformations that `.fast` allows.
     pub(super) fast: Fast,
     /// Sums and products that are not computed yet.
     pub(super) chains: Vec<Chain>,
@@ -146,7 +146,7 @@ impl Resolver<'_> {
         (!is_open).then(|| Kind::of(register.ty))
     }
 
-    /// What is known of the type of what a register holds.
+    /// The known type of a register's value.
     pub(super) fn kind(&self, id: RegisterId) -> Kind {
         self.declared_kind(id).unwrap_or_else(|| match self.kinds.get(id.index()) {
             None | Some(Kind::None) => Kind::Float,
@@ -229,7 +229,7 @@ impl Resolver<'_> {
         if failed {
             return Err(Reported);
         }
-        // What computes a value writes the register itself where nothing behind it reads what that held.
+        // The last operation writes the target itself if nothing after it reads the target's old value.
         let mut left: Vec<(RegisterId, Kind, Term)> = Vec::new();
         for (index, ((target, wanted, _), term)) in targets.iter().zip(terms).enumerate() {
             let others = terms.iter().enumerate().filter(|(other, _)| *other != index).map(|(_, term)| term);
@@ -297,7 +297,7 @@ impl Resolver<'_> {
         self.subexpressions.write(target);
     }
 
-    /// Whether a value may go to a register.
+    /// Checks that a value may go to a register.
     fn check_target(
         &mut self,
         at: At,

@@ -23,7 +23,7 @@ use takt_isa::Type;
 /// The part of the line at hand, and its expression.
 pub(super) type Here = (Span, ExprId);
 
-/// What an expression is made of, found before it is computed.
+/// Structure of an expression, found before it is computed.
 struct Plan {
     /// By first node: the last node of what a macro has computed.
     results: HashMap<u32, u32>,
@@ -42,12 +42,12 @@ struct Stretch {
     at: At,
     next: u32,
     end: u32,
-    /// Whether it is an alternative of a choice that is made already.
+    /// True if it is an alternative of a choice that is made already.
     chosen: bool,
     sum: Option<Turns>,
 }
 
-/// Where a sum is.
+/// The state of a sum.
 struct Turns {
     variable: NameId,
     value: i64,
@@ -59,7 +59,7 @@ struct Turns {
 }
 
 impl Resolver<'_> {
-    /// What is to be known of an expression before it is computed.
+    /// Analyses the structure of an expression before it is computed.
     fn plan(&mut self, at: At, line: &CurrentEquation, ast: &Ast, id: ExprId) -> Result<Plan, Reported> {
         let nodes = &ast.nodes[id.range()];
         let parts = expr::parts(nodes);
@@ -290,7 +290,7 @@ impl Resolver<'_> {
         Ok(Stretch { at: At { scope, ..outer }, next, end, chosen: false, sum: Some(turns) })
     }
 
-    /// What a name stands for.
+    /// The operand that a name denotes.
     fn name(&mut self, at: At, name: NameRef, (span, id): Here) -> Result<Term, Reported> {
         self.cast = None;
         let (place, given, meaning) = self.meaning(at, Operand { kind: OperandKind::Name(name), span })?;
@@ -328,7 +328,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// What a function computes.
+    /// Computes a function.
     fn function(
         &mut self,
         at: At,
@@ -388,7 +388,7 @@ impl Resolver<'_> {
             .filter(|meaning| self.fits(meaning, terms))
             .cloned()
             .collect();
-        // Where the terms leave the type open, as constants do, it is float.
+        // If the terms leave the type open, as constants do, it is float.
         let is_float = |meaning: &&Meaning| meaning.op.row().types.contains(&Type::F);
         let is_int =
             terms.iter().all(|term| term.value().is_some_and(|value| matches!(value, Value::Int(_))));
@@ -397,7 +397,7 @@ impl Resolver<'_> {
             false => fitting.iter().find(is_float),
         };
         let Some(Meaning { op, sources }) = found.or(fitting.first()) else {
-            // What is not less is greater or equal, and the like.
+            // A comparison may be computed as the negation of its opposite.
             if let Some(opposite) = opposite(symbol)
                 && self.forms.get(opposite, terms.len()).iter().any(|meaning| self.fits(meaning, terms))
             {
@@ -470,7 +470,7 @@ impl Resolver<'_> {
             || register.pinned.is_some_and(|address| self.ir.machine.is_input(address))
     }
 
-    /// Whether an instruction takes what the terms are.
+    /// True if an instruction takes the types of the terms.
     pub(super) fn fits(&self, meaning: &Meaning, terms: &[Term]) -> bool {
         let row = meaning.op.row();
         let passed = self.forms.passed(meaning.op);
@@ -492,7 +492,7 @@ impl Resolver<'_> {
         !mixed && terms.iter().zip(&meaning.sources).all(takes)
     }
 
-    /// Where an operator stands between or before its operands, or a function's name.
+    /// The place of an operator between or before its operands, or of a function's name.
     pub(super) fn symbol_span(&self, symbol: &str, terms: &[Term], whole: Span) -> Span {
         let sources = &self.context.reports.sources;
         let (from, to) = match terms {

@@ -1,8 +1,8 @@
-//! What `.fast` allows: sums and products as trees, divisions by constants as multiplications. A part of
+//! Tree-height reduction of sums and products, and division by constants as multiplication, where `.fast` allows it. A part of
 //! [`expression`](crate::resolve::expression).
-//!
-//! While it is computed, a sum of several terms is kept as the list of its terms, and a product as that of its factors; where the
-//! value is needed, neighbours are paired until one is left, so that of n terms ⌈log₂ n⌉ operations wait for one another.
+//! 
+//! A sum of several terms is kept as the list of its terms, and a product as that of its factors, until the value is needed. Then
+//! neighbours are paired until one is left, so that n terms make a dependence chain of ⌈log₂ n⌉ operations.
 
 use crate::context::{At, Reported};
 use crate::ir::given::Kind;
@@ -21,7 +21,7 @@ pub(super) struct Chain {
 }
 
 impl Resolver<'_> {
-    /// What a symbol means between terms where the source allows more than what is written; none if that is as ever.
+    /// The operand that a symbol computes where `.fast` allows a transformation; `None` if none applies.
     pub(super) fn fast(
         &mut self,
         at: At,

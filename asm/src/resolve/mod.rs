@@ -110,7 +110,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
     resolver.presets();
     resolver.ranges();
     for timing in std::mem::take(&mut resolver.flat.timing) {
-        // What goes wrong is in the report.
+        // Errors are reported already.
         if let Ok(demand) = resolver.demand(&timing) {
             resolver.ir.demands.push(demand);
         }
@@ -132,7 +132,7 @@ fn data_full(context: &mut Context, data: &[Data], words: u32) {
         context.machine.name,
         words - depth
     );
-    // What the first word without a place belongs to.
+    // The table of the first word without a place.
     let mut end = 0;
     let found = data.iter().find_map(|data| {
         let (at, span, count) = match *data {
@@ -174,7 +174,7 @@ enum Host {
 
 pub(crate) struct Resolver<'c> {
     pub(crate) context: &'c mut Context,
-    /// Where further sources are: for what a mistake may have meant.
+    /// Loader of further sources, for guesses at the intention of a mistake.
     pub(crate) loader: &'c dyn Loader,
     flat: Flat,
     pub(crate) ir: Ir,
@@ -193,15 +193,15 @@ pub(crate) struct Resolver<'c> {
     pub(crate) is_full: bool,
     /// The types of tables, as far as the program is read.
     pub(crate) tables: HashMap<LabelId, Kind>,
-    /// What equations write for instructions.
+    /// The instructions by their form in equations.
     forms: Forms,
-    /// What was last written to each register, above the line at hand.
+    /// The type last written to each register above the present line.
     kinds: Vec<Kind>,
-    /// What is computed already.
+    /// The available subexpressions.
     subexpressions: CommonSubexpressions,
     /// Turns of all sums.
     turns: usize,
-    /// Whether there are equations at all: what is above one counts for nothing else.
+    /// True if there are equations at all: only they need the types above.
     has_equations: bool,
 }
 
@@ -250,7 +250,7 @@ impl Resolver<'_> {
         let (first, count) = match ast.statements[item.statement as usize].kind {
             StatementKind::Bundle(first, count) => (first, u32::from(count)),
             StatementKind::Equation(equation) => {
-                // What goes wrong is in the report.
+                // Errors are reported already.
                 let _ = self.equation(item, &ast, equation);
                 return;
             }
@@ -259,7 +259,7 @@ impl Resolver<'_> {
         let written = &ast.operations[first as usize..(first + count) as usize];
         if let [one] = written {
             let location = self.location(item, (one.span, one.line), 0, 1);
-            // What goes wrong is in the report.
+            // Errors are reported already.
             if let Ok(operation) = self.operation(item.at, &ast, first, 1, location) {
                 let operations = SmallVec::from_buf([operation]);
                 self.push(Bundle { operations, explicit: false, scheduled: item.scheduled });
@@ -269,7 +269,7 @@ impl Resolver<'_> {
         let mut operations: SmallVec<[Operation; 1]> = SmallVec::with_capacity(written.len());
         for (index, (operation, number)) in written.iter().zip(first..).enumerate() {
             let location = self.location(item, (operation.span, operation.line), index, written.len());
-            // What goes wrong is in the report; other operations may have mistakes of their own.
+            // Errors are reported already; other operations may have errors of their own.
             if let Ok(operation) = self.operation(item.at, &ast, number, written.len(), location) {
                 operations.push(operation);
             }
@@ -304,7 +304,7 @@ impl Resolver<'_> {
         if self.subexpressions.stretches.is_empty() {
             return;
         }
-        // How many stretches begin, and less how many end, before each bundle.
+        // The number of ranges that begin less those that end before each bundle.
         let mut steps = vec![0i64; self.ir.bundles.len() + 2];
         for (computed, used) in &self.subexpressions.stretches {
             steps[*computed as usize + 1] += 1;
@@ -358,7 +358,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// Where an operation comes from: its own line, or what `.loc` says.
+    /// The source line of an operation: its own, or that of `.loc`.
     fn location(
         &mut self,
         item: &Item,
@@ -477,7 +477,7 @@ impl Resolver<'_> {
         })
     }
 
-    /// What a `.deadline`, `.order` or `.late` demands.
+    /// Resolves a `.deadline`, `.order` or `.late`.
     fn demand(&mut self, timing: &Timing) -> Result<Demand, Reported> {
         let at = timing.at;
         let ast = Rc::clone(&self.context.asts[at.ast as usize]);
@@ -560,7 +560,7 @@ impl Resolver<'_> {
                 continue;
             };
             for name in registers {
-                // What goes wrong is in the report.
+                // Errors are reported already.
                 let Ok((members, ty)) = self.range_registers(at, *name, *placed) else { continue };
                 let mut end = |end: &Expr| {
                     let value = self.context.value(at, end.id)?;

@@ -413,7 +413,7 @@ impl Resolver<'_> {
         Ok((register, ty))
     }
 
-    /// Whether a name is a bank's and a number.
+    /// True if a name is that of a bank and a number.
     fn looks_like_a_place(&self, name: NameId) -> bool {
         let text = self.context.scopes.text(name);
         let digits = text.trim_end_matches(|c: char| c.is_ascii_digit());
@@ -611,7 +611,7 @@ impl Resolver<'_> {
                 (value, given.span, RegisterId::ZERO)
             }
         };
-        // Where the data has no room, its places are no mistakes of their own.
+        // If the data does not fit, addresses in it are no errors of their own.
         if self.is_full && self.table_of(place, given.kind).is_some() {
             return Err(Reported);
         }

@@ -1,61 +1,87 @@
-//! What the search by priorities leaves open, of blocks that are not too long: whether there is a shorter schedule.
+//! Exact search for a shorter schedule (branch and bound), for blocks that are not too long, after list scheduling.
 //!
-//! For one length after the other, windows ([`TimeWindows`]) are narrowed, and narrowed further by supposing that a task issues
-//! at an end of its window: if that leaves another task nowhere to go, the end is cut off. If nothing is left, no schedule has
-//! this length, which raises the bound. Otherwise a schedule is searched for: in the order of time, the most urgent task
-//! that can issue does; where that leaves a task nowhere to go, the search goes back to the last choice and lets that task issue
-//! later, and the task that was in the way is preferred from then on. A search that has gone through all choices is a proof, too.
+//! For one length after the other, the tasks' time windows are narrowed by propagation, and further by shaving: a task is
+//! supposed to issue at an end of its window, and if that leaves another task no cycle, the end is cut off. If nothing is left,
+//! no schedule has this length, which raises the lower bound. Otherwise a depth-first search decides on the tasks' cycles and
+//! slots: the most urgent task that can issue does, on its preferred slots; at a dead end the search takes back the last
+//! decision and excludes it. Tasks that were left no cycle gain weight and are preferred from then on (dom/wdeg: Boussemart,
+//! Hemery, Lecoutre, Sais, ECAI 2004), and the search restarts after a growing number of dead ends. A search that has gone through
+//! all decisions is a proof, too.
 
 use super::graph::Graph;
+use super::list::Plan;
 use super::random::Random;
 use super::reservations::{Direction, Reservations};
 use super::time_windows::{Empty, Propagation, TimeWindows};
 
-/// Tasks of a block up to which it is tried.
+/// The longest block that is searched, in tasks.
 const TASKS: usize = 2000;
 
-/// Edges and tasks that a unit of effort lets it look at.
+/// Edges and members that propagation may visit for a unit of effort.
 const WORK_PER_EFFORT: u64 = 8_000_000;
 
-/// Dead ends after which a search begins anew, the first time; each time it is more by half.
+/// Dead ends before the first restart; before each further one half as many again.
 const DEAD_ENDS: u64 = 64;
 
-/// What came of it.
+/// The result of a search.
 pub(super) struct ExactResult {
     /// No schedule is shorter.
     pub(super) bound: u32,
-    /// The shortest schedule that was found, if one was: for each task its cycle.
-    pub(super) start: Option<Vec<u32>>,
+    /// The shortest schedule that was found, if one was.
+    pub(super) plan: Option<Plan>,
 }
 
-/// Which task a search decides on next.
+/// The task that a search decides on next.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Branch {
-    /// One that can issue first, of these the most urgent: good schedules come of it.
+    /// The most urgent of those that can issue first: this finds good schedules.
     Earliest,
-    /// One with few cycles to choose from: if there is no schedule, that shows soon.
+    /// One with the smallest window (fail first): this proves soon that there is no schedule.
     Narrowest,
+}
+
+/// A decision of the search.
+#[derive(Clone, Copy)]
+enum Decision {
+    /// A task issues in the first cycle of its window; else later.
+    Cycle(usize),
+    /// A task takes a choice of slots; else another.
+    Slots(usize, u8),
+}
+
+impl Decision {
+    fn apply(self, windows: &mut TimeWindows) {
+        match self {
+            Decision::Cycle(task) => windows.last[task] = windows.first[task],
+            Decision::Slots(task, choice) => windows.choose(task, choice),
+        }
+    }
+
+    fn exclude(self, windows: &mut TimeWindows) {
+        match self {
+            Decision::Cycle(task) => windows.first[task] += 1,
+            Decision::Slots(task, choice) => windows.exclude(task, choice),
+        }
+    }
 }
 
 /// The end of a search for a schedule of one length.
 enum Found {
-    Schedule(Vec<u32>),
+    Schedule(Plan),
     /// There is none.
     Nothing,
     /// The work that was allowed is done.
     Unknown,
 }
 
-/// Looks for schedules shorter than `length`, down to `least`. Tasks that have a choice of slots, or a unit that does not take an operation
-/// every cycle, are not what the windows know: then it does nothing.
+/// Searches for schedules shorter than `length`, down to `least`; `None` if there is nothing to search.
 pub(super) fn search(graph: &Graph<'_>, least: u32, length: u32, effort: u32) -> Option<ExactResult> {
     let tasks = &graph.problem.tasks;
-    let known = tasks.iter().all(|task| task.choices() <= 1);
-    if !known || tasks.len() > TASKS || effort == 0 || least >= length {
+    if tasks.len() > TASKS || effort == 0 || least >= length {
         return None;
     }
     let allowed = u64::from(effort) * WORK_PER_EFFORT;
-    // Where deadlines had a part in it, that there is none says nothing of schedules that miss them.
+    // With deadlines, that no schedule meets them says nothing of schedules that miss them.
     let timeless = tasks.iter().all(|task| task.latest.is_none());
     let mut exact = ExactSearch {
         graph,
@@ -63,8 +89,9 @@ pub(super) fn search(graph: &Graph<'_>, least: u32, length: u32, effort: u32) ->
         allowed: allowed / 8,
         random: Random::new(),
         weights: vec![0; tasks.len()],
+        lightest: graph.lightest(),
     };
-    let mut result = ExactResult { bound: least, start: None };
+    let mut result = ExactResult { bound: least, plan: None };
     while result.bound < length && !exact.is_feasible(result.bound) {
         result.bound += 1;
     }
@@ -72,22 +99,22 @@ pub(super) fn search(graph: &Graph<'_>, least: u32, length: u32, effort: u32) ->
     let mut length = length;
     while result.bound < length {
         match exact.search(result.bound, Branch::Narrowest) {
-            Found::Schedule(start) => {
-                length = start.iter().max().map_or(0, |last| last + 1);
-                result.start = Some(start);
+            Found::Schedule(plan) => {
+                length = plan.start.iter().max().map_or(0, |last| last + 1);
+                result.plan = Some(plan);
             }
             Found::Nothing if timeless => result.bound += 1,
             Found::Nothing | Found::Unknown => break,
         }
     }
-    // What was in the way of a proof is not what is in the way here.
+    // The weights of a proof are not those of a schedule.
     (exact.allowed, exact.random) = (allowed, Random::new());
     exact.weights.fill(0);
     while result.bound < length {
         match exact.search(length - 1, Branch::Earliest) {
-            Found::Schedule(start) => {
-                length = start.iter().max().map_or(0, |last| last + 1);
-                result.start = Some(start);
+            Found::Schedule(plan) => {
+                length = plan.start.iter().max().map_or(0, |last| last + 1);
+                result.plan = Some(plan);
             }
             Found::Nothing => {
                 if timeless {
@@ -104,11 +131,13 @@ pub(super) fn search(graph: &Graph<'_>, least: u32, length: u32, effort: u32) ->
 struct ExactSearch<'g, 'p> {
     graph: &'g Graph<'p>,
     propagation: Propagation<'g, 'p>,
-    /// Work up to which it goes on.
+    /// The work at which it stops.
     allowed: u64,
     random: Random,
-    /// How often each task has been left nowhere to go.
+    /// How often each task has been left no cycle.
     weights: Vec<i64>,
+    /// The preferred choice of each task.
+    lightest: Vec<u8>,
 }
 
 impl ExactSearch<'_, '_> {
@@ -116,13 +145,13 @@ impl ExactSearch<'_, '_> {
         self.propagation.work >= self.allowed
     }
 
-    /// Whether nothing shows that no schedule has so many cycles.
+    /// True if propagation does not prove that no schedule has so many cycles.
     fn is_feasible(&mut self, length: u32) -> bool {
-        let mut windows = TimeWindows::new(length, self.graph.problem.tasks.iter().map(|_| None));
+        let mut windows = TimeWindows::new(self.graph.problem, length, false);
         self.propagation.narrow(&mut windows).and_then(|()| self.shave(&mut windows, self.allowed)).is_ok()
     }
 
-    /// Cuts off the ends of windows where no schedule has a task, until so much work is done.
+    /// Cuts off the ends of windows at which propagation proves that a task cannot issue, until so much work is done.
     fn shave(&mut self, windows: &mut TimeWindows, allowed: u64) -> Result<(), Empty> {
         let mut tasks: Vec<usize> = (0..windows.first.len()).collect();
         tasks.sort_by_key(|&task| windows.last[task] - windows.first[task]);
@@ -161,8 +190,7 @@ impl ExactSearch<'_, '_> {
 
     /// A schedule of at most so many cycles.
     fn search(&mut self, length: u32, branch: Branch) -> Found {
-        let latest = self.graph.problem.tasks.iter().map(|task| task.latest);
-        let mut root = TimeWindows::new(length, latest);
+        let mut root = TimeWindows::new(self.graph.problem, length, true);
         let third = self.propagation.work + self.allowed.saturating_sub(self.propagation.work) / 3;
         if self.propagation.narrow(&mut root).and_then(|()| self.shave(&mut root, third)).is_err() {
             return Found::Nothing;
@@ -178,15 +206,19 @@ impl ExactSearch<'_, '_> {
         Found::Unknown
     }
 
-    /// One search, with noise in what is urgent, until it has met so many dead ends.
+    /// One search, with noise in the urgency, until it has met so many dead ends.
     fn descend(&mut self, mut windows: TimeWindows, branch: Branch, dead_ends: u64, noise: u64) -> Found {
         let mut left = dead_ends;
-        // Before each choice: the windows, and the task that was chosen.
-        let mut choices: Vec<(TimeWindows, usize)> = Vec::new();
+        // Each decision, and the windows before it.
+        let mut decisions: Vec<(TimeWindows, Decision)> = Vec::new();
         let scatter: Vec<i64> =
             self.weights.iter().map(|_| self.random.next(16 * noise + 1) as i64).collect();
+        let preferred = self.preferred(noise > 0);
         loop {
             let urgency = |&task: &usize| {
+                if windows.is_fixed(task) {
+                    return (i64::MIN, 0, task);
+                }
                 let (first, last) = (windows.first[task], i64::from(windows.last[task]));
                 let trouble = scatter[task] - self.weights[task].min(64);
                 match branch {
@@ -194,36 +226,53 @@ impl ExactSearch<'_, '_> {
                     Branch::Narrowest => ((last - i64::from(first)) * 16 + trouble, i64::from(first), task),
                 }
             };
-            let open = (0..windows.first.len()).filter(|task| !windows.is_fixed(*task));
+            let open = (0..windows.first.len()).filter(|task| !windows.is_decided(*task));
             let Some(task) = open.min_by_key(urgency) else {
                 let start: Vec<u32> = windows.first.iter().map(|&cycle| cycle.max(0) as u32).collect();
-                match self.holds(&start) {
-                    true => return Found::Schedule(start),
-                    false => return Found::Unknown,
-                }
+                let choice = (0..start.len()).map(|task| windows.choices(task).next().unwrap_or(0)).collect();
+                let plan = Plan { start, choice };
+                return if self.holds(&plan) { Found::Schedule(plan) } else { Found::Unknown };
             };
-            choices.push((windows.clone(), task));
-            windows.last[task] = windows.first[task];
+            let decision = if windows.is_fixed(task) {
+                let choice = windows.choices(task).min_by_key(|choice| *choice != preferred[task]);
+                Decision::Slots(task, choice.unwrap_or(0))
+            } else {
+                Decision::Cycle(task)
+            };
+            decisions.push((windows.clone(), decision));
+            decision.apply(&mut windows);
             while let Err(Empty { task }) = self.propagation.narrow(&mut windows) {
                 self.weights[task] += 1;
                 left -= 1;
-                let Some((before, chosen)) = choices.pop() else { return Found::Nothing };
+                let Some((before, decision)) = decisions.pop() else { return Found::Nothing };
                 if left == 0 || self.is_spent() {
                     return Found::Unknown;
                 }
                 windows = before;
-                windows.first[chosen] += 1;
+                decision.exclude(&mut windows);
             }
         }
     }
 
-    /// Whether all resources have room, the units too, whose intervals the windows do not know.
-    fn holds(&self, start: &[u32]) -> bool {
+    /// The choice of slots that a search tries first for each task; with noise, another for one in four.
+    fn preferred(&mut self, noise: bool) -> Vec<u8> {
+        let mut preferred = self.lightest.clone();
+        for (task, preferred) in self.graph.problem.tasks.iter().zip(&mut preferred) {
+            if noise && task.choices() > 1 && self.random.next(4) == 0 {
+                *preferred = self.random.next(task.choices() as u64) as u8;
+            }
+        }
+        preferred
+    }
+
+    /// True if all resources are free, the units too, whose intervals the time windows do not know.
+    fn holds(&self, plan: &Plan) -> bool {
         let problem = self.graph.problem;
         let mut table = Reservations::new(problem);
-        problem.tasks.iter().zip(start).all(|(task, &cycle)| {
-            let fits = table.fits(&task.uses, cycle as usize, Direction::Forward);
-            table.reserve(&task.uses, cycle as usize, Direction::Forward);
+        problem.tasks.iter().zip(plan.start.iter().zip(&plan.choice)).all(|(task, (&cycle, &choice))| {
+            let operations = task.choice(choice);
+            let fits = table.fits(operations, cycle as usize, Direction::Forward);
+            table.reserve(operations, cycle as usize, Direction::Forward);
             fits
         })
     }
@@ -237,37 +286,46 @@ mod tests {
     use takt_isa::SlotIndex;
     use takt_isa::timing::Reservation;
 
-    /// Whether the tasks from the `placed`th on can all issue before `length`: every cycle is tried.
-    fn exists(problem: &Problem, length: u32, start: &mut Vec<u32>) -> bool {
-        let placed = start.len();
+    /// True if the tasks from the `placed`th on can all issue before `length`: every cycle and every choice is tried.
+    fn exists(problem: &Problem, length: u32, plan: &mut Vec<(u32, u8)>) -> bool {
+        let placed = plan.len();
         let Some(task) = problem.tasks.get(placed) else { return true };
-        (0..length).any(|cycle| {
+        let tries = (0..length).flat_map(|cycle| (0..task.choices() as u8).map(move |choice| (cycle, choice)));
+        tries.into_iter().any(|(cycle, choice)| {
             let mut table = Reservations::new(problem);
-            for (task, &cycle) in problem.tasks.iter().zip(&*start) {
-                table.reserve(&task.uses, cycle as usize, Direction::Forward);
+            for (task, &(cycle, choice)) in problem.tasks.iter().zip(&*plan) {
+                table.reserve(task.choice(choice), cycle as usize, Direction::Forward);
             }
-            let waits = |edge: &Edge| edge.to != placed || cycle >= start[edge.from] + edge.distance;
-            if !problem.edges.iter().all(waits) || !table.fits(&task.uses, cycle as usize, Direction::Forward)
+            let waits = |edge: &Edge| {
+                edge.to != placed || {
+                    let (start, choice) = plan[edge.from];
+                    let latency = problem.tasks[edge.from].choice(choice)[0].writeback;
+                    cycle >= start + edge.latency_of.map_or(edge.distance, |_| latency.unwrap_or(0))
+                }
+            };
+            if !problem.edges.iter().all(waits)
+                || !table.fits(task.choice(choice), cycle as usize, Direction::Forward)
             {
                 return false;
             }
-            start.push(cycle);
-            let found = exists(problem, length, start);
-            start.pop();
+            plan.push((cycle, choice));
+            let found = exists(problem, length, plan);
+            plan.pop();
             found
         })
     }
 
-    fn reservation(slot: usize, latency: u32) -> Reservation {
+    fn reservation((slot, latency): (usize, u32)) -> Reservation {
         let unit = Some(slot as u16);
         let slot = SlotIndex::new(slot).expect("it is below 8");
         Reservation { slot, unit, interval: 1, writeback: Some(latency) }
     }
 
     fn problem() -> impl Strategy<Value = Problem> {
-        let task = (0..2usize, 1..4u32).prop_map(|(slot, latency)| Task {
+        let choices = prop::collection::btree_map(0..3usize, 1..4u32, 1..3);
+        let task = choices.prop_map(|choices| Task {
             operations: 1,
-            uses: vec![reservation(slot, latency)],
+            uses: choices.into_iter().map(reservation).collect(),
             ..Task::default()
         });
         let tasks = prop::collection::vec(task, 2..7);
@@ -277,11 +335,11 @@ mod tests {
                 from,
                 to,
                 distance: tasks[from].written(0).unwrap_or(0),
-                latency_of: None,
+                latency_of: Some(0).filter(|_| tasks[from].varies(0)),
                 demanded: false,
             };
             let edges = edges.map(edge).collect();
-            Problem { tasks, edges, slack: 0, slots: 2, units: 2 }
+            Problem { tasks, edges, slack: 0, slots: 3, units: 3 }
         })
     }
 
@@ -292,10 +350,10 @@ mod tests {
             let graph = Graph::new(&problem);
             let long = problem.tasks.len() as u32 * 4;
             let shortest = (1..=long).find(|length| exists(&problem, *length, &mut Vec::new()));
-            let result = search(&graph, 1, long, 20).expect("it is looked into");
+            let result = search(&graph, 1, long, 20).expect("there is something to search");
             prop_assert_eq!(Some(result.bound), shortest);
-            let start = result.start.expect("the longest was longer than need be");
-            prop_assert_eq!(start.iter().max().map(|last| last + 1), shortest);
+            let plan = result.plan.expect("the longest was longer than need be");
+            prop_assert_eq!(plan.start.iter().max().map(|last| last + 1), shortest);
         }
     }
 }

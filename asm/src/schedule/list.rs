@@ -7,12 +7,12 @@ use super::reservations::{Direction, Reservations};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// When each task issues, and on which slots.
+/// A schedule: the cycle and the choice of slots of each task.
 #[derive(Clone, Debug)]
 pub(super) struct Plan {
     /// The cycle. Those of a backward pass count from the end.
     pub(super) start: Vec<u32>,
-    /// Which of the task's choices.
+    /// The index of the task's choice.
     pub(super) choice: Vec<u8>,
 }
 
@@ -22,19 +22,19 @@ impl Plan {
     }
 }
 
-/// Which choice of slots each task takes, of several that have room.
+/// Preferred choices of slots, among several that are free.
 #[derive(Clone, Debug)]
 pub(super) struct SlotPreference {
-    /// The one that it leans toward.
+    /// The preferred choice of each task.
     pub(super) toward: Vec<u8>,
-    /// How much longer it waits for that: so many quarters of the time until it is due. None: it takes that of two as early.
+    /// The slack that a task spends to get it, in quarters of the time until it is due. With 0 it only breaks ties.
     pub(super) quarters: u32,
-    /// When it is due in a forward pass, and in a backward one.
+    /// The due times of the tasks in a forward pass, and in a backward one.
     pub(super) due: [Vec<i64>; 2],
 }
 
 impl SlotPreference {
-    /// How many cycles later the choice that a task leans toward may be than another that has room in a cycle.
+    /// The cycles by which the preferred choice may be later than another that is free in a cycle.
     #[inline]
     fn patience(&self, direction: Direction, task: usize, cycle: u32) -> u32 {
         if self.quarters == 0 {
@@ -46,9 +46,8 @@ impl SlotPreference {
 }
 
 impl Graph<'_> {
-    /// Places every task, in an order that respects the edges and otherwise follows `key` (small first), in the first
-    /// cycle that has room and is not before its `release`; of several choices of slots, that which has its results first,
-    /// unless it leans toward another.
+    /// Places every task, in a topological order that otherwise follows `key` (small first), in the first cycle that is free and not
+    /// before its `release`; of several choices of slots it takes the one whose results come first, unless it prefers another.
     pub(super) fn list_schedule(
         &self,
         direction: Direction,
@@ -88,7 +87,7 @@ impl Graph<'_> {
                 let uses = task.choice(choice);
                 let earliest = preds[i].iter().map(after).fold(release(task), u32::max);
                 let cycle = table.first_fit(uses, earliest as usize, direction) as u32;
-                // What is quicker may issue later. (Backward, the distances have seen to that.)
+                // Choices are compared by their results: a quicker one may issue later. (Backward, the distances contain the latency.)
                 let written = match direction {
                     Direction::Forward => uses.iter().filter_map(|usage| usage.writeback).max().unwrap_or(0),
                     Direction::Backward => 0,
@@ -112,9 +111,9 @@ impl Graph<'_> {
         }
     }
 
-    /// When the tasks really issue if those that share a cycle of the plan become a bundle: bundles go in order, each as early
-    /// as the machine lets it, which may be earlier than planned, and then, because of what it takes there, make a later one
-    /// late. Returns the length.
+    /// The cycles in which the tasks really issue if those of one cycle of the plan become a bundle: bundles issue in order, each as
+    /// early as the machine allows, which may be earlier than planned, and then its reservations may delay a later one. Returns the
+    /// length.
     pub(super) fn issue(&self, plan: &Plan, table: &mut Reservations, start: &mut [u32]) -> u32 {
         let Plan { start: plan, choice } = plan;
         let mut order: Vec<u32> = (0..plan.len() as u32).collect();

@@ -1,8 +1,9 @@
-//! The scheduler: packs operations into bundles and orders them for the machine, from the specification alone.
-//!
-//! It works on one block at a time: a straight run of bundles that control enters only at its first and leaves only after
-//! its last. What must keep its order is an edge between two operations (see [`Block`]); everything else may move.
-//! `docs/scheduling.md` says what that means for who writes a program.
+//! Scheduler: packs operations into bundles and orders them, from the machine's tables and [`takt_isa::timing`]'s reservation
+//! tables alone.
+//! 
+//! It works on one basic block at a time: a straight run of bundles that control enters only at its first and leaves only after
+//! its last. Dependences are edges between two tasks (see [`Block`]); everything else may move. List scheduling in forward and
+//! backward passes ([`solve`]) is followed by an exact search ([`exact`]). `docs/scheduling.md` explains it to programmers.
 
 mod bound;
 mod demand;
@@ -37,13 +38,13 @@ use takt_isa::program::{Location, Space};
 use takt_isa::timing::Reservation;
 use takt_isa::{BundleAddress, Effect, Machine, SlotIndex, Slots};
 
-/// How long the scheduler searches unless told otherwise.
+/// The default effort of the search.
 pub const DEFAULT_EFFORT: u32 = 20;
 
-/// What became of a block.
+/// Report of a scheduled block.
 #[derive(Clone, Debug)]
 pub struct BlockReport {
-    /// Where the block's first operation stands in the source.
+    /// The source line of the block's first operation.
     pub location: Option<Location>,
     /// The label at the block's start, if there is one.
     pub label: Option<String>,
@@ -55,11 +56,11 @@ pub struct BlockReport {
     pub bundles: u32,
     /// Cycles from the issue of its first bundle to that of its last, both included, if nothing is pending at its start.
     pub cycles: u32,
-    /// What no schedule can be shorter than.
+    /// The lower bound of its length.
     pub bound: Bound,
 }
 
-/// What became of a program.
+/// Report of a scheduled program.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
     /// Of each block that was scheduled.
@@ -68,15 +69,15 @@ pub struct Report {
     pub timing: Vec<TimingReport>,
 }
 
-/// How far a schedule may depart from the source's order. The nearer to it, the fewer values are needed at a time, and the longer
+/// The freedom of a schedule to depart from the source's order. The nearer to that, the lower the register pressure, and the longer
 /// the schedule may be.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Order {
-    /// As far as need be.
+    /// Any order.
     Free,
-    /// No operation issues before one that stands so many bundles or more before it.
+    /// An operation does not issue before one that precedes it by so many bundles or more.
     Near(usize),
-    /// Not at all: bundles stay as they are written, on the slots that they have without a scheduler.
+    /// The source's order: bundles stay as they are written, on the slots that they have without a scheduler.
     Written,
 }
 
@@ -163,7 +164,7 @@ fn reservation(machine: &Machine, operation: &Operation, slot: Option<SlotIndex>
     Reservation::new(machine, slot, operation.row().function, operation.dest.is_some())
 }
 
-/// What one task must wait for of another.
+/// The event of an earlier task for which a task waits.
 #[derive(Clone, Copy)]
 enum Wait {
     /// So many cycles from its issue.
@@ -183,7 +184,7 @@ enum Wait {
 /// - What redirects control comes last; what drains comes when all is written.
 struct Block {
     problem: Problem,
-    /// For each task the bundle that it is.
+    /// The bundle of each task.
     origins: Vec<usize>,
 }
 
@@ -267,7 +268,7 @@ impl Block {
                 }
                 if is_output(dest) {
                     task.output = task.output.max(task.written(index));
-                    // What precedes the port's write before this one precedes this one.
+                    // Accesses before the port's previous write precede this one transitively.
                     let known = outputs.insert(dest, (to, faults.len())).map_or(0, |(_, known)| known);
                     for &from in &faults[known..] {
                         after(from, Wait::Cycles(0));
@@ -289,7 +290,7 @@ impl Block {
         Block { problem, origins }
     }
 
-    /// The outcome for the block, a run that begins at an address now.
+    /// The report of the block, a run that now begins at an address.
     fn report(
         &self,
         ir: &Ir,
@@ -356,10 +357,10 @@ impl Block {
     }
 }
 
-/// Choices of slots that the scheduler has for a bundle: of one with very many not all.
+/// The most choices of slots that the scheduler examines for a bundle.
 const CHOICES: usize = 120;
 
-/// The ways to give the operations of a bundle slots, the present one first; the only one, if nothing says where registers may lie.
+/// The choices of slots for the operations of a bundle, the present one first; the only one without domains.
 fn choices(ir: &Ir, bundle: &Bundle, domains: Option<&Domains>) -> Vec<Vec<Option<SlotIndex>>> {
     let present: Vec<Option<SlotIndex>> = bundle.operations.iter().map(|operation| operation.slot).collect();
     let Some(domains) = domains else { return vec![present] };

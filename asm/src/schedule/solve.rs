@@ -1,4 +1,4 @@
-//! The search for a schedule of one block.
+//! Heuristic search for a schedule of one block.
 //!
 //! Serial schedule generation (each task, in an order of priority, goes to the first cycle that has room), forward and
 //! backward in turn: a backward pass moves every task as late as the length allows, a forward pass then pulls them up in that
@@ -22,14 +22,14 @@ pub(super) struct Solution {
     pub(super) plan: Plan,
     /// Cycles from the first issue to the last, both included.
     pub(super) length: u32,
-    /// What it can be compared with.
+    /// The lower bound of the length.
     pub(super) bound: Bound,
     /// If there are late tasks that output ports depend on: cycles from the first late task's issue to the last such write, and
     /// the bound of that.
     pub(super) window: Option<(u32, u32)>,
 }
 
-/// What makes one schedule better than another: the first that differs.
+/// Cost of a schedule, compared lexicographically.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct Cost {
     /// Cycles by which deadlines are missed, in all.
@@ -40,10 +40,10 @@ struct Cost {
     length: u32,
 }
 
-/// By turns, how long a task waits for the slots that it leans toward, in quarters of the time until it is due.
+/// The slack that tasks spend to get their preferred slots, by turns, in quarters of the time until they are due.
 const QUARTERS: [u32; 4] = [0, 1, 2, 4];
 
-/// One in so many tasks leans toward other slots than the best schedule's.
+/// One in so many tasks prefers other slots than the best schedule's.
 const STRAY: u64 = 32;
 
 /// Edges that cost as much as placing a task: more than an operation has but for loads and stores in great number.
@@ -53,8 +53,7 @@ const EDGES: usize = 16;
 const TASKS_PER_EFFORT: u64 = 200_000;
 
 impl Problem {
-    /// Which tasks decide how long inputs that are read late are under way: for each, whether it is late, and the distance
-    /// from its issue to an output that depends on a late task.
+    /// The window from late reads of inputs to the outputs that depend on them: its tasks, and the lower bound of its length.
     fn watched(&self) -> LateWindow {
         if !self.tasks.iter().any(|task| task.late) {
             return LateWindow::default();
@@ -99,10 +98,10 @@ struct Search<'p> {
     random: Random,
     /// Tasks that may still be placed.
     budget: u64,
-    /// Up to this length it does not matter.
+    /// The length up to which it does not count.
     allowed: u32,
     best: Option<(Cost, Plan)>,
-    /// Whether any task has a choice of slots, and the choice whose slots fewer operations depend on.
+    /// True if any task has a choice of slots, and each task's choice with the least demand.
     has_choices: bool,
     lightest: Vec<u8>,
     /// The earliest cycle of each task.
@@ -118,7 +117,7 @@ impl Search<'_> {
         Cost { tardy, excess: length.max(self.allowed), window, length }
     }
 
-    /// Whether the deadlines are met and nothing can be shorter.
+    /// True if the deadlines are met and the length is the lower bound.
     fn is_shortest(&self) -> bool {
         let is_bound = |cost: &Cost| cost.tardy == 0 && cost.length <= self.bound.cycles();
         self.best.as_ref().is_some_and(|(cost, _)| is_bound(cost))
@@ -136,7 +135,7 @@ impl Search<'_> {
             let length = self.graph.issue(&plan, &mut self.table, &mut start);
             spent += 2;
             let cost = self.cost(length, &start);
-            // One as good takes the best's place, so that the search does not turn round the first of them.
+            // An equal schedule replaces the best, so that the search leaves a plateau.
             if self.best.as_ref().is_none_or(|(best, _)| cost <= *best) {
                 self.best = Some((cost, Plan { start: start.clone(), choice: plan.choice.clone() }));
             }
@@ -152,7 +151,7 @@ impl Search<'_> {
             self.graph.list_schedule(Direction::Forward, &key, &lean, forward, &mut self.table, &mut plan);
             spent += 2;
         }
-        // Where an operation has very many to wait for, that is the work.
+        // With very many edges, these are the work.
         let cost = spent * n.max(self.graph.problem.edges.len() / EDGES) as u64;
         let lasts = self.budget >= cost;
         self.budget = self.budget.saturating_sub(cost);
@@ -202,22 +201,20 @@ impl Search<'_> {
         lean
     }
 
-    /// Looks for what priorities have not found, and for a proof that there is nothing.
+    /// Searches exactly for a schedule that priorities have not found, and for a proof that there is none.
     fn exact(&mut self, effort: u32) {
         let Some((cost, _)) = self.best.as_ref().filter(|(cost, _)| cost.tardy == 0) else { return };
         let result = exact::search(&self.graph, self.bound.cycles(), cost.length, effort);
-        let Some(ExactResult { bound, start }) = result else { return };
+        let Some(ExactResult { bound, plan }) = result else { return };
         if bound > self.bound.cycles() {
             self.bound.windows = bound;
         }
-        if let Some(start) = start {
-            let choice = vec![0; start.len()];
-            let mut issued = vec![0; start.len()];
-            let length =
-                self.graph.issue(&Plan { start, choice: choice.clone() }, &mut self.table, &mut issued);
-            let cost = self.cost(length, &issued);
+        if let Some(plan) = plan {
+            let mut start = vec![0; plan.start.len()];
+            let length = self.graph.issue(&plan, &mut self.table, &mut start);
+            let cost = self.cost(length, &start);
             if self.best.as_ref().is_none_or(|(best, _)| cost < *best) {
-                self.best = Some((cost, Plan { start: issued, choice }));
+                self.best = Some((cost, Plan { start, choice: plan.choice }));
             }
         }
     }

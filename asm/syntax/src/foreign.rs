@@ -169,7 +169,7 @@ impl<'s> ForeignLine<'_, '_, 's> {
         let symbol = self.part(before..assign + 1).1;
         let instead = match self.token(before)? {
             Token::Colon => format!("{target} = {value}"),
-            // What it is in languages where `^` is no power.
+            // In other languages `^` is exclusive or.
             Token::Operator(Operator::Power) => format!("{target} = xor({target}, {value})"),
             Token::Operator(operator) if operator.precedence() > Operator::Eq.precedence() => {
                 let value =

@@ -128,7 +128,7 @@ fn parse_chunk(chunk: &Chunk, source: &Source, ast: &mut Ast, sink: &mut Sink, s
     *ast = builder.ast;
 }
 
-/// Whether a line is meant as an equation: of the others only directives have a `=`.
+/// True if a line is meant as an equation: of other lines only directives have a `=`.
 pub(crate) fn is_equation(tokens: &[(Token, Span)]) -> bool {
     let mut assigns = false;
     for (token, _) in tokens {
@@ -235,7 +235,7 @@ fn broken(tokens: &[(Token, Span)], line: &LineTokens, ast: &mut Ast) {
     ast.statements.push(Statement { label, kind, line: line.number });
 }
 
-/// Whether an operand nests deeper, or is longer, than the assembler reads; then it is reported.
+/// True if an operand nests deeper, or is longer, than the assembler reads, which is reported.
 fn nests_too_deeply(tokens: &[(Token, Span)], sink: &mut Sink) -> bool {
     // For each open bracket, and for the operand as a whole, the prefix operators and powers that await their operand, and
     // the choices that await their last alternative.

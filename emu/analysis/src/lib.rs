@@ -3,9 +3,9 @@
 //! - [`accuracy`]: the errors of a run's outputs against binary64, and where they come from.
 //! - [`bound`]: the best and the worst that each section of a program can take, from the program alone.
 //! - [`dependence`]: after how many periods an output follows an input.
-//! - [`what_if`]: what faster units would bring.
-//! - [`period`]: a run up to the period that is looked at.
-//! - [`static_issue()`]: in which cycle each operation of a straight line issues, and what it waits for.
+//! - [`what_if`]: the effect of faster units.
+//! - [`period`]: a run to the period under examination.
+//! - [`static_issue()`]: the cycle in which each bundle of straight-line code issues, and what it waits for.
 //! - [`trace`]: where the cycles of one period, or of a run, went: every issue and what it waited for, the chain of
 //!   operations that sets the time, and what a faster unit would bring.
 //! - [`picture`]: the same as JSON, and drawn, as a page for a browser.

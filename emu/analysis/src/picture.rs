@@ -10,7 +10,7 @@ use takt_isa::text::in_script;
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
 
-/// What a faster unit would bring: to the program as it is, and assembled for a machine that has it.
+/// The effect of a faster unit on the program as it is, and on the program assembled for a machine that has it.
 pub struct Speedup {
     /// In which unit, and what to the program as it is.
     pub what: WhatIf,
@@ -22,7 +22,7 @@ pub struct Speedup {
 pub struct Reassembled {
     /// Cycles of the same period.
     pub cycles: Cycle,
-    /// What no schedule of its blocks can be shorter than.
+    /// Lower bound of any schedule of its blocks.
     pub least: Cycle,
 }
 
@@ -34,13 +34,13 @@ pub struct Picture<'p> {
     pub name: String,
     /// The number of the period, from 1; 0 is what runs once.
     pub period: u64,
-    /// Where its cycles went.
+    /// Its trace.
     pub trace: Trace,
     /// The chain that sets its time.
     pub chain: Vec<Link>,
-    /// What faster units would bring.
+    /// The effect of each faster unit.
     pub faster: Vec<Speedup>,
-    /// What its lines do to accuracy, as `takt accuracy --json` has it.
+    /// The accuracy of its lines, as `takt accuracy --json` has it.
     pub accuracy: Option<Value>,
 }
 
@@ -66,7 +66,7 @@ impl<'p> Picture<'p> {
         self.trace.issues[issue].cycle + self.trace.cycles - last
     }
 
-    /// What a link of the chain goes through, and the register that it is about.
+    /// The unit or rule that a link of the critical path goes through, and the register that it is about.
     fn through(&self, link: &Link) -> (String, Option<String>) {
         let machine = self.program.machine;
         let text = match link.kind {
@@ -156,7 +156,7 @@ impl<'p> Picture<'p> {
         include_str!("picture.html").replace("/*DATA*/", &data)
     }
 
-    /// What the picture is drawn from.
+    /// The data of the picture.
     pub fn json(&self) -> Value {
         let program = self.program;
         let critical: BTreeSet<usize> = self.chain.iter().flat_map(|link| [link.from, link.to]).collect();

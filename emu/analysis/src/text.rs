@@ -22,7 +22,7 @@ struct StallGroup {
 }
 
 impl StallGroup {
-    /// Its text, and how often it is so: in a loop, once for each turn.
+    /// Its text, and the number of times: in a loop, once for each turn.
     fn render(&self) -> String {
         match self.times {
             1 => self.text.clone(),
@@ -129,7 +129,7 @@ impl Picture<'_> {
         self.write_faster(out)
     }
 
-    /// What a faster unit would bring; where that is more cycles than today, why.
+    /// The effect of each faster unit; if that is more cycles than today, the reason.
     fn write_faster(&self, out: &mut String) -> std::fmt::Result {
         let today = self.trace.cycles;
         writeln!(out, "\none cycle less in      as it is      reassembled")?;

@@ -7,7 +7,7 @@ use takt_emu::testing::{self, Random, random_program};
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{MACHINES, Program};
 
-/// What must hold of every trace.
+/// Checks the invariants of every trace.
 fn check(program: &Program, trace: &Trace) {
     let stalled: Cycle =
         trace.issues.iter().flat_map(|issue| &issue.stalls).map(|(_, cycles)| Cycle::from(*cycles)).sum();

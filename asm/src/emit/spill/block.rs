@@ -1,8 +1,8 @@
-//! Loads and stores into one scheduled block, whose bundles stay in their order.
-//!
-//! From the first bundle to the last: where a bank holds too many values, the one that is used again latest makes room (Belady, 1966).
-//! It is stored once, behind its computation, and loaded as late as its next use allows, in slots that are free if there
-//! are any. What is loaded is a value of its own from there on, and may be the next to make room.
+//! Spill code in one scheduled block, whose bundles stay in their order.
+//! 
+//! From the first bundle to the last: where a bank has too many live values, the one whose next use is farthest is spilled (Belady,
+//! 1966). It is stored once, after its computation, and reloaded as late as its next use allows, in free slots if there are any.
+//! A reloaded value has a live range of its own, and may be spilled again.
 
 use super::super::allocate::Pressure;
 use super::Spilled;
@@ -12,7 +12,7 @@ use crate::schedule;
 use smallvec::smallvec;
 use takt_isa::{Effect, Op, ROWS, SlotIndex};
 
-/// What is missing.
+/// The shortage.
 pub(super) enum Short {
     /// Data words: so many are needed at least.
     Words(usize),
@@ -28,7 +28,7 @@ struct Value {
     first: usize,
     /// The bundles that read it, ascending.
     uses: Vec<usize>,
-    /// Whether it may make room.
+    /// True if it may be spilled.
     spillable: bool,
     /// Which of the spilled values it is, once it is in data memory.
     stored: Option<usize>,
@@ -40,13 +40,13 @@ impl Value {
         self.uses.last().copied().unwrap_or(0).max(self.first + usize::from(self.uses.is_empty()))
     }
 
-    /// Whether it needs its register between a bundle and the next.
+    /// True if it is live between a bundle and the next.
     fn spans(&self, gap: usize) -> bool {
         self.first <= gap && gap < self.end()
     }
 }
 
-/// Where an operation can be added: in a bundle, or in one of its own behind it.
+/// The place of an added operation: in a bundle, or in one of its own after it.
 #[derive(Clone, Copy)]
 enum InsertionPoint {
     In(usize),
@@ -77,7 +77,7 @@ struct Block<'a> {
     slot: SlotIndex,
 }
 
-/// The bundles of a run whose values have room, and which of these are kept in data memory, in `words`.
+/// Spills values of a run until the others have registers. Returns the new bundles and the spilled values, which are kept in `words`.
 pub(super) fn spill(
     ir: &mut Ir,
     run: Run,
@@ -172,7 +172,7 @@ impl Block<'_> {
         Ok(())
     }
 
-    /// Whether an operation can be added to a bundle.
+    /// True if an operation can be added to a bundle.
     fn has_room(&self, at: usize) -> bool {
         let Bundle { operations, explicit, .. } = &self.bundles[at];
         let taken = |operation: &Operation| operation.slot.is_none_or(|slot| slot == self.slot);

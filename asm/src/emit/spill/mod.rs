@@ -1,9 +1,9 @@
-//! Values that find no register: kept in data memory while they are not needed.
-//!
-//! Where a block of equations has more values at a time than a bank has registers, first an order is tried in which fewer are
-//! needed at a time ([`Order`]), in the end that of the source; then values whose next use is farthest are stored in words that nothing else
-//! touches, and loaded before that use ([`block`]). The shorter program is taken. What hand-written operations write
-//! stays in its register.
+//! Reduction of register pressure: other schedules, and spilling to data memory.
+//! 
+//! If a block of equations has more live values than a bank has registers, schedules nearer to the source's order are tried, which
+//! have lower pressure ([`Order`]), and spilling: values whose next use is farthest are stored in words that nothing else
+//! touches, and reloaded before that use ([`block`]). The shorter program is taken. Registers written by hand-written operations
+//! are never spilled.
 
 mod block;
 
@@ -15,7 +15,7 @@ use crate::schedule::{self, Order, Report};
 use takt_isa::BundleAddress;
 use takt_isa::program::Location;
 
-/// A value that is kept in data memory for a time.
+/// A spilled value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Spilled {
     /// Its name; empty if it is a part of an equation.
@@ -26,11 +26,11 @@ pub struct Spilled {
     pub location: Option<Location>,
     /// The data word that keeps it.
     pub word: u32,
-    /// How often it is loaded.
+    /// The number of reloads.
     pub loads: u32,
 }
 
-/// What it cost a block that its values have not enough registers.
+/// The cost of high register pressure in a block.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Spills {
     /// The block: an index into the assembled program's blocks.
@@ -68,11 +68,11 @@ impl std::fmt::Display for Spilled {
     }
 }
 
-/// Shares of a block's operations within which the order of the source is kept, to need fewer registers: a half, a quarter …; so
-/// many where not even the source's own order is known to suffice.
+/// The number of schedules that are tried, each twice as near to the source's order: within a half of the block's operations, a
+/// quarter …; so many if not even the source's own order is known to suffice.
 const REACHES: u32 = 5;
 
-/// A program in which all values have a register.
+/// A program in which all live values have a register.
 struct Reduced {
     ir: Ir,
     report: Report,
@@ -89,8 +89,7 @@ impl Reduced {
     }
 }
 
-/// Makes a scheduled program need no more registers than there are, if that is short of them. `source` is the program before it
-/// was scheduled.
+/// Reduces the register pressure of a scheduled program to the registers that there are. `source` is the program before scheduling.
 ///
 /// # Errors
 /// The reason if it cannot be done; the program is then in its order or in that of the source, whichever lacks fewer registers.
@@ -132,7 +131,7 @@ pub(crate) fn reduce_pressure(
     }
     let best = near.into_iter().chain(spilled).chain(written).min_by_key(Reduced::cycles);
     let Some(best) = best else {
-        // The message speaks of the order that lacks the fewest registers.
+        // The error is about the order that lacks the fewest registers.
         if let Some(unfit) = unfit.filter(|unfit| unfit.missing < pressure.shortage()) {
             *ir = *unfit.program;
         }
@@ -230,7 +229,7 @@ fn by_memory(ir: &Ir, runs: &[Run], pressure: &Pressure, before: &Report) -> Res
              holds {depth}"
         ));
     }
-    // The demands are to be met as it stands now.
+    // The demands on ports must be met with the spill code, too.
     if !ir.demands.is_empty() {
         let mut stands = reduced.ir.clone();
         stands.bundles.iter_mut().for_each(|bundle| bundle.scheduled = false);

@@ -107,7 +107,7 @@ impl<'s> Lexer<'s> {
             let raw = self.lexer.next();
             let range = self.lexer.span();
             let span = Span::new(self.base + range.start as u32, self.base + range.end as u32);
-            // What most tokens are, first.
+            // The common case first.
             if !line.long && (span.end - line.from) as usize <= limits::LINE_BYTES {
                 match raw {
                     Some(Ok(Raw::Name)) if range.len() <= limits::NAME_BYTES => {
@@ -161,7 +161,7 @@ impl<'s> Lexer<'s> {
                     })
                 }
                 Some(Err(())) => {
-                    // What makes no sense to the lexer is one mistake of its line, however many characters there are.
+                    // Unknown characters are one error of their line, however many there are.
                     if !std::mem::replace(&mut line.unknown, true) {
                         let text = self.lexer.slice();
                         sink.add(Severity::Error, "token", span, || {
@@ -202,7 +202,7 @@ struct LineState {
     /// Its first token.
     start: usize,
     number: u32,
-    /// Where it begins in the space of all files.
+    /// Its start in the space of all files.
     from: u32,
     bad: bool,
     continued: bool,
@@ -231,7 +231,7 @@ impl LineState {
     }
 }
 
-/// What is wrong with a token.
+/// The error of a token.
 enum TokenError {
     Unknown,
     TooLarge,

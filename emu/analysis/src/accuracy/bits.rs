@@ -23,7 +23,7 @@ const SIGN: u32 = 1 << 31;
 const LARGEST: f64 = 0x7f7f_ffff as f64;
 /// The bits of the smallest normal one.
 const NORMAL: f64 = (1u32 << EXPONENT) as f64;
-/// What an exponent of zero is written as.
+/// Bias of the exponent.
 const BIAS: i32 = 127;
 /// All words, in number.
 const WORDS: f64 = 4_294_967_296.0;
@@ -146,8 +146,8 @@ pub(super) fn to_float(number: &Number) -> Result<Number, Problem> {
     Ok(Number { actual: range, exact: range, form, error: Affine::constant(0.0), grid })
 }
 
-/// What the exponent of a float becomes if an integer is added to its bits that has none of the fraction's: the float times a
-/// power of two, exactly. Of floats that have no exponent to add to, something of that size at most.
+/// The float whose bits are a float's plus an integer with no bits of the fraction: exactly the float times a power of two. For
+/// zeros and subnormals, which have no exponent to add to, a bound of that size.
 fn scaled(float: &Number, by: &Number) -> Option<Number> {
     if by.grid? < EXPONENT {
         return None;
@@ -525,7 +525,7 @@ mod tests {
     use super::*;
     use takt_emu::testing::Random;
 
-    /// Whether bits are among those that a value stands for.
+    /// True if a value contains these bits.
     fn holds(value: &Value, bits: u32) -> bool {
         let within = |number: &Number, x: f64| {
             let step = power(number.grid.unwrap_or(-200).min(31));

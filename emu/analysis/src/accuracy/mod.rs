@@ -1,4 +1,4 @@
-//! How exact a program's results are, and where they lose it.
+//! Accuracy of a program's results, and the operations at which it is lost.
 //!
 //! [`enclose()`] proves: from the ranges of inputs and states, what no run exceeds. [`Shadow`] measures: beside the bit-exact run it carries, for every register and data word, the value that the same operations
 //! give in binary64. `docs/accuracy.md` says what is counted as an error and what is not.

@@ -1,4 +1,4 @@
-//! Binary64 beside the bit-exact run.
+//! Shadow execution: binary64 alongside the bit-exact run, with the rounding error of each operation propagated to first order.
 
 use super::probe::Probe;
 use super::{LARGEST_ROUNDED, ROUNDERS, fixed, is_rounder, ulp};
@@ -26,9 +26,9 @@ pub struct Worst {
     pub error: f64,
     /// The period, from 1; 0 is what runs once.
     pub period: u64,
-    /// What the output was.
+    /// The output.
     pub value: f64,
-    /// What it is in binary64.
+    /// The same in binary64.
     pub exact: f64,
 }
 
@@ -45,16 +45,16 @@ pub struct OutputAccuracy {
     pub ulp: Option<Worst>,
     /// The largest as a part of the exact value, which is not zero then.
     pub relative: Option<Worst>,
-    /// Where the largest absolute error comes from: the shares add up to it. The largest first.
+    /// The shares of the operations in the largest absolute error, to which they add up. The largest first.
     pub parts: Vec<ErrorShare>,
     /// Periods at whose end it was compared.
     pub periods: u64,
 }
 
-/// What an operation does to accuracy.
+/// The effect of an operation on accuracy.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OperationAccuracy {
-    /// How often it was executed.
+    /// Executions.
     pub count: u64,
     /// Its own rounding at most, in ulps of its exact result.
     pub rounding: f64,
@@ -63,34 +63,34 @@ pub struct OperationAccuracy {
     pub cancelled: f64,
     /// The period of that.
     pub cancelled_in: u64,
-    /// How often a term of its sum that is not zero was too small to change the result.
+    /// Executions in which a term of its sum that is not zero was too small to change the result.
     pub absorbed: u64,
 }
 
 /// A decision of the run that binary64 would have made otherwise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Decision {
-    /// How often.
+    /// Occurrences.
     pub count: u64,
     /// First in this period.
     pub period: u64,
 }
 
-/// Where the comparison with binary64 had to begin anew.
+/// A loss of the comparison with binary64, which began anew there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lost {
-    /// How often.
+    /// Occurrences.
     pub count: u64,
     /// First in this period.
     pub period: u64,
-    /// Whether a value was infinite or a NaN; else a value with an error was taken as bits.
+    /// True if a value was infinite or a NaN; else a value with an error was taken as bits.
     pub infinite: bool,
 }
 
 /// A register or data word.
 #[derive(Clone)]
 struct Cell {
-    /// What the run has there. If it is something else now (an input, a value set by hand), the cell tells nothing of it.
+    /// The bits of the run. If they are others now (an input, a value set by hand), the cell is out of date.
     bits: u32,
     real: f64,
     /// By word, ascending.
@@ -113,11 +113,11 @@ pub struct Shadow {
     lost: BTreeMap<u32, Lost>,
     outputs: Vec<OutputAccuracy>,
     period: u64,
-    /// Whether each period begins with exact values.
+    /// True if each period begins with exact values.
     afresh: bool,
 }
 
-/// What an operation gives.
+/// The result of an operation.
 struct Outcome {
     bits: u32,
     /// The value in binary64 and where the difference comes from; `None` if there is none.
@@ -186,7 +186,7 @@ impl Shadow {
     /// when the front end has refilled, as in [`Emulator::run_period`]. The outputs are compared at the end.
     ///
     /// # Returns
-    /// Whether the machine goes on: false once it has halted.
+    /// False once the machine has halted.
     ///
     /// # Errors
     /// The program's fault.
@@ -262,7 +262,7 @@ impl Shadow {
                 None
             }
             Effect::Immediate => Some(Outcome::exact(instruction.constant)),
-            // What these write is an integer: whoever reads it finds the bits.
+            // These write an integer, which is exact as it is.
             _ => None,
         }
     }

@@ -1,4 +1,5 @@
-//! What a register may hold, over every run: the domain in which the rows' meaning gives enclosures.
+//! Abstract domain of the enclosures: the values that a register may hold, over every run. Abstract interpretation applies the
+//! meaning of the instructions' rows to it.
 
 use super::affine::Affine;
 use super::bits;
@@ -16,19 +17,19 @@ pub(super) const INTEGERS: Interval = Interval { low: -2_147_483_648.0, high: 2_
 /// A number: what the run has, what exact arithmetic would have, and their difference.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Number {
-    /// What the run may have.
+    /// The values of the run.
     pub(super) actual: Interval,
-    /// What exact arithmetic may have.
+    /// The values of exact arithmetic.
     pub(super) exact: Interval,
-    /// The same, with what it has in common with others.
+    /// The same as an affine form, which keeps what it has in common with others.
     pub(super) form: Affine,
-    /// What the run has, less what exact arithmetic has.
+    /// The value of the run less that of exact arithmetic.
     pub(super) error: Affine,
-    /// What the run has is a multiple of 2 to this power.
+    /// The value of the run is a multiple of 2 to this power.
     pub(super) grid: Option<i32>,
 }
 
-/// What a register may hold.
+/// Abstract value: a set of values that a register may hold.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Value {
     /// One of these bit patterns.
@@ -37,7 +38,7 @@ pub(super) enum Value {
     Float(Rc<Number>),
     /// A signed integer. It has no error.
     Integer(Rc<Number>),
-    /// The same, where it is known which float it was made from.
+    /// The same, made from a float that is known.
     Offset(Rc<Offset>),
     /// An operand whose bits an operation takes as an integer.
     Whole(Rc<Value>),
@@ -45,7 +46,7 @@ pub(super) enum Value {
     Any,
     /// Any 32 bits, which depend on a hazard that is listed. As an operand of binary32 it is not listed again.
     Broken,
-    /// Nothing that this period has written, and no range says what.
+    /// A value from before this period, of which no range is given.
     Unknown,
 }
 
@@ -86,7 +87,7 @@ impl Number {
         }
     }
 
-    /// Where the value lies in the run or exactly: what a derivative between the two is taken over.
+    /// Hull of the values of the run and of exact arithmetic: a derivative between the two is taken over it.
     fn both(&self) -> Interval {
         self.actual.hull(self.exact)
     }
@@ -118,7 +119,7 @@ impl Value {
     /// The value of one register on two ways that meet.
     pub(super) fn join(&self, other: &Value) -> Value {
         match (self, other) {
-            // What merely looks alike gets a place of its own: see the product.
+            // Equality of pointers, not of contents: two equal affine forms may still be of different variables (see the product).
             (Value::Float(a), Value::Float(b)) if Rc::ptr_eq(a, b) => self.clone(),
             (Value::Offset(a), Value::Offset(b)) if Rc::ptr_eq(a, b) => self.clone(),
             (Value::Unknown, _) | (_, Value::Unknown) => Value::Unknown,
@@ -183,7 +184,7 @@ impl Value {
         }
     }
 
-    /// What it may be where it is compared, infinities included.
+    /// The values that a comparison may see, infinities included.
     fn extent(&self) -> Result<Interval, Problem> {
         let Value::Patterns(patterns) = self else { return Ok(self.float()?.actual) };
         let values = patterns.iter().map(|bits| f64::from(f32::from_bits(*bits)));
@@ -193,7 +194,7 @@ impl Value {
             .unwrap_or(Err(Problem::NotFinite))
     }
 
-    /// Whether the bits may be all zero, and whether one may be set.
+    /// Two flags: the bits may be all zero; one of them may be set.
     pub(super) fn tested(&self) -> (bool, bool) {
         match self {
             Value::Patterns(patterns) => (patterns.contains(&0), patterns.iter().any(|bits| *bits != 0)),
@@ -208,7 +209,7 @@ impl Value {
     }
 }
 
-/// What holds all of some finite numbers; `None` if one is none.
+/// Hull of finite numbers; `None` if one is not finite.
 fn hull(values: &mut dyn Iterator<Item = f64>) -> Option<Number> {
     let mut number: Option<Number> = None;
     for value in values {
@@ -229,7 +230,7 @@ fn hull(values: &mut dyn Iterator<Item = f64>) -> Option<Number> {
     number
 }
 
-/// Why an operation has no enclosure.
+/// The reason that an operation has no enclosure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Problem {
     /// The divisor may be zero.
@@ -419,7 +420,7 @@ impl Mul for Operand {
                 false => (a.actual * b.actual, a.exact * b.exact),
             };
             let crossed = a.form.mul(&b.error).add(&b.form.mul(&a.error));
-            // Where the form is wider than the number, the interval says more.
+            // If the affine form is wider than the interval, the interval says more.
             let plain = b.error.scale(a.exact).add(&a.error.scale(b.exact));
             let crossed = if plain.radius() < crossed.radius() { plain } else { crossed };
             Ok(Number {
@@ -466,7 +467,7 @@ impl Real for Operand {
                 return Err(Problem::Domain);
             }
             let actual = x.actual.sqrt();
-            // Where the exact operand is below zero, the run's result counts as exact.
+            // If the exact operand may be below zero, the run's result counts as exact.
             let exact = if x.exact.low < 0.0 { x.exact.sqrt().hull(actual) } else { x.exact.sqrt() };
             // |√A - √a| ≤ √|A - a|.
             let most = Interval::point(x.error.range().magnitude()).sqrt().high;

@@ -85,7 +85,7 @@ pub(super) struct Flat {
     pub(super) registers: BTreeMap<Register, Storage>,
     /// The words of the data memory.
     pub(super) memory: Range<Storage>,
-    /// What was sent last of a port by another, and whether it is certain which of the port's values that was.
+    /// The value of a port that was sent last with a write of another port, and whether it is certain which of the port's values it was.
     pub(super) sent: BTreeMap<(Register, Register), (Storage, bool)>,
     /// Which of several periods runs.
     pub(super) which: Option<Storage>,
@@ -352,8 +352,8 @@ impl Step {
     }
 }
 
-/// Whether a write to `by` always sends the value that the last bundle before it, or its own, wrote to `port`: results are written in
-/// another order than they issue in if their latencies differ by more than their bundles are apart.
+/// True if a write to `by` always sends the value that the last bundle before it, or its own, wrote to `port`: writebacks are out
+/// of order if latencies differ by more than the distance of the bundles.
 fn ordered(
     graph: &Graph<'_>,
     found: &BTreeMap<BundleAddress, Vec<Bundle<'_>>>,
@@ -370,7 +370,7 @@ fn ordered(
     found.values().all(|bundles| {
         (0..bundles.len()).all(|at| {
             let Some(own) = latency(&bundles[at], by) else { return true };
-            // What a `wait`'s own bundle writes comes in the next period.
+            // A value that a `wait`'s own bundle writes arrives in the next period.
             if bundles[at].waits.is_some() {
                 return false;
             }
