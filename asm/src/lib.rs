@@ -50,7 +50,6 @@ use takt_syntax as syntax;
 use takt_syntax::report;
 
 pub use banks::{Adjustment, Transfer};
-pub use context::type_name;
 pub use contract::Contraction;
 pub use emit::spill::{Spilled, Spills};
 pub use expand::load::{FileLoader, LoadError, Loader, MemoryLoader, Open, Search};

@@ -16,7 +16,6 @@
 
 use crate::encode::Instruction;
 use crate::number::{BundleAddress, Register, SlotIndex};
-use crate::spec::instructions::Function;
 use crate::spec::machines::Machine;
 use crate::spec::units::{MAX_LATENCY, Unit};
 use std::ops::Range;
@@ -32,6 +31,38 @@ pub const LATCHED_INPUT_DELAY: Cycle = 2;
 pub const TICK_DELAY: Cycle = 1;
 /// Cycles between the issue of a `wait` and the cycle in which the pins tell of it.
 pub const ENDED_DELAY: Cycle = 2;
+
+/// Cycles, from the fewest to the most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Span {
+    /// No run takes fewer.
+    pub best: Cycle,
+    /// No run takes more.
+    pub worst: Cycle,
+}
+
+impl Span {
+    /// No cycle.
+    pub const ZERO: Span = Span { best: 0, worst: 0 };
+
+    /// The cycles of two pieces of a run, one after the other.
+    #[must_use]
+    pub fn and(self, other: Span) -> Span {
+        Span { best: self.best.saturating_add(other.best), worst: self.worst.saturating_add(other.worst) }
+    }
+
+    /// The cycles of two alternatives.
+    #[must_use]
+    pub fn or(self, other: Span) -> Span {
+        Span { best: self.best.min(other.best), worst: self.worst.max(other.worst) }
+    }
+
+    /// The same after so many more cycles.
+    #[must_use]
+    pub fn after(self, cycles: Cycle) -> Span {
+        self.and(Span { best: cycles, worst: cycles })
+    }
+}
 
 /// Why a cycle issued nothing.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
@@ -134,7 +165,7 @@ impl Reservation {
     /// The table of an operation on a slot of a machine; `writes` if it writes a register.
     pub fn new(machine: &Machine, slot: SlotIndex, function: Function, writes: bool) -> Reservation {
         let row = machine.slot(slot);
-        let Some(unit) = row.unit_for(function).filter(|_| function != Function::Idle) else {
+        let Some(unit) = row.unit_for(function) else {
             return Reservation { slot, unit: None, interval: 1, writeback: None };
         };
         let before: usize = machine.slots[..slot.index()].iter().map(|slot| slot.units.len()).sum();
@@ -179,7 +210,7 @@ impl Bundle {
         let mut bundle = Bundle::default();
         for ((s, slot), instruction) in machine.numbered_slots().zip(instructions) {
             let row = instruction.op.row();
-            let Some(u) = slot.unit_for(row.function).filter(|_| row.function != Function::Idle) else {
+            let Some(u) = slot.unit_for(row.function) else {
                 continue;
             };
             let dest = instruction.writes(slot);

@@ -1,5 +1,5 @@
 //! Bank assignment: chooses the home bank of each register that operations of several slots write.
-//! 
+//!
 //! A slot writes its own bank only. A value that is live after its straight run, or that an output port shows, must reach the home
 //! bank of its register. If another slot computes it, it is transferred in the cheapest of three ways: a constant that is live
 //! from the start is loaded with the program, a later constant is rematerialised (Briggs, Cooper, Torczon, PLDI 1992) by an operation
@@ -325,8 +325,7 @@ pub(crate) fn able(ir: &Ir, id: RegisterId, op: Op) -> Slots {
 
 /// The instructions that a slot executes, with their latencies.
 fn rows(machine: &Machine, slot: SlotIndex) -> impl Iterator<Item = (u32, &'static Row)> + '_ {
-    let host = machine.slot(slot);
-    ROWS.iter().filter_map(move |row| Some((host.units[host.unit_for(row.function)?].latency, row)))
+    ROWS.iter().filter_map(move |row| Some((machine.unit(slot, row.function)?.latency, row)))
 }
 
 /// The bits that an operation writes, if they are known and it raises no flag.

@@ -1,11 +1,11 @@
 //! Slot assignment: a slot for each operation that several slots may execute, by constraint propagation.
-//! 
+//!
 //! Variables are operations, or all operations that write one register, which share a slot so that the register lies in one bank
 //! (a value from another slot is copied: [`banks`](crate::banks)); domains are sets of slots. The operations of a bundle take
 //! different slots: this all-different constraint is propagated by bipartite matching (Régin, AAAI 1994) to a fixed point. Then the
 //! first open variable, in source order, takes its first slot, and so on. A bundle without a solution splits its operations from
 //! the shared variables; `resolve` has checked that it then has one.
-//! 
+//!
 //! The scheduler chooses slots again for what it packs, as long as a register stays in one bank.
 
 use crate::banks;

@@ -1,6 +1,6 @@
 //! Webs: register renaming within straight runs of bundles, so that each definition of a name and its uses have a virtual register
 //! of their own (Muchnick, Advanced Compiler Design and Implementation, 1997, §16.3).
-//! 
+//!
 //! In `fmul t, a, b` and then `fadd t, t, c` the name `t` stands for two values, which on a machine with several banks may even
 //! lie in different ones. Each value but the run's last, which may be live after it, is renamed where that matters: where the
 //! scheduler may move the operations (renaming removes anti- and output dependences), and for names that operations of different

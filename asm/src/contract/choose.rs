@@ -72,8 +72,9 @@ fn nodes(ir: &Ir, run: runs::Run, wishes: &Wishes) -> Vec<Node> {
 }
 
 fn latency(ir: &Ir, op: Op) -> u32 {
-    let host = ir.machine.host(op.row().function);
-    host.map_or(0, |(slot, unit)| ir.machine.slot(slot).units[unit].latency)
+    let function = op.row().function;
+    let slot = ir.machine.hosts(function).first();
+    slot.and_then(|slot| ir.machine.unit(slot, function)).map_or(0, |unit| unit.latency)
 }
 
 /// The operations that a fused one waits for: those of the product's factors and of what is added.

@@ -1,10 +1,10 @@
 //! Register allocation: an address for each virtual register.
-//! 
+//!
 //! A virtual register lies in the bank of the slot whose operations write it; one that nothing writes, such as a constant, lies
 //! in the bank with the most free registers. Within a bank addresses follow the order of declaration, around those that the
 //! source gives. Inputs lie in the input bank. An output has a number, which the source gives or which is the first that is free,
 //! and lies at that place of the output window of the bank of the slot that writes it.
-//! 
+//!
 //! A virtual register that only one straight run of bundles uses, and writes before it reads, has a live range from its first write
 //! to its last use. Live ranges are allocated by linear scan (Poletto, Sarkar, TOPLAS 1999), which reuses a register only after all
 //! others of the bank. Too many live values at a time are spilled ([`spill`](super::spill)).

@@ -1,5 +1,5 @@
 //! Common-subexpression elimination in equations, by local value numbering (Cooper, Torczon, Engineering a Compiler, §8.4.1).
-//! 
+//!
 //! Two subexpressions are equal if they are the same instruction of the same sources, and no source was written between them.
 //! Knowledge ends at the end of a basic block (labels, branches, heads of loops, the section's end), and at operations that read
 //! or clear the flags. An input port that is not latched may change between two lines: a subexpression that reads one is shared

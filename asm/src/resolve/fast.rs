@@ -1,6 +1,6 @@
 //! Tree-height reduction of sums and products, and division by constants as multiplication, where `.fast` allows it. A part of
 //! [`expression`](crate::resolve::expression).
-//! 
+//!
 //! A sum of several terms is kept as the list of its terms, and a product as that of its factors, until the value is needed. Then
 //! neighbours are paired until one is left, so that n terms make a dependence chain of ⌈log₂ n⌉ operations.
 

@@ -134,7 +134,7 @@ struct ExactSearch<'g, 'p> {
     /// The work at which it stops.
     allowed: u64,
     random: Random,
-    /// How often each task has been left no cycle.
+    /// The number of conflicts in which each task was left no cycle.
     weights: Vec<i64>,
     /// The preferred choice of each task.
     lightest: Vec<u8>,
@@ -290,7 +290,8 @@ mod tests {
     fn exists(problem: &Problem, length: u32, plan: &mut Vec<(u32, u8)>) -> bool {
         let placed = plan.len();
         let Some(task) = problem.tasks.get(placed) else { return true };
-        let tries = (0..length).flat_map(|cycle| (0..task.choices() as u8).map(move |choice| (cycle, choice)));
+        let tries =
+            (0..length).flat_map(|cycle| (0..task.choices() as u8).map(move |choice| (cycle, choice)));
         tries.into_iter().any(|(cycle, choice)| {
             let mut table = Reservations::new(problem);
             for (task, &(cycle, choice)) in problem.tasks.iter().zip(&*plan) {

@@ -1,6 +1,6 @@
 //! Scheduler: packs operations into bundles and orders them, from the machine's tables and [`takt_isa::timing`]'s reservation
 //! tables alone.
-//! 
+//!
 //! It works on one basic block at a time: a straight run of bundles that control enters only at its first and leaves only after
 //! its last. Dependences are edges between two tasks (see [`Block`]); everything else may move. List scheduling in forward and
 //! backward passes ([`solve`]) is followed by an exact search ([`exact`]). `docs/scheduling.md` explains it to programmers.

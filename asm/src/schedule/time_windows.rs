@@ -173,11 +173,13 @@ impl<'g, 'p> Propagation<'g, 'p> {
 /// of slots, and of write ports, with the operations that use one of the set in every choice.
 fn constraints(problem: &Problem) -> Vec<Constraint> {
     let sets = problem.tasks.iter().flat_map(|task| (0..task.operations).map(|index| task.slots(index)));
-    let sets = sets.filter(|slots| slots.len() > 1).map(|slots| slots.iter().map(|slot| slot.index()).collect());
+    let sets =
+        sets.filter(|slots| slots.len() > 1).map(|slots| slots.iter().map(|slot| slot.index()).collect());
     let single = (0..problem.slots).map(|slot| BTreeSet::from([slot]));
     let sets: Vec<BTreeSet<usize>> = single.chain(unions(sets)).collect();
     let slots = sets.iter().map(|set| Constraint::new(members(problem, set, |_| Some(0)), set.len()));
-    let ports = sets.iter().map(|set| Constraint::new(members(problem, set, |usage| usage.writeback), set.len()));
+    let ports =
+        sets.iter().map(|set| Constraint::new(members(problem, set, |usage| usage.writeback), set.len()));
     let ports = ports.filter(|constraint| !constraint.is_uniform());
     slots.chain(ports).filter(|constraint| constraint.members.len() > 1).collect()
 }

@@ -22,7 +22,7 @@ mod text;
 mod trace;
 pub mod what_if;
 
-pub use bound::{Bounds, SectionBounds, Span, bound};
+pub use bound::{Bounds, SectionBounds, bound, section_cycles};
 pub use error::{BoundError, Refusal};
 pub use static_issue::{StaticIssue, static_issue};
 pub use trace::{Issued, Link, LinkKind, MAX_ISSUES, Stalls, Trace, TraceError, WhatIf, trace};

@@ -1,5 +1,5 @@
 //! Spill code in one scheduled block, whose bundles stay in their order.
-//! 
+//!
 //! From the first bundle to the last: where a bank has too many live values, the one whose next use is farthest is spilled (Belady,
 //! 1966). It is stored once, after its computation, and reloaded as late as its next use allows, in free slots if there are any.
 //! A reloaded value has a live range of its own, and may be spilled again.

@@ -1,5 +1,5 @@
 //! Reduction of register pressure: other schedules, and spilling to data memory.
-//! 
+//!
 //! If a block of equations has more live values than a bank has registers, schedules nearer to the source's order are tried, which
 //! have lower pressure ([`Order`]), and spilling: values whose next use is farthest are stored in words that nothing else
 //! touches, and reloaded before that use ([`block`]). The shorter program is taken. Registers written by hand-written operations
