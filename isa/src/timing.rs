@@ -16,6 +16,7 @@
 
 use crate::encode::Instruction;
 use crate::number::{BundleAddress, Register, SlotIndex};
+use crate::spec::instructions::Function;
 use crate::spec::machines::Machine;
 use crate::spec::units::{MAX_LATENCY, Unit};
 use std::ops::Range;

@@ -9,10 +9,10 @@ pub(crate) mod copies;
 pub(crate) mod slots;
 pub(crate) mod webs;
 
+use crate::context::bits_text;
 use crate::ir::flow::{self, Flow};
 use crate::ir::runs::{self, Run};
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, VirtualRegister};
-use crate::output::listing;
 use crate::report::source::Span;
 use foldhash::HashSet;
 use takt_isa::fp::Host;
@@ -55,7 +55,7 @@ pub enum Transfer {
 impl std::fmt::Display for Transfer {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Transfer::Preset(bits) => write!(f, "loaded with the program, {}", listing::shown(*bits)),
+            Transfer::Preset(bits) => write!(f, "loaded with the program, {}", bits_text(*bits)),
             Transfer::Rematerialised(mnemonic) => write!(f, "becomes `{mnemonic}`"),
             Transfer::Copy { address, alone, cycles } => {
                 match alone {

@@ -157,3 +157,11 @@ pub(crate) const fn words(ty: Type) -> &'static str {
 pub(crate) fn space_of(section: Section) -> Space {
     if section == Section::Data { Space::Data } else { Space::Code }
 }
+
+/// Bits as a number: as an integer if that is small, else as binary32.
+pub(crate) fn bits_text(bits: u32) -> String {
+    match bits as i32 {
+        small @ -0xffff..=0xffff => small.to_string(),
+        _ => format!("{:?}", f32::from_bits(bits)),
+    }
+}

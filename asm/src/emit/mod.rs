@@ -4,9 +4,9 @@ pub(crate) mod allocate;
 pub(crate) mod spill;
 
 use crate::emit::allocate::Allocation;
+use crate::ir::position::Position;
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, numbered};
 use crate::limits::NAME_BYTES;
-use crate::output::names::Position;
 use crate::report::diag::{Diagnostic, Sink};
 use crate::report::source::Span;
 use foldhash::{HashSet, HashSetExt as _};

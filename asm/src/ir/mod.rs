@@ -16,6 +16,7 @@
 pub(crate) mod flow;
 pub(crate) mod given;
 pub(crate) mod matching;
+pub(crate) mod position;
 pub(crate) mod runs;
 
 use crate::report::source::Span;

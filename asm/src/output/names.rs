@@ -8,11 +8,11 @@
 use crate::context::{Context, ScopeId};
 use crate::emit::Emitted;
 use crate::emit::allocate::Allocation;
+pub use crate::ir::position::Position;
 use crate::ir::{Ir, RegisterId};
 use crate::report::source::{Lines, Sources, Span};
 use crate::syntax::expr::Value;
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::num::NonZeroU32;
 use takt_isa::program::Columns;
 use takt_isa::{BundleAddress, Register, Type};
 
@@ -44,33 +44,6 @@ impl Names {
         let end = (address.index() + 1).saturating_mul(slots).min(self.positions.len());
         let bundles = self.positions[..end].rchunks(slots.max(1));
         bundles.flat_map(|words| words.iter().flatten()).next().copied().unwrap_or_default()
-    }
-}
-
-/// The position of a line in the source, macros and repetitions written out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Position {
-    /// Its place in the order of the source, macros and repetitions written out.
-    pub order: u32,
-    /// The number of the scope and 1: so a word without a position takes no more room than one with.
-    scope: NonZeroU32,
-}
-
-impl Position {
-    /// The position of a place in the order of the source, in a use of a macro: an index into [`Names::scopes`], below 2³² - 1.
-    pub const fn new(order: u32, scope: u32) -> Position {
-        Position { order, scope: NonZeroU32::MIN.saturating_add(scope) }
-    }
-
-    /// The use of a macro that it is of: an index into [`Names::scopes`].
-    pub const fn scope(self) -> u32 {
-        self.scope.get() - 1
-    }
-}
-
-impl Default for Position {
-    fn default() -> Position {
-        Position::new(0, 0)
     }
 }
 

@@ -3,69 +3,21 @@
 //! is the part of the line that it computes. This file assigns the values to their targets and checks their types.
 
 use crate::context::{At, Reported, Wanted, words};
+use crate::expand::Item;
 use crate::expand::equation::Results;
-use crate::expand::{Fast, Item};
 use crate::ir::given::Kind;
-use crate::ir::{Attribution, Bundle, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
+use crate::ir::{Bundle, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::resolve::Resolver;
-use crate::resolve::common_subexpressions::Key;
-use crate::resolve::fast::Chain;
 use crate::resolve::forms::Meaning;
+use crate::resolve::term::{CurrentEquation, Term, TermForm};
 use crate::syntax::ast::*;
 use crate::syntax::expr::Value;
 use smallvec::SmallVec;
 use std::rc::Rc;
 use takt_isa::{Effect, Op, Slots, Type};
-
-/// The form of an operand in an equation.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum TermForm {
-    /// A constant, and its expression.
-    Constant(Value, ExprId),
-    /// A register and what is known of its type.
-    Register(RegisterId, Kind),
-    /// A sum or a product that is still to be computed: which of the line's, and its type.
-    Chain(usize, Kind),
-}
-
-/// An operand in an equation, and its place.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Term {
-    pub(super) form: TermForm,
-    pub(super) span: Span,
-}
-
-impl Term {
-    pub(super) fn value(&self) -> Option<Value> {
-        match self.form {
-            TermForm::Constant(value, _) => Some(value),
-            TermForm::Register(..) | TermForm::Chain(..) => None,
-        }
-    }
-
-    pub(super) fn kind(&self) -> Option<Kind> {
-        match self.form {
-            TermForm::Register(_, kind) | TermForm::Chain(_, kind) => Some(kind),
-            TermForm::Constant(..) => None,
-        }
-    }
-}
-
-/// The equation being compiled.
-pub(super) struct CurrentEquation {
-    location: Attribution,
-    scheduled: bool,
-    /// The subexpressions computed so far: register, bundle, and key.
-    pub(super) computed: Vec<(RegisterId, usize, Key)>,
-    pub(super) results: Results,
-    /// The transformations that `.fast` allows.
-    pub(super) fast: Fast,
-    /// Sums and products that are not computed yet.
-    pub(super) chains: Vec<Chain>,
-}
 
 impl Resolver<'_> {
     pub(super) fn equation(&mut self, item: &Item, ast: &Rc<Ast>, equation: u32) -> Result<(), Reported> {

@@ -10,8 +10,8 @@ use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::resolve::Resolver;
-use crate::resolve::equation::{CurrentEquation, Term, TermForm};
 use crate::resolve::forms::Meaning;
+use crate::resolve::term::{CurrentEquation, Here, Term, TermForm};
 use crate::syntax::ast::*;
 use crate::syntax::expr::{self, EvalError, Value};
 use crate::syntax::name::{NameId, NameRef};
@@ -19,9 +19,6 @@ use smallvec::SmallVec;
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 use takt_isa::Type;
-
-/// The part of the line at hand, and its expression.
-pub(super) type Here = (Span, ExprId);
 
 /// Structure of an expression, found before it is computed.
 struct Plan {

@@ -7,18 +7,9 @@
 use crate::context::{At, Reported};
 use crate::ir::given::Kind;
 use crate::resolve::Resolver;
-use crate::resolve::equation::{CurrentEquation, Term, TermForm};
-use crate::resolve::expression::Here;
+use crate::resolve::term::{Chain, CurrentEquation, Here, Term, TermForm};
 use crate::syntax::ast::{ExprId, Operator};
 use crate::syntax::expr::{self, Value};
-
-/// A sum or a product that is not computed yet.
-#[derive(Clone, Debug)]
-pub(super) struct Chain {
-    is_product: bool,
-    /// Its terms, and whether each is subtracted; or its factors.
-    terms: Vec<(Term, bool)>,
-}
 
 impl Resolver<'_> {
     /// The operand that a symbol computes where `.fast` allows a transformation; `None` if none applies.

@@ -7,7 +7,7 @@ use crate::report::nearest;
 use crate::report::source::Span;
 use crate::resolve::Resolver;
 use crate::resolve::advice::from_library;
-use crate::resolve::equation::Term;
+use crate::resolve::term::Term;
 use crate::syntax::ast::Operator;
 use takt_isa::Type;
 

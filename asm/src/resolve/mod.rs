@@ -11,6 +11,7 @@ mod mismatch;
 mod operand;
 pub(crate) mod serialise;
 mod slots;
+mod term;
 
 use crate::context::{Array, At, Binding, Context, Reported, ScopeId};
 use crate::expand::load::Loader;

@@ -3,9 +3,8 @@
 use crate::ast::Directive;
 use crate::foreign;
 use crate::grammar::Expected;
-use crate::lex::Token;
+use crate::lex::{Token, is_equation};
 use crate::name::NameId;
-use crate::parse::is_equation;
 use crate::report::diag::Diagnostic;
 use crate::report::nearest;
 use crate::report::source::Span;

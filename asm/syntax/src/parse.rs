@@ -9,7 +9,7 @@ use crate::explain::describe;
 use crate::grammar::{self, Body, Builder, ParsedLine};
 use crate::grouping;
 use crate::intern::Interner;
-use crate::lex::{Chunk, Lexer, LineTokens, Token};
+use crate::lex::{Chunk, Lexer, LineTokens, Token, is_equation};
 use crate::limits;
 use crate::name::NameRef;
 use crate::report::diag::{Diagnostic, Severity, Sink};
@@ -126,19 +126,6 @@ fn parse_chunk(chunk: &Chunk, source: &Source, ast: &mut Ast, sink: &mut Sink, s
     // The parsers may hold on to the builder's lifetime until they are dropped.
     drop((bundle, equation));
     *ast = builder.ast;
-}
-
-/// True if a line is meant as an equation: of other lines only directives have a `=`.
-pub(crate) fn is_equation(tokens: &[(Token, Span)]) -> bool {
-    let mut assigns = false;
-    for (token, _) in tokens {
-        match token {
-            Token::Directive(_) | Token::NotDirective => return false,
-            Token::Assign => assigns = true,
-            _ => {}
-        }
-    }
-    assigns
 }
 
 /// Adds a parsed line to the tree.

@@ -1,11 +1,11 @@
 //! Text to tokens. One regular expression for each kind of token, none for mnemonics: those are names like any other.
 
+mod range;
 #[allow(clippy::all, unused, reason = "generated")]
 mod raw;
 
 use crate::ast::Directive;
 use crate::ast::Operator;
-use crate::foreign;
 use crate::intern::Interner;
 use crate::limits;
 use crate::name::NameId;
@@ -231,6 +231,19 @@ impl LineState {
     }
 }
 
+/// True if a line is meant as an equation: of other lines only directives have a `=`.
+pub(crate) fn is_equation(tokens: &[(Token, Span)]) -> bool {
+    let mut assigns = false;
+    for (token, _) in tokens {
+        match token {
+            Token::Directive(_) | Token::NotDirective => return false,
+            Token::Assign => assigns = true,
+            _ => {}
+        }
+    }
+    assigns
+}
+
 /// The error of a token.
 enum TokenError {
     Unknown,
@@ -280,7 +293,7 @@ fn range_before(before: &[(Token, Span)], names: &Interner, text: &str, span: Sp
         _ => None,
     };
     let last = before.len().saturating_sub(3);
-    foreign::range(&before[last..].iter().map(name).collect::<Vec<_>>(), text, span)
+    range::describe(&before[last..].iter().map(name).collect::<Vec<_>>(), text, span)
 }
 
 fn token(raw: Raw, text: &str, nesting: &mut usize, names: &mut Interner) -> Result<Token, TokenError> {

@@ -8,6 +8,8 @@ mod bits;
 mod enclose;
 mod enclosure;
 mod interval;
+mod number;
+mod operand;
 mod probe;
 mod shadow;
 mod value;
@@ -18,8 +20,8 @@ use takt_isa::{Instruction, Program, Register};
 pub use enclose::{MAX_BUNDLES, enclose};
 pub use enclosure::{Assumed, Enclosure, Hazard, Moment, OutputBound};
 pub use interval::Interval;
+pub use number::Problem;
 pub use shadow::{Decision, ErrorShare, Lost, OperationAccuracy, OutputAccuracy, Shadow, Worst};
-pub use value::Problem;
 
 /// Numbers that are added to round to integers: binary32 has no fraction there.
 const ROUNDERS: [f64; 2] = [8_388_608.0, 12_582_912.0];
