@@ -1,4 +1,4 @@
-//! What the programs of this repository take, as their documents say: no change of the assembler makes them longer unseen.
+//! Cycles of this repository's programs, as their documents say: no change of the assembler makes them longer unseen.
 
 mod common;
 

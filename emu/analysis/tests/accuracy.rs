@@ -1,4 +1,4 @@
-//! What is measured, against formulas in binary64; what is proved, against what is measured.
+//! Measured errors against formulas in binary64, and proved enclosures against measured errors.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -142,7 +142,7 @@ fn check(program: &Program, enclosure: &Enclosure, periods: usize, random: &mut 
         let (Some(error), Some(range)) = (bound.error, bound.range) else { continue };
         let measured = shadow.outputs().iter().find(|output| output.register == bound.register).unwrap();
         let Some(worst) = measured.absolute else { continue };
-        // What binary64 itself rounds.
+        // An allowance for the rounding of binary64 itself.
         let slack = 1e-12 * range.magnitude() + 1e-40;
         assert!(worst.error <= error + slack, "{}: {worst:?} beyond {error}", bound.name);
         for worst in [measured.absolute, measured.ulp].into_iter().flatten() {
@@ -345,7 +345,7 @@ fn the_first_period_must_begin_in_the_ranges_that_matter() {
     let enclosure = enclose(&source(text, &T3)).unwrap();
     let later: Vec<_> = enclosure.later().map(|state| state.found.unwrap().high).collect();
     assert_eq!((enclosure.first().count(), later), (0, vec![100.0]));
-    // What the first period writes before anything reads it may begin anywhere: the tracking program's last positions.
+    // A state that the first period writes before anything reads it may begin anywhere: the tracking program's last positions.
     let text = ".input x\n.range x = 0, 1\n.output y\n.state s\n.range s = 0, 1\n.once\n wait q\nq: mov s, x\n.period\np: mov y, s\n mov s, x\n wait p\n";
     assert!(enclose(&source(text, &T3)).unwrap().assumed.is_empty());
 }

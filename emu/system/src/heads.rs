@@ -2,7 +2,7 @@
 //! next entry's. docs/system.md says exactly what is told.
 
 use std::collections::BTreeSet;
-use takt_analysis::{StraightIssue, straight};
+use takt_analysis::{StaticIssue, static_issue};
 use takt_isa::program::Location;
 use takt_isa::system::{Description, End, LinkKind, MIN_LATENCY, Mailbox, Source};
 use takt_isa::timing::{Bundle, Cycle};
@@ -64,7 +64,7 @@ pub fn doubtful(description: &Description) -> Vec<HeadRead> {
             continue;
         }
         let mailboxes = description.mailboxes(number);
-        let issues = straight(&core.program);
+        let issues = static_issue(&core.program);
         for (link, known) in description.links.iter().enumerate() {
             let LinkKind::Fifo { pop: Some(pop), .. } = known.kind else { continue };
             if known.to == End::Core(number) {
@@ -101,7 +101,7 @@ impl Seek<'_> {
     }
 
     /// A straight line of bundles.
-    fn stretch(&self, issues: &[StraightIssue], found: &mut Vec<HeadRead>) {
+    fn stretch(&self, issues: &[StaticIssue], found: &mut Vec<HeadRead>) {
         let (mut reads, mut pops) = (Vec::new(), Vec::new());
         let machine = self.program.machine;
         for issue in issues {

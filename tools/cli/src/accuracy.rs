@@ -14,8 +14,8 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_analysis::accuracy::{
-    Assumed, Decision, Enclosure, Hazard, Interval, Lost, Moment, OperationAccuracy, OutputAccuracy,
-    OutputBound, Part, Shadow, Worst, enclose,
+    Assumed, Decision, Enclosure, ErrorShare, Hazard, Interval, Lost, Moment, OperationAccuracy,
+    OutputAccuracy, OutputBound, Shadow, Worst, enclose,
 };
 use takt_emu::Emulator;
 use takt_isa::Program;
@@ -138,7 +138,7 @@ fn line_text(program: &Program, location: Option<Location>) -> String {
 
 /// The lines that an error comes from, with the sum of their shares, and the part that each has of all that was added up; the
 /// largest first.
-fn by_line(program: &Program, parts: &[Part]) -> Vec<(Option<Location>, f64, f64)> {
+fn by_line(program: &Program, parts: &[ErrorShare]) -> Vec<(Option<Location>, f64, f64)> {
     let mut lines: BTreeMap<_, (Option<Location>, f64)> = BTreeMap::new();
     for part in parts {
         let location = location(program, part.word);
@@ -162,7 +162,7 @@ impl<'a> Measured<'a> {
         Measured { program, shadow }
     }
 
-    fn by_line(&self, parts: &[Part]) -> Vec<(Option<Location>, f64, f64)> {
+    fn by_line(&self, parts: &[ErrorShare]) -> Vec<(Option<Location>, f64, f64)> {
         by_line(self.program, parts)
     }
 
@@ -354,8 +354,8 @@ fn interval(interval: Option<Interval>) -> String {
 
 impl Bounded<'_> {
     fn parts(&self, output: &OutputBound) -> Vec<(Option<Location>, f64, f64)> {
-        let parts: Vec<Part> =
-            output.parts.iter().map(|(word, error)| Part { word: *word, error: *error }).collect();
+        let parts: Vec<ErrorShare> =
+            output.parts.iter().map(|(word, error)| ErrorShare { word: *word, error: *error }).collect();
         by_line(self.program, &parts)
     }
 

@@ -84,7 +84,7 @@ Examples:
   takt run prog.s --batch runs --outputs out.csv  a run for each CSV in the folder `runs`
   takt run system.toml --inputs in.csv --stats    several cores: a base tick for each row (docs/system.md)";
 
-pub(crate) use takt_analysis::follow::PERIOD_LIMIT;
+pub(crate) use takt_analysis::period::PERIOD_LIMIT;
 
 /// What the periods of a run came to.
 #[derive(Default)]

@@ -7,7 +7,7 @@ use common::{assemble, bad, bundles, good};
 use random_source::Random;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use takt_asm::{Assembled, Made, MemoryLoader, Options, Schedule, listing};
+use takt_asm::{Assembled, MemoryLoader, Options, Schedule, Transfer, listing};
 use takt_emu::{Emulator, Event};
 use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::Cycle;
@@ -132,7 +132,7 @@ fn run(program: &Program, seed: u64) -> Seen {
         };
         emulator.observed(&mut sink).run_period(&[]).unwrap_or_else(|error| panic!("{error}"));
     }
-    // What shares a bundle with the last `wait` is in flight when that issues: its flags are still to come.
+    // Operations in the bundle of the last `wait` are in flight when that issues: their flags are still to come.
     let landed = emulator.now() + Cycle::from(MAX_LATENCY);
     emulator.run_until(landed).unwrap_or_else(|error| panic!("{error}"));
     (writes, emulator.memory().to_vec(), emulator.flags().bits())
@@ -148,11 +148,11 @@ fn every_machine_gives_the_same_values() {
             let assembled = assembled(&text, &T3, schedule);
             assert_eq!(run(&assembled.program, seed), expected, "seed {seed}, {schedule:?}:\n{text}");
             for adjustment in &assembled.adjustments {
-                *match adjustment.made {
-                    Made::Preset(_) => &mut presets,
-                    Made::Operation(_) => &mut operations,
-                    Made::Copy { alone: false, .. } => &mut shared,
-                    Made::Copy { alone: true, .. } => &mut alone,
+                *match adjustment.transfer {
+                    Transfer::Preset(_) => &mut presets,
+                    Transfer::Rematerialised(_) => &mut operations,
+                    Transfer::Copy { alone: false, .. } => &mut shared,
+                    Transfer::Copy { alone: true, .. } => &mut alone,
                 } += 1;
             }
         }
@@ -185,7 +185,7 @@ fn the_simplest_integrator() {
         let (period, assembled) = period(&text);
         assert_eq!(period.len(), 3, "{period:?}");
         assert_eq!(assembled.program.constants.len(), 1, "{initial}");
-        assert!(matches!(assembled.adjustments[..], [ref one] if one.made == Made::Preset(0)));
+        assert!(matches!(assembled.adjustments[..], [ref one] if one.transfer == Transfer::Preset(0)));
     }
 }
 
@@ -206,11 +206,17 @@ fn an_initial_value_that_may_be_wanted_again_is_no_preset() {
     // Control comes back to the beginning.
     let text = ".input x, n:int\n.output y\n.state s\n.once\nagain: mov s, zero\n wait period\n.period\nperiod: fadd s, s, x\n mov y, s\n bnz n, again\n wait period\n";
     let (_, assembled) = period(text);
-    assert_eq!(assembled.adjustments.iter().map(|a| &a.made).collect::<Vec<_>>(), [&Made::Operation("fadd")]);
+    assert_eq!(
+        assembled.adjustments.iter().map(|a| &a.transfer).collect::<Vec<_>>(),
+        [&Transfer::Rematerialised("fadd")]
+    );
     // Something reads the register before.
     let text = ".input x\n.output y\n.state s\n.preset s = 2.0\n.once\n mov y, s\n mov s, zero\n wait period\n.period\nperiod: fadd s, s, x\n mov y, s\n wait period\n";
     let (_, assembled) = period(text);
-    assert_eq!(assembled.adjustments.iter().map(|a| &a.made).collect::<Vec<_>>(), [&Made::Operation("fadd")]);
+    assert_eq!(
+        assembled.adjustments.iter().map(|a| &a.transfer).collect::<Vec<_>>(),
+        [&Transfer::Rematerialised("fadd")]
+    );
     assert_eq!(assembled.program.constants.iter().filter(|(_, bits)| *bits == 2.0f32.to_bits()).count(), 1);
 }
 
@@ -222,7 +228,7 @@ fn accumulators_and_resets() {
     );
     assert_eq!(lines.len(), 9);
     assert!(
-        matches!(assembled.adjustments[..], [ref one] if matches!(one.made, Made::Copy { alone: false, cycles: Some(0), .. })),
+        matches!(assembled.adjustments[..], [ref one] if matches!(one.transfer, Transfer::Copy { alone: false, cycles: Some(0), .. })),
         "{:?}",
         assembled.adjustments
     );
@@ -244,7 +250,7 @@ fn accumulators_and_resets() {
     assert_eq!(lines[1], "mov s, s.1");
     let [one] = &assembled.adjustments[..] else { panic!("one copy") };
     assert_eq!(one.location.map(|at| at.line), Some(8));
-    assert!(matches!(one.made, Made::Copy { alone: true, cycles: Some(2), .. }), "{one:?}");
+    assert!(matches!(one.transfer, Transfer::Copy { alone: true, cycles: Some(2), .. }), "{one:?}");
     assert!(
         listing::listing(&assembled).contains("test.s:8+       mov s, s.1"),
         "{}",
