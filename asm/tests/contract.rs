@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::fmt::Write as _;
 use takt_asm::{Assembled, Contract, MemoryLoader, Options, Schedule, Search, listing};
 use takt_emu::{Emulator, Event};
-use takt_isa::{Function, Machine, T1, T3, T4};
+use takt_isa::{F1, F3, Function, Machine};
 
 fn assembled(text: &str, machine: &'static Machine, schedule: Schedule, contract: Contract) -> Assembled {
     let options = Options { machine, schedule, contract, effort: 1, ..Options::default() };
@@ -21,6 +21,11 @@ fn assembled(text: &str, machine: &'static Machine, schedule: Schedule, contract
 /// On a machine with one slot that fuses.
 fn on_one(text: &str) -> Assembled {
     assembled(text, rows::named("fused"), Schedule::AsWritten, Contract::AsWritten)
+}
+
+/// A machine with two slots that fuse, of four.
+fn two() -> &'static Machine {
+    rows::named("fused_twice")
 }
 
 const HEAD: &str = ".input a, b, c, d\n.output F, G\n.reg t u v\n.state s\n.preset s = 1.0\n";
@@ -150,9 +155,9 @@ fn where_it_is_on() {
     ] {
         let text = text(before, between);
         let wishes = [Contract::AsWritten, Contract::All, Contract::None];
-        assert_eq!(wishes.map(|wish| count(&text, &T4, wish)), expected, "{text}");
+        assert_eq!(wishes.map(|wish| count(&text, two(), wish)), expected, "{text}");
         // A machine without the operation.
-        assert_eq!([&T1, &T3].map(|machine| count(&text, machine, Contract::All)), [0, 0]);
+        assert_eq!([&F1, &F3].map(|machine| count(&text, machine, Contract::All)), [0, 0]);
     }
 }
 
@@ -182,7 +187,7 @@ fn what_is_said_of_it() {
     assert!(listing.contains("\n; 2 products fused into sums\n"), "{listing}");
     assert!(listing.contains("test.s:9+       fma F, a, b, c"), "{listing}");
 
-    let wrong = bad(&format!("{HEAD}.contract yes\n.period\np: wait p\n"), &T4).render(false);
+    let wrong = bad(&format!("{HEAD}.contract yes\n.period\np: wait p\n"), two()).render(false);
     assert!(wrong.contains("`.contract` is `on` or `off`, not `yes`"), "{wrong}");
 }
 
@@ -196,7 +201,7 @@ fn the_library_speaks_for_itself() {
     for (head, fused) in [("", 2), (".contract off\n", 1)] {
         let file = format!("{head}{body}");
         for contract in [Contract::AsWritten, Contract::All] {
-            let options = Options { machine: &T4, contract, ..Options::default() };
+            let options = Options { machine: two(), contract, ..Options::default() };
             let loader =
                 Search::new(MemoryLoader::of("test.s", text.as_str())).library(&[("f.s", file.as_str())]);
             let assembled = takt_asm::assemble("test.s", &loader, &options);
@@ -279,9 +284,9 @@ fn nothing_but_the_rounding_changes() {
     let (mut fused, mut compared) = (0, 0);
     for seed in 0..if cfg!(debug_assertions) { 400 } else { 4000 } {
         let text = source(seed);
-        let (plain, exact) = run(&assembled(&text, &T4, Schedule::None, Contract::None), seed);
+        let (plain, exact) = run(&assembled(&text, two(), Schedule::None, Contract::None), seed);
         let contracted = [Schedule::None, Schedule::All].map(|schedule| {
-            let assembled = assembled(&text, &T4, schedule, Contract::All);
+            let assembled = assembled(&text, two(), schedule, Contract::All);
             fused += assembled.contractions.len();
             run(&assembled, seed).0
         });
@@ -325,7 +330,7 @@ fn in_binary64(text: &str, inputs: &HashMap<String, f64>) -> HashMap<String, f64
 fn dynamics() {
     let text = include_str!("kernels/rnea6.s");
     let with = |contract| {
-        let options = Options { machine: &T4, contract, effort: 0, ..Options::default() };
+        let options = Options { machine: two(), contract, effort: 0, ..Options::default() };
         takt_asm::assemble("rnea6.s", &MemoryLoader::of("rnea6.s", text), &options)
             .unwrap_or_else(|errors| panic!("{}", errors.render(false)))
     };

@@ -189,11 +189,11 @@ fn every_defect_has_its_error() {
         error.expect_err("it is damaged")
     };
     assert_eq!(meta("\"version\":1", "\"version\":7"), ImageError::Version { found: 7 });
-    assert_eq!(meta("\"t3\"", "\"t9\""), ImageError::UnknownMachine("t9".into()));
+    assert_eq!(meta("\"f3\"", "\"t9\""), ImageError::UnknownMachine("t9".into()));
     assert!(matches!(meta("\"machine\"", "\"maschin\""), ImageError::Meta(_)));
     assert!(matches!(meta("\"inputs\":[", "\"inputs\":{"), ImageError::Meta(_)));
     assert!(matches!(meta("\"int\"", "\"jnt\""), ImageError::Meta(_)));
-    assert_eq!(meta("\"t3\"", "\"t1\""), ImageError::Sections { bundles: 9 });
+    assert_eq!(meta("\"f3\"", "\"f1\""), ImageError::Sections { bundles: 9 });
     assert!(matches!(meta("\"register\":769", "\"register\":3"), ImageError::Register { .. }));
     assert!(matches!(meta("\"register\":769", "\"register\":768"), ImageError::Register { .. }));
     assert!(matches!(meta("\"register\":769", "\"register\":-1"), ImageError::Meta(_)));

@@ -5,12 +5,12 @@ mod common;
 use common::{latency, program};
 use std::num::NonZeroU64;
 use takt_emu::{Emulator, Number, Stop};
-use takt_isa::{Function, Program, T3};
+use takt_isa::{F3, Function, Program};
 
 /// Reads its input early and late and writes both, once before the first period and in each.
 fn early_and_late() -> Program {
     let program = program(
-        &T3,
+        &F3,
         ".input x i0 int
          .output early x224 int
          .output late x225 int
@@ -79,8 +79,8 @@ fn outputs_are_published_at_the_wait() {
         let tick = emulator.now() + 20;
         emulator.tick_at(tick);
         // Both registers have been written; the `wait` has not issued.
-        emulator.run_until(tick + 4 + latency(&T3, Function::Alu)).unwrap();
-        assert_eq!(emulator.register(T3.register_address("x224").unwrap()), Some(2));
+        emulator.run_until(tick + 4 + latency(&F3, Function::Alu)).unwrap();
+        assert_eq!(emulator.register(F3.register_address("x224").unwrap()), Some(2));
         assert_eq!(outputs(emulator), [Some(1), Some(1)]);
         let before = emulator.now();
         emulator.run_to_wait().unwrap();
@@ -130,7 +130,7 @@ fn pieces_of_a_run_make_no_difference() {
 #[test]
 fn reset_gives_the_start_again() {
     let memory = program(
-        &T3,
+        &F3,
         ".input x i0
          .output y m224
          .preset a0 1.5
