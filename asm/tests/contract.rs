@@ -30,7 +30,7 @@ fn two() -> &'static Machine {
 
 const HEAD: &str = ".input a, b, c, d\n.output F, G\n.reg t u v\n.state s\n.preset s = 1.0\n";
 
-/// What becomes of a period, with contraction: the program that one would write by hand.
+/// Contraction makes of a period the program that one would write by hand.
 #[track_caller]
 fn becomes(period: &str, by_hand: &str) {
     let whole = |contract: &str, body: &str| format!("{HEAD}{contract}\n.period\np:\n{body}\n wait p\n");
@@ -84,7 +84,7 @@ fn names_that_are_used_again() {
     becomes(" mov t, a\n fmul t, t, b\n fadd t, t, c\n mov F, t", " mov t, a\n fma t, t, b, c\n mov F, t");
 }
 
-/// What takes longer than everything else: beside it there is time.
+/// A chain that takes longer than everything else: beside it there is time.
 const LONG: &str = "\n fsqrt v, d\n fsqrt G, v";
 
 #[track_caller]
@@ -247,7 +247,7 @@ fn source(seed: u64) -> String {
     text
 }
 
-/// What is written to ports over some periods; whether every sum and product was an integer that binary32 holds.
+/// The writes to ports over some periods; and true if every sum and product was an integer that binary32 holds.
 fn run(assembled: &Assembled, seed: u64) -> (Vec<Vec<u32>>, bool) {
     let random = &mut Random(seed + 5);
     let program = &assembled.program;
@@ -278,7 +278,7 @@ fn run(assembled: &Assembled, seed: u64) -> (Vec<Vec<u32>>, bool) {
     (seen, exact)
 }
 
-/// Where nothing is rounded, contraction changes nothing; and whatever is rounded, the bits do not depend on the schedule.
+/// If nothing is rounded, contraction changes nothing; and whatever is rounded, the bits do not depend on the schedule.
 #[test]
 fn nothing_but_the_rounding_changes() {
     let (mut fused, mut compared) = (0, 0);

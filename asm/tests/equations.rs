@@ -26,7 +26,7 @@ enum Tree {
 
 use Tree::{Call, Choice, Infix, Literal, Name, Prefix};
 
-/// How tightly the head of an expression binds.
+/// The precedence of the head of an expression.
 fn level(tree: &Tree) -> u8 {
     match tree {
         Choice(..) => 0,
@@ -73,7 +73,7 @@ fn is_int(name: &str) -> bool {
     matches!(name, "n" | "k" | "j")
 }
 
-/// Why there is no value: a constant part has none, which the assembler says.
+/// The reason why there is no value: a constant part has none, which the assembler says.
 struct NoValue;
 
 fn bits(seen: Seen, ty: Type) -> Result<u32, NoValue> {
@@ -374,7 +374,7 @@ fn equal_parts_are_computed_once() {
     assert_eq!(once("", " a = x*y + x*y\n b = t"), 1);
     // In the equations of a run.
     assert_eq!(once("", " a = t*u + 1\n b = t*u - 1"), 1);
-    // Where the part is a whole equation, its register has the value.
+    // If the part is a whole equation, its register has the value.
     assert_eq!(once("", " v = t*u\n a = t*u - 1\n b = v"), 1);
     // Not once a source is written, nor once what has the value is.
     assert_eq!(once("", " a = t*u + 1\n t = x\n b = t*u - 1"), 2);
@@ -492,7 +492,7 @@ fn limits_are_finite() {
     let names: Vec<String> = (1..=65).map(|i| format!("t[{i}]")).collect();
     let values = vec!["x"; 65].join(", ");
     assert_eq!(code(&format!("{} = {values}", names.join(", ")), ".reg t[65]"), "limit");
-    // What is long, but not deep, is read.
+    // An expression that is long, but not deep, is read.
     let long = vec!["x*x"; 200].join(" + ");
     assert!(
         good(&format!(".input x\n.output a\n.once\n wait p\n.period\np: a = {long}\n wait p\n"))
@@ -502,7 +502,7 @@ fn limits_are_finite() {
     );
 }
 
-/// What `.fast` allows, and that without it nothing changes.
+/// `.fast` allows rewrites that round otherwise; without it nothing changes.
 #[test]
 fn fast_allows_what_it_names() {
     let lines = " a = x + t - u + 3 - v + w - 5 + y\n b = x/3*t";

@@ -32,7 +32,7 @@ fn assemble(text: &str, machine: &'static Machine) -> Result<Assembled, Diagnost
     takt_asm::assemble("test.s", &MemoryLoader::of("test.s", text), &options)
 }
 
-/// What a source assembles to, or what is wrong with it.
+/// The program that a source assembles to, or its errors.
 fn outcome(text: &str, machine: &'static Machine) -> String {
     let told = |list: &Diagnostics| {
         // Mistakes of one line may change their order with their columns, never their text.

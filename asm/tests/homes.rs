@@ -132,7 +132,7 @@ fn run(program: &Program, seed: u64) -> Seen {
         };
         emulator.observed(&mut sink).run_period(&[]).unwrap_or_else(|error| panic!("{error}"));
     }
-    // What shares a bundle with the last `wait` is in flight when that issues: its flags are still to come.
+    // An operation that shares a bundle with the last `wait` is in flight when that issues: its flags are still to come.
     let landed = emulator.now() + Cycle::from(MAX_LATENCY);
     emulator.run_until(landed).unwrap_or_else(|error| panic!("{error}"));
     (writes, emulator.memory().to_vec(), emulator.flags().bits())

@@ -341,7 +341,7 @@ proptest! {
             bytes[at] = value;
         }
         if let Ok((program, debug)) = image::read_with(&bytes) {
-            // What is accepted can be written and read again.
+            // An image that is accepted can be written and read again.
             let (again, known) = image::read_with(&image::write_with(&program, debug.as_ref()).expect("an image holds it")).expect("it was read");
             prop_assert_eq!(again, program);
             prop_assert_eq!(known.map(|known| known.names), debug.map(|debug| debug.names));

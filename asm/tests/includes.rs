@@ -1,4 +1,4 @@
-//! Where `.include` looks: beside the file, in the folders given, in the library.
+//! The places in which `.include` looks: beside the file, in the folders given, in the library.
 
 mod common;
 

@@ -1,4 +1,4 @@
-//! What the language means, rule by rule of `docs/language.md`.
+//! The meaning of the language, rule by rule of `docs/language.md`.
 
 mod common;
 

@@ -38,7 +38,7 @@ fn deep() {
     }
     error(&format!(".period\n ld a, {}", "0[".repeat(200_000)), "limit");
     error(&format!(".const X = {}", ")".repeat(200_000)), "limit");
-    // What is within the limit is read.
+    // A source within the limit is read.
     for nest in [limits::EXPRESSION_DEPTH - 1, limits::EXPRESSION_DEPTH] {
         good(&format!(".const X = {}1{}\n.data\n .word X\n", "(".repeat(nest), ")".repeat(nest)));
         good(&format!(".const X = {}1\n.data\n .word X\n", "-".repeat(nest)));

@@ -1,4 +1,4 @@
-//! What a user reads who makes a mistake: every `mistakes/err_*.s` with the errors that it gets, as a snapshot.
+//! Messages for a user's mistakes: every `mistakes/err_*.s` with the errors that it gets, as a snapshot.
 
 mod common;
 
@@ -41,7 +41,7 @@ fn warnings_do_not_stop() {
     }
 }
 
-/// What becomes of warnings is the caller's choice; how many there are is not.
+/// The caller chooses what becomes of warnings, not how many there are.
 #[test]
 fn warnings_can_be_errors_or_nothing() {
     let text = "; machine f3\n.input x, n:int\n.output F\n.reg a\n.once\n wait p\n.period\np: fadd F, x, n\n wait p\n";

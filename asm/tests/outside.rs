@@ -28,7 +28,7 @@ fn diagnostics_show_commands_and_do_not_give_them() {
     let shown = report.render(false);
     assert!(shown.contains("┌─ a\\u001b]0;owned\\u0007\\u001b[2J\\u009b31m\\u202eb.s:3:1\n"), "{shown}");
     assert!(shown.contains("error[user]: \\u001b]0;owned"), "{shown}");
-    // What is written is counted, what is shown is underlined.
+    // Columns count what is written; what is shown is underlined.
     let text = format!(".output y\n.period\np: ;{COMMANDS}\n wait q ; {COMMANDS}\n.error \"\u{1b}\" 3\n");
     let report = bad(&text, &F3).render(false);
     let lines: Vec<&str> = report.lines().collect();

@@ -194,7 +194,7 @@ fn seen_cycles(program: &Program, register: takt_isa::Register) -> Vec<u32> {
     cycles.iter().map(|cycle| (cycle - report.start) as u32).collect()
 }
 
-/// What a report says of a port is what the machine does.
+/// A report on a port agrees with the machine.
 fn agrees(report: &TimingReport, program: &Program, text: &str) {
     for (name, first, last) in &report.ports {
         let mut ports = program.inputs.iter().chain(&program.outputs);

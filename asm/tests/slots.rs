@@ -76,7 +76,7 @@ fn serial(text: &str) -> String {
     text.replace(" || ", "\n ")
 }
 
-/// What a program puts out in its second period.
+/// The outputs of a program in its second period.
 fn outputs(program: &Program, inputs: &[f32]) -> Vec<u32> {
     let mut emulator = Emulator::new(program).expect("it fits");
     for (port, value) in program.inputs.iter().zip(inputs) {
@@ -180,7 +180,7 @@ fn shipped(folder: &str, name: &str, machine: &'static Machine, effort: u32) -> 
     (assembled.program, cycles)
 }
 
-/// What a program puts out in some periods, by name.
+/// The outputs of a program in some periods, by name.
 fn periods(program: &Program) -> Vec<(String, Vec<u32>)> {
     let mut emulator = Emulator::new(program).expect("it fits");
     let mut seen: Vec<(String, Vec<u32>)> =
@@ -220,7 +220,7 @@ fn shipped_programs_give_the_same_bits_on_every_row() {
     }
 }
 
-/// What a further adder, or multiplier, is good for.
+/// A further adder, or multiplier, saves cycles.
 #[test]
 fn shared_functions_save_cycles() {
     for (row, most) in [("second_adder", 120), ("second_multiplier", 111)] {

@@ -109,7 +109,7 @@ fn words_of_the_program_are_left_alone() {
     );
 }
 
-/// What is written by hand stays in its registers.
+/// A value that a hand-written operation writes stays in its register.
 #[test]
 fn registers_that_the_source_names_are_left_alone() {
     let names: Vec<String> = (0..300).map(|i| format!("v{i}")).collect();
@@ -176,7 +176,7 @@ fn products(constants: usize) -> String {
     text + " fadd g, g, h\n fadd h, h, g\n mov y, s\n wait p\n"
 }
 
-/// Where registers do not suffice for a short schedule, length is given for them, in the end all of it: what fits without the
+/// If registers do not suffice for a short schedule, length is given for them, in the end all of it: what fits without the
 /// scheduler fits with it.
 #[test]
 fn what_fits_without_the_scheduler_fits_with_it() {

@@ -48,7 +48,7 @@ fn inputs_are_taken_at_reset_and_at_the_tick() {
     both(|emulator| {
         emulator.set_input("x", 1.into()).unwrap();
         assert_eq!(outputs(emulator), [None, None]);
-        // What runs once sees what was set before it began, and nothing later.
+        // The code that runs once sees what was set before it began, and nothing later.
         emulator.run_until(1).unwrap();
         emulator.set_input("x", 2.into()).unwrap();
         let Stop::Wait { cycle: wait, .. } = emulator.run_to_wait().unwrap() else { panic!() };
@@ -63,7 +63,7 @@ fn inputs_are_taken_at_reset_and_at_the_tick() {
         assert_eq!(outputs(emulator), [Some(1), Some(1)]);
         emulator.run_to_wait().unwrap();
         assert_eq!(outputs(emulator), [Some(3), Some(3)]);
-        // What is not set again keeps its value.
+        // An input that is not set again keeps its value.
         emulator.run_period(&[]).unwrap();
         assert_eq!(outputs(emulator), [Some(4), Some(4)]);
         emulator.run_period(&[]).unwrap();

@@ -129,7 +129,7 @@ fn the_last_operand_is_charged() {
     );
 }
 
-/// Where two come last, the first operand of the first slot is charged.
+/// If two come last, the first operand of the first slot is charged.
 #[test]
 fn ties_are_charged_in_operand_order() {
     let (multiply, add) = (latency(&F3, Function::Multiply), latency(&F3, Function::Add));
@@ -292,7 +292,7 @@ fn drain_waits_for_every_result() {
         let cycles: Vec<u64> = [0, divide].into_iter().chain(next).collect();
         check(&F3, &source, &cycles, &[((common::at(1), Cause::Drain), divide - 1)]);
     }
-    // What issues together with it is not waited for.
+    // Operations that issue together with it are not waited for.
     check(&F3, ".preset m0 2.0\nfmul m1, m0, m0 || halt", &[0], &[]);
 }
 

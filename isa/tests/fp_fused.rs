@@ -114,7 +114,7 @@ fn random_triples_reach_every_case() {
     assert!(cases.iter().all(|&count| count >= TRIPLES / 500), "{cases:?}");
 }
 
-/// What the four instructions mean, written out: zeros, one rounding, who is negated.
+/// The meaning of the four instructions, written out: zeros, one rounding, who is negated.
 #[test]
 fn signs_and_conventions() {
     let value = |op: Op, [a, b, c]: [f32; 3]| {
