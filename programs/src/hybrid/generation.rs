@@ -18,7 +18,7 @@ pub const FIELDS: [&str; 12] = [
     "periods",
 ];
 
-/// The command of a block, by its number.
+/// The kind of a block, by its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BlockKind {
     /// To stand in a pose at once.

@@ -227,7 +227,7 @@ fn notes(robot: &Robot, attempt: &Attempt) -> Vec<String> {
     notes
 }
 
-/// The name of a joint in names of ports.
+/// The names of the joints in names of ports.
 pub(super) fn port_names(robot: &Robot) -> Vec<String> {
     let plain = |name: &str| -> String {
         let name = name.strip_suffix("_joint").unwrap_or(name);

@@ -27,7 +27,7 @@ pub(super) fn settle(graph: &Graph, outputs: &[Id], thorough: bool) -> (Graph, V
     signs.rebuilt()
 }
 
-/// The number of times that each difference is turned where that leaves as many negations.
+/// The most sweeps in which differences are turned although as many negations are left.
 const SWEEPS: usize = 12;
 
 /// A search for few negations.

@@ -125,7 +125,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The beginning of everything.
+    /// The pose of the base itself.
     pub const IDENTITY: Pose = Pose { rotation: IDENTITY, origin: [0.0; 3] };
 
     /// The pose `inner` within this one, seen from outside.
