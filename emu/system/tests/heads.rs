@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 use takt_asm::{MemoryLoader, Options, assemble};
-use takt_isa::{Program, T1};
+use takt_isa::{F1, Program};
 use takt_system::heads::{Doubt, HeadRead, doubtful};
 use takt_system::testing::describe;
 use takt_system::{Description, System};
 
 fn program(text: &str) -> Program {
-    let options = Options { machine: &T1, ..Options::default() };
+    let options = Options { machine: &F1, ..Options::default() };
     match assemble("a.s", &MemoryLoader::of("a.s", text), &options) {
         Ok(assembled) => assembled.program,
         Err(mistakes) => panic!("{}", mistakes.render(false)),
@@ -17,7 +17,7 @@ fn program(text: &str) -> Program {
 
 /// A core that takes entries of three fields from the host.
 fn receiver(text: &str) -> Description {
-    let system = "tick = 400\n[[core]]\nname = \"a\"\nprogram = \"a\"\nmachine = \"t1\"\n[[fifo]]\nname = \"q\"\nfrom = \"host\"\nto = \"a\"\n\
+    let system = "tick = 400\n[[core]]\nname = \"a\"\nprogram = \"a\"\nmachine = \"f1\"\n[[fifo]]\nname = \"q\"\nfrom = \"host\"\nto = \"a\"\n\
          ports = [\"x\", \"y\", \"z\"]\ndepth = 8\npop = \"p\"\nreceiver = { count = \"n\" }\n[[wire]]\nfrom = \"a.u\"\nto = \"host.u\"\n\
          [[wire]]\nfrom = \"a.v\"\nto = \"host.v\"\n[[wire]]\nfrom = \"a.w\"\nto = \"host.w\"\n";
     let programs = BTreeMap::from([("a".to_owned(), program(text))]);
