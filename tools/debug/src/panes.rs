@@ -1,5 +1,6 @@
 //! What there is to see at a position, as rows of plain data: the console prints them, the view draws them.
 
+use crate::console::Target;
 use crate::session::{Session, Shown, Stop, Where};
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
@@ -80,9 +81,24 @@ pub struct Line {
     pub stop: bool,
 }
 
+/// A core of a system.
+#[derive(Clone, Debug)]
+pub struct CoreLine {
+    /// Its name.
+    pub name: String,
+    /// What it does in the cycle to come.
+    pub state: String,
+    /// True if commands and the other panes are about it.
+    pub selected: bool,
+}
+
 /// All that there is to see at a position.
 #[derive(Clone, Debug)]
 pub struct Panes {
+    /// The kind of run.
+    pub target: Target,
+    /// The cores of a system.
+    pub cores: Vec<CoreLine>,
     /// Where this is, in one line.
     pub head: String,
     /// The source's name.
@@ -134,6 +150,8 @@ impl Panes {
         let (inputs, outputs, mut registers) = (of(Kind::Input), of(Kind::Output), of(Kind::Register));
         registers.sort_by_key(|row| (!row.changed, !row.used));
         Panes {
+            target: Target::Program,
+            cores: Vec::new(),
             head,
             file: program.files.get(file as usize).cloned().unwrap_or_default(),
             lines: lines(session, file, line.saturating_sub(LINES)..=line.saturating_add(LINES))
@@ -182,6 +200,20 @@ pub(crate) fn head(session: &mut Session) -> String {
         }
     };
     format!("{times}: {what}")
+}
+
+/// What a core does in the cycle to come, in a few words.
+pub(crate) fn core_state(session: &mut Session) -> String {
+    let stall = session.stall();
+    let program = session.program();
+    let bundle = program.bundle_text(session.emulator().next_address());
+    match (session.emulator().status(), stall) {
+        (Status::Halted { .. }, _) => "has halted".to_owned(),
+        (Status::Faulted(fault), _) => format!("stopped with a fault: {fault}"),
+        (Status::Waiting { .. }, _) | (_, Some(Cause::Wait)) => format!("waits for its tick, then {bundle}"),
+        (Status::Running, None) => format!("issues {bundle}"),
+        (Status::Running, Some(cause)) => format!("{bundle} waits: {}", program.cause_text(cause)),
+    }
 }
 
 /// The next bundle's slots with their operations.

@@ -7,7 +7,7 @@ use ratatui::style::{Color, Modifier};
 use std::fmt::Write as _;
 use std::sync::Arc;
 use takt_asm::{MemoryLoader, Options as AsmOptions, assemble};
-use takt_debug::console::{Console, KEYS, first_mistake};
+use takt_debug::console::{Console, KEYS, Target, first_mistake};
 use takt_debug::session::{Options, Session};
 use takt_debug::view::{self, Pane, Screen};
 use takt_emu::Rows;
@@ -113,12 +113,12 @@ fn any_size_and_any_text() {
         ".output {long}\n.reg a{long}\n; \x1b[2J\u{7}\t世界 {long}\n{long}x: mov {long}, zero\nfadd a{long}, zero, zero\nhalt\n"
     );
     let mut wild = console(&source);
-    let mut illegal = console(SOURCE).session.program().clone();
+    let mut illegal = console(SOURCE).session().program().clone();
     illegal.code.iter_mut().for_each(|word| *word = !0);
     let mut illegal = Console::new(Session::new(&illegal, Options::default()).unwrap());
     let mut empty = {
         let program =
-            Program { code: Vec::new(), lines: Vec::new(), ..console("halt").session.program().clone() };
+            Program { code: Vec::new(), lines: Vec::new(), ..console("halt").session().program().clone() };
         Console::new(Session::new(&program, Options::default()).unwrap())
     };
     for console in [&mut wild, &mut illegal, &mut empty] {
@@ -141,7 +141,7 @@ fn any_size_and_any_text() {
 #[test]
 fn keys_stand_for_commands() {
     let script: String = KEYS.iter().map(|(_, line)| format!("{line}\n")).collect();
-    assert_eq!(first_mistake::<Console>(&script), None);
+    assert_eq!(first_mistake(&script, Target::System), None);
     let mut keys: Vec<char> = KEYS.iter().map(|(key, _)| *key).collect();
     keys.sort_unstable();
     keys.dedup();

@@ -142,6 +142,31 @@ pub enum Why {
     Limit(Cycle),
     /// Somebody interrupted it.
     Interrupted,
+    /// A machine that runs elsewhere differs from its emulator: the first difference, in words.
+    Differs(String),
+    /// Something else, in words.
+    Other(String),
+}
+
+/// A move of a run.
+#[derive(Clone, Debug)]
+pub enum Move {
+    /// So many steps.
+    Step(Unit, u64),
+    /// So many steps back.
+    Back(Unit, u64),
+    /// On to a breakpoint or watchpoint.
+    Resume,
+    /// Back to one.
+    ResumeBack,
+    /// On to where an expression is not zero.
+    Until(Live),
+    /// To where so many cycles have passed.
+    Cycle(Cycle),
+    /// To where so many periods have ended.
+    Period(u64),
+    /// To the beginning.
+    Start,
 }
 
 /// What to step by.
@@ -159,6 +184,22 @@ pub enum Unit {
     Call,
     /// To where the subroutine's caller goes on.
     Out,
+}
+
+impl Unit {
+    /// The names of all.
+    pub const NAMES: [&str; 6] = ["cycle", "bundle", "line", "period", "call", "out"];
+    const ALL: [Unit; 6] = [Unit::Cycle, Unit::Bundle, Unit::Line, Unit::Period, Unit::Call, Unit::Out];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        Unit::NAMES[self as usize]
+    }
+
+    /// The unit of a name.
+    pub fn named(name: &str) -> Option<Unit> {
+        Unit::ALL.into_iter().find(|unit| unit.name() == name)
+    }
 }
 
 /// What was set by hand.

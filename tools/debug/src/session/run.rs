@@ -3,7 +3,7 @@
 use super::expression::Machine;
 use super::interest::Interest;
 use super::stops::{Stop, Where};
-use super::{CHECKPOINTS, Core, Cycle, End, Live, SLICE, Session, Unit, WINDOW, Why};
+use super::{CHECKPOINTS, Core, Cycle, End, Live, Move, SLICE, Session, Unit, WINDOW, Why};
 use std::sync::atomic::Ordering;
 use takt_emu::{Emulator, PeriodError, Upcoming};
 use takt_isa::program::Location;
@@ -244,6 +244,20 @@ impl Session {
         }
         self.go_to(0);
         Why::Start
+    }
+
+    /// Moves the run; of a step, by one.
+    pub fn go(&mut self, to: &Move) -> Why {
+        match to {
+            Move::Step(unit, _) => self.step(*unit),
+            Move::Back(unit, _) => self.step_back(*unit),
+            Move::Resume => self.resume(),
+            Move::ResumeBack => self.resume_back(),
+            Move::Until(live) => self.run_until(live),
+            Move::Cycle(cycle) => self.go_to(*cycle),
+            Move::Period(period) => self.go_to_period(*period),
+            Move::Start => self.go_to(0),
+        }
     }
 
     /// Steps forward.

@@ -44,7 +44,7 @@ impl SystemStop {
 }
 
 /// A link by its name.
-pub(super) fn link_named(name: &str, description: &Description) -> Result<usize, String> {
+pub(crate) fn link_named(name: &str, description: &Description) -> Result<usize, String> {
     description.link_named(name).ok_or_else(|| {
         let names: Vec<&str> = description.links.iter().map(|link| link.name.as_str()).collect();
         let near = nearest(name, names.iter().copied());

@@ -10,16 +10,16 @@
 //! the first or the last of it. What a core's own session stops at (breakpoints with conditions, watchpoints) is asked of that
 //! session, which looks at the core at each position that matters to it.
 
-mod console;
 mod links;
 mod seek;
 
-pub use console::SystemConsole;
+pub(crate) use links::link_named;
 pub use links::link_text;
 
 use crate::session::{self, Control, Known, Place, RUN_LIMIT, Why};
 use std::sync::Arc;
-use takt_emu::{Event, LoadError};
+use takt_emu::{Emulator, Event, LoadError};
+use takt_isa::BundleAddress;
 use takt_isa::timing::Cycle;
 use takt_system::{
     Description, HostError, InputEvent, LinkEvent, LinkEventKind, MAX_LATENCY, System, SystemFault,
@@ -183,7 +183,7 @@ impl SystemSession {
     }
 
     /// The number that the next one gets: one count for links and for all cores' sessions.
-    fn next_stop(&mut self) -> &mut u32 {
+    pub(crate) fn next_stop(&mut self) -> &mut u32 {
         &mut self.next_id
     }
 
@@ -216,6 +216,35 @@ impl SystemSession {
                 return SystemWhy::Interrupted;
             }
         }
+    }
+
+    /// Runs again from the beginning to this position, and shows a core after each cycle in which a bundle of it issued, with
+    /// that bundle. The session stays where it is.
+    ///
+    /// # Returns
+    /// [`SystemWhy::Done`], or that it was interrupted.
+    pub fn replay(&mut self, core: usize, visit: &mut dyn FnMut(&Emulator, BundleAddress)) -> SystemWhy {
+        let here = self.cycle();
+        let Some(beginning) = self.checkpoints.first().cloned() else { return SystemWhy::Start };
+        let point = std::mem::replace(&mut self.point, beginning);
+        let mut why = SystemWhy::Done;
+        while self.cycle() < here && why == SystemWhy::Done {
+            let (now, mut seen) = (self.cycle(), Seen::default());
+            why = self.advance(now + 1, Some(&mut seen));
+            for (own, event) in seen.cores {
+                match event {
+                    Event::Issue { cycle, address } if (own, cycle) == (core, now) => {
+                        visit(self.system().core(core), address);
+                    }
+                    _ => {}
+                }
+            }
+            if self.interrupted() {
+                why = SystemWhy::Interrupted;
+            }
+        }
+        self.point = point;
+        why
     }
 
     /// Sets a register or a data word of a core. What was recorded of the run after this position is forgotten.

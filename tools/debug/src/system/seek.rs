@@ -1,7 +1,7 @@
 //! Looking ahead and back for what a command waits for: events on links, steps of a core, stops of the cores' sessions.
 
 use super::{LATE, Point, STRETCH, Seen, SystemSession, SystemStop, SystemWhy};
-use crate::session::{Live, Search, Session, Unit, Why};
+use crate::session::{Live, Move, Search, Session, Unit, Why};
 use std::collections::BTreeMap;
 use takt_emu::{Event, Status};
 use takt_isa::timing::Cycle;
@@ -17,6 +17,20 @@ type Hits = Vec<(Cycle, Option<u32>)>;
 pub(super) type Searches = Vec<Option<Search>>;
 
 impl SystemSession {
+    /// Moves the run; of a step, by one, of this core. `views` has a session for each core.
+    pub fn go(&mut self, views: &mut [&mut Session], core: usize, to: &Move) -> SystemWhy {
+        match to {
+            Move::Step(unit, _) => self.step(views, core, *unit),
+            Move::Back(unit, _) => self.step_back(views, core, *unit),
+            Move::Resume => self.resume(views),
+            Move::ResumeBack => self.resume_back(views),
+            Move::Until(live) => self.run_until(views, core, live.clone()),
+            Move::Cycle(cycle) => self.go_to(*cycle),
+            Move::Period(period) => self.go_to_period(core, *period),
+            Move::Start => self.go_to(0),
+        }
+    }
+
     /// Goes on by a step of a core; all others go on meanwhile. `views` has a session for each core, or, for steps by cycle,
     /// bundle or period, none.
     ///
@@ -241,7 +255,7 @@ impl SystemSession {
     }
 
     /// Shows the cores to their sessions.
-    pub(super) fn show(&self, views: &mut [&mut Session]) {
+    pub(crate) fn show(&self, views: &mut [&mut Session]) {
         for (core, view) in views.iter_mut().enumerate() {
             self.show_core(core, view, false);
         }
