@@ -72,7 +72,7 @@ fn client(input: impl Read + Send + 'static, mut output: impl Write + Send) {
                 Err(WireError::Lost(text)) => break Some(text),
             }
         };
-        // What runs for a client that is gone runs for nobody.
+        // A run for a client that is gone is for nobody.
         heard.interrupt();
         if let Some(text) = lost {
             message(&format!("takt dap: {text}"));
@@ -137,7 +137,7 @@ const OTHERS: [&str; 17] = [
     "preLaunchTask",
     "postDebugTask",
     "internalConsoleOptions",
-    // Where an adapter on a socket is: VS Code's, and with the host Emacs's.
+    // The place of an adapter on a socket: VS Code's, and with the host Emacs's.
     "debugServer",
     "host",
     "serverReadyAction",

@@ -1,7 +1,7 @@
-//! What there is to see at a position, as rows of plain data: the console prints them, the view draws them.
+//! The state at a position, as rows of plain data: the console prints them, the view draws them.
 
-use crate::console::Target;
 use crate::session::{Session, Shown, Stop, Where};
+use crate::target::Target;
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 use takt_emu::Status;
@@ -13,7 +13,7 @@ const LINES: u32 = 1000;
 /// Stalled bundles that are listed, those with most cycles first.
 const STALLS: usize = 10;
 
-/// What a named register is.
+/// The kind of a named register.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Kind {
     /// An input port.
@@ -31,13 +31,13 @@ pub struct Named {
     pub name: String,
     /// Its place in the machine.
     pub place: String,
-    /// How its bits are read.
+    /// The type as which its bits are read.
     pub ty: Type,
     /// Its bits; `None` if it was never written.
     pub bits: Option<u32>,
-    /// Whether it is another since the last command.
+    /// True if the last command changed it.
     pub changed: bool,
-    /// Whether the next bundle reads or writes it.
+    /// True if the next bundle reads or writes it.
     pub used: bool,
 }
 
@@ -60,7 +60,7 @@ pub struct Flying {
     pub left: Cycle,
     /// The register that it goes to.
     pub register: String,
-    /// What it is.
+    /// Its mnemonic.
     pub mnemonic: &'static str,
     /// Its bundle.
     pub from: String,
@@ -73,11 +73,11 @@ pub struct Line {
     pub number: u32,
     /// Its text.
     pub text: String,
-    /// Whether the bundle that issues next is of this line.
+    /// True if the bundle that issues next is of this line.
     pub next: bool,
-    /// Whether an operation of that bundle comes from it.
+    /// True if an operation of that bundle comes from it.
     pub part: bool,
-    /// Whether a breakpoint is in it.
+    /// True if a breakpoint is in it.
     pub stop: bool,
 }
 
@@ -86,7 +86,7 @@ pub struct Line {
 pub struct CoreLine {
     /// Its name.
     pub name: String,
-    /// What it does in the cycle to come.
+    /// Its state in the cycle to come.
     pub state: String,
     /// True if commands and the other panes are about it.
     pub selected: bool,
@@ -99,7 +99,7 @@ pub struct Panes {
     pub target: Target,
     /// The cores of a system.
     pub cores: Vec<CoreLine>,
-    /// Where this is, in one line.
+    /// The position in one line.
     pub head: String,
     /// The source's name.
     pub file: String,
@@ -115,16 +115,16 @@ pub struct Panes {
     pub outputs: Vec<Named>,
     /// Operations in flight.
     pub flight: Vec<Flying>,
-    /// Why nothing issues in the cycle to come.
+    /// The reason why nothing issues in the cycle to come.
     pub cause: Option<String>,
-    /// Where the cycles since reset went.
+    /// The account of the cycles since reset.
     pub stalls: Vec<(u64, String)>,
     /// Expressions on display, with their values.
     pub displays: Vec<(String, String)>,
 }
 
 impl Panes {
-    /// What there is to see; `before` is what named registers held ([`values`]) before the last command.
+    /// The contents of the panes; `before` is what named registers held ([`values`]) before the last command.
     pub(crate) fn new(
         session: &mut Session,
         before: &[Option<u32>],
@@ -168,7 +168,7 @@ impl Panes {
     }
 }
 
-/// Where the session is, in one line.
+/// The position in one line.
 pub(crate) fn head(session: &mut Session) -> String {
     let (cycle, times) = (session.cycle(), session.times());
     let stall = session.stall();
@@ -202,7 +202,7 @@ pub(crate) fn head(session: &mut Session) -> String {
     format!("{times}: {what}")
 }
 
-/// What a core does in the cycle to come, in a few words.
+/// The state of a core in the cycle to come, in a few words.
 pub(crate) fn core_state(session: &mut Session) -> String {
     let stall = session.stall();
     let program = session.program();
@@ -246,7 +246,7 @@ pub(crate) fn named(session: &Session, kind: Kind) -> impl Iterator<Item = Named
     })
 }
 
-/// What every named register holds: input ports, output ports, registers of the source.
+/// The values of all named registers: input ports, output ports, registers of the source.
 pub(crate) fn values(session: &Session) -> Vec<Option<u32>> {
     let program = session.program();
     let all = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
@@ -280,7 +280,7 @@ pub fn flight(session: &Session) -> Vec<Flying> {
     flying.collect()
 }
 
-/// Where the cycles since reset went: bundles that issued, stalls by kind, and the bundles that stalled longest.
+/// The account of the cycles since reset: bundles that issued, stalls by kind, and the bundles that stalled longest.
 pub fn stalls(session: &Session) -> Vec<(u64, String)> {
     let statistics = session.emulator().statistics();
     let program = session.program();

@@ -1,7 +1,8 @@
 //! The full-screen view: draws plain data into cells. It decides nothing and knows neither session nor terminal.
 
-use crate::console::{Target, commands, keys};
+use crate::console::{commands, keys};
 use crate::panes::{self, CoreLine, Named, Panes};
+use crate::target::Target;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect, Spacing};
 use ratatui::style::{Color, Modifier, Style, Stylize};
@@ -53,7 +54,7 @@ impl Pane {
     ];
 }
 
-/// What a line of the output is.
+/// The kind of a line of the output.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Said {
     /// A command, as it was given.
@@ -70,11 +71,11 @@ pub struct Screen {
     pub panes: Panes,
     /// Commands and their answers, by line.
     log: Vec<(Said, String)>,
-    /// Where in the log the last command is.
+    /// The line of the log with the last command.
     latest: usize,
     /// The command that is being typed, and the column of the cursor in it.
     pub typed: Option<(String, usize)>,
-    /// What to say of a command that runs.
+    /// The text for a command that runs.
     pub running: Option<String>,
     /// The line of the help that is on top, while help is shown.
     pub help: Option<usize>,
@@ -196,7 +197,7 @@ fn areas(body: Rect, panes: &Panes) -> Vec<(Pane, Rect)> {
 fn draw_pane(frame: &mut Frame<'_>, screen: &mut Screen, pane: Pane, area: Rect) {
     let height = usize::from(area.height.saturating_sub(1));
     let panes = &screen.panes;
-    // What the pane shows, and the line that is on top if nobody scrolls.
+    // The pane's lines, and the line that is on top if nobody scrolls.
     let (title, lines, top) = match pane {
         Pane::Source => {
             let next = panes.lines.iter().position(|line| line.next).unwrap_or(0);
@@ -306,7 +307,7 @@ fn values(rows: &[Named], prefix: &'static str, room: u16) -> Vec<Line<'static>>
 }
 
 fn ports(panes: &Panes, room: u16) -> Vec<Line<'static>> {
-    // What goes out is what changes.
+    // Outputs come first: they change.
     let mut lines = values(&panes.outputs, "out ", room);
     lines.extend(values(&panes.inputs, "in  ", room));
     lines

@@ -44,7 +44,7 @@ table:  .float  0.5, 0.25
 
 ";
 
-/// What is other than it should be.
+/// A planted fault.
 #[derive(Clone, Copy, Default, Debug)]
 struct Planted {
     /// From this period on, these bits of this register are wrong.
@@ -65,7 +65,7 @@ struct Circuit {
     runs: bool,
     drives: bool,
     planted: Planted,
-    /// What was asked of it, but for values.
+    /// The requests to it, but for values.
     asked: Vec<&'static str>,
     control: Arc<Control>,
 }
@@ -206,7 +206,7 @@ impl Remote for Board {
                 Some((from, planted, bits)) if planted == register && circuit.periods >= from => bits,
                 _ => 0,
             };
-            // What was never written holds anything.
+            // A register that was never written holds anything.
             let bits =
                 |register| circuit.emulator.register(register).unwrap_or(0xdead_beef) ^ wrong(register);
             registers.iter().map(|register| bits(*register)).collect()
@@ -421,7 +421,7 @@ fn differences_are_told_once_and_by_name() {
         };
         assert!(text.contains(says), "{text}");
     }
-    // What nobody writes is compared where the session begins.
+    // Values that nobody writes are compared where the session begins.
     let (constant, bits) = program().constants[0];
     let (_, said, _) =
         begin(2, Planted { register: Some((0, constant, 1)), ..Planted::default() }, false, false);

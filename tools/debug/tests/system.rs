@@ -172,7 +172,7 @@ fn mistakes_are_told() {
     assert!(console.execute("check cycle == 400").is_ok(), "every core is in the same cycle");
 }
 
-/// What core 1 of a system has in a register, at each position, is what a watchpoint on it tells of, forward and back; and stops
+/// A watchpoint on a register of core 1 stops at each position where its value changes, forward and back; and stops
 /// with conditions are those of the positions at which they hold.
 #[test]
 fn watchpoints_and_conditions_see_every_position() {
@@ -258,7 +258,7 @@ fn watchpoints_and_conditions_see_every_position() {
     assert!(changes > 20, "{changes} changes are too few to tell");
 }
 
-/// What is set is there when a session comes back to it, and gone before.
+/// A value that is set is there when a session comes back to it, and gone before.
 #[test]
 fn what_is_set_stays() {
     let (_, description) = systems().next().expect("a system");
@@ -502,7 +502,7 @@ fn names_of_another_core() {
     assert!(run("check forever.n == 20").is_ok());
     assert!(run("continue").expect("it stops").contains("stop 2"));
     assert!(run("continue").expect("it stops").contains("stop 1"));
-    // What is wrong with it is said as for one's own.
+    // A mistake in it is told as for one's own.
     let error = run("print forever.m, calling.n").expect_err("two cores");
     assert!(error.contains("one command is about one core"), "{error}");
     run("core calling").expect("it is there");

@@ -9,9 +9,10 @@ use std::sync::Arc;
 use takt_asm::{MemoryLoader, Options as AsmOptions, assemble};
 use takt_debug::console::{Console, KEYS, Target, first_mistake};
 use takt_debug::session::{Options, Session};
+use takt_debug::system::{SystemOptions, SystemSession};
 use takt_debug::view::{self, Pane, Screen};
 use takt_emu::Rows;
-use takt_isa::{Program, T3};
+use takt_isa::{MACHINES, Program, T3};
 use takt_programs::hybrid::Controller;
 use takt_programs::hybrid::closed_loop::ClosedLoop;
 use takt_programs::trajectory::Trajectory;
@@ -77,6 +78,28 @@ fn what_stands_where() {
     insta::assert_snapshot!("running", drawn(&mut screen, 40, 8));
     screen.help = Some(0);
     insta::assert_snapshot!("help", drawn(&mut screen, 100, 40));
+}
+
+/// The panes are those of the selected core of a system; a line shows all cores.
+#[test]
+fn the_cores_of_a_system() {
+    let machine = MACHINES.iter().find(|machine| machine.name == "t1").expect("there is one");
+    let options = AsmOptions { machine, ..AsmOptions::default() };
+    let assembled = assemble("a.s", &MemoryLoader::new(&[("a.s", SOURCE)]), &options).unwrap();
+    let core = |name: &str| format!("[[core]]\nname = \"{name}\"\nprogram = \"a.s\"\nmachine = \"t1\"\n");
+    let text = format!("tick = 1000\n{}{}", core("first"), core("second"));
+    let program = |_: &takt_system::Request<'_>| -> Result<_, takt_system::ProgramError<()>> {
+        Ok(assembled.program.clone())
+    };
+    let Ok(description) = takt_system::read("system.toml", &text, program) else { panic!("it is one") };
+    let session = SystemSession::new(&description, SystemOptions::default()).unwrap();
+    let view = || {
+        let sources = vec![("a.s".to_owned(), SOURCE.to_owned())];
+        Session::new(&assembled.program, Options { sources, ..Options::default() }).unwrap()
+    };
+    let mut console = Console::of_system(session, vec![view(), view()]);
+    let commands = ["break second.add", "continue", "display sum", "core", "core", "step 2"];
+    insta::assert_snapshot!("system", drawn(&mut screen(&mut console, &commands), 100, 30));
 }
 
 #[test]

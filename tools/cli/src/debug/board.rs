@@ -32,7 +32,7 @@ pub(super) fn run(arguments: &Debug, port: &Path, color: bool, out: &mut Out) ->
     let file = arguments.file.as_deref().context("no file")?;
     if load::is_system(file) {
         let text = format!(
-            "--board is for a single program, and {} is a system; `takt live {} --program {} read CORE.NAME` reads ports and registers of its cores, `shadow` compares their outputs with the emulator's",
+            "--board is for a single program, and {} is a system: what is under way on its links cannot be read, so no emulator can take over in the board's state; `takt live {} --program {} read CORE.NAME` reads ports and registers of its cores, `shadow` compares their outputs with the emulator's from the start",
             files::input_name(file),
             port.display(),
             files::input_name(file)

@@ -2,18 +2,11 @@
 
 use super::inspector::Inspector;
 use super::moves::End;
-use super::table::inside;
+use super::table::{BACK, inside};
 use super::{Console, Engine};
 use crate::panes;
 use crate::remote::{Activity, RemoteError, RemoteSession};
 use crate::session::{Move, Place, Session, Unit, Why};
-
-/// The refusal of what goes back.
-pub(super) const BACK: &str =
-    "a circuit does not go back; `goto start` starts it again, and `takt debug` without --board goes back";
-/// The refusal of what happens within a period.
-pub(super) const INSIDE: &str =
-    "a board stops only between two periods; `takt debug` without --board stops anywhere";
 
 /// The state in which the machine is left when the session ends.
 #[derive(Clone, Copy, PartialEq, Eq)]

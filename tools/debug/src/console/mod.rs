@@ -9,8 +9,9 @@ mod system;
 mod table;
 mod values;
 
+pub use crate::target::Target;
 pub use moves::End;
-pub use table::{KEYS, Target, commands, first_mistake, keys};
+pub use table::{KEYS, commands, first_mistake, keys};
 
 use crate::panes::Panes;
 use crate::remote::RemoteSession;
@@ -176,7 +177,7 @@ impl Console {
     /// Executes a line; returns what it has to say, in whole lines.
     ///
     /// # Errors
-    /// What is wrong with it. The session is as it was.
+    /// If something is wrong with it. The session is as it was.
     pub fn execute(&mut self, line: &str) -> Result<String, String> {
         let repeated = self.last.clone();
         let line = if line.trim().is_empty() { &repeated } else { line };

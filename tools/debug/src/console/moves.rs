@@ -1,10 +1,11 @@
 //! Moves of the run, forward and back, and what is said where they end.
 
-use super::table::{Target, inside};
+use super::table::inside;
 use super::{Console, Engine, sessions};
 use crate::accuracy;
 use crate::session::{Move, Unit, Why};
 use crate::system::{SystemSession, SystemWhy};
+use crate::target::Target;
 use std::fmt::Write as _;
 use takt_analysis::accuracy::Shadow;
 use takt_asm::nearest;
@@ -93,10 +94,10 @@ impl Console {
             Why::Halted => "the program has halted\n".to_owned(),
             Why::InputsEnd => "the recorded inputs end here\n".to_owned(),
             Why::Fault(fault) => {
-                let told = self.cores[*core].session.diagnose(fault).render(false);
+                let rendered = self.cores[*core].session.diagnose(fault).render(false);
                 match self.target() {
-                    Target::System => format!("core {}:\n{told}", self.name(*core)),
-                    Target::Program | Target::Board => told,
+                    Target::System => format!("core {}:\n{rendered}", self.name(*core)),
+                    Target::Program | Target::Board => rendered,
                 }
             }
             Why::Limit(count) => format!("nothing to stop at in {count} {}s\n", self.counts()),

@@ -1,10 +1,11 @@
 //! Breakpoints and watchpoints.
 
-use super::table::{Target, inside};
+use super::table::inside;
 use super::{Console, Engine};
 use crate::info;
 use crate::session::{Session, Stop, Test, Where};
 use crate::system::SystemStop;
+use crate::target::Target;
 
 impl Console {
     // ---- As plain data.

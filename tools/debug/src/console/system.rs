@@ -106,7 +106,7 @@ fn core_names(text: &str, names: &[&str]) -> (Vec<usize>, String) {
             }
             None => own.push_str(word),
         }
-        // What is between two words.
+        // The characters between two words.
         let next = behind.find(is_name).unwrap_or(behind.len());
         own.push_str(&behind[..next]);
         rest = &behind[next..];

@@ -1,21 +1,10 @@
 //! The table of commands, one for every target: it gives dispatch, help and completion.
 
 use super::Console;
-use super::board::{BACK, INSIDE};
 use crate::session::Unit;
+use crate::target::Target;
 use std::fmt::Write as _;
 use takt_asm::nearest;
-
-/// The kind of run that a console moves.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Target {
-    /// A program on one core.
-    Program,
-    /// The cores of a system.
-    System,
-    /// A program on a machine that runs elsewhere, and stops only between two periods.
-    Board,
-}
 
 /// The targets that have a command.
 #[derive(Clone, Copy)]
@@ -65,6 +54,9 @@ pub(super) struct Command {
     text: &'static str,
 }
 
+/// The refusal of what goes back.
+pub(super) const BACK: &str =
+    "a circuit does not go back; `goto start` starts it again, and `takt debug` without --board goes back";
 const ONE_CORE: &str = "it is for the cores of a system, and this is one program";
 const NOT_HELD: &str = "it is for a board, which runs by itself; here only commands move the run";
 const PLACES: &[&str] = &["cycle", "period", "start"];
@@ -279,5 +271,5 @@ impl Console {
 
 /// The refusal of a stop or a step within a period, on a board.
 pub(super) fn inside(what: &str) -> String {
-    format!("`{what}`: {INSIDE}")
+    format!("`{what}`: a board stops only between two periods; `takt debug` without --board stops anywhere")
 }

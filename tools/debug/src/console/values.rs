@@ -59,7 +59,7 @@ impl Inspector {
     /// The place that is to be set, its bits, and what is said of it.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// If something is wrong with it.
     pub(super) fn setting(&self, arguments: &str) -> Result<(Place, u32, String), String> {
         let (target, value) = arguments.split_once('=').ok_or("set takes `place = expression`")?;
         let target = self.session.parse(target)?;

@@ -25,7 +25,7 @@ use takt_isa::{Program, Register};
 /// The most periods for which a command runs.
 pub const PERIODS: u64 = 1_000_000;
 
-/// What a command waits for, and what must be read for that.
+/// The end that a command waits for, with the registers and memory that must be read for it.
 pub(crate) struct Goal {
     search: Search,
     registers: Vec<Register>,
@@ -40,10 +40,10 @@ pub struct RemoteSession {
     /// The program after a reset; copies of it are placed where the machine stands.
     base: Emulator,
     state: State,
-    /// What was read last.
+    /// The values that were read last.
     seen: Standing,
     shadow: Shadow,
-    /// Whether `seen` is what the machine has.
+    /// True if `seen` is what the machine has.
     settled: bool,
     /// The watched values as they were seen last.
     watched: Option<Search>,
@@ -79,12 +79,12 @@ impl RemoteSession {
         })
     }
 
-    /// What the machine did when it was last asked.
+    /// The state of the machine when it was last asked.
     pub fn state(&self) -> &State {
         &self.state
     }
 
-    /// Whether what is shown is what the machine has.
+    /// True if the values shown are the machine's.
     pub fn is_settled(&self) -> bool {
         self.settled
     }
@@ -103,7 +103,7 @@ impl RemoteSession {
         view.look_afar(emulator, self.state.periods);
     }
 
-    /// Whether a register was ever written. What it holds otherwise is not shown.
+    /// True if a register was ever written. An unwritten one is not shown.
     fn is_known(&self, register: Register) -> bool {
         self.program().machine.is_input(register) || self.shadow.register(register).is_some()
     }
@@ -373,7 +373,7 @@ impl RemoteSession {
             Some(live) => Search::value(live, view),
             None => {
                 let mut search = Search::stops(view)?;
-                // What was seen last cannot be looked for: the machine does not go back.
+                // Values seen last cannot be looked for: the machine does not go back.
                 self.watched.iter().for_each(|watched| search.complete(watched));
                 search
             }

@@ -14,22 +14,24 @@
 mod expression;
 mod interest;
 mod known;
+mod machine;
 mod meaning;
 mod number;
 mod run;
 mod search;
 mod stops;
 
+pub use expression::Live;
 pub(crate) use expression::Reads;
-pub use expression::{Live, Place};
 pub(crate) use known::Known;
+pub use machine::Place;
 pub use meaning::Life;
 pub use number::{Shown, UlpDistance, hex_float, ulp_distance};
 pub(crate) use search::Search;
 use stops::Watcher;
 pub use stops::{Stop, Test, Where};
 
-use expression::Machine;
+use machine::Machine;
 use std::collections::BTreeSet;
 use std::num::NonZeroU64;
 use std::sync::Arc;
@@ -53,7 +55,7 @@ const WINDOW: Cycle = 1 << 6;
 /// Cycles for which a command runs unless told otherwise.
 pub const RUN_LIMIT: Cycle = 1_000_000_000;
 
-/// What a session is about.
+/// The options of a session.
 #[derive(Clone, Default)]
 pub struct Options {
     /// Values of input ports, register and bits, one row for each period; `None`: they are 0, and stay as they are set.
@@ -64,13 +66,13 @@ pub struct Options {
     pub constants: Vec<(String, Value)>,
     /// Sources, by the names that the program has for them.
     pub sources: Vec<(String, String)>,
-    /// What the source's names stand for.
+    /// The meanings of the source's names.
     pub names: Names,
-    /// What is shared with whoever watches.
+    /// The state shared with whoever watches.
     pub control: Arc<Control>,
 }
 
-/// What a session shares with whoever watches a command that runs, from another thread or a signal handler.
+/// The state that a session shares with whoever watches a command that runs, from another thread or a signal handler.
 #[derive(Default, Debug)]
 pub struct Control {
     interrupt: AtomicBool,
@@ -94,7 +96,7 @@ impl Control {
         self.interrupt.load(Ordering::Relaxed)
     }
 
-    /// How far the command has come.
+    /// The position that the command has come to.
     pub fn cycle(&self) -> Cycle {
         self.cycle.load(Ordering::Relaxed)
     }
@@ -114,7 +116,7 @@ pub(crate) fn put(emulator: &mut Emulator, place: Place, bits: u32) {
     }
 }
 
-/// Why a command stopped.
+/// The reason why a command stopped.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Why {
     /// It is done.
@@ -169,7 +171,7 @@ pub enum Move {
     Start,
 }
 
-/// What to step by.
+/// The unit of a step.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Unit {
     /// A cycle.
@@ -202,7 +204,7 @@ impl Unit {
     }
 }
 
-/// What was set by hand.
+/// A value that was set by hand.
 #[derive(Clone, Copy, Debug)]
 struct Edit {
     cycle: Cycle,
@@ -216,7 +218,7 @@ struct Core {
     emulator: Emulator,
     /// Periods that have ended.
     periods: u64,
-    /// Whether a period ended in the cycle before.
+    /// True if a period ended in the cycle before.
     boundary: bool,
     report: Option<PeriodReport>,
     /// Edits that have been made.
@@ -238,7 +240,7 @@ pub struct Session {
     next_id: u32,
     /// The line that a breakpoint stopped at, and the cycle.
     line: Option<(Cycle, Location)>,
-    /// Whether the machine that it looks at runs elsewhere, so that cycles and calls are not known.
+    /// True if the machine that it looks at runs elsewhere, so that cycles and calls are not known.
     afar: bool,
     /// Cycles for which a command may run.
     pub run_limit: Cycle,
@@ -311,7 +313,7 @@ impl Session {
         (self.core.emulator.next_address(), issue)
     }
 
-    /// What the cycle to come is charged to; `None` if a bundle issues in it, or the machine has stopped.
+    /// The cause that the cycle to come is charged to; `None` if a bundle issues in it, or the machine has stopped.
     pub fn stall(&mut self) -> Option<Cause> {
         let now = self.cycle();
         match self.core.emulator.status() {
@@ -372,7 +374,7 @@ impl Session {
         Machine { emulator, periods: *periods, names: &self.options.names, line }
     }
 
-    /// What a bundle that issued in the cycle to come would read from a register.
+    /// The value that a bundle issued in the cycle to come would read from a register.
     pub fn register(&self, register: Register) -> Option<u32> {
         self.machine().register(register)
     }
@@ -390,7 +392,7 @@ impl Session {
     /// Parses an expression over this program.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// If something is wrong with it.
     pub fn parse(&self, text: &str) -> Result<Live, String> {
         if text.trim().is_empty() {
             return Err("an expression is missing".to_owned());
@@ -405,7 +407,7 @@ impl Session {
     /// The value of an expression.
     ///
     /// # Errors
-    /// Why it has none.
+    /// If it has none; the message says why.
     pub fn evaluate(&self, live: &Live) -> Result<Value, String> {
         live.evaluate(&self.machine(), self.program())
     }
@@ -413,7 +415,7 @@ impl Session {
     /// The register or data word that an expression is, if it is one, with the type that it is read as, and its bits.
     ///
     /// # Errors
-    /// Why it has none.
+    /// If it has none; the message says why.
     #[allow(clippy::type_complexity)]
     pub fn place(&self, live: &Live) -> Result<Option<(Place, Type, Option<u32>)>, String> {
         let (machine, program) = (self.machine(), self.program());
@@ -482,7 +484,7 @@ impl Session {
         if self.afar { self.time() } else { format!("{}, period {}", self.time(), self.period()) }
     }
 
-    /// What an expression reads, or, without one, what the stops do.
+    /// The registers and memory that an expression reads, or, without one, the stops.
     pub(crate) fn reads(&self, live: Option<&Live>) -> Reads {
         let mut reads = Reads::default();
         match live {

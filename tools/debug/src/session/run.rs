@@ -1,7 +1,7 @@
 //! Going forward and back: to a cycle or a period, by steps, to where something is found.
 
-use super::expression::Machine;
 use super::interest::Interest;
+use super::machine::Machine;
 use super::stops::{Stop, Where};
 use super::{CHECKPOINTS, Core, Cycle, End, Live, Move, SLICE, Session, Unit, WINDOW, Why};
 use std::sync::atomic::Ordering;
@@ -205,7 +205,7 @@ impl Session {
         // Positions from here on are seen, or not wanted.
         let (mut end, mut window) = (from, WINDOW);
         while end >= 2 {
-            // What is found lies behind the beginning of the stretch, so that it is known how things were before. What is
+            // A position that is found lies behind the beginning of the stretch, so that the state before it is known. What is
             // looked for may be near, and else a stretch begins at a checkpoint.
             let near = (end - 1).saturating_sub(window);
             let index = self.checkpoints.partition_point(|checkpoint| checkpoint.emulator.now() <= end - 2);
@@ -279,7 +279,7 @@ impl Session {
         self.forward(&interest, move |session, issuing| session.ends_step(unit, depth, issuing))
     }
 
-    /// Whether a bundle calls a subroutine.
+    /// True if a bundle calls a subroutine.
     fn calls(&self, address: BundleAddress) -> bool {
         let bundle = self.program().bundle(address).and_then(Result::ok);
         bundle.is_some_and(|bundle| matches!(Flow::of(&bundle), Flow::Call(_)))
@@ -305,7 +305,7 @@ impl Session {
         })
     }
 
-    /// Whether a step by `unit` that began `depth` calls deep ends here, where `issuing` is about to issue.
+    /// The end of a step by `unit` that began `depth` calls deep, if it ends here, where `issuing` is about to issue.
     pub(super) fn ends_step(&self, unit: Unit, depth: usize, issuing: Option<BundleAddress>) -> Option<Why> {
         let address = issuing?;
         let now = self.core.emulator.stack().len();
@@ -360,7 +360,7 @@ impl Session {
 
     /// Runs on to the next position at which an expression holds (is not zero). Where it has no value it does not.
     pub fn run_until(&mut self, live: &Live) -> Why {
-        // What holds already may still hold in the next cycle, in which nothing need change that the search looks for.
+        // An expression that holds already may still hold in the next cycle, in which nothing need change that the search looks for.
         if self.holds(live) {
             match self.go_to(self.cycle() + 1) {
                 Why::Done if self.holds(live) => return Why::Holds,
@@ -372,7 +372,7 @@ impl Session {
         self.forward(&interest, |session, _| session.holds(live).then_some(Why::Holds))
     }
 
-    /// Whether an expression has a value other than zero where this line is at hand.
+    /// True if an expression has a value other than zero where this line is at hand.
     pub(super) fn holds_at(&self, line: Location, live: &Live) -> bool {
         let machine = Machine { line: Some(line), ..self.machine() };
         live.evaluate(&machine, self.program()).is_ok_and(|value| !value.is_zero())
@@ -383,7 +383,7 @@ impl Session {
         live.is_there(&self.machine(), self.program())
     }
 
-    /// Whether an expression has a value other than zero.
+    /// True if an expression has a value other than zero.
     pub(crate) fn holds(&self, live: &Live) -> bool {
         self.evaluate(live).is_ok_and(|value| !value.is_zero())
     }

@@ -32,7 +32,7 @@ const CHECKPOINTS: usize = 256;
 /// An event on a link is told of at most so many cycles late: what is under way, and a few more.
 const LATE: Cycle = MAX_LATENCY + 8;
 
-/// What the host does at a base tick.
+/// The host's actions at a base tick.
 #[derive(Clone, Debug, Default)]
 pub struct Turn {
     /// Inputs of the system that it writes.
@@ -43,7 +43,7 @@ pub struct Turn {
     pub push: Vec<usize>,
 }
 
-/// What a session is about.
+/// The options of a session.
 #[derive(Clone, Default)]
 pub struct SystemOptions {
     /// A turn for each base tick; `None`: each is `idle`.
@@ -52,18 +52,18 @@ pub struct SystemOptions {
     pub idle: Turn,
     /// FIFOs to the host, of which it takes an entry each time.
     pub pops: Vec<usize>,
-    /// What is shared with whoever watches.
+    /// The state shared with whoever watches.
     pub control: Arc<Control>,
 }
 
-/// Why a command stopped.
+/// The reason why a command stopped.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SystemWhy {
     /// It is done.
     Done,
     /// An event on a link, by the stop's number.
     Stop(u32),
-    /// What the session of a core has stopped at, or waited for.
+    /// The reason why the session of a core stopped.
     Core(usize, Why),
     /// The beginning was reached.
     Start,
@@ -81,7 +81,7 @@ pub enum SystemWhy {
     Host(HostError),
 }
 
-/// What to stop at: an event on a link; without a kind, any. (Stops at what a core does are those of its own session.)
+/// A stop at an event on a link; without a kind, any. (Stops at what a core does are those of its own session.)
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SystemStop {
     /// The link.
@@ -102,7 +102,7 @@ struct Point {
     edits: usize,
 }
 
-/// What was set by hand.
+/// A value that was set by hand.
 #[derive(Clone, Copy, Debug)]
 struct Edit {
     cycle: Cycle,
@@ -111,7 +111,7 @@ struct Edit {
     bits: u32,
 }
 
-/// What the cores did in a stretch.
+/// The events of the cores in a stretch.
 #[derive(Default)]
 struct Seen {
     cores: Vec<(usize, Event)>,
@@ -290,7 +290,7 @@ impl SystemSession {
         let point = &mut self.point;
         make_edits(&self.edits, point);
         let now = point.system.now();
-        // What has happened long ago is of no interest.
+        // Events of long ago are of no interest.
         point.links.retain(|event| event.cycle + LATE + STRETCH >= now);
         let mut why = SystemWhy::Done;
         while why == SystemWhy::Done && point.system.now() < cycle {
@@ -348,7 +348,7 @@ fn turn(system: &System, turns: u64) -> Option<Cycle> {
     Some(system.start()? - description.lead() + turns * description.tick)
 }
 
-/// What the host does at its turn; false if there is none any more.
+/// Takes the host's turn; false if there is none any more.
 fn take_turn(options: &SystemOptions, point: &mut Point) -> Result<bool, HostError> {
     let turn = match &options.turns {
         None => &options.idle,

@@ -7,10 +7,10 @@ use takt_emu::{Event, Status};
 use takt_isa::timing::Cycle;
 use takt_system::{InputEvent, LinkEvent};
 
-/// What a core's session has found: where, which core, and what.
+/// A find of a core's session: the cycle, the core, and the reason.
 type Found = (Cycle, usize, Why);
 
-/// What is looked for: positions at which to stop, with the stop's number if it is one.
+/// Positions at which to stop, with the stop's number if it is one.
 type Hits = Vec<(Cycle, Option<u32>)>;
 
 /// For each core what is looked for in its session.
@@ -63,7 +63,7 @@ impl SystemSession {
                 self.seek_back(&mut [], |_, _| Ok(Vec::new()), |cores, _| ends(unit, core, cores))
             }
             (Unit::Line | Unit::Call | Unit::Out, _) => {
-                // How deep it is now is what counts, not how deep it was where the search begins.
+                // The depth of calls now counts, not that where the search begins.
                 let wanted = self.step_searches(views, core, unit);
                 self.seek_back(views, |_, _| Ok(wanted.clone()), |_, _| Hits::new())
             }
@@ -277,7 +277,7 @@ impl SystemSession {
         let looks = searches.iter().any(Option::is_some);
         loop {
             let begin = looks.then(|| self.point.clone());
-            // What issues where a stretch ends is known of the next one.
+            // Issues at the end of a stretch are events of the next one.
             let from = self.cycle().max(origin + 1);
             let mut seen = Seen::default();
             let left = self.run_limit.saturating_sub(self.cycle() - origin).max(1);
@@ -330,7 +330,7 @@ impl SystemSession {
             let looks = searches.iter().any(Option::is_some);
             let mut hits = Hits::new();
             let mut found: Option<Found> = None;
-            // What is told of late, too.
+            // Late events count, too.
             while self.cycle() < end + LATE {
                 let from = self.cycle().max(start + 1);
                 let begin = (looks && from < end).then(|| self.point.clone());
@@ -346,7 +346,7 @@ impl SystemSession {
                     break;
                 }
             }
-            // What has just happened where a stretch begins is known of the one before.
+            // Events just before a stretch are those of the one before.
             let last =
                 hits.into_iter().filter(|(cycle, _)| *cycle < end && (*cycle > start || start == 0)).max();
             match (last, found) {
@@ -437,7 +437,7 @@ fn complete(searches: &mut [Option<Search>], earlier: &[Option<Search>]) {
     }
 }
 
-/// Where steps of a core end, of those that its own session need not be asked about: by bundles and periods; and all where it
+/// Ends of steps of a core, of those that its own session need not be asked about: by bundles and periods; and all where it
 /// halts.
 fn ends(unit: Unit, core: usize, cores: &[(usize, Event)]) -> Hits {
     let own = cores.iter().filter(|(own, _)| *own == core);

@@ -273,7 +273,7 @@ impl Debugged {
             return answer(info(format!("link {name}"), conditions));
         }
         let core = self.core_of(&of)?;
-        // What has no value yet can be watched all the same.
+        // An expression without a value yet can be watched all the same.
         if let Err(description) = self.session(core).parse(&name) {
             return answer(DataBreakpointInfo {
                 data_id: None,

@@ -32,11 +32,11 @@ pub trait Launcher {
     /// Makes it.
     ///
     /// # Errors
-    /// What is wrong with the arguments, or with the program.
+    /// If something is wrong with the arguments, or with the program.
     fn launch(&mut self, arguments: &Value, control: &Arc<Control>) -> Result<Launched, String>;
 }
 
-/// What is debugged.
+/// A session that is to be debugged.
 pub struct Launched {
     /// The session, at its beginning or where there is something to see.
     pub console: Console,
@@ -62,12 +62,12 @@ struct Server<'c> {
     stop_on_entry: bool,
     /// The client only wants it run: nothing stops it, and its end is the session's.
     no_debug: bool,
-    /// What is to be done once the answer is sent.
+    /// The consequence of the request, once the answer is sent.
     then: Then,
     ended: bool,
 }
 
-/// What is being debugged.
+/// The session that is being debugged.
 struct Debugged {
     console: Console,
     breakpoints: Breakpoints,

@@ -67,7 +67,7 @@ impl Filters {
     }
 }
 
-/// What exceptions there were up to a position, in a core.
+/// The exceptions that there were up to a position, in a core.
 #[derive(Clone, PartialEq, Debug)]
 struct Met {
     flags: Vec<(&'static str, bool)>,
@@ -79,7 +79,7 @@ impl Met {
     fn now(session: &Session, filters: Filters) -> Met {
         let emulator = session.emulator();
         let statistics = emulator.statistics();
-        // What is raised in the cycle to come counts: the operation that clears the flags may issue in that very cycle.
+        // A flag raised in the cycle to come counts: the operation that clears the flags may issue in that very cycle.
         let raised = emulator.in_flight().filter(|retire| retire.cycle <= emulator.now());
         let flags = raised.fold(emulator.flags(), |flags, retire| flags | retire.flags);
         Met {
@@ -219,16 +219,16 @@ impl Server<'_> {
             }
             Why::Start => self.stopped(core, "entry", Some("the beginning of the run".to_owned()), None),
             Why::Fault(fault) => {
-                let told = debugged.session(core).diagnose(&fault).render(false);
-                let text = told.lines().next().unwrap_or("").to_owned();
-                debugged.exception = Some((fault.kind.name().to_owned(), told.clone()));
-                self.output(&told);
+                let rendered = debugged.session(core).diagnose(&fault).render(false);
+                let text = rendered.lines().next().unwrap_or("").to_owned();
+                debugged.exception = Some((fault.kind.name().to_owned(), rendered.clone()));
+                self.output(&rendered);
                 if self.no_debug {
                     return self.event(Event::Terminated);
                 }
                 self.stopped(core, "exception", Some(text), None);
             }
-            // Where a run ends there is still a way back; the second time, it is over.
+            // From the end of a run there is still a way back; the second time, it is over.
             Why::Halted | Why::InputsEnd if over => self.event(Event::Terminated),
             Why::Halted | Why::InputsEnd => {
                 debugged.over = true;
@@ -277,7 +277,7 @@ impl Debugged {
     fn step(&mut self, core: usize, unit: Unit, over: bool) -> End {
         let depth = |debugged: &Debugged| debugged.session(core).emulator().stack().len();
         let mut end = End { core, why: Why::Done };
-        // What is shown is the bundle to come. If it is not about to issue, as before the first one, a step begins where it
+        // The bundle to come is shown. If it is not about to issue, as before the first one, a step begins where it
         // is: it would else end there, and seem to have gone nowhere.
         let now = self.session(core).cycle();
         let issues = self.console.core_mut(core).and_then(|session| session.next_issue().1) == Some(now);
