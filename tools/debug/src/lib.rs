@@ -1,6 +1,7 @@
 //! Traces of running programs, and debug sessions on them. Plain data in and out; nothing here prints.
 
 mod accuracy;
+mod along;
 pub mod console;
 pub mod fault;
 mod info;

@@ -23,7 +23,6 @@ mod stops;
 
 pub use expression::Live;
 pub(crate) use expression::Reads;
-pub(crate) use known::Known;
 pub use machine::Place;
 pub use meaning::Life;
 pub use number::{Shown, UlpDistance, hex_float, ulp_distance};
@@ -31,6 +30,7 @@ pub(crate) use search::Search;
 use stops::Watcher;
 pub use stops::{Stop, Test, Where};
 
+use crate::along::{self, Along};
 use machine::Machine;
 use std::collections::BTreeSet;
 use std::num::NonZeroU64;
@@ -45,7 +45,7 @@ use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{BundleAddress, Program, Register, SlotIndex, Type};
 
 /// Checkpoints that are kept. At 10⁸ cycles they are at most 2¹⁹ cycles apart.
-pub const CHECKPOINTS: usize = 512;
+pub const CHECKPOINTS: usize = along::MOST;
 /// Cycles between checkpoints at first.
 const INTERVAL: Cycle = 1 << 12;
 /// Cycles that run at once at most: so often is looked for an interrupt.
@@ -230,13 +230,12 @@ pub struct Session {
     options: Options,
     core: Core,
     /// By cycle, ascending; the first is cycle 0.
-    checkpoints: Vec<Core>,
-    interval: Cycle,
+    checkpoints: Along<Core>,
     /// By cycle, ascending.
     edits: Vec<Edit>,
     stops: Vec<(u32, Stop)>,
     /// The watched values at positions of the run.
-    known: Known<Watcher>,
+    known: Along<Watcher>,
     next_id: u32,
     /// The line that a breakpoint stopped at, and the cycle.
     line: Option<(Cycle, Location)>,
@@ -265,18 +264,17 @@ impl Session {
         let mut session = Session {
             options,
             core,
-            checkpoints: Vec::new(),
-            interval: INTERVAL,
+            checkpoints: Along::every(INTERVAL),
             edits: Vec::new(),
             stops: Vec::new(),
-            known: Known::default(),
+            known: Along::every(INTERVAL),
             next_id: 1,
             line: None,
             afar: false,
             run_limit: RUN_LIMIT,
         };
         session.set_row();
-        session.checkpoints.push(session.core.clone());
+        session.checkpoints.add(0, session.core.clone());
         Ok(session)
     }
 
@@ -462,7 +460,6 @@ impl Session {
         self.checkpoints.clear();
         self.edits.clear();
         self.known.clear();
-        self.checkpoints.push(self.core.clone());
     }
 
     /// Looks at a machine that runs elsewhere, between two periods.
@@ -513,7 +510,7 @@ impl Session {
         }
         let edit = Edit { cycle: self.cycle(), place, bits };
         self.edits.truncate(self.core.edits);
-        self.checkpoints.retain(|checkpoint| checkpoint.emulator.now() <= edit.cycle);
+        self.checkpoints.forget_from(edit.cycle + 1);
         self.known.forget_from(edit.cycle);
         self.edits.push(edit);
         self.make_edits();

@@ -3,7 +3,7 @@
 use super::interest::Interest;
 use super::machine::Machine;
 use super::stops::{Stop, Where};
-use super::{CHECKPOINTS, Core, Cycle, End, Live, Move, SLICE, Session, Unit, WINDOW, Why};
+use super::{Core, Cycle, End, Live, Move, SLICE, Session, Unit, WINDOW, Why};
 use std::sync::atomic::Ordering;
 use takt_emu::{Emulator, PeriodError, Upcoming};
 use takt_isa::program::Location;
@@ -31,9 +31,7 @@ impl Session {
             return Err(Why::InputsEnd);
         }
         let edit = self.edits.get(self.core.edits).map_or(Cycle::MAX, |edit| edit.cycle);
-        let last = self.checkpoints.last().map_or(0, |checkpoint| checkpoint.emulator.now());
-        // Before the last checkpoint there is none to make.
-        let checkpoint = if self.cycle() < last { Cycle::MAX } else { last + self.interval };
+        let checkpoint = self.checkpoints.due(self.cycle());
         let begin = self.cycle();
         let until = target.min(edit).min(checkpoint).min(begin + SLICE);
         let result = self.core.emulator.run_period_until(until);
@@ -53,24 +51,11 @@ impl Session {
             Err(PeriodError::Halted | PeriodError::Port(_)) => return Err(Why::Halted),
         }
         if self.cycle() >= checkpoint {
-            self.keep();
+            // Before its edits.
+            self.checkpoints.add(self.cycle(), self.core.clone());
         }
         self.make_edits();
         Ok(())
-    }
-
-    /// Keeps a checkpoint of this position, before its edits; if there are too many, every other one goes.
-    fn keep(&mut self) {
-        if self.checkpoints.len() >= CHECKPOINTS {
-            let mut index = 0;
-            self.checkpoints.retain(|_| {
-                index += 1;
-                index % 2 == 1
-            });
-            self.interval *= 2;
-        }
-        let checkpoint = self.core.clone();
-        self.checkpoints.push(checkpoint);
     }
 
     /// Runs again from the beginning to this position, and shows the machine after each cycle in which a bundle issued, with that
@@ -101,7 +86,7 @@ impl Session {
 
     /// The cycles of the checkpoints.
     pub fn checkpoints(&self) -> Vec<Cycle> {
-        self.checkpoints.iter().map(|checkpoint| checkpoint.emulator.now()).collect()
+        self.checkpoints.cycles().collect()
     }
 
     /// Goes back, or on, to a cycle.
@@ -115,8 +100,7 @@ impl Session {
 
     /// Restores the last checkpoint at which `is_before` holds, unless this position is nearer to the end of those.
     fn approach(&mut self, is_before: impl Fn(&Core) -> bool) {
-        let index = self.checkpoints.partition_point(&is_before);
-        let Some(checkpoint) = self.checkpoints.get(index.saturating_sub(1)) else { return };
+        let Some(checkpoint) = self.checkpoints.last_while(&is_before) else { return };
         if checkpoint.emulator.now() > self.cycle() || !is_before(&self.core) {
             self.core = checkpoint.clone();
         }
@@ -208,10 +192,7 @@ impl Session {
             // A position that is found lies behind the beginning of the stretch, so that the state before it is known. What is
             // looked for may be near, and else a stretch begins at a checkpoint.
             let near = (end - 1).saturating_sub(window);
-            let index = self.checkpoints.partition_point(|checkpoint| checkpoint.emulator.now() <= end - 2);
-            let checkpoint =
-                self.checkpoints[..index].last().map_or(0, |checkpoint| checkpoint.emulator.now());
-            let start = near.max(checkpoint);
+            let start = near.max(self.checkpoints.before(end - 2).map_or(0, |(cycle, _)| cycle));
             window = window.saturating_mul(8);
             let mut found = self.go_to(start);
             let mut last = None;

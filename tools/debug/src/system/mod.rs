@@ -16,7 +16,8 @@ mod seek;
 pub(crate) use links::link_named;
 pub use links::link_text;
 
-use crate::session::{self, Control, Known, Place, RUN_LIMIT, Why};
+use crate::along::Along;
+use crate::session::{self, Control, Place, RUN_LIMIT, Why};
 use std::sync::Arc;
 use takt_emu::{Emulator, Event, LoadError};
 use takt_isa::BundleAddress;
@@ -27,8 +28,6 @@ use takt_system::{
 
 /// Cycles that are recorded at once.
 const STRETCH: Cycle = 1 << 12;
-/// Checkpoints that are kept; the distance between them doubles when there are more.
-const CHECKPOINTS: usize = 256;
 /// An event on a link is told of at most so many cycles late: what is under way, and a few more.
 const LATE: Cycle = MAX_LATENCY + 8;
 
@@ -123,14 +122,13 @@ pub struct SystemSession {
     options: SystemOptions,
     point: Point,
     /// By cycle, ascending; the first is cycle 0.
-    checkpoints: Vec<Point>,
-    interval: Cycle,
+    checkpoints: Along<Point>,
     stops: Vec<(u32, SystemStop, String)>,
     next_id: u32,
     /// By cycle, ascending.
     edits: Vec<Edit>,
     /// Searches for the stops of the cores' sessions that have gone through the run up to positions of it.
-    known: Known<seek::Searches>,
+    known: Along<seek::Searches>,
     /// Cycles for which a command may run.
     pub run_limit: Cycle,
 }
@@ -144,15 +142,16 @@ impl SystemSession {
         let mut system = System::new(description)?;
         system.keep_events();
         let point = Point { system, turns: 0, links: Vec::new(), edits: 0 };
+        let mut checkpoints = Along::every(STRETCH);
+        checkpoints.add(0, point.clone());
         Ok(SystemSession {
             options,
-            checkpoints: vec![point.clone()],
+            checkpoints,
             point,
-            interval: STRETCH,
             stops: Vec::new(),
             next_id: 1,
             edits: Vec::new(),
-            known: Known::default(),
+            known: Along::every(STRETCH),
             run_limit: RUN_LIMIT,
         })
     }
@@ -251,7 +250,7 @@ impl SystemSession {
     pub fn set(&mut self, core: usize, place: Place, bits: u32) {
         let now = self.cycle();
         self.edits.truncate(self.point.edits);
-        self.checkpoints.retain(|point| point.system.now() <= now);
+        self.checkpoints.forget_from(now + 1);
         self.known.forget_from(now);
         self.edits.push(Edit { cycle: now, core, place, bits });
         make_edits(&self.edits, &mut self.point);
@@ -263,24 +262,8 @@ impl SystemSession {
 
     /// To the last checkpoint not after a cycle.
     fn restore(&mut self, cycle: Cycle) {
-        let next = self.checkpoints.partition_point(|point| point.system.now() <= cycle);
-        self.point = self.checkpoints[next.saturating_sub(1)].clone();
-    }
-
-    fn checkpoint(&mut self) {
-        let now = self.cycle();
-        let last = self.checkpoints.last().map_or(0, |point| point.system.now());
-        if now < last + self.interval {
-            return;
-        }
-        self.checkpoints.push(self.point.clone());
-        if self.checkpoints.len() > CHECKPOINTS {
-            let mut number = 0;
-            self.checkpoints.retain(|_| {
-                number += 1;
-                number % 2 == 1
-            });
-            self.interval *= 2;
+        if let Some((_, point)) = self.checkpoints.before(cycle) {
+            self.point = point.clone();
         }
     }
 
@@ -327,8 +310,8 @@ impl SystemSession {
             make_edits(&self.edits, point);
         }
         self.options.control.report(self.cycle());
-        if why == SystemWhy::Done {
-            self.checkpoint();
+        if why == SystemWhy::Done && self.cycle() >= self.checkpoints.due(self.cycle()) {
+            self.checkpoints.add(self.cycle(), self.point.clone());
         }
         why
     }

@@ -101,8 +101,9 @@ impl SystemSession {
                 return why;
             }
         }
-        let before = self.checkpoints.partition_point(|point| ended(&point.system) < period);
-        self.point = self.checkpoints[before.saturating_sub(1)].clone();
+        if let Some(point) = self.checkpoints.last_while(|point| ended(&point.system) < period) {
+            self.point = point.clone();
+        }
         while ended(self.system()) < period {
             let why = self.step(&mut [], core, Unit::Period);
             if why != SystemWhy::Done {
@@ -196,8 +197,7 @@ impl SystemSession {
         }
         let here = self.cycle();
         let base = self.known.before(here).map_or(0, |(cycle, _)| cycle);
-        let mut checkpoints: Vec<Cycle> =
-            self.checkpoints.iter().map(|point| point.system.now()).filter(|cycle| *cycle < here).collect();
+        let mut checkpoints: Vec<Cycle> = self.checkpoints.cycles().filter(|cycle| *cycle < here).collect();
         let fresh = |views: &[&mut Session]| views.iter().map(|view| Search::stops(view)).collect();
         if let Some(&near) = checkpoints.last().filter(|near| **near > base) {
             self.move_to(near)?;
