@@ -155,7 +155,7 @@ impl Block {
     #[inline]
     pub(crate) fn compile_after(&mut self, after: u64, depth: u32) {
         if self.runs >= after && matches!(self.compiled, Compiled::NotYet) {
-            self.compiled = Compiled::from_code(jit::compile(self, depth));
+            self.compiled = Compiled::from_code(jit::compile(&self.micros, &self.late, depth));
         }
     }
 
@@ -163,7 +163,7 @@ impl Block {
     #[inline]
     pub(crate) fn compile_lanes_after(&mut self, after: u64, depth: u32) {
         if self.runs >= after && matches!(self.compiled_lanes, Compiled::NotYet) {
-            self.compiled_lanes = Compiled::from_code(jit::compile_lanes(self, depth));
+            self.compiled_lanes = Compiled::from_code(jit::compile_lanes(&self.micros, &self.late, depth));
         }
     }
 

@@ -1,14 +1,17 @@
-//! The machine with a program in it: what the outside sees.
+//! The emulator as the outside sees it: a machine with a program in it.
+//!
+//! `cycle`, `fast`, `io` and `restore` implement further methods of [`Emulator`], one way of running or placing it each: they and this
+//! file import one another.
 
 use crate::block::{Cache, Line};
 use crate::code::Code;
 use crate::event::{Event, PortWrite, Retire};
 use crate::fast::{Fast, Journal};
 use crate::fault::{Fault, FaultKind, LoadError};
+use crate::io::{Period, PeriodReport, Ticks};
 use crate::jit;
 use crate::machine::{RegisterSet, State};
 use crate::statistics::{Statistics, Tally};
-use crate::system::{Period, PeriodReport, Ticks};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use takt_isa::fp::Flags;

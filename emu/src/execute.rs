@@ -37,8 +37,10 @@ fn check_operation(operation: &Operation, flow: Flow, state: &State, machine: &M
             outside.then_some(FaultKind::DataAddress { address, depth, store })
         }
         // It is this operation whose flow the bundle's is.
-        effect if effect.redirects() => stack_fault(flow, state, machine),
-        _ => None,
+        Effect::Call | Effect::Return => stack_fault(flow, state, machine),
+        Effect::Jump | Effect::BranchZero | Effect::BranchNonzero | Effect::Wait | Effect::Halt => None,
+        Effect::Compute | Effect::Immediate | Effect::ReadFlags | Effect::ClearFlags => None,
+        Effect::Nothing => None,
     }
 }
 

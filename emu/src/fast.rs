@@ -183,7 +183,7 @@ fn run(
     journal.begin(state, block, last);
     state.write_back_until(last);
     if let Compiled::Code(code, _) = &block.compiled {
-        if code.run(block, state, &mut journal.words, &mut journal.late, &mut journal.writes) {
+        if code.run(&block.late, state, &mut journal.words, &mut journal.late, &mut journal.writes) {
             finish(block, state, journal, entered);
             runs.done += 1;
             return true;

@@ -6,15 +6,16 @@
 //! the common timeline it is an ordinary emulator, which runs to the end of the period and knows nothing of the batch. At
 //! the tick it joins again, if it is then where the others are.
 
-use super::lanes::{InFlight, LANES, Lanes, Mask, Row};
+use super::lanes::{InFlight, Lanes};
 use crate::block::{Ages, Compiled, ages};
 use crate::emulator::{CompiledRuns, Emulator, MAX_CYCLE, Recent, Status};
 use crate::event::{PortWrite, Retire};
 use crate::execute::stack_fault;
 use crate::fast::has_required;
 use crate::fault::LoadError;
+use crate::io::{PeriodError, PeriodReport};
+use crate::lane::{LANES, Mask, Row};
 use crate::machine::{Pending, RegisterSet, State};
-use crate::system::{PeriodError, PeriodReport};
 use takt_isa::fp::{Flags, Value};
 use takt_isa::timing::{self, Cycle};
 use takt_isa::{BundleAddress, Flow, Program, Register};

@@ -4,22 +4,13 @@ use crate::block::Block;
 use crate::event::PortWrite;
 use crate::execute::data_address;
 use crate::jit;
+use crate::lane::{LANES, Mask, Row};
 use crate::machine::{NanWrites, State, WORDS, Word};
 use crate::micro::{Kind, Micro};
 use pulp::{Arch, NullaryFnOnce};
 use takt_isa::fp::{Flags, Host, Screened, Value, is_nan};
 use takt_isa::timing::Cycle;
 use takt_isa::{Effect, Register, compute, compute_lanes};
-
-/// Lanes of a group: vectors as wide as the widest hosts', several of them, so that choosing what to do costs little beside
-/// doing it.
-pub(crate) const LANES: usize = 16;
-
-/// One word of every lane.
-pub(crate) type Row = [u32; LANES];
-
-/// A set of lanes.
-pub(crate) type Mask = [bool; LANES];
 
 /// Of a result in flight: the values of all lanes. What is the same for all is in the timeline's list, at the same place.
 #[derive(Clone, Debug)]

@@ -10,9 +10,9 @@ mod pool;
 
 use crate::emulator::CompiledRuns;
 use crate::fault::LoadError;
-use crate::system::{Number, PeriodError, PeriodReport, PortError, input_for, output_for};
+use crate::io::{Number, PeriodError, PeriodReport, PortError, input_for, output_for};
+use crate::lane::LANES;
 use group::Group;
-pub(crate) use lanes::{LANES, Row};
 use std::num::NonZeroU64;
 use std::sync::Arc;
 use takt_isa::fp::Flags;

@@ -1,8 +1,7 @@
 //! A core of a system with its gate, and the writes to its output ports told apart.
 
 use super::SystemPlan;
-use super::plan::Driver;
-use super::plan::OutputPort;
+use super::plan::{Driver, OutputPort, STATUS};
 use crate::plan::Plan;
 use crate::plan::names::net;
 use crate::verilog::{Direction, Expr, Instance, Module, ModuleError, Net, Port, choose, concat, decimal};
@@ -10,18 +9,6 @@ use takt_isa::{Bank, BankIndex, Register};
 
 /// Whether the loader writes an input port of this core.
 pub(super) const LOAD_INPUT: Net = Net::bit("load_input");
-
-/// Ports that every core's module has and that come from the core as they are.
-pub(super) const STATUS: [Net; 8] = [
-    net::ENDED,
-    net::WAITING,
-    net::HALTED,
-    net::DEADLINE_MISSED,
-    net::FAULT,
-    net::FAULT_KIND,
-    net::FAULT_SLOT,
-    net::FAULT_ADDRESS,
-];
 
 /// Ports of a core's module that a board looks at, in whose top they have the names of [`SystemPlan::board_port`]: first the one that it
 /// drives, then those that it reads.

@@ -1,12 +1,26 @@
 //! Every name in the generated part of a system, and the top's pins.
 
-use super::core::STATUS;
-use super::top::DUE;
 use crate::plan::Plan;
+use crate::plan::names::net;
 use crate::verilog::{Direction, Expr, Net, no};
 use takt_isa::Register;
+use takt_isa::system::{Description, End, LinkKind, Mailbox, Status};
 use takt_isa::timing::Cycle;
-use takt_system::{Description, End, LinkKind, Mailbox, Status};
+
+/// The base tick is due.
+pub(super) const DUE: Net = Net::bit("due");
+
+/// Ports that every core's module has and that come from the core as they are.
+pub(super) const STATUS: [Net; 8] = [
+    net::ENDED,
+    net::WAITING,
+    net::HALTED,
+    net::DEADLINE_MISSED,
+    net::FAULT,
+    net::FAULT_KIND,
+    net::FAULT_SLOT,
+    net::FAULT_ADDRESS,
+];
 
 /// What loads a system's cores, and gives them their ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -138,7 +138,7 @@ impl Debugged {
         Variable {
             name: name.to_owned(),
             value: shown(ty, bits, hex),
-            ty: Some(format!("{} in {place}", takt_asm::type_name(ty))),
+            ty: Some(format!("{} in {place}", ty.name())),
             evaluate_name: Some(name.to_owned()),
             variables_reference: if bits.is_some() { views(core, register) } else { 0 },
         }
@@ -247,7 +247,7 @@ impl Debugged {
             Place::Word(_) => 0,
         };
         let value = Some(shown(ty, Some(bits), false));
-        answer(Evaluated { value, ty: Some(takt_asm::type_name(ty)), variables_reference, result: None })
+        answer(Evaluated { value, ty: Some(ty.name()), variables_reference, result: None })
     }
 
     pub(super) fn evaluate(&mut self, arguments: &EvaluateArguments) -> Answer {
@@ -258,9 +258,9 @@ impl Debugged {
         let evaluated = session.parse(expression).and_then(|live| {
             let (variables_reference, ty, value) = match session.place(&live)? {
                 Some((Place::Register(register), ty, bits)) => {
-                    (views(core, register), takt_asm::type_name(ty), shown(ty, bits, hex))
+                    (views(core, register), ty.name(), shown(ty, bits, hex))
                 }
-                Some((Place::Word(_), ty, bits)) => (0, takt_asm::type_name(ty), shown(ty, bits, hex)),
+                Some((Place::Word(_), ty, bits)) => (0, ty.name(), shown(ty, bits, hex)),
                 None => (0, "value", session.evaluate(&live)?.to_string()),
             };
             Ok(Evaluated { result: Some(value), ty: Some(ty), variables_reference, value: None })
