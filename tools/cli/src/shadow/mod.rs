@@ -40,7 +40,7 @@ fn read<L: Line>(host: &mut Host<L>, ports: &[Watched<'_>]) -> Result<Vec<u32>> 
     Ok(words)
 }
 
-/// What the board does instead of waiting, if it does not.
+/// The state of the board, if it does not wait.
 fn stopped<L: Line>(host: &mut Host<L>) -> Result<Option<&'static str>> {
     let status = host.status()?;
     Ok(match status {
@@ -80,7 +80,7 @@ fn compare<L: Line>(
         bail!("the board did not run the period: is another host connected?");
     }
     for (port, bits) in outputs.iter().zip(live) {
-        // What was never written may be anything.
+        // A port that was never written may have any value.
         let Some(expected) = emulator.output_bits(port.port.register) else { continue };
         if expected != bits {
             let mut text = String::new();

@@ -107,7 +107,7 @@ pub(crate) fn run<L: Line>(
             (None, Err(error)) => bail!("base tick {tick}: the board goes on; the emulator: {error}"),
         }
         for (port, bits) in outputs.iter().zip(live) {
-            // What was never written may be anything.
+            // A port that was never written may have any value.
             let Some(expected) = system.core(port.core).output_bits(port.register) else { continue };
             if expected != bits {
                 let mut text = String::new();

@@ -67,7 +67,7 @@ fn warn(system: &LoadedSystem, source: &SourceArguments, color: bool) -> Result<
     let reads = heads::doubtful(&system.description);
     let told = reads.iter().filter_map(|read| {
         let sources = &system.programs[read.core].sources;
-        takt_debug::heads::diagnose(read, &system.description, sources, &levels)
+        takt_debug::stale_reads::diagnose(read, &system.description, sources, &levels)
     });
     let told: Vec<Diagnostics> = told.collect();
     let text: Vec<String> = told.iter().map(|diagnostics| diagnostics.render(color)).collect();

@@ -1,4 +1,4 @@
-//! What stands beside a line: when its operations issue and what they wait for; and above a section: what it takes.
+//! Inlay hints beside a line: when its operations issue and what they wait for; and above a section: the cycles that it takes.
 
 use crate::lsp::program::Counted;
 use crate::lsp::{Settings, plural};
@@ -14,7 +14,7 @@ const LISTED: usize = 4;
 /// Operations of a line that are explained.
 const EXPLAINED: usize = 12;
 
-/// What is said beside a line.
+/// The hint beside a line.
 pub(crate) struct Hint {
     /// The line, from 0.
     pub(crate) line: u32,
@@ -93,7 +93,7 @@ fn short(counted: &Counted, words: &[Word]) -> String {
         let ends: Vec<String> = ends.into_iter().flatten().filter_map(shown).collect();
         format!("{} ({} operations)", ends.join(" … "), words.len())
     };
-    // Where it is one operation, what holds its bundle up is its own affair.
+    // A single operation is held up by what holds its bundle up.
     if let [(address, _)] = words
         && let Some(issue) = issue(counted, *address)
         && let Some(&(cause, cycles)) = issue.stalls.iter().max_by_key(|(_, cycles)| *cycles)
@@ -138,7 +138,7 @@ fn explained(counted: &Counted, words: &[Word]) -> String {
     text
 }
 
-/// What is said above a line of a file: lines from 0. `head` knows the lines that labels and section directives stand on.
+/// The hint above a line of a file: lines from 0. `head` knows the lines that labels and section directives stand on.
 pub(crate) fn lenses(
     counted: &Counted,
     settings: &Settings,

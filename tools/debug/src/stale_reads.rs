@@ -1,4 +1,4 @@
-//! A doubtful read of a FIFO's head, told like a mistake in the source, with the mend.
+//! The warning of a stale FIFO read: a field that is read after the pop of its entry, with the mend.
 
 use crate::fault::line;
 use std::sync::Arc;
@@ -8,7 +8,7 @@ use takt_asm::source::Sources;
 use takt_system::Description;
 use takt_system::heads::{Doubt, HeadRead};
 
-/// What to say of a read: at its source line, if `sources` (of its core's program: texts, by the names that the program has for
+/// The diagnostic of a read: at its source line, if `sources` (of its core's program: texts, by the names that the program has for
 /// them) have it. `None` if `levels` allow it.
 pub fn diagnose(
     read: &HeadRead,
