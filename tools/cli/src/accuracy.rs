@@ -13,6 +13,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use takt_analysis::follow::PERIOD_LIMIT;
 use takt_analysis::accuracy::{
     Assumed, Decision, Enclosure, Hazard, Interval, Lost, Moment, OperationAccuracy, OutputAccuracy,
     OutputBound, Part, Shadow, Worst, enclose,
@@ -108,7 +109,7 @@ fn measure(arguments: &Accuracy, inputs: &Path, program: &Program) -> Result<Sha
         }
         // What runs once sees the first period's inputs.
         for _ in 0..if once { 2 } else { 1 } {
-            emulator.set_cycle_limit(emulator.now() + crate::run::PERIOD_LIMIT);
+            emulator.set_cycle_limit(emulator.now() + PERIOD_LIMIT);
             let goes_on = shadow.run_period(&mut emulator);
             if !goes_on.with_context(|| format!("period {}", shadow.periods()))? {
                 return Ok(shadow);

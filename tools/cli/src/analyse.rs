@@ -1,11 +1,13 @@
-//! `takt analyse`: where the cycles of one period went, bundle by bundle, and what would make it shorter.
+//! `takt analyse`: an account of the cycles of one period, bundle by bundle, and of what would make it shorter; of a system, an
+//! account of each core's cycles.
 
 use crate::accuracy::Measured;
+use crate::application::{Application, refuse};
 use crate::fault;
 use crate::files::{self, Out};
-use crate::load::{self, Load};
+use crate::load::{Load, Loaded};
 use crate::number;
-use crate::output::{self, Failure};
+use crate::output;
 use crate::ports;
 use crate::select::{OptionalMachine, SourceArguments};
 use crate::system;
@@ -31,24 +33,24 @@ use takt_isa::{Machine, Program};
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Analyse {
     /// Source or image, `-` being standard input; or a system, a `.toml` file.
-    file: PathBuf,
+    pub(crate) file: PathBuf,
     #[command(flatten)]
     machine: OptionalMachine,
     #[command(flatten)]
     source: SourceArguments,
     /// CSV with one named column for each input port and one row for each period; `-` is standard input.
     #[arg(long, value_name = "CSV")]
-    inputs: Option<PathBuf>,
+    pub(crate) inputs: Option<PathBuf>,
     /// Run N periods and analyse the last; 0 is what runs once [default: the rows of --inputs, else 2].
     #[arg(long, value_name = "N", value_parser = number::natural, allow_hyphen_values = true)]
-    periods: Option<u64>,
+    pub(crate) periods: Option<u64>,
     /// Write the picture of the pipeline as a self-contained page for a browser; of a system, that of all cores and
     /// links in the last period of its slowest core. `-` is standard output.
     #[arg(long, value_name = "OUT")]
-    html: Option<PathBuf>,
+    pub(crate) html: Option<PathBuf>,
     /// Print the result as JSON.
     #[arg(long)]
-    json: bool,
+    pub(crate) json: bool,
 }
 
 const EXAMPLES: &str = "\
@@ -68,29 +70,24 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
         writes.push(("--json", Path::new("-")));
     }
     files::check(&reads, &writes)?;
-    if load::is_system(&arguments.file) {
-        if arguments.machine.machine.is_some() {
-            let message = "--machine with a system: the system's file names each core's";
-            return Err(Failure::Usage(message.to_owned()).into());
+    match Application::load(&arguments.file, &arguments.machine, &arguments.source, color)? {
+        Application::Program(loaded) => of_program(arguments, &loaded, color, out),
+        system @ Application::System(_) => {
+            let once = arguments.periods == Some(0);
+            refuse(&[("--periods 0", once, "its cycles are counted from reset, with what runs once")])?;
+            system::analyse::run(arguments, &system, color, out)
         }
-        let system = system::analyse::Arguments {
-            file: &arguments.file,
-            source: &arguments.source,
-            inputs: arguments.inputs.as_deref(),
-            periods: arguments.periods,
-            html: arguments.html.as_deref(),
-            json: arguments.json,
-        };
-        return system::analyse::run(&system, color, out);
     }
+}
+
+fn of_program(arguments: &Analyse, loaded: &Loaded, color: bool, out: &mut Out) -> Result<()> {
     let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
-    let loaded = load.with_source(&arguments.file)?;
     let program = &loaded.program;
     let rows = read_inputs(arguments, program)?;
     let name = files::input_name(&arguments.file);
     let followed = follow(program, &rows, arguments.periods);
     let Followed { trace, period, shadow } =
-        followed.map_err(|error| fault::told(error.into(), &loaded, color))?;
+        followed.map_err(|error| fault::told(error.into(), loaded, color))?;
     let again = |program: &Program| Some(follow(program, &rows, arguments.periods).ok()?.trace);
     let faster = faster(program, &trace, &candidates(arguments, &load), &again);
     let accuracy = Some(Measured::new(program, &shadow).json());

@@ -6,12 +6,12 @@ use crate::load::Loaded;
 use crate::output::{self, Failure};
 use crate::ports;
 use crate::progress::Late;
-use crate::run::PERIOD_LIMIT;
 use anyhow::{Context, Result, bail};
 use serde_json::{Value, json};
 use std::io::Write;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
+use takt_analysis::follow::PERIOD_LIMIT;
 use takt_emu::{Batch, PeriodError, Rows};
 use takt_isa::fp::Flags;
 

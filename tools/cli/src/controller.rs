@@ -1,9 +1,9 @@
 //! A program on the emulator as the controller of the hybrid robot.
 
 use crate::deny::{Denials, Watch};
-use crate::run::PERIOD_LIMIT;
 use crate::select::suggest;
 use anyhow::{Result, anyhow};
+use takt_analysis::follow::PERIOD_LIMIT;
 use takt_emu::{Emulator, Event, PeriodError, PeriodReport, Statistics};
 use takt_isa::{Program, Register};
 use takt_programs::hybrid::closed_loop::{Inputs, TrackingController};
@@ -63,7 +63,7 @@ impl OnEmulator {
 
     /// What was denied and happened.
     pub(crate) fn denials(&self) -> Denials {
-        self.watch.end(&self.emulator)
+        self.watch.end(&self.emulator, "")
     }
 
     /// The registers of the algorithm's inputs, in their order.

@@ -1,13 +1,13 @@
 //! Systems of several cores: their files, and the commands that take them.
 
 pub(crate) mod analyse;
-pub(crate) mod bound;
-pub(crate) mod cosim;
+pub(crate) mod controller;
 pub(crate) mod debug;
-mod host;
+pub(crate) mod host;
 pub(crate) mod record;
+pub(crate) mod report;
 pub(crate) mod run;
-pub(crate) mod track;
+mod watch;
 
 use crate::fault;
 use crate::files;
