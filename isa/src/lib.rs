@@ -22,11 +22,13 @@
 pub mod encode;
 pub mod flow;
 pub mod fp;
+pub mod load;
 pub mod manual;
 pub mod number;
 pub mod program;
 pub mod shape;
 pub mod spec;
+pub mod system;
 pub mod text;
 pub mod timing;
 

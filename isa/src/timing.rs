@@ -32,6 +32,38 @@ pub const TICK_DELAY: Cycle = 1;
 /// Cycles between the issue of a `wait` and the cycle in which the pins tell of it.
 pub const ENDED_DELAY: Cycle = 2;
 
+/// Cycles, from the fewest to the most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Span {
+    /// No run takes fewer.
+    pub best: Cycle,
+    /// No run takes more.
+    pub worst: Cycle,
+}
+
+impl Span {
+    /// No cycle.
+    pub const ZERO: Span = Span { best: 0, worst: 0 };
+
+    /// The cycles of two pieces of a run, one after the other.
+    #[must_use]
+    pub fn and(self, other: Span) -> Span {
+        Span { best: self.best.saturating_add(other.best), worst: self.worst.saturating_add(other.worst) }
+    }
+
+    /// The cycles of two alternatives.
+    #[must_use]
+    pub fn or(self, other: Span) -> Span {
+        Span { best: self.best.min(other.best), worst: self.worst.max(other.worst) }
+    }
+
+    /// The same after so many more cycles.
+    #[must_use]
+    pub fn after(self, cycles: Cycle) -> Span {
+        self.and(Span { best: cycles, worst: cycles })
+    }
+}
+
 /// Why a cycle issued nothing.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
 pub enum Cause {

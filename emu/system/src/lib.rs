@@ -5,22 +5,23 @@
 //! host's command to an output, [`heads`] finds reads of a FIFO's head that its own pop spoils. `docs/system.md` defines in which cycle the other side sees what. Nothing here prints.
 
 mod check;
-mod description;
 mod fifo;
 mod file;
 mod gate;
 pub mod heads;
 pub mod latency;
+mod replay;
 mod system;
 #[cfg(feature = "testing")]
 pub mod testing;
 
 pub use check::{ProgramError, ReadError, Request, read};
-pub use description::{
-    Core, Description, End, Field, Link, LinkKind, MAX_CORES, MAX_DEPTH, MAX_LATENCY, MAX_TICK, MIN_LATENCY,
-    Mailbox, Side, Source, Status, SystemPort, TEXT_BYTES,
-};
 pub use fifo::FifoCounts;
+pub use replay::{Recording, Replay};
 pub use system::{
     CorePeriods, HostAction, HostError, InputEvent, LinkEvent, LinkEventKind, System, SystemFault,
+};
+pub use takt_isa::system::{
+    Core, Description, End, Field, Link, LinkKind, MAX_CORES, MAX_DEPTH, MAX_LATENCY, MAX_TICK, MIN_LATENCY,
+    Mailbox, Side, Source, Status, SystemPort, TEXT_BYTES,
 };

@@ -1,7 +1,7 @@
 //! What goes over the UART between host and board: frames, and the registers behind them. docs/protocol.md has it in words.
 
 use std::time::Duration;
-use takt_rtl::bench::LoadRecord;
+use takt_isa::load::LoadRecord;
 use takt_system::MAX_CORES;
 use thiserror::Error;
 

@@ -2,7 +2,7 @@
 //
 //   3 load   count, then that many (space, slot, address, low, high); space 3 is an input port. Resets, then loads
 
-// As `takt_rtl::bench::Space`.
+// As `takt_isa::load::Space`.
 enum Space { TO_PROGRAM, TO_DATA, TO_REGISTER, TO_INPUT };
 
 static Was was;

@@ -6,9 +6,9 @@ use std::fs;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use takt_isa::load::{LoadRecord, Space, load_records};
 use takt_isa::timing::Cycle;
 use takt_isa::{Program, Register};
-use takt_rtl::bench::{LoadRecord, Space, load_records};
 use takt_rtl::verilator::VerilatorError;
 use thiserror::Error;
 

@@ -17,8 +17,10 @@ pub(crate) trait Driven {
     /// The columns of the inputs.
     fn inputs(&self) -> Vec<Port>;
 
-    /// The columns of the outputs.
-    fn titles(&self) -> Vec<String>;
+    /// The columns of the outputs, if there are any.
+    fn titles(&self) -> Vec<String> {
+        Vec::new()
+    }
 
     /// Runs to where the first row is due.
     fn begin(&mut self) -> Result<()> {
@@ -29,7 +31,9 @@ pub(crate) trait Driven {
     fn row(&mut self, row: &Row) -> Result<bool>;
 
     /// The outputs after the last row.
-    fn values(&self) -> Vec<String>;
+    fn values(&self) -> Vec<String> {
+        Vec::new()
+    }
 }
 
 /// The tables of a run.

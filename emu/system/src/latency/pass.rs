@@ -2,9 +2,9 @@
 
 use super::carried::{Carried, States};
 use super::{LatencyError, MAX_PHASES, MAX_STEPS, MAX_WAYS};
-use crate::description::{Description, End, Link, LinkKind, MIN_LATENCY};
 use std::collections::{BTreeMap, BTreeSet};
 use takt_analysis::Bounds;
+use takt_isa::system::{Description, End, Link, LinkKind, MIN_LATENCY};
 use takt_isa::timing::{Cycle, ENDED_DELAY};
 use takt_isa::{BundleAddress, Machine, Program};
 

@@ -14,7 +14,7 @@ use crate::wiring::{SIGNALS, Wiring};
 use crate::{VERILOG, pll};
 use parts::direction;
 use std::fmt::Write as _;
-use takt_rtl::bench::{LoadRecord, Space, load_records};
+use takt_isa::load::{LoadRecord, Space, load_records};
 use takt_rtl::export::DesignFile;
 use takt_rtl::{Driver, Library, SystemDesign, export, export_driven, system_records};
 use takt_system::Description;

@@ -12,6 +12,7 @@ use takt_analysis::Bounds;
 use takt_board::latency::{Answer, End, Part, Way, Ways, program_ways, system_ways};
 use takt_board::{Application, Board, Wiring};
 use takt_isa::Program;
+use takt_isa::timing::Span;
 use takt_system::Description;
 use takt_system::latency::Passages;
 
@@ -50,9 +51,8 @@ pub(super) fn program(
     let (board, wiring) = read(arguments, wiring, program.into(), color)?;
     // A board gives the tick only after the outputs were read, so the program always waits by then.
     let periods = bounds.sections.iter().filter(|section| !section.once).map(|section| section.cycles);
-    let program_takes = periods
-        .reduce(|a, b| takt_analysis::Span { best: a.best.min(b.best), worst: a.worst.max(b.worst) })
-        .context("the program has no period: it never waits for the tick")?;
+    let program_takes =
+        periods.reduce(Span::or).context("the program has no period: it never waits for the tick")?;
     let span = (program_takes.best, program_takes.worst);
     let ways = program_ways(&wiring, program, span);
     let Some(way) = takt_board::latency::ways(&wiring, span).ways.pop().filter(|_| !ways.ways.is_empty())
