@@ -12,7 +12,7 @@ use takt_isa::{BundleAddress, Program, Register};
 /// arrives from a link.
 const NEXT: Cycle = 1 + MIN_LATENCY;
 
-/// What is doubtful about a read.
+/// The kind of doubt about a read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Doubt {
     /// The source has it before the pop, and the scheduler has put it behind: it is the next head's if there is one.
@@ -42,7 +42,7 @@ pub struct HeadRead {
     pub after: Cycle,
     /// So many cycles after the writeback the next head is complete.
     pub complete: Cycle,
-    /// What is doubtful.
+    /// The kind of doubt.
     pub doubt: Doubt,
 }
 
@@ -59,7 +59,7 @@ struct Access {
 pub fn doubtful(description: &Description) -> Vec<HeadRead> {
     let mut found = Vec::new();
     for (number, core) in description.cores.iter().enumerate() {
-        // What is latched stays as it is until the next tick.
+        // A latched input stays as it is until the next tick.
         if core.program.latched {
             continue;
         }
@@ -162,7 +162,7 @@ impl Seek<'_> {
         lines.iter().flatten().max_by_key(|line| line.line).copied()
     }
 
-    /// Whether the source has a read before a pop. Lines of a macro that is defined elsewhere say nothing of the order: a line
+    /// True if the source has a read before a pop. Lines of a macro that is defined elsewhere say nothing of the order: a line
     /// above the stretch is none of it.
     fn stands_before(&self, read: &Access, pop: &Access, above: Option<Location>) -> bool {
         let (Some(read), Some(pop)) = (read.line, pop.line) else { return false };
@@ -171,7 +171,7 @@ impl Seek<'_> {
     }
 }
 
-/// Whether the same line reads the field before the pop too, as one that is repeated (`.rep`) does, for each entry.
+/// True if the same line reads the field before the pop too, as one that is repeated (`.rep`) does, for each entry.
 fn repeated(read: &Access, pop: &Access, reads: &[Access]) -> bool {
     reads.iter().any(|other| {
         other.register == read.register && other.line == read.line && other.cycle < pop.cycle + NEXT

@@ -63,7 +63,7 @@ fn what_is_told_is_what_is_read() {
                 (_, true) => between += 1,
                 other => panic!("distance {distance}, {name}: {other:?}"),
             }
-            // What is not told of is the old entry's before, and the new one's behind.
+            // A read that is not told of is the old entry's before the pop, and the new one's behind.
             let cycle = distance as u64 + i as u64;
             assert!(is_told || (seen[i] == 1) == (cycle < 12), "distance {distance}, {name}: {}", seen[i]);
         }
@@ -74,7 +74,7 @@ fn what_is_told_is_what_is_read() {
 /// The scheduler puts a read behind the pop that the source has below it.
 #[test]
 fn a_read_that_was_moved_is_told_of() {
-    // What `x` is used for waits for a long chain, and its read with it.
+    // The use of `x` waits for a long chain, and its read with it.
     let late = |demand: &str| {
         receiver(&format!(
             ".schedule on\n{HEAD}.reg a:int\n iadd a, n, 1\n{} iadd v, a, x\n mov p, zero\n{demand} wait q\n",
@@ -92,7 +92,7 @@ fn a_read_that_was_moved_is_told_of() {
     assert_eq!(doubts(&receiver(&written)), []);
 }
 
-/// What is right is not told of: entry after entry in one straight line, and a macro that is written above.
+/// Correct reads are not told of: entry after entry in one straight line, and a macro that is written above.
 #[test]
 fn what_is_repeated_is_right() {
     let entry = format!(" mov u, x\n mov v, y\n mov w, z\n mov p, zero\n{}", " nop\n".repeat(20));

@@ -13,9 +13,9 @@ pub struct Difference {
     pub place: String,
     /// The instruction and its place in the source, as far as the event has them.
     pub instruction: String,
-    /// What the emulator does.
+    /// The emulator's event, in words.
     pub emulator: String,
-    /// What the circuit does.
+    /// The circuit's event, in words.
     pub circuit: String,
 }
 
@@ -40,7 +40,7 @@ pub(crate) struct Comparison<E> {
     pub(crate) expected: Vec<E>,
     /// The circuit's.
     pub(crate) found: Vec<E>,
-    /// How many were the same on both.
+    /// The number of events that were the same on both sides.
     pub(crate) compared: u64,
 }
 

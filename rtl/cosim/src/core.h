@@ -10,7 +10,7 @@ static Was was;
 static bool written[OUTPUTS], known[OUTPUTS];
 static uint32_t shown[OUTPUTS];
 
-// What the memories hold, as far as it is known: what is there already is not loaded again. Of a random program that is nearly
+// Contents of the memories, as far as they are known: a word that is there already is not loaded again. Of a random program that is nearly
 // all, and loading both memories as a whole takes several times as long as the program.
 struct Shadow {
     std::vector<uint64_t> words;
@@ -36,7 +36,7 @@ static uint32_t read_output(unsigned number) {
     return top->read_value;
 }
 
-// What the outside sees: after a `wait`, all that was written; if ports are latched, nothing else in between.
+// The outside sees, after a `wait`, all that was written; if ports are latched, nothing else in between.
 static void observe_outputs() {
     if (top->ended) {
         for (unsigned n = 0; n < OUTPUTS; n++) {

@@ -40,9 +40,7 @@ impl CircuitEvent {
     /// The place of an event, at which the other side has the same one, or another one.
     pub(crate) fn place(&self) -> impl Ord + use<> {
         match *self {
-            CircuitEvent::Core { core, event } => {
-                (event.cycle, 0, core, Some((event.kind, event.slot)))
-            }
+            CircuitEvent::Core { core, event } => (event.cycle, 0, core, Some((event.kind, event.slot))),
             CircuitEvent::Link(event) => (event.cycle, 1, event.link, None),
         }
     }

@@ -61,7 +61,7 @@ pub struct Lockstep {
     free_pin: Cycle,
     simulated: Cycle,
     stopped: Option<Fault>,
-    /// What was written to output ports since the last `wait`, by number.
+    /// Values written to output ports since the last `wait`, by number.
     written: BTreeMap<u16, u32>,
     /// Cycles between an input on its pin and the cycle in which the emulator is given it.
     input_delay: Cycle,
@@ -180,8 +180,10 @@ impl Lockstep {
                     written.extend(machine.output_number(write.register).map(|number| (number, write.value)));
                 }
                 Event::Wait { cycle, .. } => {
-                    let published = std::mem::take(written).into_iter().map(|(register, value)| {
-                        CoreEvent { register, value, ..bare(EventKind::Publish, cycle) }
+                    let published = std::mem::take(written).into_iter().map(|(register, value)| CoreEvent {
+                        register,
+                        value,
+                        ..bare(EventKind::Publish, cycle)
                     });
                     expected.extend(published.map(alone));
                 }
@@ -202,7 +204,7 @@ impl Lockstep {
     /// # Errors
     /// A difference, or a simulation that ended.
     pub fn compare(&mut self) -> Result<(), LockstepError> {
-        // What the host does next stands on the pins INPUT_DELAY cycles before now.
+        // The host's next action stands on the pins INPUT_DELAY cycles before now.
         let now = self.emulator.now().saturating_sub(INPUT_DELAY + 1);
         if now > self.simulated {
             self.simulate(now)?;
@@ -224,7 +226,7 @@ impl Lockstep {
                 event.cycle <= cycle || !matches!(event.kind, EventKind::Missed | EventKind::Lost)
             }),
             (None, _) => self.check(|event| event.cycle < now),
-            // What issued before the fault is still written, and nothing else; the emulator leaves it in flight.
+            // Bundles that issued before the fault still write, and nothing else does; the emulator leaves them in flight.
             (Some(fault), _) if circuit_stops(fault) => {
                 let cycle = fault.cycle;
                 let machine = self.emulator.machine();

@@ -45,11 +45,7 @@ struct Process {
 }
 
 impl Process {
-    fn start(
-        program: &Path,
-        arguments: &[&OsStr],
-        folder: Option<&Path>,
-    ) -> Result<Process, ModelError> {
+    fn start(program: &Path, arguments: &[&OsStr], folder: Option<&Path>) -> Result<Process, ModelError> {
         let mut command = Command::new(program);
         if let Some(folder) = folder {
             command.current_dir(folder);

@@ -10,6 +10,7 @@ use crate::number;
 use crate::output::{self, Failure};
 use crate::select::{OptionalMachine, SourceArguments};
 use crate::system::run::SystemRun;
+use crate::system::watch::Observer;
 use anyhow::{Context, Result, bail};
 use bounded::Bounded;
 use clap::Args;
@@ -97,7 +98,8 @@ fn bounded(arguments: &Accuracy, application: &Application, out: &mut Out) -> Re
             (Err(error), None) => bail!("no bound: {error}"),
             (Err(error), Some(_)) => Err(format!("no bound: {error}")),
         };
-        safe &= enclosure.as_ref().is_ok_and(|found| found.hazards.is_empty() && found.first().next().is_none());
+        safe &=
+            enclosure.as_ref().is_ok_and(|found| found.hazards.is_empty() && found.first().next().is_none());
         if arguments.json {
             cores.push(match &enclosure {
                 Ok(enclosure) => Bounded { program, enclosure }.json(),
@@ -184,7 +186,7 @@ impl Driven for Shadowed<'_> {
         for &(register, bits) in row {
             self.emulator.set_input_bits(register, bits)?;
         }
-        // What runs once sees the first period's inputs.
+        // The part that runs once sees the first period's inputs.
         for _ in 0..if self.once { 2 } else { 1 } {
             self.emulator.set_cycle_limit(self.emulator.now() + PERIOD_LIMIT);
             let goes_on = self.shadow.run_period(&mut self.emulator);
@@ -209,39 +211,12 @@ fn measure(arguments: &Accuracy, inputs: &Path, program: &Program) -> Result<Vec
     Ok(vec![shadowed.shadow])
 }
 
-/// A run of a system, of which each core's inputs and ticks are recorded.
-struct Recorded<'a> {
-    run: SystemRun<'a, 'a>,
-    recording: Recording,
-}
-
-impl Driven for Recorded<'_> {
-    const ROWS: &'static str = SystemRun::ROWS;
-
-    fn inputs(&self) -> Vec<Port> {
-        self.run.inputs()
-    }
-
-    fn begin(&mut self) -> Result<()> {
-        let result = self.run.begin();
-        self.recording.record(&mut self.run.system);
-        result
-    }
-
-    fn row(&mut self, row: &Row) -> Result<bool> {
-        let result = self.run.row(row);
-        self.recording.record(&mut self.run.system);
-        result
-    }
-}
-
 /// Runs a system, and then each core by itself on what it was given there, with binary64 beside it.
 fn measure_cores(arguments: &Accuracy, inputs: &Path, description: &Description) -> Result<Vec<Shadow>> {
     let mut run = SystemRun::new(description)?;
-    let recording = Recording::new(&mut run.system);
-    let mut recorded = Recorded { run, recording };
-    Tables { inputs: Some(inputs), outputs: None, most: arguments.periods }.drive(&mut recorded)?;
-    let Recorded { run, recording } = recorded;
+    run.observer = Observer::Recording(Recording::new(&mut run.system));
+    Tables { inputs: Some(inputs), outputs: None, most: arguments.periods }.drive(&mut run)?;
+    let Observer::Recording(recording) = &run.observer else { return Ok(Vec::new()) };
     let measure = |(number, core): (usize, &Core)| -> Result<Shadow> {
         let Replay { mut emulator, mut inputs } = recording.replay(&run.system, number)?;
         let mut shadow = shadow(arguments, &core.program);

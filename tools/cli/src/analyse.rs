@@ -132,7 +132,7 @@ fn read_inputs(arguments: &Analyse, program: &Program) -> Result<Rows> {
         bail!("{wanted} periods: at most {MOST_PERIODS} are run on the way to the one to look at");
     }
     let path = arguments.inputs.as_deref();
-    // What runs once reads the first period's inputs.
+    // The part that runs once reads the first period's inputs.
     let most = wanted.map(|wanted| wanted.max(1)).or(path.map(|_| MOST_PERIODS));
     let rows = ports::rows(path, most, PERIODS, &program.inputs)?;
     if let (Some(path), Some(wanted)) = (path, wanted)

@@ -27,7 +27,7 @@ struct Inputs {
     rows: Rows,
 }
 
-/// What came of a run.
+/// The outcome of a run.
 struct Ran {
     name: String,
     periods: u64,
@@ -42,7 +42,7 @@ struct Ran {
     outputs: Vec<Vec<String>>,
 }
 
-/// What the command line says of a batch.
+/// The command line of a batch.
 pub(crate) struct Arguments<'a> {
     /// The program's file.
     pub(crate) file: &'a Path,

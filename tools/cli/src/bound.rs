@@ -216,12 +216,7 @@ pub(crate) fn sections_json(program: &Program, bounds: &Bounds) -> Value {
     bounds.sections.iter().map(section).collect()
 }
 
-fn program_json(
-    arguments: &Bound,
-    program: &Program,
-    bounds: &Bounds,
-    verdict: Option<&Verdict>,
-) -> Value {
+fn program_json(arguments: &Bound, program: &Program, bounds: &Bounds, verdict: Option<&Verdict>) -> Value {
     json!({
         "program": files::input_name(&arguments.file),
         "machine": program.machine.name,

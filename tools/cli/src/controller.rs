@@ -32,7 +32,7 @@ pub(crate) struct Latency {
     pub(crate) from_last_encoder: u64,
 }
 
-/// What the last period showed in detail.
+/// The last period in detail.
 #[derive(Clone)]
 pub(crate) struct Detail {
     /// Counts before and after it.
@@ -61,7 +61,7 @@ impl OnEmulator {
         Ok(OnEmulator { emulator, binding, watch, until_detail: detail, report: None, detail: None })
     }
 
-    /// What was denied and happened.
+    /// The denied things that happened.
     pub(crate) fn denials(&self) -> Denials {
         self.watch.end(&self.emulator, "")
     }
@@ -103,7 +103,7 @@ impl OnEmulator {
     }
 }
 
-/// Why the program cannot control the robot any further.
+/// An error after which the program cannot control the robot any further.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ControllerError {
     /// It has stopped, or a port cannot be set.

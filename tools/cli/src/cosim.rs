@@ -17,7 +17,9 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use takt_analysis::follow::PERIOD_LIMIT;
 use takt_cosim::system::{SystemLockstep, SystemModel};
-use takt_cosim::{Lockstep, LockstepError, Model, ModelError, Simulation, cache_folder, circuit_stops, random};
+use takt_cosim::{
+    Lockstep, LockstepError, Model, ModelError, Simulation, cache_folder, circuit_stops, random,
+};
 use takt_emu::{Fault, Row, Status};
 use takt_isa::{MACHINES, Machine, Program};
 use takt_rtl::{Design, Library, SystemDesign, export};
@@ -53,7 +55,7 @@ pub(crate) struct Cosim {
     /// Random programs with latched ports. (A program from a file has what it says.)
     #[arg(long, conflicts_with = "file")]
     latched: bool,
-    /// Where the waveform of a difference goes, as VCD.
+    /// File for the waveform of a difference, as VCD.
     #[arg(long, value_name = "FILE", default_value = "cosim.vcd")]
     waveform: PathBuf,
     /// Print the result as JSON.
@@ -151,14 +153,6 @@ impl<'a> Pair<'a> {
         match self {
             Pair::Program { program, .. } => Ok(run_program(program, rows, simulation)?),
             Pair::System { system, design, host } => run_system(system, design, host, rows, simulation),
-        }
-    }
-
-    /// The machine, or the cores, in words.
-    fn cores(&self) -> String {
-        match self {
-            Pair::Program { program, .. } => program.machine.name.to_owned(),
-            Pair::System { system, .. } => format!("{} cores", system.description.cores.len()),
         }
     }
 }
@@ -261,26 +255,30 @@ fn one(arguments: &Cosim, file: &Path, color: bool, out: &mut Out) -> Result<()>
             }
         }
     });
+    // A program's row is a period, a system's a base tick.
+    let (of, name, rows, unit, compared) = match &pair {
+        Pair::Program { program, .. } => {
+            ("machine", program.machine.name.to_owned(), "periods", "periods", "events")
+        }
+        Pair::System { .. } => ("system", files::input_name(file), "ticks", "base ticks", "events and pins"),
+    };
     if arguments.json {
-        let mut value = json!({
-            "cycles": ran.cycles, "cycles_per_second": rate, "stopped": stopped, "difference": Value::Null,
+        let value = json!({
+            of: name,
+            rows: ran.rows,
+            "cycles": ran.cycles,
+            "cycles_per_second": rate,
+            "events": ran.compared,
+            "stopped": stopped,
+            "difference": Value::Null,
         });
-        let (of, rows, compared) = match &pair {
-            Pair::Program { .. } => (("machine", pair.cores()), "periods", "events"),
-            Pair::System { .. } => (("system", files::input_name(file)), "ticks", "compared"),
-        };
-        value[of.0] = of.1.into();
-        value[rows] = ran.rows.into();
-        value[compared] = ran.compared.into();
         return output::json(&value, out);
     }
-    let (rows, compared) = match &pair {
-        Pair::Program { .. } => (format!("{} periods on {}, {} cycles", ran.rows, pair.cores(), ran.cycles), "events"),
-        Pair::System { .. } => {
-            (format!("{} base ticks, {} cycles of {}", ran.rows, ran.cycles, pair.cores()), "events and pins")
-        }
-    };
-    writeln!(out, "{rows}: {} {compared}, no difference", ran.compared)?;
+    writeln!(
+        out,
+        "{} {unit} on {name}, {} cycles: {} {compared}, no difference",
+        ran.rows, ran.cycles, ran.compared
+    )?;
     writeln!(out, "  {rate} cycles a second, both sides together")?;
     match &ran.stopped {
         None => {}

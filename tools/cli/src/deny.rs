@@ -83,7 +83,7 @@ struct First {
     operation: Option<(SlotIndex, Option<Register>)>,
 }
 
-/// How often something denied happened.
+/// The count of something denied.
 #[derive(Clone)]
 struct Finding {
     what: What,
@@ -153,6 +153,11 @@ fn location(program: &Program, first: &First) -> Option<String> {
 }
 
 impl Watch {
+    /// True if the run need not be observed.
+    pub(crate) fn denies_nothing(&self) -> bool {
+        self.findings.is_empty()
+    }
+
     /// One that denies nothing.
     pub(crate) fn idle() -> Watch {
         Watch { findings: Vec::new(), period: None, at: BundleAddress::RESET, has_waited: false }

@@ -55,7 +55,7 @@ impl Tables<'_> {
         let (mut inputs, mut outputs) =
             ports::open_both(self.inputs, open, self.outputs, titles.into_iter())?;
         driven.begin()?;
-        // Where a row appears for each period, that is progress enough.
+        // A row that appears for each period is progress enough.
         let shows_rows = self.outputs.is_some_and(files::is_dash);
         let all = self.most.or_else(|| progress::rows(self.inputs)).filter(|_| !live && !shows_rows);
         let mut bar = Late::new(all, D::ROWS);

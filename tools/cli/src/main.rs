@@ -162,7 +162,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
     }
 }
 
-/// What the command line asks for, or the status to end with where clap has already answered (help, version, a mistake).
+/// The arguments, or the status to end with where clap has already answered (help, version, a mistake).
 fn parse(out: &mut Out) -> Result<Arguments, ExitCode> {
     Arguments::try_parse().map_err(|mut answer| {
         wrong::suggest(&mut answer);
@@ -209,7 +209,7 @@ fn main() -> ExitCode {
         takt_emu::Emulator::switch_compiler_off();
     }
     let result = run(&arguments, color, &mut out);
-    // What was written before an error still goes out; the first error is the one that counts.
+    // Results written before an error still go out; the first error is the one that counts.
     let flushed = out.flush().map_err(anyhow::Error::from);
     end(result.and(flushed), color)
 }

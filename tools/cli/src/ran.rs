@@ -9,9 +9,10 @@ use crate::output;
 use crate::ports;
 use crate::trace::TraceArguments;
 use anyhow::Result;
+use clap::Args;
 use serde_json::{Map, Value, json};
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use takt_emu::Emulator;
 use takt_isa::fp::Flags;
 use takt_isa::timing::Cycle;
@@ -27,13 +28,18 @@ pub(crate) trait Execution<'a>: Driven {
     fn end(self, trace: &TraceArguments, color: bool) -> Result<Ran<'a>>;
 }
 
-/// The wishes of the command line.
-pub(crate) struct Shown<'a> {
-    pub(crate) file: &'a Path,
-    /// True if the inputs are from a table.
-    pub(crate) has_table: bool,
-    pub(crate) outputs: Option<&'a Path>,
-    pub(crate) stats: bool,
+/// Options that say where the outcome goes.
+#[derive(Args)]
+pub(crate) struct Shown {
+    /// Table of the output ports, as CSV, one row for each period, with a column `cycles`; `-` is standard output, where
+    /// nothing else is written then.
+    #[arg(long, value_name = "CSV")]
+    pub(crate) outputs: Option<PathBuf>,
+    /// Print where the cycles went; on standard error with `--outputs -`.
+    #[arg(long)]
+    stats: bool,
+    /// Print the result as JSON.
+    #[arg(long)]
     pub(crate) json: bool,
 }
 
@@ -65,7 +71,8 @@ pub(crate) struct Ran<'a> {
     pub(crate) cores: Vec<CoreRan<'a>>,
     /// The last value of each output; `None` if there was none.
     pub(crate) outputs: Vec<(String, Option<(Type, u32)>)>,
-    pub(crate) has_inputs: bool,
+    /// True if there are inputs, and no table of them.
+    pub(crate) zeros: bool,
     pub(crate) nans: NanWrites,
     /// `None` for a program by itself.
     pub(crate) system: Option<SystemRan<'a>>,
@@ -118,21 +125,17 @@ impl<'a> CoreRan<'a> {
         if shortest == longest { shortest.to_string() } else { format!("{shortest} to {longest}") }
     }
 
-    /// A line of a table with a line for each core.
-    fn line(&self, width: usize, out: &mut impl Write) -> Result<()> {
-        let (machine, count) = (self.program.machine.name, self.periods.count);
-        write!(out, "  {:<width$}  {machine}: {count} periods", self.name)?;
-        if count > 0 {
-            write!(out, ", {} cycles each", self.cycles())?;
-        }
-        write!(out, ", {} deadlines missed", self.missed)?;
+    /// The periods and cycles of the core, behind its name in a system.
+    fn line(&self, out: &mut impl Write) -> Result<()> {
+        let (machine, count, cycles) = (self.program.machine.name, self.periods.count, self.account.cycles);
+        let (periods, each) = if count == 1 { ("period", "cycles") } else { ("periods", "cycles each") };
+        let took = if count == 0 { String::new() } else { format!("{} {each}, ", self.cycles()) };
+        let missed = self.missed;
+        write!(out, "{count} {periods} on {machine}: {took}{cycles} in all, {missed} deadlines missed")?;
         if self.periods.skipped > 0 {
             write!(out, ", snapshots skipped at {} ticks", self.periods.skipped)?;
         }
-        if self.nan_writes > 0 {
-            write!(out, ", NaN written to output ports {} times", self.nan_writes)?;
-        }
-        writeln!(out, ", exception flags: {}", self.flags)?;
+        writeln!(out)?;
         Ok(())
     }
 
@@ -163,12 +166,12 @@ impl Ran<'_> {
         Denials::verdict(self.cores.into_iter().map(|core| core.denials))
     }
 
-    /// Prints the outcome where the command line wants it; `rows` is the number of periods, or of base ticks.
-    pub(crate) fn print(&self, shown: &Shown<'_>, rows: Option<u64>, out: &mut Out) -> Result<()> {
+    /// Prints the outcome of a file's application; `rows` is the number of periods, or of base ticks.
+    pub(crate) fn print(&self, file: &Path, shown: &Shown, rows: Option<u64>, out: &mut Out) -> Result<()> {
         if shown.json {
-            return output::json(&self.json(shown, rows), out);
+            return output::json(&self.json(file, rows), out);
         }
-        if !shown.outputs.is_some_and(files::is_dash) {
+        if !shown.outputs.as_deref().is_some_and(files::is_dash) {
             return self.text(shown, rows, out);
         }
         if shown.stats {
@@ -179,12 +182,12 @@ impl Ran<'_> {
         Ok(())
     }
 
-    fn json(&self, shown: &Shown<'_>, rows: Option<u64>) -> Value {
+    fn json(&self, file: &Path, rows: Option<u64>) -> Value {
         let outputs = self.outputs.iter();
         let outputs: Map<_, _> = outputs
             .map(|(name, value)| (name.clone(), json!(value.map(|(ty, bits)| ports::json(ty, bits)))))
             .collect();
-        let file = files::input_name(shown.file);
+        let file = files::input_name(file);
         let Some(system) = &self.system else {
             let mut value = self.cores[0].json();
             value["program"] = file.into();
@@ -216,18 +219,20 @@ impl Ran<'_> {
         })
     }
 
-    fn text(&self, shown: &Shown<'_>, rows: Option<u64>, out: &mut impl Write) -> Result<()> {
+    fn text(&self, shown: &Shown, rows: Option<u64>, out: &mut impl Write) -> Result<()> {
         let (what, none) = match &self.system {
-            None => {
-                self.program_line(rows, out)?;
-                ("input ports", "(never written)")
-            }
-            Some(system) => {
-                self.system_lines(system, rows, out)?;
-                ("system's inputs", "(nothing)")
-            }
+            None => ("input ports", "(never written)"),
+            Some(_) => ("system's inputs", "(nothing)"),
         };
-        if !shown.has_table && self.has_inputs {
+        match (&self.system, rows) {
+            (None, None) => {
+                let core = &self.cores[0];
+                writeln!(out, "{} cycles on {}", core.account.cycles, core.program.machine.name)?;
+            }
+            (None, Some(_)) => self.cores[0].line(out)?,
+            (Some(system), _) => self.system_lines(system, rows, out)?,
+        }
+        if self.zeros {
             writeln!(out, "  without --inputs the {what} are 0")?;
         }
         if shown.outputs.is_none() {
@@ -245,25 +250,6 @@ impl Ran<'_> {
         Ok(())
     }
 
-    /// The first line about a program.
-    fn program_line(&self, rows: Option<u64>, out: &mut impl Write) -> Result<()> {
-        let core = &self.cores[0];
-        let (machine, cycles) = (core.program.machine.name, core.account.cycles);
-        match rows {
-            None => writeln!(out, "{cycles} cycles on {machine}")?,
-            Some(count) => {
-                let (periods, each) =
-                    if count == 1 { ("period", "cycles") } else { ("periods", "cycles each") };
-                let (period, missed) = (core.cycles(), core.missed);
-                writeln!(
-                    out,
-                    "{count} {periods} on {machine}: {period} {each}, {cycles} in all, {missed} deadlines missed"
-                )?;
-            }
-        }
-        Ok(())
-    }
-
     /// The lines about a system: its ticks, each core, each FIFO.
     fn system_lines(&self, system: &SystemRan<'_>, rows: Option<u64>, out: &mut impl Write) -> Result<()> {
         match rows {
@@ -273,8 +259,14 @@ impl Ran<'_> {
                 writeln!(out, "{count} base tick{plural} of {} cycles", system.description.tick)?;
             }
         }
-        let width = self.cores.iter().map(|core| core.name.len()).max().unwrap_or(0);
-        self.cores.iter().try_for_each(|core| core.line(width, out))?;
+        for core in &self.cores {
+            write!(out, "{}: ", core.name)?;
+            core.line(out)?;
+            if core.nan_writes > 0 {
+                writeln!(out, "  NaN written to output ports {} times", core.nan_writes)?;
+            }
+            writeln!(out, "  exception flags: {}", core.flags)?;
+        }
         for (name, FifoCounts { pushed, popped, overflows, underflows, most }) in &system.fifos {
             writeln!(
                 out,

@@ -14,6 +14,7 @@ use crate::ran::{CoreRan, Execution, Ran, Shown};
 use crate::select::{OptionalMachine, SourceArguments};
 use crate::system::LoadedSystem;
 use crate::system::run::SystemRun;
+use crate::system::watch::Observer;
 use crate::trace::TraceArguments;
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -54,10 +55,6 @@ pub(crate) struct Run {
         conflicts_with_all = ["inputs", "periods", "trace", "deny", "stats"]
     )]
     batch: Option<PathBuf>,
-    /// Where the output ports go, as CSV, one row for each period, with a column `cycles`; `-` is standard output, where
-    /// nothing else is written then.
-    #[arg(long, value_name = "CSV")]
-    outputs: Option<PathBuf>,
     /// Run at most this many periods.
     #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
     periods: Option<u64>,
@@ -71,12 +68,8 @@ pub(crate) struct Run {
     trace: TraceArguments,
     #[command(flatten)]
     deny: DenyArguments,
-    /// Print where the cycles went; on standard error with `--outputs -`.
-    #[arg(long)]
-    stats: bool,
-    /// Print the result as JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    shown: Shown,
 }
 
 const EXAMPLES: &str = "\
@@ -96,9 +89,9 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
     let batch = arguments.batch.as_deref();
     reads.extend(batch.filter(|path| !path.is_dir()).map(|path| ("--batch", path)));
     let mut writes = Vec::new();
-    writes.extend(arguments.outputs.as_deref().map(|path| ("--outputs", path)));
+    writes.extend(arguments.shown.outputs.as_deref().map(|path| ("--outputs", path)));
     writes.extend(arguments.trace.given());
-    if arguments.json {
+    if arguments.shown.json {
         writes.push(("--json", Path::new("-")));
     }
     files::check(&reads, &writes)?;
@@ -110,7 +103,7 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
             ("--deny and --trace", traced, "both take the cores' events; run it once with each"),
         ])?;
     }
-    if arguments.outputs.is_some() && !arguments.has_rows() {
+    if arguments.shown.outputs.is_some() && !arguments.has_rows() {
         return Err(Failure::Usage(
             "--outputs has a row for each period: give --inputs or --periods".to_owned(),
         )
@@ -118,13 +111,14 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
     }
     let application = Application::load(&arguments.file, &arguments.machine, &arguments.source, color)?;
     if let (Some(inputs), Application::Program(loaded)) = (batch, &application) {
-        let Run { file, tick, max_cycles, json, .. } = arguments;
-        let (outputs, max_cycles) = (arguments.outputs.as_deref(), *max_cycles);
-        let arguments = batch::Arguments { file, inputs, outputs, tick: *tick, max_cycles, json: *json };
+        let Run { file, tick, max_cycles, shown, .. } = arguments;
+        let (tick, max_cycles) = (*tick, *max_cycles);
+        let (outputs, json) = (shown.outputs.as_deref(), shown.json);
+        let arguments = batch::Arguments { file, inputs, outputs, tick, max_cycles, json };
         return batch::run(&arguments, loaded, color, out);
     }
     let mut trace = arguments.trace.create()?;
-    let (result, ran) = match &application {
+    let (result, mut ran) = match &application {
         Application::Program(loaded) => arguments.execute(arguments.of(loaded, trace.as_mut())?, color)?,
         Application::System(system) => {
             arguments.execute(arguments.of_system(system, trace.as_mut())?, color)?
@@ -136,10 +130,9 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
         Err(error) if output::is_closed_pipe(&error) => return ran.verdict(),
         result => result?,
     };
+    ran.zeros &= arguments.inputs.is_none();
     ran.warn(color);
-    let Run { file, inputs, outputs, stats, json, .. } = arguments;
-    let (has_table, outputs) = (inputs.is_some(), outputs.as_deref());
-    ran.print(&Shown { file, has_table, outputs, stats: *stats, json: *json }, rows, out)?;
+    ran.print(&arguments.file, &arguments.shown, rows, out)?;
     ran.verdict()
 }
 
@@ -154,7 +147,7 @@ impl Run {
         mut run: impl Execution<'a>,
         color: bool,
     ) -> Result<(Result<Option<u64>>, Ran<'a>)> {
-        let (inputs, outputs) = (self.inputs.as_deref(), self.outputs.as_deref());
+        let (inputs, outputs) = (self.inputs.as_deref(), self.shown.outputs.as_deref());
         let result = match self.has_rows() {
             true => Tables { inputs, outputs, most: self.periods }.drive(&mut run).map(Some),
             false => run.run_to_halt().map(|()| None),
@@ -180,9 +173,7 @@ impl Run {
         let mut run = SystemRun::new(&system.description)?;
         run.max_cycles = self.max_cycles;
         run.tracer = trace.map(|file| self.trace.begin_system(&run.system, file)).transpose()?;
-        if self.deny.is_given() {
-            run.watch(&self.deny.watch());
-        }
+        run.observer = Observer::watching(&mut run.system, self.deny.watch());
         Ok(run)
     }
 }
@@ -237,7 +228,8 @@ impl Driven for ProgramRun<'_, '_> {
             return Ok(false);
         }
         let periods = &mut self.periods;
-        periods.shortest = if periods.count == 0 { report.cycles } else { periods.shortest.min(report.cycles) };
+        periods.shortest =
+            if periods.count == 0 { report.cycles } else { periods.shortest.min(report.cycles) };
         periods.longest = periods.longest.max(report.cycles);
         periods.count += 1;
         self.last = report.cycles;
@@ -275,7 +267,7 @@ impl<'a> Execution<'a> for ProgramRun<'a, '_> {
         let outputs = outputs.collect();
         let denials = self.watch.end(&self.emulator, "");
         let core = CoreRan::new("", self.program, &self.emulator, self.periods, denials);
-        let (has_inputs, nans) = (!self.program.inputs.is_empty(), self.nans);
-        Ok(Ran { cores: vec![core], outputs, has_inputs, nans, system: None })
+        let (zeros, nans) = (!self.program.inputs.is_empty(), self.nans);
+        Ok(Ran { cores: vec![core], outputs, zeros, nans, system: None })
     }
 }

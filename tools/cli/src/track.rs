@@ -18,8 +18,8 @@ use crate::report::{self, Totals, Tracking, variant};
 use crate::select::{self, OptionalMachine, SourceArguments, suggest};
 use crate::system::LoadedSystem;
 use crate::system::controller::OnSystem;
-use crate::system::report::SystemTracking;
 use crate::system::record;
+use crate::system::report::SystemTracking;
 use crate::{output, ports};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
@@ -231,7 +231,9 @@ impl Observed {
 impl Drive<'_> {
     /// True if standard output is a file's.
     fn writes_stdout(&self) -> bool {
-        [&self.arguments.csv, &self.arguments.plot].iter().any(|path| path.as_deref().is_some_and(files::is_dash))
+        [&self.arguments.csv, &self.arguments.plot]
+            .iter()
+            .any(|path| path.as_deref().is_some_and(files::is_dash))
     }
 
     fn monte_carlo(&self, name: &str, program: &Program, robots: u64, out: &mut Out) -> Result<()> {
@@ -321,12 +323,10 @@ impl Drive<'_> {
         let robot = arguments.robot.robot(&self.trajectory)?;
         // The first block, which places the robot, takes a tick of its own, in which it stands.
         let counts = robot.plant().counts().context("the robot stands where its encoders reach")?;
-        let mut controller = OnSystem::new(description, blocks(&self.trajectory)?)?;
+        let watch = arguments.deny.watch();
+        let mut controller = OnSystem::new(description, blocks(&self.trajectory)?, watch)?;
         if arguments.csv.is_some() {
             controller.system.keep_host_actions();
-        }
-        if arguments.deny.is_given() {
-            controller.watch(&arguments.deny.watch());
         }
         let told = |error| application.told(error, self.color);
         controller.tick(counts).map_err(|error| told(error.into()))?;

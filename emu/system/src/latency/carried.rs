@@ -48,7 +48,7 @@ impl Carried {
                 Sent::Written | Sent::AtWait => None,
             });
             let by: BTreeSet<(Register, Register)> = by.flatten().collect();
-            // What cannot be followed has no bounds either.
+            // A value that cannot be followed has no bounds either.
             let dependence = Dependence::new(&description.cores[number].program, &by);
             let dependence = dependence.unwrap_or_else(|_| Dependence::unknown());
             let mut dependents: BTreeMap<Register, Dependents<'_>> = BTreeMap::new();

@@ -131,16 +131,16 @@ impl SystemLockstep {
         cycle
     }
 
-    /// Does what a host did, as [`System::host_actions`] has it.
+    /// As [`System::act`].
     ///
     /// # Errors
-    /// If the system is another one.
-    pub fn act(&mut self, action: &HostAction) -> Result<(), LockstepError> {
+    /// As there.
+    pub fn act(&mut self, action: &HostAction) -> Result<bool, LockstepError> {
         match action {
-            HostAction::Input { name, bits } => self.set_input(name, *bits),
-            HostAction::Publish(link) => self.publish(*link),
-            HostAction::Push(link) => self.push(*link).map(drop),
-            HostAction::Pop(link) => self.pop(*link).map(drop),
+            HostAction::Input { name, bits } => self.set_input(name, *bits).map(|()| true),
+            HostAction::Publish(link) => self.publish(*link).map(|()| true),
+            HostAction::Push(link) => self.push(*link),
+            HostAction::Pop(link) => self.pop(*link).map(|entry| entry.is_some()),
         }
     }
 
@@ -252,7 +252,7 @@ impl SystemLockstep {
         self.check(end)
     }
 
-    /// What the host sees, on each of its pins.
+    /// Compares the value on each of the host's pins.
     fn check_pins(&mut self, now: Cycle, values: &[u32]) -> Result<(), LockstepError> {
         for (pin, &found) in self.pins.iter().zip(values) {
             if pin.direction != Direction::Output {

@@ -19,12 +19,7 @@ const TICKS: u64 = 10;
 /// Stalls that are listed of each core, the longest first.
 const STALLS: usize = 8;
 
-pub(crate) fn run(
-    arguments: &Analyse,
-    application: &Application,
-    color: bool,
-    out: &mut Out,
-) -> Result<()> {
+pub(crate) fn run(arguments: &Analyse, application: &Application, color: bool, out: &mut Out) -> Result<()> {
     let Some(loaded) = application.system() else { return Ok(()) };
     let mut run = SystemRun::new(&loaded.description)?;
     if arguments.html.is_some() {

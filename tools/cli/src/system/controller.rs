@@ -1,6 +1,6 @@
 //! A system as the controller of the hybrid robot, one of whose cores computes the path's points.
 
-use super::watch::Watches;
+use super::watch::Observer;
 use crate::deny::{Denials, Watch};
 use anyhow::{Context, Result, bail};
 use takt_analysis::follow::PERIOD_LIMIT;
@@ -20,7 +20,7 @@ const AXES: usize = 5;
 /// The system as the controller: the reference is its own.
 pub(crate) struct OnSystem {
     pub(crate) system: System,
-    watches: Watches,
+    observer: Observer,
     /// Field names of a motion block, as the system names them.
     fields: [String; FIELDS.len()],
     fifo: usize,
@@ -48,7 +48,7 @@ pub(crate) enum StepError {
 }
 
 impl OnSystem {
-    pub(crate) fn new(description: &Description, path: Vec<Block>) -> Result<OnSystem> {
+    pub(crate) fn new(description: &Description, path: Vec<Block>, watch: Watch) -> Result<OnSystem> {
         let inputs: Vec<String> = description.inputs().into_iter().map(|port| port.name).collect();
         let given = |name: &str| inputs.iter().any(|known| known == name);
         let fields = FIELDS.map(|field| format!("{BLOCKS}.{field}"));
@@ -83,11 +83,13 @@ impl OnSystem {
             *register = found.register;
         }
         let mut system = System::new(description)?;
+        let mut observer = Observer::watching(&mut system, watch);
         let start = system.run_to_start(PERIOD_LIMIT)?;
         let start = start.context("the cores do not come to their first ticks")?;
+        observer.observe(&mut system);
         Ok(OnSystem {
             system,
-            watches: Watches::default(),
+            observer,
             fields,
             fifo,
             depth: depth as usize,
@@ -100,14 +102,9 @@ impl OnSystem {
         })
     }
 
-    /// Observes each core from now on.
-    pub(crate) fn watch(&mut self, watch: &Watch) {
-        self.watches = Watches::new(&mut self.system, watch);
-    }
-
     /// The denials of each core.
     pub(crate) fn denials(&self) -> Vec<Denials> {
-        self.watches.end(&self.system)
+        self.observer.denials(&self.system)
     }
 
     /// A base tick: blocks as far as there is room, encoders, and what the system answers until the next one.
@@ -129,7 +126,7 @@ impl OnSystem {
         }
         self.next += self.tick;
         let result = self.system.run_until(self.next);
-        self.watches.observe(&mut self.system);
+        self.observer.observe(&mut self.system);
         Ok(result?)
     }
 

@@ -7,7 +7,7 @@ pub(crate) mod host;
 pub(crate) mod record;
 pub(crate) mod report;
 pub(crate) mod run;
-mod watch;
+pub(crate) mod watch;
 
 use crate::fault;
 use crate::files;

@@ -1,8 +1,7 @@
 //! A run of a system, a base tick for each row of inputs.
 
 use super::host::Host;
-use super::watch::Watches;
-use crate::deny::Watch;
+use super::watch::Observer;
 use crate::drive::Driven;
 use crate::nan::NanWrites;
 use crate::ports;
@@ -23,7 +22,7 @@ pub(crate) struct SystemRun<'a, 't> {
     /// Cycles after which the run ends with an error.
     pub(crate) max_cycles: Option<u64>,
     pub(crate) tracer: Option<SystemTracer<'t>>,
-    watches: Watches,
+    pub(crate) observer: Observer,
     /// The cycle in which the host writes the next row.
     next: Cycle,
     /// The outputs as the host saw them last.
@@ -36,23 +35,18 @@ impl<'a, 't> SystemRun<'a, 't> {
     pub(crate) fn new(description: &'a Description) -> Result<SystemRun<'a, 't>> {
         let host = Host::new(description);
         let system = System::new(description)?;
-        let (watches, last) = (Watches::default(), vec![None; host.outputs.len()]);
+        let (observer, last) = (Observer::default(), vec![None; host.outputs.len()]);
         Ok(SystemRun {
             description,
             host,
             system,
             max_cycles: None,
             tracer: None,
-            watches,
+            observer,
             next: 0,
             last,
             refused: 0,
         })
-    }
-
-    /// Observes each core.
-    pub(crate) fn watch(&mut self, watch: &Watch) {
-        self.watches = Watches::new(&mut self.system, watch);
     }
 
     /// Runs to the first base tick, if there is one.
@@ -62,7 +56,7 @@ impl<'a, 't> SystemRun<'a, 't> {
             Some(tracer) => tracer.run_to_start(&mut self.system, limit),
             None => self.system.run_to_start(limit),
         };
-        self.watches.observe(&mut self.system);
+        self.observer.observe(&mut self.system);
         Ok(start?)
     }
 
@@ -71,7 +65,7 @@ impl<'a, 't> SystemRun<'a, 't> {
             Some(tracer) => tracer.run_until(&mut self.system, cycle),
             None => self.system.run_until(cycle),
         };
-        self.watches.observe(&mut self.system);
+        self.observer.observe(&mut self.system);
         Ok(result?)
     }
 
@@ -139,7 +133,7 @@ impl<'a> Execution<'a> for SystemRun<'a, '_> {
             trace.finish(tracer.finish(), self.system.now(), color)?;
         }
         let SystemRun { description, host, system, refused, .. } = self;
-        let denials = self.watches.end(&system).into_iter();
+        let denials = self.observer.denials(&system).into_iter();
         let cores = description.cores.iter().enumerate().zip(denials);
         let cores = cores.map(|((number, core), denials)| {
             let (emulator, periods) = (system.core(number), system.periods(number));
@@ -155,7 +149,7 @@ impl<'a> Execution<'a> for SystemRun<'a, '_> {
         Ok(Ran {
             cores: cores.collect(),
             outputs: outputs.collect(),
-            has_inputs: !host.inputs.is_empty(),
+            zeros: !host.inputs.is_empty(),
             nans: NanWrites::default(),
             system: Some(SystemRan { description, first_tick, cycles, fifos, refused }),
         })

@@ -1,37 +1,52 @@
-//! `--deny` for a system: an observer of each core.
+//! Observers of a system's cores: for `--deny`, or to replay each core by itself.
 
 use crate::deny::{Denials, Watch};
-use takt_system::System;
+use takt_system::{Recording, System};
 
-/// The observers; none if nothing is denied, and the system is as fast as ever.
+/// An observer; without one, a system is as fast as ever.
 #[derive(Default)]
-pub(crate) struct Watches(Vec<Watch>);
+pub(crate) enum Observer {
+    #[default]
+    Idle,
+    /// For `--deny`, a watch of each core.
+    Watches(Vec<Watch>),
+    Recording(Recording),
+}
 
-impl Watches {
-    /// Observes each core as `watch` says.
-    pub(crate) fn new(system: &mut System, watch: &Watch) -> Watches {
+impl Observer {
+    /// Watches each core for what `watch` denies.
+    pub(crate) fn watching(system: &mut System, watch: Watch) -> Observer {
+        if watch.denies_nothing() {
+            return Observer::Idle;
+        }
         system.keep_core_events();
-        Watches(vec![watch.clone(); system.description().cores.len()])
+        Observer::Watches(vec![watch; system.description().cores.len()])
     }
 
-    /// Hears the events since it was last called.
+    /// Observes a run of the system that has just ended.
     pub(crate) fn observe(&mut self, system: &mut System) {
-        if !self.0.is_empty() {
-            system.take_input_events();
-            for (core, event) in system.take_core_events() {
-                self.0[core].hear_core(&event);
+        match self {
+            Observer::Idle => {}
+            Observer::Recording(recording) => recording.record(system),
+            Observer::Watches(watches) => {
+                system.take_input_events();
+                for (core, event) in system.take_core_events() {
+                    watches[core].hear_core(&event);
+                }
             }
         }
     }
 
     /// The denials of each core.
-    pub(crate) fn end(&self, system: &System) -> Vec<Denials> {
+    pub(crate) fn denials(&self, system: &System) -> Vec<Denials> {
         let idle = Watch::idle();
-        let cores = system.description().cores.iter().enumerate();
         let end = |(number, core): (usize, &takt_system::Core)| {
-            let watch = self.0.get(number).unwrap_or(&idle);
+            let watch = match self {
+                Observer::Watches(watches) => &watches[number],
+                _ => &idle,
+            };
             watch.end(system.core(number), &format!("core {}", core.name))
         };
-        cores.map(end).collect()
+        system.description().cores.iter().enumerate().map(end).collect()
     }
 }
