@@ -16,7 +16,6 @@
 
 use crate::encode::Instruction;
 use crate::number::{BundleAddress, Register, SlotIndex};
-use crate::spec::instructions::Function;
 use crate::spec::machines::Machine;
 use crate::spec::units::MAX_LATENCY;
 
@@ -64,7 +63,7 @@ impl Span {
     }
 }
 
-/// Why a cycle issued nothing.
+/// The cause of a cycle without issue.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
 pub enum Cause {
     /// The front end refills after a redirection or decides a conditional branch.
@@ -157,13 +156,13 @@ pub struct Bundle {
 }
 
 impl Bundle {
-    /// What the rules need to know of a bundle: one instruction for each slot of `machine`, each of which
+    /// The parts of a bundle that the rules need: one instruction for each slot of `machine`, each of which
     /// [`Instruction::place`] accepts.
     pub fn new(machine: &Machine, instructions: &[Instruction]) -> Bundle {
         let mut bundle = Bundle::default();
         for ((s, slot), instruction) in machine.numbered_slots().zip(instructions) {
             let row = instruction.op.row();
-            let Some(u) = slot.unit_for(row.function).filter(|_| row.function != Function::Idle) else {
+            let Some(u) = slot.unit_for(row.function) else {
                 continue;
             };
             bundle.operations.push(Operation {
@@ -195,7 +194,7 @@ impl Bundle {
     }
 }
 
-/// How a bundle issued: the cycle, and what the cycles before it were charged to. The charges add up to `cycle - earliest`.
+/// The issue of a bundle: its cycle, and the causes of the cycles before it. The charges add up to `cycle - earliest`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Issue {
     /// The cycle of issue.
@@ -221,7 +220,7 @@ impl Issue {
     }
 }
 
-/// What of a scoreboard counts from some cycle on, in cycles from that one: two states with equal residues time every
+/// The part of a scoreboard that counts from some cycle on, in cycles from that one: two states with equal residues time every
 /// program alike.
 ///
 /// The results still pending say it all but for the units that are busy: `drained` is the last of them, and a bank's bookings are
@@ -235,7 +234,7 @@ pub struct Residue {
 }
 
 impl Residue {
-    /// What is left after so many more cycles without an issue.
+    /// The residue after so many more cycles without an issue.
     pub fn later(&self, cycles: u16) -> Residue {
         let pending = self.pending.iter().filter(|(_, left)| *left > cycles);
         let busy = self.busy.iter().filter(|(_, _, left)| *left > cycles);
@@ -245,7 +244,7 @@ impl Residue {
         }
     }
 
-    /// Whether nothing is left: the state after a reset.
+    /// True if nothing is left: the state after a reset.
     pub fn is_empty(&self) -> bool {
         self.pending.is_empty() && self.busy.is_empty()
     }
@@ -295,7 +294,7 @@ impl Scoreboard {
         issue
     }
 
-    /// How a bundle would issue, from `earliest` on; nothing changes.
+    /// The issue that a bundle would have from `earliest` on; nothing changes.
     pub fn plan(&self, bundle: &Bundle, earliest: Cycle) -> Issue {
         let mut issue = Issue { cycle: earliest, stalls: [(Cause::Drain, 0); 5], count: 0 };
 
@@ -350,7 +349,7 @@ impl Scoreboard {
         issue
     }
 
-    /// What of the past can still hold up bundles that are delivered in cycle `now`, which no bundle has issued in or after.
+    /// The past that can still hold up bundles delivered in cycle `now`, which no bundle has issued in or after.
     pub fn residue(&self, now: Cycle) -> Residue {
         let pending = Register::all().zip(&self.ready[..]).filter(|(_, (ready, _))| *ready > now);
         let units = SlotIndex::all().zip(&self.free).flat_map(|(s, units)| {

@@ -423,7 +423,9 @@ impl Explorer<'_> {
                 None
             }
             Effect::ReadFlags => Some(Value::Any),
-            _ => None,
+            // These write nothing.
+            Effect::ClearFlags | Effect::Nothing | Effect::Wait | Effect::Halt => None,
+            Effect::Jump | Effect::BranchZero | Effect::BranchNonzero | Effect::Call | Effect::Return => None,
         })
     }
 

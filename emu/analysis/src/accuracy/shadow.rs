@@ -280,8 +280,11 @@ impl Shadow {
                 None
             }
             Effect::Immediate => Some(Outcome::exact(instruction.constant)),
-            // What these write is an integer: whoever reads it finds the bits.
-            _ => None,
+            // The flags are an integer: whoever reads them finds the bits.
+            Effect::ReadFlags => None,
+            // These write nothing.
+            Effect::ClearFlags | Effect::Nothing | Effect::Wait | Effect::Halt => None,
+            Effect::Jump | Effect::BranchZero | Effect::BranchNonzero | Effect::Call | Effect::Return => None,
         }
     }
 

@@ -323,7 +323,10 @@ impl Places {
                 },
                 Effect::ReadFlags => (Reads::Places(self.flags.into_iter().collect()), to.map(Writes::Place)),
                 Effect::ClearFlags => (Reads::Places(Vec::new()), self.flags.map(Writes::Place)),
-                _ => continue,
+                // These write nothing.
+                Effect::Nothing | Effect::Wait | Effect::Halt => continue,
+                Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => continue,
+                Effect::Call | Effect::Return => continue,
             };
             step.moves.extend(to.map(|to| (from, to)));
         }
@@ -364,7 +367,7 @@ fn ordered(
         let mut writes = bundle.node.instructions.iter().zip(slots);
         writes.find_map(|(instruction, slot)| {
             instruction.writes(slot).filter(|written| *written == register)?;
-            Some(slot.units[slot.unit_for(instruction.op.row().function)?].latency)
+            Some(slot.unit(instruction.op.row().function)?.latency)
         })
     };
     found.values().all(|bundles| {

@@ -49,7 +49,7 @@ impl Ticks {
         }
     }
 
-    /// Whether there is a tick in this cycle; it is then taken from those to come. A regular tick and one that was asked
+    /// True if there is a tick in this cycle; it is then taken from those to come. A regular tick and one that was asked
     /// for in the same cycle are one.
     #[inline]
     pub(crate) fn take(&mut self, cycle: Cycle) -> bool {
@@ -84,7 +84,7 @@ impl Ticks {
         }
     }
 
-    /// Whether the ticks to come, and one that is remembered, are the same.
+    /// True if the ticks to come, and one that is remembered, are the same.
     pub(crate) fn agree(&self, other: &Ticks) -> bool {
         let to_come = |ticks: &Ticks| (ticks.every, ticks.regular, ticks.remembered, ticks.waited.is_some());
         to_come(self) == to_come(other) && self.asked == other.asked
@@ -125,7 +125,7 @@ pub struct PeriodReport {
     pub wait: Cycle,
     /// Cycles that it took: `wait - start`. Each issued a bundle or is charged to a stall.
     pub cycles: Cycle,
-    /// Whether the next tick came before the `wait` had issued.
+    /// True if the next tick came before the `wait` had issued.
     pub missed: bool,
     /// Ticks lost during the period.
     pub lost: u64,
@@ -191,7 +191,7 @@ impl Number {
         }
     }
 
-    /// Whether it may stand for a value of this type.
+    /// True if it may stand for a value of this type.
     pub(crate) fn fits(self, ty: Type) -> bool {
         matches!(
             (self, ty),
@@ -200,7 +200,7 @@ impl Number {
     }
 }
 
-/// Why a port cannot be set or read.
+/// The reason why a port cannot be set or read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PortError {
     /// The program has no port of this name.
@@ -216,7 +216,7 @@ pub enum PortError {
     Type {
         /// The port.
         name: String,
-        /// What it carries.
+        /// The type that it carries.
         ty: Type,
     },
     /// Values for another number of lanes than the batch has ([`crate::Batch`]).
@@ -235,7 +235,7 @@ pub enum PortError {
     },
 }
 
-/// Why a period did not come to its end.
+/// The reason why a period did not come to its end.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PeriodError {
     /// A fault.
@@ -307,7 +307,7 @@ impl Emulator {
         Ok(())
     }
 
-    /// What the outside sees on an output port, by its register: what was last written there, or, if ports are latched, what
+    /// The visible value of an output port, by its register: the value last written there, or, if ports are latched, what
     /// was last published. `None` if nothing ever was, or if there is no such port.
     pub fn output_bits(&self, register: Register) -> Option<u32> {
         self.machine().is_output(register).then(|| self.state.output(register))?
@@ -357,7 +357,7 @@ impl Emulator {
         Some(self.ticks.next().unwrap_or_else(earliest))
     }
 
-    /// Whether a deadline was missed since reset: a tick came before the program waited.
+    /// True if a deadline was missed since reset: a tick came before the program waited.
     pub fn deadline_missed(&self) -> bool {
         self.ticks.missed > 0
     }

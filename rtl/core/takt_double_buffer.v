@@ -1,7 +1,7 @@
-// takt_places: of the two places of each latched port, the one that is written and the one that is shown.
+// takt_double_buffer: the control of double buffers for latched ports: which of two places is written, which is read.
 //
-// It holds no values: two places of a memory do. What is written goes to the place that is not shown, until the two change
-// sides. Ports that are not written in between keep their side, and so their value.
+// The values are in a memory with two places for each port. A write goes to the back place; a flip exchanges front and back of the
+// ports that were written. A port that was not written keeps its front place, and so its value.
 //
 // Contract
 //   flip: what was written before this cycle is shown from this cycle on.
@@ -11,7 +11,7 @@
 //   read_index: readers; read_place: what is shown to each, in the same cycle.
 //   PORTS: those with two places, from 0 on: a power of two, 2 or more. The others have place 0 alone; with 0, all.
 
-module takt_places #(
+module takt_double_buffer #(
     parameter PORTS  = 0,
     parameter INDEX  = 8,  // bits of an index
     parameter WRITES = 1,

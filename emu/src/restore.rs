@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use takt_isa::fp::Flags;
 use takt_isa::{BundleAddress, Flow, Register};
 
-/// What is known of a machine with nothing in flight. Its return stack is not known, and is taken to be empty.
+/// The known state of a machine with nothing in flight. Its return stack is not known, and is taken to be empty.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Standing {
-    /// Where it stands.
+    /// The position of its execution.
     pub at: At,
     /// Registers with their bits, and input ports as the host has set them. A register that is not here was never written.
     pub registers: BTreeMap<Register, u32>,
@@ -18,7 +18,7 @@ pub struct Standing {
     pub flags: Flags,
 }
 
-/// Where a machine stands.
+/// The position of a machine's execution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum At {
     /// At its beginning, after a reset.

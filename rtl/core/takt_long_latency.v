@@ -1,14 +1,14 @@
-// takt_late: the result of a unit that works on one operation at a time and takes longer than the slot's pipelined units.
+// takt_long_latency: tracks the one result of an iterative unit, which takes longer than the slot's pipelined units.
 //
 // Contract
 //   An operation that issues now, insert, is in at[1] in the next cycle, in at[2] in the one after, and so on; in flight until
 //   its result passes on to takt_in_flight's last place: last, in the cycle before. busy: the unit would not accept an
 //   operation in the next cycle even if none issues now.
 //   Requires INTERVAL >= LATENCY - DEPTH, so that one operation at a time is in flight here.
-//   cancel, which stays: what issued in the last two cycles and what issues from now on does not count.
+//   cancel, which stays high after a fault: an operation issued in the last two cycles, or later, is dropped.
 //   Requires LATENCY - DEPTH >= 2: none is cancelled that has passed on.
 
-module takt_late #(
+module takt_long_latency #(
     parameter LATENCY  = 18,
     parameter INTERVAL = 14,
     parameter DEPTH    = 10,  // places of takt_in_flight

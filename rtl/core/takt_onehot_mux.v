@@ -1,10 +1,12 @@
-// takt_choice: one of several values, or 0, in half as many 4-input lookup tables a bit as there are values: a chain, each link
-// of which takes the next two, and what comes down the chain chooses between them.
+// takt_onehot_mux: a multiplexer with one-hot select.
+//
+// It is a chain of 4-input lookup tables, half as many a bit as there are values: each link takes the next two values and the
+// output of the link before.
 //
 // Contract
 //   choose: one-hot, or none, for which value is 0. With AHEAD it is that of the cycle before.
 
-module takt_choice #(
+module takt_onehot_mux #(
     parameter VALUES = 6,  // 2 at least
     parameter AHEAD  = 0
 ) (
