@@ -1,6 +1,7 @@
 //! `takt accuracy`: the distance of the outputs from binary64, and the lines that it comes from; or a bound for it.
 
 mod bounded;
+mod lines;
 mod measured;
 
 use crate::application::Application;
@@ -63,11 +64,6 @@ Examples:
   takt accuracy prog.s --inputs in.csv                errors against binary64, and the lines that they come from
   takt accuracy prog.s --inputs in.csv --each-period  without what states carry from period to period
   takt accuracy system.toml --inputs in.csv           of each core, in a run of the system";
-
-/// Lines of each list of the text; --json has all.
-const SHOWN: usize = 12;
-/// Lines that are shown of those an output's error comes from.
-const SHOWN_PARTS: usize = 3;
 
 pub(crate) fn run(arguments: &Accuracy, color: bool, out: &mut Out) -> Result<()> {
     let mut reads = vec![("FILE", arguments.file.as_path())];
@@ -229,27 +225,4 @@ fn measure_cores(arguments: &Accuracy, inputs: &Path, description: &Description)
         Ok(shadow)
     };
     description.cores.iter().enumerate().map(measure).collect()
-}
-
-fn location(program: &Program, word: u32) -> Option<Location> {
-    *program.lines.get(word as usize)?
-}
-
-fn line_text(program: &Program, location: Option<Location>) -> String {
-    location.map_or_else(|| "(no source line)".to_owned(), |location| program.place_text(location))
-}
-
-/// The lines that an error comes from, with the sum of their shares, and the part that each has of all that was added up; the
-/// largest first.
-fn by_line(program: &Program, parts: &[Part]) -> Vec<(Option<Location>, f64, f64)> {
-    let mut lines: BTreeMap<_, (Option<Location>, f64)> = BTreeMap::new();
-    for part in parts {
-        let location = location(program, part.word);
-        let key = location.map(|location| (location.file, location.line));
-        lines.entry(key).or_insert((location, 0.0)).1 += part.error;
-    }
-    let all: f64 = lines.values().map(|(_, error)| error.abs()).sum();
-    let mut lines: Vec<_> = lines.into_values().map(|(at, error)| (at, error, error.abs() / all)).collect();
-    lines.sort_by(|a, b| b.2.total_cmp(&a.2));
-    lines
 }

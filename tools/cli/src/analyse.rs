@@ -3,6 +3,7 @@
 
 use crate::accuracy::Measured;
 use crate::application::{Application, refuse};
+use crate::drive::Tables;
 use crate::fault;
 use crate::files::{self, Out};
 use crate::load::{Load, Loaded};
@@ -33,24 +34,24 @@ use takt_isa::{Machine, Program};
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Analyse {
     /// Source or image, `-` being standard input; or a system, a `.toml` file.
-    pub(crate) file: PathBuf,
+    file: PathBuf,
     #[command(flatten)]
     machine: OptionalMachine,
     #[command(flatten)]
     source: SourceArguments,
     /// CSV with one named column for each input port and one row for each period; `-` is standard input.
     #[arg(long, value_name = "CSV")]
-    pub(crate) inputs: Option<PathBuf>,
+    inputs: Option<PathBuf>,
     /// Run N periods and analyse the last; 0 is what runs once [default: the rows of --inputs, else 2].
     #[arg(long, value_name = "N", value_parser = number::natural, allow_hyphen_values = true)]
-    pub(crate) periods: Option<u64>,
+    periods: Option<u64>,
     /// Write the picture of the pipeline as a self-contained page for a browser; of a system, that of all cores and
     /// links in the last period of its slowest core. `-` is standard output.
     #[arg(long, value_name = "OUT")]
-    pub(crate) html: Option<PathBuf>,
+    html: Option<PathBuf>,
     /// Print the result as JSON.
     #[arg(long)]
-    pub(crate) json: bool,
+    json: bool,
 }
 
 const EXAMPLES: &str = "\
@@ -70,13 +71,24 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
         writes.push(("--json", Path::new("-")));
     }
     files::check(&reads, &writes)?;
-    match Application::load(&arguments.file, &arguments.machine, &arguments.source, color)? {
-        Application::Program(loaded) => of_program(arguments, &loaded, color, out),
-        system @ Application::System(_) => {
-            let once = arguments.periods == Some(0);
-            refuse(&[("--periods 0", once, "its cycles are counted from reset, with what runs once")])?;
-            system::analyse::run(arguments, &system, color, out)
-        }
+    let application = Application::load(&arguments.file, &arguments.machine, &arguments.source, color)?;
+    let system = match &application {
+        Application::Program(loaded) => return of_program(arguments, loaded, color, out),
+        Application::System(system) => system,
+    };
+    let once = arguments.periods == Some(0);
+    refuse(&[("--periods 0", once, "its cycles are counted from reset, with what runs once")])?;
+    let (inputs, html, name) =
+        (arguments.inputs.as_deref(), arguments.html.as_deref(), files::input_name(&arguments.file));
+    let tables = Tables { inputs, outputs: None, most: arguments.periods };
+    let analysed = system::analyse::analyse(&system.description, tables, html, &name);
+    let (json, text) = analysed.map_err(|error| application.told(error, color))?;
+    if arguments.json {
+        output::json(&json, out)
+    } else if html.is_some_and(files::is_dash) {
+        Ok(())
+    } else {
+        Ok(out.write_all(&text)?)
     }
 }
 

@@ -4,6 +4,7 @@ use crate::files::{self, Given, Out};
 use crate::load::Load;
 use crate::output::{self, Failure};
 use crate::select::{MachineArgument, SourceArguments, When};
+use crate::spills::{block_name, spilled};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
@@ -13,7 +14,7 @@ use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
 use takt_asm::schedule::DemandKind;
 use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, Resources, SharedBound, TimingReport};
-use takt_asm::{Adjustment, Assembled, Contraction, Made, Schedule, Spilled, Spills, image, listing};
+use takt_asm::{Adjustment, Assembled, Contraction, Made, Schedule, Spills, image, listing};
 use takt_isa::{Program, SlotIndex, Slots};
 use takt_rtl::header::{Header, Language};
 
@@ -285,19 +286,6 @@ fn write_adjustments(assembled: &Assembled, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
-/// The cost of blocks that have more values at a time than there are registers, in lines.
-pub(crate) fn spilled(assembled: &Assembled) -> Vec<String> {
-    let lines = assembled.spills.iter().flat_map(|spills| {
-        let block = block_name(&assembled.program, &assembled.blocks[spills.block]);
-        let value = |value: &Spilled| {
-            let place = value.location.map(|at| format!("{}: ", assembled.program.place_text(at)));
-            format!("  {}{value}", place.unwrap_or_default())
-        };
-        std::iter::once(format!("spilled: {block}: {spills}")).chain(spills.values.iter().map(value))
-    });
-    lines.collect()
-}
-
 /// A demand, and that it is met or how far.
 fn timing_text(report: &TimingReport) -> (String, String) {
     match (report.kind, report.window) {
@@ -309,12 +297,6 @@ fn timing_text(report: &TimingReport) -> (String, String) {
         ),
         (DemandKind::Late(_), None) => ("late".to_owned(), "no output depends on it".to_owned()),
     }
-}
-
-/// A block's label, or else the place of its first operation.
-fn block_name(program: &Program, block: &BlockReport) -> String {
-    let place = || block.location.map(|at| program.place_text(at));
-    block.label.clone().or_else(place).unwrap_or_else(|| format!("bundle {}", block.address))
 }
 
 /// The bounds of the critical path, and of what needs most: a slot, a unit, slots and units that share functions.

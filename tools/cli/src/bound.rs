@@ -1,6 +1,7 @@
 //! `takt bound`: the best and the worst case of each section of each core, from the programs alone; of a system, also of the way
 //! from the host's inputs to its outputs.
 
+mod groups;
 #[cfg(feature = "board")]
 pub(crate) mod pins;
 pub(crate) mod ways;
@@ -12,6 +13,7 @@ use crate::output::{self, Failure};
 use crate::select::{self, OptionalMachine, SourceArguments};
 use anyhow::{Result, bail};
 use clap::Args;
+pub(crate) use groups::{grouped, listed, microseconds};
 use serde_json::{Value, json};
 use std::io::Write;
 use std::path::PathBuf;
@@ -69,41 +71,6 @@ Examples:
   takt bound robot.s --pins --wiring robot.toml      from an encoder's edge to a PWM's, on a board
   takt bound system.toml                             of each core, and from the host's inputs to outputs
   takt bound axis.toml --pins --wiring wiring.toml   over a system's cores and links, from pin to pin";
-
-/// Names that are shown of a list with many.
-const SHOWN: usize = 3;
-
-/// Names one after the other, of many the first ones.
-pub(crate) fn listed(names: &[String]) -> String {
-    match names {
-        many if many.len() > SHOWN => format!("{}, … ({})", many[..SHOWN].join(", "), many.len()),
-        few => few.join(", "),
-    }
-}
-
-/// The name of one end, or the merging of another group's ends of that side into one's own.
-type Side<G> = (fn(&G) -> &Vec<String>, fn(&mut G, G));
-
-/// Groups of ways that are alike but for the names of their ends: each of one group's heads leads to each of its tails.
-pub(crate) fn grouped<G>(
-    ways: impl Iterator<Item = G>,
-    alike: impl Fn(&G, &G) -> bool,
-    (heads, with_heads): Side<G>,
-    (tails, with_tails): Side<G>,
-) -> Vec<G> {
-    let merged = |groups: Vec<G>, same: fn(&G) -> &Vec<String>, with: fn(&mut G, G)| {
-        let mut merged: Vec<G> = Vec::new();
-        for group in groups {
-            match merged.iter_mut().find(|other| alike(other, &group) && same(other) == same(&group)) {
-                Some(other) => with(other, group),
-                None => merged.push(group),
-            }
-        }
-        merged
-    };
-    // First the tails of the same heads, then the heads of the same tails.
-    merged(merged(ways.collect(), heads, with_tails), tails, with_heads)
-}
 
 /// The deadline against the worst period.
 struct Verdict {
@@ -284,11 +251,6 @@ pub(crate) fn write_sections(program: &Program, bounds: &Bounds, clock: f64, out
         )?;
     }
     Ok(())
-}
-
-/// Cycles as a time.
-pub(crate) fn microseconds(cycles: Cycle, clock: f64) -> String {
-    format!("{:.3} µs", cycles as f64 / clock)
 }
 
 /// The sections of each core of a system.

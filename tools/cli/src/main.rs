@@ -52,6 +52,7 @@ mod run;
 mod select;
 #[cfg(feature = "board")]
 mod shadow;
+mod spills;
 mod synthesis;
 mod system;
 mod trace;

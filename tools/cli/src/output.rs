@@ -1,12 +1,11 @@
 //! Results as JSON, messages on standard error, and how failures are told.
 
-use crate::files::Out;
 use anyhow::Result;
 use std::io::{self, IsTerminal, Write};
 use takt_isa::text::visible;
 
 /// Writes a value as JSON, for people to read too.
-pub(crate) fn json(value: &impl serde::Serialize, out: &mut Out) -> Result<()> {
+pub(crate) fn json(value: &impl serde::Serialize, out: &mut impl Write) -> Result<()> {
     // Via a string: an error of writing stays an `io::Error`.
     let text = serde_json::to_string_pretty(value)?;
     Ok(writeln!(out, "{text}")?)

@@ -1,6 +1,6 @@
 //! When a value passes through the cores on its way, from the bounds of their periods and the rules of `docs/system.md`.
 
-use super::carried::{Carried, States};
+use super::carried::{Carried, States, at_wait};
 use super::{LatencyError, MAX_PHASES, MAX_STEPS, MAX_WAYS};
 use std::collections::{BTreeMap, BTreeSet};
 use takt_analysis::Bounds;
@@ -302,15 +302,6 @@ fn late(program: &Program, address: BundleAddress) -> u32 {
         instruction.writes(slot).filter(|register| machine.is_output(*register)).map(|_| unit.latency)
     };
     bundle.iter().zip(machine.slots).filter_map(latency).max().unwrap_or(0)
-}
-
-/// True if a link carries values that its sender's `wait` publishes.
-pub(super) fn at_wait(description: &Description, link: &Link) -> bool {
-    match link.kind {
-        LinkKind::Snapshot { strobe } => strobe.is_none(),
-        LinkKind::Wire => description.core(link.from).is_some_and(|core| core.program.latched),
-        LinkKind::Fifo { .. } => false,
-    }
 }
 
 /// Cycles from the write (or the `wait`) of a core until the receiver's bundles can read the value, or a tick can take it, or until the

@@ -1,6 +1,6 @@
 //! The proved bounds of a program, as text and as JSON.
 
-use super::{SHOWN_PARTS, by_line, line_text};
+use super::lines::{SHOWN_PARTS, by_line, line_text};
 use crate::files::Out;
 use anyhow::Result;
 use serde_json::{Value, json};

@@ -1,6 +1,6 @@
 //! The measured accuracy of a program, as text and as JSON.
 
-use super::{SHOWN, SHOWN_PARTS, by_line, line_text, location};
+use super::lines::{SHOWN, SHOWN_PARTS, by_line, line_text, location};
 use crate::files::Out;
 use anyhow::Result;
 use serde_json::{Value, json};

@@ -1,6 +1,6 @@
 //! The ways through a system, from a command of the host to an output's first response.
 
-use super::{grouped, listed, microseconds};
+use super::groups::{grouped, listed, microseconds};
 use crate::files::Out;
 use anyhow::{Result, anyhow};
 use serde_json::{Value, json};

@@ -2,42 +2,38 @@
 
 use super::run::SystemRun;
 use crate::account::Account;
-use crate::analyse::Analyse;
-use crate::application::Application;
 use crate::drive::Tables;
-use crate::files::{self, Out};
-use crate::output;
+use crate::files;
 use anyhow::Result;
 use serde_json::{Map, Value, json};
 use std::io::Write;
+use std::path::Path;
 use takt_debug::trace::{SystemTracer, Timeline};
 use takt_isa::timing::Cause;
-use takt_system::System;
+use takt_system::{Description, System};
 
 /// Base ticks without `--inputs`.
 const TICKS: u64 = 10;
 /// Stalls that are listed of each core, the longest first.
 const STALLS: usize = 8;
 
-pub(crate) fn run(arguments: &Analyse, application: &Application, color: bool, out: &mut Out) -> Result<()> {
-    let Some(loaded) = application.system() else { return Ok(()) };
-    let mut run = SystemRun::new(&loaded.description)?;
-    if arguments.html.is_some() {
+/// Runs a system; the outcome, as JSON and as text. A page with its timeline goes to `html`.
+pub(crate) fn analyse(
+    description: &Description,
+    tables: Tables<'_>,
+    html: Option<&Path>,
+    name: &str,
+) -> Result<(Value, Vec<u8>)> {
+    let mut run = SystemRun::new(description)?;
+    if html.is_some() {
         run.system.keep_host_actions();
     }
-    let inputs = arguments.inputs.as_deref();
-    let most = arguments.periods.or(inputs.is_none().then_some(TICKS));
-    let ticks = Tables { inputs, outputs: None, most }.drive(&mut run);
-    let ticks = ticks.map_err(|error| application.told(error, color))?;
+    let most = tables.most.or(tables.inputs.is_none().then_some(TICKS));
+    let ticks = Tables { most, ..tables }.drive(&mut run)?;
     let system = run.system;
-    let description = &loaded.description;
-    if let (Some(path), Some(start)) = (&arguments.html, system.start()) {
-        let timeline = timeline(&system, ticks)?;
-        let page = timeline.html(description, start, &files::input_name(&arguments.file));
+    if let (Some(path), Some(start)) = (html, system.start()) {
+        let page = timeline(&system, ticks)?.html(description, start, name);
         files::write(path, page.as_bytes())?;
-        if files::is_dash(path) {
-            return Ok(());
-        }
     }
     let mut cores = Map::new();
     let mut text = Vec::new();
@@ -84,17 +80,8 @@ pub(crate) fn run(arguments: &Analyse, application: &Application, color: bool, o
         });
         cores.insert(core.name.clone(), value);
     }
-    if arguments.json {
-        let value = json!({
-            "system": files::input_name(&arguments.file),
-            "ticks": ticks,
-            "cycles": system.now(),
-            "cores": cores,
-        });
-        return output::json(&value, out);
-    }
-    out.write_all(&text)?;
-    Ok(())
+    let value = json!({ "system": name, "ticks": ticks, "cycles": system.now(), "cores": cores });
+    Ok((value, text))
 }
 
 /// The timeline from the time at which the host wrote for the last period of the slowest core. The run is done once more, with
