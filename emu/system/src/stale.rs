@@ -1,8 +1,8 @@
-//! Reads of a FIFO's head that its own pop spoils: what a program reads of an entry after it has taken it out may be the
-//! next entry's. docs/system.md says exactly what is told.
+//! Stale reads of FIFOs: a program that reads a field of an entry after the pop that took the entry out may get the next entry's.
+//! docs/system.md says exactly which reads are told.
 
 use std::collections::BTreeSet;
-use takt_analysis::{StraightIssue, straight};
+use takt_analysis::{StaticIssue, static_issue};
 use takt_isa::program::Location;
 use takt_isa::system::{Description, End, LinkKind, MIN_LATENCY, Mailbox, Source};
 use takt_isa::timing::{Bundle, Cycle};
@@ -23,7 +23,7 @@ pub enum Doubt {
 
 /// A read of a field of a FIFO's head after the pop in the same straight line of bundles.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct HeadRead {
+pub struct StaleRead {
     /// The core that reads.
     pub core: usize,
     /// The FIFO.
@@ -55,8 +55,8 @@ struct Access {
     cycle: Cycle,
 }
 
-/// The doubtful reads of a system's programs, each source line and field once.
-pub fn doubtful(description: &Description) -> Vec<HeadRead> {
+/// The stale reads in a system's programs, each source line and field once.
+pub fn stale_reads(description: &Description) -> Vec<StaleRead> {
     let mut found = Vec::new();
     for (number, core) in description.cores.iter().enumerate() {
         // A latched input stays as it is until the next tick.
@@ -64,7 +64,7 @@ pub fn doubtful(description: &Description) -> Vec<HeadRead> {
             continue;
         }
         let mailboxes = description.mailboxes(number);
-        let issues = straight(&core.program);
+        let issues = static_issue(&core.program);
         for (link, known) in description.links.iter().enumerate() {
             let LinkKind::Fifo { pop: Some(pop), .. } = known.kind else { continue };
             if known.to == End::Core(number) {
@@ -76,7 +76,7 @@ pub fn doubtful(description: &Description) -> Vec<HeadRead> {
         }
     }
     let mut told = BTreeSet::new();
-    found.retain(|read: &HeadRead| {
+    found.retain(|read: &StaleRead| {
         let place = read.read.map_or((u32::MAX, read.read_at.index() as u32), |line| (line.file, line.line));
         told.insert((read.core, read.link, read.field, place))
     });
@@ -101,7 +101,7 @@ impl Seek<'_> {
     }
 
     /// A straight line of bundles.
-    fn stretch(&self, issues: &[StraightIssue], found: &mut Vec<HeadRead>) {
+    fn stretch(&self, issues: &[StaticIssue], found: &mut Vec<StaleRead>) {
         let (mut reads, mut pops) = (Vec::new(), Vec::new());
         let machine = self.program.machine;
         for issue in issues {
@@ -133,7 +133,7 @@ impl Seek<'_> {
                     () if after < complete => Doubt::Between,
                     () => continue,
                 };
-                found.push(HeadRead {
+                found.push(StaleRead {
                     core: self.core,
                     link: self.link,
                     field: read.register,

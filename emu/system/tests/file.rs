@@ -18,7 +18,7 @@ fn told(text: &str) -> String {
         if request.path != "a.s" {
             return Err(missing());
         }
-        let options = Options { machine: request.machine.unwrap_or(&takt_isa::T3), ..Options::default() };
+        let options = Options { machine: request.machine.unwrap_or(&takt_isa::F3), ..Options::default() };
         Ok(assemble("a.s", &MemoryLoader::of("a.s", A), &options).expect("it is right").program)
     });
     match read {

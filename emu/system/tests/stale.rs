@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 use takt_asm::{MemoryLoader, Options, assemble};
-use takt_isa::{Program, T1};
-use takt_system::heads::{Doubt, HeadRead, doubtful};
+use takt_isa::{F1, Program};
+use takt_system::stale::{Doubt, StaleRead, stale_reads};
 use takt_system::testing::describe;
 use takt_system::{Description, System};
 
 fn program(text: &str) -> Program {
-    let options = Options { machine: &T1, ..Options::default() };
+    let options = Options { machine: &F1, ..Options::default() };
     match assemble("a.s", &MemoryLoader::of("a.s", text), &options) {
         Ok(assembled) => assembled.program,
         Err(mistakes) => panic!("{}", mistakes.render(false)),
@@ -17,7 +17,7 @@ fn program(text: &str) -> Program {
 
 /// A core that takes entries of three fields from the host.
 fn receiver(text: &str) -> Description {
-    let system = "tick = 400\n[[core]]\nname = \"a\"\nprogram = \"a\"\nmachine = \"t1\"\n[[fifo]]\nname = \"q\"\nfrom = \"host\"\nto = \"a\"\n\
+    let system = "tick = 400\n[[core]]\nname = \"a\"\nprogram = \"a\"\nmachine = \"f1\"\n[[fifo]]\nname = \"q\"\nfrom = \"host\"\nto = \"a\"\n\
          ports = [\"x\", \"y\", \"z\"]\ndepth = 8\npop = \"p\"\nreceiver = { count = \"n\" }\n[[wire]]\nfrom = \"a.u\"\nto = \"host.u\"\n\
          [[wire]]\nfrom = \"a.v\"\nto = \"host.v\"\n[[wire]]\nfrom = \"a.w\"\nto = \"host.w\"\n";
     let programs = BTreeMap::from([("a".to_owned(), program(text))]);
@@ -28,8 +28,8 @@ const HEAD: &str =
     ".input x:int, y:int, z:int, n:int\n.output u:int, v:int, w:int, p:int\n.once\n wait q\n.period\nq:\n";
 
 fn doubts(description: &Description) -> Vec<(String, Doubt)> {
-    let name = |read: &HeadRead| description.cores[read.core].program.register_text(read.field);
-    doubtful(description).iter().map(|read| (name(read), read.doubt)).collect()
+    let name = |read: &StaleRead| description.cores[read.core].program.register_text(read.field);
+    stale_reads(description).iter().map(|read| (name(read), read.doubt)).collect()
 }
 
 /// For every distance from a pop to reads of all fields: where the emulator shows this entry, none is told of; where a field is
@@ -51,7 +51,7 @@ fn what_is_told_is_what_is_read() {
         let start = system.run_to_start(10_000).unwrap().unwrap();
         system.run_until(start + 200).unwrap();
         let seen = ["u", "v", "w"].map(|port| system.output(port).unwrap());
-        let told = doubtful(&description);
+        let told = stale_reads(&description);
         for (i, name) in ["x", "y", "z"].into_iter().enumerate() {
             let is_told = told.iter().any(|read| {
                 assert_eq!(read.doubt, Doubt::Between);
@@ -83,7 +83,7 @@ fn a_read_that_was_moved_is_told_of() {
     };
     let moved = late("");
     assert_eq!(doubts(&moved), [("x".to_owned(), Doubt::Moved)]);
-    let [read] = &doubtful(&moved)[..] else { panic!("one") };
+    let [read] = &stale_reads(&moved)[..] else { panic!("one") };
     let line = |location: Option<takt_isa::program::Location>| location.unwrap().line;
     assert!(line(read.read) < line(read.popped), "{read:?}");
     // As written, with the demand, and if ports are latched, there is nothing to tell of.

@@ -242,9 +242,9 @@ T4 = Machine {
 }
 
 impl Machine {
-    /// The machine of this name.
+    /// The machine of this name, fixtures of the tests included.
     pub fn from_name(name: &str) -> Option<&'static Machine> {
-        MACHINES.iter().copied().find(|machine| machine.name == name)
+        MACHINES.iter().chain(super::fixture::FIXTURES).copied().find(|machine| machine.name == name)
     }
 
     /// The first slot that hosts a unit for `function`, and that unit's index in the slot. Idle operations have none: every slot takes them.

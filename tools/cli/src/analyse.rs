@@ -16,9 +16,9 @@ use anyhow::{Result, bail};
 use clap::Args;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use takt_analysis::faster::{Candidate, faster};
-use takt_analysis::follow::{Followed, MOST_PERIODS, PERIODS, follow};
+use takt_analysis::period::{MOST_PERIODS, PERIODS, PeriodRun, run_to_period};
 use takt_analysis::picture::Picture;
+use takt_analysis::what_if::{Candidate, what_if};
 use takt_asm::schedule::BlockReport;
 use takt_emu::Rows;
 use takt_isa::timing::Cycle;
@@ -97,11 +97,11 @@ fn of_program(arguments: &Analyse, loaded: &Loaded, color: bool, out: &mut Out) 
     let program = &loaded.program;
     let rows = read_inputs(arguments, program)?;
     let name = files::input_name(&arguments.file);
-    let followed = follow(program, &rows, arguments.periods);
-    let Followed { trace, period, shadow } =
+    let followed = run_to_period(program, &rows, arguments.periods);
+    let PeriodRun { trace, period, shadow } =
         followed.map_err(|error| fault::told(error.into(), loaded, color))?;
-    let again = |program: &Program| Some(follow(program, &rows, arguments.periods).ok()?.trace);
-    let faster = faster(program, &trace, &candidates(arguments, &load), &again);
+    let again = |program: &Program| Some(run_to_period(program, &rows, arguments.periods).ok()?.trace);
+    let faster = what_if(program, &trace, &candidates(arguments, &load), &again);
     let accuracy = Some(Measured::new(program, &shadow).json());
     let picture = Picture { faster, accuracy, ..Picture::new(program, name, period, trace) };
     if let Some(path) = &arguments.html {

@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use takt_analysis::follow::PERIOD_LIMIT;
+use takt_analysis::period::PERIOD_LIMIT;
 use takt_emu::Emulator;
 use takt_isa::program::Port;
 use takt_isa::{Function, Machine, Register, T3};

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
 use takt_asm::schedule::DemandKind;
 use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, Resources, SharedBound, TimingReport};
-use takt_asm::{Adjustment, Assembled, Contraction, Made, Schedule, Spills, image, listing};
+use takt_asm::{Adjustment, Assembled, Contraction, Schedule, Spills, Transfer, image, listing};
 use takt_isa::{Program, SlotIndex, Slots};
 use takt_rtl::header::{Header, Language};
 
@@ -279,9 +279,9 @@ fn write_adjustments(assembled: &Assembled, out: &mut Out) -> Result<()> {
     };
     let width = longest.clamp(12, 40);
     writeln!(out, "{:<1$} bank   written by several slots", "registers", width + 2)?;
-    for Adjustment { register, bank, mnemonic, location, made } in adjustments {
+    for Adjustment { register, bank, mnemonic, location, transfer } in adjustments {
         let place = location.map_or(String::new(), |at| format!("{}: ", assembled.program.place_text(at)));
-        writeln!(out, "  {register:<width$} {bank:<6} {place}`{mnemonic}` {made}")?;
+        writeln!(out, "  {register:<width$} {bank:<6} {place}`{mnemonic}` {transfer}")?;
     }
     Ok(())
 }
@@ -398,10 +398,10 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
         })
     };
     let adjustment = |one: &Adjustment| {
-        let (made, details) = match one.made {
-            Made::Preset(bits) => ("preset", json!({ "bits": bits })),
-            Made::Operation(mnemonic) => ("operation", json!({ "mnemonic": mnemonic })),
-            Made::Copy { address, alone, cycles } => {
+        let (made, details) = match one.transfer {
+            Transfer::Preset(bits) => ("preset", json!({ "bits": bits })),
+            Transfer::Rematerialised(mnemonic) => ("operation", json!({ "mnemonic": mnemonic })),
+            Transfer::Copy { address, alone, cycles } => {
                 ("copy", json!({ "address": address, "alone": alone, "cycles": cycles }))
             }
         };

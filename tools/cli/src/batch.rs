@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use std::io::Write;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
-use takt_analysis::follow::PERIOD_LIMIT;
+use takt_analysis::period::PERIOD_LIMIT;
 use takt_emu::{Batch, PeriodError, Rows};
 use takt_isa::fp::Flags;
 

@@ -3,7 +3,7 @@
 use crate::deny::{Denials, Watch};
 use crate::select::suggest;
 use anyhow::{Result, anyhow};
-use takt_analysis::follow::PERIOD_LIMIT;
+use takt_analysis::period::PERIOD_LIMIT;
 use takt_emu::{Emulator, Event, PeriodError, PeriodReport, Statistics};
 use takt_isa::{Program, Register};
 use takt_programs::hybrid::closed_loop::{Inputs, TrackingController};

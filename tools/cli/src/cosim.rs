@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use takt_analysis::follow::PERIOD_LIMIT;
+use takt_analysis::period::PERIOD_LIMIT;
 use takt_cosim::system::{SystemLockstep, SystemModel};
 use takt_cosim::{
     Lockstep, LockstepError, Model, ModelError, Simulation, cache_folder, circuit_stops, random,

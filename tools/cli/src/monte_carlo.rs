@@ -15,7 +15,7 @@ use std::io::Write;
 use std::num::NonZeroU64;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use takt_analysis::follow::PERIOD_LIMIT;
+use takt_analysis::period::PERIOD_LIMIT;
 use takt_emu::{Batch, PeriodError};
 use takt_isa::Program;
 use takt_programs::hybrid::closed_loop::{Inputs, LoopError, distance, not_finite};

@@ -20,7 +20,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
-use takt_analysis::follow::PERIOD_LIMIT;
+use takt_analysis::period::PERIOD_LIMIT;
 use takt_debug::trace::Tracer;
 use takt_emu::{Emulator, Row, Stop};
 use takt_isa::Program;

@@ -13,12 +13,15 @@ fn a_script() {
         "# what the program is to do\nbreak add if i == 2\nwatch sum\ncontinue\ncontinue\nstops\nflight\nprint sum, i, table[i], @m0\n\
          list\nstep out\nback line\nreverse\ndelete\ndisplay sum\nuntil count == 3\ncheck sum == -1.0\nulp sum, -1.0000001\nregisters *\nports\nmemory table 3\nstalls\nhelp until\n",
     );
-    let said = folder.line("debug sum.s --script good.txt").ok();
+    let said = folder.line("debug sum.s -m f3 --script good.txt").ok();
     insta::assert_snapshot!("script", &said);
     let script = folder.read("good.txt");
-    assert_eq!(folder.fed("debug sum.s", &script).ok(), folder.fed("debug sum.s --script -", &script).ok());
+    assert_eq!(
+        folder.fed("debug sum.s -m f3", &script).ok(),
+        folder.fed("debug sum.s -m f3 --script -", &script).ok()
+    );
     // An image has all that its source has.
-    folder.line("asm sum.s -o sum.takt").ok();
+    folder.line("asm sum.s -m f3 -o sum.takt").ok();
     assert_eq!(folder.line("debug sum.takt --script good.txt").ok(), said);
 }
 
@@ -102,7 +105,7 @@ fn mistakes() {
         "until",
         "watch",
     ] {
-        let done = folder.fed("debug sum.s", format!("step 4\n{command}\necho alive\n").as_bytes());
+        let done = folder.fed("debug sum.s -m f3", format!("step 4\n{command}\necho alive\n").as_bytes());
         assert_eq!(done.status, Some(1), "{command}");
         assert!(done.stdout.ends_with("alive\n"), "{command}: {}", done.stdout);
         text.push_str(&format!("(takt) {command}\n{}\n", done.stderr));

@@ -91,7 +91,7 @@ fn hovering_shows_the_details() {
         "mean.s",
         ".input a, b\n.output mean\n.period\n.reg sum\np:  fadd sum, a, b\n    fdiv mean, sum, 2.0\n    wait p\n",
     );
-    folder.line("analyse mean.s --html page.html").ok();
+    folder.line("analyse mean.s -m f3 --html page.html").ok();
     let hover = "<script>
         const over = (element) => {
             // Beside the chain, which is drawn through the middle.

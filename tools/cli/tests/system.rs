@@ -226,7 +226,8 @@ fn the_hybrid_robot_on_two_processors() {
     let overall = |run: &serde_json::Value| number(&run["tracking_error_m"]["overall"]);
     assert!((overall(&one) - overall(&both)).abs() < 1e-7, "{both} {one}");
     assert_eq!(both["missed"], 0);
-    assert_eq!(both["cores"][0]["longest"], 324);
+    // The point is there before the tracking core's tick, 400 cycles later.
+    assert!(both["cores"][0]["longest"].as_u64() < Some(400), "{both}");
     assert!(number(&both["points"][0]["largest_error"]) < 6.2e-8, "{both}");
     let text = folder.line(&format!("track -q --periods 10 --system {two}")).ok();
     assert!(text.contains("\n  n1, n2, n3 -> F1, F2, F3, through tracking\n"), "{text}");

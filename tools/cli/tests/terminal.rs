@@ -128,7 +128,7 @@ impl Terminal {
 fn full_screen() {
     let folder = Folder::new();
     folder.write("sum.s", SUM);
-    let line = "takt debug sum.s --tui; echo status $?; stty -a";
+    let line = "takt debug sum.s -m f3 --tui; echo status $?; stty -a";
     let mut terminal = Terminal::new(&folder, line, 24, 80);
     terminal.until("the alternate screen", vt100::Screen::alternate_screen);
     terminal.shows("cycle 0, period 0");

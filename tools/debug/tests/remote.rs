@@ -7,7 +7,7 @@ use takt_debug::remote::{Activity, Remote, RemoteConsole, RemoteError, RemoteSes
 use takt_debug::session::{Control, Options, Session};
 use takt_emu::{Emulator, PeriodError, Status};
 use takt_isa::fp::Flags;
-use takt_isa::{BundleAddress, Program, Register, T3};
+use takt_isa::{BundleAddress, F3, Program, Register};
 
 /// Sums its input, keeps the last eight sums in a ring, and stops where it is told to.
 const SOURCE: &str = "\
@@ -226,13 +226,13 @@ impl Remote for Board {
 }
 
 fn program() -> Program {
-    let options = AsmOptions { machine: &T3, ..AsmOptions::default() };
+    let options = AsmOptions { machine: &F3, ..AsmOptions::default() };
     assemble("ring.s", &MemoryLoader::new(&[("ring.s", SOURCE)]), &options).unwrap().program
 }
 
 /// A console on a board after so many periods, what it said, and the board.
 fn begin(periods: u64, planted: Planted, restart: bool, interactive: bool) -> (RemoteConsole, String, Board) {
-    let options = AsmOptions { machine: &T3, ..AsmOptions::default() };
+    let options = AsmOptions { machine: &F3, ..AsmOptions::default() };
     let assembled = assemble("ring.s", &MemoryLoader::new(&[("ring.s", SOURCE)]), &options).unwrap();
     let debug = assembled.debug_info();
     let (program, control) = (&assembled.program, Arc::new(Control::default()));

@@ -5,7 +5,7 @@ use takt_asm::{MemoryLoader, Options as AsmOptions, assemble};
 use takt_debug::console::Console;
 use takt_debug::session::{CHECKPOINTS, Options, Place, Session, Stop, Test, Unit, Where, Why};
 use takt_emu::testing::{Options as ProgramOptions, Random, input_ports, random_program};
-use takt_isa::{BundleAddress, MACHINES, Program, Register, T3};
+use takt_isa::{BundleAddress, F3, MACHINES, Program, Register};
 
 /// A random program with inputs for some periods; with `subroutines` it has calls.
 fn random_session(seed: u64, index: usize, periods: u64) -> Session {
@@ -140,7 +140,8 @@ out:    .space  3
 
 fn console(source: &str) -> Console {
     let files = [("a.s", source)];
-    let assembled = assemble("a.s", &MemoryLoader::new(&files), &AsmOptions::default()).unwrap();
+    let options = AsmOptions { machine: &F3, ..AsmOptions::default() };
+    let assembled = assemble("a.s", &MemoryLoader::new(&files), &options).unwrap();
     let sources = vec![("a.s".to_owned(), source.to_owned())];
     let options = Options { sources, constants: assembled.constants, ..Options::default() };
     Console::new(Session::new(&assembled.program, options).unwrap())
@@ -356,7 +357,7 @@ fn expressions() {
 #[test]
 fn a_long_run() {
     let loader = MemoryLoader::new(takt_programs::SOURCES);
-    let options = AsmOptions { machine: &T3, effort: 0, ..AsmOptions::default() };
+    let options = AsmOptions { machine: &F3, effort: 0, ..AsmOptions::default() };
     let program = assemble("hybrid/tracking.s", &loader, &options).unwrap().program;
     let zeros: Vec<(Register, u32)> = program.inputs.iter().map(|port| (port.register, 0)).collect();
     let rows = Some(Arc::new(vec![zeros; 10_000]));

@@ -6,7 +6,7 @@ use takt_debug::session::{Options, Session, Unit};
 use takt_debug::system::{SystemConsole, SystemOptions, SystemSession, SystemStop, SystemWhy};
 use takt_emu::Event;
 use takt_emu::testing::Random;
-use takt_isa::{MACHINES, Register};
+use takt_isa::{F1, MACHINES, Register};
 use takt_system::testing::random_description;
 use takt_system::{Description, System};
 
@@ -300,8 +300,7 @@ once:   iadd    n, n, 0
 ";
     const FOREVER: &str = ".reg n:int\n li n, 0\nagain: iadd n, n, 1\n jmp again\n";
     let assembled = |name: &str, text: &str| {
-        let machine = MACHINES.iter().find(|machine| machine.name == "t1").expect("there is one");
-        let options = takt_asm::Options { machine, ..takt_asm::Options::default() };
+        let options = takt_asm::Options { machine: &F1, ..takt_asm::Options::default() };
         let files = takt_asm::MemoryLoader::new(&[(name, text)]);
         takt_asm::assemble(name, &files, &options).expect("it assembles")
     };
@@ -310,11 +309,11 @@ once:   iadd    n, n, 0
 [[core]]
 name = \"calling\"
 program = \"calling.s\"
-machine = \"t1\"
+machine = \"f1\"
 [[core]]
 name = \"forever\"
 program = \"forever.s\"
-machine = \"t1\"
+machine = \"f1\"
 ";
     let program = |request: &takt_system::Request<'_>| -> Result<_, takt_system::ProgramError<()>> {
         Ok(programs[usize::from(request.path == "forever.s")].program.clone())

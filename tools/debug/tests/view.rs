@@ -11,7 +11,7 @@ use takt_debug::console::{Console, KEYS, first_mistake};
 use takt_debug::session::{Options, Session};
 use takt_debug::view::{self, Pane, Screen};
 use takt_emu::Rows;
-use takt_isa::{Program, T3};
+use takt_isa::{F3, Program};
 use takt_programs::hybrid::Controller;
 use takt_programs::hybrid::closed_loop::ClosedLoop;
 use takt_programs::trajectory::Trajectory;
@@ -40,7 +40,7 @@ table:  .float  0.5, 0.25, -1.75
 
 fn console(source: &str) -> Console {
     let files = [("a.s", source)];
-    let options = AsmOptions { machine: &T3, ..AsmOptions::default() };
+    let options = AsmOptions { machine: &F3, ..AsmOptions::default() };
     let assembled = assemble("a.s", &MemoryLoader::new(&files), &options).unwrap();
     let sources = vec![("a.s".to_owned(), source.to_owned())];
     let options = Options { sources, constants: assembled.constants, ..Options::default() };

@@ -5,7 +5,7 @@ use crate::files::Out;
 use anyhow::Result;
 use serde_json::{Value, json};
 use std::io::Write;
-use takt_analysis::accuracy::{Assumed, Enclosure, Hazard, Interval, Moment, OutputBound, Part};
+use takt_analysis::accuracy::{Assumed, Enclosure, ErrorShare, Hazard, Interval, Moment, OutputBound};
 use takt_isa::Program;
 use takt_isa::program::Location;
 
@@ -22,8 +22,8 @@ fn interval(interval: Option<Interval>) -> String {
 
 impl Bounded<'_> {
     fn parts(&self, output: &OutputBound) -> Vec<(Option<Location>, f64, f64)> {
-        let parts: Vec<Part> =
-            output.parts.iter().map(|(word, error)| Part { word: *word, error: *error }).collect();
+        let parts: Vec<ErrorShare> =
+            output.parts.iter().map(|(word, error)| ErrorShare { word: *word, error: *error }).collect();
         by_line(self.program, &parts)
     }
 

@@ -1,7 +1,7 @@
 //! Errors by source line.
 
 use std::collections::BTreeMap;
-use takt_analysis::accuracy::Part;
+use takt_analysis::accuracy::ErrorShare;
 use takt_isa::Program;
 use takt_isa::program::Location;
 
@@ -20,7 +20,7 @@ pub(super) fn line_text(program: &Program, location: Option<Location>) -> String
 
 /// The lines that an error comes from, with the sum of their shares, and the part that each has of all that was added up; the
 /// largest first.
-pub(super) fn by_line(program: &Program, parts: &[Part]) -> Vec<(Option<Location>, f64, f64)> {
+pub(super) fn by_line(program: &Program, parts: &[ErrorShare]) -> Vec<(Option<Location>, f64, f64)> {
     let mut lines: BTreeMap<_, (Option<Location>, f64)> = BTreeMap::new();
     for part in parts {
         let location = location(program, part.word);

@@ -6,7 +6,7 @@ use anyhow::Result;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::io::Write;
-use takt_analysis::accuracy::{Decision, Lost, OperationAccuracy, OutputAccuracy, Part, Shadow, Worst};
+use takt_analysis::accuracy::{Decision, ErrorShare, Lost, OperationAccuracy, OutputAccuracy, Shadow, Worst};
 use takt_isa::Program;
 use takt_isa::program::Location;
 
@@ -30,7 +30,7 @@ impl<'a> Measured<'a> {
         Measured { program, shadow }
     }
 
-    fn by_line(&self, parts: &[Part]) -> Vec<(Option<Location>, f64, f64)> {
+    fn by_line(&self, parts: &[ErrorShare]) -> Vec<(Option<Location>, f64, f64)> {
         by_line(self.program, parts)
     }
 

@@ -3,7 +3,7 @@
 use super::watch::Observer;
 use crate::deny::{Denials, Watch};
 use anyhow::{Context, Result, bail};
-use takt_analysis::follow::PERIOD_LIMIT;
+use takt_analysis::period::PERIOD_LIMIT;
 use takt_isa::Register;
 use takt_isa::timing::Cycle;
 use takt_programs::hybrid::Outputs;

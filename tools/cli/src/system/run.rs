@@ -8,7 +8,7 @@ use crate::ports;
 use crate::ran::{CoreRan, Execution, Ran, SystemRan};
 use crate::trace::TraceArguments;
 use anyhow::{Result, anyhow, bail};
-use takt_analysis::follow::PERIOD_LIMIT;
+use takt_analysis::period::PERIOD_LIMIT;
 use takt_debug::trace::SystemTracer;
 use takt_emu::Row;
 use takt_isa::program::Port;

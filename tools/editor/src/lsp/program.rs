@@ -6,7 +6,7 @@ use crate::lsp::text::{Encoding, Text};
 use lsp_types::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use takt_analysis::{BoundError, Bounds, StraightIssue};
+use takt_analysis::{BoundError, Bounds, StaticIssue};
 use takt_asm::diag::Diagnostics;
 use takt_asm::index::{Index, Reference, Symbol};
 use takt_asm::source::{Sources, Span};
@@ -124,7 +124,7 @@ pub(crate) struct Full {
 /// A program and its cycles.
 pub(crate) struct Counted {
     pub(crate) assembled: Assembled,
-    pub(crate) issues: Vec<StraightIssue>,
+    pub(crate) issues: Vec<StaticIssue>,
     pub(crate) bounds: Result<Bounds, BoundError>,
 }
 
@@ -176,7 +176,7 @@ pub(crate) fn finish(root: &Path, checked: Checked) -> Full {
     match checked.finish() {
         Err(diagnostics) => Full { files, diagnostics, program: None },
         Ok(assembled) => {
-            let issues = takt_analysis::straight(&assembled.program);
+            let issues = takt_analysis::static_issue(&assembled.program);
             let bounds = takt_analysis::bound(&assembled.program);
             let diagnostics = assembled.warnings.clone();
             Full { files, diagnostics, program: Some(Counted { assembled, issues, bounds }) }

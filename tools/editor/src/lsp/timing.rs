@@ -4,7 +4,7 @@ use crate::lsp::program::Counted;
 use crate::lsp::{Settings, plural};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use takt_analysis::StraightIssue;
+use takt_analysis::StaticIssue;
 use takt_asm::schedule::BlockReport;
 use takt_isa::program::Location;
 use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
@@ -57,12 +57,12 @@ pub(crate) fn hints(counted: &Counted, file: &str) -> Vec<Hint> {
         .collect()
 }
 
-fn issue(counted: &Counted, address: BundleAddress) -> Option<&StraightIssue> {
+fn issue(counted: &Counted, address: BundleAddress) -> Option<&StaticIssue> {
     counted.issues.get(address.index())
 }
 
 /// A cycle, and from where it counts where that is not the beginning of a section.
-fn cycle(program: &Program, issue: &StraightIssue) -> String {
+fn cycle(program: &Program, issue: &StaticIssue) -> String {
     if program.sections.iter().any(|section| section.start == issue.from) {
         return issue.cycle.to_string();
     }

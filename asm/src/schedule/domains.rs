@@ -1,17 +1,17 @@
-//! In which banks registers may still lie while blocks are scheduled one after another: a choice of slot for one operation that
-//! writes a register is a choice for all.
+//! Domains of slots while blocks are scheduled one after another: operations that write one register must share a slot, because
+//! the register lies in one bank.
 
 use crate::ir::runs::Run;
 use crate::ir::{Bundle, Ir, Operation, RegisterId, RegisterKind};
 use std::collections::HashMap;
 use takt_isa::{SlotIndex, Slots};
 
-/// For registers that several operations write, the slots that all of these may have.
-pub(super) struct Banks {
+/// For each register that several operations write, the slots that all of them may have.
+pub(super) struct Domains {
     of: HashMap<RegisterId, Slots>,
 }
 
-/// What is known of the operations that write a register.
+/// The operations that write a register.
 #[derive(Clone, Copy)]
 struct Writers {
     /// The slots that may execute all of them.
@@ -19,21 +19,21 @@ struct Writers {
     /// The last run that has one.
     run: usize,
     count: u32,
-    /// Whether they stay where they are.
+    /// True if they keep their slots.
     stay: bool,
-    /// Whether one of them shares its bundle with others.
+    /// True if one of them shares its bundle with others.
     bundled: bool,
     /// The slot that they have.
     slot: SlotIndex,
 }
 
-impl Banks {
-    /// What the source leaves open. Where it says what the bundles are (all of them, if `fixed`), or one choice would have to
-    /// suit several operations of a block or of a bundle, it is the slot that the operations have.
-    pub(super) fn new(ir: &Ir, runs: &[Run], fixed: bool) -> Banks {
+impl Domains {
+    /// The domains before scheduling. Operations keep their slots in bundles that are not scheduled (all, if `fixed`), and where one
+    /// choice would have to suit several operations of a block or of a bundle.
+    pub(super) fn new(ir: &Ir, runs: &[Run], fixed: bool) -> Domains {
         let mut of = HashMap::new();
         if ir.operations().all(|operation| operation.slots.len() < 2) {
-            return Banks { of };
+            return Domains { of };
         }
         let mut registers: HashMap<RegisterId, Writers> = HashMap::new();
         for (number, run) in runs.iter().enumerate() {
@@ -56,23 +56,23 @@ impl Banks {
             let stay = writers.stay || writers.bundled;
             of.insert(*register, if stay { Slots::of(writers.slot) } else { writers.able });
         }
-        Banks { of }
+        Domains { of }
     }
 
-    /// The slots that may execute an operation. One that writes an output port is executed where that takes least time: the
-    /// port's demands count on it.
+    /// The slots that may execute an operation; for one that writes an output port, those with the least latency: the port's demands
+    /// count on that.
     pub(super) fn able(&self, ir: &Ir, operation: &Operation) -> Slots {
         let Some(dest) = operation.dest else { return operation.slots };
         let slots = self.of.get(&dest).map_or(operation.slots, |slots| slots.and(operation.slots));
         if ir.register(dest).kind != RegisterKind::Output || slots.len() < 2 {
             return slots;
         }
-        let latency = |slot: &SlotIndex| super::part(ir.machine, operation, Some(*slot)).writes;
+        let latency = |slot: &SlotIndex| super::reservation(ir.machine, operation, Some(*slot)).writeback;
         let least = slots.iter().map(|slot| latency(&slot)).min();
         slots.iter().filter(|slot| Some(latency(slot)) == least).collect()
     }
 
-    /// Notes the slots that a block's operations have got.
+    /// Fixes the slots of a scheduled block's operations.
     pub(super) fn settle(&mut self, bundles: &[Bundle]) {
         for operation in bundles.iter().flat_map(|bundle| &bundle.operations) {
             if let (Some(dest), Some(slot)) = (operation.dest, operation.slot)

@@ -12,6 +12,8 @@
 //! non-ASCII character of a comment. Two of its habits are worked around here: it hands out numbers in binary32
 //! (ours are read again from the span, in binary64), and it drops or misreads some numbers of codes, like `G1.`
 //! and `G429496730` (both are refused beforehand).
+//!
+//! The files of this folder are one module and import one another: the reader's types and limits are here, its errors state them.
 
 mod error;
 mod interpret;
@@ -31,7 +33,7 @@ pub const MAX_INTEGER_DIGITS: usize = 8;
 /// A tool path read from G-code, in SI units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Program {
-    /// Where the robot starts: the target of the first motion.
+    /// The pose in which the robot starts: the target of the first motion.
     pub start: Pose,
     /// The moves in order, each starting where the one before ended; may include moves of length 0.
     pub moves: Vec<Move>,

@@ -83,7 +83,7 @@ struct Reader<'s> {
     words: Vec<Word<'s>>,
     /// The first error.
     error: Option<Located>,
-    /// Whether M2 or M30 has been read.
+    /// True once M2 or M30 has been read.
     ended: bool,
 }
 

@@ -1,64 +1,63 @@
-//! Homes: in which bank a register lies that operations of several slots write, and what becomes of those whose slot writes
-//! another bank.
+//! Bank assignment: chooses the home bank of each register that operations of several slots write.
 //!
-//! A slot writes its own bank only. A value that must outlive its straight run, or that an output port shows, has to come
-//! to one place, the register's home. What another slot computes gets there in the cheapest of three ways: a constant that is
-//! there from the start is loaded with the program, a constant that comes later is computed by an operation of the right
-//! slot, and anything else is copied by an operation that copies bits ([`copies`](crate::homes::copies)).
+//! A slot writes its own bank only. A value that is live after its straight run, or that an output port shows, must reach the home
+//! bank of its register. If another slot computes it, it is transferred in the cheapest of three ways: a constant that is live
+//! from the start is loaded with the program, a later constant is rematerialised (Briggs, Cooper, Torczon, PLDI 1992) by an operation
+//! of the right slot, and any other value is copied ([`copies`](crate::banks::copies)).
 
 pub(crate) mod copies;
 pub(crate) mod slots;
-pub(crate) mod values;
+pub(crate) mod webs;
 
+use crate::context::bits_text;
 use crate::ir::flow::{self, Flow};
 use crate::ir::runs::{self, Run};
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, VirtualRegister};
-use crate::output::listing;
 use crate::report::source::Span;
 use foldhash::HashSet;
 use takt_isa::fp::Host;
 use takt_isa::program::Location;
 use takt_isa::{BundleAddress, Effect, Machine, Op, ROWS, Register, Row, SlotIndex, Slots, Type, compute};
 
-/// What the assembler did about a register that operations of several slots write.
+/// A transfer of a value to the home bank of its register.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Adjustment {
     /// The register's name.
     pub register: String,
     /// The bank that it lies in.
     pub bank: &'static str,
-    /// The operation that could not write it: its name, and where it stands.
+    /// The mnemonic of the operation that could not write it.
     pub mnemonic: &'static str,
-    /// Where it stands.
+    /// The operation's source line.
     pub location: Option<Location>,
-    /// What became of it.
-    pub made: Made,
+    /// The transfer.
+    pub transfer: Transfer,
 }
 
-/// What became of an operation whose slot does not write the bank of its destination.
+/// Transfer of a value to a bank that the slot of its operation does not write.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Made {
+pub enum Transfer {
     /// The loader sets the register to these bits; the operation is gone.
     Preset(u32),
     /// An operation of the right slot, by name, gives the same bits.
-    Operation(&'static str),
+    Rematerialised(&'static str),
     /// Its value is copied.
     Copy {
         /// The bundle that copies.
         address: BundleAddress,
-        /// Whether nothing else issues in that bundle.
+        /// True if nothing else issues in that bundle.
         alone: bool,
-        /// Cycles that its straight run of bundles takes longer for it, if these stay as they are written; else it is among what is scheduled.
+        /// The cycles that it costs its straight run of bundles; `None` if that is scheduled.
         cycles: Option<u32>,
     },
 }
 
-impl std::fmt::Display for Made {
+impl std::fmt::Display for Transfer {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Made::Preset(bits) => write!(f, "loaded with the program, {}", listing::shown(*bits)),
-            Made::Operation(mnemonic) => write!(f, "becomes `{mnemonic}`"),
-            Made::Copy { address, alone, cycles } => {
+            Transfer::Preset(bits) => write!(f, "loaded with the program, {}", bits_text(*bits)),
+            Transfer::Rematerialised(mnemonic) => write!(f, "becomes `{mnemonic}`"),
+            Transfer::Copy { address, alone, cycles } => {
                 match alone {
                     true => write!(f, "copied in a bundle of its own, {address}")?,
                     false => write!(f, "copied in a free slot of bundle {address}")?,
@@ -74,52 +73,52 @@ impl std::fmt::Display for Made {
     }
 }
 
-/// The home of a register, for those that need to be given one.
+/// The home bank of a register.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Home {
+pub(crate) struct HomeBank {
     /// The slot that writes it.
     pub(crate) slot: SlotIndex,
-    /// What copies bits there, if anything.
+    /// The operation that copies bits there, if there is one.
     pub(crate) copier: Option<Op>,
 }
 
-/// A register that has no home that all who write it can reach, and what to do.
+/// A register without a bank that all its writes can reach, and advice.
 #[derive(Clone, Debug)]
-pub(crate) struct Homeless {
+pub(crate) struct BankConflict {
     pub(crate) register: RegisterId,
     pub(crate) help: String,
-    /// What stands in the way, and where.
+    /// The cause and its place.
     pub(crate) because: Option<(Span, String)>,
 }
 
-/// What is known of the homes of a program's registers.
+/// The assignment of a program's registers to banks.
 #[derive(Default)]
-pub(crate) struct Homes {
+pub(crate) struct BankAssignment {
     /// By register.
-    pub(crate) of: Vec<Option<Home>>,
-    /// For registers that have a home: by run, whether the value that the run leaves is wanted.
+    pub(crate) of: Vec<Option<HomeBank>>,
+    /// Liveness of registers with a home bank: by run, true if the register is live after it.
     pub(crate) live: Vec<(RegisterId, Vec<bool>)>,
-    pub(crate) homeless: Vec<Homeless>,
+    pub(crate) conflicts: Vec<BankConflict>,
     /// Registers that the source writes in `.once`, if only to write them again before they are read.
     pub(crate) set_once: HashSet<RegisterId>,
-    /// Registers made for values that nothing need read.
+    /// Registers made for values; that nothing reads one is no mistake.
     pub(crate) quiet: HashSet<RegisterId>,
     pub(crate) adjustments: Vec<Adjustment>,
-    /// For each value that is copied which of the adjustments that is, and its register.
+    /// For each copied value the index of its adjustment, and its register.
     pub(crate) copied: Vec<(usize, RegisterId)>,
 }
 
-impl Homes {
-    pub(crate) fn get(&self, register: RegisterId) -> Option<Home> {
+impl BankAssignment {
+    pub(crate) fn get(&self, register: RegisterId) -> Option<HomeBank> {
         self.of.get(register.index()).copied().flatten()
     }
 
-    /// What there is to say of a register that has no home.
-    pub(crate) fn homeless(&self, register: RegisterId) -> Option<&Homeless> {
-        self.homeless.iter().find(|homeless| homeless.register == register)
+    /// The conflict of a register without a home bank.
+    pub(crate) fn conflict(&self, register: RegisterId) -> Option<&BankConflict> {
+        self.conflicts.iter().find(|conflict| conflict.register == register)
     }
 
-    /// Whether what a run leaves in a register may be read after it, or is shown by a port.
+    /// True if a register is live after a run: its value may be read, or a port shows it.
     pub(crate) fn is_live(&self, register: RegisterId, run: usize) -> bool {
         let found = self.live.binary_search_by_key(&register, |(register, _)| *register);
         found.map_or(true, |index| self.live[index].1[run])
@@ -131,38 +130,38 @@ struct Write {
     bundle: usize,
     number: usize,
     slot: SlotIndex,
-    /// Whether its value must come home: a port shows it, or it may be read after the run.
+    /// True if the value must reach the home bank: a port shows it, or it is live after the run.
     live: bool,
     /// The bits that it writes, if they are known.
     constant: Option<u32>,
-    /// Whether they can be there from the start.
+    /// True if the loader can set them.
     initial: bool,
-    /// Whether the value can be copied after it.
+    /// True if the value can be copied after it.
     copied: bool,
 }
 
-/// What a write costs that comes home by an operation of the right slot, and by a copy.
+/// Cost of a transfer by rematerialisation, and by a copy.
 const OPERATION: u64 = 1;
 const COPY: u64 = 4;
 
-/// Chooses homes. Constants come home here; what is to be copied still writes the register.
-pub(crate) fn choose(ir: &mut Ir) -> Homes {
-    let contested = values::contested(ir);
-    let mut homes = Homes { of: vec![None; ir.registers.len()], ..Homes::default() };
+/// Assigns home banks. Constants are transferred here; a value that is to be copied still writes the register.
+pub(crate) fn assign(ir: &mut Ir) -> BankAssignment {
+    let contested = webs::contested(ir);
+    let mut assignment = BankAssignment { of: vec![None; ir.registers.len()], ..BankAssignment::default() };
     if !contested.contains(&true) {
-        return homes;
+        return assignment;
     }
     let runs = runs::runs(ir);
     let flow = Flow::new(ir, &runs);
     for index in (0..contested.len()).filter(|index| contested[*index]) {
         let id = RegisterId::new(index);
-        // What is named by its place alone is meant to be there, and nowhere else.
+        // A register that the source names by its address stays there.
         if ir.register(id).name.is_empty() {
             continue;
         }
         let mut once = ir.bundles[..ir.period as usize].iter().flat_map(|bundle| &bundle.operations);
         if once.any(|operation| operation.dest == Some(id)) {
-            homes.set_once.insert(id);
+            assignment.set_once.insert(id);
         }
         let live = if ir.register(id).kind == RegisterKind::Output {
             vec![true; runs.len()]
@@ -170,30 +169,30 @@ pub(crate) fn choose(ir: &mut Ir) -> Homes {
             let (reads, writes) = flow::uses(ir, &runs, id);
             flow.live_after(&reads, &writes)
         };
-        let writes = coming_home(ir, &runs, &flow, id, &live);
-        match best(ir, &flow, &writes, ir.register(id).pinned) {
+        let writes = bank_writes(ir, &runs, &flow, id, &live);
+        match best_bank(ir, &flow, &writes, ir.register(id).pinned) {
             Some(slot) => {
-                let home = Home { slot, copier: copier(ir.machine, slot) };
-                homes.of[index] = Some(home);
-                homes.live.push((id, live));
+                let home = HomeBank { slot, copier: copier(ir.machine, slot) };
+                assignment.of[index] = Some(home);
+                assignment.live.push((id, live));
                 for write in writes.iter().filter(|write| write.live && write.slot != slot) {
-                    homes.adjustments.extend(bring(ir, id, slot, write));
+                    assignment.adjustments.extend(transfer_constant(ir, id, slot, write));
                 }
             }
             None => {
-                homes.homeless.push(homeless(ir, &flow, id, &writes));
+                assignment.conflicts.push(conflict(ir, &flow, id, &writes));
             }
         }
     }
-    homes
+    assignment
 }
 
-/// The writes of a register that may have to come home.
-fn coming_home(ir: &Ir, runs: &[Run], flow: &Flow, id: RegisterId, live: &[bool]) -> Vec<Write> {
+/// The writes of a register whose values may have to reach its home bank.
+fn bank_writes(ir: &Ir, runs: &[Run], flow: &Flow, id: RegisterId, live: &[bool]) -> Vec<Write> {
     let output = ir.register(id).kind == RegisterKind::Output;
     let fixed = runs::jumps_to_numbers(ir);
     let mut writes = Vec::new();
-    // Whether an operation so far has used the register.
+    // True if an operation so far has used the register.
     let mut used = false;
     for (run, live) in runs.iter().zip(live) {
         let first = writes.len();
@@ -217,23 +216,23 @@ fn coming_home(ir: &Ir, runs: &[Run], flow: &Flow, id: RegisterId, live: &[bool]
     writes
 }
 
-/// Whether the value that an operation writes can be in its register from the start, if nothing uses that before.
+/// True if the loader can set the register that an operation writes, provided that nothing uses it before.
 pub(crate) fn is_initial(ir: &Ir, flow: &Flow, at: usize, operation: &Operation) -> bool {
     let output = operation.dest.is_some_and(|dest| ir.register(dest).kind == RegisterKind::Output);
     !output && at < flow.once && constant(ir, operation).is_some()
 }
 
-/// A redirection that reads what its own bundle writes: it cannot be issued after the rest.
+/// A redirection that reads a register written by its own bundle: it cannot be issued after the rest.
 fn branch_that_reads(ir: &Ir, at: usize) -> Option<&Operation> {
     let operations = &ir.bundles[at].operations;
     let writes = |register: &RegisterId| operations.iter().any(|operation| operation.dest == Some(*register));
     operations.iter().find(|operation| operation.redirects() && operation.reads().iter().any(writes))
 }
 
-/// The slot whose bank is the home that costs least. Where the register is `pinned`, the bank is given.
-fn best(ir: &Ir, flow: &Flow, writes: &[Write], pinned: Option<Register>) -> Option<SlotIndex> {
+/// The slot whose bank is the cheapest home. A `pinned` register has its bank already.
+fn best_bank(ir: &Ir, flow: &Flow, writes: &[Write], pinned: Option<Register>) -> Option<SlotIndex> {
     let machine = ir.machine;
-    // Of equals that of the first write.
+    // Of equals the bank of the first write.
     let live = || writes.iter().filter(|write| write.live);
     let favourite = live().next().or(writes.first()).map(|write| write.slot);
     let is_possible = |slot: &takt_isa::Slot| pinned.is_none_or(|address| slot.bank.contains(address));
@@ -244,7 +243,7 @@ fn best(ir: &Ir, flow: &Flow, writes: &[Write], pinned: Option<Register>) -> Opt
             let weight = flow.weights[write.bundle];
             let cost = match write.constant {
                 Some(_) if write.initial => 0,
-                Some(bits) if is_free(ir, write, slot) && giving(machine, slot, bits).is_some() => {
+                Some(bits) if is_free(ir, write, slot) && materialise(machine, slot, bits).is_some() => {
                     OPERATION * weight
                 }
                 _ if write.copied && copier.is_some() => COPY * weight,
@@ -259,22 +258,22 @@ fn best(ir: &Ir, flow: &Flow, writes: &[Write], pinned: Option<Register>) -> Opt
         .map(|(_, _, slot)| slot)
 }
 
-/// Whether no operation of a write's bundle needs a slot.
+/// True if no operation of a write's bundle needs a slot.
 fn is_free(ir: &Ir, write: &Write, slot: SlotIndex) -> bool {
     ir.bundles[write.bundle].operations.iter().all(|operation| operation.slot != Some(slot))
 }
 
-/// Brings a constant home.
-fn bring(ir: &mut Ir, id: RegisterId, slot: SlotIndex, write: &Write) -> Option<Adjustment> {
+/// Transfers a constant to the home bank.
+fn transfer_constant(ir: &mut Ir, id: RegisterId, slot: SlotIndex, write: &Write) -> Option<Adjustment> {
     let bits = write.constant?;
     let old = ir.bundles[write.bundle].operations[write.number];
-    let made = if write.initial {
+    let transfer = if write.initial {
         ir.registers[id.index()].preset = Some(bits);
-        // Taken out of its bundle once nothing counts on its place.
+        // It leaves its bundle later: indices of operations still count it.
         ir.bundles[write.bundle].operations[write.number] = Operation { made: true, ..old.idle() };
-        Made::Preset(bits)
+        Transfer::Preset(bits)
     } else if is_free(ir, write, slot) {
-        let (op, sources) = giving(ir.machine, slot, bits)?;
+        let (op, sources) = materialise(ir.machine, slot, bits)?;
         let slots = able(ir, id, op);
         let mut new = Operation { op, slots, slot: Some(slot), dest: Some(id), made: true, ..old.idle() };
         (new.attribution, new.expansion) = (old.attribution, old.expansion);
@@ -282,16 +281,16 @@ fn bring(ir: &mut Ir, id: RegisterId, slot: SlotIndex, write: &Write) -> Option<
             Effect::Immediate => new.constant = Constant::Value(bits),
             _ => {
                 for (source, bits) in new.sources.iter_mut().zip(sources) {
-                    *source = holding(ir, bits, old.span);
+                    *source = constant_register(ir, bits, old.span);
                 }
             }
         }
         ir.bundles[write.bundle].operations[write.number] = new;
-        Made::Operation(op.row().mnemonic)
+        Transfer::Rematerialised(op.row().mnemonic)
     } else {
         return None;
     };
-    Some(adjustment(ir, id, slot, &old, made))
+    Some(adjustment(ir, id, slot, &old, transfer))
 }
 
 pub(crate) fn adjustment(
@@ -299,18 +298,18 @@ pub(crate) fn adjustment(
     id: RegisterId,
     slot: SlotIndex,
     from: &Operation,
-    made: Made,
+    transfer: Transfer,
 ) -> Adjustment {
     Adjustment {
         register: ir.register(id).name.clone(),
         bank: ir.machine.slot(slot).bank.name,
         mnemonic: from.row().mnemonic,
         location: ir.location(from),
-        made,
+        transfer,
     }
 }
 
-/// What copies bits to the bank of a slot: the quickest.
+/// The operation with the least latency that copies bits to the bank of a slot.
 fn copier(machine: &Machine, slot: SlotIndex) -> Option<Op> {
     rows(machine, slot)
         .filter(|(_, row)| row.copies())
@@ -326,8 +325,7 @@ pub(crate) fn able(ir: &Ir, id: RegisterId, op: Op) -> Slots {
 
 /// The instructions that a slot executes, with their latencies.
 fn rows(machine: &Machine, slot: SlotIndex) -> impl Iterator<Item = (u32, &'static Row)> + '_ {
-    let host = machine.slot(slot);
-    ROWS.iter().filter_map(move |row| Some((host.units[host.unit_for(row.function)?].latency, row)))
+    ROWS.iter().filter_map(move |row| Some((machine.unit(slot, row.function)?.latency, row)))
 }
 
 /// The bits that an operation writes, if they are known and it raises no flag.
@@ -351,9 +349,9 @@ fn constant(ir: &Ir, operation: &Operation) -> Option<u32> {
     }
 }
 
-/// An operation of a slot that gives these bits and raises no flag, and the bits of its sources: the quickest, with the
-/// simplest sources.
-fn giving(machine: &Machine, slot: SlotIndex, bits: u32) -> Option<(Op, [u32; 2])> {
+/// Rematerialises a constant: the operation of a slot with the least latency that gives these bits and raises no flag, and the bits
+/// of its sources.
+fn materialise(machine: &Machine, slot: SlotIndex, bits: u32) -> Option<(Op, [u32; 2])> {
     let palette = [0, bits, (-0.0f32).to_bits(), 1.0f32.to_bits()];
     let sources = |row: &Row| {
         let pairs = || palette.iter().flat_map(|&a| palette.iter().map(move |&b| [a, b]));
@@ -374,7 +372,7 @@ fn giving(machine: &Machine, slot: SlotIndex, bits: u32) -> Option<(Op, [u32; 2]
 }
 
 /// The register that holds these bits.
-fn holding(ir: &mut Ir, bits: u32, span: Span) -> RegisterId {
+fn constant_register(ir: &mut Ir, bits: u32, span: Span) -> RegisterId {
     let holds = |register: &VirtualRegister| match register.kind {
         RegisterKind::Zero => bits == 0,
         RegisterKind::Constant(other) => other == bits,
@@ -396,12 +394,12 @@ fn holding(ir: &mut Ir, bits: u32, span: Span) -> RegisterId {
     RegisterId::new(index)
 }
 
-/// Why a register has no home, and what to do.
-fn homeless(ir: &Ir, flow: &Flow, register: RegisterId, writes: &[Write]) -> Homeless {
+/// The reason that a register has no home bank, and advice.
+fn conflict(ir: &Ir, flow: &Flow, register: RegisterId, writes: &[Write]) -> BankConflict {
     let found = ir.register(register);
-    let because_of = |help: String, because| Homeless { register, help, because };
+    let because_of = |help: String, because| BankConflict { register, help, because };
     if found.pinned.is_some()
-        && let Some(slot) = best(ir, flow, writes, None)
+        && let Some(slot) = best_bank(ir, flow, writes, None)
     {
         let bank = ir.machine.slot(slot).bank.name;
         let help = format!("leave its place to the assembler, or place it in bank {bank}");

@@ -1,19 +1,19 @@
-//! In which cycle each operation issues, as far as that follows from the program alone: along its straight lines.
+//! Static issue times: the cycle in which each bundle of straight-line code issues, from the program alone.
 
 use std::collections::BTreeSet;
 use takt_isa::timing::{self, Bundle, Cause, Cycle, Issue, Scoreboard};
 use takt_isa::{BundleAddress, Flow, Instruction, Program, Register};
 
-/// When a bundle issues.
+/// The issue of a bundle.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct StraightIssue {
+pub struct StaticIssue {
     /// Its address.
     pub address: BundleAddress,
-    /// The bundle from which cycles count: the first of a section, one that is jumped to, or one behind a bundle that jumps.
+    /// The bundle from which cycles count: the first of a section, the target of a jump, or the one after a jump.
     pub from: BundleAddress,
     /// Its cycle. The first bundle's is 1, if no earlier result is in flight.
     pub cycle: Cycle,
-    /// The cycles before it in which nothing issued, and why.
+    /// The stalled cycles before it, by cause.
     pub stalls: Vec<(Cause, u32)>,
     /// For each slot: of the registers that its operation reads, the one whose result comes last along this line, the cycle from
     /// which on it is there, and the bundle that computes it.
@@ -21,7 +21,7 @@ pub struct StraightIssue {
 }
 
 /// The issue of each bundle of a program, by address. A bundle that is none ends the list.
-pub fn straight(program: &Program) -> Vec<StraightIssue> {
+pub fn static_issue(program: &Program) -> Vec<StaticIssue> {
     let machine = program.machine;
     let mut entries: BTreeSet<BundleAddress> = program.sections.iter().map(|section| section.start).collect();
     entries.extend(program.loop_bounds.iter().map(|bound| bound.address));
@@ -44,7 +44,7 @@ pub fn straight(program: &Program) -> Vec<StraightIssue> {
         let awaits = awaits.collect();
         let issue: Issue = scoreboard.issue(&bundle, address, earliest);
         let stalls = issue.stalls().to_vec();
-        issues.push(StraightIssue { address, from, cycle: issue.cycle, stalls, awaits });
+        issues.push(StaticIssue { address, from, cycle: issue.cycle, stalls, awaits });
         match Flow::of(instructions) {
             Flow::Next => earliest = timing::after_sequential(issue.cycle),
             Flow::Branch { .. } => earliest = timing::after_not_taken(machine, issue.cycle),

@@ -7,13 +7,13 @@ use common::{assemble, bad, bundles, good};
 use random_source::Random;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use takt_asm::{Assembled, Made, MemoryLoader, Options, Schedule, listing};
+use takt_asm::{Assembled, MemoryLoader, Options, Schedule, Transfer, listing};
 use takt_emu::{Emulator, Event};
 use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::Cycle;
-use takt_isa::{MACHINES, Machine, Program, ROWS, T1, T3};
+use takt_isa::{F1, F3, MACHINES, Machine, Program, ROWS};
 
-/// Instructions of each slot of t3, with two sources.
+/// Instructions of each slot of f3, with two sources.
 const MNEMONICS: [&[&str]; 3] =
     [&["fmul", "fmul"], &["fadd", "fsub"], &["fmax", "ixor", "fdiv", "fsat", "ior"]];
 
@@ -132,7 +132,7 @@ fn run(program: &Program, seed: u64) -> Seen {
         };
         emulator.observed(&mut sink).run_period(&[]).unwrap_or_else(|error| panic!("{error}"));
     }
-    // What shares a bundle with the last `wait` is in flight when that issues: its flags are still to come.
+    // An operation that shares a bundle with the last `wait` is in flight when that issues: its flags are still to come.
     let landed = emulator.now() + Cycle::from(MAX_LATENCY);
     emulator.run_until(landed).unwrap_or_else(|error| panic!("{error}"));
     (writes, emulator.memory().to_vec(), emulator.flags().bits())
@@ -143,16 +143,16 @@ fn every_machine_gives_the_same_values() {
     let (mut presets, mut operations, mut shared, mut alone) = (0, 0, 0, 0);
     for seed in 0..if cfg!(debug_assertions) { 250 } else { 3000 } {
         let text = source(seed);
-        let expected = run(&assembled(&text.replace(" @ x9", ""), &T1, Schedule::None).program, seed);
+        let expected = run(&assembled(&text.replace(" @ x9", ""), &F1, Schedule::None).program, seed);
         for schedule in [Schedule::None, Schedule::AsWritten, Schedule::All] {
-            let assembled = assembled(&text, &T3, schedule);
+            let assembled = assembled(&text, &F3, schedule);
             assert_eq!(run(&assembled.program, seed), expected, "seed {seed}, {schedule:?}:\n{text}");
             for adjustment in &assembled.adjustments {
-                *match adjustment.made {
-                    Made::Preset(_) => &mut presets,
-                    Made::Operation(_) => &mut operations,
-                    Made::Copy { alone: false, .. } => &mut shared,
-                    Made::Copy { alone: true, .. } => &mut alone,
+                *match adjustment.transfer {
+                    Transfer::Preset(_) => &mut presets,
+                    Transfer::Rematerialised(_) => &mut operations,
+                    Transfer::Copy { alone: false, .. } => &mut shared,
+                    Transfer::Copy { alone: true, .. } => &mut alone,
                 } += 1;
             }
         }
@@ -161,9 +161,9 @@ fn every_machine_gives_the_same_values() {
     assert!(seen.iter().all(|count| *count > 50), "{seen:?} presets, operations, copies shared and alone");
 }
 
-/// The bundles of the period of a program for t3, which t1 takes too.
+/// The bundles of the period of a program for f3, which f1 takes too.
 fn period(text: &str) -> (Vec<String>, Assembled) {
-    assert!(assemble(text, &T1).is_ok_and(|assembled| assembled.adjustments.is_empty()), "{text}");
+    assert!(assemble(text, &F1).is_ok_and(|assembled| assembled.adjustments.is_empty()), "{text}");
     let assembled = good(text);
     let start =
         assembled.program.sections.iter().find(|section| section.name == "period").expect("it has one").start;
@@ -185,7 +185,7 @@ fn the_simplest_integrator() {
         let (period, assembled) = period(&text);
         assert_eq!(period.len(), 3, "{period:?}");
         assert_eq!(assembled.program.constants.len(), 1, "{initial}");
-        assert!(matches!(assembled.adjustments[..], [ref one] if one.made == Made::Preset(0)));
+        assert!(matches!(assembled.adjustments[..], [ref one] if one.transfer == Transfer::Preset(0)));
     }
 }
 
@@ -206,11 +206,17 @@ fn an_initial_value_that_may_be_wanted_again_is_no_preset() {
     // Control comes back to the beginning.
     let text = ".input x, n:int\n.output y\n.state s\n.once\nagain: mov s, zero\n wait period\n.period\nperiod: fadd s, s, x\n mov y, s\n bnz n, again\n wait period\n";
     let (_, assembled) = period(text);
-    assert_eq!(assembled.adjustments.iter().map(|a| &a.made).collect::<Vec<_>>(), [&Made::Operation("fadd")]);
+    assert_eq!(
+        assembled.adjustments.iter().map(|a| &a.transfer).collect::<Vec<_>>(),
+        [&Transfer::Rematerialised("fadd")]
+    );
     // Something reads the register before.
     let text = ".input x\n.output y\n.state s\n.preset s = 2.0\n.once\n mov y, s\n mov s, zero\n wait period\n.period\nperiod: fadd s, s, x\n mov y, s\n wait period\n";
     let (_, assembled) = period(text);
-    assert_eq!(assembled.adjustments.iter().map(|a| &a.made).collect::<Vec<_>>(), [&Made::Operation("fadd")]);
+    assert_eq!(
+        assembled.adjustments.iter().map(|a| &a.transfer).collect::<Vec<_>>(),
+        [&Transfer::Rematerialised("fadd")]
+    );
     assert_eq!(assembled.program.constants.iter().filter(|(_, bits)| *bits == 2.0f32.to_bits()).count(), 1);
 }
 
@@ -222,7 +228,7 @@ fn accumulators_and_resets() {
     );
     assert_eq!(lines.len(), 9);
     assert!(
-        matches!(assembled.adjustments[..], [ref one] if matches!(one.made, Made::Copy { alone: false, cycles: Some(0), .. })),
+        matches!(assembled.adjustments[..], [ref one] if matches!(one.transfer, Transfer::Copy { alone: false, cycles: Some(0), .. })),
         "{:?}",
         assembled.adjustments
     );
@@ -244,7 +250,7 @@ fn accumulators_and_resets() {
     assert_eq!(lines[1], "mov s, s.1");
     let [one] = &assembled.adjustments[..] else { panic!("one copy") };
     assert_eq!(one.location.map(|at| at.line), Some(8));
-    assert!(matches!(one.made, Made::Copy { alone: true, cycles: Some(2), .. }), "{one:?}");
+    assert!(matches!(one.transfer, Transfer::Copy { alone: true, cycles: Some(2), .. }), "{one:?}");
     assert!(
         listing::listing(&assembled).contains("test.s:8+       mov s, s.1"),
         "{}",
@@ -275,7 +281,7 @@ fn a_port_shows_every_value_in_order() {
     let text = text.as_str();
     let seen = |machine, schedule| run(&assembled(text, machine, schedule).program, 3).0;
     for schedule in [Schedule::None, Schedule::All] {
-        assert_eq!(seen(&T3, schedule), seen(&T1, schedule));
+        assert_eq!(seen(&F3, schedule), seen(&F1, schedule));
     }
 }
 
@@ -288,7 +294,7 @@ fn mends_that_the_help_names_work() {
     };
     // A place out of reach of who copies.
     let pinned = program(".state s @ a3", "fadd s, s, x\n ld s, [n]");
-    let help = |text: &str| bad(text, &T3).messages()[0].help.clone().expect("it has a help");
+    let help = |text: &str| bad(text, &F3).messages()[0].help.clone().expect("it has a help");
     assert_eq!(help(&pinned), "leave its place to the assembler, or place it in bank x");
     good(&pinned.replace(" @ a3", ""));
     good(&pinned.replace("a3", "x3"));
@@ -306,7 +312,7 @@ fn mends_that_the_help_names_work() {
 fn a_jump_to_a_number_is_a_way_in() {
     // Bundle 2 reads what bundle 1 computed, or what it computed itself.
     let text = ".input x, n:int\n.output F\n.reg t\n.once\n wait 1\n.period\n fmul t, x, x\n fadd t, t, 1.0\n mov F, t\n bnz n, 2\n wait 1\n";
-    let report = bad(text, &T3);
+    let report = bad(text, &F3);
     assert_eq!(report.messages()[0].code, "two-slots", "{}", report.render(false));
     let labels = text.replace(" fadd", "again: fadd").replace("n, 2", "n, again");
     let labels = labels.replace("wait 1", "wait period").replace(".period\n", ".period\nperiod:");
@@ -321,7 +327,7 @@ fn two_values_of_a_branching_bundle() {
     let place = |what: &str| lines.iter().position(|line| line.contains(what)).expect(what);
     assert!(place("mov s, s.1") < place("bz n") && place("mov t, t.1") < place("bz n"), "{lines:?}");
     for seed in 0..4 {
-        let small = self::assembled(text, &T1, Schedule::None);
+        let small = self::assembled(text, &F1, Schedule::None);
         assert_eq!(run(&assembled.program, seed), run(&small.program, seed));
     }
 }

@@ -1,6 +1,6 @@
-//! What a faster unit would bring: to the program as it is, and assembled for a machine that has it.
+//! What-if analysis of faster units: their effect on the program as it is, and on the program assembled for a machine that has one.
 
-use crate::picture::{Faster, Reassembled};
+use crate::picture::{Reassembled, Speedup};
 use crate::{Trace, WhatIf};
 use std::collections::HashMap;
 use std::sync::{LazyLock, Mutex, PoisonError};
@@ -16,28 +16,28 @@ pub struct Candidate {
     pub spare: Vec<(BundleAddress, Cycle)>,
 }
 
-/// What each unit of a trace would bring. `assemble` makes the program anew for a machine, and `follow` runs that as the trace was made;
-/// where one gives nothing, only the program as it is is looked at.
-pub fn faster(
+/// The effect of a faster unit, for each unit of a trace. `assemble` assembles the program for another machine, and `run` runs that
+/// as the trace was made; if either returns `None`, the result is that of the present program alone.
+pub fn what_if(
     program: &Program,
     trace: &Trace,
     assemble: &dyn Fn(&'static Machine) -> Option<Candidate>,
-    follow: &dyn Fn(&Program) -> Option<Trace>,
-) -> Vec<Faster> {
+    run: &dyn Fn(&Program) -> Option<Trace>,
+) -> Vec<Speedup> {
     let reassembled = |what: &WhatIf| {
         let Candidate { program, spare } = assemble(quicker(program.machine, what.unit))?;
-        let found = follow(&program)?;
+        let found = run(&program)?;
         let visits = |address| found.issues.iter().filter(|issue| issue.address == address).count() as Cycle;
         let spare: Cycle = spare.iter().map(|(address, spare)| visits(*address) * spare).sum();
         Some(Reassembled { cycles: found.cycles, least: found.cycles.saturating_sub(spare) })
     };
-    trace.what_if(program).into_iter().map(|what| Faster { reassembled: reassembled(&what), what }).collect()
+    trace.what_if(program).into_iter().map(|what| Speedup { reassembled: reassembled(&what), what }).collect()
 }
 
-/// Of a machine, by its address, the one with a quicker unit, or front end.
+/// Machines with a quicker unit, or front end, by the address of the original machine.
 type Quicker = HashMap<(usize, Option<(SlotIndex, u8)>), &'static Machine>;
 
-/// A machine with one cycle less in a unit, or in the front end. Each is made once and never given back: there are as many as units.
+/// A machine with one cycle less in a unit, or in the front end. Each is leaked, and made only once: there are as many as units.
 fn quicker(machine: &'static Machine, unit: Option<(SlotIndex, u8)>) -> &'static Machine {
     static KNOWN: LazyLock<Mutex<Quicker>> = LazyLock::new(Mutex::default);
     let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);

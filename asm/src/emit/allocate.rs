@@ -1,12 +1,13 @@
-//! Registers to places.
+//! Register allocation: an address for each virtual register.
 //!
-//! A register lies in the bank of the slot whose operations write it; one that nothing writes, a constant above all, lies
-//! in the bank with most room. Within a bank registers follow one another in the order of their declaration, around those
-//! that the source has placed. Inputs lie in the input bank. An output has a number, which the source gives or which is the
-//! first that is free, and lies at that place of the output window of the bank of the slot that writes it.
+//! A virtual register lies in the bank of the slot whose operations write it; one that nothing writes, such as a constant, lies
+//! in the bank with the most free registers. Within a bank addresses follow the order of declaration, around those that the
+//! source gives. Inputs lie in the input bank. An output has a number, which the source gives or which is the first that is free,
+//! and lies at that place of the output window of the bank of the slot that writes it.
 //!
-//! A register that only one straight run of bundles uses, and writes before it reads, is needed from its first write to its
-//! last use: it takes a register that is free for so long. While there are enough, each gets one of its own.
+//! A virtual register that only one straight run of bundles uses, and writes before it reads, has a live range from its first write
+//! to its last use. Live ranges are allocated by linear scan (Poletto, Sarkar, TOPLAS 1999), which reuses a register only after all
+//! others of the bank. Too many live values at a time are spilled ([`spill`](super::spill)).
 
 use crate::ir::runs::Run;
 use crate::ir::{Ir, Operation, RegisterId, RegisterKind, VirtualRegister};
@@ -15,12 +16,12 @@ use crate::report::source::Span;
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use takt_isa::{Bank, Register, SlotIndex};
 
-/// Where each register of a program lies, by index; `None` for those that nothing uses.
+/// The address of each virtual register, by index; `None` for those that nothing uses.
 #[derive(Clone, Debug)]
-pub(crate) struct Placement {
+pub(crate) struct Allocation {
     /// The addresses.
     pub addresses: Vec<Option<Register>>,
-    /// Whether another register has the same address, at another time.
+    /// True if another virtual register has the same address, at another time.
     pub shared: Vec<bool>,
 }
 
@@ -61,19 +62,18 @@ impl Space {
     }
 }
 
-/// What registers need when those that only one run uses ([`Room::ranges`]) have no place yet.
-pub(crate) struct Room {
+/// Register pressure: the allocation of all virtual registers except the live ranges within one run ([`Pressure::ranges`]).
+pub(crate) struct Pressure {
     /// The slot that writes each register.
     pub(crate) writer: Vec<Option<SlotIndex>>,
-    /// For registers that one run of bundles writes before it reads, and no other uses: the bundles of the first write and the last
-    /// use, if they are still without a place.
+    /// Live ranges within one run, still without an address: the bundles of the first write and the last use.
     pub(crate) ranges: Vec<Option<(u32, u32)>>,
     /// By slot, the registers of its bank that are left for these.
     pub(crate) free: Vec<usize>,
     space: Space,
     addresses: Vec<Option<Register>>,
     missing: Vec<(usize, Option<SlotIndex>)>,
-    homeless: Vec<usize>,
+    unplaced: Vec<usize>,
 }
 
 /// The register pressure of a bank: the most live values at a time, and the first bundle with so many.
@@ -83,8 +83,8 @@ struct Peak {
     bundle: u32,
 }
 
-impl Room {
-    /// By slot, how many values its bank must hold at a time at most.
+impl Pressure {
+    /// By slot, the peak of live values in its bank.
     fn peaks(&self) -> Vec<Peak> {
         peaks(&self.ranges, &self.writer, self.free.len())
     }
@@ -93,21 +93,21 @@ impl Room {
         self.peaks().iter().zip(&self.free).all(|(peak, free)| peak.values <= *free)
     }
 
-    /// Whether a bank has too few registers for values that are needed at the same time, and all else has its place.
+    /// True if only values that are live at the same time lack registers.
     pub(crate) fn is_short(&self) -> bool {
-        !self.holds_values() && self.missing.is_empty() && self.homeless.is_empty()
+        !self.holds_values() && self.missing.is_empty() && self.unplaced.is_empty()
     }
 
-    /// The number of registers that are missing.
+    /// The number of missing registers.
     pub(crate) fn shortage(&self) -> usize {
         let peaks = self.peaks();
         let values = peaks.iter().zip(&self.free).map(|(peak, free)| peak.values.saturating_sub(*free));
-        values.sum::<usize>() + self.missing.len() + self.homeless.len()
+        values.sum::<usize>() + self.missing.len() + self.unplaced.len()
     }
 
-    /// True if everything has its place.
+    /// True if everything has a register.
     pub(crate) fn has_all(&self) -> bool {
-        self.missing.is_empty() && self.homeless.is_empty() && self.holds_values()
+        self.missing.is_empty() && self.unplaced.is_empty() && self.holds_values()
     }
 }
 
@@ -115,7 +115,7 @@ fn peaks(ranges: &[Option<(u32, u32)>], writer: &[Option<SlotIndex>], slots: usi
     let mut changes: Vec<BTreeMap<u32, i64>> = vec![BTreeMap::new(); slots];
     for (range, writer) in ranges.iter().zip(writer) {
         if let (Some((first, last)), Some(slot)) = (*range, *writer) {
-            // What is never read needs its register for a moment.
+            // A value that is never read is live for one cycle.
             let last = last.max(first + 1);
             *changes[slot.index()].entry(first).or_default() += 1;
             *changes[slot.index()].entry(last).or_default() -= 1;
@@ -135,29 +135,28 @@ fn peaks(ranges: &[Option<(u32, u32)>], writer: &[Option<SlotIndex>], slots: usi
     changes.iter().map(most).collect()
 }
 
-/// Gives every register that is used a place. `why` is what has been found of values that find none: why they cannot be kept
-/// elsewhere.
-pub(crate) fn place(ir: &Ir, runs: &[Run], why: Option<&str>, sink: &mut Sink) -> Placement {
-    let mut room = room(ir, runs, sink);
-    let peaks = room.peaks();
-    let shared = share(ir, &mut room);
-    report(ir, &room, &peaks, why, sink);
-    Placement { addresses: room.addresses, shared }
+/// Allocates every virtual register that is used. `why` is the reason that values without a register could not be spilled.
+pub(crate) fn allocate(ir: &Ir, runs: &[Run], why: Option<&str>, sink: &mut Sink) -> Allocation {
+    let mut pressure = pressure(ir, runs, sink);
+    let peaks = pressure.peaks();
+    let shared = linear_scan(ir, &mut pressure);
+    report(ir, &pressure, &peaks, why, sink);
+    Allocation { addresses: pressure.addresses, shared }
 }
 
-/// Places all registers but those of short-lived values. While there are enough, constants leave room for all of these; if not,
-/// for as many as are needed at a time.
-pub(crate) fn room(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Room {
-    let room = room_beside(ir, runs, false, sink);
-    if room.has_all() {
-        return room;
+/// Allocates all virtual registers except live ranges within one run. Constants leave a register for each of these if there are
+/// enough, else as many as are live at a time.
+pub(crate) fn pressure(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Pressure {
+    let pressure = pressure_with(ir, runs, false, sink);
+    if pressure.has_all() {
+        return pressure;
     }
-    let closer = room_beside(ir, runs, true, &mut Sink::default());
-    if closer.shortage() < room.shortage() { closer } else { room }
+    let closer = pressure_with(ir, runs, true, &mut Sink::default());
+    if closer.shortage() < pressure.shortage() { closer } else { pressure }
 }
 
-/// The same. Where it is `close`, constants leave the registers that short-lived values need at a time, and no more.
-fn room_beside(ir: &Ir, runs: &[Run], close: bool, sink: &mut Sink) -> Room {
+/// The same; if `close`, constants leave only as many registers as are live at a time.
+fn pressure_with(ir: &Ir, runs: &[Run], close: bool, sink: &mut Sink) -> Pressure {
     let machine = ir.machine;
     // The slot that writes each register, and whether an operation uses it at all.
     let mut writer: Vec<Option<SlotIndex>> = vec![None; ir.registers.len()];
@@ -179,7 +178,7 @@ fn room_beside(ir: &Ir, runs: &[Run], close: bool, sink: &mut Sink) -> Room {
     outputs(ir, &writer, &mut space, &mut addresses, sink);
     let mut ranges = ranges(ir, runs);
     let is_local = |index: usize| ranges[index].is_some() && addresses[index].is_none();
-    // The registers that short-lived values need in each bank: room that constants leave if they can.
+    // The registers that live ranges within one run need in each bank: constants leave these if they can.
     let mut wanted_by_locals = vec![0; machine.slots.len()];
     if close {
         let local =
@@ -218,7 +217,7 @@ fn room_beside(ir: &Ir, runs: &[Run], close: bool, sink: &mut Sink) -> Room {
             None => missing.push((index, slot)),
         }
     }
-    let mut homeless = Vec::new();
+    let mut unplaced = Vec::new();
     for index in constants {
         let kind = ir.registers[index].kind;
         let windows = machine.slots.iter().enumerate();
@@ -228,7 +227,7 @@ fn room_beside(ir: &Ir, runs: &[Run], close: bool, sink: &mut Sink) -> Room {
         let roomiest = open.max_by_key(|(s, window)| space.room(*window) as i64 - wanted_by_locals[*s]);
         match roomiest.and_then(|(_, window)| space.take(window)) {
             Some(address) => addresses[index] = Some(address),
-            None => homeless.push(index),
+            None => unplaced.push(index),
         }
     }
     let windows = machine.slots.iter();
@@ -237,10 +236,10 @@ fn room_beside(ir: &Ir, runs: &[Run], close: bool, sink: &mut Sink) -> Room {
     for (index, range) in ranges.iter_mut().enumerate() {
         *range = range.filter(|_| addresses[index].is_none());
     }
-    Room { writer, ranges, free, space, addresses, missing, homeless }
+    Pressure { writer, ranges, free, space, addresses, missing, unplaced }
 }
 
-/// Gives every output its place.
+/// Allocates the outputs.
 fn outputs(
     ir: &Ir,
     writer: &[Option<SlotIndex>],
@@ -251,7 +250,7 @@ fn outputs(
     let machine = ir.machine;
     let count = machine.outputs_per_bank;
     let given: HashMap<RegisterId, u16> = ir.numbers.iter().map(|(number, id)| (*id, *number)).collect();
-    // What the source writes at an output's place without a name has its number.
+    // An unnamed register that the source writes at an output's address has that number.
     let unnamed = |number| {
         let mut places =
             machine.slots.iter().filter_map(|slot| machine.output_registers(slot).nth(usize::from(number)));
@@ -297,10 +296,10 @@ fn outputs(
     }
 }
 
-/// For each register that one run of bundles writes before it reads, and no other uses: the bundles of its first write and
-/// its last use.
+/// The live range of each virtual register that one run of bundles writes before it reads, and no other uses: the bundles of its
+/// first write and its last use.
 fn ranges(ir: &Ir, runs: &[Run]) -> Vec<Option<(u32, u32)>> {
-    /// What is known of a register so far.
+    /// The uses of a register so far.
     #[derive(Clone, Copy)]
     enum Seen {
         Nowhere,
@@ -353,10 +352,10 @@ fn ranges(ir: &Ir, runs: &[Run]) -> Vec<Option<(u32, u32)>> {
     seen.iter().map(range).collect()
 }
 
-/// Places short-lived values, in the order of their first writes, in what room there is. A register is taken again only after
-/// all others of its bank have been; the bundle of a value's last read may write the next one, for it reads first.
-fn share(ir: &Ir, room: &mut Room) -> Vec<bool> {
-    let Room { writer, ranges, space, addresses, missing, .. } = room;
+/// Linear scan over the live ranges, in the order of their first writes. A register is reused only after all others of its bank;
+/// the bundle of a value's last read may write the next value, because it reads first.
+fn linear_scan(ir: &Ir, pressure: &mut Pressure) -> Vec<bool> {
+    let Pressure { writer, ranges, space, addresses, missing, .. } = pressure;
     let mut shared = vec![false; ir.registers.len()];
     let ranges = ranges.iter().enumerate();
     let mut starting: Vec<(u32, u32, usize)> =
@@ -433,9 +432,9 @@ impl std::fmt::Display for Fill {
 }
 
 /// One error for each bank that is full.
-fn report(ir: &Ir, room: &Room, peaks: &[Peak], why: Option<&str>, sink: &mut Sink) {
+fn report(ir: &Ir, pressure: &Pressure, peaks: &[Peak], why: Option<&str>, sink: &mut Sink) {
     let machine = ir.machine;
-    let Room { missing, homeless, .. } = room;
+    let Pressure { missing, unplaced, .. } = pressure;
     let mut rest: Vec<&(usize, Option<SlotIndex>)> = missing.iter().collect();
     while let Some(&&(first, slot)) = rest.first() {
         let kind = ir.registers[first].kind;
@@ -444,11 +443,12 @@ fn report(ir: &Ir, room: &Room, peaks: &[Peak], why: Option<&str>, sink: &mut Si
         let window = Window::of(bank, kind, machine.outputs_per_bank);
         let available = usize::from(window.end - window.first);
         // Short-lived values count as often as they are needed at a time.
-        let lasts = |index: usize| room.ranges[index].is_none();
+        let lasts = |index: usize| pressure.ranges[index].is_none();
         let inside = |address: &Option<Register>| {
             address.is_some_and(|address| (window.first..window.end).contains(&address.get()))
         };
-        let placed = (0..).zip(&room.addresses).filter(|(index, address)| lasts(*index) && inside(address));
+        let placed =
+            (0..).zip(&pressure.addresses).filter(|(index, address)| lasts(*index) && inside(address));
         let (constants, others): (Vec<usize>, Vec<usize>) = placed
             .map(|(index, _)| index)
             .partition(|index| matches!(ir.registers[*index].kind, RegisterKind::Constant(_)));
@@ -460,12 +460,12 @@ fn report(ir: &Ir, room: &Room, peaks: &[Peak], why: Option<&str>, sink: &mut Si
             constant: constants.last().map(|index| ir.registers[*index].span),
         };
         // If constants find no room, neither do values: that is the same mistake.
-        if lasts(first) || homeless.is_empty() {
-            sink.push(full(ir, room, (first, slot), &fill, peak, available, why));
+        if lasts(first) || unplaced.is_empty() {
+            sink.push(full(ir, pressure, (first, slot), &fill, peak, available, why));
         }
         rest.retain(|entry| !same(entry));
     }
-    if let Some(first) = homeless.first() {
+    if let Some(first) = unplaced.first() {
         let available: usize = machine
             .slots
             .iter()
@@ -476,12 +476,12 @@ fn report(ir: &Ir, room: &Room, peaks: &[Peak], why: Option<&str>, sink: &mut Si
         };
         let fill = Fill {
             constants: kind(|kind| matches!(kind, RegisterKind::Constant(_))),
-            lasting: lasting(ir, room),
+            lasting: lasting(ir, pressure),
             values: peaks.iter().map(|peak| peak.values).sum(),
             constant: None,
         };
-        let plural = if homeless.len() == 1 { "" } else { "s" };
-        let message = format!("no register is left for {} constant{plural}", homeless.len());
+        let plural = if unplaced.len() == 1 { "" } else { "s" };
+        let message = format!("no register is left for {} constant{plural}", unplaced.len());
         let error = Diagnostic::error("bank-full", ir.registers[*first].span, message)
             .note(format!("{} has {available} registers, and needed are {fill}", machine.name))
             .help(CONSTANTS_ELSEWHERE);
@@ -490,19 +490,20 @@ fn report(ir: &Ir, room: &Room, peaks: &[Peak], why: Option<&str>, sink: &mut Si
 }
 
 /// Registers that keep their values from block to block.
-fn lasting(ir: &Ir, room: &Room) -> usize {
+fn lasting(ir: &Ir, pressure: &Pressure) -> usize {
     let is_one = |index: &usize| {
         let kind = ir.registers[*index].kind;
-        matches!(kind, RegisterKind::Plain | RegisterKind::State) && room.ranges[*index].is_none()
+        matches!(kind, RegisterKind::Plain | RegisterKind::State) && pressure.ranges[*index].is_none()
     };
-    let placed = (0..room.addresses.len()).filter(|index| room.addresses[*index].is_some()).filter(is_one);
-    placed.count() + room.missing.iter().filter(|(index, _)| is_one(index)).count()
+    let placed =
+        (0..pressure.addresses.len()).filter(|index| pressure.addresses[*index].is_some()).filter(is_one);
+    placed.count() + pressure.missing.iter().filter(|(index, _)| is_one(index)).count()
 }
 
 /// The error of a full bank, or of too many inputs: `first` is the first register that finds no room.
 fn full(
     ir: &Ir,
-    room: &Room,
+    pressure: &Pressure,
     (first, slot): (usize, Option<SlotIndex>),
     fill: &Fill,
     peak: Peak,
@@ -511,7 +512,7 @@ fn full(
 ) -> Diagnostic {
     let (machine, register) = (ir.machine, &ir.registers[first]);
     let needed = fill.total();
-    let missing = room.missing.iter().filter(|(_, other)| *other == slot);
+    let missing = pressure.missing.iter().filter(|(_, other)| *other == slot);
     let names: Vec<&str> = missing
         .map(|(index, _)| ir.registers[*index].name.as_str())
         .filter(|name| !name.is_empty())
@@ -528,7 +529,7 @@ fn full(
         format!("{needed} registers in bank {bank} are needed, and {} has {available}", machine.name);
     // Values of a block are too many where most are needed at a time, not where one of them is declared.
     let writes = |operation: &&Operation| operation.slot == Some(slot) && operation.dest.is_some();
-    let crowded = room.ranges[first].and_then(|_| {
+    let crowded = pressure.ranges[first].and_then(|_| {
         let operations = &ir.bundles.get(peak.bundle as usize)?.operations;
         operations.iter().find(writes).or(operations.first())
     });

@@ -1,13 +1,14 @@
-//! A slot for each operation that several may execute.
+//! Slot assignment: a slot for each operation that several slots may execute, by constraint propagation.
 //!
-//! Within a bundle each operation takes a slot of its own, and all that write one register should take the same, whose bank the
-//! register then lies in: what does not is copied ([`homes`](crate::homes)). Where a bundle or a register leaves no choice, that
-//! is settled first and what follows from it; where there is one, in the order of the source, for the first slot. A bundle that
-//! cannot do as its registers would have it goes its own way: `resolve` has seen to it that there is one.
+//! Variables are operations, or all operations that write one register, which share a slot so that the register lies in one bank
+//! (a value from another slot is copied: [`banks`](crate::banks)); domains are sets of slots. The operations of a bundle take
+//! different slots: this all-different constraint is propagated by bipartite matching (Régin, AAAI 1994) to a fixed point. Then the
+//! first open variable, in source order, takes its first slot, and so on. A bundle without a solution splits its operations from
+//! the shared variables; `resolve` has checked that it then has one.
 //!
-//! The scheduler chooses the slots again of what it packs, as long as a register stays in one bank.
+//! The scheduler chooses slots again for what it packs, as long as a register stays in one bank.
 
-use crate::homes;
+use crate::banks;
 use crate::ir::flow::Flow;
 use crate::ir::matching;
 use crate::ir::runs::{self, Run};
@@ -20,7 +21,7 @@ use takt_isa::{SlotIndex, Slots};
 type At = (usize, usize);
 
 /// Chooses a slot for each operation.
-pub(crate) fn choose(ir: &mut Ir) {
+pub(crate) fn assign(ir: &mut Ir) {
     if !ir.has_choices || ir.operations().all(|operation| operation.slots.len() < 2) {
         return;
     }
@@ -32,13 +33,13 @@ pub(crate) fn choose(ir: &mut Ir) {
     }
 }
 
-/// What is to be chosen, and what is still possible.
+/// The variables and their domains.
 struct Choice {
-    /// For each operation that has a slot, which choice is its own: one that it shares with those that write its register, or not.
+    /// For each operation that needs a slot its variable, which it may share with those that write its register.
     of: BTreeMap<At, usize>,
-    /// For each choice the slots that are left.
+    /// The domain of each variable: the slots that are left.
     sets: Vec<Slots>,
-    /// For each choice the bundles of several operations that it is about.
+    /// For each variable the bundles of several operations that it occurs in.
     bundles: Vec<Vec<usize>>,
     /// For each operation the slots that may execute it.
     able: BTreeMap<At, Slots>,
@@ -49,7 +50,7 @@ impl Choice {
         let mut choice =
             Choice { of: BTreeMap::new(), sets: Vec::new(), bundles: Vec::new(), able: BTreeMap::new() };
         let mut writers: BTreeMap<RegisterId, Vec<At>> = BTreeMap::new();
-        // Registers used so far. What sets one to a constant before anything uses it may become a preset, whatever its bank.
+        // Registers used so far. An operation that sets one to a constant before that may become a preset, whatever its bank.
         let mut used: HashSet<RegisterId> = HashSet::default();
         let runs = runs::runs(ir);
         let flow = Flow::new(ir, &runs);
@@ -63,7 +64,7 @@ impl Choice {
                     choice.bundles.push(several);
                 }
                 if let Some(dest) = operation.dest
-                    && (used.contains(&dest) || !homes::is_initial(ir, &flow, b, operation))
+                    && (used.contains(&dest) || !banks::is_initial(ir, &flow, b, operation))
                 {
                     writers.entry(dest).or_default().push((b, o));
                 }
@@ -82,7 +83,7 @@ impl Choice {
         choice
     }
 
-    /// Makes one choice of those of several operations.
+    /// Joins the variables of several operations.
     fn join(&mut self, operations: &[At], slots: Slots) {
         let joint = self.sets.len();
         self.sets.push(slots);
@@ -92,12 +93,12 @@ impl Choice {
         self.bundles.push(bundles);
     }
 
-    /// Makes every choice.
+    /// Assigns every variable.
     fn settle(&mut self) {
         let all: Vec<usize> = self.bundles.iter().flatten().copied().collect();
         self.propagate(all.into());
         let mut next = 0;
-        // A bundle that goes its own way adds choices.
+        // A bundle that is split adds variables.
         while next < self.sets.len() {
             if let Some(first) = self.sets[next].first().filter(|_| self.sets[next].len() > 1) {
                 self.sets[next] = Slots::of(first);
@@ -107,7 +108,7 @@ impl Choice {
         }
     }
 
-    /// Takes out what no assignment of a bundle can use, and what then follows for others.
+    /// Propagates the constraints of bundles to a fixed point: removes each slot that no matching of a bundle uses.
     fn propagate(&mut self, mut waiting: VecDeque<usize>) {
         while let Some(bundle) = waiting.pop_front() {
             let operations: Vec<At> =
@@ -115,7 +116,7 @@ impl Choice {
             let variables: Vec<usize> = operations.iter().map(|at| self.of[at]).collect();
             let mut sets: Vec<Slots> = variables.iter().map(|variable| self.sets[*variable]).collect();
             if !matching::is_possible(&sets) {
-                // It goes its own way.
+                // No matching: the bundle's operations get variables of their own.
                 for at in &operations {
                     self.of.insert(*at, self.sets.len());
                     self.sets.push(self.able[at]);
@@ -145,8 +146,8 @@ impl Choice {
     }
 }
 
-/// Which operations that write a register are to have one slot, and which slots that may be: all of them, if a slot can take all;
-/// else those whose values must come to the register's home, or as many of these as weigh most.
+/// The operations that write a register and shall share a slot, and the slots that can take them: all operations, if a slot can take
+/// all; else those whose values must reach the register's home bank, or the heaviest of these that agree on a slot.
 fn together(ir: &Ir, runs: &[Run], flow: &Flow, register: RegisterId, writers: &[At]) -> (Vec<At>, Slots) {
     let able = |at: &At| ir.bundles[at.0].operations[at.1].slots;
     let common = |writers: &[At]| writers.iter().map(able).reduce(Slots::and).unwrap_or_default();
@@ -167,7 +168,7 @@ fn together(ir: &Ir, runs: &[Run], flow: &Flow, register: RegisterId, writers: &
         lasting.iter().filter(|at| able(at).contains(slot)).map(|at| flow.weights[at.0]).sum()
     };
     let slots = lasting.iter().map(able).fold(Slots::default(), Slots::or);
-    // Of equals the first.
+    // The last maximum in reverse is the first slot.
     let Some(slot) = slots.iter().rev().max_by_key(|slot| weight(*slot)) else { return (lasting, slots) };
     lasting.retain(|at| able(at).contains(slot));
     (lasting, Slots::of(slot))

@@ -1,11 +1,12 @@
-//! Values to registers: a name that a straight run of bundles computes several times can stand for several registers.
+//! Webs: register renaming within straight runs of bundles, so that each definition of a name and its uses have a virtual register
+//! of their own (Muchnick, Advanced Compiler Design and Implementation, 1997, §16.3).
 //!
-//! In `fmul t, a, b` and then `fadd t, t, c` the name `t` stands for two values, which on a machine with several banks even
-//! lie in different ones. Each value but the run's last, which may be read elsewhere, gets a register of its own wherever
-//! that matters: where the scheduler may move the operations (the reuse of a name then orders nothing), and for names that
-//! operations of different slots write. Of these the last value, too, where it does not lie in the name's home.
+//! In `fmul t, a, b` and then `fadd t, t, c` the name `t` stands for two values, which on a machine with several banks may even
+//! lie in different ones. Each value but the run's last, which may be live after it, is renamed where that matters: where the
+//! scheduler may move the operations (renaming removes anti- and output dependences), and for names that operations of different
+//! slots write. Of these the last value, too, if its slot does not write the name's home bank.
 
-use crate::homes::Homes;
+use crate::banks::BankAssignment;
 use crate::ir::runs;
 use crate::ir::{Ir, RegisterId, RegisterKind, Version, VirtualRegister, numbered};
 
@@ -22,9 +23,9 @@ pub(crate) fn contested(ir: &Ir) -> Vec<bool> {
     contested
 }
 
-/// What a run makes of a register.
+/// Renaming of a register within a run.
 #[derive(Clone, Copy, Default)]
-struct Name {
+struct Renaming {
     /// Operations of the run that are still to write it.
     left: u32,
     /// Values that have got a register of their own.
@@ -35,9 +36,9 @@ struct Name {
     version: usize,
 }
 
-/// A value that is to be copied to the register that it is a value of.
+/// A value to be copied to the home bank of its name.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Copy {
+pub(crate) struct BankCopy {
     /// The bundle that computes it, and which of its operations.
     pub(crate) at: (usize, usize),
     /// The register that it lies in.
@@ -46,18 +47,18 @@ pub(crate) struct Copy {
     pub(crate) to: RegisterId,
 }
 
-/// Splits names into values where that matters. Returns the values that are still to be copied home, in order.
-pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
+/// Renames values. Returns those that are still to be copied to their home banks, in order.
+pub(crate) fn split(ir: &mut Ir, assignment: &mut BankAssignment) -> Vec<BankCopy> {
     let mut copies = Vec::new();
-    if homes.of.iter().all(Option::is_none) && !ir.scheduled {
+    if assignment.of.iter().all(Option::is_none) && !ir.scheduled {
         return copies;
     }
-    let mut names = vec![Name::default(); ir.registers.len()];
+    let mut names = vec![Renaming::default(); ir.registers.len()];
     let mut touched: Vec<usize> = Vec::new();
     for (number, run) in runs::runs(ir).into_iter().enumerate() {
         for operation in ir.bundles[run.start..run.end].iter().flat_map(|bundle| &bundle.operations) {
             let Some(id) = operation.dest else { continue };
-            if homes.get(id).is_some() || (run.scheduled && is_free(ir.register(id))) {
+            if assignment.get(id).is_some() || (run.scheduled && is_free(ir.register(id))) {
                 names[id.index()].left += 1;
                 touched.push(id.index());
             }
@@ -70,7 +71,7 @@ pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
             for operation in &mut bundle.operations {
                 let count = operation.row().shape.sources();
                 for source in &mut operation.sources[..count] {
-                    // A register made here is beyond the table, and is never read under another name.
+                    // A register made here is beyond the table and is not renamed again.
                     *source = names.get(source.index()).and_then(|name| name.current).unwrap_or(*source);
                 }
             }
@@ -82,7 +83,7 @@ pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
                     versions[name.version].through = operation.order;
                 }
                 let original = &registers[dest.index()];
-                let home = homes.get(dest);
+                let home = assignment.get(dest);
                 let is_home = home.is_none_or(|home| operation.slot == Some(home.slot));
                 // A port shows every value, another register the run's last.
                 let settles = name.left == 0 || original.kind == RegisterKind::Output;
@@ -100,7 +101,7 @@ pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
                 };
                 let id = RegisterId::new(registers.len());
                 if home.is_some() && (settles || !is_free(original)) {
-                    homes.quiet.insert(id);
+                    assignment.quiet.insert(id);
                 }
                 registers.push(fresh);
                 name.version = versions.len();
@@ -108,23 +109,23 @@ pub(crate) fn split(ir: &mut Ir, homes: &mut Homes) -> Vec<Copy> {
                 versions.push(Version { name: dest, register: id, after, through });
                 name.current = Some(id);
                 operation.dest = Some(id);
-                if settles && homes.is_live(dest, number) {
-                    copies.push(Copy { at: (at, which), from: id, to: dest });
+                if settles && assignment.is_live(dest, number) {
+                    copies.push(BankCopy { at: (at, which), from: id, to: dest });
                 }
             }
         }
         for index in touched.drain(..) {
-            // A value that is copied home is what the name means to the end of the run.
+            // A value that is copied to its home bank is the name's value to the end of the run.
             if names[index].current.is_some() {
                 versions[names[index].version].through = last;
             }
-            names[index] = Name { made: names[index].made, ..Name::default() };
+            names[index] = Renaming { made: names[index].made, ..Renaming::default() };
         }
     }
     copies
 }
 
-/// Whether the register of a name may be any, and another for each value.
+/// True if the values of a name may have registers of their own.
 fn is_free(register: &VirtualRegister) -> bool {
     register.kind == RegisterKind::Plain && register.pinned.is_none() && register.preset.is_none()
 }

@@ -1,4 +1,4 @@
-//! A run up to the period that is looked at.
+//! Runs a program to the period under examination, and traces that.
 
 use crate::accuracy::Shadow;
 use crate::{Trace, TraceError, trace};
@@ -6,20 +6,20 @@ use takt_emu::{Emulator, LoadError, PeriodError, PortError, Status};
 use takt_isa::timing::Cycle;
 use takt_isa::{Program, Register};
 
-/// Cycles in which a period ends, or nobody expects it to any more.
+/// The most cycles that a period may take before it counts as endless.
 pub const PERIOD_LIMIT: Cycle = 1_000_000_000;
-/// Periods that are run at most on the way to the one to look at.
+/// The most periods that are run.
 pub const MOST_PERIODS: u64 = 1_000_000;
-/// Periods that are run where nobody says how many.
+/// The default number of periods.
 pub const PERIODS: u64 = 2;
 
-/// Why a period cannot be looked at.
+/// The reason that there is no trace of a period.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum FollowError {
+pub enum PeriodRunError {
     /// The program does not fit its machine.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// What runs once cannot be followed.
+    /// The section that runs once cannot be traced.
     #[error(transparent)]
     Once(TraceError),
     /// An input cannot be set.
@@ -28,54 +28,54 @@ pub enum FollowError {
     /// A period on the way failed.
     #[error("period {period}")]
     Period {
-        /// Which.
+        /// The period.
         period: u64,
-        /// Why.
+        /// The cause.
         source: PeriodError,
     },
     /// The period itself failed.
     #[error("period {period}")]
     Trace {
-        /// Which.
+        /// The period.
         period: u64,
-        /// Why.
+        /// The cause.
         source: TraceError,
     },
     /// There is no such period.
     #[error("the program halts before period {wanted}; the last is {halted}")]
     Halted {
-        /// The one that is asked for.
+        /// The period asked for.
         wanted: u64,
-        /// The one that it halted in.
+        /// The period in which it halts.
         halted: u64,
     },
 }
 
-/// A period that was looked at.
+/// A traced period.
 #[derive(Clone)]
-pub struct Followed {
-    /// When everything happened.
+pub struct PeriodRun {
+    /// Its trace.
     pub trace: Trace,
-    /// Which period; 0 is what runs once.
+    /// Its number; 0 is the section that runs once.
     pub period: u64,
-    /// How exact it was, by itself.
+    /// The accuracy of this period by itself.
     pub shadow: Shadow,
 }
 
-/// Runs the program and follows period `wanted`, or else the last of `rows`, which has register and bits of the
-/// inputs of each period.
+/// Runs the program to period `wanted`, or else to the last of `rows`, and traces that. A row has register and bits of the inputs
+/// of one period.
 ///
 /// # Errors
-/// See [`FollowError`].
-pub fn follow(
+/// See [`PeriodRunError`].
+pub fn run_to_period(
     program: &Program,
     rows: &[Vec<(Register, u32)>],
     wanted: Option<u64>,
-) -> Result<Followed, FollowError> {
+) -> Result<PeriodRun, PeriodRunError> {
     let given = wanted.is_some();
     let wanted = wanted.unwrap_or(rows.len() as u64);
     let mut emulator = Emulator::new(program)?;
-    let set = |emulator: &mut Emulator, period: u64| -> Result<(), FollowError> {
+    let set = |emulator: &mut Emulator, period: u64| -> Result<(), PeriodRunError> {
         for &(register, bits) in rows.get(period.saturating_sub(1) as usize).into_iter().flatten() {
             emulator.set_input_bits(register, bits)?;
         }
@@ -84,23 +84,23 @@ pub fn follow(
     };
     set(&mut emulator, 0)?;
     let mut before = emulator.clone();
-    let mut found = trace(&mut emulator).map_err(FollowError::Once)?;
+    let mut found = trace(&mut emulator).map_err(PeriodRunError::Once)?;
     let mut period = 0;
     while period < wanted && !matches!(emulator.status(), Status::Halted { .. }) {
         period += 1;
         set(&mut emulator, period)?;
         if period < wanted {
-            emulator.run_period(&[]).map_err(|source| FollowError::Period { period, source })?;
+            emulator.run_period(&[]).map_err(|source| PeriodRunError::Period { period, source })?;
         } else {
             before = emulator.clone();
-            found = trace(&mut emulator).map_err(|source| FollowError::Trace { period, source })?;
+            found = trace(&mut emulator).map_err(|source| PeriodRunError::Trace { period, source })?;
         }
     }
     if period < wanted && (given || period > 0) {
-        return Err(FollowError::Halted { wanted, halted: period });
+        return Err(PeriodRunError::Halted { wanted, halted: period });
     }
     let mut shadow = Shadow::new(program);
-    // It goes through what has been traced without a fault.
+    // The period was traced without a fault, so that this cannot fail.
     let _ = shadow.run_period(&mut before);
-    Ok(Followed { trace: found, period, shadow })
+    Ok(PeriodRun { trace: found, period, shadow })
 }

@@ -1,4 +1,4 @@
-//! What can be wrong with a G-code program.
+//! Errors of G-code programs.
 
 use crate::hybrid::workspace::Unreachable;
 
@@ -10,12 +10,12 @@ pub struct GcodeError {
     pub line: usize,
     /// Column in characters, counted from 1.
     pub column: usize,
-    /// What is wrong.
+    /// The mistake.
     #[source]
     pub kind: GcodeErrorKind,
 }
 
-/// What is wrong, and what would be right.
+/// The mistake, and what would be right.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GcodeErrorKind {
@@ -44,7 +44,7 @@ pub enum GcodeErrorKind {
     UnsupportedCode {
         /// The code as written.
         code: String,
-        /// What is supported instead.
+        /// The words that are supported instead.
         hint: &'static str,
     },
     /// A letter that is no word of this machine.

@@ -9,9 +9,9 @@
 //! moves of the AGH path last a whole number of periods on paper and an ulp more in binary64; they get one
 //! period more, and only so the path has the 346,666 periods that the specification counts (346,661 otherwise).
 
-use crate::gcode::Program;
-use crate::hybrid::kinematics::Reference;
-use crate::hybrid::params::{SAMPLE_RATE, SAMPLE_TIME};
+use super::gcode::Program;
+use super::kinematics::Reference;
+use super::params::{SAMPLE_RATE, SAMPLE_TIME};
 use crate::path::{Move, MoveKind, Pose};
 
 /// Most periods that a trajectory may have: an hour.
@@ -21,7 +21,7 @@ pub const RAPID_RAMP: f64 = 0.06;
 /// Duration `Tr` of one ramp of a cutting move, s.
 pub const CUT_RAMP: f64 = 0.03;
 
-/// Why a program has no trajectory.
+/// The reason why a program has no trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum TrajectoryError {
     /// The program takes longer than [`MAX_PERIODS`].
@@ -37,7 +37,7 @@ pub enum TrajectoryError {
 pub struct Sample {
     /// The reference point, in binary64.
     pub reference: Reference<f64>,
-    /// Whether the move cuts.
+    /// True if the move cuts.
     pub cutting: bool,
     /// Index of the move in the program.
     pub move_index: usize,
@@ -159,7 +159,7 @@ impl Trajectory {
         Ok(Self { start: program.start, segments, periods })
     }
 
-    /// Where the robot stands before the first period.
+    /// The pose of the robot before the first period.
     #[must_use]
     pub fn start(&self) -> Pose {
         self.start
