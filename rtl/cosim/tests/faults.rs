@@ -190,7 +190,7 @@ fn planted_faults_are_found_on_t3() {
     faults_are_found(&T3, 0, &[COMMON, OF_T3].concat(), generated_for_t3);
 }
 
-/// What t3 has not.
+/// Faults in modules that t3 does not have.
 #[test]
 fn planted_faults_are_found_on_t1() {
     faults_are_found(&T1, 0, OF_T1, generated_for_t1);

@@ -6,12 +6,12 @@ use takt_asm::diag::{Diagnostic, Diagnostics, Severity};
 use takt_asm::levels::{Level, Levels};
 use takt_asm::source::Sources;
 use takt_system::Description;
-use takt_system::heads::{Doubt, HeadRead};
+use takt_system::stale::{Doubt, StaleRead};
 
 /// The diagnostic of a read: at its source line, if `sources` (of its core's program: texts, by the names that the program has for
 /// them) have it. `None` if `levels` allow it.
 pub fn diagnose(
-    read: &HeadRead,
+    read: &StaleRead,
     description: &Description,
     sources: &[(String, String)],
     levels: &Levels,
@@ -25,13 +25,13 @@ pub fn diagnose(
     let program = &core.program;
     let [field, pop] = [read.field, read.pop].map(|register| program.register_text(register));
     let link = &description.links[read.link].name;
-    let HeadRead { after, complete, .. } = read;
+    let StaleRead { after, complete, .. } = read;
     let message = match read.doubt {
         Doubt::Moved => format!(
-            "`{field}` of `{link}` is read {after} cycles after the pop that stands below it: it may be the next entry's by then"
+            "stale read: `{field}` of `{link}` is read {after} cycles after the pop that stands below it, so it may be the next entry's"
         ),
         Doubt::Between => format!(
-            "`{field}` of `{link}` is read {after} cycles after a pop, which is neither before the next entry nor after it"
+            "stale read: `{field}` of `{link}` is read {after} cycles after a pop, which is neither before the next entry nor after it"
         ),
     };
     let place = |at| line(program, at, sources);

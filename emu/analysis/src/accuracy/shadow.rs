@@ -193,9 +193,27 @@ impl Shadow {
     pub fn run_period(&mut self, emulator: &mut Emulator) -> Result<bool, Fault> {
         if let Status::Waiting { since, .. } = *emulator.status() {
             emulator.tick_at(emulator.now().max(since + Cycle::from(emulator.machine().refill)));
+        }
+        self.run_period_with(emulator, |_| {})
+    }
+
+    /// As [`Shadow::run_period`], with a tick that was asked for; `act` acts on the machine before each cycle.
+    ///
+    /// # Returns
+    /// As there.
+    ///
+    /// # Errors
+    /// The program's fault.
+    pub fn run_period_with(
+        &mut self,
+        emulator: &mut Emulator,
+        mut act: impl FnMut(&mut Emulator),
+    ) -> Result<bool, Fault> {
+        if let Status::Waiting { .. } = emulator.status() {
             self.begin_period();
         }
         loop {
+            act(emulator);
             match emulator.step_cycle()? {
                 Step::Halted => return Ok(false),
                 Step::Stalled { .. } => {}

@@ -1,104 +1,35 @@
-//! `takt bound SYSTEM.toml`: each core's sections, and the way from the host's inputs to its outputs.
+//! The ways through a system, from a command of the host to an output's first response.
 
-use super::{LoadedSystem, load};
-use crate::bound::{Bound, grouped, listed, microseconds, sections_json, write_sections};
-use crate::files::{self, Out};
-use crate::output::{self, Failure};
-use anyhow::{Result, anyhow, bail};
+use super::groups::{grouped, listed, microseconds};
+use crate::files::Out;
+use anyhow::{Result, anyhow};
 use serde_json::{Value, json};
 use std::io::Write;
 use takt_analysis::Bounds;
+use takt_system::Description;
 use takt_system::latency::{Latency, latencies};
-use takt_system::{Core, Description};
 
-pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
-    if arguments.machine.machine.is_some() {
-        let why = "--machine with a system: the system's file names each core's";
-        return Err(Failure::Usage(why.to_owned()).into());
-    }
-    let LoadedSystem { description, .. } = load(&arguments.file, &arguments.source, color)?;
-    let bounds = bounds(&description)?;
-    #[cfg(feature = "board")]
-    if let Some(wiring) = &arguments.wiring {
-        return crate::bound::pins::system(arguments, wiring, &description, &bounds, color, out);
-    }
-    let deadline = arguments
-        .deadline
-        .map(|deadline| Deadline { cycles: deadline.cycles(arguments.clock), empty: arguments.empty_fifos });
-    let ways = latencies(&description, &bounds).map_err(|error| anyhow!("no end-to-end bound: {error}"));
-    if deadline.is_some() && matches!(&ways, Ok(ways) if ways.is_empty()) {
-        bail!("a deadline, and no way leads from an input of the system to an output");
-    }
-    let is_kept = |ways: &[Latency]| {
-        deadline.is_none_or(|deadline| ways.iter().all(|way| deadline.kept(way) == Some(true)))
-    };
-    let verdict = ways.as_ref().is_ok_and(|ways| is_kept(ways));
-    if arguments.json {
-        let ways = ways?;
-        output::json(&result_json(arguments, &description, &bounds, &ways, deadline), out)?;
-    } else {
-        write_text(arguments, &description, &bounds, out)?;
-        // The cores' bounds stand even where the system's do not.
-        write_ways(&description, &ways?, arguments.clock, deadline, out)?;
-    }
-    if verdict { Ok(()) } else { Err(Failure::Reported.into()) }
+/// The bounds of every way.
+pub(crate) fn ways(description: &Description, bounds: &[Bounds]) -> Result<Vec<Latency>> {
+    latencies(description, bounds).map_err(|error| anyhow!("no end-to-end bound: {error}"))
 }
 
 /// The deadline that a first response is held against.
 #[derive(Clone, Copy)]
-pub(super) struct Deadline {
-    cycles: u64,
+pub(crate) struct Deadline {
+    pub(super) cycles: u64,
     /// True if FIFOs are empty when the command comes.
-    empty: bool,
+    pub(super) empty: bool,
 }
 
 impl Deadline {
-    fn kept(self, way: &Latency) -> Option<bool> {
+    pub(super) fn kept(self, way: &Latency) -> Option<bool> {
         way.kept(self.cycles, self.empty)
     }
 }
 
-/// The bounds of each core's sections.
-pub(super) fn bounds(description: &Description) -> Result<Vec<Bounds>> {
-    let bound = |core: &Core| {
-        takt_analysis::bound(&core.program).map_err(|error| anyhow!("core {}: no bound: {error}", core.name))
-    };
-    description.cores.iter().map(bound).collect()
-}
-
-fn result_json(
-    arguments: &Bound,
-    description: &Description,
-    bounds: &[Bounds],
-    ways: &[Latency],
-    deadline: Option<Deadline>,
-) -> Value {
-    let core = |(core, bounds): (&Core, &Bounds)| {
-        json!({
-            "name": core.name,
-            "program": core.path,
-            "machine": core.program.machine.name,
-            "period": core.period(description.tick),
-            "sections": sections_json(&core.program, bounds),
-        })
-    };
-    let way = |way: &Latency| {
-        let mut value = way_json(description, way);
-        value["kept"] = json!(deadline.and_then(|deadline| deadline.kept(way)));
-        value
-    };
-    json!({
-        "system": files::input_name(&arguments.file),
-        "tick": description.tick,
-        "clock_mhz": arguments.clock,
-        "cores": description.cores.iter().zip(bounds).map(core).collect::<Vec<_>>(),
-        "latencies": ways.iter().map(way).collect::<Vec<_>>(),
-        "deadline": deadline.map(|deadline| deadline.cycles),
-    })
-}
-
 /// A way's bounds, as JSON.
-pub(super) fn way_json(description: &Description, way: &Latency) -> Value {
+pub(crate) fn way_json(description: &Description, way: &Latency) -> Value {
     let links = |links: &[usize]| -> Vec<String> {
         links.iter().map(|link| description.links[*link].name.clone()).collect()
     };
@@ -115,22 +46,8 @@ pub(super) fn way_json(description: &Description, way: &Latency) -> Value {
     })
 }
 
-fn write_text(arguments: &Bound, description: &Description, bounds: &[Bounds], out: &mut Out) -> Result<()> {
-    writeln!(out, "cycles, whatever the inputs")?;
-    for (core, bounds) in description.cores.iter().zip(bounds) {
-        let period = core.period(description.tick);
-        let time = microseconds(period, arguments.clock);
-        writeln!(
-            out,
-            "\n{}: {} on {}, a tick every {period} ({time})",
-            core.name, core.path, core.program.machine.name
-        )?;
-        write_sections(&core.program, bounds, arguments.clock, out)?;
-    }
-    Ok(())
-}
-
-pub(super) fn write_ways(
+/// Writes the ways, those that differ in the names of their ends only as one.
+pub(crate) fn write_ways(
     description: &Description,
     ways: &[Latency],
     clock: f64,
@@ -200,7 +117,7 @@ pub(super) fn write_ways(
     Ok(())
 }
 
-/// Which states a first response comes through; nothing of a way that is direct and ends with the response.
+/// The states that a first response comes through; none of a way that is direct and ends with the response.
 fn states_text(way: &Latency, cores: &[&str]) -> Option<String> {
     let periods = |count: u32| format!("{count} period{}", if count == 1 { "" } else { "s" });
     let through = |(number, core): (usize, &&str)| {

@@ -1,5 +1,5 @@
-//! Reads of a FIFO's head that its own pop spoils: what a program reads of an entry after it has taken it out may be the
-//! next entry's. docs/system.md says exactly what is told.
+//! Stale reads of FIFOs: a program that reads a field of an entry after the pop that took the entry out may get the next entry's.
+//! docs/system.md says exactly which reads are told.
 
 use std::collections::BTreeSet;
 use takt_analysis::{StaticIssue, static_issue};
@@ -12,7 +12,7 @@ use takt_isa::{BundleAddress, Program, Register};
 /// arrives from a link.
 const NEXT: Cycle = 1 + MIN_LATENCY;
 
-/// What is doubtful about a read.
+/// The kind of doubt about a read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Doubt {
     /// The source has it before the pop, and the scheduler has put it behind: it is the next head's if there is one.
@@ -23,7 +23,7 @@ pub enum Doubt {
 
 /// A read of a field of a FIFO's head after the pop in the same straight line of bundles.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct HeadRead {
+pub struct StaleRead {
     /// The core that reads.
     pub core: usize,
     /// The FIFO.
@@ -42,7 +42,7 @@ pub struct HeadRead {
     pub after: Cycle,
     /// So many cycles after the writeback the next head is complete.
     pub complete: Cycle,
-    /// What is doubtful.
+    /// The kind of doubt.
     pub doubt: Doubt,
 }
 
@@ -55,11 +55,11 @@ struct Access {
     cycle: Cycle,
 }
 
-/// The doubtful reads of a system's programs, each source line and field once.
-pub fn doubtful(description: &Description) -> Vec<HeadRead> {
+/// The stale reads in a system's programs, each source line and field once.
+pub fn stale_reads(description: &Description) -> Vec<StaleRead> {
     let mut found = Vec::new();
     for (number, core) in description.cores.iter().enumerate() {
-        // What is latched stays as it is until the next tick.
+        // A latched input stays as it is until the next tick.
         if core.program.latched {
             continue;
         }
@@ -76,7 +76,7 @@ pub fn doubtful(description: &Description) -> Vec<HeadRead> {
         }
     }
     let mut told = BTreeSet::new();
-    found.retain(|read: &HeadRead| {
+    found.retain(|read: &StaleRead| {
         let place = read.read.map_or((u32::MAX, read.read_at.index() as u32), |line| (line.file, line.line));
         told.insert((read.core, read.link, read.field, place))
     });
@@ -101,7 +101,7 @@ impl Seek<'_> {
     }
 
     /// A straight line of bundles.
-    fn stretch(&self, issues: &[StaticIssue], found: &mut Vec<HeadRead>) {
+    fn stretch(&self, issues: &[StaticIssue], found: &mut Vec<StaleRead>) {
         let (mut reads, mut pops) = (Vec::new(), Vec::new());
         let machine = self.program.machine;
         for issue in issues {
@@ -133,7 +133,7 @@ impl Seek<'_> {
                     () if after < complete => Doubt::Between,
                     () => continue,
                 };
-                found.push(HeadRead {
+                found.push(StaleRead {
                     core: self.core,
                     link: self.link,
                     field: read.register,
@@ -162,7 +162,7 @@ impl Seek<'_> {
         lines.iter().flatten().max_by_key(|line| line.line).copied()
     }
 
-    /// Whether the source has a read before a pop. Lines of a macro that is defined elsewhere say nothing of the order: a line
+    /// True if the source has a read before a pop. Lines of a macro that is defined elsewhere say nothing of the order: a line
     /// above the stretch is none of it.
     fn stands_before(&self, read: &Access, pop: &Access, above: Option<Location>) -> bool {
         let (Some(read), Some(pop)) = (read.line, pop.line) else { return false };
@@ -171,7 +171,7 @@ impl Seek<'_> {
     }
 }
 
-/// Whether the same line reads the field before the pop too, as one that is repeated (`.rep`) does, for each entry.
+/// True if the same line reads the field before the pop too, as one that is repeated (`.rep`) does, for each entry.
 fn repeated(read: &Access, pop: &Access, reads: &[Access]) -> bool {
     reads.iter().any(|other| {
         other.register == read.register && other.line == read.line && other.cycle < pop.cycle + NEXT

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_isa::{F1, Program};
-use takt_system::heads::{Doubt, HeadRead, doubtful};
+use takt_system::stale::{Doubt, StaleRead, stale_reads};
 use takt_system::testing::describe;
 use takt_system::{Description, System};
 
@@ -28,8 +28,8 @@ const HEAD: &str =
     ".input x:int, y:int, z:int, n:int\n.output u:int, v:int, w:int, p:int\n.once\n wait q\n.period\nq:\n";
 
 fn doubts(description: &Description) -> Vec<(String, Doubt)> {
-    let name = |read: &HeadRead| description.cores[read.core].program.register_text(read.field);
-    doubtful(description).iter().map(|read| (name(read), read.doubt)).collect()
+    let name = |read: &StaleRead| description.cores[read.core].program.register_text(read.field);
+    stale_reads(description).iter().map(|read| (name(read), read.doubt)).collect()
 }
 
 /// For every distance from a pop to reads of all fields: where the emulator shows this entry, none is told of; where a field is
@@ -51,7 +51,7 @@ fn what_is_told_is_what_is_read() {
         let start = system.run_to_start(10_000).unwrap().unwrap();
         system.run_until(start + 200).unwrap();
         let seen = ["u", "v", "w"].map(|port| system.output(port).unwrap());
-        let told = doubtful(&description);
+        let told = stale_reads(&description);
         for (i, name) in ["x", "y", "z"].into_iter().enumerate() {
             let is_told = told.iter().any(|read| {
                 assert_eq!(read.doubt, Doubt::Between);
@@ -63,7 +63,7 @@ fn what_is_told_is_what_is_read() {
                 (_, true) => between += 1,
                 other => panic!("distance {distance}, {name}: {other:?}"),
             }
-            // What is not told of is the old entry's before, and the new one's behind.
+            // A read that is not told of is the old entry's before the pop, and the new one's behind.
             let cycle = distance as u64 + i as u64;
             assert!(is_told || (seen[i] == 1) == (cycle < 12), "distance {distance}, {name}: {}", seen[i]);
         }
@@ -74,7 +74,7 @@ fn what_is_told_is_what_is_read() {
 /// The scheduler puts a read behind the pop that the source has below it.
 #[test]
 fn a_read_that_was_moved_is_told_of() {
-    // What `x` is used for waits for a long chain, and its read with it.
+    // The use of `x` waits for a long chain, and its read with it.
     let late = |demand: &str| {
         receiver(&format!(
             ".schedule on\n{HEAD}.reg a:int\n iadd a, n, 1\n{} iadd v, a, x\n mov p, zero\n{demand} wait q\n",
@@ -83,7 +83,7 @@ fn a_read_that_was_moved_is_told_of() {
     };
     let moved = late("");
     assert_eq!(doubts(&moved), [("x".to_owned(), Doubt::Moved)]);
-    let [read] = &doubtful(&moved)[..] else { panic!("one") };
+    let [read] = &stale_reads(&moved)[..] else { panic!("one") };
     let line = |location: Option<takt_isa::program::Location>| location.unwrap().line;
     assert!(line(read.read) < line(read.popped), "{read:?}");
     // As written, with the demand, and if ports are latched, there is nothing to tell of.
@@ -92,7 +92,7 @@ fn a_read_that_was_moved_is_told_of() {
     assert_eq!(doubts(&receiver(&written)), []);
 }
 
-/// What is right is not told of: entry after entry in one straight line, and a macro that is written above.
+/// Correct reads are not told of: entry after entry in one straight line, and a macro that is written above.
 #[test]
 fn what_is_repeated_is_right() {
     let entry = format!(" mov u, x\n mov v, y\n mov w, z\n mov p, zero\n{}", " nop\n".repeat(20));
