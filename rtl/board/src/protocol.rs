@@ -367,7 +367,7 @@ pub enum LinkError {
     Image(usize),
     /// The board has another number of cores.
     #[error(
-        "the board carries a circuit of {there} cores, and {wanted} are wanted (a single program is one): `takt board build` makes a circuit for them"
+        "number of cores: {there} on the board, {wanted} in the program or system; `takt board build` makes a circuit for it"
     )]
     OtherCores {
         /// The board's.

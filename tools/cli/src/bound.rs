@@ -128,7 +128,7 @@ pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
     let bounds = takt_analysis::bound(&program).map_err(|error| anyhow!("no bound: {error}"))?;
     #[cfg(feature = "board")]
     if let Some(wiring) = &arguments.wiring {
-        return pins::program(arguments, wiring, &program, &bounds, color, out);
+        return pins::run(arguments, wiring, (&program).into(), &[bounds], color, out);
     }
     let verdict = match (arguments.deadline, bounds.worst_period()) {
         (None, _) => None,

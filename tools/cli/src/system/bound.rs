@@ -20,7 +20,7 @@ pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
     let bounds = bounds(&description)?;
     #[cfg(feature = "board")]
     if let Some(wiring) = &arguments.wiring {
-        return crate::bound::pins::system(arguments, wiring, &description, &bounds, color, out);
+        return crate::bound::pins::run(arguments, wiring, (&description).into(), &bounds, color, out);
     }
     let deadline = arguments
         .deadline
