@@ -49,7 +49,6 @@ use takt_isa::{Machine, Program, T3};
 use takt_syntax as syntax;
 use takt_syntax::report;
 
-pub use context::type_name;
 pub use contract::Contraction;
 pub use emit::spill::{Spilled, Spills};
 pub use expand::load::{FileLoader, LoadError, Loader, MemoryLoader, Open, Search};

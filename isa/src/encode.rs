@@ -199,7 +199,7 @@ impl Instruction {
     /// If it may not: see [`PlacementError`].
     pub fn place(&self, machine: &'static Machine, slot: SlotIndex) -> Result<(), PlacementError> {
         let (row, host) = (self.op.row(), machine.slot(slot));
-        if row.function != Function::Idle && host.unit_for(row.function).is_none() {
+        if row.function != Function::Idle && host.unit(row.function).is_none() {
             return Err(PlacementError::NoUnit {
                 machine: machine.name,
                 slot: host.name,

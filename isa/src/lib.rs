@@ -10,9 +10,9 @@
 //! use takt_isa::{Instruction, Op, T3};
 //!
 //! let row = Op::from_mnemonic("fadd").expect("an instruction").row();
-//! let slot = T3.slots.iter().find(|slot| slot.unit_for(row.function).is_some()).expect("t3 has it");
-//! let unit = slot.units[slot.unit_for(row.function).expect("just found")];
-//! assert_eq!((slot.name, unit.latency), ("add", 5));
+//! let (slot, _) = T3.host(row.function).expect("t3 has it");
+//! let unit = T3.unit(slot, row.function).expect("just found");
+//! assert_eq!((T3.slot(slot).name, unit.latency), ("add", 5));
 //!
 //! let instruction = Instruction::bare(row.op);
 //! let word = instruction.encode().expect("it fits");
@@ -22,11 +22,13 @@
 pub mod encode;
 pub mod flow;
 pub mod fp;
+pub mod load;
 pub mod manual;
 pub mod number;
 pub mod program;
 pub mod shape;
 pub mod spec;
+pub mod system;
 pub mod text;
 pub mod timing;
 

@@ -65,7 +65,7 @@ fn timings(row: &Row, machine: &'static Machine) -> Vec<Timing> {
         return vec![Timing { machine: machine.name, slot: "any", unit: "", latency: 0, interval: 1 }];
     }
     let timing = |slot: &'static Slot| {
-        let unit = &slot.units[slot.unit_for(row.function)?];
+        let unit = slot.unit(row.function)?;
         let latency = if row.shape.has_dest() { unit.latency } else { 0 };
         Some(Timing {
             machine: machine.name,

@@ -4,7 +4,7 @@ use crate::encode::{DecodeError, Instruction, PlacementError};
 use crate::number::{BundleAddress, Register, SlotIndex};
 use crate::spec::instructions::Type;
 use crate::spec::machines::Machine;
-use crate::timing::Cause;
+use crate::timing::{Cause, Span};
 
 /// A program for one machine.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,6 +39,22 @@ pub struct Program {
     pub lines: Vec<Option<Location>>,
     /// Of words that compute a part of an equation, what part of their line that is: index into `code`, ascending, and columns.
     pub parts: Vec<(u32, Columns)>,
+}
+
+/// The cycles of a section, as a host needs them.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct SectionCycles {
+    /// Its label, or `once`.
+    pub name: String,
+    /// Its first bundle.
+    pub address: BundleAddress,
+    /// True if it runs once, from reset to its `wait`; else it runs from each tick.
+    pub once: bool,
+    /// Cycles to the issue of its `wait`; of a period, with its tick in time.
+    pub cycles: Span,
+    /// Cycles of a period whose tick came before the `wait` of the one before.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub missed: Option<Span>,
 }
 
 /// Columns of a line: its characters from `first` to `last`, from 1.

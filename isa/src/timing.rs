@@ -16,7 +16,6 @@
 
 use crate::encode::Instruction;
 use crate::number::{BundleAddress, Register, SlotIndex};
-use crate::spec::instructions::Function;
 use crate::spec::machines::Machine;
 use crate::spec::units::MAX_LATENCY;
 
@@ -31,6 +30,38 @@ pub const LATCHED_INPUT_DELAY: Cycle = 2;
 pub const TICK_DELAY: Cycle = 1;
 /// Cycles between the issue of a `wait` and the cycle in which the pins tell of it.
 pub const ENDED_DELAY: Cycle = 2;
+
+/// Cycles, from the fewest to the most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Span {
+    /// No run takes fewer.
+    pub best: Cycle,
+    /// No run takes more.
+    pub worst: Cycle,
+}
+
+impl Span {
+    /// No cycle.
+    pub const ZERO: Span = Span { best: 0, worst: 0 };
+
+    /// The cycles of two pieces of a run, one after the other.
+    #[must_use]
+    pub fn and(self, other: Span) -> Span {
+        Span { best: self.best.saturating_add(other.best), worst: self.worst.saturating_add(other.worst) }
+    }
+
+    /// The cycles of two alternatives.
+    #[must_use]
+    pub fn or(self, other: Span) -> Span {
+        Span { best: self.best.min(other.best), worst: self.worst.max(other.worst) }
+    }
+
+    /// The same after so many more cycles.
+    #[must_use]
+    pub fn after(self, cycles: Cycle) -> Span {
+        self.and(Span { best: cycles, worst: cycles })
+    }
+}
 
 /// Why a cycle issued nothing.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
@@ -131,7 +162,7 @@ impl Bundle {
         let mut bundle = Bundle::default();
         for ((s, slot), instruction) in machine.numbered_slots().zip(instructions) {
             let row = instruction.op.row();
-            let Some(u) = slot.unit_for(row.function).filter(|_| row.function != Function::Idle) else {
+            let Some(u) = slot.unit_for(row.function) else {
                 continue;
             };
             bundle.operations.push(Operation {

@@ -1,7 +1,7 @@
 //! Every reason for which a row is no machine, each by the message that whoever writes the row gets from the compiler.
 
 use takt_isa::spec::units::{ADD, ALU, ALU_LATE, CONVERT, MEMORY, SEQUENCER};
-use takt_isa::{Bank, MACHINES, Machine, Slot, T1, T3, Unit};
+use takt_isa::{Bank, Function, MACHINES, Machine, Slot, T1, T3, Unit};
 
 fn leak<T>(value: impl Into<Box<[T]>>) -> &'static [T] {
     Box::leak(value.into())
@@ -98,6 +98,10 @@ fn every_reason() {
         (units(&[Unit { interval: 64, ..ADD }]), "slot `add`: unit `add` has interval 64; that is 1 to 63"),
         (units(&[Unit { functions: &[], ..ADD }]), "slot `add`: unit `add` offers no function"),
         (
+            units(&[Unit { functions: &[Function::Add, Function::Idle], ..ADD }]),
+            "slot `add`: unit `add` offers Idle; every slot takes idle operations without a unit",
+        ),
+        (
             units(&[ADD, ALU, CONVERT, ALU_LATE]),
             "slot `add`: unit `alu` and unit `alu_late` both offer Alu; in a slot, one unit executes a function",
         ),
@@ -124,7 +128,7 @@ fn every_reason() {
     let mut reasons: Vec<_> = cases.iter().filter_map(|(machine, _)| Some(machine.error()?.reason)).collect();
     reasons.dedup_by_key(|reason| std::mem::discriminant(reason));
     let distinct: std::collections::HashSet<_> = reasons.iter().map(std::mem::discriminant).collect();
-    assert_eq!(distinct.len(), 18, "reasons without a case");
+    assert_eq!(distinct.len(), 19, "reasons without a case");
 }
 
 /// Two slots may host the same function, and an adder may take the place of another one.

@@ -68,7 +68,10 @@ fn every_reason() {
         ),
         (Machine { refill: 5, ..T3 }, "refill is 5; rtl/core/takt_sequencer.v needs refill 6"),
         (Machine { resolve: 1, ..T1 }, "resolve is 1; rtl/core/takt_sequencer.v needs resolve 2"),
-        (Machine { stack_depth: 32, ..T3 }, "stack_depth is 32; rtl/core/takt_sequencer.v needs stack 16"),
+        (
+            Machine { stack_depth: 24, ..T3 },
+            "stack_depth is 24; the circuit needs a power of two from 2 to 64",
+        ),
         (
             units(2, &[ALU, Unit { latency: 3, ..MEMORY }, SEQUENCER]),
             "slot `aux`: the latency of unit `memory` is 3; rtl/core/takt_memory.v needs latency 4",

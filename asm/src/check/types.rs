@@ -6,7 +6,7 @@
 //! written to it, or none. What may be either is not reported: every warning is about a value that is certainly of the other type.
 
 use crate::check::{dest_span, source_span, text};
-use crate::context::{Context, ScopeId, type_name, words};
+use crate::context::{Context, ScopeId, words};
 use crate::ir::given::{self, Given, GivenTypes, Kind, Part, What};
 use crate::ir::runs::Run;
 use crate::ir::{Ir, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
@@ -441,7 +441,7 @@ fn wrong_source(
         Some(Origin { what: What::Declared, span, .. })
             if span == ir.register(operation.sources[which]).span =>
         {
-            format!("declare `{name}:{}` if it is {}, ", type_name(wanted), words(wanted))
+            format!("declare `{name}:{}` if it is {}, ", wanted.name(), words(wanted))
         }
         _ => String::new(),
     };
@@ -507,7 +507,7 @@ fn wrong_register(
     result: Typed,
 ) {
     let (name, wanted) = (text(ir, register), register.ty);
-    let declare = format!("declare `{name}:{}` if it is {}", type_name(ty), words(ty));
+    let declare = format!("declare `{name}:{}` if it is {}", ty.name(), words(ty));
     if let Some(Origin { what: What::Literal(value), span, scope }) = result.origin {
         let (shown, instead) = shown(value, wanted);
         let message = format!("{shown} goes to `{name}`, which is {}", words(wanted));

@@ -144,15 +144,6 @@ impl Context {
     }
 }
 
-/// A type as the source writes it.
-pub const fn type_name(ty: Type) -> &'static str {
-    match ty {
-        Type::F => "float",
-        Type::I => "int",
-        Type::B => "bits",
-    }
-}
-
 /// A type in words.
 pub(crate) const fn words(ty: Type) -> &'static str {
     match ty {

@@ -336,11 +336,7 @@ impl std::fmt::Display for SymbolMap {
             [("input", &self.inputs), ("output", &self.outputs), ("register", &self.registers)]
         {
             for register in list {
-                let ty = match register.ty {
-                    Type::F => "float",
-                    Type::I => "int",
-                    Type::B => "bits",
-                };
+                let ty = register.ty.name();
                 let what = register.number.map_or(what.to_owned(), |number| format!("{what} {number}"));
                 writeln!(f, "{what:<10}{:<width$}{:<5} {ty}", register.name, register.place)?;
             }

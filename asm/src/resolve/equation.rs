@@ -2,7 +2,7 @@
 //! names, in the order in which the equation is written ([`expression`](crate::resolve::expression)). Each operation has the part
 //! of the line that it computes as its span. Here is what becomes of the values: where they go, and what types they have.
 
-use crate::context::{At, Reported, Wanted, type_name, words};
+use crate::context::{At, Reported, Wanted, words};
 use crate::expand::equation::Results;
 use crate::expand::{Fast, Item};
 use crate::ir::given::Kind;
@@ -321,10 +321,10 @@ impl Resolver<'_> {
         let error = match self.forms.conversion(is, to) {
             Some(convert) => {
                 let shown = if written.len() > 24 { "…" } else { written };
-                let help = format!("convert it: `{convert}({shown})`, or declare `{name}:{}`", type_name(is));
+                let help = format!("convert it: `{convert}({shown})`, or declare `{name}:{}`", is.name());
                 error.mend(help, format!("{convert}({written})"))
             }
-            None => error.help(format!("declare `{name}:{}`", type_name(is))),
+            None => error.help(format!("declare `{name}:{}`", is.name())),
         };
         Err(self.context.report(at.scope, error))
     }

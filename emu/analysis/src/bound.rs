@@ -9,8 +9,8 @@ use crate::error::{BoundError, Refusal, place};
 use crate::graph::{Edge, Graph};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
-use takt_isa::program::Location;
-use takt_isa::timing::{self, Cycle, Residue, Scoreboard};
+use takt_isa::program::{Location, SectionCycles};
+use takt_isa::timing::{self, Cycle, Residue, Scoreboard, Span};
 use takt_isa::{BundleAddress, Flow, Program};
 
 /// Straight runs of bundles and turns of loops that are gone through at most, each from each state in which it is entered.
@@ -20,31 +20,6 @@ pub const MAX_DEPTH: usize = 64;
 
 /// Cycles of a section at most.
 pub const MAX_CYCLES: Cycle = 1 << 62;
-
-/// Cycles, from the fewest to the most.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Span {
-    /// No run takes fewer.
-    pub best: Cycle,
-    /// No run takes more.
-    pub worst: Cycle,
-}
-
-impl Span {
-    const NONE: Span = Span { best: 0, worst: 0 };
-
-    fn and(self, other: Span) -> Span {
-        Span { best: self.best.saturating_add(other.best), worst: self.worst.saturating_add(other.worst) }
-    }
-
-    fn or(self, other: Span) -> Span {
-        Span { best: self.best.min(other.best), worst: self.worst.max(other.worst) }
-    }
-
-    fn after(self, cycles: Cycle) -> Span {
-        self.and(Span { best: cycles, worst: cycles })
-    }
-}
 
 /// What a section can take.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -83,6 +58,22 @@ impl Bounds {
     pub fn worst_period(&self) -> Option<Cycle> {
         self.sections.iter().filter(|section| !section.once).map(|section| section.in_time.worst).max()
     }
+}
+
+/// The cycles of each section, as a header tells them to a host, or the reason why there is no bound.
+///
+/// # Errors
+/// The text of the [`BoundError`].
+pub fn section_cycles(program: &Program) -> Result<Vec<SectionCycles>, String> {
+    let of = |section: SectionBounds| SectionCycles {
+        name: section.name,
+        address: section.address,
+        once: section.once,
+        cycles: if section.once { section.cycles } else { section.in_time },
+        missed: (!section.once).then_some(section.missed),
+    };
+    let bounds = bound(program).map_err(|error| error.to_string())?;
+    Ok(bounds.sections.into_iter().map(of).collect())
 }
 
 /// Bounds of what each section of a program takes, whatever its inputs and data, in every run without fault.
@@ -280,7 +271,7 @@ impl Explorer<'_> {
     fn turns(&mut self, head: BundleAddress, entry: &Residue) -> Result<Summary, BoundError> {
         let (most, again) = (self.graph.loops[&head].most, Edge { to: head, back: true });
         let mut summary = Summary::default();
-        let mut heads = BTreeMap::from([(entry.clone(), Span::NONE)]);
+        let mut heads = BTreeMap::from([(entry.clone(), Span::ZERO)]);
         for turn in 1..=most {
             let mut next: BTreeMap<Residue, Span> = BTreeMap::new();
             let mut left: Vec<(Outcome, Span)> = Vec::new();
@@ -325,7 +316,7 @@ impl Explorer<'_> {
         let order = self.order(region, entry)?;
         let mut summary = Summary::default();
         let mut left =
-            BTreeMap::from([((order[&entry], entry), BTreeMap::from([(residue.clone(), Span::NONE)]))]);
+            BTreeMap::from([((order[&entry], entry), BTreeMap::from([(residue.clone(), Span::ZERO)]))]);
         while let Some(((_, address), states)) = left.pop_first() {
             for (residue, before) in states {
                 let here = if self.graph.loops.contains_key(&address) && region != Region::Turn(address) {

@@ -22,7 +22,7 @@ mod straight;
 mod text;
 mod trace;
 
-pub use bound::{Bounds, SectionBounds, Span, bound};
+pub use bound::{Bounds, SectionBounds, bound, section_cycles};
 pub use error::{BoundError, Refusal};
 pub use straight::{StraightIssue, straight};
 pub use trace::{Issued, Link, LinkKind, MAX_ISSUES, Stalls, Trace, TraceError, WhatIf, trace};

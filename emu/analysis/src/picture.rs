@@ -74,9 +74,8 @@ impl<'p> Picture<'p> {
                 let bundle = self.bundle(link.from);
                 let mut writers = bundle.iter().zip(machine.slots);
                 let writer = writers.find(|(instruction, slot)| instruction.writes(slot) == Some(register));
-                let unit = writer.and_then(|(instruction, slot)| {
-                    Some(slot.units[slot.unit_for(instruction.op.row().function)?].name)
-                });
+                let unit = writer
+                    .and_then(|(instruction, slot)| Some(slot.unit(instruction.op.row().function)?.name));
                 return (unit.unwrap_or("?").to_owned(), Some(self.program.register_text(register)));
             }
             LinkKind::Unit { slot, unit } => format!("{} busy", self.unit(Some((slot, unit)))),
@@ -139,8 +138,7 @@ impl<'p> Picture<'p> {
         instruction: &Instruction,
     ) -> Option<Value> {
         let (program, slot) = (self.program, self.program.machine.slot(s));
-        let function = instruction.op.row().function;
-        let unit = &slot.units[slot.unit_for(function).filter(|_| function != Function::Idle)?];
+        let unit = slot.unit(instruction.op.row().function)?;
         Some(json!({
             "slot": slot.name,
             "unit": unit.name,

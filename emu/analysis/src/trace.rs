@@ -1,7 +1,6 @@
 //! Where the cycles of a run went, issue by issue.
 
 use takt_emu::{Emulator, Fault, Status, Step};
-use takt_isa::spec::instructions::Function;
 use takt_isa::timing::{Bundle, Cause, Cycle, Scoreboard};
 use takt_isa::{BundleAddress, Instruction, Program, Register, Slot, SlotIndex};
 
@@ -295,7 +294,7 @@ fn parts(program: &Program, address: BundleAddress) -> Vec<Part> {
     let instructions: Vec<Instruction> = program.bundle(address).and_then(Result::ok).unwrap_or_default();
     let part = |((s, slot), instruction): ((SlotIndex, &Slot), &Instruction)| {
         let function = instruction.op.row().function;
-        let unit = slot.unit_for(function).filter(|_| function != Function::Idle)?;
+        let unit = slot.unit_for(function)?;
         Some(Part {
             slot: s,
             unit: unit as u8,

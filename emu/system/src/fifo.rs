@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use takt_isa::timing::Cycle;
 
-use crate::description::Status;
+use takt_isa::system::Status;
 
 /// What has happened to a FIFO.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,10 +1,10 @@
 //! Reads of a FIFO's head that its own pop spoils: what a program reads of an entry after it has taken it out may be the
 //! next entry's. docs/system.md says exactly what is told.
 
-use crate::description::{Description, End, LinkKind, MIN_LATENCY, Mailbox, Source};
 use std::collections::BTreeSet;
 use takt_analysis::{StraightIssue, straight};
 use takt_isa::program::Location;
+use takt_isa::system::{Description, End, LinkKind, MIN_LATENCY, Mailbox, Source};
 use takt_isa::timing::{Bundle, Cycle};
 use takt_isa::{BundleAddress, Program, Register};
 

@@ -5,7 +5,6 @@
 //! host's command to an output, [`heads`] finds reads of a FIFO's head that its own pop spoils. `docs/system.md` defines in which cycle the other side sees what. Nothing here prints.
 
 mod check;
-mod description;
 mod fifo;
 mod file;
 mod gate;
@@ -16,11 +15,11 @@ mod system;
 pub mod testing;
 
 pub use check::{ProgramError, ReadError, Request, read};
-pub use description::{
-    Core, Description, End, Field, Link, LinkKind, MAX_CORES, MAX_DEPTH, MAX_LATENCY, MAX_TICK, MIN_LATENCY,
-    Mailbox, Side, Source, Status, SystemPort, TEXT_BYTES,
-};
 pub use fifo::FifoCounts;
 pub use system::{
     CorePeriods, HostAction, HostError, InputEvent, LinkEvent, LinkEventKind, System, SystemFault,
+};
+pub use takt_isa::system::{
+    Core, Description, End, Field, Link, LinkKind, MAX_CORES, MAX_DEPTH, MAX_LATENCY, MAX_TICK, MIN_LATENCY,
+    Mailbox, Side, Source, Status, SystemPort, TEXT_BYTES,
 };

@@ -1,7 +1,6 @@
 //! Random systems from a seed, and a stepper that goes cycle by cycle, with every register of a link in its place: for
 //! tests, of the emulator here and of the circuit against it.
 
-use crate::description::{Description, End, Link, LinkKind, Side, Source, Status};
 use crate::fifo::{Change, Store};
 use crate::{ProgramError, ReadError, read};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -10,6 +9,7 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 use takt_emu::testing::{Options, Random, random_program};
 use takt_emu::{Emulator, Event, Fault, LoadError};
+use takt_isa::system::{Description, End, Link, LinkKind, Side, Source, Status};
 use takt_isa::timing::{Cycle, ENDED_DELAY};
 use takt_isa::{MACHINES, Machine, Program, Register};
 

@@ -63,6 +63,8 @@ pub enum MachineReason {
     IdleLatency { slot: &'static str, unit: &'static str, latency: u32 },
     /// A unit's interval is 0 or reaches [`MAX_LATENCY`].
     Interval { slot: &'static str, unit: &'static str, interval: u32 },
+    /// A unit offers what every slot takes without one.
+    Idle { slot: &'static str, unit: &'static str },
     /// A unit that offers nothing.
     NoFunction { slot: &'static str, unit: &'static str },
     /// Two units of a slot offer the same function: an operation would not know which one executes it.
@@ -212,6 +214,9 @@ impl MachineError {
                 .number(interval)
                 .text("; that is 1 to ")
                 .number(MAX_LATENCY - 1),
+            Idle { slot, unit } => {
+                m.unit(slot, unit).text(" offers Idle; every slot takes idle operations without a unit")
+            }
             NoFunction { slot, unit } => m.unit(slot, unit).text(" offers no function"),
             TwoUnits { slot, unit, other, function } => m
                 .unit(slot, other)
@@ -322,6 +327,9 @@ const fn unit_error(slot: &'static str, units: &'static [Unit], u: usize) -> Opt
     }
     if functions.is_empty() {
         return Some(MachineReason::NoFunction { slot, unit });
+    }
+    if offers(&units[u], Function::Idle) {
+        return Some(MachineReason::Idle { slot, unit });
     }
     if latency >= MAX_LATENCY {
         return Some(MachineReason::Latency { slot, unit, latency });

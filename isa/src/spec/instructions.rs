@@ -79,6 +79,17 @@ pub enum Type {
     B,
 }
 
+impl Type {
+    /// The word for it in the language: `float`, `int`, `bits`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Type::F => "float",
+            Type::I => "int",
+            Type::B => "bits",
+        }
+    }
+}
+
 /// What an instruction does beyond its arithmetic.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Effect {

@@ -60,9 +60,14 @@ pub struct Slot {
 }
 
 impl Slot {
-    /// The index of the hosted unit that offers `function`.
+    /// The index of the hosted unit that offers `function`; `None` also for idle operations, which every slot takes.
     pub fn unit_for(&self, function: Function) -> Option<usize> {
         self.units.iter().position(|unit| unit.functions.contains(&function))
+    }
+
+    /// The hosted unit that offers `function`; `None` also for idle operations, which every slot takes.
+    pub fn unit(&self, function: Function) -> Option<&'static Unit> {
+        Some(&self.units[self.unit_for(function)?])
     }
 }
 
@@ -245,6 +250,14 @@ impl Machine {
     /// The first slot that hosts a unit for `function`, and that unit's index in the slot. Idle operations have none: every slot takes them.
     pub fn host(&self, function: Function) -> Option<(SlotIndex, usize)> {
         self.numbered_slots().find_map(|(s, slot)| slot.unit_for(function).map(|u| (s, u)))
+    }
+
+    /// The unit of a slot that executes a function; `None` if the slot hosts none, and for idle operations.
+    ///
+    /// # Panics
+    /// If the machine has no slot of this index.
+    pub fn unit(&self, slot: SlotIndex, function: Function) -> Option<&'static Unit> {
+        self.slot(slot).unit(function)
     }
 
     /// A slot.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 use takt_isa::Type;
-use takt_rtl::bench::LoadRecord;
+use takt_isa::load::LoadRecord;
 use takt_system::MAX_CORES;
 use thiserror::Error;
 

@@ -335,7 +335,7 @@ fn each_kind_keeps_what_it_states() {
     wiring.check("w.toml", KINDS_WIRING, &program).expect("ports fit");
     let bounds = takt_analysis::bound(&program).expect("it can be bounded");
     let period = bounds.sections.iter().find(|section| !section.once).expect("a period").cycles;
-    let way = undivided(&wiring, (period.best, period.worst)).expect("inputs and outputs");
+    let way = undivided(&wiring, period).expect("inputs and outputs");
     // A kind that is not here has no pin to state a bound of (`spi`), or has a test of its own (`pwm`, in top.rs).
     for kind in KINDS.iter().filter(|kind| !["spi", "pwm"].contains(&kind.name)) {
         assert!(wiring.peripherals.iter().any(|known| known.kind == kind), "{} is not tried", kind.name);

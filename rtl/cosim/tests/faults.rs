@@ -52,8 +52,8 @@ const COMMON: &[Fault] = &[
     // Branches, calls, the tick.
     ("takt_sequencer", "x_operand == 32'd0 ? x_if_zero : x_if_nonzero", "x_if_zero"),
     ("takt_sequencer", "x_if_zero | x_if_nonzero | wait_next", "wait_next"),
-    ("takt_sequencer", "x_call & entries[4]", "1'b0"),
-    ("takt_sequencer", "x_return & (entries == 5'd0)", "1'b0"),
+    ("takt_sequencer", "x_call & entries[LEVEL]", "1'b0"),
+    ("takt_sequencer", "x_return & ~|entries", "1'b0"),
     ("takt_sequencer", "x_address + 16'd1", "x_address + 16'd2"),
     ("takt_sequencer", "x_wait & ~remembered & ~fault", "x_wait & ~fault"),
     ("takt_sequencer", "remembered & ~x_wait", "remembered"),

@@ -8,8 +8,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use takt_emu::Emulator;
+use takt_isa::load::{Space, load_records};
 use takt_isa::{Machine, Program, Register, T1, T3};
-use takt_rtl::bench::{Space, load_records};
 use takt_rtl::wishbone::{INPUTS, OUTPUTS, REGISTERS};
 use takt_rtl::{Library, bench, export};
 

@@ -283,7 +283,8 @@ fn check_windows(machine: &'static Machine) -> Result<(), PlanError> {
     let smallest = machine.slots.iter().map(|slot| slot.bank.depth).min().unwrap_or(0);
     power("outputs_per_bank".to_owned(), machine.outputs_per_bank.into(), u32::from(smallest) / 2)?;
     power("code_depth".to_owned(), machine.code_depth, 1 << 15)?;
-    power("data_depth".to_owned(), machine.data_depth, 1 << 12)
+    power("data_depth".to_owned(), machine.data_depth, 1 << 12)?;
+    power("stack_depth".to_owned(), machine.stack_depth, 1 << 6)
 }
 
 /// The row's values that a module of the core states limits for, in the name of the module that it instantiates to refuse others.
@@ -292,15 +293,8 @@ fn check_parts(machine: &'static Machine) -> Result<(), PlanError> {
         let units = slot.units.iter().filter(|unit| unit.functions.contains(&Function::Memory));
         units.map(|unit| (format!("slot `{}`: the latency of unit `{}`", slot.name, unit.name), unit.latency))
     });
-    let asked = [("refill", machine.refill), ("resolve", machine.resolve), ("stack", machine.stack_depth)]
-        .map(|(quantity, value)| {
-            (
-                "takt_sequencer",
-                quantity,
-                format!("{quantity}{}", if quantity == "stack" { "_depth" } else { "" }),
-                value,
-            )
-        })
+    let asked = [("refill", machine.refill), ("resolve", machine.resolve)]
+        .map(|(quantity, value)| ("takt_sequencer", quantity, quantity.to_owned(), value))
         .into_iter()
         .chain(memory.map(|(what, latency)| ("takt_memory", "latency", what, latency)));
     for (part, quantity, what, value) in asked {

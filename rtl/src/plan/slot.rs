@@ -107,7 +107,7 @@ impl SlotPlan {
     ) -> SlotPlan {
         let rows: Vec<&Row> = ROWS
             .iter()
-            .filter(|row| row.function == Function::Idle || slot.unit_for(row.function).is_some())
+            .filter(|row| row.function == Function::Idle || slot.unit(row.function).is_some())
             .collect();
         let sources = rows.iter().map(|row| row.shape.sources()).max().unwrap_or(0);
         let mut plan = SlotPlan {
@@ -151,7 +151,7 @@ impl SlotPlan {
     }
 
     fn latency(&self, row: &Row) -> u32 {
-        self.slot.unit_for(row.function).map_or(0, |unit| self.slot.units[unit].latency)
+        self.slot.unit(row.function).map_or(0, |unit| unit.latency)
     }
 
     /// Bits of control.

@@ -3,7 +3,7 @@
 use super::{PinKind, SystemPlan};
 use crate::plan::names::net;
 use crate::verilog::{Expr, Instance, Module, Net, concat, decimal, no};
-use takt_system::{End, Link, LinkKind, Side, Source, Status};
+use takt_isa::system::{End, Link, LinkKind, Side, Source, Status};
 
 /// Writes every link: its nets, and its instance.
 pub(super) fn write(plan: &SystemPlan, m: &mut Module, reset: &Net) {

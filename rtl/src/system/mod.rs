@@ -12,12 +12,12 @@ mod top;
 
 pub use plan::{Driver, Pin, PinKind, SystemPlan};
 
-use crate::bench::LoadRecord;
 use crate::circuit::Library;
 use crate::export::{Design, DesignFile, ExportError, export};
 use crate::files::SYSTEM;
 use crate::verilog::ModuleError;
-use takt_system::Description;
+use takt_isa::load::LoadRecord;
+use takt_isa::system::Description;
 use thiserror::Error;
 
 /// Why a system has no circuit.

@@ -5,8 +5,8 @@ use super::top::DUE;
 use crate::plan::Plan;
 use crate::verilog::{Direction, Expr, Net, no};
 use takt_isa::Register;
+use takt_isa::system::{Description, End, LinkKind, Mailbox, Status};
 use takt_isa::timing::Cycle;
-use takt_system::{Description, End, LinkKind, Mailbox, Status};
 
 /// What loads a system's cores, and gives them their ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

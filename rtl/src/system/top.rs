@@ -7,7 +7,7 @@ use super::{SystemPlan, links};
 use crate::export::RESET_CYCLES;
 use crate::plan::names::net;
 use crate::verilog::{Direction, Expr, Instance, Module, ModuleError, Net, Parameter, Port, concat, string};
-use takt_system::{End, LinkKind};
+use takt_isa::system::{End, LinkKind};
 
 const RUNNING: Net = Net::bit("running");
 pub(super) const DUE: Net = Net::bit("due");
@@ -224,7 +224,7 @@ fn loader(plan: &SystemPlan, m: &mut Module, records: &[Record]) {
     m.wires([net::LOAD_ADDRESS]);
     m.wires([net::LOAD_VALUE]);
     let most = |of: fn(&crate::plan::Plan) -> u32| plan.cores.iter().map(of).max().unwrap_or(1);
-    let transit = plan.description.links.iter().map(takt_system::Link::transit).max().unwrap_or(0);
+    let transit = plan.description.links.iter().map(takt_isa::system::Link::transit).max().unwrap_or(0);
     let settle = (transit + 8).max(2 * RESET_CYCLES);
     m.instance(
         Instance::new("takt_loader", "loader")

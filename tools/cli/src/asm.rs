@@ -211,7 +211,7 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
 fn header(program: &Program, source: &Path) -> Header {
     let stem = source.file_stem().filter(|_| !files::is_dash(source));
     let name = stem.map_or_else(|| "program".into(), |stem| stem.to_string_lossy());
-    Header::new(program, &name)
+    Header::new(program, &name, takt_analysis::section_cycles(program))
 }
 
 /// What the scheduler made of each block, beside its bound.

@@ -14,9 +14,10 @@ use clap::Args;
 use serde_json::{Value, json};
 use std::io::Write;
 use std::path::PathBuf;
-use takt_analysis::{Bounds, SectionBounds, Span};
+use takt_analysis::{Bounds, SectionBounds};
 use takt_isa::Program;
 use takt_isa::timing::Cycle;
+use takt_isa::timing::Span;
 
 /// Bound the cycles of each section, whatever the inputs.
 ///

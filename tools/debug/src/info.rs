@@ -3,7 +3,7 @@
 use crate::session::{Life, Session, Where};
 use std::fmt::Write as _;
 use takt_asm::expr::Value;
-use takt_isa::{BundleAddress, Program, Register, Type};
+use takt_isa::{BundleAddress, Program, Register};
 
 /// Bundles that are listed of those that write or read a register.
 const LISTED: usize = 6;
@@ -33,8 +33,7 @@ pub(crate) fn info(session: &Session, name: &str) -> Result<String, String> {
     let width = lives.iter().map(|life| life.label.len()).max().unwrap_or(0);
     if let [only] = &lives[..] {
         let place = place(program, only);
-        let _ =
-            writeln!(text, "{name} is {}, {}: {}", kind(program, only.register), place, type_name(only.ty));
+        let _ = writeln!(text, "{name} is {}, {}: {}", kind(program, only.register), place, only.ty.name());
     } else {
         let at_hand = lives.iter().any(|life| life.at_hand);
         let at_hand = if at_hand { "; > marks the current line's" } else { "; none is the current line's" };
@@ -59,14 +58,6 @@ fn kind(program: &Program, register: Register) -> &'static str {
         () if among(&program.inputs) => "an input port",
         () if among(&program.outputs) => "an output port",
         () => "a register",
-    }
-}
-
-const fn type_name(ty: Type) -> &'static str {
-    match ty {
-        Type::F => "float",
-        Type::I => "int",
-        Type::B => "bits",
     }
 }
 

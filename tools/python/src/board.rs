@@ -1,6 +1,6 @@
 //! A board at a serial port, from Python.
 
-use crate::program::{Program, kind};
+use crate::program::Program;
 use pyo3::exceptions::PyValueError;
 use pyo3::import_exception;
 use pyo3::prelude::*;
@@ -113,7 +113,7 @@ impl Board {
         py.detach(|| {
             let mut values = Vec::with_capacity(places.len());
             for place in places {
-                values.push((kind(place.ty), host.read(place.read, 1)?.first().copied().unwrap_or(0)));
+                values.push((place.ty.name(), host.read(place.read, 1)?.first().copied().unwrap_or(0)));
             }
             Ok(values)
         })
@@ -135,7 +135,7 @@ impl Board {
     fn stream(&mut self, py: Python<'_>, names: Vec<String>, every: u32) -> PyResult<Vec<&'static str>> {
         let application = Application::from(&*self.program);
         let stream = Stream::of(application, &names).map_err(wrong)?;
-        let types = names.iter().map(|name| application.find(name).map(|place| kind(place.ty)));
+        let types = names.iter().map(|name| application.find(name).map(|place| place.ty.name()));
         let types = types.collect::<Result<Vec<_>, _>>().map_err(wrong)?;
         let register = stream.register(every);
         let host = &mut self.host;

@@ -15,7 +15,7 @@ use takt_asm::names::DebugInfo;
 use takt_asm::{Assembled, Contract, FileLoader, Options, Schedule, Search, disasm, image, listing, nearest};
 use takt_isa::fp::Flags;
 use takt_isa::program::Port;
-use takt_isa::{MACHINES, Machine, Type};
+use takt_isa::{MACHINES, Machine};
 
 import_exception!(takt._errors, AssemblyError);
 import_exception!(takt._errors, NoBoundError);
@@ -209,15 +209,7 @@ type Pair = (u64, u64);
 
 /// A port: name, and `float`, `int` or `bits`.
 fn ports(ports: &[Port]) -> Vec<(String, &'static str)> {
-    ports.iter().map(|port| (port.name.clone(), kind(port.ty))).collect()
-}
-
-pub(crate) fn kind(ty: Type) -> &'static str {
-    match ty {
-        Type::F => "float",
-        Type::I => "int",
-        Type::B => "bits",
-    }
+    ports.iter().map(|port| (port.name.clone(), port.ty.name())).collect()
 }
 
 impl Program {
@@ -340,7 +332,7 @@ impl Program {
             .detach(|| takt_analysis::bound(program))
             .map_err(|error| NoBoundError::new_err(format!("no bound: {error}")))?;
         let worst = bounds.worst_period();
-        let pair = |span: takt_analysis::Span| (span.best, span.worst);
+        let pair = |span: takt_isa::timing::Span| (span.best, span.worst);
         let sections = bounds.sections.into_iter().map(|section| {
             let place = section.location.map(|location| program.place_text(location));
             let (plain, in_time, missed) = (section.cycles, section.in_time, section.missed);

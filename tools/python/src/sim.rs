@@ -2,7 +2,7 @@
 
 use crate::failure::{self, Failure};
 use crate::interrupt::Interrupt;
-use crate::program::{Program, kind, suggest};
+use crate::program::{Program, suggest};
 use crate::run::{loaded, misses, period, port_error};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -97,7 +97,7 @@ impl Sim {
     fn bits(port: &Port, value: &Bound<'_, PyAny>) -> PyResult<u32> {
         let wrong = |text: String| PyValueError::new_err(format!("input `{}`: {text}", port.name));
         let typed = |error: PyErr| {
-            let text = format!("input `{}` takes {}: {error}", port.name, kind(port.ty));
+            let text = format!("input `{}` takes {}: {error}", port.name, port.ty.name());
             PyTypeError::new_err(text)
         };
         match port.ty {

@@ -43,5 +43,6 @@ pub(crate) fn header(loaded: &Loaded, params: Value) -> Result<Value, String> {
         other => return Err(format!("there is no header in `{other}` (languages: c, rust, json, svd)")),
     };
     let stem = loaded.name.strip_suffix(".s").unwrap_or(&loaded.name);
-    Ok(Value::from(Header::new(&loaded.assembled.program, stem).text(language)))
+    let program = &loaded.assembled.program;
+    Ok(Value::from(Header::new(program, stem, takt_analysis::section_cycles(program)).text(language)))
 }

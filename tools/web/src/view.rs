@@ -23,7 +23,7 @@ impl Playground {
 
 fn named(row: &Named) -> Value {
     json!({
-        "name": row.name, "place": row.place, "type": takt_asm::type_name(row.ty), "value": row.value(),
+        "name": row.name, "place": row.place, "type": row.ty.name(), "value": row.value(),
         "every_way": row.every_way(), "changed": row.changed, "used": row.used,
     })
 }

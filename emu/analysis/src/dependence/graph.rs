@@ -364,7 +364,7 @@ fn ordered(
         let mut writes = bundle.node.instructions.iter().zip(slots);
         writes.find_map(|(instruction, slot)| {
             instruction.writes(slot).filter(|written| *written == register)?;
-            Some(slot.units[slot.unit_for(instruction.op.row().function)?].latency)
+            Some(slot.unit(instruction.op.row().function)?.latency)
         })
     };
     found.values().all(|bundles| {

@@ -2,18 +2,15 @@
 
 mod links;
 
-use crate::description::{
-    Core, Description, End, Field, Link, MAX_CORES, MAX_LATENCY, MAX_TICK, MIN_LATENCY,
-};
 use crate::file::{CoreTable, File};
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 use std::sync::Arc;
-use takt_asm::diag::{Diagnostic, Diagnostics};
-use takt_asm::nearest;
-use takt_asm::source::{Sources, Span};
-use takt_asm::type_name;
+use takt_diagnostics::diag::{Diagnostic, Diagnostics};
+use takt_diagnostics::nearest;
+use takt_diagnostics::source::{Sources, Span};
 use takt_isa::program::Port;
+use takt_isa::system::{Core, Description, End, Field, Link, MAX_CORES, MAX_LATENCY, MAX_TICK, MIN_LATENCY};
 use takt_isa::{MACHINES, Machine, Program, Type};
 use toml::Spanned;
 
@@ -396,13 +393,8 @@ impl<'m> Checker<'m> {
             (Some(from), Some(to)) => {
                 let (a, b) = (from.ty, to.ty);
                 if a != b && a != Type::B && b != Type::B {
-                    let text = format!(
-                        "`{}` carries {}, `{}` takes {}",
-                        from.name,
-                        type_name(a),
-                        to.name,
-                        type_name(b)
-                    );
+                    let text =
+                        format!("`{}` carries {}, `{}` takes {}", from.name, a.name(), to.name, b.name());
                     let help = "declare both ports with the same type, or one of them `:bits`";
                     let diagnostic = self.mistakes.add("type", to_place, text);
                     diagnostic.help = Some(help.to_owned());

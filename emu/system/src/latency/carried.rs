@@ -1,10 +1,10 @@
 //! After how many of its periods a core passes a value on, from each field of a link to it to each of one from it.
 
 use super::pass::at_wait;
-use crate::description::{Description, End, Link, LinkKind};
 use std::collections::{BTreeMap, BTreeSet};
 use takt_analysis::dependence::{Dependence, Dependents, Periods, Sent};
 use takt_isa::Register;
+use takt_isa::system::{Description, End, Link, LinkKind};
 
 /// Of each field of one link, and each of another: whether and when the second follows the first.
 type Fields = Vec<Vec<Option<Periods>>>;

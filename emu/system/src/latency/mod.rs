@@ -9,9 +9,9 @@ mod pass;
 
 pub use pass::{Pass, Passages, Route};
 
-use crate::description::{Description, LinkKind};
 use pass::{at_once, carry, contention};
 use takt_analysis::Bounds;
+use takt_isa::system::{Description, LinkKind};
 use takt_isa::timing::Cycle;
 
 /// Ways from an input to an output at most.

@@ -2,9 +2,9 @@
 
 use super::carried::{Carried, States};
 use super::{LatencyError, MAX_PHASES, MAX_STEPS, MAX_WAYS};
-use crate::description::{Description, End, Link, LinkKind, MIN_LATENCY};
 use std::collections::{BTreeMap, BTreeSet};
 use takt_analysis::Bounds;
+use takt_isa::system::{Description, End, Link, LinkKind, MIN_LATENCY};
 use takt_isa::timing::{Cycle, ENDED_DELAY};
 use takt_isa::{BundleAddress, Machine, Program};
 
@@ -298,7 +298,7 @@ fn late(program: &Program, address: BundleAddress) -> u32 {
     let machine: &Machine = program.machine;
     let Some(Ok(bundle)) = program.bundle(address) else { return 0 };
     let latency = |(instruction, slot): (&takt_isa::Instruction, &takt_isa::Slot)| {
-        let unit = &slot.units[slot.unit_for(instruction.op.row().function)?];
+        let unit = slot.unit(instruction.op.row().function)?;
         instruction.writes(slot).filter(|register| machine.is_output(*register)).map(|_| unit.latency)
     };
     bundle.iter().zip(machine.slots).filter_map(latency).max().unwrap_or(0)

@@ -1,9 +1,9 @@
 //! What the host does between runs.
 
 use super::{HostAction, HostError, LinkEventKind, LinkState, System};
-use crate::description::{End, LinkKind};
 use std::sync::Arc;
 use takt_emu::Number;
+use takt_isa::system::{End, LinkKind};
 
 impl System {
     fn acted(&mut self, action: impl FnOnce() -> HostAction) {

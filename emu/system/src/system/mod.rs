@@ -9,12 +9,12 @@ mod host;
 mod links;
 mod run;
 
-use crate::description::{Description, End, Link, LinkKind, Mailbox, Source, Status};
 use crate::fifo::{Fifo, FifoCounts};
 use crate::gate::Gate;
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use takt_emu::{Emulator, Event, Fault, LoadError, PeriodReport};
+use takt_isa::system::{Description, End, Link, LinkKind, Mailbox, Source, Status};
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Program, Register};
 

@@ -1,10 +1,10 @@
 //! Running ahead: each core to where it needs to know of others.
 
 use super::{InputEvent, System, SystemFault, latched};
-use crate::description::{End, LinkKind, MIN_LATENCY, Side, Source};
 use crate::system::{CoreState, LinkState};
 use std::sync::Arc;
 use takt_emu::{Event, Fault, Status, Stop};
+use takt_isa::system::{End, LinkKind, MIN_LATENCY, Side, Source};
 use takt_isa::timing::{Cycle, ENDED_DELAY};
 
 /// Cycles that a core runs ahead of the one that is behind all others at most, so that what is under way stays small.

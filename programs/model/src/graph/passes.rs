@@ -25,8 +25,8 @@ impl Delays {
     /// Those of a machine.
     pub fn of(machine: &Machine) -> Delays {
         let delay = |function| {
-            let unit = machine.host(function).map(|(slot, unit)| &machine.slots[slot.index()].units[unit]);
-            unit.map(|unit| unit.latency)
+            let (slot, _) = machine.host(function)?;
+            Some(machine.unit(slot, function)?.latency)
         };
         let div = delay(Function::Divide).unwrap_or(1);
         let or_div = |function| delay(function).unwrap_or(div);

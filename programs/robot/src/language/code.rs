@@ -8,9 +8,9 @@ use super::tree::{
 };
 use crate::limits;
 use std::collections::{BTreeMap, BTreeSet};
-use takt_asm::diag::Diagnostic;
-use takt_asm::nearest;
-use takt_asm::source::Span;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::nearest;
+use takt_diagnostics::source::Span;
 
 /// Components of a pose or frame, in their order.
 pub const POSE_COMPONENTS: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];

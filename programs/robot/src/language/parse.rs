@@ -9,9 +9,9 @@ use crate::host::LinkFault;
 use crate::limits;
 use crate::packet::{JogMode, Profile};
 use logos::Logos;
-use takt_asm::diag::Diagnostic;
-use takt_asm::nearest;
-use takt_asm::source::Span;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::nearest;
+use takt_diagnostics::source::Span;
 
 /// What a text is.
 #[derive(Debug, Default)]

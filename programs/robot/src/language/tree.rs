@@ -1,7 +1,7 @@
 //! The tree of a program.
 
 use crate::packet::{JogMode, Profile};
-use takt_asm::source::Span;
+use takt_diagnostics::source::Span;
 
 /// A name and its place.
 #[derive(Clone, Debug, PartialEq)]

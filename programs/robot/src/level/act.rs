@@ -9,8 +9,8 @@ use crate::host::{Event, Host, Inputs, Problem, Robot, degrees, radians, ticks};
 use crate::language::tree::{Action, Course, Expression, Item, Pace, Simulation};
 use crate::limits;
 use crate::packet::{Cause, Command, How, JogMode, Motion, Profile, Report, ReportKind};
-use takt_asm::diag::Diagnostic;
-use takt_asm::source::Span;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
 
 /// Ticks between two looks at a condition that is waited for.
 const LOOK: u64 = 10;

@@ -10,8 +10,8 @@ use crate::language::tree::Expression;
 use crate::limits;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use takt_asm::diag::Diagnostic;
-use takt_asm::source::Span;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
 
 /// A program or subprogram on its way.
 #[derive(Clone, Debug)]
@@ -211,7 +211,7 @@ impl<R: Robot + Clone> Session<R> {
         let Some(file) = self.sources.files().get(self.sources.file_of(span.start)) else {
             return text.to_owned();
         };
-        let line = takt_asm::source::Lines::of(&file.text).index(span.start - file.base) + 1;
+        let line = takt_diagnostics::source::Lines::of(&file.text).index(span.start - file.base) + 1;
         format!("{}:{line}: {text}", file.name)
     }
 

@@ -17,9 +17,9 @@ use execute::Machine;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use takt_asm::diag::{Diagnostic, Diagnostics};
-use takt_asm::nearest;
-use takt_asm::source::{Lines, Sources, Span};
+use takt_diagnostics::diag::{Diagnostic, Diagnostics};
+use takt_diagnostics::nearest;
+use takt_diagnostics::source::{Lines, Sources, Span};
 use value::Value;
 
 /// Files, as the session's surroundings have them. Errors are in words.

@@ -5,7 +5,7 @@ use crate::geometry::Transform;
 use crate::language::code::{FRAME_COMPONENTS, JOINT_COMPONENTS, POSE_COMPONENTS};
 use crate::language::tree::{Binary, Expression, ExpressionKind, Name, Unary};
 use std::fmt;
-use takt_asm::diag::Diagnostic;
+use takt_diagnostics::diag::Diagnostic;
 
 /// A value. In poses and joint angles, NaN stands for "as it is".
 #[derive(Clone, Copy, Debug, PartialEq)]

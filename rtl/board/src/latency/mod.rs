@@ -13,6 +13,7 @@ pub use way::{Answer, End, Part, Way, Ways};
 use crate::application::Application;
 use crate::wiring::Wiring;
 use takt_analysis::Bounds;
+use takt_isa::timing::Span;
 use takt_system::latency::{LatencyError, Passages};
 use thiserror::Error;
 
@@ -38,7 +39,6 @@ pub fn ways(wiring: &Wiring, application: &Application<'_>, bounds: &[Bounds]) -
     }
     // A board gives the tick only after the outputs were read, so the program always waits by then.
     let sections = bounds.iter().flat_map(|bounds| &bounds.sections).filter(|section| !section.once);
-    let spans = sections.map(|section| (section.cycles.best, section.cycles.worst));
-    let span = spans.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).ok_or(WaysError::NoPeriod)?;
+    let span = sections.map(|section| section.cycles).reduce(Span::or).ok_or(WaysError::NoPeriod)?;
     Ok(ports::ways(wiring, &description.cores[0].program, span))
 }

@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use takt_analysis::dependence::{Dependence, Sent};
 use takt_isa::Program;
 use takt_isa::program::Port;
+use takt_isa::timing::Span;
 
 /// `takt_exchange`: from the board's tick to the core's, with no input.
 const BEGIN: u64 = 5;
@@ -16,7 +17,7 @@ const END: u64 = 14;
 
 /// The ways of a program, with the periods that states add: inputs and outputs with the same states share one. Outputs that follow none of
 /// the inputs are left out.
-pub(super) fn ways(wiring: &Wiring, program: &Program, span: (u64, u64)) -> Ways {
+pub(super) fn ways(wiring: &Wiring, program: &Program, span: Span) -> Ways {
     let way = undivided(wiring, span);
     let dependence = Dependence::new(program, &BTreeSet::new()).unwrap_or_else(|_| Dependence::unknown());
     let sent = if program.latched { Sent::AtWait } else { Sent::Written };
@@ -69,15 +70,15 @@ pub(super) fn ways(wiring: &Wiring, program: &Program, span: (u64, u64)) -> Ways
 }
 
 /// The way from all inputs of a wiring to all of its outputs, whatever depends on what, through a core without links whose periods take
-/// between `best` and `worst` cycles from tick to `wait`, the next tick coming after the `wait`; `None` if there is no such input or output.
-pub fn undivided(wiring: &Wiring, (best, worst): (u64, u64)) -> Option<Way> {
+/// the cycles of `span` from tick to `wait`, the next tick coming after the `wait`; `None` if there is no such input or output.
+pub fn undivided(wiring: &Wiring, span: Span) -> Option<Way> {
     let inputs: Vec<_> = wiring.peripherals.iter().flat_map(inputs).collect();
     let outputs: Vec<_> = wiring.peripherals.iter().flat_map(outputs).collect();
     let (reads, writes) = (inputs.len() as u64, outputs.len() as u64);
     let between = vec![
         Part::new("until the tick", 0, u64::from(wiring.period) - 1),
         Part::new(format!("registers to input ports ({reads})"), reads + BEGIN, reads + BEGIN),
-        Part::new("the program, from tick to `wait`", best, worst),
+        Part::new("the program, from tick to `wait`", span.best, span.worst),
         Part::new(format!("output ports to registers ({writes})"), writes + END, writes + END),
     ];
     let [inputs, outputs] =

@@ -4,16 +4,13 @@ use super::{Bound, grouped, listed, microseconds};
 use crate::board;
 use crate::files::{self, Out};
 use crate::output;
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use serde_json::{Value, json};
 use std::io::Write;
 use std::path::Path;
 use takt_analysis::Bounds;
 use takt_board::latency::{Answer, End, Part, Way, Ways};
 use takt_board::{Application, Board, Wiring};
-use takt_isa::Program;
-use takt_system::Description;
-use takt_system::latency::Passages;
 
 /// Characters of a part's text, at least.
 const WIDTH: usize = 36;

@@ -131,10 +131,9 @@ impl<'w> Kanata<'w> {
                     self.line(cycle, format_args!("W\t{id}\t{producer}\t0"));
                 }
             }
-            let unit =
-                instruction.as_ref().and_then(|instruction| slot.unit_for(instruction.op.row().function));
+            let unit = instruction.as_ref().and_then(|instruction| slot.unit(instruction.op.row().function));
             let dest = instruction.as_ref().and_then(|instruction| instruction.writes(slot));
-            let latency = unit.filter(|_| dest.is_some()).map_or(0, |unit| slot.units[unit].latency);
+            let latency = unit.filter(|_| dest.is_some()).map_or(0, |unit| unit.latency);
             let writeback = cycle + Cycle::from(latency);
             let mut stage = "Is";
             if latency > 1 {
@@ -153,9 +152,9 @@ impl<'w> Kanata<'w> {
             let slot = program.machine.slot(slot);
             let Some(instruction) = instruction else { continue };
             if let (Some(dest), Some(unit)) =
-                (instruction.writes(slot), slot.unit_for(instruction.op.row().function))
+                (instruction.writes(slot), slot.unit(instruction.op.row().function))
             {
-                self.writers.insert(dest, (id, cycle + Cycle::from(slot.units[unit].latency)));
+                self.writers.insert(dest, (id, cycle + Cycle::from(unit.latency)));
             }
         }
     }

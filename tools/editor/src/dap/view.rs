@@ -128,7 +128,7 @@ impl Debugged {
         json!({
             "name": name,
             "value": shown(ty, bits, hex),
-            "type": format!("{} in {place}", takt_asm::type_name(ty)),
+            "type": format!("{} in {place}", ty.name()),
             "evaluateName": name,
             "variablesReference": if bits.is_some() { views(core, register) } else { 0 },
         })
@@ -254,7 +254,7 @@ impl Debugged {
             Place::Word(_) => 0,
         };
         Ok(
-            json!({ "value": shown(ty, Some(bits), false), "type": takt_asm::type_name(ty), "variablesReference": reference }),
+            json!({ "value": shown(ty, Some(bits), false), "type": ty.name(), "variablesReference": reference }),
         )
     }
 
@@ -276,7 +276,7 @@ impl Debugged {
         match result {
             Ok((reference, ty, value)) => Ok(json!({
                 "result": value,
-                "type": ty.map_or("value", takt_asm::type_name),
+                "type": ty.map_or("value", takt_isa::Type::name),
                 "variablesReference": reference,
             })),
             // In the console, the debugger's own commands that only look.

@@ -7,11 +7,11 @@ use lsp_types::{
     MarkupKind, Range, TextEdit,
 };
 use std::collections::BTreeMap;
+use takt_asm::Directive;
 use takt_asm::expr::{BUILTINS, Function};
 use takt_asm::index::SymbolKind;
 use takt_asm::source::Span;
 use takt_asm::tokens::{self, Token, TokenKind};
-use takt_asm::{Directive, type_name};
 use takt_isa::{Op, Operand, ROWS, Row, Type};
 
 /// What is wanted.
@@ -124,7 +124,7 @@ pub(crate) fn complete(
     };
     let previous = operands.last().unwrap_or(head);
     if previous.kind == TokenKind::Colon {
-        let types = [Type::F, Type::I, Type::B].map(type_name);
+        let types = [Type::F, Type::I, Type::B].map(Type::name);
         return types
             .map(|ty| wanted.item(ty, CompletionItemKind::TYPE_PARAMETER, String::new(), ty.to_owned()))
             .into();
@@ -303,7 +303,7 @@ fn named(
             SymbolKind::Input | SymbolKind::Output => CompletionItemKind::PROPERTY,
             _ => CompletionItemKind::VARIABLE,
         };
-        let ty = symbol.ty.map_or(String::new(), |ty| format!(":{}", type_name(ty)));
+        let ty = symbol.ty.map_or(String::new(), |ty| format!(":{}", ty.name()));
         let detail = format!("{}{ty}", symbol.kind.text());
         items.entry(name.clone()).or_insert_with(|| wanted.item(&name, kind, detail, name.clone()));
     }

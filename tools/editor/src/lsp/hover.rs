@@ -4,11 +4,11 @@
 use crate::lsp::program::{Counted, File, Front};
 use crate::lsp::{Settings, plural, timing};
 use std::fmt::Write as _;
+use takt_asm::Directive;
 use takt_asm::expr::{BUILTINS, Function, Value};
 use takt_asm::index::{Symbol, SymbolKind};
 use takt_asm::source::Span;
 use takt_asm::tokens::{self, TokenKind};
-use takt_asm::{Directive, type_name};
 use takt_debug::session::{Shown, ulp_distance};
 use takt_isa::program::Space;
 use takt_isa::{BundleAddress, Op, Register, Row, Type, manual};
@@ -132,7 +132,7 @@ fn place_text(settings: &Settings, counted: Option<&Counted>, word: &str) -> Opt
 fn symbol_text(settings: &Settings, front: &Front, counted: Option<&Counted>, symbol: &Symbol) -> String {
     let Symbol { name, kind, .. } = symbol;
     let mut text = match symbol.ty {
-        Some(ty) => format!("**{name}**: {}, `:{}`", kind.text(), type_name(ty)),
+        Some(ty) => format!("**{name}**: {}, `:{}`", kind.text(), ty.name()),
         None => format!("**{name}**: {}", kind.text()),
     };
     if let Some(of) = &symbol.of {

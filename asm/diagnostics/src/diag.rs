@@ -3,9 +3,9 @@
 //! Nothing here prints. [`Diagnostics::render`] makes the text for a terminal, with or without colour;
 //! [`Diagnostics::messages`] makes plain data for serde.
 
+use crate::levels::{Level, Levels, WARNINGS};
 use crate::limits;
-use crate::report::levels::{Level, Levels, WARNINGS};
-use crate::report::source::{Lines, Source, Sources, Span};
+use crate::source::{Lines, Source, Sources, Span};
 use codespan_reporting::diagnostic as codespan;
 use codespan_reporting::files::{Error, Files};
 use codespan_reporting::term;

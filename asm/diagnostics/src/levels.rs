@@ -1,6 +1,6 @@
 //! The warnings by name, and what is to become of each.
 
-use crate::report::nearest;
+use crate::nearest;
 use std::str::FromStr;
 
 /// Every warning: its name, and what it is about.

@@ -1,8 +1,8 @@
-//! A system as data, checked: every name is a port, every port has one driver.
+//! A system of several cores as plain data: the cores, and the links between their ports. `takt-system` reads and checks its file.
 
+use crate::timing::{Cycle, ENDED_DELAY, INPUT_DELAY, LATCHED_INPUT_DELAY};
+use crate::{Program, Register, Type};
 use std::sync::Arc;
-use takt_isa::timing::{Cycle, ENDED_DELAY, INPUT_DELAY, LATCHED_INPUT_DELAY};
-use takt_isa::{Program, Register, Type};
 
 /// Cores of a system at most.
 pub const MAX_CORES: usize = 16;
